@@ -58,7 +58,7 @@ def main() -> int:
     """Run the demo; return the exit code of the process."""
     # However it ends, no node is left behind.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    return command.run('demo', lambda _: show(), None, '`make demo` installs it')
+    return command.run('demo', lambda _: show(), None)
 
 
 def show():

@@ -38,7 +38,7 @@ def main(scene_file, port=PORT) -> int:
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
         # The terminal is closed. With nohup it may be.
         signal.signal(signal.SIGHUP, signal.default_int_handler)
-    return command.run('view', lambda _: view(scene_file, port), None, '`make view` installs it')
+    return command.run('view', lambda _: view(scene_file, port), None)
 
 
 def view(scene_file, port):

@@ -244,7 +244,7 @@ def constructions(design):
 
 def construction_page() -> str:
     """Return the page of the constructions: the words for them, and their formulas."""
-    words, rules = re.split(r'\n\n(?=A joint)', joint_lines.__doc__.split('\n\n', 1)[1])
+    _, *rules = doc_blocks(joint_lines.__doc__)
     intro = '\n\n'.join(doc_blocks(planar.__doc__))
     sections = '\n\n'.join(f'### {word}\n\n' + '\n\n'.join(doc_blocks(function.__doc__))
                            for word, function in FORMULAS.items())
@@ -253,11 +253,7 @@ def construction_page() -> str:
 
 A linkage is written down joint by joint, one line each:
 
-```text
-{textwrap.dedent(words)}
-```
-
-{chr(10).join(block + chr(10) for block in doc_blocks(rules))}
+{chr(10).join(block + chr(10) for block in rules)}
 ## Formulas
 
 {intro}

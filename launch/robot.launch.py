@@ -15,10 +15,11 @@ Bring up a robot with the scene that from_robot has made of it, all its joints o
 """
 
 from pathlib import Path
+import shlex
 import tempfile
 
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -51,16 +52,19 @@ def _started(context):
     loops = chosen['loops'] or None
     shown, robot = scene.load(chosen['scene']), readers.read(chosen['robot'], loops)
     held = {name: float(value) for name, _, value in (
-        each.rpartition('=') for each in chosen['hold'].split())}
+        each.rpartition('=') for each in shlex.split(chosen['hold']))}
     files = [chosen['scene']]
-    if rest := model.others(robot, shown.machines, held):
+    rest, lost = model.others(robot, shown.machines, held)
+    if rest:
         # The last file says which mechanisms there are.
         file = Path(tempfile.mkdtemp()) / 'others.yaml'
         file.write_text(in_yaml({'mechanisms': [*shown.machines, model.OTHERS], **rest}))
         files.append(str(file))
     text = ParameterValue(model.description(chosen['robot'], loops), value_type=str)
     nodes = ['kinematics'] + ['crank_driver'] * (chosen['simulated'].lower() in ('true', '1'))
-    return [Node(package='robot_state_publisher', executable='robot_state_publisher',
+    reports = [LogInfo(msg=f'robot.launch.py: {model.not_published(lost)}')] * bool(lost)
+    return [*reports,
+            Node(package='robot_state_publisher', executable='robot_state_publisher',
                  parameters=[{'robot_description': text, 'publish_frequency': 100.0}]),
             *(Node(package='linkage_ros', executable=name, parameters=files,
                    remappings=ON_JOINT_STATES) for name in nodes)]

@@ -14,7 +14,6 @@ Bring up a scene: its nodes, and what it is looked at with.
     ros2 launch linkage_ros scene.launch.py scene:=strandbeest rviz:=true
 """
 
-from importlib.util import find_spec
 from pathlib import Path
 import re
 
@@ -26,6 +25,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from linkage_ros import scene
+from linkage_ros.optional import needs
 from linkage_ros.robot_model import rviz, urdf
 from linkage_ros.words import meant
 import yaml
@@ -34,7 +34,6 @@ PACKAGE = 'linkage_ros'
 NODES = ('crank_driver', 'kinematics', 'servo_inverse')
 TOGETHER = ('scene',)
 VIEWER = 'viewer'
-NO_VIEWER = 'The viewer is left out: it needs aiohttp (apt install python3-aiohttp).'
 RVIZ_CONFIG = 'linkage.rviz'
 # Without a robot model nothing else publishes a transform, and RViz would know of no frame.
 FRAME = 'linkages'
@@ -97,11 +96,8 @@ def _started(context):
         nodes.append(_transform(shown.frame_id, prefix + shown.frame_id, time, common))
     elif rviz_wanted and not robot_model:
         nodes.append(_transform(shown.frame_id, FRAME, time, common))
-    if viewer and not find_spec('aiohttp'):
-        nodes.append(LogInfo(msg=NO_VIEWER))
-    elif viewer:
-        nodes.append(Node(package=PACKAGE, executable=VIEWER, parameters=[listens],
-                          **common))
+    if viewer:
+        nodes.append(_viewer(listens, common))
     return nodes + [Node(package=PACKAGE, executable=name, **common,
                          parameters=[str(path), time, {'frame_prefix': prefix}])
                     for name in (NODES if apart else TOGETHER)]
@@ -132,6 +128,16 @@ def _transform(frame, child, time, common):
     """Return what says that a frame is where another is."""
     return Node(package='tf2_ros', executable='static_transform_publisher', parameters=[time],
                 arguments=['--frame-id', frame, '--child-frame-id', child], **common)
+
+
+def _viewer(listens, common):
+    """Return what serves the page, or what says why that cannot be."""
+    try:
+        with needs('aiohttp'):
+            from aiohttp import web  # noqa: F401
+    except ImportError as error:
+        return LogInfo(msg=f'The viewer is left out: {error}.')
+    return Node(package=PACKAGE, executable=VIEWER, parameters=[listens], **common)
 
 
 def _scene_path(share, name):

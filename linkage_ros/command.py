@@ -14,14 +14,17 @@ import argparse
 import os
 import re
 import sys
-from typing import Callable, List, Mapping, NoReturn, Optional, Sequence
+from typing import Any, Callable, List, Mapping, NoReturn, Optional, Sequence
 
 from .scene import SceneError, SceneMechanism
-from .words import meant
+from .words import meant, sentence
 
 
 class RequestError(Exception):
     """An invalid request; the text is one sentence."""
+
+    def __init__(self, text: Any):
+        super().__init__(sentence(text))
 
 
 class Parser(argparse.ArgumentParser):
@@ -40,7 +43,7 @@ class Parser(argparse.ArgumentParser):
         return found
 
 
-def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) -> int:
+def run(name: str, work: Callable, args: Optional[Sequence[str]]) -> int:
     """
     Run a command; return the exit code.
 
@@ -52,8 +55,6 @@ def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) ->
         Takes the arguments; raises RequestError, SceneError, OSError or ImportError.
     args : list of str
         The arguments; None: those of this process.
-    needs : str
-        How to install packages that may be missing.
 
     """
     try:
@@ -64,15 +65,13 @@ def run(name: str, work: Callable, args: Optional[Sequence[str]], needs: str) ->
         # The reader has closed the pipe: Python discards the rest of the output at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except (RequestError, SceneError) as error:
+    except (RequestError, SceneError, ImportError) as error:
         why: object = error
-    except ImportError as error:
-        why = f'{(error.name or "").split(".")[0]} is not installed: {needs}'
     except OSError as error:
         why = f'{error.filename}: {error.strerror}{_beside(error)}' if error.filename else error
     except KeyboardInterrupt:
         why = 'interrupted'
-    print(f'{name}: {" ".join(str(why).split())}', file=sys.stderr)
+    print(f'{name}: {sentence(why)}', file=sys.stderr)
     return 1
 
 

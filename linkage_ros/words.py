@@ -14,8 +14,8 @@ from difflib import get_close_matches
 import reprlib
 from typing import Any, Iterable
 
-# Maximum number of letters of a quoted value, and of a whole message.
-LONGEST, MESSAGE = 60, 299
+# Maximum number of letters of a quoted value, of a whole message, and of a line in a terminal.
+LONGEST, MESSAGE, LINE = 60, 299, 4000
 
 _short = reprlib.Repr()
 _short.maxstring = _short.maxother = _short.maxlong = LONGEST
@@ -32,6 +32,11 @@ def elided(text: str, most: int = LONGEST) -> str:
     """Return a text as one line of limited length, with unprintable letters escaped."""
     start = ''.join(c if c.isprintable() else ascii(c)[1:-1] for c in text[:most + 1])
     return start if len(start) <= most else start[:most - 3] + '...'
+
+
+def sentence(text: Any) -> str:
+    """Return a text for a terminal: one line of limited length, as is each of its words."""
+    return elided(' '.join(elided(word, MESSAGE) for word in str(text).split()), LINE)
 
 
 def quoted(value: Any) -> str:

@@ -11,11 +11,20 @@
 """C code as a library of this process, compiled without a warning."""
 
 import ctypes
+import os
+from pathlib import Path
 import shutil
 import subprocess
+import sys
 
 import pytest
 
+STAND_IN = Path(__file__).parent / 'ros2_control'
+# What finds rcutils, whose log transmissions use; nothing if it is not installed.
+ROS = next(([f'-isystem{include}', f'-L{prefix}/lib', '-lrcutils', f'-Wl,-rpath,{prefix}/lib']
+            for prefix in (sys.prefix, *os.environ.get('AMENT_PREFIX_PATH', '').split(':'))
+            for include in (f'{prefix}/include/rcutils', f'{prefix}/include')
+            if Path(include, 'rcutils', 'logging_macros.h').is_file()), [])
 COMPILER = shutil.which('cc') or shutil.which('gcc')
 STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror', '-O2')
 

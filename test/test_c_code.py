@@ -14,6 +14,7 @@ import ctypes
 import math
 from pathlib import Path
 import re
+import shutil
 import subprocess
 
 from c_libraries import COMPILER, loaded
@@ -312,12 +313,36 @@ int pose(float right, float left, float *angle)
         assert list(found) == pytest.approx([angles['pitch'], angles['roll']], abs=1e-5)
 
 
-def test_the_sketch_has_the_header_that_is_printed(capsys):
+def test_the_sketch_has_the_header_of_its_scene(tmp_path):
     sketch = ROOT / 'examples' / 'hobby_servo'
-    assert command.main([str(sketch / 'lever.yaml'), '--output', 'lever', '--float']) == 0
-    assert capsys.readouterr().out.splitlines() == (sketch / 'lever.h').read_text().splitlines()
+    text = (sketch / 'lever.h').read_text()
     called = set(re.findall(r'\blever_\w+(?=\()', (sketch / 'hobby_servo.ino').read_text()))
-    assert called and called <= set(re.findall(r'\blever_\w+', (sketch / 'lever.h').read_text()))
+    assert called and called <= set(re.findall(r'\blever_\w+', text))
+    machine, = scene.load(str(sketch / 'lever.yaml')).machines.values()
+    library = loaded(tmp_path, text + """
+int both(float crank, float *angle, float *back, float *servo)
+{
+    lever_pose p;
+    lever_memory memory;
+    lever_joints desired = { { 0 }, { 0 }, { 0 } };
+    lever_actuators found = desired;
+    if (!lever_reaches(crank) || !lever_solve(crank, &p) || !lever_begin(&memory))
+        return 0;
+    *angle = p.angle_lever;
+    desired.position[0] = p.angle_lever;
+    memory.input[1][0] = crank;
+    if (lever_joints_to_actuators(&memory, &desired, &found))
+        return 0;
+    *servo = found.position[LEVER_ACTUATOR_LEVER_CRANK];
+    return lever_crank_for_angle_lever(p.angle_lever, crank, back);
+}
+""")
+    for crank in np.linspace(-1.2, 1.2, 50, dtype=np.float32):
+        found = [ctypes.c_float() for _ in range(3)]
+        assert library.both(ctypes.c_float(crank), *map(ctypes.byref, found)) == 1
+        assert found[0].value == pytest.approx(
+            float(machine.linkage.joint_angles(float(crank))['lever']), abs=1e-6)
+        assert [each.value for each in found[1:]] == pytest.approx([crank, crank], abs=1e-5)
 
 
 def test_a_scene_file_is_printed_as_c(capsys):
@@ -350,6 +375,36 @@ def test_any_names_of_a_scene_are_names_in_c(tmp_path, language):
                             '-Werror', '-Wno-unused-function', file],
                            capture_output=True, text=True)
     assert not ended.returncode, ended.stderr[:2000]
+
+
+LOADED = [['B=0 -9.81'], ['B=3 0', 'A=0 1', 'QB=0'], ['C=1 2', 'AB=-0.0', 'B=0 0']]
+
+
+@pytest.mark.parametrize('compiler, language', [pytest.param(
+    compiler, language, marks=pytest.mark.skipif(
+        not shutil.which(compiler), reason=f'{compiler} is not installed'))
+    for compiler, language in (('gcc', 'c99'), ('g++', 'c++17'), ('clang', 'c99'),
+                               ('clang++', 'c++17'), ('tcc', 'c99'))])
+def test_loads_compile_without_a_warning(tmp_path, compiler, language):
+    machines = scene.read({
+        'mechanisms': [f'm{i}' for i in range(len(LOADED))],
+        **{f'm{i}.{key}': value for i, loads in enumerate(LOADED) for key, value in {
+            'type': 'custom', 'loads': loads, 'crank.sweep': [-1.0, 1.0], 'joints': [
+                'O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left',
+                'C rigid A B 0.6 0.6 left']}.items()}}).machines.values()
+    for i, code in enumerate((
+            ''.join(header.written(machine, ['QB']) for machine in machines),
+            ''.join(header.written(machine, ['B.y'], True) for machine in machines),
+            ''.join(header.opened(machine) for machine in machines))):
+        (tmp_path / f'{i}.h').write_text(code)
+        file = tmp_path / f'{i}.c'
+        file.write_text(f'#include "{i}.h"\nint main(void) {{ return 0; }}\n')
+        ended = subprocess.run([
+            compiler, *(['-c', '-o', tmp_path / 'code.o'] if compiler == 'tcc' else [
+                '-fsyntax-only', '-x', language.rstrip('179')]),
+            f'-std={language}', '-Wall', '-Wextra', '-Wconversion', '-Wpedantic', '-Wshadow',
+            '-Werror', file], capture_output=True, text=True)
+        assert not ended.returncode, ended.stderr[:2000]
 
 
 @pytest.mark.parametrize('arguments, said', [

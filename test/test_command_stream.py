@@ -27,8 +27,10 @@ from truth.working_modes import excavator, five_bar
 pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 
+from linkage_ros.nodes import log  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
+from linkage_ros.nodes.worker import Worker  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import Float64MultiArray  # noqa: E402
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
@@ -157,6 +159,19 @@ def test_a_reason_is_throttled_whoever_sends(stream, capfd, name):
     assert capfd.readouterr().err.count('are moved by one input') == 1
 
 
+def test_of_a_name_twice_the_last_counts_as_in_crank_states(stream):
+    assert stream.want(['flap', 'bar_QB', 'flap'], [flap(0.2), 1.2, flap(0.7)])['servo'] == (
+        pytest.approx(0.7, abs=1e-13),)
+
+
+def test_names_that_somebody_makes_up_do_not_fill_the_log(stream, capfd):
+    for number in range(60):
+        stream.want(['flap', f'wing{number}'], [flap(0.2), 1.0])
+    said = [line for line in capfd.readouterr().err.splitlines() if 'no output is called' in line]
+    assert 'called wing0;' in said[0] and len(said) == log.NAMES
+    assert 'no more will be named' in said[-1]
+
+
 def test_hostile_bytes_end_nothing(stream, graph):
     publisher = graph.node.create_publisher(JointState, 'wanted_states', 10)
     graph.until(publisher.get_subscription_count)
@@ -261,6 +276,19 @@ def test_a_foot_and_a_bucket_go_in_along_a_line_and_back_out(graph):
         np.testing.assert_allclose(speeds, way * slope(actuators_at, part), rtol=1e-6)
     graph.until(lambda: all(arrays) and np.allclose(
         [place for array in arrays for place in array[-1].data], actuators_at(0.0), rtol=1e-11))
+
+
+def test_of_several_inputs_no_command_outlives_a_change_of_the_geometry(graph):
+    stream = Stream(graph, {
+        'mechanisms': ['leg', 'other', 'bar'], 'leg.type': 'five_bar', 'leg.crank.start': 1.9,
+        'leg.crank2.start': 1.24, 'other.type': 'five_bar', 'other.crank.start': 1.9,
+        'other.crank2.start': 1.24, 'bar.type': 'four_bar'})
+    names, far = [*FOOT, 'other_P.x', 'other_P.y', 'bar_QB'], [9.0, 9.0]
+    good = stream.want(names, [*LINE[:2], *LINE[:2], 1.2])
+    assert stream.want(names, [*far, *far, 1.2]) == good
+    assert graph.set(stream.node, leg__dimensions__a=0.085).successful
+    held = stream.want(names, [*far, *far, 1.2])
+    assert held == {name: at for name, at in good.items() if not name.startswith('leg')}
 
 
 @pytest.mark.slow
@@ -400,7 +428,7 @@ def test_a_trajectory_of_a_foot_and_a_bucket(graph, several_plan):
     (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions'),
     (['flap'], [([0.0], [1.0, 2.0])], 'as many velocities or none, not 1 and 2'),
     (['flap', 'wing'], [([0.0, 0.0], [])], 'no output is called wing'),
-    (['flap', 'flap'], [([0.0, 0.0], [])], 'flap and flap are moved by one input'),
+    (['flap', 'flap'], [([0.0, 0.0], [])], 'joint_names has a name twice'),
     ([], [([], [])], 'joint_names is empty: name at least one output'),
     (['flap'], [([0.0], [math.nan])], 'point 0: a velocity must be finite'),
     (['flap'], [([0.0], [1.0]), ([0.1], [math.inf])], 'point 1: a velocity must be finite'),
@@ -418,6 +446,52 @@ def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd, n
     assert reason in ''.join(logged)
     graph.until(plan(['flap'], ([flap(0.3)], [])))
     assert not refused()
+
+
+@pytest.mark.parametrize('times, reason', [
+    ([(0, 5), (0, 5), (1, 0)], ''), ([(0, 0)], ''), ([(0, 2 * 10 ** 9), (2, 1)], ''),
+    ([(1, 0), (0, 999_999_999)], 'point 1 is at 1 s, before 1 s'),
+    ([(-1, 0)], 'point 0 is at -1 s, before 0 s: time_from_start must not decrease'),
+    ([(0, 0), (3, 0), (2, 5 * 10 ** 8)], 'point 2 is at 2.5 s, before 3 s')])
+def test_a_trajectory_goes_forwards_in_time(graph, stream, capfd, times, reason):
+    planned, logged = graph.listen(JointTrajectory, 'servo_trajectory'), []
+    publisher = graph.node.create_publisher(JointTrajectory, 'wanted_trajectory', 10)
+    graph.until(publisher.get_subscription_count)
+    graph.until(lambda: stream.node.count_subscribers('servo_trajectory'))
+    points = [JointTrajectoryPoint(positions=[flap(0.3)], time_from_start=Duration(
+        sec=sec, nanosec=nanosec)) for sec, nanosec in times]
+    publisher.publish(JointTrajectory(joint_names=['flap'], points=points))
+    graph.until(lambda: logged.append(capfd.readouterr().err) or planned
+                or 'wanted_trajectory is refused: ' in ''.join(logged))
+    assert reason in ''.join(logged) and bool(planned) != bool(reason)
+    assert [point.time_from_start for one in planned for point in one.points] == (
+        [] if reason else [point.time_from_start for point in points])
+
+
+def test_a_newer_trajectory_ends_the_older_one(graph, plan, monkeypatch):
+    begun, queued, kinds, solved = threading.Event(), threading.Event(), [], []
+    replace, command = Worker.replace, InverseRequest.command
+
+    def replaced(worker, kind, job):
+        replace(worker, kind, job)
+        kinds.append(kind)
+        if kinds.count('wanted_trajectory') == 2:
+            queued.set()
+
+    def after_both_are_there(*args):
+        begun.set()
+        assert queued.wait(20.0)
+        solved.append(args)
+        return command(*args)
+
+    monkeypatch.setattr(Worker, 'replace', replaced)
+    monkeypatch.setattr(InverseRequest, 'command', after_both_are_there)
+    older = plan(['flap'], *(([flap(0.3)], []) for _ in range(50)))
+    graph.until(begun.is_set)
+    newer = plan(['flap'], ([flap(0.2)], []))
+    assert graph.until(newer) and not older()
+    # Of the older one no more than the point that was being solved.
+    assert len(solved) <= 2
 
 
 @pytest.mark.slow

@@ -248,6 +248,17 @@ def test_the_page_of_a_mechanism_has_all_of_it(catalogue, type_):
     exec(compile(re.findall(r'```python\n(.*?)```', page, re.DOTALL)[0], type_, 'exec'), {})
 
 
+def test_the_page_of_constructions_has_every_word_in_whatever_words(catalogue, monkeypatch):
+    page = catalogue.construction_page()
+    for word in joint_lines.FORMS:
+        assert re.search(rf'^[A-Z][A-Z ]* {word} ', page, re.MULTILINE), word
+    assert set(re.findall(r'^### (\w+)', page, re.MULTILINE)) == set(catalogue.FORMULAS)
+    assert '`sqrt(a)`' in page
+    monkeypatch.setattr(joint_lines, '__doc__', '\nWhat it is.\n\n    Y line\n\nIn a_b words.\n')
+    assert '```text\nY line\n```\n\nIn a\\_b words.\n' in catalogue.construction_page()
+    assert 'What it is' not in catalogue.construction_page()
+
+
 @pytest.fixture
 def measured(monkeypatch):
     pytest.importorskip('mpmath')

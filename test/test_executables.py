@@ -242,13 +242,3 @@ def test_the_library_works_where_there_is_no_ros():
             print(error)
         """)
     assert (done.returncode, done.stdout) == (0, 'blocked: rclpy\n'), done.stderr
-
-
-@pytest.mark.slow
-def test_without_the_interfaces_the_service_says_how_to_build_them(harness):
-    done = without('linkage_interfaces', 'import linkage_ros.nodes.servo_inverse')
-    assert 'run colcon build in the workspace, which builds linkage_interfaces too' in \
-        done.stderr.splitlines()[-1]
-    others = without('linkage_interfaces',
-                     'from linkage_ros.nodes import crank_driver, kinematics')
-    assert others.returncode == 0, others.stderr

@@ -17,6 +17,7 @@ import math
 from pathlib import Path
 import re
 import runpy
+import shlex
 import sys
 
 from linkage_ros import scene
@@ -228,15 +229,15 @@ needs_launch = pytest.mark.skipif(
     not find_spec('launch_ros'), reason='launch and launch_ros are not installed')
 
 
-def started(**arguments):
-    """Return the nodes that the launch file starts."""
+def started(launch=LAUNCH, **arguments):
+    """Return the nodes that a launch file starts."""
     from launch import LaunchContext
     from launch.actions import DeclareLaunchArgument, OpaqueFunction
 
     context = LaunchContext()
     context.launch_configurations.update(arguments)
     nodes = []
-    for entity in runpy.run_path(str(LAUNCH))['generate_launch_description']().entities:
+    for entity in runpy.run_path(str(launch))['generate_launch_description']().entities:
         if isinstance(entity, DeclareLaunchArgument):
             entity.execute(context)
         elif isinstance(entity, OpaqueFunction):
@@ -266,9 +267,10 @@ def test_the_launch_file_starts_the_nodes_of_a_scene(arguments, besides, monkeyp
 def test_without_aiohttp_the_rest_is_started(monkeypatch):
     from launch.actions import LogInfo
 
-    monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
+    monkeypatch.setitem(sys.modules, 'aiohttp', None)
     said, *nodes = started()
     assert isinstance(said, LogInfo)
+    assert said.msg[0].text.startswith('The viewer is left out: aiohttp is not installed: ')
     assert [node.node_executable for node in nodes] == ['scene']
 
 
@@ -291,3 +293,53 @@ def test_viewers_that_are_launched_together_take_ports_of_their_own(constants, g
     assert ports[0] != ports[1]
     with pytest.raises(scene.SceneError, match='address already in use'):
         graph.start(viewer.Viewer, constants['listening'](ports[0]))
+
+
+ROBOT, ROBOTS = LAUNCH.with_name('robot.launch.py'), Path(__file__).with_name('robot_files')
+COUPLER = '<body name="right_coupler" pos="0 0.0315 -0.0041">'
+
+
+def robot_launched(tmp_path, monkeypatch, file, capsys, *more, **arguments):
+    """Return what robot.launch.py starts of a robot, with the scene that from_robot prints."""
+    from linkage_ros.robot_files import command
+
+    monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
+    assert command.main([str(file), *more]) == 0
+    made = tmp_path / 'scene.yaml'
+    made.write_text(capsys.readouterr().out)
+    return made, started(ROBOT, robot=str(file), scene=str(made), **arguments)
+
+
+@needs_launch
+def test_a_whole_robot_is_launched_with_all_its_joints(tmp_path, monkeypatch, capsys):
+    scene_file, nodes = robot_launched(
+        tmp_path, monkeypatch, ROBOTS / 'wheel_leg.urdf', capsys)
+    assert [node.node_executable for node in nodes] == [
+        'robot_state_publisher', 'kinematics', 'crank_driver']
+    # No other mechanism is needed: motors are sources, and the others are published.
+    _, nodes = robot_launched(tmp_path, monkeypatch, ROBOTS / 'boom.urdf', capsys,
+                              simulated='false')
+    assert [node.node_executable for node in nodes] == ['robot_state_publisher', 'kinematics']
+
+
+@needs_launch
+def test_a_joint_that_nothing_determines_is_named_and_no_input(tmp_path, monkeypatch, capsys):
+    from launch.actions import LogInfo
+
+    pytest.importorskip('mujoco')
+    file = tmp_path / 'gripper.xml'
+    text = (ROBOTS / 'gripper.xml').read_text()
+    assert COUPLER in text
+    file.write_text(text.replace(COUPLER, f'{COUPLER}<joint name="a spring" axis="1 0 0"/>'))
+    _, (report, *nodes) = robot_launched(tmp_path, monkeypatch, file, capsys)
+    assert isinstance(report, LogInfo) and [node.node_executable for node in nodes] == [
+        'robot_state_publisher', 'kinematics', 'crank_driver']
+    lost = {'a spring', 'right_spring_link_joint', 'right_follower_joint'}
+    said = ''.join(part.text for part in report.msg)
+    assert all(name in said for name in lost)
+    # Held, all of them are there.
+    made, nodes = robot_launched(tmp_path, monkeypatch, file, capsys, '--hold', 'a spring=0',
+                                 hold="'a spring=0'")
+    hold = re.search('hold:=(.*)', made.read_text())[1]
+    assert shlex.split(*shlex.split(hold)) == ['a spring=0']
+    assert not isinstance(nodes[0], LogInfo)

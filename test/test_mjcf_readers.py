@@ -20,14 +20,19 @@ import math
 import re
 from xml.sax.saxutils import quoteattr
 
+from linkage_ros import scene
 from linkage_ros.robot_files import command, readers
 from linkage_ros.robot_files.spatial import trees
+from linkage_ros.robot_model import bodies, mjcf, sdf
+from linkage_ros.robot_model.assembled import assembled
 import numpy as np
 import pytest
-from test_robot_files import check_comes_back, random_robot, words
+from test_robot_files import check_comes_back, published, random_robot, words
 from test_sdf_readers import frame, quaternion
+from test_simulators import simulated
+from test_urdf import drives, posed
 
-pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
+mujoco = pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
 
 
 def motion(joint, change):
@@ -183,6 +188,39 @@ class Writer:
         return f'<tendon>{tendons}</tendon><actuator>{motors}</actuator>'
 
 
+ROUND = 'four_bar', 'slotted_lever', 'slider_crank', 'five_bar', 'boom'
+
+
+@pytest.mark.parametrize('name', ROUND)
+@pytest.mark.parametrize('write', [mjcf.write, sdf.write])
+def test_a_scene_comes_back_from_the_model_that_is_written_of_it(tmp_path, capsys, name, write):
+    # What is published of the model's joints is what the scene had published of them.
+    one = simulated(name)
+    file, made = tmp_path / 'model.xml', tmp_path / 'scene.yaml'
+    file.write_text(write(assembled(bodies.robot([one], 'world'))))
+    assert command.main([str(file)]) == 0
+    made.write_text(capsys.readouterr().out)
+    machines, moved = scene.load(made).machines.values(), 0
+    # Positions in an SDF are zero where it starts.
+    zeros = posed(one, np.array([drive.start for drive in one.inputs.values()]))[0]
+    rows = drives(one, 9)
+    for thetas in rows[np.linspace(0, len(rows) - 1, 9).astype(int)][1:-1]:
+        there, _ = posed(one, thetas)
+        if write is sdf.write:
+            there = {key: value - zeros[key] for key, value in there.items()}
+        for machine in machines:
+            found = published(machine, **{drive.source: there[drive.source]
+                                          for drive in machine.inputs.values()})
+            for key in found.keys() & there.keys():
+                off = found[key] - there[key]
+                off = off if 'block' in key or 'cylinder' in key else math.remainder(
+                    off, math.tau)
+                assert off == pytest.approx(0.0, abs=1e-9) or math.isnan(off), key
+                moved += not math.isnan(off) and key not in {
+                    drive.source for drive in machine.inputs.values()}
+    assert moved > 5
+
+
 def check_is_read(folder, seeds):
     """Check that linkages move as they do where they were written as MJCF."""
     moved, robots = 0, {seed: made for seed in seeds if (made := random_robot(seed))}
@@ -198,6 +236,35 @@ def check_is_read(folder, seeds):
         except command.command.RequestError as error:
             assert re.search('closes a loop|not of dyads|it cannot move', str(error)), seed
     assert moved > 0.9 * len(robots)
+
+
+TIED = """<mujoco><compiler angle="radian"/><worldbody>
+  <body><joint name="a" type="{}" axis="0 0 1" ref="{}"/><geom size="1"/></body>
+  <body><joint name="b" type="{}" axis="0 0 1" ref="{}"/><geom size="1"/></body></worldbody>
+  <equality><joint joint1="a" {} polycoef="{} {} 0 0 0"/></equality></mujoco>"""
+
+
+@pytest.mark.parametrize('seed', range(6))
+@pytest.mark.parametrize('other', ['joint2="b"', ''])
+def test_joints_with_zeros_of_their_own_are_where_mujoco_ties_them(tmp_path, seed, other):
+    # By MuJoCo's residual: what is tied counts from `ref`, in both joints.
+    rng, file = np.random.default_rng(seed), tmp_path / 'tied.xml'
+    kinds = rng.choice(['hinge', 'slide'], 2)
+    ref, ref_b, start, ratio, b = rng.normal(size=5)
+    file.write_text(TIED.format(kinds[0], ref, kinds[1], ref_b, other, start, ratio))
+    robot = readers.read(str(file))
+    if other:
+        (leader, factor, offset), = robot.follows.values()
+        positions = {'b': b, 'a': factor * b + offset}
+        assert leader == 'b' and not robot.held
+    else:
+        positions = {'b': b, **robot.held}
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    for name, value in positions.items():
+        data.joint(name).qpos = value
+    mujoco.mj_forward(model, data)
+    assert data.ne == 1 and abs(data.efc_pos[0]) < 1e-15
 
 
 # The second has a hinge on a block of which no word can tell the angle.

@@ -169,16 +169,6 @@ def test_an_llvmlite_that_is_too_old_is_named(monkeypatch):
         importlib.reload(native)
 
 
-def test_without_llvmlite_only_accelerated_is_missing(monkeypatch):
-    monkeypatch.setitem(sys.modules, 'llvmlite', None)
-    linkage = mechanisms.create('water_drop')
-    with pytest.raises(ImportError, match=r'needs llvmlite: pip install llvmlite'):
-        linkage.accelerated()
-    solution = Assembly(linkage, 2).solution(('P',))
-    solution.solve([0.3])
-    assert solution.rows[0] == pytest.approx(linkage.solve(0.3)['P'])
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize('legs', [1, 2])
 def test_a_single_leg_is_solved_without_llvmlite_in_memory(legs):

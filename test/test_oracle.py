@@ -126,6 +126,17 @@ def test_what_leaves_its_reach_leaves_the_picture(graph, seed):
         *(message({'b_crank': angle}, [1.0]) for angle in [0.1, 0.1, *near, *5 * [END + 0.1]])])
 
 
+@pytest.mark.parametrize('turn', [-3, 1, 1000])
+def test_the_reach_is_the_same_in_any_turn(graph, turn):
+    parameters = {'mechanisms': ['b'], 'b.type': 'peaucellier'}
+    angles = [sign * (END + gap) + turn * math.tau
+              for sign in (1.0, -1.0) for gap in (-1.0, -1e-6, 1e-6, 0.5)]
+    bench = Bench(graph, parameters)
+    bench.run([
+        *everything(parameters), message({'b_crank': 0.1}),
+        *(message({'b_crank': angle}) for angle in angles)])
+
+
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('name', ['an excavator', 'a reach that ends',
                                   'more legs than are solved one by one'])

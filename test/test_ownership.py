@@ -224,6 +224,29 @@ def test_announcements_that_make_no_sense_are_passed_over(graph, warned):
     assert all(len(text) < 2000 for text in warned)
 
 
+def test_what_a_follower_refused_is_followed_with_the_value_that_it_waits_for(graph, warned):
+    service = graph.start(ServoInverse, LEVER)
+    publisher = graph.node.create_publisher(ParameterEvent, TOPIC, LATCHED)
+
+    def announce(values):
+        publisher.publish(ParameterEvent(node='/owner', changed_parameters=[
+            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]))
+
+    first = {one.name: one.value for one in service.scene.parameters
+             if one.field.shared and one.value != ()}
+    announce({**first, 'mechanisms': ['lever']})
+    graph.until(lambda: owned(service))
+    # The pin cannot reach this slot before its crank has grown, which is announced later.
+    e, b = 'lever.dimensions.e', 'lever.dimensions.b'
+    announce({e: 700.0, b: 170.0})
+    graph.until(lambda: of(service, b) == 170.0)
+    assert of(service, e) != 700.0
+    assert [text for text in warned if 'values that cannot be followed' in text]
+    announce({A: 900.0})
+    graph.until(lambda: of(service) == 900.0)
+    graph.until(lambda: of(service, e) == 700.0)
+
+
 @pytest.mark.long
 def test_a_second_node_of_the_same_name_is_noticed_once(graph, warned):
     graph.start(CrankDriver, LEVER)

@@ -436,17 +436,6 @@ def test_no_ros_is_needed(tmp_path):
     assert out.read_text().lstrip().startswith('<?xml')
 
 
-def test_without_matplotlib_its_package_is_named(tmp_path):
-    code = ('import sys; sys.modules["matplotlib"] = None; '
-            'from linkage_ros.render import main; sys.exit(main(sys.argv[1:]))')
-    ended = subprocess.run(
-        [sys.executable, '-c', code, str(CONFIG / 'jansen.yaml'), '--out', 'leg.svg'],
-        cwd=ROOT, capture_output=True, text=True, timeout=120)
-    assert ended.returncode == 1
-    assert ended.stderr.startswith('render: matplotlib is not installed: ')
-    assert ended.stderr.count('\n') == 1
-
-
 def test_readings_are_written_beside_or_below_each_other():
     machines = [*scene.load(str(CONFIG / 'excavator.yaml')).machines.values(),
                 *scene.load(str(CONFIG / 'scissor_lift.yaml')).machines.values(),

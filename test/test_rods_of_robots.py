@@ -13,6 +13,7 @@
 import math
 
 from linkage_ros import scene
+from linkage_ros.robot_files import check, closing, command, readers
 from linkage_ros.robot_files.command import main as from_robot
 import numpy as np
 import pytest
@@ -30,15 +31,22 @@ def less(one, other):
     return text(np.subtract(one, other))
 
 
-def mjcf(ankle, limits, motors=('l', 'r')):
-    """Return an ankle as MJCF; its rods hang on balls, and their eyes are tied to the foot."""
+def mjcf(ankle, limits, motors=('l', 'r'), pins=None):
+    """
+    Return an ankle as MJCF; its rods hang on balls, and their eyes are tied to the foot.
+
+    With `pins`, they hang on hinges about these axes of each rod.
+    """
+    held = ['<joint type="ball" name="ball {i}"/>' if pins is None else ''.join(
+        f'<joint name="pin {i} {k}" axis="{text(axis)}"/>' for k, axis in enumerate(pins[i]))
+        for i in (0, 1)]
     legs = ''.join(
         f'<body name="crank {i}" pos="{text(ankle.motors[i])}"><joint name="{name}" '
         f'axis="{text(ankle.motor_axes[i])}"/>{LIGHT}<body name="rod {i}" '
-        f'pos="{less(ankle.pivots[i], ankle.motors[i])}"><joint type="ball" name="ball {i}"/>'
+        f'pos="{less(ankle.pivots[i], ankle.motors[i])}">{held[i].format(i=i)}'
         f'{LIGHT}<site name="eye {i}" pos="{less(ankle.ends[i], ankle.pivots[i])}"/></body></body>'
         for i, name in enumerate(motors))
-    pins = ''.join(f'<site name="pin {i}" pos="{less(ankle.ends[i], ankle.second)}"/>'
+    eyes = ''.join(f'<site name="pin {i}" pos="{less(ankle.ends[i], ankle.second)}"/>'
                    for i in (0, 1))
     ranges = [f'range="{low!r} {high!r}"' if limits is not None else ''
               for low, high in (np.transpose(limits).tolist() if limits is not None
@@ -50,7 +58,7 @@ def mjcf(ankle, limits, motors=('l', 'r')):
         f'{LIGHT}<joint name="knee" axis="0 1 0"/><body name="cross" pos="{text(ankle.first)}">'
         f'<joint name="pitch" axis="{text(ankle.first_axis)}" {ranges[0]}/>{LIGHT}'
         f'<body name="foot" pos="{less(ankle.second, ankle.first)}"><joint name="roll" '
-        f'axis="{text(ankle.second_axis)}" {ranges[1]}/>{LIGHT}{pins}</body></body>{legs}</body>'
+        f'axis="{text(ankle.second_axis)}" {ranges[1]}/>{LIGHT}{eyes}</body></body>{legs}</body>'
         f'</worldbody><equality>{ties}</equality><actuator>{drives}</actuator></mujoco>')
 
 
@@ -90,6 +98,31 @@ def test_an_ankle_is_imported_with_the_limits_of_its_file(tmp_path, capsys, seed
     assert np.abs(np.array(gaps)[:, there]).max() < 1e-15
 
 
+@pytest.mark.parametrize('old, new, why', [
+    # Rods a micrometre longer than the robot's; narrower limits; a foot that turns the other way.
+    ('length ', 'length 1e-6+', 'its loops stand open by '),
+    ('within -0.15', 'within -0.015', 'it has no pose, where the loops of the robot are'),
+    ('=pitch', '=-pitch', 'its loops stand open by ')])
+def test_an_ankle_that_differs_from_its_robot_is_refused(tmp_path, old, new, why):
+    file = tmp_path / 'robot.xml'
+    file.write_text(mjcf(turning(1), ([-0.15, -0.12], [0.15, 0.12])))
+    robot = closing.closed(readers.read(str(file))).robot
+    given, _, _ = command.described(robot)
+
+    def compared():
+        machine = scene.read(given).machines['l_rods']
+        ends = {'l': (-0.1, 0.1), 'r': (-0.1, 0.1)}
+        return check.compared(robot, machine, [*ends], ends, 0.0)
+
+    assert compared()[0].startswith('Checked: l_rods: in ')
+    key = 'l_rods.joint_names' if '=' in old else 'l_rods.joints'
+    changed = [line.replace(old, new) for line in given[key]]
+    assert changed != given[key]
+    given[key] = changed
+    with pytest.raises(check.Difference, match=f'with l at .*, r at .* {why}'):
+        compared()
+
+
 @pytest.mark.parametrize('seed', [1, 3])
 def test_an_ankle_on_a_cross_is_imported(tmp_path, capsys, seed):
     # As most are: both hinges of the foot cross in a point, and are no ball all the same.
@@ -103,6 +136,46 @@ def test_an_ankle_on_a_cross_is_imported(tmp_path, capsys, seed):
     there = np.isfinite(found[0])
     assert there.sum() > 10
     assert np.abs(np.array(rods.gaps(ankle, motors, *found))[:, there]).max() < 1e-15
+
+
+@pytest.mark.parametrize('seed', [1, 2])
+@pytest.mark.parametrize('count', [2, 3])
+def test_hinges_of_rods_are_published(tmp_path, capsys, seed, count):
+    # Two hinges across the rod; a third one along it stays.
+    mujoco, (ankle, rng) = pytest.importorskip('mujoco'), (turning(seed), np.random.default_rng(9))
+    pins = []
+    for pivot, end in zip(ankle.pivots, ankle.ends):
+        way = np.subtract(end, pivot)
+        first = np.cross(rng.normal(size=3), way)
+        # The second leans, as it may.
+        pins.append([first, np.cross(way, first) / np.linalg.norm(way) + 0.2 * first, way][:count])
+    file = tmp_path / 'robot.xml'
+    file.write_text(mjcf(ankle, ([-0.15, -0.12], [0.15, 0.12]), pins=pins))
+    assert from_robot([str(file)]) == 0
+    out, said = capsys.readouterr()
+    assert 'Not published' not in said and ('pin 1 2=0' in out) == (count == 3)
+    (tmp_path / 'robot.yaml').write_text(out)
+    (machine,) = scene.load(tmp_path / 'robot.yaml').machines.values()
+    names = {link: called for link, called in machine.joints.items() if called.published}
+    assert {called.name for called in names.values()} == {
+        'pitch', 'roll', *(f'pin {i} {k}' for i in (0, 1) for k in (0, 1))}
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data, closed = mujoco.MjData(model), 0
+    for values in np.random.default_rng(3).uniform(-0.1, 0.1, (30, 2)):
+        angles = machine.linkage.joint_angles(values)
+        found = {called.name: float(called.of(angles[link])) for link, called in names.items()}
+        if np.isnan([*found.values()]).any():
+            continue
+        for (drive, value) in zip(machine.inputs.values(), values):
+            data.joint(drive.source).qpos = value
+        for name, value in found.items():
+            data.joint(name).qpos = value
+        mujoco.mj_kinematics(model, data)
+        closed += 1
+        for i in (0, 1):
+            eye, pin = (data.site(f'{name} {i}').xpos for name in ('eye', 'pin'))
+            assert eye == pytest.approx(pin, abs=1e-14)
+    assert closed > 8
 
 
 @pytest.mark.parametrize('left, right, sweep, said', [

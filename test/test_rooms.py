@@ -14,12 +14,16 @@ import ast
 from functools import cache
 from pathlib import Path
 import re
+import sys
+from xml.etree import ElementTree
+
+from linkage_ros import optional
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / 'linkage_ros'
 # From the ground up: a module imports from its own room and from those below.
-ROOMS = ('words', 'palette', 'cache', 'formula', 'linkage', 'mechanisms', 'scene', 'command',
-         'c_code', 'robot_model', 'robot_files', 'render', 'nodes', 'web',
+ROOMS = ('words', 'optional', 'palette', 'cache', 'formula', 'linkage', 'mechanisms', 'scene',
+         'command', 'c_code', 'robot_model', 'robot_files', 'render', 'nodes', 'web',
          'executables')
 WITH_ROS = ('nodes', 'web')
 ROS = ('rclpy', 'builtin_interfaces', 'geometry_msgs', 'rcl_interfaces', 'sensor_msgs', 'std_msgs',
@@ -53,12 +57,17 @@ def imported(module):
     """Yield what a module imports, at once or later, as full names."""
     here = ('linkage_ros', *module.relative_to(PACKAGE).parent.parts)
     for node in ast.walk(parsed(module)):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = here[:len(here) - node.level + 1] if node.level else ()
-            base += tuple((node.module or '').split('.')) if node.module else ()
-            yield from ('.'.join((*base, alias.name)) for alias in node.names)
+        if isinstance(node, (ast.Import, ast.ImportFrom)):
+            yield from named(node, here)
+
+
+def named(node, here):
+    """Yield the full names in an import of a module in the package `here`."""
+    base = ()
+    if isinstance(node, ast.ImportFrom):
+        base = here[:len(here) - node.level + 1] if node.level else ()
+        base += tuple((node.module or '').split('.')) if node.module else ()
+    yield from ('.'.join((*base, alias.name)) for alias in node.names)
 
 
 def test_every_module_has_its_room():
@@ -73,6 +82,40 @@ def test_a_module_imports_nothing_from_above():
             if top == 'linkage_ros' and own:
                 assert ROOMS.index(below[0]) <= ROOMS.index(own), f'{module.name} imports {name}'
             assert own in WITH_ROS or top not in ROS, f'{module.name} needs ROS: {name}'
+
+
+def unguarded(module):
+    """Yield what a module imports outside `needs`, at once or later, as full names."""
+    guarded = {id(each) for node in ast.walk(parsed(module)) if isinstance(node, ast.With)
+               and ast.unparse(node.items[0].context_expr).startswith('needs(')
+               for each in ast.walk(node)}
+    here = ('linkage_ros', *module.relative_to(PACKAGE).parent.parts)
+    for node in ast.walk(parsed(module)):
+        if id(node) not in guarded and isinstance(node, (ast.Import, ast.ImportFrom)):
+            yield from named(node, here)
+
+
+def test_whoever_starts_without_an_optional_package_imports_it_inside_needs():
+    imports = {'.'.join(('linkage_ros', *module.relative_to(PACKAGE).with_suffix('').parts)): [
+        *unguarded(module)] for module in MODULES}
+    # Those that cannot be imported without one, and those that import them.
+    without, before = set(optional.INSTALL), None
+    while without != before:
+        before = set(without)
+        without |= {name for name, others in imports.items() for other in others
+                    if {other, other.rpartition('.')[0], other.partition('.')[0]} & without}
+    assert {name.rpartition('.')[2] for name in without - {*optional.INSTALL}} == {
+        'llvm_arrays', 'llvm_code', 'mjcf', 'files', 'layers',
+        'picture', 'server'}
+
+
+def test_every_foreign_package_is_declared():
+    manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
+    declared = {one.text.removeprefix('python3-') for one in manifest.iter('exec_depend')}
+    for module in MODULES:
+        tops = {name.partition('.')[0] for name in imported(module)}
+        foreign = tops - {'linkage_ros', '__future__'} - sys.stdlib_module_names
+        assert foreign <= declared | {*optional.INSTALL}, module
 
 
 def test_who_tests_or_measures_uses_what_everybody_may():

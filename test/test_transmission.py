@@ -25,7 +25,7 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-from c_libraries import COMPILER, loaded, STRICT
+from c_libraries import COMPILER, loaded, ROS, STAND_IN, STRICT
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header, transmission
 from linkage_ros.c_code.axes import actuators, joints
@@ -35,7 +35,6 @@ from sweeps import EXHAUSTIVE, few_and_many
 from truth import random_linkages
 
 ROOT = Path(__file__).parents[1]
-STAND_IN = ROOT / 'test' / 'ros2_control'
 SANITIZED = ('-g', '-O1', '-fsanitize=address,undefined', '-fno-sanitize-recover=all')
 COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
     not shutil.which(name), reason=f'{name} is not installed')) for name in ('g++', 'clang++')]
@@ -61,6 +60,7 @@ SCENE = {
 GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
           'D crank Q 0.27 geared crank -2 0', 'B dyad A D 2.661 2.4 left']
 SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 out 0.08']
+UNWRITTEN = 0.123456789
 CALLER = """
 static {name}_memory {name}_m;
 int {name}_started(void) {{ return {name}_begin(&{name}_m); }}
@@ -85,11 +85,11 @@ class Memory:
         assert library[f'{name}_started']() == 1
 
     def send(self, side, position, velocity=None, effort=None):
-        """Return the status and the other side's positions, velocities and efforts."""
+        """Return the status and the other side's positions, velocities, efforts: or UNWRITTEN."""
         n = self._n
         given = np.array([position, np.zeros(n) if velocity is None else velocity,
                           np.zeros(n) if effort is None else effort], float).reshape(3 * n)
-        found = np.full(3 * n, np.nan)
+        found = np.full(3 * n, UNWRITTEN)
         status = self._send(side, *(ctypes.c_void_p(x.ctypes.data) for x in (given, found)))
         return status, found.reshape(3, n)
 
@@ -200,17 +200,68 @@ def test_the_right_one_of_several_inputs_is_chosen(tmp_path, joints_, given, nam
         assert status == 0 and found[0] == pytest.approx(expected_, rel=1e-12)
 
 
-def test_what_is_missing_is_held_and_said(library, machines):
+@pytest.mark.parametrize('ratio', [-2.0, 0.25])
+def test_a_sensor_repeats_after_a_turn_of_what_it_measures(tmp_path, ratio):
+    machines = scene.read({
+        'mechanisms': ['lift', 'wheel'], 'lift.type': 'custom', 'lift.joints': [
+            'O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left'],
+        'wheel.type': 'custom', 'wheel.joints': GEARED, 'wheel.crank.measures': 'crank2',
+        **{f'lift.crank.{key}': value for key, value in {
+            'measures': 'QB', 'ratio': ratio, 'offset': 0.1, 'start': 0.5}.items()},
+        'wheel.crank.ratio': ratio}).machines
+    lift, wheel = machines.values()
+    library = loaded(tmp_path, ''.join(
+        header.written(machine, joints=[f'{name}_crank']) + CALLER.format(name=name)
+        for name, machine in machines.items()))
+    memory, (reading, *_) = Memory(library, 'lift', 1), expected(lift, [0.5])
+    for turns in (0, 1, -1, 3, -100):
+        status, (crank, *_) = memory.send(0, reading + turns * math.tau / abs(ratio))
+        assert status == 0 and crank == pytest.approx(0.5, abs=1e-10)
+    # Less than a turn is another pose, or none.
+    status, (crank, *_) = memory.send(0, reading + 0.25 * math.tau / abs(ratio))
+    assert status == 1 or crank != pytest.approx(0.5, abs=1e-3)
+    # A geared input counts its turns, through any gear.
+    memory = Memory(library, 'wheel', 1)
+    for crank in (0.4, 7.0, -300.0):
+        reading = -2.0 * crank / ratio
+        status, (position, velocity, _) = memory.send(0, [reading], [1.0])
+        assert status == 0 and position == pytest.approx(crank, rel=1e-12)
+        assert velocity == pytest.approx(ratio / -2.0, rel=1e-12)
+        status, (position, *_) = memory.send(1, [crank + 20.0])
+        assert status == 0 and position == pytest.approx(-2.0 * (crank + 20.0) / ratio, rel=1e-12)
+
+
+def test_joints_that_move_with_no_input_are_refused():
+    machine, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
+        'O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left',
+        # Two bars to joints of one link: D does not move on it.
+        'C rigid A B 0.6 0.6 left', 'D dyad C B 0.5 0.4 left']}).machines.values()
+    assert [each.name for each in joints(machine, ['m_QB'])] == ['m_QB']
+    with pytest.raises(ValueError, match='m_CD of m moves with none'):
+        joints(machine, ['m_CD'])
+
+
+def test_what_is_missing_is_said(library, machines):
     machine, memory, nan = machines['rocker'], Memory(library('rocker'), 'rocker', 1), math.nan
     actuator, _, joint, _ = expected(machine, [1.0])
-    status, (position, velocity, effort) = memory.send(1, [nan], [1.0], [2.0])
-    assert status == 4 and np.isnan(position) and velocity == 0.0 and effort == 0.0
+    # A command in no known pose.
+    status, found = memory.send(1, [nan], [1.0], [2.0])
+    assert status == 4 and (found == UNWRITTEN).all()
     assert memory.send(0, actuator)[0] == 0
-    # Only an effort is commanded: it is held against where the actuators are.
+    # Only an effort is commanded: that where the actuators are.
     status, (position, velocity, effort) = memory.send(1, [nan], [0.0], [2.0])
-    assert status == 4 and position == actuator and effort != 0.0
-    status, (_, velocity, held) = memory.send(1, joint, [math.inf], [nan])
-    assert status == 4 and velocity == 0.0 and held == effort
+    assert status == 4 and position == UNWRITTEN and velocity == 0.0 and effort != UNWRITTEN
+    status, (position, velocity, effort) = memory.send(1, joint, [math.inf], [nan])
+    assert status == 4 and position == pytest.approx(actuator)
+    assert velocity == UNWRITTEN and effort == UNWRITTEN
+    # What is measured is held.
+    _, (position, _, effort) = memory.send(0, actuator, [1.0], [2.0])
+    status, found = memory.send(0, [nan], [nan], [nan])
+    assert status == 4 and list(found.ravel()) == [position, 0.0, effort]
+    # A velocity alone is that at the last pose.
+    _, (_, velocity, _) = memory.send(0, actuator, [1.0])
+    status, (_, again, _) = memory.send(0, [nan], [1.0])
+    assert status == 4 and again == velocity != 0.0
 
 
 def test_a_singular_pose_is_said(library, machines):
@@ -232,8 +283,12 @@ def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
     assert memory.send(0, expected(machine, states(machine, 1)[0])[0])[0] == 0
     values = [math.nan, math.inf, -math.inf, 1e308, -1e300, 5e-324, 0.0, 1.0, 1e-3, 3.0]
     for _ in range(3000):
-        status, found = memory.send(int(rng.integers(2)), *rng.choice(values, (3, n)))
+        side, given = int(rng.integers(2)), rng.choice(values, (3, n))
+        status, found = memory.send(side, *given)
         assert 0 <= status < 8 and np.isfinite(found).all()
+        # What is not commanded is not written, and all else is.
+        is_missing = ~np.isfinite(given).all(axis=1) & bool(side)
+        assert ((found == UNWRITTEN) == is_missing[:, None]).all()
 
 
 @pytest.mark.slow
@@ -345,7 +400,8 @@ def proved(package, name, compiler, count, *flags):
     program = package / f'proof_{name}'
     subprocess.run([compiler, '-std=c++17', *STRICT, *flags, f'-DNAME={name}', f'-DCLASS={class_}',
                     f'-DNAMESPACE={space}', '-isystem', STAND_IN / 'include', '-I',
-                    package / 'src', STAND_IN / 'proof.cpp', '-o', program], check=True)
+                    package / 'src', '-I', package / 'include', STAND_IN / 'proof.cpp', '-o',
+                    program, *ROS], check=True)
     ended = subprocess.run([program, str(count)], capture_output=True, text=True)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     tried, good = map(int, re.search(r'(\d+) states, (\d+)', ended.stdout).groups())
@@ -379,53 +435,8 @@ def test_mechanisms_of_any_names_are_classes_of_their_own(tmp_path):
     package = written(tmp_path, file)
     (package / 'all.cpp').write_text(''.join(f'#include "{name}.hpp"\n' for name in names))
     subprocess.run(['g++', '-std=c++17', *STRICT, '-fsyntax-only', '-Wno-unused-function',
-                    '-isystem', STAND_IN / 'include', '-I', package / 'src',
-                    package / 'all.cpp'], check=True)
-
-
-@pytest.fixture(scope='module')
-def refusals(tmp_path_factory):
-    """Return what says how a slotted lever is configured, compiled."""
-    folder = tmp_path_factory.mktemp('refusals')
-    package = written(folder, ROOT / 'config' / 'slotted_lever.yaml')
-    if not shutil.which('g++'):
-        pytest.skip('g++ is not installed')
-    subprocess.run(['g++', '-std=c++17', *STRICT, '-isystem', STAND_IN / 'include', '-I',
-                    package / 'src', STAND_IN / 'configure.cpp', '-o', folder / 'configure'],
-                   check=True)
-    return folder / 'configure'
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('words, said', [
-    (['parameter', 'a', '90'], ''),
-    (['parameter', 'a', 'wide'], "must be a number [m], not 'wide'"),
-    (['parameter', 'a', '-1'], 'a must be a positive number'),
-    (['parameter', 'a', '1e999'], 'a must be a'), (['parameter', 'a', '1 2'], 'must be a number'),
-    (['parameter', 'e', '1e6'], 'it cannot be assembled'), (['parameter', 'e', '-3'], ''),
-    (['parameter', 'x', '1'], "there is no parameter 'x'; allowed: a b e"),
-    (['joint', 'left_flap', 'lever'], ''), (['joint', 'left_flap', 'rod'], ''),
-    (['twice', '', ''], "'slotted_lever_lever', role 'lever', is none of"),
-    (['none', '', ''], "joint 'slotted_lever_lever' is missing"),
-    (['reduction', '', ''], 'must have no mechanical_reduction'),
-    (['handle', 'elbow', ''], "handle 'elbow' belongs to no joint"),
-    (['interface', 'effort', ''], 'need a position interface'),
-    (['interface', 'temperature', ''], 'one interface in common')])
-def test_what_cannot_be_configured_is_refused_in_words(refusals, words, said):
-    ended = subprocess.run([refusals, *words], capture_output=True, text=True)
-    assert (ended.returncode == 0) == (not said), ended.stdout
-    assert said in ended.stdout
-
-
-@pytest.mark.slow
-def test_other_dimensions_are_those_of_another_linkage(refusals):
-    for a, angle in ((90.0, 0.4), (80.0, 1.1), (120.0, -2.0)):
-        ended = subprocess.run([refusals, 'parameter', 'a', str(a), str(angle)],
-                               capture_output=True, text=True)
-        joint, back = map(float, ended.stdout.split())
-        lever = mechanisms.create('slotted_lever', a=a)
-        assert joint == pytest.approx(float(lever.joint_angles(angle)['lever']), abs=1e-14)
-        assert back == pytest.approx(angle, abs=1e-12)
+                    '-isystem', STAND_IN / 'include', '-I', package / 'src', '-I',
+                    package / 'include', *ROS, package / 'all.cpp'], check=True)
 
 
 @pytest.mark.slow
@@ -494,6 +505,23 @@ def test_a_package_is_built_and_tests_itself(tmp_path):
         assert ended.returncode == 0, ended.stdout + ended.stderr
     assert '2 tests' in ended.stdout or 'out of 2' in ended.stdout
     assert (tmp_path / 'install' / 'lib' / 'libleg_transmissions.so').is_file()
+    # A hardware component finds the header of the status.
+    component = tmp_path / 'component'
+    component.mkdir()
+    (component / 'CMakeLists.txt').write_text(f"""
+cmake_minimum_required(VERSION 3.16)
+project(component LANGUAGES CXX)
+set(CMAKE_CXX_STANDARD 17)
+find_package(leg_transmissions REQUIRED)
+add_library(component SHARED {STAND_IN / 'component.cpp'})
+target_link_libraries(component leg_transmissions::status)
+""")
+    for command in (
+            ['cmake', '-S', component, '-B', tmp_path / 'other', '-DCMAKE_PREFIX_PATH='
+             f'{tmp_path / "install"};{STAND_IN / "cmake"};{sys.prefix}',
+             f'-DPython3_EXECUTABLE={sys.executable}'], ['cmake', '--build', tmp_path / 'other']):
+        ended = subprocess.run(command, capture_output=True, text=True)
+        assert ended.returncode == 0, ended.stdout + ended.stderr
 
 
 def test_a_package_names_what_the_scene_names(tmp_path):

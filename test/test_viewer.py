@@ -311,7 +311,8 @@ def test_a_slider_sets_the_node_that_owns_the_parameter(show):
     ({'dimensions__b': 'long'}, 'lever.dimensions.b must be a finite number'),
     ({'dimensions__b': True}, 'lever.dimensions.b must be a finite number'),
     ({'dimensions__q': 1.0}, "lever has no parameter 'dimensions.q'"),
-    ({'type': 'jansen'}, 'lever.type must be'),
+    ({'type': 'jansen'}, 'lever.type is no number, .*: use ros2 param set .*lever.type'),
+    ({'points': ['L']}, 'lever.points is no number'),
     ({'dimensions__a': 10.0, 'dimensions__e': 700.0}, 'be assembled'),
     ({'branches__L': 5}, r'lever\.branches\.L'),
 ])
@@ -993,6 +994,28 @@ def test_a_client_that_does_not_read_costs_little_and_harms_nobody(show, what, s
     assert asyncio.run(use()) < 30.0
 
 
+@pytest.mark.sample(1)
+@pytest.mark.parametrize('half', [
+    b'', b'GET / HT', b'GET / HTTP/1.1\r\nHost: ',
+    b'POST / HTTP/1.1\r\nContent-Length: 9\r\n\r\nx'])
+def test_half_a_request_is_not_waited_for_and_a_page_stays(show, monkeypatch, half):
+    monkeypatch.setattr(server, 'SECONDS_TO_READ', 0.2)
+    monkeypatch.setattr(server, 'SECONDS_TO_CLOSE', 0.1)
+    url = show(LEG).viewer.url
+
+    async def use():
+        async with Page(url) as page:
+            await page.cast('/leg')
+            host, port = url[len('http://'):-1].split(':')
+            reader, writer = await asyncio.open_connection(host, port)
+            writer.write(half)
+            await asyncio.wait_for(reader.read(), 10.0)
+            writer.close()
+            assert await page.set('/leg', crank__speed=2.0) == ''
+
+    asyncio.run(use())
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize('last', [b'', b'nonsense'])
 def test_a_client_that_does_not_read_is_sent_home(show, monkeypatch, last):
@@ -1456,6 +1479,20 @@ def served():
     here = asyncio.get_running_loop()
     return [task for task in gc.get_objects() if isinstance(task, asyncio.Task)
             and not task.done() and task.get_loop() is not here]
+
+
+def test_what_a_page_looked_at_is_not_subscribed_to_when_it_is_gone(graph, show):
+    running = show(LEG)
+    at_rest = running.entities()
+
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/leg')
+            await browser.until(lambda: len(page.drawn('/leg', 'joints')))
+            assert running.entities()[0] >= at_rest[0] + 4
+        await browser.until(lambda: running.entities() == at_rest)
+
+    asyncio.run(use(running.viewer.url))
 
 
 @pytest.mark.long

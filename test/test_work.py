@@ -174,9 +174,14 @@ def test_a_subscriber_that_comes_or_goes_is_served_or_spared_from_the_next_tick(
 def test_all_legs_of_a_walker_are_solved_in_one_call(graph, work):
     graph.start(Kinematics, WALKER)
     turn = graph.crank(['walker_crank'])
-    message = turn([0.1], graph.listen(MarkerArray, 'walker/markers'))
-    assert len(message.markers[1].points) == 6 * 8
-    assert sum(work.values()) == 1
+    markers = graph.listen(MarkerArray, 'walker/markers')
+    assert len(turn([0.1], markers).markers[1].points) == 6 * 8
+    # What was repeated until the first answer is done with at the second.
+    turn([0.2], markers)
+    work.clear()
+    turn([0.3], markers)
+    # Even if a message came twice: one by one there would be six.
+    assert 0 < sum(work.values()) < 6
 
 
 @pytest.mark.parametrize('count', [1, 7, 288])

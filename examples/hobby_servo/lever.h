@@ -4,7 +4,7 @@
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * float: joints are off by up to 1e-07 of the longest bar at 2001 poses over the reach, without its outermost hundredth.
  * C99 and C++17 without heap, lock or recursion; compile without -ffast-math, which drops the checks.
- * A call of the transmission takes at most 12 poses.
+ * A call of the transmission takes at most 18 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -41,32 +41,36 @@ static inline int lever_solve(float crank, lever_pose *p)
     const float k10 = (-0.045f);
     const float k19 = 0.02f;
     const float k26 = 0.04f;
-    const float k31 = 0.025f;
-    const float k43 = 0.081f;
-    const float k62 = 0.000625f;
-    const float k65 = 0.0036f;
-    const float k73 = 0.0f;
+    const float k30 = 0.025f;
+    const float k31 = 0.000625f;
+    const float k34 = 0.0036f;
+    const float k40 = 1.0f;
+    const float k58 = 0.081f;
+    const float k77 = 0.000625f;
+    const float k84 = 0.0f;
     const float x0 = crank;
     const float v14 = (0.5f * x0);
     const float v15 = sinf(v14);
     const float v17 = cosf(v14);
-    const float v29 = (-((k26 * v15) * v17));
-    const float v32 = (v17 * v17);
-    const float v34 = (k31 + (k26 * v32));
-    const float v37 = sqrtf(((v29 * v29) + (v34 * v34)));
-    const float v38 = (v29 / v37);
-    const float v45 = (v34 / v37);
+    const float v35 = (v17 * v17);
+    const float v36 = (k34 * v35);
+    const float v44 = lever_gated((k31 + v36), ((v35 + k40) - 7.888609e-31f), 0.0f);
+    const float v45 = lever_gated((-((k26 * v15) * v17)), v44, 0.0f);
+    const float v49 = lever_gated((k30 + (k26 * v35)), v44, 0.0f);
+    const float v52 = sqrtf(((v45 * v45) + (v49 * v49)));
+    const float v53 = (v45 / v52);
+    const float v60 = (v49 / v52);
     p->O_x = 0.0f;
     p->O_y = 0.0f;
     p->Q_x = 0.0f;
     p->Q_y = k10;
     p->A_x = (-(((2.0f * v15) * v17) * k19));
     p->A_y = ((1.0f - (2.0f * (v15 * v15))) * k19);
-    p->L_x = (v38 * k43);
-    p->L_y = (k7 + (v45 * k43));
+    p->L_x = (v53 * k58);
+    p->L_y = (k7 + (v60 * k58));
     p->angle_crank = x0;
-    p->angle_lever = atan2f((-v38), v45);
-    p->slide_slide = lever_root((k62 + (k65 * v32)), k73);
+    p->angle_lever = atan2f((-v53), v60);
+    p->slide_slide = lever_root((k77 + v36), k84);
     return isfinite(p->O_x)
         && isfinite(p->O_y)
         && isfinite(p->Q_x)
@@ -90,30 +94,33 @@ static inline void lever_rates(float crank, lever_pose *by_crank)
     const float k26 = 0.000625f;
     const float k29 = 0.0036f;
     const float k34 = 0.04f;
-    const float k50 = 0.081f;
-    const float k74 = 0.000625f;
-    const float k81 = 0.0f;
+    const float k39 = 1.0f;
+    const float k59 = 0.081f;
+    const float k83 = 0.000625f;
+    const float k90 = 0.0f;
     const float x0 = crank;
     const float v5 = (0.5f * x0);
     const float v6 = sinf(v5);
     const float v14 = cosf(v5);
     const float v21 = (v14 * v14);
     const float v30 = (k29 * v21);
-    const float v33 = (((k10 * (k19 + (k20 * v21))) / (k26 + v30)) + 0.0f);
-    const float v36 = (k25 + (k34 * v21));
-    const float v39 = (-((k34 * v6) * v14));
-    const float v43 = sqrtf(((v39 * v39) + (v36 * v36)));
+    const float v31 = (k26 + v30);
+    const float v33 = (((k10 * (k19 + (k20 * v21))) / v31) + 0.0f);
+    const float v43 = lever_gated(v31, ((v21 + k39) - 7.888609e-31f), 0.0f);
+    const float v44 = lever_gated((k25 + (k34 * v21)), v43, 0.0f);
+    const float v48 = lever_gated((-((k34 * v6) * v14)), v43, 0.0f);
+    const float v52 = sqrtf(((v48 * v48) + (v44 * v44)));
     by_crank->O_x = 0.0f;
     by_crank->O_y = 0.0f;
     by_crank->Q_x = 0.0f;
     by_crank->Q_y = 0.0f;
     by_crank->A_x = (-((1.0f - (2.0f * (v6 * v6))) * k10));
     by_crank->A_y = (-(((2.0f * v6) * v14) * k10));
-    by_crank->L_x = (-((v33 * (v36 / v43)) * k50));
-    by_crank->L_y = ((v33 * (v39 / v43)) * k50);
+    by_crank->L_x = (-((v33 * (v44 / v52)) * k59));
+    by_crank->L_y = ((v33 * (v48 / v52)) * k59);
     by_crank->angle_crank = lever_gated(1.0f, fabsf(x0), 0.0f);
     by_crank->angle_lever = v33;
-    by_crank->slide_slide = (-(((((v6 * 0.5f) * v14) * 2.0f) * k29) / (2.0f * lever_root((k74 + v30), k81))));
+    by_crank->slide_slide = (-(((((v6 * 0.5f) * v14) * 2.0f) * k29) / (2.0f * lever_root((k83 + v30), k90))));
 }
 
 /* Whether it can be assembled: [-3.14159, 3.14159] rad. */
@@ -124,7 +131,7 @@ static inline int lever_reaches(float crank)
 
 /* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep, or not found
    by a search. SINGULAR: a velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or
-   infinite. */
+   infinite, which of a command means that there is none. */
 enum { LEVER_OK = 0, LEVER_OUT_OF_REACH = 1, LEVER_SINGULAR = 2, LEVER_NOT_KNOWN = 4 };
 enum { LEVER_ACTUATOR_LEVER_CRANK = 0 };
 enum { LEVER_JOINT_LEVER_LEVER = 0 };
@@ -138,11 +145,13 @@ typedef lever_side lever_joints;
 typedef struct { float position[2][1], rate[2][1][1], load[1]; } lever_point;
 
 /* The state between calls, which lever_begin initializes: the last poses and inputs by measured
-   actuators [0] and by commanded joints [1], and the last valid values of both. */
+   actuators [0] and by commanded joints [1], which of them is newer, and whether there is one; what
+   is held: the actuators [0] where they were last commanded or measured, whichever is newer, and the
+   joints [1] where they were last measured. NaN was never there. */
 typedef struct {
     lever_point point[2];
     float input[2][1];
-    int is_known[2], is_held[2];
+    int newer, is_known;
     lever_side held[2];
 } lever_memory;
 
@@ -158,23 +167,26 @@ static inline int lever_at(const float *q, int is_rated, lever_point *p)
 {
     const float k2 = 0.02f;
     const float k3 = 0.04f;
-    const float k13 = 0.025f;
-    const float k22 = (-0.025f);
-    const float k23 = 0.09f;
-    const float k27 = 0.000625f;
-    const float k30 = 0.0036f;
+    const float k12 = 0.025f;
+    const float k13 = 0.000625f;
+    const float k16 = 0.0036f;
+    const float k24 = 1.0f;
+    const float k37 = (-0.025f);
+    const float k38 = 0.09f;
     const float x0 = q[0];
     const float v5 = (0.5f * x0);
     const float v8 = cosf(v5);
-    const float v14 = (v8 * v8);
+    const float v17 = (v8 * v8);
+    const float v19 = (k13 + (k16 * v17));
+    const float v28 = lever_gated(v19, ((v17 + k24) - 7.888609e-31f), 0.0f);
     p->position[0][0] = x0;
-    p->position[1][0] = atan2f((-(-((k3 * sinf(v5)) * v8))), (k13 + (k3 * v14)));
+    p->position[1][0] = atan2f((-lever_gated((-((k3 * sinf(v5)) * v8)), v28, 0.0f)), lever_gated((k12 + (k3 * v17)), v28, 0.0f));
     if (!isfinite(p->position[0][0] + p->position[1][0]))
         return 0;
     if (!is_rated)
         return 1;
     p->rate[0][0][0] = lever_gated(1.0f, fabsf(x0), 0.0f);
-    p->rate[1][0][0] = (((k2 * (k22 + (k23 * v14))) / (k27 + (k30 * v14))) + 0.0f);
+    p->rate[1][0][0] = (((k2 * (k37 + (k38 * v17))) / v19) + 0.0f);
     p->load[0] = 0.0f;
     return 1;
 }
@@ -184,21 +196,24 @@ static inline int lever_at_angle_lever(const float *q, int is_rated, lever_point
 {
     const float k1 = 0.02f;
     const float k2 = 0.04f;
-    const float k13 = 0.025f;
-    const float k18 = (-0.025f);
-    const float k19 = 0.09f;
-    const float k23 = 0.000625f;
-    const float k26 = 0.0036f;
+    const float k12 = 0.025f;
+    const float k13 = 0.000625f;
+    const float k16 = 0.0036f;
+    const float k24 = 1.0f;
+    const float k35 = (-0.025f);
+    const float k36 = 0.09f;
     const float x0 = q[0];
     const float v5 = (0.5f * x0);
     const float v8 = cosf(v5);
-    const float v14 = (v8 * v8);
-    p->position[1][0] = atan2f((-(-((k2 * sinf(v5)) * v8))), (k13 + (k2 * v14)));
+    const float v17 = (v8 * v8);
+    const float v19 = (k13 + (k16 * v17));
+    const float v28 = lever_gated(v19, ((v17 + k24) - 7.888609e-31f), 0.0f);
+    p->position[1][0] = atan2f((-lever_gated((-((k2 * sinf(v5)) * v8)), v28, 0.0f)), lever_gated((k12 + (k2 * v17)), v28, 0.0f));
     if (!isfinite(p->position[1][0]))
         return 0;
     if (!is_rated)
         return 1;
-    p->rate[1][0][0] = (((k1 * (k18 + (k19 * v14))) / (k23 + (k26 * v14))) + 0.0f);
+    p->rate[1][0][0] = (((k1 * (k35 + (k36 * v17))) / v19) + 0.0f);
     p->load[0] = 0.0f;
     return 1;
 }
@@ -414,14 +429,14 @@ static inline void lever_modes_joints(const float position[1],
     start[0][0] = atan2f((-((-v49) - v54)), (v58 + v59));
     start[1][0] = atan2f((-(v49 - v54)), (v58 - v59));
 }
-/* From positions to the inputs nearest to q. In closed form, 12 poses at most. */
+/* From positions to the inputs nearest to q. In closed form, 18 poses at most. */
 static inline int lever_from_joints(const float position[1], float q[1], lever_point *p)
 {
     /* The inputs' turns, and one over them; 0 where there is none. */
     static const float turn[1][2] = { { 6.2831855f, 0.15915494f } };
     /* Whole turns that a position counts are taken away, so that they cost no digits. */
     float whole[1] = { 0 }, to[1], near[1];
-    float start[2][1], away[2], far;
+    float start[3][1], away[3], far;
     lever_point found;
     int i, k, next, ended;
     for (i = 0; i < 1; i++) {
@@ -429,11 +444,13 @@ static inline int lever_from_joints(const float position[1], float q[1], lever_p
         near[i] = q[i];
     }
     lever_modes_joints(to, start);
-    for (k = 0; k < 2; k++) {
+    for (i = 0; i < 1; i++) start[2][i] = q[i] - turn[i][0] * floorf(q[i] * turn[i][1] + 0.5f);
+    for (k = 0; k < 3; k++) {
         away[k] = lever_turned(1, turn, whole, start[k], near, q);
     }
+    away[2] = 1000000.0f;
     for (;;) {
-        for (next = 0, k = 1; k < 2; k++)
+        for (next = 0, k = 1; k < 3; k++)
             next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
         if (!isfinite(away[next]))
             return 0;
@@ -474,14 +491,14 @@ static inline void lever_modes_angle_lever(const float position[1],
     start[0][0] = atan2f((-((-v49) - v54)), (v58 + v59));
     start[1][0] = atan2f((-(v49 - v54)), (v58 - v59));
 }
-/* From positions to the inputs nearest to q. In closed form, 12 poses at most. */
+/* From positions to the inputs nearest to q. In closed form, 18 poses at most. */
 static inline int lever_from_angle_lever(const float position[1], float q[1], lever_point *p)
 {
     /* The inputs' turns, and one over them; 0 where there is none. */
     static const float turn[1][2] = { { 6.2831855f, 0.15915494f } };
     /* Whole turns that a position counts are taken away, so that they cost no digits. */
     float whole[1] = { 0 }, to[1], near[1];
-    float start[2][1], away[2], far;
+    float start[3][1], away[3], far;
     lever_point found;
     int i, k, next, ended;
     for (i = 0; i < 1; i++) {
@@ -489,11 +506,13 @@ static inline int lever_from_angle_lever(const float position[1], float q[1], le
         near[i] = q[i];
     }
     lever_modes_angle_lever(to, start);
-    for (k = 0; k < 2; k++) {
+    for (i = 0; i < 1; i++) start[2][i] = q[i] - turn[i][0] * floorf(q[i] * turn[i][1] + 0.5f);
+    for (k = 0; k < 3; k++) {
         away[k] = lever_turned(2, turn, whole, start[k], near, q);
     }
+    away[2] = 1000000.0f;
     for (;;) {
-        for (next = 0, k = 1; k < 2; k++)
+        for (next = 0, k = 1; k < 3; k++)
             next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
         if (!isfinite(away[next]))
             return 0;
@@ -523,8 +542,11 @@ static inline int lever_begin(lever_memory *m)
 {
     static const lever_side none = { { 0 }, { 0 }, { 0 } };
     int i;
-    m->is_known[0] = m->is_known[1] = m->is_held[0] = m->is_held[1] = 0;
+    m->newer = 1;
+    m->is_known = 0;
     m->held[0] = m->held[1] = none;
+    for (i = 0; i < 1; i++)
+        m->held[0].position[i] = m->held[1].position[i] = (float)NAN;
     for (i = 0; i < 4096; i++) {
         lever_sample(i, m->input[1]);
         if (lever_at(m->input[1], 1, &m->point[1]))
@@ -535,36 +557,46 @@ static inline int lever_begin(lever_memory *m)
 
 static inline int lever_transmit(lever_memory *m, int side, const lever_side *from, lever_side *to)
 {
-    const int other = 1 - side;
+    const int other = 1 - side, before = m->newer, was_known = m->is_known;
+    static const float none[1][2] = { { 0 } };
     lever_side *held = &m->held[other];
-    lever_point found;
+    lever_point found = m->point[before];
     const lever_point *at;
     float q[1], x[1], y[1] = { 0 };
     int i, j, status = LEVER_OK, all;
     for (i = 0; i < 1; i++) {
-        q[i] = m->input[!m->is_known[0]][i];
+        q[i] = m->input[before][i];
         status = isfinite(from->position[i]) ? status : LEVER_NOT_KNOWN;
+        /* Where an actuator is measured is newer than its command, within the reach or not. */
+        if (!side && isfinite(from->position[i]))
+            m->held[0].position[i] = from->position[i];
     }
-    if (status == LEVER_OK && !(side ? lever_from_joints(from->position, q, &found)
+    /* Where it is already needs no search; but a command has to be in the sweep. */
+    if (status == LEVER_OK && !(was_known && lever_gap(from->position, &found, side, x) <= 2e-06f
+            && isfinite(lever_turned(side, none, y, q, q, x)))
+            && !(side ? lever_from_joints(from->position, q, &found)
             : lever_from_actuators(from->position, q, &found)))
         status = LEVER_OUT_OF_REACH;
     for (i = 0; status == LEVER_OK && i < 1; i++)
         status = isfinite(found.position[other][i]) ? LEVER_OK : LEVER_OUT_OF_REACH;
     if (status == LEVER_OK) {
+        m->newer = side;
+        m->is_known = 1;
         m->point[side] = found;
         for (i = 0; i < 1; i++) {
             m->input[side][i] = q[i];
             held->position[i] = found.position[other][i];
-            m->held[side].position[i] = m->is_held[side] ? m->held[side].position[i] : from->position[i];
         }
-        m->is_known[side] = m->is_held[0] = m->is_held[1] = 1;
-    } else if (side && status == LEVER_NOT_KNOWN)
-        m->is_known[1] = 0;
+    }
+    /* A position that is not commanded is not written. */
+    for (i = 0; i < 1; i++)
+        if (!(side && status == LEVER_NOT_KNOWN) && isfinite(held->position[i]))
+            to->position[i] = held->position[i];
     all = status;
 
-    /* Velocities at the requested pose, else at the last one; a held position has velocity 0. */
-    at = &m->point[m->is_known[side] ? side : other];
-    if (status == LEVER_NOT_KNOWN && (m->is_known[0] || m->is_known[1]))
+    /* Velocities at the newest pose; a held position has velocity 0. */
+    at = &m->point[m->newer];
+    if (status == LEVER_NOT_KNOWN && m->is_known)
         status = LEVER_OK;
     for (i = 0; i < 1; i++)
         status |= isfinite(from->velocity[i]) ? LEVER_OK : LEVER_NOT_KNOWN;
@@ -576,37 +608,40 @@ static inline int lever_transmit(lever_memory *m, int side, const lever_side *fr
     for (i = 0; i < 1; i++)
         status |= isfinite(y[i]) ? LEVER_OK : LEVER_SINGULAR;
     for (i = 0; i < 1; i++)
-        held->velocity[i] = status == LEVER_OK ? y[i] : 0;
+        if (!(side && status & LEVER_NOT_KNOWN))
+            to->velocity[i] = status == LEVER_OK ? y[i] : 0;
     all |= status;
 
-    /* Efforts at the actuators' pose: their power is that of the joints, less that of the loads. */
-    at = &m->point[m->is_known[0] ? 0 : 1];
-    status = m->is_known[0] || m->is_known[1] ? LEVER_OK : LEVER_NOT_KNOWN;
-    for (i = 0; status == LEVER_OK && i < 1; i++) {
-        status = isfinite(from->effort[i]) ? LEVER_OK : LEVER_NOT_KNOWN;
-        x[i] = side ? at->load[i] : -at->load[i];
-        for (j = 0; j < 1; j++)
+    /* Efforts where the actuators are: their power is that of the joints, less that of the loads. */
+    at = &m->point[side && was_known ? before : m->newer];
+    status = m->is_known ? LEVER_OK : LEVER_NOT_KNOWN;
+    for (i = 0; i < 1; i++)
+        status = isfinite(from->effort[i]) ? status : LEVER_NOT_KNOWN;
+    for (i = 0; status == LEVER_OK && i < 1; i++)
+        for (x[i] = side ? at->load[i] : -at->load[i], j = 0; j < 1; j++)
             x[i] += at->rate[side][j][i] * from->effort[j];
-    }
     if (status == LEVER_OK && !lever_solved(at, other, 1, 0.001f, x, y))
         status = LEVER_SINGULAR;
     for (i = 0; i < 1; i++) {
-        held->effort[i] = status == LEVER_OK ? y[i] : held->effort[i];
-        to->position[i] = m->is_held[other] ? held->position[i] : to->position[i];
-        to->velocity[i] = held->velocity[i];
-        to->effort[i] = held->effort[i];
+        /* What was commanded before a pause is not held after it. */
+        if (status != LEVER_SINGULAR && (side || status == LEVER_OK))
+            held->effort[i] = status == LEVER_OK ? y[i] : 0;
+        if (!(side && status == LEVER_NOT_KNOWN))
+            to->effort[i] = held->effort[i];
     }
     return all | status;
 }
 
 /* From the actuators' positions, velocities and efforts to the joints'. Returns a status: where it
-   is not OK, positions and efforts are the last valid ones, and velocities 0. */
+   is not OK, positions and efforts are the last measured ones, and velocities 0. */
 static inline int lever_actuators_to_joints(lever_memory *m, const lever_actuators *from, lever_joints *to)
 {
     return lever_transmit(m, 0, from, to);
 }
 
-/* The same from the joints to the actuators, to the inputs nearest to the last ones. */
+/* The same from the joints to the actuators, to the inputs nearest to the last ones. Out of reach
+   the actuators are commanded to where they are: what was last commanded or measured, whichever is
+   newer. What is not commanded, NaN, is not written. */
 static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints *from, lever_actuators *to)
 {
     return lever_transmit(m, 1, from, to);

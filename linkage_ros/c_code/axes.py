@@ -11,18 +11,20 @@
 """The actuators and the commanded joints of a mechanism, one of each for every input."""
 
 import math
-from typing import List, NamedTuple, Optional, Sequence
+from typing import Any, List, NamedTuple, Optional, Sequence
 
 import numpy as np
 
 from ..linkage.builder import GROUND, Link
+from ..linkage.inputs import spread
 from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion
 from ..words import listed
 
-# Relative size of a Jacobian below which outputs do not determine the inputs.
-DEPENDENT = 1e-9
+# Relative size of a Jacobian below which outputs do not determine the inputs, and the poses in
+# which it is looked at.
+DEPENDENT, SPREAD = 1e-9, 200
 
 
 class Axis(NamedTuple):
@@ -87,6 +89,9 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
         raise ValueError(f'{machine.name} has {len(machine.inputs)} inputs: as many joints are '
                          f'needed, not {listed(names)}')
     machine.linkage.inverse(tuple(outputs))
+    if names and not _tell(machine, outputs, spread(machine.linkage.inputs, SPREAD)):
+        raise ValueError(f'{listed(names)} of {machine.name} moves with none of the inputs, or '
+                         'only together with another joint')
     named = [machine.joints.get(_key(machine, output)) or JointName(f'{machine.name}_{output}')
              for output in outputs]
     return [axis(machine, output, joint.name, joint.sign, joint.offset, joint.wraps)
@@ -138,11 +143,18 @@ def _chain(machine: SceneMechanism) -> List[str]:
         return list(machine.inputs)
 
 
-def _tell(machine: SceneMechanism, outputs: Sequence[str]) -> bool:
-    """Return whether outputs change independently of each other at the start of the inputs."""
-    pose = machine.linkage.posed((), (), tuple(outputs))
-    rates = np.reshape(pose.over(*start(machine)), (-1, len(outputs)))
-    if not np.isfinite(rates).all():
+def _tell(machine: SceneMechanism, outputs: Sequence[str],
+          inputs: Optional[Sequence[Any]] = None) -> bool:
+    """Return whether outputs determine the inputs at any of such inputs, by default the start."""
+    linkage = machine.linkage
+    own = start(machine) if inputs is None else inputs
+    pose = linkage.posed((), (), tuple(outputs))
+    rates = np.reshape(pose.over(*own), (len(linkage.inputs), len(outputs), -1))
+    if not np.isfinite(rates).all(axis=(0, 1)).any():
         return True
-    values = np.linalg.svd(rates, compute_uv=False)
-    return len(values) == len(outputs) and bool(values[-1] > DEPENDENT * values[0])
+    sizes = np.array([1.0 if linkage.is_angle(each) else linkage.longest for each in outputs])
+    rates = rates * np.array([each.size for each in linkage.inputs])[:, None, None]
+    scaled = np.moveaxis(np.nan_to_num(rates / sizes[:, None]), -1, 0)
+    values = np.linalg.svd(scaled, compute_uv=False)
+    return values.shape[1] == len(outputs) and bool(
+        (values[:, -1] > DEPENDENT * np.maximum(1.0, values[:, 0])).any())

@@ -23,14 +23,16 @@ from ..formula.expression import Real, real, unknown
 from ..formula.operations import OPERATIONS
 from ..formula.program import Dialect, evaluate, Pose
 from ..linkage.mechanism import Mechanism
-from ..linkage.planar import TOLERANCE
+from ..linkage.planar import LEAST_SQUARE, TINY, TOLERANCE
 from ..linkage.spatial import EDGE, LAST_STEP
 
 # Expressions that are true or false.
 _CONDITIONS = ('less', 'less_equal')
+# Names of constants, arguments and values.
+_NAMED = re.compile(r'\b[kxv]\d+\b')
 # What formulas count as rounding, and what that is in float.
 _IN_FLOAT = {TOLERANCE: 8 * 2.0 ** -24, -TOLERANCE: -8 * 2.0 ** -24, LAST_STEP: 2.0 ** -11,
-             EDGE: 2.0 ** -17}
+             EDGE: 2.0 ** -17, TINY: 2.0 ** -26, LEAST_SQUARE: 2.0 ** -100}
 
 
 class Code:
@@ -72,10 +74,15 @@ class Code:
     def function(self, head: str, pose: Pose, arguments: Sequence[str],
                  ending: Callable[[List[str]], List[str]]) -> str:
         """Return a C function with the operations of a Pose, from the code of its arguments."""
-        constants, lines, outputs = pose.statements(self.dialect)
+        constants, listed, outputs = pose.statements(self.dialect)
         ends = ending(outputs)
-        text = '\n'.join([code for _, code in lines] + ends)
-        used = set(re.findall(r'\b[kx]\d+\b', text))
+        lines: List[Tuple[str, str]] = []
+        used = set(_NAMED.findall('\n'.join(ends)))
+        # Compilers warn of what is computed and not used, such as a coordinate with a load.
+        for name, code in reversed(listed):
+            if name in used:
+                lines.insert(0, (name, code))
+                used.update(_NAMED.findall(code))
         nodes = dict(zip(constants, pose.variant.constants))
         body = [f'    const {_kind(nodes[name], self.number)} {name} = '
                 f'{self.constant(nodes[name], value)};'

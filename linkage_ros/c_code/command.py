@@ -20,12 +20,11 @@ from ..scene import SceneMechanism
 from ..words import listed, meant
 
 NAME = 'c_code'
-NEEDS = 'pip install pyyaml, or apt install python3-yaml'
 
 
 def main(args: Optional[List[str]] = None) -> int:
     """Print C99; return the exit code."""
-    return command.run(NAME, show, args, NEEDS)
+    return command.run(NAME, show, args)
 
 
 def show(args: Optional[List[str]]) -> None:

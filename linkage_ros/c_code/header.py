@@ -169,7 +169,7 @@ class _Header:
             self.linkage.posed((), (), [*self.fields.values()]), ending)
 
     def _reach(self) -> str:
-        if len(self.inputs) > 1:
+        if len(self.inputs) > 1 or self.linkage.inputs[0].is_part:
             return ''
         first, arcs, literal = self.linkage.inputs[0], self.machine.first.reach, self.code.literal
         ranges = ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs)

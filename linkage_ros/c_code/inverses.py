@@ -20,12 +20,13 @@ from .axes import Axis
 from .code import Code
 from .names import filled, template
 from ..formula.program import Program
-from ..linkage.inputs import MOST_COUNTED
 from ..linkage.inverse_linkage import InverseLinkage, Mode
 from ..linkage.mechanism import Mechanism
 
 # Newton steps, the first pose included, from a closed form and of a search.
 CLOSED, SEARCHED = 4, 64
+# Samples of each part of the reach, for the assembly modes that are there.
+SAMPLES = 256
 # Inputs that are no further apart are the same [rad, sizes].
 ALIKE = 1e-6
 # An end of the reach is taken further inside by this [rad, sizes]: it is rounded, too.
@@ -55,8 +56,8 @@ class Inverses:
         self._sizes = [input_.size for input_ in linkage.inputs]
         self.poses = 0
         first, *others = linkage.inputs
-        # Whether the reach is known: of longer periods only one turn is computed.
-        self._is_known = not others and first.period <= MOST_COUNTED
+        # Whether the reach is known: of very long periods only a part is computed.
+        self._is_known = not others and not first.is_part
         self._arcs = linkage.reach() if self._is_known else []
         if first.is_whole(self._arcs):
             self._arcs = []
@@ -64,7 +65,7 @@ class Inverses:
     def within(self) -> Dict[str, object]:
         """Return the function that keeps the input in its reach, and its call, if it has ends."""
         first, code = self._linkage.inputs[0], self._code
-        turn, inside = first.turn if first.turns else 0.0, INSIDE[code.number]
+        turn, inside = first.turn if first.wraps else 0.0, INSIDE[code.number]
         if not self._arcs:
             return {'within': '', 'clamped': ''}
         arcs = ((0.5 * (low + high) / first.size, 0.5 * (high - low) / first.size - inside)
@@ -83,15 +84,17 @@ class Inverses:
         values = [code.times(
             f'position[{i}]' + (f' - {code.literal(each.offset)}' if each.offset else ''),
             1.0 / each.factor) for i, each in enumerate(axes)]
-        given, counted = {}, []
-        turns = [(input_.turn, 1.0 / input_.turn) if input_.turns else (0.0, 0.0)
-                 for input_ in inputs]
-        for k, i, ratio, offset in self._gears(axes):
+        given, counted, gears = {}, [], [*self._gears(axes)]
+        # Outputs may repeat earlier than the linkage.
+        turns = [(each.turn, 1.0 / each.turn) if each.wraps else (0.0, 0.0)
+                 for each in (inputs if len(gears) == len(outputs) else
+                              self._linkage.inverse(outputs).inputs)]
+        for k, i, ratio, offset in gears:
             value = values[k] + (f' - {code.literal(offset)}' if offset else '')
             value = code.times(value, 1.0 / (ratio * sizes[i]))
             given[i] = f'near[{i}] - whole[{i}]'
             counted += [f'    near[{i}] = {value};']
-            if inputs[i].turns:
+            if inputs[i].wraps:
                 turn, over = map(code.literal, turns[i])
                 counted += [
                     f'    whole[{i}] = {turn} * floor{code.suffix}(near[{i}] * {over} + '
@@ -99,7 +102,7 @@ class Inverses:
                     f'    to[{k}] -= {code.times(f"whole[{i}]", axes[k].factor * ratio)};']
                 turns[i] = 0.0, 0.0
         modes, way = '', {'count': 1, 'steps': CLOSED, 'poses': CLOSED, 'how': 'By its gear',
-                          'starts': '', 'strict': '0'}
+                          'starts': '', 'strict': '0', 'fallback': ''}
         kind = 'inverse.h.in'
         if len(given) < len(outputs):
             if closed := self._linkage.inverse(outputs).closed:
@@ -135,7 +138,7 @@ class Inverses:
             f'            p->position[{side}][{k}] += '
             f'{self._code.times(f"q[{i}] - {given}[{i}]", axes[k].factor * ratio)};'
             for side, axes in enumerate(self._sides) for k, i, ratio, _ in self._gears(axes)
-            if self._linkage.inputs[i].turns)
+            if self._linkage.inputs[i].wraps)
 
     def _pieces(self, axes: Sequence[Axis]) -> Dict[str, object]:
         """Return the pieces of the reach for a search in them; nothing if they are not known."""
@@ -161,10 +164,10 @@ class Inverses:
                     f'    start[{k}][0] = {code.literal(value)};'
                     for k, value in enumerate(middles, 1))])}
 
-    def _begin(self) -> str:
+    def _begin(self, k: int = 0) -> str:
         """Return the code that starts from the inputs, without their turns, which cost digits."""
         half = self._code.literal(0.5)
-        return (f'for (i = 0; i < {len(self._sizes)}; i++) start[0][i] = q[i] - turn[i][0] * '
+        return (f'for (i = 0; i < {len(self._sizes)}; i++) start[{k}][i] = q[i] - turn[i][0] * '
                 f'floor{self._code.suffix}(q[i] * turn[i][1] + {half});')
 
     def _closed(self, tag: str, outputs: Tuple[str, ...], closed: InverseLinkage,
@@ -172,21 +175,23 @@ class Inverses:
         """Return the function for the inputs in all assembly modes, and how it is used."""
         code = self._code
         modes, count = self._modes(tag, self._own_modes(outputs, closed), closed, values)
-        call = f'{code.name}_modes_{tag}(to, start);'
-        strict = f'far < {self._values["last"]}'
+        starts, how = f'    {code.name}_modes_{tag}(to, start);', 'In closed form'
+        steps = f'{CLOSED}'
         # Each start may be tried twice, at an end of the reach with one more pose.
-        poses = count * (CLOSED + 2 + bool(self._arcs))
-        if not code.is_open or not self._linkage.dimensions:
-            return modes, {'count': count, 'how': 'In closed form', 'starts': f'    {call}',
-                           'strict': strict, 'poses': poses}
+        poses = (count + 1) * (CLOSED + 2 + bool(self._arcs))
+        if code.is_open and self._linkage.dimensions:
+            how += '; with other dimensions by a search from q'
+            steps, poses = f'c->is_own ? {CLOSED} : {SEARCHED}', max(poses, SEARCHED + 1)
+            starts = (f'    if (c->is_own)\n    {starts}\n    else\n'
+                      f'        for (k = 0; k < {count}; k++)\n'
+                      f'            for (i = 0; i < {len(self._sizes)}; i++)\n'
+                      f'                start[k][i] = {code.literal(math.nan)};')
+        last = self._values['last']
         return modes, {
-            'count': count, 'how': 'In closed form; with other dimensions by a search from q',
-            'starts': f'    if (c->is_own) {{\n        {call}\n    }} else {{\n        '
-                      f'{self._begin()}\n        for (k = 1; k < {count}; k++)\n            '
-                      f'for (i = 0; i < {len(self._sizes)}; i++)\n'
-                      f'                start[k][i] = {code.literal(math.nan)};\n    }}',
-            'strict': f'c->is_own && {strict}', 'poses': max(poses, SEARCHED + 1),
-            'steps': f'c->is_own ? {CLOSED} : {SEARCHED}'}
+            'count': count + 1, 'how': how, 'poses': poses, 'steps': steps,
+            'strict': f'far < {last}', 'starts': f'{starts}\n    {self._begin(count)}',
+            # Where no mode has an answer, that nearest to q may be found from q.
+            'fallback': f'    away[{count}] = {last};'}
 
     def _modes(self, tag: str, modes: Sequence[Mode], closed: InverseLinkage,
                values: Sequence[str]) -> Tuple[str, int]:
@@ -217,15 +222,17 @@ class Inverses:
     def _own_modes(self, outputs: Tuple[str, ...], closed: InverseLinkage) -> Sequence[Mode]:
         """Return the assembly modes in which the linkage is anywhere in its reach, if known."""
         linkage, modes, first = self._linkage, closed.modes, self._linkage.inputs[0]
-        if not self._is_known:
+        pieces, _ = linkage.monotone(outputs[0], math.inf) if self._is_known else ((), ())
+        if not pieces:
             return modes
-        # Between extremes of the output the mode is the same; in the middle two may meet.
-        pieces, _ = linkage.monotone(outputs[0], math.inf)
-        inputs = np.array([low + 0.382 * (high - low) for low, high, *_ in pieces])
+        # Where the inverse linkage has a dead point of its own, the mode changes.
+        parts = (np.arange(SAMPLES) + 0.382) / SAMPLES
+        inputs = np.concatenate([low + parts * (high - low) for low, high, *_ in pieces])
         values = linkage.posed((), outputs).over(inputs)[0]
         starts = linkage.bind(Program(
             [mode.inputs[0] for mode in modes], 1, closed.arguments)).over(values)
-        is_own = first.apart(np.add.outer(closed.turns[0], starts), inputs).min(
-            axis=0) < ALIKE * first.size
-        return [mode for mode, own in zip(modes, is_own.any(axis=1)) if own] if is_own.any(
-            axis=0).all() else modes
+        apart = np.nan_to_num(first.apart(np.add.outer(closed.turns[0], starts), inputs),
+                              nan=math.inf).min(axis=0)
+        is_own = apart <= np.maximum(apart.min(axis=0), ALIKE * first.size)
+        own = (is_own & (apart < math.inf)).any(axis=1)
+        return [mode for mode, is_there in zip(modes, own) if is_there] or modes

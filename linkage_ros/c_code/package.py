@@ -54,7 +54,8 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
         'mechanisms': ' '.join(part['name'] for part in parts),
         'table': '\n'.join(part['row'] for part in parts)}
     files = {Path(path): filled(template(Path(path).name), common) for path in (
-        'CMakeLists.txt', 'package.xml', 'README.md', 'src/transmission-of.hpp')}
+        'CMakeLists.txt', 'package.xml', 'README.md', 'src/transmission-of.hpp',
+        'include/linkage_ros/linkage_transmission.hpp')}
     files[Path('plugins.xml')] = f'<library path="{name}">\n' + ''.join(
         filled(template('plugin.xml'), part) for part in parts) + '</library>\n'
     files[Path('urdf/transmissions.xml')] = '<!-- Written by linkage_ros. -->\n' + ''.join(

@@ -14,7 +14,7 @@ from pathlib import Path
 import sys
 from typing import List, Optional
 
-from .command import NEEDS, parser, with_joints
+from .command import parser, with_joints
 from .package import PACKAGE, package
 from .. import command, scene
 
@@ -23,7 +23,7 @@ NAME = 'transmission'
 
 def main(args: Optional[List[str]] = None) -> int:
     """Write the package; return the exit code."""
-    return command.run(NAME, write, args, NEEDS)
+    return command.run(NAME, write, args)
 
 
 def write(args: Optional[List[str]]) -> None:

@@ -37,6 +37,7 @@ import numpy as np
 from .expression import Real, unknown
 from .operations import COMMUTING, OPERATIONS
 from ..cache import Cache
+from ..optional import needs
 
 # A block of this many poses stays in the second-level cache; measured in benchmark/.
 BLOCK_OF_POSES = 4096
@@ -282,8 +283,8 @@ class _Variant:
     def loop(self) -> Future:
         """Return the machine code for many poses, compiled in the background."""
         def make() -> Any:
-            from .llvm_code import Loop
-
+            with needs('llvmlite'):
+                from .llvm_code import Loop
             return Loop(*self.listing.operations())
 
         return compile_in_background(make)
@@ -291,8 +292,8 @@ class _Variant:
     @cached_property
     def arrays(self) -> Any:
         """Return the machine code for arrays of poses."""
-        from .llvm_arrays import Arrays
-
+        with needs('llvmlite'):
+            from .llvm_arrays import Arrays
         return Arrays(*self.listing.operations())
 
 
@@ -410,7 +411,13 @@ class Pose:
         return self.variant.arrays.solve(given, self._given)
 
     def batch(self, rows: np.ndarray) -> Batch:
-        """Return poses to solve repeatedly by machine code, into rows (poses, outputs)."""
+        """
+        Return poses to solve repeatedly by machine code, into rows (poses, outputs).
+
+        Raises ImportError without an llvmlite that works.
+        """
+        with needs('llvmlite'):
+            from . import llvm_code  # noqa: F401
         return Batch(self.variant.loop, self._given, self.variant.arguments, rows)
 
     def _in_python(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:

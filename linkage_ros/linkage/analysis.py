@@ -46,7 +46,7 @@ class Analysis:
         linkage = self._linkage
         linkage.check_output(output)
         pose, angular = linkage.bound('output', output), np.array([linkage.is_angle(output)])
-        size = self._first.size
+        size = self._first.step
         parts = linkage.reach(*self._others) if arcs is None else arcs
         if arcs is None and (branches := self.branches(output)).jumps:
             parts = [(low * size, high * size) for low, high in branches.arcs]
@@ -54,7 +54,7 @@ class Analysis:
                           angular)[0].tolist() for low, high in parts]
         return [(tuple(least), tuple(greatest)) for least, greatest in found]
 
-    # From here on the first input is in units of its size.
+    # From here on the first input is in units of its step.
 
     def dead_points(self) -> List[float]:
         """Return the values of the input at which a dyad stretches or folds."""
@@ -80,13 +80,13 @@ class Analysis:
 
     def _reach(self) -> List[Arc]:
         """Return the reach in arcs, none of them on both sides of an end of a turn."""
-        size = self._first.size
+        size = self._first.step
         return [part for lo, hi in self._linkage.reach(*self._others)
-                for part in self._first.within(lo / size, hi / size)]
+                for part in self._first.counted().within(lo / size, hi / size)]
 
     def _curve(self, kind: str, name: object) -> Callable:
         """Return the function from the first input to numbers, and each one's rate by it."""
-        pose, size, others = self._linkage.bound(kind, name), self._first.size, self._others
+        pose, size, others = self._linkage.bound(kind, name), self._first.step, self._others
 
         def curve(value: np.ndarray) -> np.ndarray:
             rows = pose.searched(value * size, *others)

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 from . import planar
 from .inputs import ANGLE, Input, LENGTH
@@ -32,6 +32,7 @@ from ..formula.expression import (
     dimension,
     dot,
     gated,
+    nearest_integer,
     Number,
     Real,
     real,
@@ -111,7 +112,9 @@ class _Vector(NamedTuple):
 class Builder:
     """The joints, links and limits of a linkage, as expressions of its dimensions and inputs."""
 
-    def __init__(self) -> None:
+    def __init__(self, turned: Optional[Mapping[str, float]] = None) -> None:
+        # Whole turns from which inputs are counted.
+        self._turned = turned or {}
         self.points: Dict[str, Point] = {}
         self.links: List[Link] = []
         self.bars: List[Bar] = []
@@ -247,6 +250,9 @@ class Builder:
                 raise ConstructionError(f'it cannot be geared to {geared.input}; allowed: '
                                         f'{", ".join(alike) or "none"}')
             value = geared.ratio * driving + geared.offset
+            if count := self._turned.get(geared.input):
+                turns = geared.ratio * count
+                value = value + 2.0 * pi * (turns - nearest_integer(turns))
         self.driven[input_.name] = input_, value
         return value
 
@@ -286,7 +292,7 @@ class Builder:
     def dyad(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
              side: float) -> None:
         """Join bars of to_first and to_second [m] from two joints, left of first -> second."""
-        found = planar.dyad(self.arm(first, second), to_first, to_second, side)
+        found = planar.dyad(self.arm(first, second, smooth=True), to_first, to_second, side)
         self.limits += found.limits
         start, pivot = self.points[first], self.points[second]
         place = start.place + found.first
@@ -328,7 +334,7 @@ class Builder:
         """Mirror a joint in the line of two others: the far corner of a kite."""
         pin = self.points[first].crank
         ends = [self._side(end, point).vector for end in (second, first)]
-        place, arm = self.points[point].place, self.arm(second, first)
+        place, arm = self.points[point].place, self.arm(second, first, smooth=True)
         self._reflect(name, first, second, arm, place, arm.offset(place, ends[0]), ends,
                       self.distance(first, point), self.distance(second, point), point)
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
@@ -348,7 +354,7 @@ class Builder:
     def antiparallelogram(self, name: str, corner: str, first: str, second: str) -> None:
         """Join two bars as long as those from a corner, but crossed."""
         to_first, to_second = (self._side(corner, end) for end in (first, second))
-        arm = self.arm(second, first)
+        arm = self.arm(second, first, smooth=True)
         opposite = self.points[first].place + to_second.vector
         start = self.points[corner].place
         offset = -arm.offset(start, -to_second.vector)
@@ -494,12 +500,12 @@ class Builder:
         self.frames[name] = {tip: Complex(0.0, 0.0)}
         self._axes[name] = _Vector(along, real(1.0), name)
 
-    def arm(self, first: str, second: str) -> planar.Arm:
-        """Return the arm from one joint to another."""
+    def arm(self, first: str, second: str, *, smooth: bool = False) -> planar.Arm:
+        """Return the arm from one joint to another; see `planar.CrankArm` for `smooth`."""
         ends = self.points[first], self.points[second]
         for (foot, pin), reverse in ((ends, False), (ends[::-1], True)):
             if pin.crank and foot.home == GROUND and foot.place is not pin.crank.centre:
-                return planar.CrankArm(foot.place, pin.crank, reverse)
+                return planar.CrankArm(foot.place, pin.crank, reverse, smooth)
         return self._plain_arm(first, second)
 
     def _plain_arm(self, first: str, second: str) -> planar.Arm:

@@ -27,7 +27,8 @@ class Design:
     The `tracer` is the joint of the locus; `signed` dimensions may be zero or
     negative. `check` raises ValueError for a mechanism of this type with invalid dimensions;
     by default every bar must have a length. Lines `in_space` are those
-    of `rod_lines`, with `inputs` as the given joints, by default the driven ones.
+    of `rod_lines`, with `inputs` as the given joints, by default the driven ones. `turned` are
+    whole turns, by input, from which its inputs are counted; see `Mechanism.turned`.
     """
 
     name: str
@@ -38,6 +39,7 @@ class Design:
     check: Optional[Callable] = None
     in_space: bool = False
     inputs: Tuple[str, ...] = ()
+    turned: Tuple[Tuple[str, float], ...] = ()
 
     @property
     def words(self) -> Any:

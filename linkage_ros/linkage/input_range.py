@@ -44,7 +44,7 @@ MOST = 100
 
 
 def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Callable,
-         places: Callable) -> List[Arc]:
+         places: Callable, step: float) -> List[Arc]:
     """
     Return the parts of the first input's range, each (lo, hi), on which no margin is negative.
 
@@ -53,22 +53,28 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
     margins : callable
         From values of the input, shape (n,), to margins, shape (limits, n).
     input_ : Input
-        The first input, in units of its size.
+        The first input, in units of its step.
     limits : sequence of Limit
         The limits of the margins.
     value : callable
         From an expression of dimensions to its value.
     places : callable
         From values of the input, shape (n,), to the coordinates of all joints, shape (any, n).
+    step : float
+        The step of the input [rad or m].
 
     """
     def assembled(theta: Any) -> Any:
         return _failing(margins, theta) == len(limits)
 
     closed = [limit for limit in limits if limit.ends and limit.ends.theta.args[0] == 0]
-    ends = [end + math.tau * turn for limit in closed for end in _crank_ends(limit, value)
-            for turn in range(int(input_.period))]
-    if input_.turns:
+    # Without a whole period, the turns on both sides of zero.
+    first, last = (0.0, input_.turn) if input_.wraps else (input_.low - math.tau / step,
+                                                           input_.high + math.tau / step)
+    turns = range(round(first * step / math.tau), round(last * step / math.tau))
+    ends = [(end + math.tau * turn) / step for limit in closed
+            for end in _crank_ends(limit, value) for turn in turns]
+    if input_.wraps:
         # The linkage may be assembled differently a turn later: the arcs then end at -pi and pi.
         ends.append(input_.low)
     if any(x.margin.varies and x not in closed for x in limits):
@@ -114,7 +120,7 @@ def _limits(margins: Callable, lo: float, hi: float) -> List[float]:
             lambda x, as_before=first[place][:, None]: _failing(margins, x) == as_before,
             theta[place], theta[place + 1])
         known, ends = len(ends), sorted({lo, hi, *before.tolist(), *after.tolist()})
-        if len(ends) == known or len(ends) > MOST:
+        if len(ends) == known or len(ends) > MOST * max(1.0, (hi - lo) / math.tau):
             break
     return ends[1:-1]
 
@@ -181,10 +187,10 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
             found[-1] = found[-1][0], hi
         else:
             found.append((lo, hi))
-    if (input_.turns and len(found) > 1 and found[0][0] + input_.turn - found[-1][1] <= NARROWEST
+    if (input_.wraps and len(found) > 1 and found[0][0] + input_.turn - found[-1][1] <= NARROWEST
             and joined()):
         found[-1] = found[-1][0], found.pop(0)[1] + input_.turn
-    return [(lo - input_.turn, hi - input_.turn) if input_.turns and lo >= input_.high
+    return [(lo - input_.turn, hi - input_.turn) if input_.wraps and lo >= input_.high
             else (lo, hi) for lo, hi in found]
 
 

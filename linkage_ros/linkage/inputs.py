@@ -25,9 +25,11 @@ Arc = Tuple[float, float]
 
 ANGLE, LENGTH = 'angle', 'length'
 
-# Longest period [turns] whose reach is computed: each turn costs as much as the first. The reach
-# of longer periods is that of one turn.
-MOST_COUNTED = 60
+# Longest period that is computed as a whole, and the part that is computed of a longer one [turns;
+# fewer where a geared link is fast]. Of several inputs it is the product, which is the cost.
+MOST_COUNTED, WINDOW = 1024, 64
+# Greatest denominator of a gear ratio with a period, and greatest ratio.
+MOST_TURNS, FASTEST = 10 ** 6, 1000
 # Values beyond an end of the reach by no more than this [rad] may be that end, rounded.
 ROUNDED_END = 1e-12
 # Arcs below this width [rad] are the rounding of one angle.
@@ -40,7 +42,9 @@ class Input(NamedTuple):
 
     All poses lie between `low` and `high`: one period of an angle, or the longest stroke.
     `period` is the number of turns after which poses repeat: above one if it drives cranks by
-    fractional gears or passes one change point per turn, infinite for irrational ratios.
+    fractional gears or passes one change point per turn, infinite for irrational ratios. Of a
+    very long period, `low` to `high` is a part, around zero. `speed` is that of the fastest link
+    that it drives by gears, in turns per turn.
     """
 
     name: str
@@ -48,6 +52,7 @@ class Input(NamedTuple):
     low: Any = -math.pi
     high: Any = math.pi
     period: float = 1
+    speed: float = 1
 
     @property
     def turn(self) -> float:
@@ -56,8 +61,13 @@ class Input(NamedTuple):
 
     @property
     def turns(self) -> bool:
-        """Whether it is an angle after whose period poses repeat."""
-        return self.kind == ANGLE and self.period < math.inf
+        """Whether it is an angle."""
+        return self.kind == ANGLE
+
+    @property
+    def wraps(self) -> bool:
+        """Whether it is an angle whose whole period lies between `low` and `high`."""
+        return self.kind == ANGLE and self.turn <= self.high - self.low
 
     @property
     def quantity(self) -> str:
@@ -74,21 +84,41 @@ class Input(NamedTuple):
         """Return a unit, a power of two [m], in which a stroke is about as long as a turn."""
         return 1.0 if self.kind == ANGLE else 2.0 ** (math.frexp(self.high - self.low)[1] - 2)
 
+    @property
+    def is_part(self) -> bool:
+        """Whether it is an angle of which only a part of the period is computed."""
+        return self.turns and not self.wraps
+
+    def whole_turns(self, near: Any) -> Any:
+        """Return the turns around which values are computed, if not those around zero."""
+        if not self.is_part:
+            return 0.0 * near
+        # Half of what is computed lies on both sides of a value by at least a quarter of it.
+        half = math.floor((self.high - self.low) / (2.0 * math.tau))
+        return half * np.round(near / (half * math.tau))
+
+    @property
+    def step(self) -> float:
+        """Return a unit, a power of two [rad or m], in which all of it moves a turn at most."""
+        return self.size if self.kind == LENGTH else 2.0 ** min(0, 3 - math.frexp(self.speed)[1])
+
     def counted(self) -> Input:
-        """Return the same input in units of its size."""
-        return self._replace(low=self.low / self.size, high=self.high / self.size)
+        """Return the same input in units of its step."""
+        step = self.step
+        return self._replace(low=self.low / step, high=self.high / step,
+                             period=self.period / step, speed=1)
 
     def wrapped(self, value: Any) -> Any:
         """Return angles wrapped to [low, high), and lengths unchanged."""
-        return wrapped(value, self.turn) if self.turns else value
+        return wrapped(value, self.turn) if self.wraps else value
 
     def turns_of(self, value: float) -> float:
         """Return the whole periods [rad] by which a value is out of [low, high)."""
-        return self.turn * math.floor(value / self.turn + 0.5) if self.turns else 0.0
+        return self.turn * math.floor(value / self.turn + 0.5) if self.wraps else 0.0
 
     def beside(self, value: Any, near: Any) -> Any:
         """Return values plus the whole turns that bring them closest to others."""
-        if not self.turns:
+        if not self.wraps:
             return value + 0.0 * near
         return value + self.turn * np.round((near - value) / self.turn)
 
@@ -97,30 +127,37 @@ class Input(NamedTuple):
         return abs(self.wrapped(value - other))
 
     def is_whole(self, arcs: Sequence[Arc]) -> bool:
-        """Return whether some arcs are a full rotation."""
-        return self.turns and len(arcs) == 1 and arcs[0][1] - arcs[0][0] >= self.turn
+        """Return whether some arcs are a full rotation, or all that is computed of one."""
+        return self.turns and len(arcs) == 1 and arcs[0][1] - arcs[0][0] >= min(
+            self.turn, self.high - self.low)
 
     def is_cut(self, value: float) -> bool:
         """Return whether the input is cut off at a value: a turn at pi, a stroke at its end."""
         return value in (self.low, self.high)
 
     def on(self, arcs: Sequence[Arc], value: float) -> bool:
-        """Return whether a value lies on one of the arcs, up to whole turns and rounding."""
+        """
+        Return whether a value lies on one of the arcs, up to whole turns and rounding.
+
+        Arcs of a part of a period say nothing of values outside it: these count as on them.
+        """
+        if self.is_part and (value < self.low or self.high < value):
+            return True
         slack = ROUNDED_END * self.size
         for low, high in arcs:
             ahead = value - low + slack
-            if 0.0 <= (ahead % self.turn if self.turns else ahead) <= high - low + 2.0 * slack:
+            if 0.0 <= (ahead % self.turn if self.wraps else ahead) <= high - low + 2.0 * slack:
                 return True
         return False
 
     def holds(self, arc: Arc, low: float, high: float) -> bool:
         """Return whether an arc contains another, up to whole turns."""
-        turns = self.turn * math.floor((high - arc[0]) / self.turn) if self.turns else 0.0
+        turns = self.turn * math.floor((high - arc[0]) / self.turn) if self.wraps else 0.0
         return arc[0] <= low - turns and high - turns <= arc[1]
 
     def within(self, low: float, high: float) -> Iterator[Arc]:
         """Yield an arc, in two where it crosses the upper end of a period."""
-        if not self.turns:
+        if not self.wraps:
             yield low, high
             return
         for turn in (0.0, self.turn):
@@ -131,14 +168,14 @@ class Input(NamedTuple):
     def between(self, ends: Iterable[float]) -> List[Arc]:
         """Return the arcs between values, in order; the last of a turn ends where it began."""
         marks: List[float] = []
-        inside = (end - self.turns_of(end) for end in ends) if self.turns else (
+        inside = (end - self.turns_of(end) for end in ends) if self.wraps else (
             end for end in (self.low, *ends, self.high) if self.low <= end <= self.high)
         for end in sorted(inside):
             if not marks or end - marks[-1] > NARROWEST:
                 marks.append(end)
         if not marks:
             return [(self.low, self.high)]
-        return list(zip(marks, marks[1:] + [marks[0] + self.turn] * self.turns))
+        return list(zip(marks, marks[1:] + [marks[0] + self.turn] * self.wraps))
 
 
 CRANK = Input('crank')

@@ -17,12 +17,14 @@ If the inverse linkage decomposes into dyads, each of its assembly modes is a cl
 
 from __future__ import annotations
 
-from itertools import chain, combinations
+from functools import partial
+from itertools import chain, combinations, takewhile
 import math
 from typing import (
     Any,
     cast,
     Dict,
+    Iterable,
     List,
     Mapping,
     NamedTuple,
@@ -51,8 +53,8 @@ from ..words import listed, quoted
 if TYPE_CHECKING:
     from .mechanism import Mechanism
 
-# Number of values of a path that are processed together.
-BLOCK = 1024
+# Number of values of a path that are processed together, and of solutions that are compared.
+BLOCK, GROUP = 1024, 32
 
 Ends = Optional[Sequence[Optional[Tuple[float, float]]]]
 
@@ -121,8 +123,8 @@ class Inverse:
     closed : InverseLinkage or None
         Joint lines and assembly modes of the inverse linkage; None if the inverse is searched.
     inputs : tuple of Input
-        The inputs of the linkage; see `InverseProblem`. Those of an infinite period have the
-        solutions of one turn.
+        The inputs of the linkage; see `InverseProblem`. One that `is_part` has the solutions of
+        the turns around zero, or around given inputs.
 
     """
 
@@ -131,7 +133,9 @@ class Inverse:
         blocks(linkage, outputs)
         self._problem = problem = InverseProblem(linkage, outputs)
         self.inputs, self._n = problem.inputs, len(outputs)
-        self.closed: Optional[InverseLinkage] = (
+        self._is_open = any(each.is_part for each in self.inputs)
+        # An inverse linkage has each input in one period, or else in one turn.
+        self.closed: Optional[InverseLinkage] = None if self._is_open else (
             taken_apart if linkage.axes == 'xy' else rods_taken_apart)(linkage, outputs)
         self._solver: Union[ClosedForm, Search] = ClosedForm(
             problem, self.closed) if self.closed else Search(problem)
@@ -177,6 +181,11 @@ class Inverse:
             If there is not one value for each output, and one finite `near` for each input.
 
         """
+        if near is not None and (there := self._elsewhere(self._one_each(near, 'near'))):
+            inverse, start, own = there
+            return [Answer(tuple(np.add(each, start).tolist()), self) for each, _ in inverse.all(
+                np.subtract(self._one_each(values), own), np.subtract(
+                    self._one_each(near), start))]
         found = [inputs for inputs, _ in self._all(self._one_each(values))]
         if near is not None:
             beside = self._finite(near, 'near')
@@ -184,6 +193,21 @@ class Inverse:
                            key=lambda x: sum(((a - b) / size) ** 2 for a, b, size in zip(
                                x, beside, self._problem.sizes)))
         return [Answer(inputs, self) for inputs in found]
+
+    def _elsewhere(self, near: Sequence[float]
+                   ) -> Optional[Tuple[Inverse, Sequence[float], Sequence[float]]]:
+        """
+        Return the inverse in the turns of some inputs, if it is not this one, and these turns.
+
+        These are the angles [rad] of each input, and of each output that is an input.
+        """
+        turns = [float(input_.whole_turns(x)) if math.isfinite(x) else 0.0
+                 for input_, x in zip(self.inputs, near)]
+        if not any(turns):
+            return None
+        start = {input_.name: math.tau * count for input_, count in zip(self.inputs, turns)}
+        return (self.linkage.turned(*turns).inverse(self.outputs), list(start.values()),
+                [start.get(name, 0.0) for name in self.outputs])
 
     def over(self, *values: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
         """
@@ -228,8 +252,13 @@ class Inverse:
     def _distinct(self, found: Sequence[Found]) -> List[Found]:
         """Return solutions in order, one of those that differ by rounding."""
         distinct: List[Found] = []
+        near, turn = NEIGHBOURS * self._problem.sizes[0], self._problem.turned[0][1]
         for answer in sorted(found):
-            if not any(self._are_one(answer, other) for other in distinct):
+            below, turned = answer[0][0] - near, answer[0][0] - (turn - near)
+            # Those just below, and those that are nearly a turn below.
+            beside = (*takewhile(partial(_is_above, below), reversed(distinct)),
+                      *takewhile(partial(_is_below, turned), distinct))
+            if not any(self._are_one(answer, other) for other in beside):
                 distinct.append(answer)
         return distinct
 
@@ -252,7 +281,13 @@ class Inverse:
     def _single(self, inputs: np.ndarray, rates: np.ndarray) -> None:
         """Make NaN all but one of the solutions that differ by rounding."""
         doubtful = np.zeros(inputs.shape[2], bool)
-        for one, two in combinations(inputs, 2):
+        pairs: Iterable[Tuple[np.ndarray, np.ndarray]] = combinations(inputs, 2)
+        if self._n == 1:
+            ordered = np.sort(inputs, axis=0)
+            last = np.isfinite(ordered).sum(axis=0, keepdims=True).clip(1) - 1
+            ends = ordered[0], np.take_along_axis(ordered, last, 0)[0]
+            pairs = [*zip(ordered[:-1], ordered[1:]), *[ends] * (len(ordered) > 2)]
+        for one, two in pairs:
             away = self._problem.away(one, two)
             with np.errstate(invalid='ignore'):
                 doubtful |= away <= self._n * NEIGHBOURS ** 2
@@ -344,6 +379,8 @@ class Inverse:
         limits, values = self._limits(ends), self._each(values)
         near = None if near is None else self._each(near, 'near')
         given = (*values, *(near or ()), *chain(*limits))
+        if near and self._is_open:
+            return self._nearest_in_turns(values, near, limits)
         if set(map(type, given)) == {float}:
             return self._chosen(self._solutions(values), near, limits)[1:]
         if not self.closed:
@@ -360,6 +397,23 @@ class Inverse:
                 tuple(one[:self._n])), near and one[self._n:], limits)[1:])]
         found = [row.reshape(arrays[0].shape) for row in rows[1:]]
         return tuple(found[:self._n]), tuple(found[self._n:])
+
+    def _nearest_in_turns(self, values: Sequence[Any], near: Sequence[Any], limits: Sequence
+                          ) -> Tuple[Any, Any]:
+        """Return what `nearest` does, each value by the inverse in the turns of its inputs."""
+        arrays = np.broadcast_arrays(*values, *near)
+        found = np.full((self._n + self._n ** 2, *arrays[0].shape), np.nan)
+        for place in np.ndindex(arrays[0].shape):
+            one = [float(each[place]) for each in arrays]
+            inverse, start, own = self._elsewhere(one[self._n:]) or (
+                self, [0.0] * self._n, [0.0] * self._n)
+            inputs, rates = inverse._chosen(
+                inverse._solutions(tuple(np.subtract(one[:self._n], own).tolist())),
+                np.subtract(one[self._n:], start).tolist(),
+                [tuple(np.subtract(pair, turn).tolist()) for pair, turn in zip(limits, start)])[1:]
+            found[(slice(None), *place)] = [*np.add(inputs, start), *rates]
+        rows = found.tolist() if {*map(type, (*values, *near))} == {float} else found
+        return tuple(rows[:self._n]), tuple(rows[self._n:])
 
     def path(self, values: Sequence[np.ndarray], near: Optional[Sequence[float]] = None,
              ends: Ends = None) -> Tuple[Any, Any]:
@@ -385,6 +439,14 @@ class Inverse:
             raise self._miscounted(values, 'values')
         inputs, rates = self._found(rows)
         limits, beside = self._limits(ends), None if near is None else self._finite(near, 'near')
+        if beside and (there := self._elsewhere(beside)):
+            inverse, start, own = there
+            inputs, rates = inverse.path(
+                [row - turn for row, turn in zip(rows, own)],
+                np.subtract(beside, start).tolist(), [
+                    (pair[0] - turn, pair[1] - turn) if pair else None
+                    for pair, turn in zip(limits, start)])
+            return tuple(row + turn for row, turn in zip(inputs, start)), rates
         found = np.full((self._n + self._n ** 2, inputs.shape[2]), np.nan)
         breaks: Dict[int, np.ndarray] = {}
         at, known = 0, np.flatnonzero(self._may_be_inside(inputs, limits))
@@ -448,6 +510,13 @@ class Inverse:
         n = self._n
         if not answers:
             return 0.0, (math.nan,) * n, (math.nan,) * (n * n)
+        if len(answers) > GROUP:
+            groups = [self._chosen(answers[k:k + GROUP], near, limits)
+                      for k in range(0, len(answers), GROUP)]
+            rank, *chosen = self._chosen([(x, rates) for _, x, rates in groups], near, limits)
+            ranks = np.stack(np.broadcast_arrays(*(
+                k * GROUP + group[0] for k, group in enumerate(groups))))
+            return (np.take_along_axis(ranks, np.asarray(rank, int)[None], 0)[0], *chosen)
         choose = self._choice(len(answers), near is not None, tuple(map(bool, limits)))
         rank, *found = choose(*chain.from_iterable(chain(*answer) for answer in answers),
                               *(near or ()), *chain(*limits))
@@ -488,6 +557,10 @@ class Inverse:
         values, near = self._one_each(values), self._one_each(near, 'near')
         if not all(map(math.isfinite, (*values, *near))):
             return (math.nan,) * self._n, (math.nan,) * self._n ** 2
+        if there := self._elsewhere(near):
+            inverse, start, own = there
+            inputs, rates = inverse.follow(np.subtract(values, own), np.subtract(near, start))
+            return tuple(np.add(inputs, start).tolist()), rates
         return self._solver.follow(self._problem.reduced(values), near)
 
     # --- the working mode ---
@@ -529,3 +602,11 @@ def _broadcast(values: Sequence[Any]) -> Sequence[np.ndarray]:
 
 def _sign(value: float, size: float) -> int:
     return int(np.sign(value)) if abs(value) > SINGULAR * size else 0
+
+
+def _is_above(least: float, answer: Found) -> bool:
+    return answer[0][0] >= least
+
+
+def _is_below(most: float, answer: Found) -> bool:
+    return answer[0][0] <= most

@@ -415,7 +415,7 @@ class _Sketch(Dyads):
 
     def _read(self, by: int, input_: Input) -> _Read:
         """Return where an input is read: from its own link, or from one that is geared to it."""
-        counted = self._linkage.period(by) == input_.period or not input_.turns
+        counted = not input_.is_part
         for name in (input_.name, *(self._linkage.geared_to(by) if counted else ())):
             try:
                 ends = self._ends(self._links[name])
@@ -423,7 +423,7 @@ class _Sketch(Dyads):
                 continue
             ratio, offset = (1.0, 0.0) if name == input_.name else self._linkage.gear(name, by)
             is_output = name in self._outputs and name == input_.name
-            count = round(abs(ratio) * input_.period) if input_.turns and not is_output else 1
+            count = round(abs(ratio) * input_.period) if input_.wraps and not is_output else 1
             return _Read(name, ends, ratio, offset, tuple(
                 turn * math.tau / abs(ratio) for turn in range(count)))
         raise ValueError(f'{input_.name} is not placed')

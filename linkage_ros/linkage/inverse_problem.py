@@ -48,8 +48,8 @@ class InverseProblem:
     Attributes
     ----------
     inputs : tuple of Input
-        Those of the linkage. If the gears of one repeat only after very many turns, its period is
-        that of the outputs, or infinite if they have none.
+        Those of the linkage. If one repeats only after very many turns, its period is that of the
+        outputs, if they repeat earlier.
     angular : list of bool
         For each output, whether it is an angle.
     scales, sizes : list of float
@@ -73,20 +73,20 @@ class InverseProblem:
         self.inputs = tuple(map(self._coming_round, range(len(outputs)), linkage.inputs))
         # An output that is an input has its period.
         fixed = {input_.name: input_ for input_ in self.inputs}
-        self.periods = [math.inf if not angular or name in fixed and not fixed[name].turns else
+        self.periods = [math.inf if not angular or name in fixed and not fixed[name].wraps else
                         fixed[name].turn if name in fixed else math.tau
                         for name, angular in zip(outputs, self.angular)]
-        self.turned = [(0.5 * input_.turn, input_.turn, LEAST) if input_.turns else
+        self.turned = [(0.5 * input_.turn, input_.turn, LEAST) if input_.wraps else
                        (math.inf, math.inf, LEAST * input_.size) for input_ in self.inputs]
 
     def _coming_round(self, by: int, input_: Input) -> Input:
         """Return an input with the period of the outputs if its own has too many turns."""
-        if not input_.turns or self.linkage.period(by) == input_.period:
+        if not input_.is_part:
             return input_
         rates = [self.linkage.gear(name, by)[0] for name in self.linkage.geared_to(by)]
-        periods = (1.0, *(1.0 / abs(rate) for rate in rates if abs(rate) > 1.0), math.inf)
-        return next(each for each in (input_._replace(period=period) for period in periods)
-                    if not each.turns or is_periodic(partial(self._outputs_over, by), each))
+        periods = (1.0, *(1.0 / abs(rate) for rate in rates if rate))
+        return next((each for each in (input_._replace(period=period) for period in periods)
+                     if each.wraps and is_periodic(partial(self._outputs_over, by), each)), input_)
 
     def _outputs_over(self, by: int, values: np.ndarray) -> np.ndarray:
         """Return the outputs, angles as directions, over one input; the others are spread."""
@@ -119,7 +119,7 @@ class InverseProblem:
 
     def next_to(self, inputs: Sequence[float], near: Sequence[float]) -> Tuple[float, ...]:
         """Return inputs plus the whole turns that bring them closest to others."""
-        return tuple(x + input_.turn * round((y - x) / input_.turn) if input_.turns else x
+        return tuple(x + input_.turn * round((y - x) / input_.turn) if input_.wraps else x
                      for input_, x, y in zip(self.inputs, inputs, near))
 
     def jacobian(self, rates: Sequence[float]) -> np.ndarray:

@@ -38,10 +38,10 @@ Each driven joint is an input, called `crank`, `crank2`, `cylinder` and so on, o
 The name of a joint or dimension is a letter, followed by letters, digits and underscores. `left`
 and `right` are as seen along the first two joints; `out` is the half of a slot on the tip's side,
 or the block ahead of the pin; `in` the other. A number is a length [m], an angle [rad], a
-dimension's name, or arithmetic on them without spaces: + - * / and parentheses, max(a,b), sqrt(a),
-`pi`, and for angles degrees: 30deg or (a+b)deg. It is zero or between 1e-70 and 1e70; an angle
-beyond a turn is written with `deg` or `pi`. A dimension that is the length of a bar must be
-positive; other dimensions may be zero or negative.
+dimension's name, or arithmetic on them without spaces: + - * / and parentheses, `max(a,b)`,
+`sqrt(a)`, `pi`, and for angles degrees: `30deg` or `(a+b)deg`. It is zero or between 1e-70 and
+1e70; an angle beyond a turn is written with `deg` or `pi`. A dimension that is the length of a bar
+must be positive; other dimensions may be zero or negative.
 
 A dyad stays on its side of first -> second as long as it can be assembled. The exception is a
 change point: a dyad between a ground joint and a crank pin stretches or folds just as the crank
@@ -50,7 +50,10 @@ two). There it continues smoothly and changes sides: a parallelogram stays a par
 line then has the side at a crank angle of a quarter turn. The block of a slider on a crank pin
 continues smoothly, too, where the rod is square to the line; `out` and `in` are then as they are
 where the pin is farthest along the line. A linkage with one change point in a turn repeats only
-after two turns: its crank angle counts beyond a turn.
+after two turns: its crank angle counts beyond a turn. Where an arm has no length, what stands on
+it has the limit from both sides if they agree, as at a change point, and else no place.
+
+A gear's ratio is a number up to 1000. Poses repeat after as many turns as its denominator says.
 """
 
 from __future__ import annotations

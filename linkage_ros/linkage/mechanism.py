@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from importlib.util import find_spec
 import math
 from types import MappingProxyType
 from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple, TypeVar, Union
@@ -29,19 +28,18 @@ from .arguments import checked_dimensions, numbers
 from .builder import in_metres, UNIT
 from .design import Design
 from .input_range import arcs, is_periodic
-from .inputs import Arc, Input, MOST_COUNTED, spread
+from .inputs import Arc, FASTEST, Input, MOST_COUNTED, MOST_TURNS, spread, WINDOW
 from .inverse import Answer, Inverse
 from .quantities import LinkPoint, Points, structure_of
 from ..cache import Cache
 from ..formula.expression import derivative, Real, real
 from ..formula.program import evaluate, Pose, Program
+from ..optional import needs
 from ..words import listed, meant, plain_text, quoted
 
 # Lengths beyond these have a unit of their own, a power of two. It changes no bit of a result and
 # keeps squares and products of lengths inside the range of float64.
 SMALL_LENGTH, LARGE_LENGTH = 1e-30, 1e30
-# Largest denominator of a gear ratio; other ratios are rounded to such a fraction.
-MOST_TURNS = 1000
 # Cached values of expressions of dimensions: some twenty times those of Jansen's leg.
 MOST_VALUES = 10000
 # Quantities of joints; all others are of links.
@@ -217,6 +215,11 @@ class Mechanism:
             check(self.design.lines, self)
         else:
             check_bars(self)
+        for by, input_ in enumerate(self.inputs):
+            for name in self.geared if input_.speed > FASTEST else ():
+                if abs(ratio := self.gear(name, by)[0]) > FASTEST:
+                    raise ValueError(f'{self.type}: {name} turns {abs(ratio):g} times as fast as '
+                                     f'the {input_.name}; allowed: {FASTEST} times')
 
     def with_dimensions(self, /, **changed: ArrayLike) -> Mechanism:
         """Return a copy with other dimensions [m]; raises ValueError as `create` does."""
@@ -245,6 +248,18 @@ class Mechanism:
         made.check()
         return made
 
+    def turned(self: Own, *turns: float) -> Own:
+        """
+        Return the same linkage, each input counted from so many whole turns on.
+
+        Gears make it another one. Of an input whose period is very long, reach, dead points and
+        inverse are those of the turns around zero, and so of any others.
+        """
+        counts = tuple((input_.name, float(count)) for input_, count in zip(self.inputs, turns))
+        return self.cache.get_or_make(('turned', counts), lambda: type(self)(
+            replace(self.design, turned=counts), self.dimensions, self.branches,
+            self.is_accelerated))
+
     def accelerated(self) -> Mechanism:
         """
         Return a copy that solves arrays by compiled code, large ones on all cores.
@@ -252,29 +267,36 @@ class Mechanism:
         The first call for a set of points compiles for about 0.1 s. Sine, cosine and arctangent
         are its own and satisfy the rule for errors. A pose is the same in any array, on any number
         of cores, but its last digits may differ from those of a single pose. Raises ImportError
-        without llvmlite.
+        without an llvmlite that works.
         """
-        if not find_spec('llvmlite'):
-            raise ImportError('accelerated() needs llvmlite: pip install llvmlite')
+        with needs('llvmlite'):
+            from ..formula import llvm_arrays  # noqa: F401
         return self.cache.get_or_make('accelerated', lambda: type(self)(
             self.design, self.dimensions, self.branches, True))
 
-    def period(self, by: int = 0) -> int:
+    def period(self, by: int = 0) -> float:
         """
-        Return the number of turns of an input after which the pose repeats.
+        Return the number of turns of an input after which the pose repeats: `inputs[by].period`.
 
         It is above one if the input drives cranks by fractional gears, or if it passes one change
-        point per turn. Gear ratios are rounded to fractions with denominators up to MOST_TURNS.
-        With arrays of dimensions, change points are ignored.
+        point per turn, and infinite if a gear ratio is no fraction with a denominator up to
+        MOST_TURNS. With arrays of dimensions, change points are ignored.
         """
-        return self.cache.get_or_make(('period', by), lambda: self._period(by))
+        return self.inputs[self._checked_by(by)].period
 
-    def _period(self, by: int) -> int:
-        ratios = [np.ravel(self.value(derivative(value, {by: 1.0}, {})))
-                  for _, value in self.structure.built.driven.values()]
-        turns = math.lcm(*(Fraction(float(ratio)).limit_denominator(MOST_TURNS).denominator
-                           for each in ratios for ratio in each if math.isfinite(ratio)))
-        if turns > MOST_COUNTED or not self._passes_change_point(by):
+    def _ratios(self, by: int) -> List[float]:
+        """Return the turns of each driven link per turn of an input."""
+        each = [np.ravel(self.value(derivative(value, {by: 1.0}, {})))
+                for _, value in self.structure.built.driven.values()]
+        return [float(ratio) for ratios in each for ratio in ratios if math.isfinite(ratio)]
+
+    def _period(self, by: int, ratios: Sequence[float], most: float) -> float:
+        fractions = [Fraction(ratio).limit_denominator(MOST_TURNS) for ratio in ratios]
+        if any(abs(float(fraction) - ratio) > 4.0 * math.ulp(ratio)
+               for fraction, ratio in zip(fractions, ratios)):
+            return math.inf
+        turns = math.lcm(*(fraction.denominator for fraction in fractions))
+        if turns > most or not self._passes_change_point(by):
             return turns
         return turns if is_periodic(lambda theta: self._points_over(by, theta), Input(
             '', low=-math.pi * turns, high=math.pi * turns, period=turns)) else 2 * turns
@@ -297,9 +319,13 @@ class Mechanism:
         """Return an input with the limits [rad or m] of all poses."""
         if not input_.turns:
             return self._with_stroke(input_)
-        period = self.period(by)
-        period = period if period <= MOST_COUNTED else 1
-        return input_._replace(low=-math.pi * period, high=math.pi * period, period=period)
+        ratios = self._ratios(by)
+        input_ = input_._replace(speed=max(1.0, *map(abs, ratios)))
+        most, window = (input_.step * count ** (1.0 / len(self.structure.built.inputs))
+                        for count in (MOST_COUNTED, WINDOW))
+        period = self._period(by, ratios, most)
+        turns = period if period <= max(most, 1.0) else max(2.0, 2.0 * round(0.5 * window))
+        return input_._replace(low=-math.pi * turns, high=math.pi * turns, period=period)
 
     def _with_stroke(self, input_: Input) -> Input:
         """Return an input with its stroke [m]; an angle is unchanged."""
@@ -596,11 +622,11 @@ class Mechanism:
         if margins.shape:
             raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
                              'not for arrays')
-        first = self.inputs[0]
-        return [(lo * first.size, hi * first.size) for lo, hi in arcs(
-            lambda value: margins.searched(value * first.size, *others), first.counted(),
+        step = self.inputs[0].step
+        return [(lo * step, hi * step) for lo, hi in arcs(
+            lambda value: margins.searched(value * step, *others), self.inputs[0].counted(),
             self.structure.built.limits, self.value,
-            lambda theta: self._ready('points', None)[1].searched(theta, *others))]
+            lambda theta: self._ready('points', None)[1].searched(theta * step, *others), step)]
 
     def dead_points(self, *others: float) -> list:
         """
@@ -610,7 +636,7 @@ class Mechanism:
         or pi, and the input alone does not determine the motion. Crank angles are in
         [-pi, pi). Raises ValueError as `reach` does.
         """
-        return [dead * self.inputs[0].size
+        return [dead * self.inputs[0].step
                 for dead in Analysis(self, self._fixed(others)).dead_points()]
 
     def distance_to_dead_point(self, theta: ArrayLike, *others: float) -> Any:
@@ -638,7 +664,7 @@ class Mechanism:
         Each piece has the input [rad or m] and the output at both ends; the output changes by
         `most` at most. The code computes the output and its rate.
         """
-        size = self.inputs[0].size
+        size = self.inputs[0].step
         self.check_output(output)
         return [(low * size, high * size, *values) for low, high, *values
                 in Analysis(self, self._fixed(others)).branches(output).pieces(most)

@@ -53,7 +53,7 @@ def in_order(answers: np.ndarray, input_: Input) -> np.ndarray:
     if len(rows) > 1:
         rows[1:][np.diff(rows, axis=0) <= CLOSE] = np.nan
         last = np.nanmax(rows, axis=0, initial=-np.inf)
-        again = input_.turns & (rows == last) & (last - rows[0] >= input_.turn - CLOSE)
+        again = input_.wraps & (rows == last) & (last - rows[0] >= input_.turn - CLOSE)
         rows = np.sort(np.where(again, np.nan, rows), axis=0)
     most = int(np.isfinite(rows).sum(axis=0).max(initial=0))
     rows = rows[:max(most, 1)] if len(rows) else np.full((1, answers.shape[1]), np.nan)

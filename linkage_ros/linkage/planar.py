@@ -58,6 +58,11 @@ LEFT, RIGHT = 1.0, -1.0
 
 # A margin counts as zero within rounding: eight half ulps of the scale.
 TOLERANCE = 8 * 2.0 ** -53
+# Added to a cosine that may vanish where the quotient of two zeros has a limit: its square is a
+# normal number, and it is far below the rounding of a direction.
+TINY = 2.0 ** -330
+# An arm whose square is smaller has no direction: squares below lose digits, or are zero.
+LEAST_SQUARE = 2.0 ** -1000
 
 
 @dataclass(frozen=True)
@@ -131,6 +136,9 @@ class Limit(NamedTuple):
 class Arm:
     """The arm between two moving points; a given length is constant."""
 
+    _length: Optional[Real] = None
+    _is_smooth = False
+
     def __init__(self, foot: Complex, vector: Complex, span: Real, length: Optional[Real] = None):
         self.foot = foot
         self.vector = vector
@@ -138,6 +146,17 @@ class Arm:
         self.square = vector.squared() if length is None else gated(
             square(length), abs(vector.x), real(0.0))
         self._span, self._length = span, length
+
+    @property
+    def divisor(self) -> Real:
+        """Its square, NaN where it has no direction."""
+        return self.square if self._length or self._is_smooth else gated(
+            self.square, self._clear - LEAST_SQUARE, real(0.0))
+
+    @property
+    def _clear(self) -> Real:
+        """Return a square that is not tiny where the arm has a direction."""
+        return self.square
 
     @property
     def length(self) -> Optional[Real]:
@@ -172,7 +191,7 @@ class Arm:
 
     def across(self, point: Complex, offset: Real) -> Complex:
         """Return the vector from a point of this offset to its mirror image in the arm's line."""
-        return self.vector.turned() * (-2.0 * offset / self.square)
+        return self.vector.turned() * (-2.0 * offset / self.divisor)
 
     def _with_rate(self, margin: Real, radius: Real, sign: float) -> Real:
         return with_rate(margin, self.square, radius, formula=lambda rate, growth: (
@@ -187,21 +206,29 @@ class Arm:
 
 
 class CrankArm(Arm):
-    """The arm from a ground point to a crank pin, or back if `reverse`, from half angles."""
+    """
+    The arm from a ground point to a crank pin, or back if `reverse`, from half angles.
 
-    def __init__(self, ground: Complex, crank: Crank, reverse: bool = False):
+    An arm between two equal lengths, g = m, vanishes once in a turn, and then its direction
+    e^(i theta'/2) only changes its sign. A `smooth` arm is for what does not depend on that sign:
+    its h is never zero.
+    """
+
+    def __init__(self, ground: Complex, crank: Crank, reverse: bool = False,
+                 smooth: bool = False):
         line = crank.centre - ground
         g, m = line.length(), crank.length
         along = line.direction()
         turn = crank.zero * along.conjugate()
         s, h = _half_angle(crank.angle, turn)
+        h = h + where(abs(g - m) <= 0.0, TINY, 0.0) if smooth else h
         vector = along * Complex((g - m) + 2.0 * m * square(h), 2.0 * m * s * h)
         self.foot = crank.centre + crank.bar() if reverse else ground
         self.square = square(g - m) + 4.0 * g * m * square(h)
         self._crank, self._along, self._turn = crank, -along if reverse else along, turn
         self._line = along
         self._area = 2.0 * g * m * s * h * (1.0 if reverse else -1.0)
-        self._g, self._m, self._s, self._h = g, m, s, h
+        self._g, self._m, self._s, self._h, self._is_smooth = g, m, s, h, smooth
         bar = crank.bar()
         vector = Complex(
             with_rate(vector.x, crank.angle, formula=lambda rate: -(rate * bar.y)),
@@ -213,22 +240,16 @@ class CrankArm(Arm):
         self.vector = -vector if reverse else vector
 
     @property
+    def _clear(self) -> Real:
+        return square(self._h) + where(self._is_isosceles, 0.0, 1.0)
+
+    @property
     def _is_isosceles(self) -> Real:
         return abs(self._g - self._m) <= 0.0
 
     def offset(self, point: Complex, relative: Complex) -> Real:
         """Return the cross product of the arm and a point relative to its foot."""
         return self._area if point is self._crank.centre else super().offset(point, relative)
-
-    def across(self, point: Complex, offset: Real) -> Complex:
-        """Return the vector from a point of this offset to its mirror image in the arm's line."""
-        vector = super().across(point, offset)
-        if point is not self._crank.centre:
-            return vector
-        s, m = self._s, self._m
-        centre = self._line.turned() * Complex(self._h, s) * (2.0 * m * s)
-        return Complex(where(self._is_isosceles, centre.x, vector.x),
-                       where(self._is_isosceles, centre.y, vector.y))
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
@@ -252,7 +273,7 @@ class CrankArm(Arm):
         and arm are the parallel sides of a trapezoid; their product is |first^2 - second^2|.
         """
         power = gated((first - second) * (first + second), self.square, real(0.0))
-        return self.vector * (power / self.square)
+        return self.vector * (power / self.divisor)
 
     def _half_angle_limit(self, radius: Real, size: Real, sign: float, start: Real,
                           end: Real) -> Limit:
@@ -277,7 +298,8 @@ class CrankArm(Arm):
         """
         g, m, s, sin = self._g, self._m, self._s, 2.0 * self._s * self._h
         lead = (g + m) * ((g + m) + k * (m - g))
-        across = m * sin * (lead - 4.0 * g * m * square(s)) / self.square
+        lead = where(self._is_isosceles, self.square, lead - 4.0 * g * m * square(s))
+        across = m * sin * lead / self.square
         along = (1.0 + k) * m * (1.0 - 2.0 * square(s)) + \
             2.0 * k * g * square(m * sin) / self.square
         return self._crank.centre + self._line * Complex(along, across)
@@ -329,7 +351,7 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) 
     radius = first + second
     limits = arm.within(radius, radius), arm.beyond(first - second, radius)
     v = _height(arm, limits, side, smooth)
-    skew = _nan_with(v, arm.vector, (first - second) * radius / (2.0 * arm.square))
+    skew = _nan_with(v, arm.vector, (first - second) * radius / (2.0 * arm.divisor))
     u, turning = 0.5 + skew, spin(arm.vector)
 
     def bar(along: Real, length: Real) -> Complex:
@@ -344,7 +366,7 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) 
 def _height(arm: Arm, limits: Sequence[Limit], side: float, smooth: bool) -> Real:
     """Return the distance of a dyad's joint to the left of its arm, in lengths of the arm."""
     within, beyond = (x.smooth if smooth and x.smooth else x.root() for x in limits)
-    return within * beyond / (2.0 * arm.square) * side
+    return within * beyond / (2.0 * arm.divisor) * side
 
 
 def extended(arm: Arm, first: Real, second: Real, side: float, longest: Real) -> Dyad:
@@ -363,7 +385,7 @@ def extended(arm: Arm, first: Real, second: Real, side: float, longest: Real) ->
     v = _height(arm, limits, side, False)
     twice = where(square(first) <= arm.square, power + square(first),
                   (first - second) * (first + second) + arm.square)
-    u = _nan_with(v, arm.vector, twice / (2.0 * arm.square))
+    u = _nan_with(v, arm.vector, twice / (2.0 * arm.divisor))
     growth, turning = _growth(arm, first, second, v), spin(arm.vector)
 
     def with_growing(bar: Complex, grown: Real, widened: Real) -> Complex:
@@ -488,7 +510,7 @@ def inversor(arm: Arm, long: Real, short: Real) -> Inversor:
     left = dyad(arm, long, short, LEFT, smooth=False)
     power = (long - short) * (long + short)
     straight = arm.inverse_of_isosceles() if isinstance(arm, CrankArm) else None
-    inverse = (arm.vector * (power / arm.square) if straight is None else straight * power)
+    inverse = (arm.vector * (power / arm.divisor) if straight is None else straight * power)
     return Inversor(right, left, _where_assembled(inverse, right.limits))
 
 
@@ -516,12 +538,12 @@ def slot(arm: Arm, offset: Real, half: float) -> Slot:
     limit = arm.beyond(offset, abs(offset))
     slide = limit.root() * half
     central, aside = abs(offset) <= 0.0, arm.vector * Complex(slide, -offset)
-    along = Complex(where(central, arm.vector.x * half, aside.x),
-                    where(central, arm.vector.y * half, aside.y))
+    along = Complex(*(gated(where(central, way * half, part), arm.divisor, real(0.0)) for way, part
+                      in ((arm.vector.x, aside.x), (arm.vector.y, aside.y))))
     turning = spin(arm.vector)
     return Slot(with_spin(along.direction(), Rate(
         (slide, *turning.of), lambda rate, *rates: turning.formula(*rates) + where(
-            central, 0.0, offset * rate / arm.square))), slide, limit)
+            central, 0.0, offset * rate / arm.divisor))), slide, limit)
 
 
 class Rail:

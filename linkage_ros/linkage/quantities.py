@@ -77,7 +77,7 @@ class Structure:
     """Formulas of a design with its branches, which all its mechanisms share."""
 
     def __init__(self, design: Design, branches: Mapping[str, Any]):
-        self.built = Builder()
+        self.built = Builder(dict(design.turned))
         given = {'inputs': design.inputs} if design.inputs else {}
         design.words.draw(self.built, design.lines, joint_lines.symbols_of(
             design.dimensions, design.signed), branches, **given)

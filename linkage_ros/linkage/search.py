@@ -126,16 +126,17 @@ class BranchSearch:
 
     def answers(self, values: np.ndarray) -> np.ndarray:
         """Return all inputs (answers, 1, n) for values (1, n), NaN where there are fewer."""
-        inputs = self._branches.answers(values[0])[:, None] * self._input.size
+        inputs = self._branches.answers(values[0])[:, None] * self._input.step
         return np.asarray(self._input.wrapped(
-            np.where(np.abs(inputs) < LEAST * self._input.size, 0.0, inputs)))
+            np.where(np.abs(inputs) < LEAST * self._input.step, 0.0, inputs)))
 
     def follow(self, values: Sequence[float], near: Sequence[float]) -> Found:
         """Return the solution that is continuous from given inputs, and the rates."""
         input_ = self._input
         turns = input_.turns_of(near[0])
-        found, rate = self._branches.follow(self._pose.at, input_.size, values[0], near[0] - turns,
-                                            input_.turn if input_.turns else math.inf)
+        turn = input_.turn / input_.step if input_.wraps else math.inf
+        found, rate = self._branches.follow(self._pose.at, input_.step, values[0],
+                                            near[0] - turns, turn)
         return (found + turns,), (rate,)
 
 
@@ -145,7 +146,7 @@ class StepSearch:
     def __init__(self, linkage: Mechanism, outputs: Names, turns: Sequence[float]):
         self._linkage = linkage
         self.outputs, self.inputs = outputs, [input_.counted() for input_ in linkage.inputs]
-        self.sizes = np.array([input_.size for input_ in linkage.inputs])
+        self.sizes = np.array([input_.step for input_ in linkage.inputs])
         # The period of each output; outputs that are inputs, by their numbers in both.
         self._turns = np.array(turns)
         self._given = {outputs.index(input_.name): by for by, input_ in enumerate(self.inputs)
@@ -227,7 +228,7 @@ class StepSearch:
             q = q.copy()
             for by, x in zip(columns, (q[:, columns] + step).T):
                 input_ = self.inputs[by]
-                q[:, by] = input_.wrapped(x) if input_.turns else x.clip(input_.low, input_.high)
+                q[:, by] = input_.wrapped(x) if input_.wraps else x.clip(input_.low, input_.high)
             return q
 
         def beyond(q: np.ndarray) -> np.ndarray:

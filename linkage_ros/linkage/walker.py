@@ -15,7 +15,7 @@ Pair j of N has its left leg at theta - 2 pi j/N and its right leg, the mirror i
 leg at pi - (theta - 2 pi j/N), on the same crank pin.
 """
 
-from importlib.util import find_spec
+from contextlib import suppress
 import math
 from struct import Struct
 from typing import Any, List, NamedTuple, Optional, Sequence, Union
@@ -75,7 +75,7 @@ class Solution:
     A solver of all legs, and the numbers of its last solution: `values`, in a `Layout`.
 
     `function` is the result of `Mechanism.legs`. Several legs are solved by machine code, where
-    llvmlite is installed and as soon as the code is compiled; otherwise by plain Python, which
+    llvmlite works and as soon as the code is compiled; otherwise by plain Python, which
     returns the same bits.
     """
 
@@ -90,9 +90,10 @@ class Solution:
         # Each leg, with the place of its row [bytes].
         self._legs = [(i * self.rows.strides[0], leg) for i, leg in enumerate(legs)]
         self._batch: Optional[Batch] = None
-        if len(legs) > 1 and find_spec('llvmlite'):
-            self._batch = function.batch(self.rows)
-            self._batch.arguments[2 * layout.inputs:].T[:] = legs
+        if len(legs) > 1:
+            with suppress(ImportError):
+                self._batch = function.batch(self.rows)
+                self._batch.arguments[2 * layout.inputs:].T[:] = legs
 
     def solve(self, inputs: Sequence[float], speeds: Sequence[Any] = ()) -> bool:
         """

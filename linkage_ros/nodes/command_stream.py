@@ -18,12 +18,13 @@ import math
 import time
 from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Sequence
 
+from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from . import joint_state_reader
-from .log import Once, Throttle
+from .log import NAMES, Once, Throttle
 from .message_layout import NEVER, pack_time, unpack
 from .messages import joint_states
 from .publishers import PatchedPublisher, TrackedPublisher
@@ -36,9 +37,9 @@ from ..words import elided, listed
 
 # Pause after a search for a first command [s]; and at least as many times the search's duration.
 SECONDS_BETWEEN_SEARCHES, PAUSES = 0.5, 9.0
-# Maximum numbers of cached publishers, of logged unknown names, and of points of a trajectory,
-# which take the worker some seconds.
-PUBLISHERS, UNKNOWN_NAMES, MOST_POINTS = 100, 1000, 10_000
+# Maximum numbers of cached publishers, and of points of a trajectory, which take the worker some
+# seconds.
+PUBLISHERS, MOST_POINTS = 100, 10_000
 
 
 class Target(NamedTuple):
@@ -117,7 +118,7 @@ class CommandStream:
         self._arrays = {name: TrackedPublisher(node, Float64MultiArray, f'{name}/commands', 10)
                         for name in mechanisms}
         self._trajectories = TrackedPublisher(node, JointTrajectory, 'servo_trajectory', 10)
-        self._throttle, self._unknown = Throttle(self._logger), Once(UNKNOWN_NAMES)
+        self._throttle, self._unknown = Throttle(self._logger), Once(NAMES)
         self._searched = Throttle(self._logger)
         self._machines: Mapping[str, SceneMechanism] = {}
         self._last: dict[str, Command] = {}
@@ -153,14 +154,14 @@ class CommandStream:
 
     def _targets(self, names: Sequence[str]) -> tuple[list[Target], list[str], list[str]]:
         """
-        Return three lists for the output names in a message.
+        Return three lists for the output names in a message; of a repeated name the last counts.
 
         They are the targets, the names that are no outputs, and the reasons why a mechanism with
         outputs in the message has no target.
         """
         found: dict[str, list[tuple]] = {}
         targets, unknown, reasons = [], [], []
-        for index, named in enumerate(names):
+        for named, index in dict(zip(names, range(len(names)))).items():
             if output := self._output(named):
                 found.setdefault(output[0].name, []).append((index, *output[1:]))
             else:
@@ -286,6 +287,8 @@ class CommandStream:
         try:
             if len(message.points) > MOST_POINTS:
                 raise ValueError(f'it has {len(message.points)} points; send up to {MOST_POINTS}')
+            if len({*message.joint_names}) < len(message.joint_names):
+                raise ValueError('joint_names has a name twice')
             targets, unknown, reasons = self._targets(message.joint_names)
             if unknown or reasons:
                 raise ValueError(_no_output(unknown) if unknown else reasons[0])
@@ -307,8 +310,13 @@ class CommandStream:
         """Solve a trajectory; return a function to publish it, or None if it is dropped."""
         solved = JointTrajectory(header=message.header, joint_names=[
             name for target in targets for name in target.actuators])
+        time_ = 0
         try:
             for i, point in enumerate(message.points):
+                before, time_ = time_, Duration.from_msg(point.time_from_start).nanoseconds
+                if time_ < before:
+                    raise ValueError(f'point {i} is at {time_ / 1e9:g} s, before '
+                                     f'{before / 1e9:g} s: time_from_start must not decrease')
                 if not self._worker.is_newest('wanted_trajectory'):
                     return None
                 solved.points.append(_solved_point(

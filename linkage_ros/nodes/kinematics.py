@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from importlib.util import find_spec
 import time
 from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Tuple
 
@@ -22,7 +21,7 @@ from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node, shutdown
-from .log import Once
+from .log import NAMES, Once
 from .mechanism_model import MechanismModel
 from .mechanism_topics import MechanismTopics
 from .message_layout import NEVER, pack_time
@@ -31,9 +30,8 @@ from .. import scene
 from ..robot_model import bodies, urdf
 from ..words import listed
 
-# Time from the first input received to a warning about the others [s]; most unknown joint names
-# that are logged.
-MISSING_AFTER, UNKNOWN_NAMES = 5.0, 1000
+# Time from the start, and from the first input received, to a warning about missing ones [s].
+MISSING_AFTER = 5.0
 # Longest wait for subscribers to delete markers when the node ends [s].
 DELETION_TIMEOUT = 0.1
 
@@ -55,7 +53,7 @@ class Kinematics(scene_node.SceneNode):
         self._mechanisms: Dict[str, MechanismTopics] = {}
         self._models: Dict[str, MechanismModel] = {}
         super().__init__(scene.KINEMATICS, **kwargs)
-        self._clashing = Once(UNKNOWN_NAMES)
+        self._clashing = Once(NAMES)
         # Mechanism and index of the inputs, by their source joint.
         self._inputs: Dict[str, List[Tuple[str, int]]] = {}
         for name, machine in self.scene.machines.items():
@@ -68,16 +66,26 @@ class Kinematics(scene_node.SceneNode):
         # That of the last message that set an input.
         self._stamp = NEVER
         self._own: frozenset = frozenset()
-        self._missing, self._unknown = set(self._inputs), Once(UNKNOWN_NAMES)
+        self._missing, self._unknown = set(self._inputs), Once(NAMES)
         self._missing_timer = self.create_timer(
             MISSING_AFTER, self.guarded('the check for missing inputs', self._warn_of_missing),
-            clock=Clock(clock_type=ClockType.STEADY_TIME), autostart=False)
+            clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
-        if not find_spec('llvmlite') and any(len(machine.assembly().legs) > 1
-                                             for machine in self.scene.machines.values()):
-            self.get_logger().info('a walker is solved in plain Python, since llvmlite is not '
-                                   'installed (pip install llvmlite); the results are the same')
+        for machine in self.scene.machines.values():
+            if len(machine.assembly().legs) > 1:
+                self._log_machine_code(machine.linkage)
+                break
         joint_state_reader.subscribe(self, 'crank_states', self._receive)
+
+    def _log_machine_code(self, linkage: Any) -> None:
+        """Log why there is no machine code for the legs of a walker, if there is none."""
+        try:
+            linkage.accelerated()
+        except ImportError as error:
+            # Whoever has not installed it knows; whoever has, does not know that it is broken.
+            is_missing = isinstance(error, ModuleNotFoundError)
+            log = self.get_logger().info if is_missing else self.get_logger().warning
+            log(f'plain Python is used instead of machine code, with the same results: {error}')
 
     def serves(self) -> str:
         """Return the mechanisms' names, in words."""

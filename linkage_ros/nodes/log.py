@@ -24,8 +24,9 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 RCLError = rclpy_implementation.RCLError
 InvalidHandle = rclpy_implementation.InvalidHandle
 # Shortest time between two warnings about one subject [s]; most subjects that are throttled; most
-# kinds of errors that are logged.
-SECONDS, SUBJECTS, ERRORS = 5.0, 1000, 100
+# kinds of errors that are logged; unknown names after which further ones are not logged: a sender
+# that makes up names would fill the log.
+SECONDS, SUBJECTS, ERRORS, NAMES = 5.0, 1000, 100, 20
 
 
 class Throttle:
@@ -48,7 +49,7 @@ class Throttle:
 
 
 class Once:
-    """A record of logged subjects, so that each is logged once and at most `most` are."""
+    """A record of logged subjects, so that each is logged once, and no more after `most`."""
 
     def __init__(self, most: int):
         self._most = most
@@ -57,15 +58,16 @@ class Once:
 
     def new(self, subjects: Iterable[Hashable]) -> List[Any]:
         """Return the subjects that no call has returned before; none after `most` subjects."""
-        room = self._most - len(self._logged)
-        new = [one for one in dict.fromkeys(subjects) if hash(one) not in self._logged][:room]
+        if len(self._logged) >= self._most:
+            return []
+        new = [one for one in dict.fromkeys(subjects) if hash(one) not in self._logged]
         self._logged.update(map(hash, new))
         return new
 
     @property
     def ending(self) -> str:
         """Text that ends the warning which reaches the limit; empty before."""
-        return '; no more will be named' if len(self._logged) == self._most else ''
+        return '; no more will be named' if len(self._logged) >= self._most else ''
 
 
 class Incidents:

@@ -16,6 +16,7 @@ import math
 import time
 from typing import AbstractSet, Any, List, Optional, Sequence, Tuple
 
+import numpy as np
 from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -175,11 +176,21 @@ class MechanismTopics:
                     f'out of reach of {inputs[0].measures}')
         at = ', '.join(f'{one.input.quantity} {value:.6g} {one.input.unit}'
                        for one, value in zip(inputs, self.inputs))
+        if len(inputs) > 1:
+            return f'{legs} cannot be assembled at {at}: no place for "{self._unplaced()}"'
         first, *others = missing
-        reach = ', '.join(f'{scene.in_words(self._reach(one, first))} {one.input.unit}'
-                          for one in inputs)
         of = f' of {missing[first]}' if others else ''
-        return f'{legs} cannot be assembled at {at}; the reach{of} is {reach}'
+        return (f'{legs} cannot be assembled at {at}; the reach{of} is '
+                f'{scene.in_words(self._reach(inputs[0], first))} {inputs[0].input.unit}')
+
+    def _unplaced(self) -> str:
+        """Return the first joint line that has no place at the present inputs."""
+        mechanism = self.model.mechanism
+        own = [value / mechanism.scale_of(name)
+               for name, value in zip(mechanism.inputs, self.inputs)]
+        found = {**mechanism.linkage.solve(own), **mechanism.linkage.joint_angles(own)}
+        return next((line.text for line in mechanism.linkage.design.lines
+                     if any(np.isnan(found.get(name, 0.0)).any() for name in line.names)), '')
 
     def _reach(self, settings: scene.InputSettings, leg: int) -> Sequence[Tuple[float, float]]:
         """Return the reach of a leg, by the crank that all legs have in common."""

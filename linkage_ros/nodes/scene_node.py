@@ -277,7 +277,7 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
             get_logger(name), lambda: not rclpy.ok()))
     except ExternalShutdownException:
         pass
-    except scenes.SceneError as error:
+    except (scenes.SceneError, ImportError) as error:
         return _failed(name, error)
     finally:
         gc.enable()

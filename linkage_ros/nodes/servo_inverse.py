@@ -26,20 +26,10 @@ from .command_stream import CommandStream
 from .message_layout import Unreadable
 from .. import scene
 from ..cache import Cache
+from ..optional import needs
 from ..robot_model import bodies
 from ..scene.inverse_request import InverseRequest, LEVER, present_inputs
 from ..words import elided, listed, meant, MESSAGE, quoted
-
-try:
-    from linkage_interfaces.srv import (  # type: ignore[attr-defined]
-        InputsFor,
-        ServoInverse as ServoInverseType,
-    )
-except ImportError as error:
-    raise ImportError(
-        'servo_inverse needs the service types of linkage_interfaces: run colcon '
-        'build in the workspace, which builds linkage_interfaces too, and source '
-        'install/setup.bash') from error
 
 # Other callers and messages wait for an answer: most values at once, most of an output that is
 # searched, and the CPU time after which an answer is given up [s], seen after a block of them.
@@ -52,6 +42,11 @@ class ServoInverse(scene_node.SceneNode):
     """Serves `servo_inverse` and `inputs_for`, and turns `wanted_states` into commands."""
 
     def __init__(self, **kwargs: Any):
+        with needs('linkage_interfaces'):
+            from linkage_interfaces.srv import (  # type: ignore[attr-defined]
+                InputsFor,
+                ServoInverse as ServoInverseType,
+            )
         super().__init__(scene.INVERSE, **kwargs)
         self._requests = Cache(self._request)
         self._sources: frozenset = frozenset()

@@ -21,12 +21,12 @@ from rclpy.utilities import remove_ros_args
 
 from . import scene_node
 from .. import command, scene
-from ..robot_model.command import NAME, NEEDS, show
+from ..robot_model.command import NAME, show
 
 
 def main(args: Optional[List[str]] = None) -> int:
     """Print the URDF of a scene; return the exit code. `args` are by default sys.argv[1:]."""
-    return command.run(NAME, _show, sys.argv[1:] if args is None else args, NEEDS)
+    return command.run(NAME, _show, sys.argv[1:] if args is None else args)
 
 
 def _show(args: List[str]) -> None:

@@ -19,6 +19,7 @@ from . import parts
 from .. import scene
 from ..command import chosen, Parser, RequestError, run
 from ..linkage.arithmetic import Formula
+from ..optional import needs
 from ..scene.scene_mechanism import IN_SPACE
 from ..words import meant
 
@@ -35,13 +36,10 @@ examples:
   render config/slotted_lever.yaml --out lever.svg --angle 40 --data joints.csv
 """
 
-NEEDS = ('pip install matplotlib pyyaml tqdm, or apt install python3-matplotlib python3-tqdm '
-         'python3-yaml')
-
 
 def main(args=None) -> int:
     """Run the command line; return the exit code."""
-    return run('render', _draw, args, NEEDS)
+    return run('render', _draw, args)
 
 
 def _draw(args):
@@ -84,9 +82,10 @@ def check_mp4(asked):
 
 def draw(asked, machines):
     """Write the files."""
-    from matplotlib import style
+    with needs('matplotlib'):
+        from matplotlib import style
 
-    from .picture import Picture, PictureError
+        from .picture import Picture, PictureError
 
     for machine in machines:
         if machine.in_space:
@@ -104,9 +103,10 @@ def draw(asked, machines):
 
 def write(asked, picture, times):
     """Write the picture and, on request, the data."""
-    from tqdm import tqdm
-
-    from . import files
+    with needs('tqdm'):
+        from tqdm import tqdm
+    with needs('PIL'):
+        from . import files
 
     def progress(times):
         return tqdm(times, asked.out.name, unit='frame', disable=None)

@@ -8,57 +8,86 @@
 # express or implied. See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Comparison of a mechanism with its robot, whose loops are closed in space."""
+"""
+Check by substitution: what is published, put into the robot's own joints, closes its loops.
+
+Joints without a published position, such as the balls of rods, close the loops as well as they
+can. So a mechanism is wrong where the loops stand open, or where it has no pose and the robot has.
+"""
 
 from __future__ import annotations
 
 from dataclasses import replace
 import math
-from typing import Dict, List, Mapping, NamedTuple, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Sequence, Set, Tuple
 
 import numpy as np
 
 from .robot import Robot, SLIDE
-from .spatial import CLOSED, Component, components, DEAD, Poses
+from .spatial import Component, components, EXACT, Poses
 from .. import scene
 
 # Number of paths of several motors, of poses on all paths, and of poses that a check needs.
 PATHS, POSES, FEWEST = 12, 240, 200
-# Allowed difference [rad, or of the size] for exact axes in the file.
-EXACT = 1e-9
+# A misfit of the file opens its loops by less than this factor times it.
+MISFIT = 10.0
+# A mechanism whose joints are farther off in the file's pose [rad, or of the size] is another.
+OTHER = 1e-3
+# A measured input turns back where it makes a larger step than this [rad, or of its size].
+TURN = 0.1
+# A loop that closes with a larger step of a joint [rad, or of the size] than this is another pose.
+LEAP = 0.35
 # Stiffness next to a change point, as a part of the largest.
 CHANGE = 0.25
-# A measured input within this of an end of its reach [rad, or of its size] turns back there.
-TURN = 0.1
-# The first step, as a part of the others.
-LITTLE = 1e-3
-# A step that turns joints by more [rad] is halved, at most so many times.
-LEAP, HALVINGS = 0.35, 6
+
+# Parts of the motors' ranges that a check of the whole robot tries.
+PARTS = 1.0, 0.3, 0.1
+# The report on loops of a whole robot that stand open.
+OPEN = 'Open:'
+
+Ranges = Dict[str, Tuple[float, float]]
 
 
 class Difference(ValueError):
     """How a mechanism differs from its robot, or why it could not be compared."""
 
 
+class Imported(NamedTuple):
+    """
+    A mechanism's name, its parameters and its report.
+
+    Also the ranges of sources in which it was checked, the misfit of the file, of the size, and
+    hinges of balls that may stay where they are.
+    """
+
+    name: str
+    parameters: Dict[str, Any]
+    reports: List[str]
+    ranges: Ranges
+    slack: float = 0.0
+    still: Sequence[str] = ()
+
+
 class Track(NamedTuple):
     """
-    Poses along paths: positions of motors and joints, which are closed, and their stiffness.
+    Positions along paths (paths, steps), how far loops stand open there [m], and their poses.
 
-    `last` are the last poses of the paths that are closed to their ends.
+    It is NaN where there is no pose. `joints` has the motors, too; `inputs` are those of the
+    mechanism.
     """
 
-    motors: np.ndarray
     joints: Dict[str, np.ndarray]
-    alive: np.ndarray
-    margin: np.ndarray
-    volume: np.ndarray
-    last: Poses
+    inputs: np.ndarray
+    gaps: np.ndarray
+    poses: List[Poses]
 
 
-def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
-             ends: Mapping[str, Tuple[float, float]], slack: float) -> str:
+def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str], ends: Ranges,
+             slack: float) -> Tuple[str, Ranges, Tuple[float, float]]:
     """
-    Compare what a mechanism publishes with the joints of its robot, and report on it.
+    Put what a mechanism publishes into the loops of its robot; report on it.
+
+    Also return the ranges of its sources and of its first input in the poses that were checked.
 
     Parameters
     ----------
@@ -71,192 +100,249 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
     ends : dict
         Between which positions each source moves [rad or m].
     slack : float
-        What the file leaves open for good, of the size.
+        The misfit of the file, of the size.
 
     Raises
     ------
     Difference
-        If they differ, or if fewer than FEWEST poses could be compared.
+        If the loops stand open, or if they are closed in fewer than FEWEST poses.
 
     """
-    component = next(each for each in components(replace(robot, driven=[*driven]))
-                     if {*driven} & {joint.name for joint in each.joints})
+    loops = _Loops(robot, machine, driven, [*ends], slack)
     start = np.array([robot.positions[source] for source in ends])
     targets = np.array([*ends.values()]).T
-    inside, near = np.clip(start, *targets), machine.first.start
+    inside = np.clip(start, *targets)
     if len(ends) > 1:
         low, high = targets
         targets = np.random.default_rng(1).uniform(low, high, (PATHS, len(ends)))
-    tracker, sources = _Tracker(robot, component, driven, [*ends], slack), [*ends]
-    if (inside != start).any():
-        track = tracker.track(start, inside[None])
-        apart, names, inputs = _differences(machine, component, sources, track, near)
-        if track.alive.all() and (apart <= _allowed(track, slack)).all():
-            start, near, tracker.poses = inside, float(inputs[0, -1]), track.last
+    loops.check_start(start)
+    if (inside != start).any() and (track := loops.track(start, inside[None])) and (
+            loops.closed(track).all()):
+        start, loops.near, loops.poses = inside, float(track.inputs[0, -1]), track.poses[-1]
     good, beyond = np.zeros((0, 1), bool), ''
     for _ in range(3):
         targets = targets[np.max(np.abs(targets - start), axis=1) > 1e-9]
         if not len(targets):
             break
-        track = tracker.track(start, targets)
-        apart, names, inputs = _differences(machine, component, sources, track, near)
-        good = np.logical_and.accumulate(
-            track.alive & (apart <= _allowed(track, slack)), axis=1)
-        turned = [i for i, count in enumerate(good.sum(axis=1)) if not good[i].all()
-                  and _turns_back(machine.first, *[near, *inputs[i]][count:count + 2])]
-        _check_ends(track, sources, apart, names, good, turned)
-        if not good.all():
-            beyond = '; not beyond ' + (
-                'where its input turns back' if turned else
-                'a change point' if (track.alive & ~good).any() else 'where its loops end')
+        track = loops.track(start, targets)
+        good = np.logical_and.accumulate(loops.closed(track), axis=1)
+        ended = [loops.end(track, i, count) for i, count in enumerate(good.sum(axis=1))
+                 if not good[i].all()]
+        beyond = f'; not beyond where its {ended[0]}' if ended else beyond
         if good.sum() >= FEWEST:
-            worst = np.unravel_index(np.argmax(np.where(good, apart, -1.0)), good.shape)
-            moved = ', '.join(
-                f'{source} from {min(*values, first):.4g} to {max(*values, first):.4g}'
-                for source, first, values in zip(sources, start, track.motors[good].T))
-            return (f'Checked: {machine.name}: in {good.sum()} poses of the robot, its loops '
-                    f'closed in space, {moved}, the worst difference is {apart[worst]:.0e}, of '
-                    f'{names[worst]}{beyond}.')
+            ranges = {source: (min(track.joints[source][good].min(), first),
+                               max(track.joints[source][good].max(), first))
+                      for source, first in zip(ends, start)}
+            moved = ', '.join(f'{source} from {low:.4g} to {high:.4g}'
+                              for source, (low, high) in ranges.items())
+            return (f'Checked: {machine.name}: in {good.sum()} poses of the robot, {moved}, its '
+                    f'loops stand open by {track.gaps[good].max():.0e} m at most{beyond}.', ranges,
+                    (float(min(track.inputs[good].min(), loops.near)),
+                     float(max(track.inputs[good].max(), loops.near))))
         targets = start + (targets - start) * good.mean(axis=1)[:, None]
     raise Difference(f'it could not be checked in more than {good.sum()} poses')
 
 
-def _allowed(track: Track, slack: float) -> np.ndarray:
-    """Return the allowed difference in each pose [rad, or of the size]."""
-    return (EXACT + 30.0 * slack) / np.maximum(track.margin, 1e-4)
-
-
-def _turns_back(drive: scene.InputSettings, last: float, following: float) -> bool:
+def positions(machine: scene.SceneMechanism, motors: Mapping[str, np.ndarray], near: float
+              ) -> Tuple[Dict[str, np.ndarray], np.ndarray]:
     """
-    Return whether a measured input does not continue after its last pose, at an end of its reach.
+    Return what a mechanism publishes along paths of its sources, and its first input.
 
-    The motor that measures it is between two moving links, and can move on from there.
+    A measured input continues from `near`.
     """
-    near = TURN * drive.input.size
-    return bool(drive.measures) and not drive.input.apart(last, following) < near and any(
-        drive.input.apart(last, end) < near for arc in drive.reach for end in arc)
-
-
-def _check_ends(track: Track, sources: List[str], apart: np.ndarray, names: np.ndarray,
-                good: np.ndarray, turned: Sequence[int]) -> None:
-    """
-    Raise Difference for a path with good poses up to a wrong one, unless it branches there.
-
-    Paths that `turned` end.
-    """
-    largest = np.max(track.volume, where=track.alive, initial=0.0)
-    for i in {*np.flatnonzero(~good.all(axis=1)).tolist()}.difference(turned):
-        at = i, good[i].sum()
-        # Past a change point a robot can continue in two ways.
-        if not track.alive[at] or np.min(track.volume[i, :at[1] + 1]) < CHANGE * largest:
-            continue
-        if np.max(track.margin, where=track.alive, initial=0.0) < DEAD:
-            raise Difference('it could not be checked: its loops are at a dead point wherever '
-                             'its motors are')
-        where = ', '.join(f'{source} at {value:.4g}'
-                          for source, value in zip(sources, track.motors[at]))
-        raise Difference(f'with {where} ' + (
-            'it has no pose, where the loops of the robot are closed' if math.isnan(apart[at])
-            else f'{names[at]} is off by {apart[at]:.2g}'))
-
-
-def _differences(machine: scene.SceneMechanism, component: Component, sources: List[str],
-                 track: Track, first: float) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """
-    Return the largest difference in each pose [rad, or of the size], its joint, and the input.
-
-    A measured input continues from `first`.
-    """
-    values = [drive.ratio * track.motors[..., sources.index(drive.source)] + drive.offset
+    values = [drive.ratio * motors[drive.source] + drive.offset
               for drive in machine.inputs.values()]
     if output := machine.first.measures:
         for path in values[0]:
-            near = first
+            last = near
             for i, value in enumerate(path):
-                path[i] = machine.measured(output, value, near)[0]
-                near = near if math.isnan(path[i]) else path[i]
+                path[i] = machine.measured(output, value, last)[0]
+                last = last if math.isnan(path[i]) else path[i]
     angles = machine.linkage.joint_angles(values if len(values) > 1 else values[0])
-    slides = {joint.name for joint in component.joints if joint.kind == SLIDE}
-    apart = {}
-    for link, called in machine.joints.items():
-        if called.published and called.name in track.joints:
-            off = called.of(angles[link]) - track.joints[called.name]
-            apart[called.name] = np.abs(off) / component.size if called.name in slides else np.abs(
-                off - math.tau * np.round(off / math.tau))
-    apart = apart or {'': np.full(track.alive.shape, math.nan)}
-    every = np.array([*apart.values()])
-    worst = np.argmax(np.where(np.isnan(every), math.inf, every), axis=0)
-    return (np.take_along_axis(every, worst[None], axis=0)[0], np.array([*apart])[worst],
-            values[0])
+    return {called.name: called.of(angles[link]) for link, called in machine.joints.items()
+            if called.published}, values[0]
 
 
-class _Tracker:
-    """Moves the motors of a component along paths, and closes its loops."""
+def published(machines: Mapping[str, scene.SceneMechanism]) -> Set[str]:
+    """Return the joints that a scene publishes or reads."""
+    return {drive.source for machine in machines.values() for drive in machine.inputs.values()} | {
+        called.name for machine in machines.values() for called in machine.joints.values()
+        if called.published}
 
-    def __init__(self, robot: Robot, component: Component, driven: Sequence[str],
+
+def opened(component: Component, joints: Mapping[str, np.ndarray], start: Poses
+           ) -> Tuple[np.ndarray, List[Poses]]:
+    """
+    Put positions of joints (paths, steps) into loops; return how far they stand open [m].
+
+    By how much the file's own misfit opens them does not count. A joint that closes a loop opens
+    it by its error in angle times the loops' size. The poses are those of each step.
+    """
+    shape = next(iter(joints.values())).shape
+    fixed = component.columns_of([*joints])
+    isnan = np.any([np.isnan(values) for values in joints.values()], axis=0)
+    poses, gaps, each = start.some(np.zeros(shape[0], int)), np.empty(shape), []
+    free, misfit = np.zeros((shape[0], len(fixed))), component.errors(component.at_start())[0]
+    for k in range(shape[1]):
+        here = {name: np.where(isnan[:, k], component.positions[name], values[:, k])
+                for name, values in joints.items()}
+        poses = component.stepped(poses, component.aimed(poses, free, {
+            name: values for name, values in here.items() if name not in component.cut_names}))
+        poses = poses if fixed.all() else component.closed(poses, fixed)
+        gaps[:, k] = np.max(np.abs(component.errors(poses)[0] - misfit), axis=1)
+        read = component.read(poses)
+        for name in here.keys() & component.cut_names:
+            off = here[name] - read[name]
+            gaps[:, k] = np.maximum(gaps[:, k], component.size * np.abs(
+                off - math.tau * np.round(off / math.tau)))
+        each.append(poses)
+    return np.where(isnan, math.nan, gaps), each
+
+
+def _is_wrong(component: Component, joints: Mapping[str, np.ndarray], motors: Mapping[str, float],
+              path: Sequence[Poses], gap: float, allowed: float) -> bool:
+    """
+    Return whether joints are wrong at the end of a path, rather than loops that end there.
+
+    They are if they are all that closes the loops, or if the motors alone close them, by a step
+    from the last pose on the path. Past a change point a robot can continue in two ways.
+    """
+    if not math.isnan(gap) and component.columns_of([*joints]).all():
+        return True
+    last, fixed = path[-1], component.columns_of([*motors])
+    new = component.closed(component.stepped(last, component.aimed(last, np.zeros(
+        (1, len(fixed))), {name: np.array([value]) for name, value in motors.items()})), fixed, 40)
+    error = component.errors(new)[0] - component.errors(component.at_start())[0]
+    leap = component.step_between(last, new) / component.unit
+    stiffness = component.stiffness(Poses(*map(np.concatenate, zip(*path, new))), fixed)
+    return bool(np.max(np.abs(error)) < allowed and np.max(np.abs(leap)) < LEAP
+                and np.min(stiffness) > CHANGE * np.max(stiffness))
+
+
+def whole(robot: Robot, machines: Mapping[str, scene.SceneMechanism], imported: Sequence[Imported]
+          ) -> List[str]:
+    """
+    Put what all mechanisms of a scene publish into all loops of a robot, and report on them.
+
+    All motors move at once towards both ends of the ranges in which their mechanisms were checked,
+    less far where a loop that is left out ends.
+    """
+    worst, least = 0.0, POSES // 2
+    reports: List[str] = []
+    movers = {*robot.driven, *(source for each in imported for source in each.ranges)}
+    for component in components(robot):
+        slack = max((each.slack for each in imported if each.ranges.keys() & component.names),
+                    default=0.0)
+        allowed, count = (EXACT + MISFIT * slack) * component.size, POSES // 2
+        for part in PARTS:
+            found = _moved(robot, machines, imported, part)
+            found = {name: found[name] for name in component.names & found.keys()}
+            motors = [name for name in found if robot.source(name)[0] in movers]
+            if len(motors) == len(found):
+                break
+            gaps, poses = opened(component, found, component.at_start())
+            good = np.logical_and.accumulate(gaps <= allowed, axis=1)
+            worst = max(worst, float(np.max(gaps, where=good, initial=0.0)))
+            count = int(good.sum())
+            wrong = [gaps[path, step] for path, step in enumerate(good.sum(axis=1))
+                     if not good[path].all() and gaps[path, step] > allowed and _is_wrong(
+                         component, found, {name: found[name][path, step] for name in motors},
+                         [component.at_start(), *(each.some([path]) for each in poses[:step])],
+                         gaps[path, step], allowed)]
+            if wrong:
+                reports.append(f'{OPEN} the loops of {", ".join(sorted(found))}, by '
+                               f'{max(wrong):.2g} m.')
+            if wrong or 2 * count > good.size:
+                break
+        least = min(least, count)
+    return [f'Checked: the whole robot: in {least} poses, its loops stand open by {worst:.0e} m '
+            'at most.', *reports]
+
+
+def _moved(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
+           imported: Sequence[Imported], part: float) -> Dict[str, np.ndarray]:
+    """Return what a scene publishes and reads on two paths, a part of the ranges of its motors."""
+    steps = np.arange(1, POSES // 4 + 1) / (POSES // 4) * part
+    found = {drive.source: np.full((2, len(steps)), (drive.start - drive.offset) / drive.ratio)
+             for machine in machines.values() for drive in machine.inputs.values()}
+    for source in {source for each in imported for source in each.ranges}:
+        every = np.array([each.ranges[source] for each in imported if source in each.ranges])
+        ends = max(every[:, 0]), min(every[:, 1])
+        start = min(max(robot.positions[source], ends[0]), ends[1])
+        found[source] = start + (np.array([ends]).T - start) * steps
+    for machine in machines.values():
+        found.update(positions(machine, found, machine.first.start)[0])
+    return found
+
+
+class _Loops:
+    """The loops of a mechanism in its robot."""
+
+    def __init__(self, robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
                  sources: List[str], slack: float):
-        self._component, self._slack = component, slack
-        self._fixed = component.columns_of(driven)
-        # Where paths start: the pose of the file.
-        self.poses = component.at_start()
+        self._component = next(each for each in components(replace(robot, driven=[*driven]))
+                               if {*driven} & {joint.name for joint in each.joints})
+        self._machine, self._sources = machine, sources
         # For each driven joint its source, ratio and offset.
-        self._movers = {name: (sources.index(source), ratio, offset) for name in driven
-                        for source, ratio, offset in [robot.source(name)]}
+        self._movers = {name: robot.source(name) for name in driven}
+        self._slack = MISFIT * slack
+        self._allowed = (EXACT + self._slack) * self._component.size
+        # Where paths start: the pose of the file.
+        self.poses, self.near = self._component.at_start(), machine.first.start
 
     def track(self, start: np.ndarray, targets: np.ndarray) -> Track:
-        """Return poses on straight paths of the motors, each closed from the one before."""
-        component, fixed, count = self._component, self._fixed, len(targets)
-        steps = -(-POSES // count)
-        poses = component.closed(self.poses.some(np.zeros(count, int)), fixed)
-        self._base = component.errors(poses)[0][0]
-        nullity = component.nullity(fixed)
-        motors = start + (targets - start)[:, None] * (np.arange(steps + 1) / steps)[:, None]
-        alive = np.zeros((count, steps), bool)
-        margin, volume = np.ones((2, count, steps))
-        joints: Dict[str, np.ndarray] = {}
-        drift, going = np.zeros((count, len(fixed))), np.arange(count)
-        # A small step gives the directions of joints, which keep the first step on its branch.
-        little = motors[:, 0] + LITTLE * (motors[:, 1] - motors[:, 0])
-        ahead, fine = self._advanced(poses, motors[:, 0], little, drift, 0)
-        drift[fine] = component.step_between(poses, ahead)[fine] / LITTLE
-        last = drift
-        for k in range(steps):
-            before = poses
-            poses, fine = self._advanced(
-                poses, motors[going, k], motors[going, k + 1], drift, HALVINGS)
-            moved = component.step_between(before, poses)[fine]
-            # The path is extrapolated by a parabola.
-            drift, last = 2.0 * moved - last[fine], moved
-            poses, going = poses.some(fine), going[fine]
-            if not len(going):
-                break
-            alive[going, k] = True
-            margin[going, k], volume[going, k] = component.stiffness(poses, fixed, nullity)
-            for name, values in component.read(poses).items():
-                joints.setdefault(name, np.full(alive.shape, math.nan))[going, k] = values
-        return Track(motors[:, 1:], joints, alive, margin, volume, poses)
+        """Return what is published on straight paths of the motors."""
+        steps = -(-POSES // len(targets))
+        motors = start + (targets - start)[:, None] * (np.arange(1, steps + 1) / steps)[:, None]
+        sources = {name: motors[..., i] for i, name in enumerate(self._sources)}
+        found, inputs = positions(self._machine, sources, self.near)
+        found = {**{name: ratio * sources[source] + offset
+                    for name, (source, ratio, offset) in self._movers.items()}, **found}
+        if self._machine.first.measures:
+            before = np.column_stack([np.full(len(inputs), self.near), inputs[:, :-1]])
+            size = self._machine.first.input.size
+            jumps = ~(self._machine.first.input.apart(before, inputs) < TURN * size)
+            found = {name: np.where(jumps, math.nan, values) for name, values in found.items()}
+        names = self._component.names
+        gaps, poses = opened(self._component, {
+            name: values for name, values in found.items() if name in names}, self.poses)
+        return Track({**sources, **found}, inputs, gaps, poses)
 
-    def _advanced(self, poses: Poses, before: np.ndarray, after: np.ndarray, drift: np.ndarray,
-                  halvings: int) -> Tuple[Poses, np.ndarray]:
-        """Return poses with the motors moved, and which of them are closed."""
-        component = self._component
-        step = component.aimed(poses, drift, {
-            name: ratio * after[:, i] + offset
-            for name, (i, ratio, offset) in self._movers.items()})
-        new = component.closed(component.stepped(poses, step), self._fixed, 8)
-        fine = (np.max(np.abs(component.errors(new)[0] - self._base), axis=1)
-                < (CLOSED + 10.0 * self._slack) * component.size) & (
-            np.max(np.abs(component.step_between(poses, new)) / component.unit, axis=1) < LEAP)
-        if fine.all() or not halvings:
-            return new, fine
-        some, middle = np.flatnonzero(~fine), 0.5 * (before + after)
-        half, reached = self._advanced(poses.some(some), before[some], middle[some],
-                                       0.5 * drift[some], halvings - 1)
-        left = some[reached]
-        if len(left):
-            rest, fine[left] = self._advanced(
-                half.some(np.flatnonzero(reached)), middle[left], after[left], 0.5 * drift[left],
-                halvings - 1)
-            for old, one in zip(new, rest):
-                old[left] = one
-        return new, fine
+    def closed(self, track: Track) -> np.ndarray:
+        """Return in which poses the loops are closed."""
+        return track.gaps <= self._allowed
+
+    def check_start(self, start: np.ndarray) -> None:
+        """Raise Difference if a joint is not where the file has it."""
+        found, _ = positions(self._machine, {
+            name: np.full((1, 1), value) for name, value in zip(self._sources, start)}, self.near)
+        for joint in self._component.joints:
+            if joint.name in found and joint.position is not None:
+                off = float(found[joint.name][0, 0]) - joint.position
+                off = off / self._component.size if joint.kind == SLIDE else math.remainder(
+                    off, math.tau)
+                if abs(off) > OTHER + self._slack:
+                    raise Difference(f'{self._at(start)} {joint.name} is off by {abs(off):.2g}')
+
+    def end(self, track: Track, path: int, step: int) -> str:
+        """Return why a path ends at a step; raise Difference if the robot can move on."""
+        drive, component = self._machine.first, self._component
+        at = float(track.inputs[path, step - 1]) if step else self.near
+        if drive.measures and any(drive.input.apart(at, end) < TURN * drive.input.size
+                                  for arc in drive.reach for end in arc):
+            return 'input turns back'
+        gap = float(track.gaps[path, step])
+        if not _is_wrong(component, track.joints, {
+                name: ratio * track.joints[source][path, step] + offset
+                for name, (source, ratio, offset) in self._movers.items()},
+                [self.poses, *(each.some([path]) for each in track.poses[:step])], gap,
+                self._allowed):
+            return 'loops end'
+        where = self._at(np.array([track.joints[source][path, step] for source in self._sources]))
+        raise Difference(where + (
+            ' it has no pose, where the loops of the robot are closed' if math.isnan(gap) else
+            f' its loops stand open by {gap:.2g} m'))
+
+    def _at(self, values: np.ndarray) -> str:
+        return 'with ' + ', '.join(
+            f'{source} at {value:.4g}' for source, value in zip(self._sources, values))

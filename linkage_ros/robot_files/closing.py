@@ -23,8 +23,8 @@ from .spatial import CLOSED, Component, components, DEAD, displaced, posed, Pose
 from ..words import listed
 
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
-# Such loops are closed without a search.
-NEAR = 1e-4
+# Such loops are closed without a search, as far as they can be.
+NEAR = 1e-3
 # Number of random starts of a search for closed poses.
 STARTS = 24
 # Two poses are equally near if their distances differ by less than this factor and this [rad];
@@ -169,7 +169,7 @@ def nearest(component: Component, names: List[str], followers: List[str]) -> Tup
     poses = component.closed(start, fixed, soft=1e-7)
     if gap < NEAR and component.gap(poses)[0] <= max(CLOSED, gap) \
             and np.linalg.norm(component.away(poses.positions)) < 1e3 * max(gap, CLOSED):
-        _check_unfolded(component, poses, names, max(DEAD, 3.0 * math.sqrt(gap)))
+        _check_unfolded(component, poses, names, max(DEAD, 3.0 * math.sqrt(min(gap, 1e-4))))
         return poses, ''
     # If the loops cannot be closed otherwise, followers move, and then motors.
     found, held_ones, open_by = start, names, math.inf

@@ -19,21 +19,21 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import check, closing, loops, planar, readers, rods, spatial
+from . import check, closing, loops, model, planar, readers, rods, spatial
 from .robot import FARTHEST, Joint, Robot
-from .. import command
+from .. import command, scene
+from ..linkage.dyads import short
 from ..scene.writing import in_yaml
-from ..words import elided
+from ..words import elided, sentence
 
 NAME = 'from_robot'
-NEEDS = 'pip install pyyaml, and mujoco for MJCF'
 # The report on a mechanism that differs from its robot, or could not be compared.
 WRONG = 'compared with the robot'
 
 
 def main(args: Optional[List[str]] = None) -> int:
     """Print a scene file; return the exit code."""
-    return command.run(NAME, show, args, NEEDS)
+    return command.run(NAME, show, args)
 
 
 def show(args: Optional[List[str]]) -> None:
@@ -55,36 +55,45 @@ def show(args: Optional[List[str]]) -> None:
         robot.check_names(asked.driven or ())
         robot = spatial.posed(robot, _values(asked.pose))
         robot = closing.held(robot, {**robot.held, **_values(asked.hold)})
-        given, reports = described(robot)
+        given, reports, still = described(robot)
     # Unprintable characters in names of the file could end a comment.
-    head = [elided(line, 10 ** 6) for line in (
-        f'From {asked.file}. All its joints on /joint_states, and its model:', _launch(asked),
-        *reports)]
+    head = [*(elided(line, 10 ** 6) for line in (
+        f'From {asked.file}. Its joints on /joint_states, and its model:',
+        _launch(asked, still))), *map(sentence, reports)]
     print(*(f'# {line}' for line in head), in_yaml(given), sep='\n', end='')
     print(*(f'{NAME}: {line}' for line in head[2:]), sep='\n', file=sys.stderr)
     if wrong := [line for line in reports if WRONG in line]:
         raise command.RequestError(f'{len(wrong)} mechanisms are left out, as they differ from '
                                    'the robot or could not be compared with it')
+    if wrong := [line for line in reports if line.startswith(check.OPEN)]:
+        raise command.RequestError(f'{len(wrong)} loops of the whole robot stand open')
 
 
-def _launch(asked: Any) -> str:
-    """Return the command that launches the robot with its scene."""
+def _launch(asked: Any, still: Mapping[str, float]) -> str:
+    """Return the command that launches the robot with its scene; some joints stay."""
     arguments = {'robot': asked.file, 'scene': 'SCENE.yaml', 'loops': asked.loops or '',
-                 'hold': ' '.join(asked.hold)}
+                 'hold': shlex.join([*asked.hold, *(
+                     f'{name}={short(value)}' for name, value in still.items())])}
     return 'ros2 launch linkage_ros robot.launch.py ' + ' '.join(
         f'{name}:={shlex.quote(text)}' for name, text in arguments.items() if text)
 
 
-def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
-    """Return the parameters of a robot's scene, and the report on omissions and checks."""
+def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
+    """
+    Return the parameters of a robot's scene, and the report on omissions and checks.
+
+    Also return the positions of joints in loops that stay.
+    """
     given: Dict[str, Any] = {'mechanisms': []}
     closed = closing.closed(robot)
     robot, reports = closed.robot, closed.report
+    imported: List[check.Imported] = []
 
-    def add(name: str, parameters: Mapping[str, Any], more: Sequence[str]) -> None:
-        given['mechanisms'].append(name)
-        given.update(parameters)
-        reports.extend(more)
+    def add(made: check.Imported) -> None:
+        imported.append(made)
+        given['mechanisms'].append(made.name)
+        given.update(made.parameters)
+        reports.extend(made.reports)
 
     for group in loops.groups(robot, closed.immobile):
         open_one, fault = (_first(reasons, group.joints) for reasons in (
@@ -92,7 +101,7 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
         left = group.joints
         for part in (group.parts if group.why else [group]) if not open_one else ():
             try:
-                add(*planar.described(robot, part, given['mechanisms']))
+                add(planar.described(robot, part, given['mechanisms']))
             except (ArithmeticError, ValueError) as error:
                 if group.why:
                     continue
@@ -107,14 +116,24 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str]]:
         try:
             if open_one:
                 raise ValueError(open_one)
-            add(*rods.described(robot, group._replace(joints=left), given['mechanisms']))
+            add(rods.described(robot, group._replace(joints=left), given['mechanisms']))
         except (ArithmeticError, ValueError) as error:
             why = fault or (f'as rods in space: {error}' if group.why else error)
             reports.append(f'Left out: {", ".join(_bodies(left))}: '
                            + f'{group.why}; ' * bool(group.why) + f'{why}.')
     if not given['mechanisms']:
         raise command.RequestError(' '.join(reports) or 'no joint of this robot closes a loop')
-    return given, reports
+    machines = scene.read(given).machines
+    tree = {joint.name for _, joint in spatial.trees(robot)[0].values()}
+    stay = {*closed.immobile, *(name for made in imported for name in made.still)}
+    still = {name: value for name, value in robot.positions.items()
+             if name in tree & stay - check.published(machines)}
+    rest, lost = model.others(robot, machines, still)
+    if rest:
+        machines = scene.read({**given, **rest, 'mechanisms': [*machines, model.OTHERS]}).machines
+    if lost:
+        reports.append(model.not_published(lost))
+    return given, [*reports, *check.whole(robot, machines, imported)], still
 
 
 def _values(texts: Sequence[str]) -> Dict[str, float]:

@@ -41,7 +41,7 @@ def parse(path: str) -> Element:
     parser.CharacterDataHandler = builder.data
     try:
         with open(path, 'rb') as file:
-            parser.ParseFile(file)
+            parser.Parse(file.read(), True)
     except (expat.ExpatError, LookupError, ValueError) as error:
         raise RequestError(f'{path} is no XML: {error}') from None
     if has_xacro:

@@ -18,15 +18,14 @@ from typing import Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from .robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE
-from .spatial import blocks, TOGETHER, top, trees
+from .spatial import blocks, EXACT, TOGETHER, top, trees
 from ..linkage.dyads import ROUNDING
 
 # Kinds of joints in planar loops.
 FLAT = (HINGE, SLIDE, BALL)
-# Axes that differ by less [rad] are parallel: files have angles such as 1.5708.
-ASKEW = 1e-4
-# Loops with a larger gap, of their size, cannot be closed.
-OPEN = 1e-5
+# Axes that differ by less [rad] are parallel, and loops with a smaller gap, of their size, are
+# closed: files have rounded numbers, and mirrored legs that somebody aligned by hand.
+ASKEW, OPEN = 1e-3, 1e-4
 
 
 class Loop(NamedTuple):
@@ -36,7 +35,8 @@ class Loop(NamedTuple):
     Places of joints are complex [m], and so are the axes of slides; the axis of a hinge is 1 or
     -1. `size` is the largest distance of two joints [m], `gap` the distance that cannot be closed
     [m], `lean` the inclination of axes [rad], and `across` has the distances of joints' ends
-    normal to the plane [m].
+    normal to the plane [m]. `pins` are the hinges and slides with a position, those of balls in
+    the plane included, and `still` the other hinges of these balls.
     """
 
     ground: str
@@ -47,6 +47,15 @@ class Loop(NamedTuple):
     gap: float
     lean: float
     across: Dict[str, float]
+    pins: List[Joint]
+    still: List[str]
+
+    @property
+    def misfit(self) -> str:
+        """Return the report on what cannot be closed exactly; empty if it is rounding."""
+        return '' if max(self.lean, self.gap / self.size) < EXACT else (
+            f'Warning: the file is not exact: axes lean by {self.lean:.2g} rad, and loops stay '
+            f'open by {self.gap:.2g} m; so is what is published.')
 
     @property
     def near(self) -> float:
@@ -178,8 +187,9 @@ def check_planar(ground: str, joints: Sequence[Joint], drives: Sequence[str] = (
         lean = max(lean, askew)
         if askew > ASKEW:
             raise ValueError(f'not planar: the axes of {hinges[0].name} and {joint.name} are '
-                             f'{np.degrees(np.arcsin(min(askew, 1.0))):.3g} degrees from it')
-    _check_rods(ground, joints)
+                             f'{np.degrees(np.arcsin(min(askew, 1.0))):.3g} degrees from it, more '
+                             f'than {np.degrees(ASKEW):.2g}')
+    _check_rods(ground, joints, hinges[0].axis)
     return hinges, lean
 
 
@@ -222,17 +232,35 @@ def flat(robot: Robot, group: Group, drives: Sequence[str]) -> Loop:
     gap = max(abs((apart / joint.axis).imag if joint.kind == SLIDE else apart)
               for apart, joint in gaps)
     if gap > OPEN * size:
-        raise ValueError(f'its loops cannot be closed: they stay open by {gap:.3g} m')
+        raise ValueError(f'its loops cannot be closed: they stay open by {gap:.3g} m, more than '
+                         f'{OPEN:g} of their size')
+    pins = [joint for joint in found if joint.position is not None]
+    still: List[str] = []
+    up = hinges[0].axis * np.sign((seen[:3, :3] @ hinges[0].axis)[2])
+    stiff = [joint for joint in found if len(joint.hinges) == 2 and not any(
+        joint.kind == HINGE and _lean(joint, up) < ASKEW for joint in joint.hinges)]
+    for joint in found:
+        # A rod turns in the plane about one hinge of the ball at its end; the others stay, unless
+        # its other end needs them.
+        for hinge, sign in joint.chain:
+            if _lean(hinge, up) < ASKEW and not any(
+                    {*joint.bodies} & {*other.bodies} for other in stiff):
+                pins.append(replace(joint, name=hinge.name, kind=HINGE, position=hinge.position,
+                                    axes=[sign * float(np.sign(hinge.axis @ up))] * 2))
+                still += [one.name for one, _ in joint.chain if one is not hinge]
+                break
     return Loop(ground, frame_id, frame, found, size, gap, lean if lean > 1e-12 else 0.0,
-                across)
+                across, pins, still)
 
 
-def _check_rods(ground: str, joints: Sequence[Joint]) -> None:
+def _check_rods(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> None:
     """Raise ValueError if a body can leave the plane: only rods may be on balls alone."""
     held = {ground}
-    while more := {end for joint in joints for end in joint.bodies
-                   if joint.kind != BALL
-                   and held & {*joint.bodies}} - held:
+    # A universal joint with an axis normal to the plane is a pin.
+    pins = [joint for joint in joints if joint.kind != BALL or len(joint.hinges) == 2 and any(
+        joint.kind == HINGE and _lean(joint, normal) < ASKEW for joint in joint.hinges)]
+    while more := {end for joint in pins for end in joint.bodies
+                   if held & {*joint.bodies}} - held:
         held |= more
     for body in dict.fromkeys(end for joint in joints for end in joint.bodies):
         own = [joint.bodies for joint in joints if body in joint.bodies]

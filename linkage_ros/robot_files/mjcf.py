@@ -12,22 +12,40 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
+from mujoco import (
+    mj_kinematics,
+    MjData,
+    MjSpec,
+    mjtEq,
+    mjtGeom,
+    mjtJoint,
+    mjtObj,
+    mjtTrn,
+    mjtWrap,
+    set_mju_user_warning,
+)
 import numpy as np
 
 from .elements import at, turned_by
 from .robot import BALL, FIXED, HINGE, Robot, SLIDE
+from ..command import RequestError
+
+# What MuJoCo says of a file, and the sentence for it.
+_ERRORS = [
+    (r"Error opening file '(.*)'", 'it includes {!r}, which is not there'),
+    (r'plugin (\S+) not found', 'it uses the plugin {!r}, which this MuJoCo does not have: remove '
+     'that from <extension>, and what refers to it')]
 
 
 def read(path: str) -> Robot:
     """Return the robot in a file, in the pose of its first keyframe, or at its zero."""
-    import mujoco as mj
-
     model = _compiled(path)
-    data = mj.MjData(model)
+    data = MjData(model)
     data.qpos[:] = model.key_qpos[0] if model.nkey else model.qpos0
-    mj.mj_kinematics(model, data)
+    mj_kinematics(model, data)
     bodies = [model.body(i).name or f'body{i}' for i in range(model.nbody)]
     names = [model.joint(i).name or f'joint{i}' for i in range(model.njnt)]
     robot = Robot(bodies[0], {body: at(data.xpos[i], data.xmat[i].reshape(3, 3))
@@ -41,7 +59,7 @@ def read(path: str) -> Robot:
             # Several joints of one body have bodies without a name between them.
             below = body if j == joints[-1] else f'{body}/{names[j]}'
             robot.frames.setdefault(below, robot.frames[body])
-            kind = mj.mjtJoint(model.jnt_type[j]).name[6:].lower()
+            kind = mjtJoint(model.jnt_type[j]).name[6:].lower()
             one = kind in (HINGE, SLIDE)
             robot.join(names[j], kind, (above, below), at(data.xanchor[j]),
                        data.xaxis[j] if one else (0.0, 0.0, 1.0), None,
@@ -51,25 +69,29 @@ def read(path: str) -> Robot:
     for i in np.flatnonzero(model.eq_active0).tolist():
         _tie(robot, model, i, bodies, names)
     for way, target in zip(model.actuator_trntype, model.actuator_trnid[:, 0]):
-        kind = mj.mjtTrn(way).name[6:].lower()
+        kind = mjtTrn(way).name[6:].lower()
         wraps = model.tendon_adr[target] + np.arange(model.tendon_num[target]) \
             if kind == 'tendon' else ()
         robot.driven += [names[target]] * (kind in ('joint', 'jointinparent')) + [
             names[model.wrap_objid[i]] for i in wraps
-            if mj.mjtWrap(model.wrap_type[i]) == mj.mjtWrap.mjWRAP_JOINT]
+            if mjtWrap(model.wrap_type[i]) == mjtWrap.mjWRAP_JOINT]
     return robot
 
 
 def _compiled(path: str) -> Any:
     """Return a model without meshes, whose files may be missing."""
-    import mujoco as mj
-
     # Warnings, which MuJoCo writes to a file, concern dynamics.
-    mj.set_mju_user_warning(lambda text: None)
-    spec = mj.MjSpec.from_file(path)
+    set_mju_user_warning(lambda text: None)
+    try:
+        spec = MjSpec.from_file(path)
+    except ValueError as error:
+        for pattern, why in _ERRORS:
+            if found := re.search(pattern, str(error)):
+                raise RequestError(why.format(found[1])) from None
+        raise
     for geom in spec.geoms:
-        if geom.type in (mj.mjtGeom.mjGEOM_MESH, mj.mjtGeom.mjGEOM_HFIELD, mj.mjtGeom.mjGEOM_SDF):
-            geom.type, geom.meshname, geom.hfieldname = mj.mjtGeom.mjGEOM_SPHERE, '', ''
+        if geom.type in (mjtGeom.mjGEOM_MESH, mjtGeom.mjGEOM_HFIELD, mjtGeom.mjGEOM_SDF):
+            geom.type, geom.meshname, geom.hfieldname = mjtGeom.mjGEOM_SPHERE, '', ''
             geom.size = [0.01, 0.0, 0.0]
         geom.material = ''
     for part in (*spec.meshes, *spec.hfields, *spec.skins, *spec.materials, *spec.textures):
@@ -80,9 +102,7 @@ def _compiled(path: str) -> Any:
 
 def _tie(robot: Robot, model: Any, i: int, bodies: Any, names: Any) -> None:
     """Add the constraint of an equality between two bodies or joints."""
-    import mujoco as mj
-
-    kind, given = mj.mjtEq(model.eq_type[i]).name[5:].lower(), model.eq_data[i]
+    kind, given = mjtEq(model.eq_type[i]).name[5:].lower(), model.eq_data[i]
     ends = [model.eq_obj1id[i], model.eq_obj2id[i]]
     if kind == 'joint' and ends[1] < 0:
         robot.held[names[ends[0]]] = float(given[0] + model.qpos0[model.jnt_qposadr[ends[0]]])
@@ -91,7 +111,7 @@ def _tie(robot: Robot, model: Any, i: int, bodies: Any, names: Any) -> None:
         robot.follow(names[ends[0]], names[ends[1]], given[1], given[0] + one - given[1] * other)
     if kind in ('connect', 'weld'):
         welds = kind == 'weld'
-        if mj.mjtObj(model.eq_objtype[i]) == mj.mjtObj.mjOBJ_SITE:
+        if mjtObj(model.eq_objtype[i]) == mjtObj.mjOBJ_SITE:
             frames = [at(model.site_pos[end], turned_by(model.site_quat[end])) for end in ends]
             ends = model.site_bodyid[ends]
         else:

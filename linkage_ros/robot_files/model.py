@@ -13,14 +13,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Dict, Optional
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import readers
+from . import closing, readers
+from .check import published
 from .elements import at, parse
 from .robot import FARTHEST, HINGE, Robot, SLIDE
-from .spatial import posed, trees
+from .spatial import components, posed, trees
 from .. import scene
 from ..robot_model.bodies import coordinates
 from ..robot_model.urdf import link, tree_joint
@@ -58,23 +59,39 @@ def urdf(robot: Robot) -> str:
     return f'<robot name="robot">\n{text}</robot>'
 
 
-def others(robot: Robot, machines: Dict[str, scene.SceneMechanism], held: Dict[str, float]
-           ) -> Dict[str, Any]:
-    """Return the parameters of a mechanism of all joints that a scene does not publish."""
-    known = {drive.source for machine in machines.values() for drive in machine.inputs.values()}
-    known |= {called.name for machine in machines.values()
-              for called in machine.joints.values() if called.published}
-    left = [name for name in robot.positions if name not in known]
-    given: Dict[str, Any] = {'joints': ['A ground 0 0', *(
-        f'B{i} crank A 1' for i in range(len(left)))], 'type': 'custom', 'only_named': True}
-    names = []
-    for i, name in enumerate(left):
-        own = f'crank{i + 1 if i else ""}'
-        source, ratio, offset = robot.source(name)
+def not_published(names: Sequence[str]) -> str:
+    """Return the report on joints that nothing determines."""
+    return (f'Not published: {", ".join(names)}: passive joints of loops that no mechanism '
+            'determines. What they carry has no transform.')
+
+
+def others(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
+           held: Mapping[str, float]) -> Tuple[Dict[str, Any], List[str]]:
+    """
+    Return the parameters of a mechanism of all joints that a scene does not publish.
+
+    Also return the joints that nothing determines: undriven ones in loops, and what follows them.
+    `held` are positions of joints that stay.
+    """
+    held = {name: value for name, value in {**robot.held, **held}.items()
+            if name in robot.positions}
+    known = published(machines)
+    loops = components(closing.held(robot, held))
+    passive = {joint.name for each in loops for joint in each.joints}.difference(
+        known, held, robot.driven)
+    given: Dict[str, Any] = {}
+    lines, names, lost = ['A ground 0 0'], [], []
+    for name in [each for each in robot.positions if each not in known]:
+        source, ratio, offset = (name, 1.0, 0.0) if name in held else robot.source(name)
+        if source in passive:
+            lost.append(name)
+            continue
+        own = f'crank{len(lines) if len(lines) > 1 else ""}'
         value = ratio * held.get(source, robot.positions[source]) + offset
         given.update({f'{own}.source': source, f'{own}.ratio': ratio, f'{own}.offset': offset,
-                      f'{own}.start': held.get(name, value), f'{own}.speed': 0.0})
+                      f'{own}.start': value, f'{own}.speed': 0.0})
+        lines.append(f'B{len(lines)} crank A 1')
         if source != name:
             names.append(f'{own}={quoted_name(name)}')
-    given['joint_names'] = names
-    return {f'{OTHERS}.{key}': value for key, value in given.items()} if left else {}
+    given.update(type='custom', joints=lines, joint_names=names, only_named=True)
+    return {f'{OTHERS}.{key}': value for key, value in given.items()} if lines[1:] else {}, lost

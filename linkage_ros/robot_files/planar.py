@@ -149,20 +149,39 @@ class Drawing(Dyads):
         pin = self.joint_at(child, joint.places[1]) or ''
         base, body = (parent, child) if self.home[pin] == parent else (child, parent)
         if self.home[pin] != base:
-            return None
+            return self._between(pin, parent, child, joint)
         link, hangs, along, slide, _ = self.parts[body]
         if not link or hangs != pin or slide:
             # The angle of a triangle on this link is the angle between the two links.
             try:
-                start, (other, end) = self.on[body][pin], self.other(body, pin)
+                tip = self._triangle(body, pin, 'dyad')
             except ValueError:
                 # No word places a second joint on this block or barrel.
                 return None
-            along = (end - start) * complex(0.5, 0.75 ** 0.5)
-            side = self.length_text(abs(end - start))
-            tip = self.name(start + along, body, f'dyad {pin} {other} {side} {side} left')
+            along = self.on[body][tip] - self.on[body][pin]
             link = bar_name(pin, tip)
         return link, joint.motion(body), phase(along / self.parts[base].along)
+
+    def _triangle(self, body: str, pin: str, word: str = 'rigid') -> str:
+        """Add a joint to a body, the tip of an equilateral triangle on a joint, by a line."""
+        start, (other, end) = self.on[body][pin], self.other(body, pin)
+        side = self.length_text(abs(end - start))
+        return self.name(start + (end - start) * complex(0.5, 0.75 ** 0.5), body,
+                         f'{word} {pin} {other} {side} {side} left')
+
+    def _between(self, pin: str, base: str, body: str, joint: Joint
+                 ) -> Optional[Tuple[str, float, float]]:
+        """Return the link of an angle between two bodies that turn on a pin of a third one."""
+        # A bar parallel to the one body that hangs on the other.
+        try:
+            tip, end = self.other(body, pin)
+            aside = next((name for name in self.on[base] if self.home[name] == base), '') \
+                or self._triangle(base, pin)
+        except ValueError:
+            return None
+        along = end - self.on[body][pin]
+        name = self.name(self.on[base][aside] + along, body, f'parallelogram {pin} {aside} {tip}')
+        return bar_name(aside, name), joint.motion(body), phase(along / self.parts[base].along)
 
     def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> Tuple[str, str]:
         """Add an input, as `Dyads` requires; inputs of one source are geared to the first."""
@@ -209,10 +228,9 @@ class NotPlaced(ValueError):
         self.bodies = drawing.left
 
 
-def described(robot: Robot, group: loops.Group, others: Sequence[str]
-              ) -> Tuple[str, Dict[str, Any], List[str]]:
+def described(robot: Robot, group: loops.Group, others: Sequence[str]) -> check.Imported:
     """
-    Return a mechanism's name, its parameters, and its report.
+    Return a mechanism.
 
     Raises ValueError for loops that are no dyads, or whose poses are others than the robot's.
     """
@@ -227,26 +245,22 @@ def described(robot: Robot, group: loops.Group, others: Sequence[str]
     reports = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
     drawing.limits, more = robot.limits(drawing.moved_by)
     reports += more
-    if drawing.measured:
-        reports += [f'Left out: the limits of {limits.text(source)}: its motor is between two '
-                    'moving links.' for source, limits in drawing.limits.items()]
-    else:
+    if not drawing.measured:
         reports += sweeps.added(given, name, drawing.drives, drawing.limits, machine.inputs)
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if drawing.apart(machine.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
-    report = check.compared(robot, machine, [joint.name for joint in drawing.moved_by],
-                            drawing.ends, loop.lean + loop.gap / loop.size)
-    reports.append(report)
+    slack = loop.lean + loop.gap / loop.size
+    report, ranges, (low, high) = check.compared(
+        robot, machine, [joint.name for joint in drawing.moved_by], drawing.ends, slack)
+    if drawing.measured and drawing.limits:
+        own = f'{name}.{drawing.drives[0].name}'
+        given[f'{own}.sweep'] = [low, high]
+        given[f'{own}.start'] = min(max(given[f'{own}.start'], low), high)
+    reports += [report] + [loop.misfit] * bool(loop.misfit)
     reports += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle '
                 'depends.' for joint, gap in loop.across.items()]
-    published = {called.name for called in machine.joints.values() if called.published}
-    published |= {joint.name for joint in drawing.moved_by}
-    own = {one.name for joint in loop.joints if drawing.parts.keys() >= {*joint.bodies}
-           for one in joint.hinges}
-    if lost := [joint for joint in robot.positions if joint in own - published]:
-        reports.append(f'Not published: {", ".join(lost)}, which no angle in the plane tells.')
-    return name, given, reports
+    return check.Imported(name, given, reports, ranges, slack, loop.still)
 
 
 def _drawn(robot: Robot, group: loops.Group) -> Drawing:
@@ -300,8 +314,8 @@ def _why(drawing: Drawing) -> str:
 
 
 def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
-    seen = [(joint, found) for joint in drawing.loop.joints if joint.position is not None
-            and joint not in drawing.moved_by and joint not in drawing.driven
+    seen = [(joint, found) for joint in drawing.loop.pins
+            if joint not in drawing.moved_by and joint not in drawing.driven
             and (found := drawing.measured_by(joint))]
     measured = drawing.measured and drawing.measured_by(drawing.measured)
     yield 'type', 'custom'

@@ -16,10 +16,11 @@ from collections import Counter
 from contextlib import contextmanager
 from typing import Any, Iterator, Mapping, Optional
 
-from . import mjcf, sdf, urdf
+from . import sdf, urdf
 from .elements import parse
 from .robot import Robot
 from ..command import RequestError
+from ..optional import needs
 
 
 def read(path: str, loops: Optional[str] = None) -> Robot:
@@ -31,6 +32,8 @@ def read(path: str, loops: Optional[str] = None) -> Robot:
         raise RequestError(f'{path} has its own loops; --loops is for a URDF')
     with _blaming(path):
         if root.tag == 'mujoco':
+            with needs('mujoco'):
+                from . import mjcf
             robot = mjcf.read(path)
         elif root.tag == 'sdf':
             robot = sdf.read(path, root)
@@ -67,12 +70,12 @@ def _blaming(path: str) -> Iterator[None]:
 
 
 def _loops(path: str) -> Mapping[str, Any]:
-    import yaml
-
+    with needs('yaml'):
+        from yaml import safe_load, YAMLError
     try:
         with open(path, encoding='utf-8') as file:
-            found = yaml.safe_load(file)
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+            found = safe_load(file)
+    except (YAMLError, UnicodeDecodeError) as error:
         raise RequestError(f'{path} is no YAML: {error}') from None
     if not isinstance(found, dict) or not {*urdf.LOOPS} & found.keys():
         raise RequestError(f'{path} must have one of {": ".join(urdf.LOOPS)}:')

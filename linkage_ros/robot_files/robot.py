@@ -103,6 +103,22 @@ class Joint:
         return self.position or 0.0
 
     @property
+    def chain(self) -> List[Tuple['Joint', float]]:
+        """
+        Return the hinges of a ball from its first body to its second, if all have positions.
+
+        With each its sign: 1 if its second body is nearer to that of the ball.
+        """
+        found: List[Tuple[Joint, float]] = []
+        body, left = self.bodies[0], self.hinges if self.parts else []
+        if any(joint.position is None for joint in left):
+            return []
+        while near := [joint for joint in left if body in joint.bodies]:
+            found.append((near[0], 1.0 if near[0].bodies[0] == body else -1.0))
+            body, left = near[0].other(body), [joint for joint in left if joint is not near[0]]
+        return found
+
+    @property
     def hinges(self) -> List['Joint']:
         """Return the hinges of a ball that is made of some, else the joint itself."""
         return [one for part in self.parts for one in part.hinges] or [self]
@@ -171,8 +187,9 @@ class Robot:
             # Two hinges with a cross between them.
             cross = f'{name}/cross'
             self.frames[cross] = frame
-            self.join(name, HINGE, (bodies[0], cross), frame, axis)
-            self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame, ways[1], other)
+            self.join(name, HINGE, (bodies[0], cross), frame, axis, None, position)
+            self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame, ways[1], other,
+                      position if other is None else None)
             return
         turns = tuple(each[:3, :3] for each in frames)
         self.joints.append(Joint(

@@ -18,6 +18,7 @@ pose that the robot has.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 import math
 from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Set, Tuple
@@ -35,6 +36,8 @@ from ..words import listed
 
 # A hinge with wider limits [rad] has none.
 _ANY = 0.999 * math.pi
+# The least sine of an angle that places a hinge of a universal joint.
+_SQUARE = 0.1
 # Number of poses along each side of the motors' ranges.
 _SIDE = 7
 
@@ -61,6 +64,9 @@ class Rods:
         # The joint that drives each input, and the input's value in the pose of the robot.
         self.inputs: Dict[str, Joint] = {}
         self.zeros: Dict[str, float] = {}
+        # Hinges of universal joints, whose limits do not count, and third hinges, which stay.
+        self.universals: Set[str] = set()
+        self.still: List[str] = []
         self._names: Set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
         rods = {body: tuple(held) for body, held in _on_bodies(group.joints).items()
                 if body != ground and [joint.kind for joint in held] == [BALL, BALL]}
@@ -82,6 +88,7 @@ class Rods:
                              'than rods in them')
         for body, held in rods.items():
             self._rod(body, held)
+            self._universal(body, held)
         for half in halves:
             self._cylinder(half, [next(joint for joint in own[body] if joint is not half)
                                   for body in half.bodies])
@@ -125,6 +132,38 @@ class Rods:
         self.rods.append(f'{name} rod {self._end(held[0], body)} {self._end(held[1], body)} '
                          f'length {length}')
 
+    def _universal(self, body: str, held: Tuple[Joint, ...]) -> None:
+        """Add two hinges of a ball at an end of a rod, if it has some; a third one stays."""
+        for ball, other in held, held[::-1]:
+            base, place = ball.other(body), ball.place(body)
+            chain = [hinge for hinge, _ in ball.chain]
+            # A third hinge stays, unless the other end needs it.
+            if not 2 <= len(chain) <= 2 + (len(other.hinges) != 2):
+                continue
+            (first, second), way = (chain if ball.bodies[1] == body else chain[::-1])[:2], (
+                other.place(body) - place)
+            cross = {*first.bodies} & {*second.bodies}
+            (middle,), (end,) = cross, {*second.bodies} - cross
+            axes = first.motion(middle), second.motion(end)
+            # Along the second axis, and a quarter turn about it: no dead point is near.
+            marks = axes[1] * np.linalg.norm(way), np.cross(axes[1], way)
+            if min(abs(axis @ np.cross(mark, way)) for mark, axis in zip(marks, axes)
+                   ) < _SQUARE * way @ way:
+                continue
+            link = self._bodies[base]
+            for hinge, axis, mark in zip((first, second), axes, marks):
+                name = self._named(hinge)
+                self.links[name] = hinge
+                self.universals.add(name)
+                self._ends[name] = f'{link} at {self._text(place)} axis {self._text(axis, False)}'
+                link = name
+                self.rods.append(
+                    f'{self._named(replace(hinge, name=f"{hinge.name}_mark"))} rod '
+                    f'{self._end(other, body)} {link} {self._text(place + mark)} '
+                    f'length {short(float(np.linalg.norm(way - mark)))}')
+            self.still += [hinge.name for hinge in chain if hinge not in (first, second)]
+            return
+
     def _cylinder(self, half: Joint, balls: Sequence[Joint]) -> None:
         ends = [ball.place(body) for ball, body in zip(balls, half.bodies)]
         way = ends[1] - ends[0]
@@ -140,7 +179,8 @@ class Rods:
         found = []
         for name, joint in self.links.items():
             word = 'motor' if name in self.inputs else joint.kind
-            ends = None if word == 'motor' else limits.get(name, self._limits(joint))
+            ends = None if word == 'motor' or name in self.universals else limits.get(
+                name, self._limits(joint))
             found.append(f'{name} {word} {self._ends[name]}' + (
                 f' within {short(ends[0])} {short(ends[1])}' if ends else ''))
         return found + self.rods
@@ -182,10 +222,9 @@ def _on_bodies(joints: Sequence[Joint]) -> Dict[str, List[Joint]]:
             for joint in joints for body in joint.bodies}
 
 
-def described(robot: Robot, group: Group, others: Sequence[str]
-              ) -> Tuple[str, Dict[str, Any], List[str]]:
+def described(robot: Robot, group: Group, others: Sequence[str]) -> check.Imported:
     """
-    Return a mechanism's name, its parameters, and its report.
+    Return a mechanism.
 
     Raises ValueError for loops that rods cannot be, or whose poses are others than the robot's.
     """
@@ -200,15 +239,17 @@ def described(robot: Robot, group: Group, others: Sequence[str]
     limits, more = robot.limits(found.inputs.values())
     reports += more + [
         f'Left out: the limits of {joint.name}, {why}.' for link, joint in found.links.items()
-        if link not in found.inputs and (why := joint.no_limits or found.one_sided(joint))]
+        if link not in {*found.inputs, *found.universals}
+        and (why := joint.no_limits or found.one_sided(joint))]
     reports += sweeps.added(given, name, [
         sweeps.Source(link, joint.name, 1.0, found.zeros[link] - joint.start, found.zeros[link])
         for link, joint in found.inputs.items()], limits, machine.inputs)
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     ends = _ranges(machine, found)
-    report = check.compared(robot, machine, [joint.name for joint in found.inputs.values()],
-                            ends, 0.0)
-    return name, given, [*reports, report, *_corners(machine, found)]
+    report, ranges, _ = check.compared(
+        robot, machine, [joint.name for joint in found.inputs.values()], ends, 0.0)
+    return check.Imported(name, given, [*reports, report, *_corners(machine, found)], ranges,
+                          still=found.still)
 
 
 def _lines(found: Rods) -> Tuple[List[str], List[str]]:

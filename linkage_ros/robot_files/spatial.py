@@ -37,6 +37,8 @@ MOST = 100
 TOGETHER = 1e-6
 # Loops open by less, of their size, are closed.
 CLOSED = 1e-10
+# Loops open by more, of their size, are so in the file or by a mistake, not by rounding.
+EXACT = 1e-9
 # Loops that are less stiff, of their size, are at a dead point.
 DEAD = 1e-6
 # The order of joints in the tree, which leaves hinges and balls to close the loops.
@@ -60,7 +62,7 @@ class Poses(NamedTuple):
     positions: np.ndarray
     moved: np.ndarray
 
-    def some(self, which: np.ndarray) -> 'Poses':
+    def some(self, which: Any) -> 'Poses':
         """Return some of the poses."""
         return Poses(self.positions[which], self.moved[which])
 
@@ -260,6 +262,16 @@ class Component:
         return {joint.name: joint.position for joint in self.joints
                 if joint.position is not None}
 
+    @property
+    def cut_names(self) -> Set[str]:
+        """Names of the hinges that close its loops, whose angles `read` returns."""
+        return {cut.name for cut in self._cuts if cut.position is not None and cut.kind == HINGE}
+
+    @property
+    def names(self) -> Set[str]:
+        """Names of the joints whose positions `read` returns."""
+        return self.cut_names | {self._names[i] for i in np.flatnonzero(self._named)}
+
     def at_start(self, count: int = 1) -> Poses:
         """Return the pose of the file, `count` times."""
         return Poses(np.zeros((count, len(self._elements))),
@@ -299,12 +311,11 @@ class Component:
         """Return the difference of two poses in each column; balls have none."""
         return (other.positions - one.positions)[:, self._column]
 
-    def stiffness(self, poses: Poses, fixed: np.ndarray, nullity: int
-                  ) -> Tuple[np.ndarray, np.ndarray]:
-        """Return the least and the product of singular values of each pose: 0 at a dead point."""
+    def stiffness(self, poses: Poses, fixed: np.ndarray) -> np.ndarray:
+        """Return the product of singular values of the loops in each pose: 0 at a dead point."""
         slope = self.errors(poses, True)[1][:, :, ~fixed] / self.size
-        values = np.linalg.svd(slope, compute_uv=False)[:, :np.sum(~fixed) - nullity]
-        return np.min(values, axis=1, initial=1.0), np.prod(values, axis=1)
+        count = np.sum(~fixed) - self.nullity(fixed)
+        return np.prod(np.linalg.svd(slope, compute_uv=False)[:, :count], axis=1)
 
     def nullity(self, fixed: np.ndarray) -> int:
         """Return the degrees of freedom that the loops leave, in a random open pose."""

@@ -65,7 +65,8 @@ class Reader:
                     raise RequestError(f'joint {joint.get("name")} is on {end!r}, which is no '
                                        'link')
             below[bases[child]].append(child)
-        row = [link for link in names if link not in joints]
+        # The ground of Drake, which hangs on nothing and has no joints.
+        row = [link for link in names if link not in joints and (link != 'world' or below[link])]
         if len(row) != 1:
             raise RequestError(f'a URDF has one root link, not {len(row)}')
         robot = self.robot = Robot(row[0], {row[0]: np.eye(4)})
@@ -73,13 +74,16 @@ class Reader:
             for child in below[link]:
                 robot.frames[child] = robot.frames[link] @ origin(joints[child].find('origin'))
             row += below[link]
-        if lost := [link for link in names if link not in robot.frames]:
+        if lost := [link for link in names if link not in robot.frames and link in joints]:
             raise RequestError(f'{lost[0]} hangs on itself')
         # The link of each frame, and its pose on the link.
         self._frames = {link: (link, _NOWHERE) for link in robot.frames}
         self._frames.update((frame.get('name', ''), (frame.get('link', ''), origin(frame)))
                             for frame in root.findall('frame'))
         self._children = {joint.get('name', ''): child for child, joint in joints.items()}
+        if 'world' in names and 'world' not in robot.frames:
+            robot.frames['world'] = robot.frames[row[0]]
+            robot.join('', FIXED, (row[0], 'world'), robot.frames['world'])
         for child, joint in joints.items():
             self._tree_joint(joint, (bases[child], child))
         self._of_elements()
@@ -88,6 +92,10 @@ class Reader:
         robot.driven = [joint.get('name', '') for joint in (
             *root.findall('transmission/joint'),
             *root.findall('ros2_control/joint[command_interface]'))]
+        # URDF+ says which joints are not independent.
+        if not robot.driven and root.find('joint[@independent="false"]') is not None:
+            robot.driven = [name for joint in joints.values() if joint.get(
+                'independent') != 'false' and (name := joint.get('name', '')) in robot.positions]
 
     def _tree_joint(self, joint: Element, ends: Tuple[str, str]) -> None:
         name, mimic, limit = joint.get('name', ''), joint.find('mimic'), joint.find('limit')
@@ -110,6 +118,10 @@ class Reader:
         """Add the loops that elements of the URDF close."""
         for cut in (*self._root.findall('constraint'), *self._root.findall('loop_joint'),
                     *self._root.findall('loop')):
+            # An example of Isaac Sim has an empty one first.
+            for empty in [part for part in cut if part.tag in ('link1', 'link2')
+                          and not part.get('link')]:
+                cut.remove(empty)
             tags = next((tags for tags in (('link1', 'link2'), ('predecessor', 'successor'))
                          if cut.find(tags[0]) is not None), ('parent', 'child'))
             own = [origin(next((part for part in map(cut.find, (
@@ -205,8 +217,12 @@ class Reader:
             self.robot.join(name, UNIVERSAL, joint.bodies, at(joint.places[0], joint.turns[0]),
                             first, second=second)
         else:
-            joint.kind = KINDS.get(kind.lower(), kind)
-            joint.position, joint.limits, joint.no_limits = None, None, ''
+            joint.kind = KINDS.get(kind.lower(), kind.lower())
+            if joint.kind == FIXED and joint.position is not None:
+                # The URDF still has it, so that its position is published.
+                self.robot.held[name], joint.kind = joint.position, HINGE
+            else:
+                joint.position, joint.limits, joint.no_limits = None, None, ''
 
 
 def _check_keys(where: str, given: Iterable[Any], allowed: Sequence[str]) -> None:

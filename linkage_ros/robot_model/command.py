@@ -18,12 +18,11 @@ from .assembled import assembled, DENSITY
 from .. import command, scene
 
 NAME = 'urdf'
-NEEDS = 'pip install pyyaml, or apt install python3-yaml'
 
 
 def main(args: Optional[List[str]] = None) -> int:
     """Print a robot model; return the exit code."""
-    return command.run(NAME, show, args, NEEDS)
+    return command.run(NAME, show, args)
 
 
 def show(args: Optional[List[str]], given: Optional[scene.Scene] = None) -> None:

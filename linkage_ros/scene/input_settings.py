@@ -26,6 +26,10 @@ from ..words import quoted
 MARGIN = 0.01
 # Narrowest sweep [rad]; of a length, as a fraction of `Input.size`.
 NARROWEST_SWEEP = 1e-6
+# Turns of an input that never repeats, before they are counted from zero again.
+NEVER = 1e12
+# Intervals in a message, at most: gears may have hundreds.
+MOST_ARCS = 8
 # Largest angle [rad] whose rounding error is negligible for a crank.
 FARTHEST = 1e6
 FASTEST = 100.0
@@ -104,7 +108,9 @@ class InputSettings:
 
 def in_words(arcs: Iterable[Arc]) -> str:
     """Return intervals as text, such as '[0, 1] or [2, 3]'."""
-    return ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs)
+    texts = [f'[{low:.6g}, {high:.6g}]' for low, high in arcs]
+    return ' or '.join(texts if len(texts) <= MOST_ARCS else [
+        *texts[:MOST_ARCS], f'{len(texts) - MOST_ARCS} more'])
 
 
 def _scaled(input_: Input, linkage: Mechanism, reach: Tuple[Arc, ...],
@@ -125,7 +131,7 @@ def read_settings(name: str, linkage: Mechanism, input_: Input, reach: Tuple[Arc
     """Read the settings of an input; its lengths are those of the linkage times `scale`."""
     drive = _read(name, *_scaled(input_, linkage, reach, scale), values, old, strict)
     _check_measures(name, linkage, drive)
-    return replace(drive, period=linkage.period(linkage.inputs.index(input_)))
+    return replace(drive, period=int(min(input_.period, NEVER)))
 
 
 def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values,

@@ -267,7 +267,7 @@ class InverseRequest:
         """Return how far an input is beyond an end, its value in that turn, and the end's name."""
         sign, own = 1.0 if name == 'upper' else -1.0, self._inverse.inputs[0]
         gap = sign * (input_ - end)
-        gap = gap % own.turn if own.turns else gap if gap > 0.0 else math.inf
+        gap = gap % own.turn if own.wraps else gap if gap > 0.0 else math.inf
         return gap, end + sign * gap, name
 
     @property
@@ -298,7 +298,7 @@ class InverseRequest:
         if not drive.ends:
             return drive.reach
         low, high = drive.ends
-        return [(low, min(high, low + drive.input.turn) if drive.input.turns else high)]
+        return [(low, min(high, low + drive.input.turn) if drive.input.wraps else high)]
 
     @cached_property
     def _spans(self) -> List[List[Tuple[float, float]]]:
@@ -316,7 +316,7 @@ def _times(values: Sequence[Any], factors: Sequence[float]) -> List[Any]:
 def _between_ends(drive: InputSettings, input_: Input, value: float) -> float:
     """Return an input between its ends, a crank after whole periods if needed; else NaN."""
     low, high = drive.ends or (value, value)
-    if input_.turns and not low <= value <= high:
+    if input_.wraps and not low <= value <= high:
         turn = input_.turn
         value += turn * (math.ceil((low - value) / turn) if value < low else
                          math.floor((high - value) / turn))

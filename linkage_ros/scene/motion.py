@@ -62,7 +62,7 @@ class Motion:
         self._turns, self._round = turns, period * TURN
         self._low, high = (0, self._round) if sweep is None else map(_steps, sweep)
         self._width, self._end = high - self._low, high / STEPS
-        self._period = self._round if sweep is None else 2 * self._width
+        self._period = self._round if sweep is None else 2 * self._width or 1
         self._phase = self._place(_steps(start))
         self._since = since
 

@@ -25,6 +25,7 @@ from typing import Any, Dict, Iterator, Optional, Sequence, Set, Tuple
 
 from .parameters import SceneError
 from ..cache import cached
+from ..optional import needs
 from ..words import elided, quoted
 
 KEY = 'ros__parameters'
@@ -47,12 +48,14 @@ Sections = Dict[str, Dict[str, Any]]
 
 def sections(path: str) -> Sections:
     """Return the sections of a parameter file; raise SceneError, with the line, if it is none."""
-    import yaml
+    with needs('yaml'):
+        import yaml
 
+        loader = _loader(yaml)
     found: Sections = {}
     try:
         with open(path, 'rb') as file:
-            root = yaml.compose(file, Loader=_loader())
+            root = yaml.compose(file, Loader=loader)
         if root is not None and root.value:
             _refuse_aliases(root, set())
             _add_sections(found, root, ())
@@ -81,10 +84,8 @@ def is_text(text: str) -> bool:
 
 
 @cached(1)
-def _loader() -> Any:
+def _loader(yaml: Any) -> Any:
     """Return a parser of YAML that marks each value with its type for ROS."""
-    import yaml
-
     class Loader(getattr(yaml, 'CBaseLoader', yaml.BaseLoader)):  # type: ignore[misc]
         pass
 

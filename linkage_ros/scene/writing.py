@@ -18,13 +18,15 @@ from typing import Any, Dict, Mapping
 
 from . import read, Scene, SceneError
 from .parameter_file import is_text, TEXT
+from ..optional import needs
 
 
 def in_yaml(values: Mapping[str, Any]) -> str:
     """Return the text of a parameter file; `values` are by full parameter name."""
-    import yaml
+    with needs('yaml'):
+        from yaml import dump, SafeDumper
 
-    class Dumper(yaml.SafeDumper):
+    class Dumper(SafeDumper):
         """Quotes texts that ROS would read as another type, such as y, nan and 1e5."""
 
     Dumper.add_representer(str, lambda dumper, text: dumper.represent_scalar(
@@ -36,8 +38,8 @@ def in_yaml(values: Mapping[str, Any]) -> str:
             # rcl cannot read an empty list, which is the default anyway.
             continue
         numbers = isinstance(written, list) and not any(isinstance(one, str) for one in written)
-        text = yaml.dump({name: written}, Dumper=Dumper, width=1000,
-                         default_flow_style=numbers and None)
+        text = dump({name: written}, Dumper=Dumper, width=1000,
+                    default_flow_style=numbers and None)
         texts.append(indent(text.rstrip(), '    '))
     return '\n'.join(texts) + '\n'
 

@@ -90,6 +90,8 @@ class Server:
         self._bridge = bridge
         self._host = host
         self._clients: set[Client] = set()
+        # The connections whose request is being answered.
+        self._answered: set[Any] = set()
         started: Future[Any] = Future()
         self._thread = Thread(target=lambda: asyncio.run(self._serve(port, started)),
                               name='web', daemon=True)
@@ -124,11 +126,25 @@ class Server:
             await runner.cleanup()
             started.set_exception(error)
             return
+        sweeping = asyncio.ensure_future(self._end_half_requests(runner))
         stopping = asyncio.Event()
         started.set_result((self._bridge.loop, stopping, runner.addresses[0][1]))
         await stopping.wait()
+        sweeping.cancel()
         await asyncio.gather(*(client.close() for client in self._clients))
         await runner.cleanup()
+
+    async def _end_half_requests(self, runner: web.AppRunner) -> None:
+        """Close connections that do not send a whole request in time."""
+        since: dict[Any, float] = {}
+        while runner.server:
+            now = self._bridge.loop.time()
+            since = {one: since.get(one, now) for one in runner.server.connections
+                     if one not in self._answered}
+            for one, start in since.items():
+                if now > start + SECONDS_TO_READ:
+                    one.force_close()
+            await asyncio.sleep(SECONDS_TO_CLOSE)
 
     @web.middleware
     async def _guard(self, request: web.Request, handler: Callable[..., Any]) -> Any:
@@ -144,7 +160,11 @@ class Server:
             raise web.HTTPForbidden(text=f'{host!r} is not a name of this server.\n')
         if origin is not None and _parts(origin).netloc.lower() != host.lower():
             raise web.HTTPForbidden(text=f'{origin!r} is a foreign origin.\n')
-        response = await handler(request)
+        self._answered.add(request.protocol)
+        try:
+            response = await handler(request)
+        finally:
+            self._answered.discard(request.protocol)
         if not response.prepared:
             response.headers.update(HEADERS)
         return response

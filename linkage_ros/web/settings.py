@@ -121,7 +121,10 @@ class Setting:
 
     def asked(self, full_name: str, value: Any) -> Any:
         """Return a parameter message with a value from JSON; ValueError if it is not allowed."""
-        if not ALLOWS.get(self._type, lambda _: False)(value):
+        if self._type not in ALLOWS:
+            raise ValueError(f'{full_name} is no number, and the page sets numbers only: use ros2 '
+                             f'param set {self.node} {full_name}')
+        if not ALLOWS[self._type](value):
             allowed = self.descriptor.additional_constraints or f'a {self._type.name.lower()}'
             raise ValueError(f'{full_name} must be {allowed}, not {quoted(value)}')
         if self._type == Parameter.Type.DOUBLE:

@@ -17,16 +17,11 @@ from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 
+from .bridge import Bridge
+from .scene_view import SceneView
 from .. import scene
 from ..nodes import scene_node, shutdown
-
-try:
-    from .server import Server
-except ImportError as error:
-    raise ImportError('viewer needs aiohttp: apt install python3-aiohttp, or pip install '
-                      'aiohttp') from error
-from .bridge import Bridge  # noqa: I100
-from .scene_view import SceneView
+from ..optional import needs
 
 VIEWER = 'viewer'
 PORT = 8020
@@ -40,13 +35,17 @@ class Viewer(Node):
     ------
     SceneError
         If it cannot listen at its host and port.
+    ImportError
+        Without an aiohttp that works.
 
     """
 
     def __init__(self, **kwargs: Any) -> None:
+        with needs('aiohttp'):
+            from .server import Server
         super().__init__(VIEWER, **kwargs)
         try:
-            self._server = self._served()
+            self._server = self._served(Server)
         except (OSError, ParameterException) as error:
             super().destroy_node()
             in_use = getattr(error, 'errno', None) == EADDRINUSE
@@ -61,7 +60,7 @@ class Viewer(Node):
         self._server.stop()
         super().destroy_node()
 
-    def _served(self) -> Server:
+    def _served(self, server: Any) -> Any:
         host = self._declared('host', '127.0.0.1', 'Address to listen at; 127.0.0.1: for browsers '
                               'on this machine alone. Whoever reaches it can move the scene.')
         port = self._declared('port', PORT, 'Port to listen at; 0: any that is free.',
@@ -70,11 +69,11 @@ class Viewer(Node):
                                 'that one is taken.')
         bridge = Bridge(self)
         try:
-            return Server(SceneView(bridge), bridge, host, port)
+            return server(SceneView(bridge), bridge, host, port)
         except OSError as error:
             if not or_any or error.errno != EADDRINUSE:
                 raise
-            return Server(SceneView(bridge), bridge, host, 0)
+            return server(SceneView(bridge), bridge, host, 0)
 
     def _declared(self, name: str, default: Any, description: str, **ranges: Any) -> Any:
         return self.declare_parameter(name, default, ParameterDescriptor(

@@ -28,8 +28,10 @@ namespace
 using Code = NAMESPACE::JOINED(CLASS, Code);
 constexpr int n = static_cast<int>(Code::size);
 constexpr double nan_ = std::numeric_limits<double>::quiet_NaN();
+constexpr double unwritten = 0.123456789;
 constexpr double inf = std::numeric_limits<double>::infinity();
-bool may_allocate = true;
+// Of this thread: that which logs may allocate.
+thread_local bool may_allocate = true;
 
 void check(bool holds, const char * what, long state)
 {
@@ -190,13 +192,23 @@ void hostile(Robot & robot, long state)
   double (&other)[3][n] = state % 2 ? robot.actuator : robot.joint;
   for (auto & kind : other) {
     for (double & value : kind) {
-      value = nan_;
+      value = unwritten;
     }
   }
   state % 2 ? robot.transmission.joint_to_actuator() : robot.transmission.actuator_to_joint();
   for (auto & kind : other) {
     for (double value : kind) {
       check(std::isfinite(value), "something is written that is not finite", state);
+    }
+  }
+  // What is not commanded is not written.
+  for (int kind = 0; state % 2 && kind < 3; ++kind) {
+    bool is_commanded = true;
+    for (int i = 0; i < n; ++i) {
+      is_commanded = is_commanded && std::isfinite(robot.joint[kind][i]);
+    }
+    for (double value : other[kind]) {
+      check(is_commanded || value == unwritten, "what is not commanded is written", state);
     }
   }
 }

@@ -13,19 +13,26 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <cstddef>
 #include <limits>
 #include <locale>
+#include <mutex>
 #include <optional>
 #include <sstream>
 #include <string>
+#include <thread>
+#include <type_traits>
 #include <vector>
 
 #include "hardware_interface/hardware_info.hpp"
+#include "linkage_ros/linkage_transmission.hpp"
+#include "rcutils/logging_macros.h"
 #include "transmission_interface/exception.hpp"
 #include "transmission_interface/handle.hpp"
-#include "transmission_interface/transmission.hpp"
 
 namespace @namespace@
 {
@@ -34,6 +41,78 @@ struct Axis { const char * name, * role; };
 
 /// A dimension [m] that a parameter of the transmission may replace.
 struct Dimension { const char * name; double value; };
+
+/// Logs why values are held, from a thread of its own: a control loop only sets bits.
+class HeldLog
+{
+public:
+  HeldLog() = default;
+  HeldLog(const HeldLog &) = delete;
+  HeldLog & operator=(const HeldLog &) = delete;
+
+  ~HeldLog()
+  {
+    if (thread_.joinable()) {
+      {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        is_over_ = true;
+      }
+      over_.notify_one();
+      thread_.join();
+    }
+  }
+
+  void start(const std::string & name)
+  {
+    if (!thread_.joinable()) {
+      name_ = name;
+      thread_ = std::thread([this] { run(); });
+    }
+  }
+
+  /// Note the status of a command, or of a measurement; neither allocates, locks nor waits.
+  void note(int status, bool is_command)
+  {
+    // A value that is not commanded is not held.
+    const int bits = is_command ? status & ~linkage_ros::LinkageTransmission::NOT_KNOWN : status << 3;
+    if (bits) {
+      seen_.fetch_or(bits, std::memory_order_relaxed);
+    }
+  }
+
+private:
+  void run()
+  {
+    static const std::array<const char *, 6> reasons{
+      "a command is out of reach or out of the sweep: the actuators hold their positions",
+      "a command at a singular pose: velocities are 0 or efforts are held", "",
+      "actuators are measured where the linkage cannot be: the joints' positions are held",
+      "measured at a singular pose: velocities are 0 or efforts are held",
+      "a measured value is not finite: the joints' values are held"};
+    std::unique_lock<std::mutex> lock(mutex_);
+    for (int before = 0;;) {
+      const int now = seen_.exchange(0, std::memory_order_relaxed);
+      for (std::size_t i = 0; i < reasons.size(); ++i) {
+        // A reason that goes on is logged once.
+        if (now & ~before & 1 << i) {
+          RCUTILS_LOG_WARN_NAMED("linkage_transmission", "%s: %s", name_.c_str(), reasons[i]);
+        }
+      }
+      before = now;
+      if (is_over_) {
+        return;
+      }
+      over_.wait_for(lock, std::chrono::seconds(1), [this] { return is_over_; });
+    }
+  }
+
+  std::string name_;
+  std::atomic<int> seen_{0};
+  bool is_over_ = false;
+  std::mutex mutex_;
+  std::condition_variable over_;
+  std::thread thread_;
+};
 
 /// The handles of all actuators, or of all joints, by interface: position, velocity, effort.
 template <class Handle, std::size_t size>
@@ -51,8 +130,17 @@ public:
       allowed += std::string(" '") + axis.name + "' (role '" + axis.role + "')";
     }
     std::array<std::string, size> names;
+    std::string ignored;
     for (const auto & info : infos) {
-      const std::size_t i = place(axes, info.name, info.role);
+      std::size_t i = place(axes, info.name, info.role);
+      if (i == size && is_added(info)) {
+        // It is the only actuator, or one beside that of the description.
+        if (!names[0].empty()) {
+          ignored = info.name;
+          continue;
+        }
+        i = 0;
+      }
       if (i == size || !names[i].empty()) {
         throw Exception(what + " '" + info.name + "', role '" + info.role + "', is none of" + allowed);
       }
@@ -73,26 +161,38 @@ public:
         std::find(names.begin(), names.end(), handle.get_prefix_name()) - names.begin());
       const auto kind = static_cast<std::size_t>(
         std::find(kinds.begin(), kinds.end(), handle.get_interface_name()) - kinds.begin());
+      if (i == size && handle.get_prefix_name() == ignored && !ignored.empty()) {
+        continue;
+      }
       if (i == size) {
         throw Exception("handle '" + handle.get_prefix_name() + "' belongs to no " + what + " of" + allowed);
       }
-      if (handle && kind < kinds.size()) {
-        handles_[std::min<std::size_t>(kind, 2)][i].emplace(handle);
+      if (!handle || kind == kinds.size()) {
+        continue;
       }
+      auto & own = handles_[std::min<std::size_t>(kind, 2)][i];
+      if (own) {
+        throw Exception(what + " '" + names[i] + "' has two handles for one interface: '" +
+          own->get_interface_name() + "' and '" + handle.get_interface_name() + "'");
+      }
+      own.emplace(handle);
     }
   }
 
-  /// Whether all of them have an interface.
-  bool have(std::size_t kind) const
+  /// The number of handles for an interface.
+  std::size_t count(std::size_t kind) const
   {
     const auto & own = handles_[kind];
-    return std::all_of(own.begin(), own.end(), [](const auto & handle) { return handle.has_value(); });
+    return static_cast<std::size_t>(std::count_if(
+      own.begin(), own.end(), [](const auto & handle) { return handle.has_value(); }));
   }
 
-  void read(std::size_t kind, double missing, double (&values)[size]) const
+  bool have(std::size_t kind) const { return handles_[kind][0].has_value(); }
+
+  void read(std::size_t kind, double (&values)[size]) const
   {
     for (std::size_t i = 0; i < size; ++i) {
-      values[i] = have(kind) ? handles_[kind][i]->get_value() : missing;
+      values[i] = have(kind) ? handles_[kind][i]->get_value() : 0.0;
     }
   }
 
@@ -106,27 +206,36 @@ public:
   }
 
 private:
+  /// The place of a role; of a name, if there is no role.
   static std::size_t place(
     const std::array<Axis, size> & axes, const std::string & name, const std::string & role)
   {
-    for (const bool by_role : {true, false}) {
-      for (std::size_t i = 0; i < size; ++i) {
-        if (by_role ? role == axes[i].role : name == axes[i].name) {
-          return i;
-        }
+    for (std::size_t i = 0; i < size; ++i) {
+      if (role.empty() ? name == axes[i].name : role == axes[i].role) {
+        return i;
       }
     }
-    return size == 1 ? 0 : size;
+    return size;
+  }
+
+  /// Whether ros2_control has added an actuator, which it does to hardware of type "actuator".
+  template <class Info>
+  static bool is_added(const Info & info)
+  {
+    return size == 1 && std::is_same_v<Handle, transmission_interface::ActuatorHandle> &&
+      info.name == "actuator1" && info.role == "actuator1";
   }
 
   std::array<std::array<std::optional<Handle>, size>, 3> handles_;
 };
 
-/// A linkage between actuators and joints; Code wraps its generated C.
-template <class Code>
-class TransmissionOf : public transmission_interface::Transmission
+/// A linkage between actuators and joints; Code_ wraps its generated C.
+template <class Code_>
+class TransmissionOf : public linkage_ros::LinkageTransmission
 {
 public:
+  using Code = Code_;
+
   explicit TransmissionOf(const hardware_interface::TransmissionInfo & info) : info_(info) {}
 
   /// Set parameters and find handles by role or name; throws an exception that says what is wrong.
@@ -139,14 +248,15 @@ public:
     joints_ = {};
     actuators_.find("actuator", Code::actuators, info_.actuators, actuator_handles);
     joints_.find("joint", Code::joints, info_.joints, joint_handles);
-    const auto both = [this](std::size_t kind) { return actuators_.have(kind) && joints_.have(kind); };
-    if (!both(0) && !both(1) && !both(2)) {
-      refuse("all actuators and joints need one interface in common: position, velocity or effort");
+    static const std::array<const char *, 3> kinds{"position", "velocity", "effort"};
+    for (std::size_t kind = 0; kind < 3; ++kind) {
+      const auto count = actuators_.count(kind) + joints_.count(kind);
+      if (count != 2 * Code::size && (count != 0 || kind == 0)) {
+        refuse(std::string("all its actuators and joints need a handle for ") + kinds[kind] +
+          (kind ? ", or none of them" : ": velocities and efforts depend on the pose"));
+      }
     }
-    if (!actuators_.have(0) && !joints_.have(0)) {
-      refuse("velocities and efforts depend on the pose: all actuators, or all joints, need a "
-        "position interface");
-    }
+    log_.start(info_.name);
   }
 
   void actuator_to_joint() override { transmit(actuators_, joints_, Code::to_joints); }
@@ -157,8 +267,7 @@ public:
 
   std::size_t num_joints() const override { return Code::size; }
 
-  /// The status of the last call: 0, or a sum of the bits in the header.
-  int status() const { return status_; }
+  int status() const noexcept override { return status_; }
 
 private:
   void set_dimensions()
@@ -201,16 +310,22 @@ private:
   void transmit(const From & from, To & to, Function function)
   {
     typename Code::Side given{}, found{};
-    from.read(0, std::numeric_limits<double>::quiet_NaN(), given.position);
-    from.read(1, 0.0, given.velocity);
-    from.read(2, 0.0, given.effort);
-    std::fill_n(found.position, Code::size, std::numeric_limits<double>::quiet_NaN());
-    status_ = function(linkage_, memory_, given, found);
-    const double (*values[3])[Code::size] = {&found.position, &found.velocity, &found.effort};
+    double (*values[3])[Code::size] = {&given.position, &given.velocity, &given.effort};
     for (std::size_t kind = 0; kind < 3; ++kind) {
-      if (from.have(kind)) {
-        to.write(kind, *values[kind]);
-      }
+      from.read(kind, *values[kind]);
+    }
+    // What stays NaN is not written.
+    double (*made[3])[Code::size] = {&found.position, &found.velocity, &found.effort};
+    for (auto & each : made) {
+      std::fill_n(*each, Code::size, std::numeric_limits<double>::quiet_NaN());
+    }
+    status_ = function(linkage_, memory_, given, found);
+    if (!from.have(1) && !from.have(2)) {
+      status_ &= ~SINGULAR;
+    }
+    log_.note(status_, std::is_same_v<To, decltype(actuators_)>);
+    for (std::size_t kind = 0; kind < 3; ++kind) {
+      to.write(kind, *made[kind]);
     }
   }
 
@@ -219,6 +334,7 @@ private:
   typename Code::Memory memory_{};
   Handles<transmission_interface::ActuatorHandle, Code::size> actuators_;
   Handles<transmission_interface::JointHandle, Code::size> joints_;
-  int status_ = 0;
+  int status_ = OK;
+  HeldLog log_;
 };
 }  // namespace @namespace@

@@ -7,17 +7,19 @@
 // License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
 // express or implied. See the License for the specific language governing permissions and
 // limitations under the License.
-// Exports a maker under the name of the class, so that a test can look it up in the library.
+// A generated transmission, its names in NAME, CLASS and NAMESPACE, is proved: both ways at many states: positions there and back, velocities against differences, power, and
 #pragma once
 
 #include <type_traits>
 
 #define STAND_IN_JOINED(a, b) a##b
-#define STAND_IN_NAME(line) STAND_IN_JOINED(stand_in_maker_, line)
+#define STAND_IN_NAME(count) STAND_IN_JOINED(stand_in_made_, count)
+// Functions stand_in_made_0, stand_in_made_1 ... of a library, each of which makes a plugin.
 #define PLUGINLIB_EXPORT_CLASS(Derived, Base) \
   static_assert(std::is_base_of<Base, Derived>::value, "a plugin is of its base"); \
-  extern "C" const char * STAND_IN_NAME(__LINE__)() \
+  extern "C" __attribute__((visibility("default"))) Base * STAND_IN_NAME(__COUNTER__)( \
+    const char ** type) \
   { \
-    static Derived made; \
-    return static_cast<Base *>(&made) ? #Derived : ""; \
+    *type = #Derived; \
+    return new Derived; \
   }

@@ -1,0 +1,181 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Gears of any ratio: the inverse, the reach and the motion in any turn."""
+
+import ctypes
+from fractions import Fraction
+import itertools
+import math
+
+from linkage_ros import mechanisms, scene
+from linkage_ros.scene.motion import Motion
+import numpy as np
+import pytest
+from test_c_code import compiled, OUTPUTS
+
+# Ratios with their periods.
+RATIOS = {'1/64': 64, '1/80': 80, '1/100': 100, '0.31': 100, '22/7': 7, '3/7': 7, '-2.37': 100,
+          '0.999': 1000, '1/1000': 1000, '0.12345': 20000, '2/3+1/7919': 23757,
+          'sqrt(2)': math.inf, 'pi': math.inf, '8': 1, '180': 1, '-1000': 1}
+# Turns of the motor in which is asked.
+TURNS = 0.0, 13.3, -31.4, 4711.8, -1e5
+
+
+def motor(ratio, *more):
+    """Return a motor, and a crank that is geared to it."""
+    return mechanisms.create('custom', joints=[
+        'O ground 0 0', 'M crank O 0.01', f'A crank O 1 geared crank {ratio} 0', *more])
+
+
+def two(ratio):
+    """Return a rocker on the motor's crank, and a bar from it to a geared crank."""
+    return mechanisms.create('custom', joints=[
+        'O ground 0 0', 'Q ground 3 0', 'R ground 10 0', 'A crank O 1',
+        f'D crank R 1 geared crank {ratio} 0.3', 'B dyad A Q 2.5 2 left', 'E dyad B D 9 8 left'])
+
+
+def limited(ratio):
+    """Return two cranks that can be assembled in a part of the turns."""
+    return mechanisms.create('custom', joints=[
+        'O ground 0 0', 'Q ground 2 0', 'A crank O 1', f'D crank Q 0.7 geared crank {ratio} 0.3',
+        'B dyad A D 1.1 1.2 left'])
+
+
+@pytest.mark.parametrize('ratio, period', RATIOS.items())
+def test_there_is_one_period(ratio, period):
+    found = motor(ratio)
+    assert found.period() == found.inputs[0].period == period
+    if period < math.inf:
+        later = found.solve(0.3 + math.tau * period)['A']
+        assert later == pytest.approx(found.solve(0.3)['A'], abs=1e-9)
+
+
+def test_a_motor_is_known_in_the_turns_of_its_gear():
+    found = motor('1/80')
+    angle = 80.0 * math.pi / 3.0
+    assert sorted(x for answer in found.inverse('A.x').all(0.5) for x in answer.inputs) == \
+        pytest.approx([-angle, angle])
+    assert found.input_for('A.x', 0.5, near=80.0) == pytest.approx(angle)
+    assert found.input_for('A.x', 0.5) == pytest.approx([-angle, angle])
+    assert found.input_for('A.x', 0.5, near=500.0) == pytest.approx(
+        160.0 * math.pi - angle)
+    assert found.follow('A.x', 0.49, angle)[0] == pytest.approx(80.0 * math.acos(0.49))
+
+
+@pytest.mark.sample(6)
+@pytest.mark.parametrize('ratio', ['1/3', *RATIOS])
+def test_a_pose_is_answered_in_the_turn_in_which_it_is(ratio):
+    found, size = two(ratio), 1.0 + abs(motor(ratio).gear('crank2')[0])
+    for output in ('E.x', 'QB', 'D.y', 'angle(B,D)'):
+        for theta in (0.4 + math.tau * turns for turns in TURNS):
+            value, rate = (float(ask(theta, (output,))[output])
+                           for ask in (found.joint_angles, found.joint_rates))
+            close = 1e-9 + 8.0 * size * math.ulp(theta) / min(1.0, abs(rate))
+            assert found.input_for(output, value, near=theta) == pytest.approx(
+                theta, abs=close), output
+            assert found.follow(output, value, theta)[0] == pytest.approx(theta, abs=close)
+            (many,), _ = found.inverse(output).nearest(([value] * 2,), ([theta, theta],))
+            assert many == pytest.approx([theta] * 2, abs=close)
+            (first, *_) = found.inverse(output).all(value, theta)
+            assert first.inputs[0] == pytest.approx(theta, abs=close)
+            away = found.joint_angles(first.inputs[0], (output,))[output] - value
+            assert math.remainder(away, math.tau) == pytest.approx(
+                0.0, abs=1e-12 + 8.0 * size * math.ulp(theta))
+
+
+@pytest.mark.parametrize('ratio', [8, 60, 180, 1000, -999])
+def test_a_fast_gear_loses_no_answer(ratio):
+    found = motor(ratio).input_for('A.x', 0.3)
+    angle = math.acos(0.3)
+    expected = sorted(math.remainder((sign * angle + math.tau * k) / abs(ratio), math.tau)
+                      for sign in (1, -1) for k in range(abs(ratio)))
+    assert found == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('ratio', ['7', '60.5', '180', '1000', '1/80', '0.31'])
+def test_as_many_answers_as_brute_force_finds(ratio):
+    found = two(ratio)
+    turns = found.period()
+    theta = np.linspace(-math.pi * turns, math.pi * turns, int(
+        2000 * turns * max(1.0, abs(found.gear('crank2')[0]))) + 1)
+    gap = found.solve(theta, ('E',))['E'][:, 0] - 4.0321
+    inside = np.isfinite(gap[1:] * gap[:-1])
+    assert np.sum(inside & (gap[1:] * gap[:-1] <= 0.0)) == len(found.input_for('E.x', 4.0321))
+
+
+@pytest.mark.sample(4)
+@pytest.mark.parametrize('ratio', ['1/3', '0.31', '1/80', '1000', 'sqrt(2)', '0.12345'])
+def test_the_reach_is_where_it_can_be_assembled(ratio):
+    found = limited(ratio)
+    first, = found.inputs
+    theta = np.random.default_rng(0).uniform(first.low, first.high, 20001)
+    whole = np.isfinite(found.solve(theta)['B']).all(axis=1)
+    assert whole.any() and not whole.all()
+    reach = found.reach()
+    wrong = theta[[first.on(reach, x) for x in theta.tolist()] != whole]
+    ends = np.ravel(reach)
+    assert all(np.min(np.abs(ends - value)) < 1e-6 for value in wrong)
+    assert len(wrong) < 5
+    # Beyond a part of the period the reach says nothing.
+    assert first.is_part == all(first.on(reach, 1e6 + k) for k in range(99))
+
+
+def test_a_linkage_is_the_same_whole_turns_on():
+    for ratio, turns in itertools.product(('1/3', 'sqrt(2)', '1.2345678'), (32, -640)):
+        found = two(ratio)
+        there, start = found.turned(turns), math.tau * turns
+        for theta in (-1.0, 0.3, 90.0):
+            assert there.solve(theta)['E'] == pytest.approx(
+                found.solve(theta + start)['E'], abs=1e-11)
+
+
+@pytest.mark.parametrize('ratio', ['1001', '-2e3', '1e9'])
+def test_a_gear_that_is_too_fast_is_refused_with_what_is_allowed(ratio):
+    with pytest.raises(ValueError, match=r'crank2 turns \S+ times as fast as the crank; '
+                                         r'allowed: 1000 times'):
+        motor(ratio)
+
+
+@pytest.mark.parametrize('ratio', ['1/80', '0.12345', 'sqrt(2)', '22/7'])
+def test_a_driver_goes_on_without_a_jump_until_all_comes_round(ratio):
+    machine = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
+        'O ground 0 0', 'M crank O 0.01', f'A crank O 1 geared crank {ratio} 0']}).machines['m']
+    motion, gear = Motion.of(machine.first), Fraction(machine.linkage.gear('crank2')[0])
+    for seconds in (1, 10 ** 4, 10 ** 7):
+        angle, _ = motion.at(seconds * 10 ** 9)
+        turned = float(gear * seconds % Fraction(math.tau))
+        # 2 pi is rounded, once a turn.
+        assert machine.linkage.solve(angle)['A'] == pytest.approx(
+            [math.cos(turned), math.sin(turned)], abs=1e-14 * seconds + 1e-9)
+
+
+def test_c_goes_on_in_the_turn_of_near(tmp_path):
+    for name, ratio in (('slow', '1/80'), ('endless', 'sqrt(2)'), ('fast', '180')):
+        machine = scene.read({'mechanisms': [name], f'{name}.type': 'custom', f'{name}.joints': [
+            'O ground 0 0', 'M crank O 0.01', f'A crank O 1 geared crank {ratio} 0']}
+        ).machines[name]
+        (tmp_path / name).mkdir()
+        library = compiled_for(tmp_path / name, machine, 'A.x')
+        for near in (0.4, 83.0, 83.0 + 320.0 * math.pi):
+            given = np.array([machine.linkage.solve(near)['A'][0], near + 1e-3])
+            found = np.zeros(2)
+            assert library(given.ctypes.data, found.ctypes.data)
+            assert found[0] == pytest.approx(near, abs=1e-9)
+
+
+def compiled_for(folder, machine, output):
+    """Return the C function for an output of a machine."""
+    OUTPUTS[machine.name] = output,
+    library = compiled(folder, [machine])
+    function = library[f'{machine.name}_crank_for_{output.replace(".", "_")}_']
+    function.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
+    return function

@@ -1,0 +1,514 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Transmissions as a hardware component has them: loaded from a library, configured and called.
+
+The component is `test/ros2_control/component.cpp`, compiled with the header of one package and
+used with the plugins of two. ros2_control itself is a stand-in; the log is that of ROS.
+"""
+
+import ctypes
+from itertools import product
+import math
+import re
+import shutil
+import subprocess
+import weakref
+
+from c_libraries import ROS, STAND_IN, STRICT
+from linkage_ros import scene
+from linkage_ros.c_code.package import package
+import numpy as np
+import pytest
+
+pytestmark = [
+    pytest.mark.skipif(not shutil.which('g++'), reason='g++ is not installed'),
+    pytest.mark.skipif(not ROS, reason='rcutils is not installed')]
+
+# A motor with a gear, one in a sweep, a five-bar, and one that measures what it moves.
+SCENE = {
+    'mechanisms': ['knee', 'lever', 'leg', 'lift'],
+    'knee.type': 'custom', 'knee.crank.source': 'knee_motor', 'knee.crank.ratio': -0.1,
+    'knee.crank.sweep': [-0.45, 0.7],
+    'knee.joints': ['O ground 0 0', 'Q ground 0 -0.25', 'A crank O 0.045',
+                    'B dyad A Q 0.25 0.036 left'],
+    'lever.type': 'slotted_lever', 'lever.crank.source': 'servo', 'lever.crank.ratio': -0.5,
+    'lever.crank.offset': 0.3, 'lever.crank.sweep': [-0.4, 0.4],
+    'lever.joint_names': ['lever=-flap+0.1'],
+    'leg.type': 'five_bar', 'leg.crank.start': 1.9, 'leg.crank2.start': 1.24,
+    'leg.loads': ['P=3 -20'],
+    'lift.type': 'custom', 'lift.joints': [
+        'O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left'],
+    'lift.crank.measures': 'QB', 'lift.crank.start': 0.5, 'lift.crank.sweep': [0.2, 2.2]}
+OTHER = {'mechanisms': ['rocker', 'drag'], 'rocker.type': 'four_bar', 'rocker.crank.start': 1.0,
+         'drag.type': 'custom', 'drag.joints': [
+             'O ground 0 0', 'Q ground 0.3 0', 'A crank O 1', 'B dyad A Q 0.9 1.1 left']}
+ACTUATORS = {'knee': {'knee_motor': 'crank'}, 'lever': {'servo': 'crank'},
+             'leg': {'leg_crank': 'crank', 'leg_crank2': 'crank2'},
+             'lift': {'lift_crank': 'crank'},
+             'rocker': {'rocker_crank': 'crank'}, 'drag': {'drag_crank': 'crank'}}
+JOINTS = {'knee': {'knee_QB': 'QB'}, 'lever': {'flap': 'lever'},
+          'leg': {'leg_crank': 'crank', 'leg_AP': 'AP'}, 'lift': {'lift_crank': 'crank'},
+          'rocker': {'rocker_QB': 'QB'}, 'drag': {'drag_QB': 'QB'}}
+KINDS = 'position', 'velocity', 'effort'
+NAN, UNWRITTEN = math.nan, 0.123456789
+OK, OUT_OF_REACH, SINGULAR, NOT_KNOWN = 0, 1, 2, 4
+COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
+    not shutil.which(name), reason=f'{name} is not installed')) for name in ('g++', 'clang++')]
+
+
+class Refused(Exception):
+    """A transmission that cannot be configured."""
+
+
+class Plugins:
+    """The compiled packages of both scenes, and the component that loads them."""
+
+    def __init__(self, folder, compiler='g++', *flags):
+        self.machines, self.libraries = {}, {}
+        compile_ = [compiler, '-std=c++17', *STRICT, '-O0', *flags, '-shared', '-fPIC', '-isystem',
+                    STAND_IN / 'include', *ROS]
+        for name, parameters in (('robot_transmissions', SCENE), ('other_transmissions', OTHER)):
+            machines = scene.read(parameters).machines
+            made = folder / name
+            for path, text in package(name, 'robot.yaml', [
+                    (machine, [*JOINTS[each]]) for each, machine in machines.items()]).items():
+                (made / path).parent.mkdir(parents=True, exist_ok=True)
+                (made / path).write_text(text, encoding='utf-8')
+            library = folder / f'lib{name}.so'
+            subprocess.run([*compile_, '-I', made / 'include', made / 'src' / 'plugins.cpp', '-o',
+                            library, *ROS], check=True)
+            self.machines.update(machines)
+            self.libraries.update(dict.fromkeys(machines, (library, f'{name}_plugins')))
+        host = folder / 'component.so'
+        subprocess.run([*compile_, '-I', made / 'include', STAND_IN / 'component.cpp', '-o', host,
+                        '-ldl'], check=True)
+        self.host = ctypes.CDLL(str(host))
+        self.host.component_made.restype = ctypes.c_void_p
+        self.host.component_problem.restype = ctypes.c_char_p
+
+    def component(self, name, *lines, kinds=KINDS, actuators=None, joints=None):
+        """Return a component with one transmission; `lines` are added to what describes it."""
+        return Component(self, name, lines, kinds, ACTUATORS[name] if actuators is None
+                         else actuators, JOINTS[name] if joints is None else joints)
+
+
+class Component:
+    """
+    A hardware component with one transmission.
+
+    Its values are arrays `actuator` and `joint` of shape (kinds, axes); `end` deletes it.
+    """
+
+    def __init__(self, plugins, name, lines, kinds, actuators, joints):
+        self._host = plugins.host
+        n = len(actuators)
+        self._memory = np.full((2, 3, n), NAN)
+        self.actuator, self.joint = self._memory
+        described = [*lines]
+        for side, (what, axes) in enumerate((('actuator', actuators), ('joint', joints))):
+            described += [f'{what}\t{each}\t{role}\t1\t0' for each, role in axes.items()]
+            described += [
+                f'{what}_handle\t{each}\t{kind}\t{(3 * side + KINDS.index(kind)) * n + i}'
+                for i, each in enumerate(axes) for kind in kinds]
+        library, namespace = plugins.libraries[name]
+        self._made = ctypes.c_void_p(self._host.component_made(
+            str(library).encode(), f'{namespace}::{name.title()}Loader'.encode(),
+            '\n'.join(described).encode(), ctypes.c_void_p(self._memory.ctypes.data)))
+        if not self._made:
+            raise Refused(self._host.component_problem().decode())
+        self.end = weakref.finalize(self, self._host.component_ended, self._made)
+
+    def read(self, position, velocity=0.0, effort=0.0):
+        """Measure actuators; return the status and the joints' positions, velocities, efforts."""
+        self.actuator[:] = np.stack(np.broadcast_arrays(position, velocity, effort)).reshape(3, -1)
+        self.joint[:] = UNWRITTEN
+        self._host.component_read(self._made)
+        return self._host.component_status(self._made), self.joint.copy()
+
+    def write(self, position=NAN, velocity=NAN, effort=NAN):
+        """Command joints; return the status and the actuators' positions, velocities, efforts."""
+        self.joint[:] = [np.broadcast_to(each, self.joint.shape[1]) for each in (
+            position, velocity, effort)]
+        self.actuator[:] = UNWRITTEN
+        self._host.component_write(self._made)
+        return self._host.component_status(self._made), self.actuator.copy()
+
+
+@pytest.fixture(scope='module')
+def plugins(tmp_path_factory):
+    """Return the compiled packages."""
+    return Plugins(tmp_path_factory.mktemp('plugins'))
+
+
+def poses(machine, *crank):
+    """Return the actuators' and the joints' positions at inputs, from Python."""
+    linkage, names = machine.linkage, [*JOINTS[machine.name].values()]
+    angles = linkage.joint_angles(crank if len(crank) > 1 else crank[0])
+    keys = [name if name in machine.inputs else next(iter(machine.assembly().legs)) + name
+            for name in names]
+    measured = [angles[drive.measures or name] for name, drive in machine.inputs.items()]
+    return (np.array([(float(value) - drive.offset) / drive.ratio
+                      for value, drive in zip(measured, machine.inputs.values())]),
+            np.array([machine.joints[key].of(float(angles[name]))
+                      for key, name in zip(keys, names)]))
+
+
+INPUTS = {'knee': [(0.3,), (-0.4,)], 'lever': [(0.1,), (-0.3,)], 'leg': [(1.9, 1.24), (1.8, 1.4)],
+          'lift': [(0.5,), (1.2,)], 'rocker': [(1.0,), (2.5,)]}
+UNREACHABLE = {'knee': 9.0, 'lever': 1.5, 'leg': [1.9, -0.2], 'lift': 2.9, 'rocker': 9.0}
+
+
+@pytest.mark.parametrize('name', INPUTS)
+def test_both_ways_are_those_of_the_linkage(plugins, name):
+    component = plugins.component(name)
+    for inputs in INPUTS[name]:
+        actuator, joint = poses(plugins.machines[name], *inputs)
+        status, (position, *_) = component.read(actuator)
+        assert status == OK and position == pytest.approx(joint, abs=1e-12)
+        status, (position, *_) = component.write(joint)
+        assert status & OUT_OF_REACH == 0 and position == pytest.approx(actuator, abs=1e-9)
+
+
+@pytest.mark.parametrize('name', INPUTS)
+def test_what_is_not_commanded_is_not_written(plugins, name):
+    component, (inputs, others) = plugins.component(name), INPUTS[name]
+    actuator, joint = poses(plugins.machines[name], *inputs)
+    further = poses(plugins.machines[name], *others)[0]
+    # Before anything is known, after a measurement, a command, and another measurement.
+    for before in (lambda: None, lambda: component.read(actuator),
+                   lambda: component.write(joint, 1.0, 2.0), lambda: component.read(further)):
+        before()
+        status, written = component.write(NAN)
+        assert status == NOT_KNOWN and (written == UNWRITTEN).all()
+        for kind in range(3):
+            given = [NAN] * 3
+            given[kind] = joint if kind == 0 else np.ones(len(joint))
+            status, written = component.write(*given)
+            others_ = [other for other in range(3) if other != kind]
+            assert status & NOT_KNOWN and (written[others_] == UNWRITTEN).all()
+
+
+def test_one_joint_of_two_moves_no_motor(plugins):
+    component = plugins.component('leg')
+    actuator, joint = poses(plugins.machines['leg'], 1.9, 1.24)
+    component.read(actuator)
+    for other in (NAN, math.inf):
+        for given in ([joint[0] + 0.1, other], [other, joint[1] + 0.1]):
+            status, written = component.write(given)
+            assert status == NOT_KNOWN and (written == UNWRITTEN).all()
+            status, written = component.write(joint, [1.0, 1.0], given)
+            assert status == NOT_KNOWN and (written[2] == UNWRITTEN).all()
+            assert written[0] == pytest.approx(actuator) and np.isfinite(written[1]).all()
+
+
+@pytest.mark.parametrize('name', INPUTS)
+def test_a_command_out_of_reach_holds_what_was_last_measured(plugins, name):
+    component = plugins.component(name)
+    first, second = (poses(plugins.machines[name], *inputs) for inputs in INPUTS[name])
+    # Moved by hand, maybe after a command.
+    for has_command in (False, True):
+        if has_command:
+            component.write(first[1])
+        for part in np.linspace(0.0, 1.0, 5):
+            moved = first[0] + part * (second[0] - first[0])
+            component.read(moved)
+            status, (position, velocity, _) = component.write(UNREACHABLE[name], 1.0)
+            assert status & OUT_OF_REACH and (position == moved).all() and not velocity.any()
+        component.read(moved)
+        for _ in range(3):
+            component.write(NAN)
+            assert (component.write(UNREACHABLE[name])[1][0] == moved).all()
+
+
+def test_the_knee_moved_by_hand_stays(plugins):
+    for bad in (NAN, 9.0):
+        component = plugins.component('knee', kinds=('position',))
+        component.write(-0.2)
+        for motor in range(5):
+            component.read(float(motor))
+        component.joint[0] = bad
+        component.actuator[0] = 4.0
+        component._host.component_write(component._made)
+        assert component.actuator[0] == 4.0
+
+
+@pytest.mark.parametrize('name', INPUTS)
+def test_a_command_out_of_reach_holds_the_last_command_if_that_is_newer(plugins, name):
+    component = plugins.component(name)
+    first, second = (poses(plugins.machines[name], *inputs) for inputs in INPUTS[name])
+    component.read(first[0])
+    component.write(second[1])
+    status, (position, *_) = component.write(UNREACHABLE[name])
+    assert status & OUT_OF_REACH and position == pytest.approx(second[0], abs=1e-9)
+    # Nothing is known: nothing is written.
+    status, written = plugins.component(name).write(UNREACHABLE[name])
+    assert status & OUT_OF_REACH and (written[0] == UNWRITTEN).all()
+
+
+def test_motors_that_are_measured_hold_without_the_others(plugins):
+    component = plugins.component('leg')
+    first, second = (poses(plugins.machines['leg'], *inputs) for inputs in INPUTS['leg'])
+    component.read(first[0])
+    status, (position, *_) = component.read([second[0][0], NAN])
+    assert status & NOT_KNOWN and position == pytest.approx(first[1], abs=1e-9)
+    status, (position, *_) = component.write(UNREACHABLE['leg'])
+    assert status & OUT_OF_REACH and list(position) == [second[0][0], first[0][1]]
+
+
+@pytest.mark.parametrize('name', INPUTS)
+def test_a_state_is_never_a_command(plugins, name):
+    component = plugins.component(name)
+    first, second = (poses(plugins.machines[name], *inputs) for inputs in INPUTS[name])
+    # Nothing was measured yet.
+    component.write(second[1])
+    status, written = component.read(NAN)
+    assert status & NOT_KNOWN and (written[0] == UNWRITTEN).all()
+    component.read(first[0])
+    component.write(second[1])
+    status, (position, velocity, _) = component.read(NAN)
+    assert status & NOT_KNOWN and position == pytest.approx(first[1], abs=1e-12)
+    assert not velocity.any()
+
+
+def test_effort_then_position(plugins):
+    component = plugins.component('knee')
+    actuator, joint = poses(plugins.machines['knee'], 0.3)
+    component.read(actuator)
+    status, written = component.write(effort=5.0)
+    assert status == NOT_KNOWN and (written[:2] == UNWRITTEN).all() and written[2] != UNWRITTEN
+    # Controllers are switched: the robot was moved by torques, and a position is commanded.
+    moved = poses(plugins.machines['knee'], -0.4)[0]
+    component.read(moved)
+    status, written = component.write(9.0)
+    assert status == OUT_OF_REACH | NOT_KNOWN and written[0] == moved and written[2] == UNWRITTEN
+    status, written = component.write(joint)
+    assert written[0] == pytest.approx(actuator) and written[2] == UNWRITTEN
+    # And back.
+    status, written = component.write(effort=5.0)
+    assert written[0] == UNWRITTEN and written[2] != UNWRITTEN
+
+
+def test_an_effort_is_not_held_over_a_pause(plugins):
+    machine, component = plugins.machines['lift'], plugins.component('lift')
+    (_, dead), *_ = machine.linkage.extremes('QB')[0]
+    good, singular = (poses(machine, crank)[0] for crank in (0.5, dead))
+    component.read(good)
+    _, (*_, held) = component.write(effort=5.0)
+    component.read(singular)
+    status, (*_, effort) = component.write(effort=6.0)
+    assert status & SINGULAR and effort == held
+    component.write()
+    status, (*_, effort) = component.write(effort=6.0)
+    assert status & SINGULAR and effort == 0.0
+
+
+def test_the_nearest_input_is_that_to_the_newest_position(plugins):
+    # The motor turns on by commands alone: none of them goes back by a turn.
+    machine, component = plugins.machines['drag'], plugins.component('drag')
+    component.read(0.0)
+    for crank in np.arange(0.0, 20.0, 0.25):
+        assert component.write(poses(machine, crank)[1])[1][0] == pytest.approx(crank, abs=1e-9)
+    machine, component = plugins.machines['lever'], plugins.component('lever')
+    component.read(poses(machine, 0.2)[0])
+    # A velocity or an effort without a position is at the newest pose.
+    for crank in (0.1, -0.2):
+        actuator, joint = poses(machine, crank)
+        rate = float(machine.linkage.joint_rates(crank, ['lever'])['lever'])
+        component.write(joint)
+        _, (_, velocity, effort) = component.write(NAN, 1.0, 3.0)
+        assert velocity == pytest.approx(1.0 / -rate / -0.5, rel=1e-9)
+        assert effort == pytest.approx(3.0 * rate * 0.5, rel=1e-9)
+
+
+def test_an_effort_is_that_at_the_measured_pose(plugins):
+    machine, component = plugins.machines['lever'], plugins.component('lever')
+    there, here = (poses(machine, crank) for crank in (-0.1, 0.3))
+    rate = float(machine.linkage.joint_rates(0.3, ['lever'])['lever'])
+    component.write(there[1])
+    component.read(here[0])
+    _, (position, _, effort) = component.write(there[1], effort=3.0)
+    assert position == pytest.approx(there[0]) and effort == pytest.approx(3.0 * rate * 0.5)
+
+
+def test_a_motor_in_one_memory_for_states_and_commands_stays(plugins):
+    machine, component = plugins.machines['leg'], plugins.component('leg', kinds=('position',))
+    actuator, _ = poses(machine, 1.9, 1.24)
+    component.actuator[0] = actuator
+    for _ in range(100):
+        component._host.component_read(component._made)
+        component._host.component_write(component._made)
+    assert component.actuator[0] == pytest.approx(actuator, abs=1e-12)
+
+
+@pytest.mark.parametrize('name', INPUTS)
+def test_any_history_of_values_moves_a_motor_to_what_was_commanded(plugins, name):
+    """Random calls, against a model: a motor gets nothing, a solution, or where it stays."""
+    component, rng = plugins.component(name), np.random.default_rng(3)
+    machine, newest = plugins.machines[name], None
+    for _ in range(300):
+        low, high = np.array(INPUTS[name])
+        inputs = low + rng.uniform(0.0, 1.0, len(low)) * (high - low)
+        actuator, joint = poses(machine, *inputs)
+        kind = rng.integers(5)
+        if kind == 0:
+            component.read(actuator)
+            newest = actuator
+        elif kind == 1:
+            component.read(np.where(np.arange(len(low)) == rng.integers(len(low)), NAN, actuator))
+            if len(low) == 1:
+                continue
+            newest = component.write(UNREACHABLE[name])[1][0]
+            assert set(newest) & set(actuator)
+        elif kind == 2:
+            status, (position, *_) = component.write(joint)
+            assert status & OUT_OF_REACH == 0 and np.isfinite(position).all()
+            newest = position
+        elif kind == 3:
+            _, written = component.write(
+                np.where(np.arange(len(low)) == rng.integers(len(low)), NAN, joint))
+            assert (written == UNWRITTEN).all()
+        elif newest is not None:
+            assert (component.write(UNREACHABLE[name])[1][0] == newest).all()
+
+
+def test_a_singular_pose_of_positions_alone_is_not_told(plugins):
+    machine = plugins.machines['rocker']
+    dead = machine.linkage.extremes('QB')[0][0][1]
+    for kinds, expected in ((('position',), OK), (KINDS, SINGULAR)):
+        component = plugins.component('rocker', kinds=kinds)
+        assert component.read(poses(machine, dead)[0])[0] == expected
+
+
+@pytest.mark.parametrize('name, lines, actuators, joints, said', [
+    # Roles are the names of the linkage; without one, the scene's name counts.
+    ('knee', [], {'left_motor': 'crank'}, {'left_knee': 'QB'}, ''),
+    ('knee', [], {'knee_motor': ''}, {'knee_QB': ''}, ''),
+    ('knee', [], {'knee_motor': 'crank'}, {'left_knee': 'banana'}, "role 'banana', is"),
+    ('knee', [], {'knee_motor': 'crank'}, {'left_knee': 'AB'}, "role 'AB', is none of 'knee_QB'"),
+    ('knee', [], {'knee_motor': 'crank'}, {'left_knee': ''}, "'left_knee', role '', is none of"),
+    ('knee', [], {'knee_motor': 'crank'}, {'knee_QB': 'banana'}, "role 'banana', is none of"),
+    ('knee', [], {'knee_motor': 'QB'}, {'knee_QB': 'QB'}, "role 'QB', is none of 'knee_motor'"),
+    ('leg', [], {'a': 'crank2', 'b': 'crank'}, {'c': 'AP', 'd': 'crank'}, ''),
+    ('leg', [], {'a': 'crank', 'b': 'crank2'}, {'c': 'AP', 'd': 'banana'}, "role 'banana', is"),
+    ('leg', [], {'a': 'crank', 'b': 'crank'}, {'c': 'AP', 'd': 'crank'}, "'b', role 'crank', is"),
+    ('knee', [], {'knee_motor': 'crank'}, {}, "joint 'knee_QB' is missing"),
+    ('knee', ['joint\tother\tQB\t1\t0'], {'knee_motor': 'crank'}, {'knee_QB': 'QB'},
+     "'knee_QB', role 'QB', is none of"),
+    # What ros2_control adds to hardware of type "actuator".
+    ('knee', ['actuator_handle\tactuator1\tposition\t0'],
+     {'knee_motor': 'crank', 'actuator1': 'actuator1'}, {'knee_QB': 'QB'}, ''),
+    ('knee', [], {'actuator1': 'actuator1'}, {'knee_QB': 'QB'}, ''),
+    ('knee', [], {'knee_motor': 'crank'}, {'actuator1': 'actuator1'}, "'actuator1', is none of"),
+    ('leg', [], {'leg_crank': 'crank', 'actuator1': 'actuator1'}, JOINTS['leg'], 'is none of'),
+    ('knee', ['actuator_handle\telbow\tposition\t0'], {'knee_motor': 'crank'}, {'knee_QB': 'QB'},
+     "handle 'elbow' belongs to no actuator"),
+    # Each interface: one handle, on all axes or on none.
+    ('knee', ['joint_handle\tknee_QB\tposition\t5'], None, None,
+     "joint 'knee_QB' has two handles for one interface: 'position' and 'position'"),
+    ('knee', ['joint_handle\tknee_QB\ttorque\t5'], None, None, "'torque' and 'effort'"),
+    ('leg', ['actuator_handle\tleg_crank2\tforce\t5'], None, None, "'leg_crank2' has two handles"),
+    ('knee', ['joint_handle\tknee_QB\ttemperature\t5'], None, None, '')])
+def test_axes_and_handles_are_checked(plugins, name, lines, actuators, joints, said):
+    kinds = ('position', 'effort')
+    if not said:
+        plugins.component(name, *lines, kinds=kinds, actuators=actuators, joints=joints).end()
+        return
+    with pytest.raises(Refused, match=re.escape(said)):
+        plugins.component(name, *lines, kinds=kinds, actuators=actuators, joints=joints)
+
+
+@pytest.mark.parametrize('name', ['knee', 'leg'])
+@pytest.mark.parametrize('side, kind', [*product(('joint', 'actuator'), KINDS)])
+def test_an_interface_of_one_side_is_refused(plugins, name, side, kind):
+    axes = (JOINTS if side == 'joint' else ACTUATORS)[name]
+    others = [each for each in KINDS if each not in (kind, 'position')]
+    both = [*others[:1], *(['position'] if kind != 'position' else [])]
+    # On no axis of the other side, and on some of this.
+    for count in range(1, len(axes) + 1):
+        lines = [f'{side}_handle\t{each}\t{kind}\t{i}' for i, each in enumerate([*axes][:count])]
+        with pytest.raises(Refused, match=f'need a handle for {kind}'):
+            plugins.component(name, *lines, kinds=both)
+    # A handle without a value is none.
+    with pytest.raises(Refused, match=f'need a handle for {kind}'):
+        plugins.component(name, *(f'{each}_handle\t{axis}\t{kind}\t{"" if each == side else 0}'
+                                  for each, named in (('joint', JOINTS), ('actuator', ACTUATORS))
+                                  for axis in named[name]), kinds=both)
+
+
+@pytest.mark.parametrize('words, said', [
+    ('joint\tknee_QB\tQB\t2\t0', 'must have no mechanical_reduction'),
+    ('joint\tknee_QB\tQB\t1\t0.5', 'must have no mechanical_reduction and no offset')])
+def test_gears_are_those_of_the_scene(plugins, words, said):
+    with pytest.raises(Refused, match=said):
+        plugins.component('knee', words, joints={})
+
+
+@pytest.mark.parametrize('key, value, said', [
+    ('a', '90', ''), ('e', '-3', ''), ('a', 'wide', "must be a number [m], not 'wide'"),
+    ('a', '-1', 'a must be a positive number'), ('a', '1e999', 'must be a number'),
+    ('a', '1 2', 'must be a number'), ('a', '', 'must be a number'),
+    ('a', '0x1p9', 'must be a number'), ('e', '1e6', 'it cannot be assembled'),
+    ('x', '1', "transmission 'tested': there is no parameter 'x'; allowed: a b e")])
+def test_dimensions_are_parameters(plugins, key, value, said):
+    line = f'parameter\t{key}\t{value}'
+    if said:
+        with pytest.raises(Refused, match=re.escape(said)):
+            plugins.component('lever', line)
+        return
+    component = plugins.component('lever', line)
+    lever = plugins.machines['lever'].linkage.with_dimensions(**{key: float(value)})
+    for crank in (0.2, -0.3):
+        status, (position, *_) = component.read((crank - 0.3) / -0.5)
+        angle = float(lever.joint_angles(crank)['lever'])
+        assert position == pytest.approx(0.1 - angle, abs=1e-13)
+        assert status == OK and component.write(position)[1][0] == pytest.approx(
+            (crank - 0.3) / -0.5, abs=1e-12)
+
+
+def test_why_values_are_held_is_logged_once_per_reason(plugins, capfd):
+    component = plugins.component('knee')
+    actuator, joint = poses(plugins.machines['knee'], 0.3)
+    component.read(actuator)
+    for _ in range(1000):
+        component.write(9.0)
+        component.write(NAN)
+        component.write(joint, 1.0, 1.0)
+    component.end()
+    logged = capfd.readouterr().err
+    assert logged.count('tested: ') == 1 == logged.count('\n') and '[WARN]' in logged
+    assert 'tested: a command is out of reach or out of the sweep' in logged
+    component = plugins.component('knee')
+    for _ in range(1000):
+        component.read(NAN)
+        component.read(actuator)
+    component.end()
+    logged = capfd.readouterr().err
+    assert logged.count('\n') == 1 and 'a measured value is not finite' in logged
+    # Neither what is not commanded nor what can be had is worth a word.
+    component = plugins.component('knee')
+    for _ in range(10):
+        component.read(actuator)
+        component.write(NAN)
+        component.write(joint, 1.0, 1.0)
+    component.end()
+    assert not capfd.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('compiler', COMPILERS)
+def test_a_status_is_reached_where_nothing_else_is_visible(tmp_path, compiler):
+    plugins = Plugins(tmp_path, compiler, '-fvisibility=hidden')
+    for name in ('knee', 'rocker'):
+        component = plugins.component(name)
+        assert component.read(poses(plugins.machines[name], *INPUTS[name][0])[0])[0] == OK
+        assert component.write(9.0)[0] & OUT_OF_REACH

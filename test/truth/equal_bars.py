@@ -1,0 +1,133 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Random linkages of equal bars, and the limits of their poses from both sides.
+
+All lengths are one of two numbers, their sum or their difference, and all joints of the ground lie
+on such a grid: cranks are as long as the ground, dyads have equal bars, and joints coincide.
+"""
+
+from typing import NamedTuple, Optional
+
+from gmpy2 import mpc, mpfr
+from linkage_ros import mechanisms
+import numpy as np
+
+from .drawing import DIGITS, draw, FLOATS, Linkage, precisely
+from .drawing_accuracy import turned_bar
+from .random_linkages import Design, INPUTS
+
+# How far from a value its sides are; limits that differ by less are equal; arms below it vanish.
+SIDE, EQUAL, NONE = mpfr(2) ** -150, mpfr(2) ** -50, mpfr(2) ** -280
+# Lengths by their text, with how often each is drawn.
+LENGTHS = {'a': 6, 'b': 2, 'a+b': 1, '2*a': 2}
+LINES = {
+    'dyad {0} {1} {l} {l} {side}': 8, 'dyad {0} {1} {l} {m} {side}': 2, 'mirror {0} {1} {2}': 3,
+    'parallelogram {0} {1} {2}': 2, 'antiparallelogram {0} {1} {2}': 1,
+    'rigid {0} {1} {l} {l} {side}': 1, 'line {0} {1} {l}': 1, 'slot {0} {1} 0 {half} {l}': 1,
+    'slider {0} {l} {1} {angle} {half}': 3, 'slider {0} {l} {1} along {2} {half}': 1,
+    'yoke {0} {1} along {2}': 1, 'block {0} {l} 0': 1, 'inversor {0} {1} {l} {m}': 1,
+    'crank {0} {l} geared crank {ratio} 0': 1, 'crank {0} {l} zero {1} geared crank {ratio} 0': 1}
+STARTS = {'crank O {l}': 6, 'crank O {l} up': 1, 'crank O {l} zero Q': 1,
+          'cylinder O Q {l} {side}': 1, 'carriage O along Q -{l} {l}': 1,
+          'carriage O along Q 0 {l}': 1}
+CHOICES = {'side': ('left', 'right'), 'half': ('out', 'in'), 'angle': ('0', '90deg', '45deg'),
+           'ratio': ('1', '-1', '2', '0.5')}
+
+
+def design(rng, lines=4):
+    """Return a random `Design` of equal bars with one input; every line of it is allowed."""
+    unit = 10.0 ** int(rng.choice((-150, -20, 0, 0, 0, 0, 0, 20, 150)))
+    dimensions = {'a': float(rng.choice((1.0, 0.3, 0.7))) * unit,
+                  'b': float(rng.choice((1.0, 0.4, 2.5))) * unit}
+    ground = [(x, y) for x in ('0', 'a', '-a') for y in ('0', '0', 'a') if (x, y) != ('0', '0')]
+    joints = ['O ground 0 0', 'Q ground {} {}'.format(*ground[rng.integers(len(ground))])]
+    names = ['O', 'Q']
+    for i in range(lines + 1):
+        for _ in range(40):
+            name = f'X{i}'
+            text = _line(rng, _chosen(rng, LINES if i else STARTS), names)
+            new = [name, f'{name}b', f'{name}c'] if text.startswith('inversor') else [name]
+            line = f'{" ".join(new)} {text}'
+            if _is_allowed([*joints, line], dimensions):
+                joints.append(line)
+                names += new
+                break
+    return Design(tuple(joints), dimensions, {})
+
+
+def _is_allowed(joints, dimensions):
+    """Tell whether lines are a linkage, some pose of which has no arm of nothing but rounding."""
+    try:
+        first, = mechanisms.create('custom', joints=joints, **dimensions).inputs
+    except ValueError:
+        return False
+    linkage = Linkage(joints, dimensions)
+    rows, turns, unit = linkage.in_floats({})
+    values = np.linspace(first.low, first.high, 25)[1:-1] / (1.0 if first.turns else unit)
+    with np.errstate(all='ignore'):
+        drawn = draw(FLOATS, linkage, rows, [values], {}, turns)
+        held = np.all([gap > -1e-6 + 0.0 * values for gap in (1.0, *drawn.gaps.values())], axis=0)
+        apart = np.all([arm > 1e-6 + 0.0 * values for arm in (1.0, *drawn.arms.values())], axis=0)
+    last, = linkage.lines[-1:]
+    moves = last.word in INPUTS or not linkage.fixed.issuperset(last.joints)
+    return bool(moves and np.sum(held & apart) > 0.9 * np.sum(held))
+
+
+def _chosen(rng, weights):
+    share = np.array(list(weights.values()), float)
+    return str(rng.choice(list(weights), p=share / share.sum()))
+
+
+def _line(rng, form, names):
+    picked = rng.permutation(names)[[0, 1, min(2, len(names) - 1)]]
+    given = {key: str(rng.choice(values)) for key, values in CHOICES.items()}
+    return form.format(*picked, l=_chosen(rng, LENGTHS), m=_chosen(rng, LENGTHS), **given)
+
+
+class Limits(NamedTuple):
+    """
+    The pose next to a value of the input, in many digits.
+
+    `before` and `after` have each output as a complex number, None where it cannot be assembled;
+    `vanishing` are the joints whose lines are drawn on an arm that vanishes at the value.
+    """
+
+    before: Optional[list]
+    after: Optional[list]
+    vanishing: frozenset
+
+    def agree(self, i, size):
+        """Tell whether both limits of an output are the same."""
+        one, other = self.before[i], self.after[i]
+        return abs(one - other) <= EQUAL * max(abs(one), abs(other), size)
+
+
+@precisely
+def limits(linkage: Linkage, poses, way, value: float, others=()) -> Limits:
+    """Return the limits of outputs at a value of the first input from both sides."""
+    rows, turns = linkage.prepared(linkage.numbers), linkage.turns(linkage.numbers, way)
+    unit = 1 if linkage.inputs[0].turns else linkage.longest
+    drawn = [draw(DIGITS, linkage, rows, [mpfr(value) + side * SIDE * unit, *map(mpfr, others)],
+                  way, turns) for side in (-1, 0, 1)]
+    sides = [None if any(gap < 0 for gap in each.gaps.values())
+             else [_pose(out, each) for out in poses] for each in drawn[::2]]
+    return Limits(*sides, frozenset(
+        name for name, arm in drawn[1].arms.items() if arm < NONE * linkage.longest))
+
+
+def _pose(out, drawn):
+    if out.what == 'point':
+        return drawn.points[out.name]
+    if out.what == 'slide':
+        return mpc(drawn.slides[out.parts[0][0]])
+    bar = turned_bar(out, drawn)
+    return bar * mpc(0, -1) ** out.quarters / (abs(bar) or 1)
