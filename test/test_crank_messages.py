@@ -12,7 +12,6 @@
 
 import math
 import struct
-import sys
 import warnings
 
 import numpy as np
@@ -295,16 +294,6 @@ def test_nothing_is_missed_where_everything_was_heard(graph):
     patience.end()
     graph.all_logged(hand.node, hand.said)
     assert not hand.warnings('was received, without')
-
-
-@pytest.mark.parametrize('pairs', [1, 2])
-def test_without_llvmlite_the_node_of_a_walker_says_so(graph, monkeypatch, pairs):
-    monkeypatch.setitem(sys.modules, 'llvmlite', None)
-    said = graph.log()
-    node = graph.start(Kinematics, {'mechanisms': ['jansen'], 'jansen.leg_pairs': pairs})
-    graph.all_logged(node, said)
-    found = [m.level for m in said if 'instead of machine code' in m.msg]
-    assert found == [LoggingSeverity.INFO] * (pairs > 1)
 
 
 def test_a_crank_alone_is_no_exception(graph):
