@@ -120,12 +120,13 @@ def test_the_reach_is_where_it_can_be_assembled(ratio):
     theta = np.random.default_rng(0).uniform(first.low, first.high, 20001)
     whole = np.isfinite(found.solve(theta)['B']).all(axis=1)
     assert whole.any() and not whole.all()
-    wrong = theta[first.on(found.reach(), theta) != whole]
-    ends = np.ravel(found.reach())
+    reach = found.reach()
+    wrong = theta[[first.on(reach, x) for x in theta.tolist()] != whole]
+    ends = np.ravel(reach)
     assert all(np.min(np.abs(ends - value)) < 1e-6 for value in wrong)
     assert len(wrong) < 5
     # Beyond a part of the period the reach says nothing.
-    assert first.is_part == bool(first.on(found.reach(), [1e6 + k for k in range(99)]).all())
+    assert first.is_part == all(first.on(reach, 1e6 + k) for k in range(99))
 
 
 def test_a_linkage_is_the_same_whole_turns_on():

@@ -16,6 +16,8 @@ import os
 from pathlib import Path
 import resource
 import signal
+import subprocess
+import sys
 
 import pytest
 
@@ -33,7 +35,7 @@ from rclpy.logging import LoggingSeverity  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.publisher import Publisher  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from ros_harness import Graph, Process  # noqa: E402
+from ros_harness import DEADLINE, Graph, Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from sweeps import EXHAUSTIVE
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
@@ -301,12 +303,36 @@ def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
 @pytest.mark.slow
 @pytest.mark.parametrize('number', SIGNALS)
 def test_a_signal_ends_a_node_that_compiles(processes, number):
-    process = Process('kinematics', CONFIG / 'all.yaml')
+    # Only the legs of a walker are compiled.
+    process = Process('kinematics', CONFIG / 'strandbeest.yaml')
     processes.append(process)
     with Graph(process.domain) as graph:
-        graph.listen(MarkerArray, 'jansen/markers')
-        graph.crank(['jansen_crank'])([0.1], graph.listen(JointState, 'jansen/joint_states'))
+        graph.listen(MarkerArray, 'strandbeest/markers')
+        graph.crank(['strandbeest_crank'])(
+            [0.1], graph.listen(JointState, 'strandbeest/joint_states'))
         ends_quietly(process, number)
+
+
+SCRIPT = """
+import rclpy
+from linkage_ros.nodes.kinematics import Kinematics
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+
+rclpy.init()
+node, executor = Kinematics(), SingleThreadedExecutor()
+executor.add_node(node)
+for _ in range(20):
+    executor.spin_once(timeout_sec=0.01)
+node.set_parameters([Parameter('jansen.scale', value=2.0)])
+"""
+
+
+@pytest.mark.slow
+def test_a_script_ends_that_leaves_a_changed_scene_to_a_node_that_no_longer_spins():
+    with Graph() as graph:
+        subprocess.run([sys.executable, '-c', SCRIPT], timeout=DEADLINE, check=True, env={
+            **os.environ, 'ROS_DOMAIN_ID': str(graph.context.get_domain_id())})
 
 
 # --- without llvmlite --------------------------------------------------------------------------

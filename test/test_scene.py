@@ -352,9 +352,12 @@ def test_the_mechanisms_of_the_scene_of_all_stand_apart():
 
 @pytest.mark.parametrize('text, reason', [
     ('', 'scene.yaml must be YAML with'), ('{}', 'scene.yaml must be YAML with'),
-    ('mechanisms: [jansen]', 'Sequences can only be values and not keys in params'),
-    ('/**: 3', 'Cannot have a value before ros__parameters at line 1'),
-    ('/**: {', 'Error parsing a event near line 1'), ('[]', 'Sequences cannot be key at line 1')])
+    ('mechanisms: [jansen]', 'ros__parameters below the name of a node, .* is expected in line 1'),
+    ('/**: 3', 'ros__parameters below the name of a node, .* is expected in line 1'),
+    ('ros__parameters: {rate: 5.0}', 'ros__parameters must be below the name of a node'),
+    ('/**:\n  ros__parameters: {rate: }', 'a value is missing in line 2'),
+    ('/**: {', 'not a valid ROS parameter file: did not find expected .*, line [12]$'),
+    ('[1]', 'ros__parameters below the name of a node, .* is expected in line 1')])
 def test_a_file_that_is_no_scene_says_so(tmp_path, text, reason):
     pytest.importorskip('yaml')
     path = tmp_path / 'scene.yaml'
