@@ -140,8 +140,12 @@ class Component:
         self.joint[:] = [np.broadcast_to(each, self.joint.shape[1]) for each in (
             position, velocity, effort)]
         self.actuator[:] = UNWRITTEN
+        return self.transmit(), self.actuator.copy()
+
+    def transmit(self):
+        """Command what is in the joints; return the status."""
         self._host.component_write(self._made)
-        return self._host.component_status(self._made), self.actuator.copy()
+        return self._host.component_status(self._made)
 
 
 @pytest.fixture(scope='module')
@@ -238,7 +242,7 @@ def test_the_knee_moved_by_hand_stays(plugins):
             component.read(float(motor))
         component.joint[0] = bad
         component.actuator[0] = 4.0
-        component._host.component_write(component._made)
+        component.transmit()
         assert component.actuator[0] == 4.0
 
 
