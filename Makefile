@@ -107,7 +107,7 @@ long: build $(venv)/.tools ## Run the long tests; WHICH='long and not exhaustive
 # Some minutes to an hour a room, and some minutes once for a state of the checkout.
 .PHONY: mutants
 mutants: build $(venv)/.tools .venv-mutants/.installed ## Put COUNT=40 random bugs into ROOM=scene; SEED=2: others; AGAIN=file: only what survived there
-	@$(in_ros) nice -n 10 .venv-mutants/bin/python test/mutants.py --out $(build)/mutants \
+	@$(in_ros) nice -n 10 python test/mutants.py --out $(build)/mutants \
 	  --room '$(ROOM)' --count $(or $(COUNT),40) --seed $(or $(SEED),1) $(if $(AGAIN),--again '$(AGAIN)')
 
 .PHONY: lint
