@@ -32,7 +32,7 @@ MODULES = sorted(PACKAGE.rglob('*.py'))
 PAGE = PACKAGE / 'web' / 'page'
 OUTSIDE = sorted([*(ROOT / 'test').rglob('*.py'), *(ROOT / 'benchmark').rglob('*.py')])
 # Public for all their underscores.
-NAMED_TUPLE = ('_replace', '_asdict', '_fields', '_make')
+PUBLIC = ('_replace', '_asdict', '_fields', '_make', '_exit')
 
 
 @cache
@@ -123,7 +123,7 @@ def test_who_tests_or_measures_uses_what_everybody_may():
         if not re.search(r'(?<!self)\._[a-z]', module.read_text()):
             continue
         for node in ast.walk(parsed(module)):
-            if isinstance(node, ast.Attribute) and node.attr not in NAMED_TUPLE:
+            if isinstance(node, ast.Attribute) and node.attr not in PUBLIC:
                 private = node.attr.startswith('_') and not node.attr.endswith('__')
                 assert not private or ast.unparse(node.value) == 'self', f'{module}:{node.lineno}'
 
