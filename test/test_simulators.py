@@ -190,7 +190,7 @@ def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
     one, file = simulated(name), tmp_path / 'robot.xml'
     built = model([one])
     file.write_text(form.write(built))
-    given, said = from_robot.described(readers.read(str(file)))
+    given, said, _ = from_robot.described(readers.read(str(file)))
     assert not any(line.startswith('Left out') for line in said)
     # An SDF has its zeros where it starts.
     zeros = {solid.joint.name: solid.position if form is sdf else 0.0

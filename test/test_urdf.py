@@ -38,6 +38,8 @@ ENGINE = ['O ground 0 0', 'G ground 0 -20', 'A crank O 40', 'B slider A 120 G 0.
           'P rigid A B 50 90 left']
 FIVE_BAR = ['O ground 0 0', 'Q ground 0.118 0', 'A crank O 0.09', 'C crank Q 0.08 up',
             'P dyad A C 0.1 0.09 left', 'G ground 0 0.2', 'S slider P 0.3 G 0.2 out']
+GEARED = ['O ground 0 0', 'Q ground 0.3 0', 'A crank O 0.1', 'B crank Q 0.08', 'D ground 0.3 0.2',
+          'E crank D 0.05 geared crank2 -0.5 0.2', 'P dyad A B 0.25 0.22 left']
 BOOM = ['O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C line O B 1.6',
         'E rigid O B 0.6 0.7 left', 'F cylinder E B 0.4 left']
 SWINGING_BLOCK = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'P slot A Q 0 out 4',
@@ -68,6 +70,9 @@ MACHINES = {
     'swinging block on the ground': lambda: machine('custom', SWINGING_BLOCK),
     'boom': lambda: machine('custom', BOOM[:4], scale=2.0),
     'boom and arm': lambda: machine('custom', BOOM, scale=2.0),
+    'five-bar with a gear': lambda: machine(
+        'custom', GEARED, scale=1.0, crank2__sweep=[-6.0, 1.0],
+        joint_names=['crank2=-m_crank2+1.0', 'crank3=m_crank3-0.4']),
 }
 OWN = {name: lambda case=case, pairs=2 if name == 'Cardan gears' else 1: machine(
     'custom', case.joints, leg_pairs=pairs,

@@ -1,0 +1,448 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Everything that a URDF, an SDF and an MJCF of a scene say, against the scene. No ROS."""
+
+import copy
+import math
+from types import SimpleNamespace
+from unittest.mock import ANY
+from xml.etree import ElementTree
+
+from hypothesis import given, strategies as st
+from linkage_ros import palette, scene
+from linkage_ros.linkage.output_range import ground_frame
+from linkage_ros.robot_model import bodies, mjcf, rviz, sdf, urdf
+from linkage_ros.robot_model.command import main
+from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
+import numpy as np
+import pytest
+from test_simulators import model, simulated
+from test_urdf import in_space, MACHINES, OWN, posed
+
+QUICK = ('jansen', 'slotted_lever', 'walker of 3 pairs', 'engine with zeros elsewhere', 'five_bar',
+         'boom and arm', 'Scotch yoke', 'Cardan gears', 'scissor lift', 'five-bar with a gear')
+GREY, BLUE, ORANGE = ([round(part / 255, 3) for part in colour] + [1.0] for colour in (
+    (0x8a, 0x8a, 0x8a), (0x00, 0x81, 0xc9), (0xc8, 0x78, 0x00)))
+DENSITY = 1234.5
+
+
+def turned(x, y, z, roll, pitch, yaw):
+    """Return a pose as a matrix: about the fixed axes x, y and z in turn."""
+    made = np.eye(4)
+    for angle, (i, j) in zip((roll, pitch, yaw), ((1, 2), (2, 0), (0, 1))):
+        turn = np.eye(4)
+        turn[i, i] = turn[j, j] = math.cos(angle)
+        turn[j, i], turn[i, j] = math.sin(angle), -math.sin(angle)
+        made = turn @ made
+    made[:3, 3] = x, y, z
+    return made
+
+
+def numbers(text):
+    return [float(word) for word in (text or '').split()]
+
+
+def row(shape, colour, thickness, start, end):
+    """Return what is seen as numbers, whichever of its ends is first."""
+    ends = sorted([[round(value, 7) + 0.0 for value in end] for end in (start, end)])
+    return [('sphere', 'cylinder', 'box').index(shape), *colour, thickness, *ends[0], *ends[1]]
+
+
+def seen(shape, colour, sizes, pose):
+    """Return a visual in a file as numbers; a cylinder is along z, a box along x."""
+    assert shape != 'box' or sizes[1] == sizes[2]
+    thickness, length = {'sphere': lambda r: (r, 0.0), 'cylinder': lambda r, long: (r, long),
+                         'box': lambda long, wide, _: (wide, long)}[shape](*sizes)
+    along = pose[:3, 2 if shape == 'cylinder' else 0] * 0.5 * length
+    return row(shape, colour, thickness, pose[:3, 3] - along, pose[:3, 3] + along)
+
+
+class Read(SimpleNamespace):
+    """
+    What a file says.
+
+    Attributes
+    ----------
+    poses : dict
+        Of each link in space, as a matrix.
+    seen : dict
+        Of each link its visuals, in space.
+    joints : dict
+        Of each joint kind, parent, child and axis.
+    points : dict
+        Of each point its link and its place in space.
+    weights : dict
+        Of each link that has one mass, and centre and inertia, both in space.
+
+    """
+
+    def __init__(self):
+        super().__init__(poses={}, seen={}, joints={}, points={}, weights={})
+
+    def weigh(self, name, mass, place, xx, yy, zz, *others):
+        xy, xz, yz = others or (0.0, 0.0, 0.0)
+        pose = self.poses[name]
+        about = pose[:3, :3] @ [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] @ pose[:3, :3].T
+        self.weights[name] = mass, (pose @ [*place, 1.0])[:3], about
+
+    def check(self, other):
+        """Check that another file has the same links, joints and points."""
+        for what in 'poses', 'seen', 'points':
+            assert vars(self)[what].keys() == vars(other)[what].keys()
+        for name, pose in self.poses.items():
+            assert pose == pytest.approx(other.poses[name], abs=1e-9), name
+        for name, (link, place) in self.points.items():
+            assert link == other.points[name][0]
+            assert place == pytest.approx(other.points[name][1], abs=1e-9)
+        check_seen(self.seen, other.seen)
+        assert self.joints == other.joints
+
+
+def check_seen(found, wanted):
+    assert {name for name in found if found[name]} == {name for name in wanted if wanted[name]}
+    for name, rows in found.items():
+        assert np.array(sorted(rows)) == pytest.approx(np.array(sorted(wanted[name])), abs=1e-6)
+
+
+def read_urdf(text, positions):
+    """Return what a URDF says where its joints have positions."""
+    root, found = ElementTree.fromstring(text), Read()
+    assert {each.tag for each in root} == {'material', 'link', 'joint'}
+    colours = {each.get('name'): numbers(each.find('color').get('rgba'))
+               for each in root.findall('material')}
+    joints = {joint.find('child').get('link'): joint for joint in root.iter('joint')}
+    first, *links = root.findall('link')
+    poses = {first.get('name'): np.eye(4)}
+    for link in links:
+        name, joint = link.get('name'), joints[link.get('name')]
+        parent, kind = joint.find('parent').get('link'), joint.get('type')
+        pose, axis = poses[parent] @ origin(joint), None
+        if kind != 'fixed':
+            assert (kind == 'continuous') == (joint.find('limit') is None)
+            kind = 'prismatic' if kind == 'prismatic' else 'revolute'
+            axis = numbers(joint.find('axis').get('xyz'))
+            moved = np.array(axis) * positions[joint.get('name')]
+            pose = pose @ turned(*([*moved, 0, 0, 0] if kind == 'prismatic' else [0, 0, 0, *moved]))
+        poses[name], owner = pose, name
+        if name.endswith('_link'):
+            found.poses[name] = pose
+            found.joints[joint.get('name')] = (
+                kind, found.points.get(parent, [parent])[0], name, axis)
+        else:
+            assert joint.get('name') == f'{name}_fixed' and kind == 'fixed'
+            owner, found.points[name] = parent, (parent, pose[:3, 3])
+        for visual in link.iter('visual'):
+            shape, = visual.find('geometry')
+            sizes = numbers(' '.join(filter(None, map(shape.get, ('size', 'radius', 'length')))))
+            found.seen.setdefault(owner, []).append(seen(
+                shape.tag, colours[visual.find('material').get('name')], sizes,
+                pose @ origin(visual)))
+    return found
+
+
+def origin(element):
+    at = element.find('origin')
+    return np.eye(4) if at is None else turned(*numbers(at.get('xyz')), *numbers(at.get('rpy')))
+
+
+def read_sdf(text):
+    """Return what an SDF says, without the pins that close its loops, and these by name."""
+    root, found = ElementTree.fromstring(text)[0], Read()
+    pins = {}
+    for link in root.findall('link'):
+        name, base = link.get('name'), link.find('pose').get('relative_to')
+        pose = turned(*numbers(link.findtext('pose')))
+        found.poses[name] = pose if base == '__model__' else found.poses[base] @ pose
+        found.seen[name] = []
+        for i, visual in enumerate(link.findall('visual')):
+            assert visual.get('name') == f'{name}_{i}'
+            shape, = visual.find('geometry')
+            ambient, diffuse = (numbers(visual.findtext(f'material/{way}'))
+                                for way in ('ambient', 'diffuse'))
+            assert ambient == diffuse
+            found.seen[name].append(seen(
+                shape.tag, ambient, [value for size in shape for value in numbers(size.text)],
+                found.poses[name] @ turned(*numbers(visual.findtext('pose')))))
+        if (inertial := link.find('inertial')) is not None:
+            *place, roll, pitch, yaw = numbers(inertial.findtext('pose'))
+            assert not (roll or pitch or yaw)
+            found.weigh(name, float(inertial.findtext('mass')), place,
+                        *(float(inertial.findtext(f'inertia/i{way}'))
+                          for way in ('xx', 'yy', 'zz', 'xy')), 0.0, 0.0)
+    for frame in root.findall('frame'):
+        link = frame.get('attached_to')
+        place = (found.poses[link] @ turned(*numbers(frame.findtext('pose'))))[:3, 3]
+        found.points[frame.get('name')] = link, place
+    for joint in root.findall('joint'):
+        axis = joint.findtext('axis/xyz')
+        said = (joint.get('type'), joint.findtext('parent'), joint.findtext('child'),
+                axis and numbers(axis))
+        if said[2].endswith('_link'):
+            found.joints[joint.get('name')] = said
+        else:
+            pins.setdefault(said[2], {})[joint.get('name')] = said
+    return found, root, {name: (joints, *(vars(found)[what].pop(name)
+                                          for what in ('poses', 'seen', 'weights')))
+                         for name, joints in pins.items()}
+
+
+def read_mjcf(text):
+    """Return what an MJCF says of its bodies, and the positions of its joints."""
+    root, found, positions = ElementTree.fromstring(text), Read(), {}
+    compiler = root.find('compiler')
+    assert compiler.attrib == {'angle': 'radian', 'eulerseq': 'XYZ'}
+
+    def pose(element):
+        return turned(*numbers(element.get('pos')), *numbers(element.get('euler') or '0 0 0'))
+
+    def read(body, parent, at):
+        for child in body.findall('body'):
+            name = child.get('name')
+            found.poses[name] = there = at @ pose(child)
+            found.seen[name] = []
+            joint, moves = f'{name}_fixed', ('fixed', parent, name, None)
+            for each in child.findall('joint'):
+                joint, kind = each.get('name'), {'slide': 'prismatic', 'hinge': 'revolute'}
+                moves = kind[each.get('type')], parent, name, numbers(each.get('axis'))
+                positions[joint] = float(each.get('ref'))
+            found.joints[joint] = moves
+            for geom in child.findall('geom'):
+                shape, sizes = geom.get('type'), np.array(numbers(geom.get('size')))
+                sizes *= {'box': 2.0, 'sphere': 1.0, 'cylinder': [1.0, 2.0]}[shape]
+                found.seen[name].append(seen(
+                    shape, numbers(geom.get('rgba')), sizes, there @ pose(geom)))
+            for site in child.findall('site'):
+                found.points[site.get('name')] = name, (there @ pose(site))[:3, 3]
+            for inertial in child.findall('inertial'):
+                found.weigh(name, float(inertial.get('mass')), numbers(inertial.get('pos')),
+                            *numbers(inertial.get('fullinertia')))
+            read(child, name, there)
+
+    read(root.find('worldbody'), 'world', np.eye(4))
+    return found, root, positions
+
+
+def weight_of(rows, density):
+    """Return mass, centre and inertia of visuals in space, by the formulas of textbooks."""
+    parts = []
+    for shape, *_, r, x, y, z, u, v, w in rows:
+        start, end = np.array([x, y, z]), np.array([u, v, w])
+        long = math.dist(start, end)
+        along = (end - start) / long if long else np.zeros(3)
+        volume, own, across = [
+            (4 / 3 * math.pi * r ** 3, 2 / 5 * r ** 2, 2 / 5 * r ** 2),
+            (math.pi * r ** 2 * long, r ** 2 / 2, r ** 2 / 4 + long ** 2 / 12),
+            (r ** 2 * long, r ** 2 / 6, (r ** 2 + long ** 2) / 12)][int(shape)]
+        about = across * np.eye(3) + (own - across) * np.outer(along, along)
+        parts.append((density * volume, (start + end) / 2, about))
+    mass = sum(part for part, _, _ in parts)
+    centre = sum(part * place for part, place, _ in parts) / mass
+    return mass, centre, sum(part * (about + np.dot(place - centre, place - centre) * np.eye(3)
+                                     - np.outer(place - centre, place - centre))
+                             for part, place, about in parts)
+
+
+def check_weight(found, wanted):
+    for one, other in zip(found, wanted):
+        size = np.abs(other).max()
+        assert np.array(one) / size == pytest.approx(np.array(other) / size, abs=1e-4)
+
+
+def scene_seen(one, thetas):
+    """Return what is seen of the links of a scene, and the bare names of the points on them."""
+    _, places = posed(one, thetas)
+    found, points, size = {}, {}, bodies.size(one)
+    shown = shapes(one)
+    ends = one.assembly().solution([end for shape in shown for end in (shape.start, shape.end)])
+    ends.solve(thetas.tolist())
+
+    def add(link, *visual):
+        found.setdefault(f'm_{link}_link', []).append(row(*visual))
+
+    def colour(link):
+        return ORANGE if link in one.inputs else BLUE
+
+    for (prefix, leg), leg_ends in zip(one.assembly().legs.items(), ends.rows):
+        spots = {name[len(f'm_{prefix}'):]: in_space(one.pose, place)
+                 for name, place in places.items() if name.startswith(f'm_{prefix}')}
+        joints = {link.name: link.joint for link in one.linkage.links}
+        for link, frame in {'ground': ground_frame(one.linkage), **one.linkage.frames}.items():
+            name = link if link == 'ground' else prefix + link
+            on = [point for point in frame if point != joints.get(link)]
+            points.setdefault(f'm_{name}_link', []).extend(f'm_{prefix}{point}' for point in on)
+            for point in on or [joints[link]]:
+                add(name, 'sphere', GREY, size / 40, spots[point], spots[point])
+            for start, end in one.linkage.bars if link != 'ground' else ():
+                if {start, end} <= set(frame):
+                    add(name, 'cylinder', colour(link), size / 80, spots[start], spots[end])
+        for shape, (start, end) in zip(shown, leg_ends.reshape(-1, 2, 2)):
+            link, slide = shape.start.link, shape.slide.name
+            look = {GUIDE: ('box', GREY, size / 80), BLOCK: ('box', colour(slide), size / 20),
+                    BARREL: ('cylinder', colour(slide), size / 32),
+                    ROD: ('cylinder', BLUE, size / 80)}[shape.kind]
+            drawn = (*look, in_space(one.pose, start), in_space(one.pose, end))
+            if link != 'ground' or row(*drawn) not in found['m_ground_link']:
+                add(link if link == 'ground' else prefix + link, *drawn)
+    if len(one.assembly().legs) > 1:
+        hub = in_space(one.pose, places['m_left0_' + one.linkage.links[0].joint])
+        add(one.linkage.links[0].name, 'sphere', GREY, size / 40, hub, hub)
+    return found, points
+
+
+def bare(name):
+    return name.partition('_cut')[0]
+
+
+@pytest.mark.parametrize('name', [
+    pytest.param(name, marks=() if name in QUICK else pytest.mark.long)
+    for name in [*MACHINES, *OWN]])
+def test_three_formats_say_what_the_scene_has(name):
+    one = simulated(name)
+    built = model([one], density=DENSITY)
+    starts = np.array([np.clip(drive.start, *drive.sweep or (-math.inf, math.inf))
+                       for drive in one.inputs.values()])
+    positions, places = posed(one, starts)
+    tree = read_urdf(urdf.describe([one], 'world'), positions)
+    wanted, points = scene_seen(one, starts)
+    check_seen(tree.seen, wanted)
+    for link, names in points.items():
+        assert sorted(bare(point) for point, (on, _) in tree.points.items() if on == link) == (
+            sorted(names))
+    loops, simulator, at = read_mjcf(mjcf.write(built))
+    gazebo, robot, pins = read_sdf(sdf.write(built))
+    loops.check(gazebo)
+    ratios = gears(one, starts)
+    check_mjcf(one, loops, simulator, starts, places, ratios)
+    check_sdf(one, gazebo, robot, pins, starts, ratios)
+    # What runs in a yoke's slot hangs on the yoke, with a pin where the point in the slot is.
+    for prefix in one.assembly().legs:
+        for link, pin in one.linkage.yokes.items():
+            slot = f'm_{prefix}{link}_slot'
+            place = in_space(one.pose, places[f'm_{prefix}{pin}'])
+            wanted[f'{slot}_link'] = [row('sphere', GREY, bodies.size(one) / 40, place, place)]
+            check_seen({'': loops.seen.pop(f'{slot}_link')}, {'': wanted[f'{slot}_link']})
+            assert loops.joints.pop(slot) == (
+                'prismatic', f'm_{prefix}{link}_link', f'{slot}_link', [1.0, 0.0, 0.0])
+            on, where = loops.points.pop(f'm_{prefix}{link}_pin')
+            assert on == f'{slot}_link' and where == pytest.approx(place)
+            assert loops.poses.pop(on)[:3, 3] == pytest.approx(place) and at.pop(slot) == 0.0
+    loops.check(tree)
+    assert at == pytest.approx(positions)
+    assert gazebo.weights.keys() == wanted.keys() and loops.weights.keys() == {
+        link for link in wanted if link != 'm_ground_link'}
+    for file in loops, gazebo:
+        for link, weight in file.weights.items():
+            check_weight(weight, weight_of(wanted[link], DENSITY))
+
+
+def check_mjcf(one, loops, root, starts, places, ratios):
+    """Check all that an MJCF says but its bodies."""
+    size, links = bodies.size(one), {link.name: link for link in one.linkage.links}
+    assert (root.tag, root.get('model')) == ('mujoco', 'm')
+    leg = f'm_{next(iter(one.assembly().legs))}'
+    arms = {name: math.dist(places[leg + links[name].joint], places[leg + links[name].tip])
+            if drive.input.turns else size for name, drive in one.inputs.items()}
+    step = 1e-3 * math.sqrt(min([1.0, *arms.values()]))
+    assert [[each.tag, each.attrib] for each in root if each.tag in ('option', 'keyframe')] == [
+        ['option', {'timestep': ANY, 'integrator': 'implicitfast'}], ['keyframe', {}]]
+    assert float(root.find('option').get('timestep')) == pytest.approx(step)
+    (geom, equality), (key,) = root.find('default'), root.find('keyframe')
+    assert geom.attrib == {'contype': '0', 'conaffinity': '0'}
+    assert numbers(equality.get('solref')) == pytest.approx([2.0 * step, 1.0])
+    assert numbers(equality.get('solimp')) == [0.9999, 0.9999, 1.0]
+    assert {tuple(sorted(each.items())) for each in root.findall('equality/connect')} == {
+        (('name', cut), ('site1', met), ('site2', cut)) for cut, met in cuts(one, loops).items()}
+    assert [(joint.attrib, numbers(joint.attrib.pop('polycoef')))
+            for joint in root.findall('equality/joint')] == [
+        ({'joint1': name, 'joint2': other}, pytest.approx([0.0, ratio, 0.0, 0.0, 0.0], abs=1e-6))
+        for name, (other, ratio) in ratios.items()]
+    # A servo gives way by a thousandth [rad, or of the longest bar], and pulls ten times as much.
+    weight = 9.81 * sum(mass for mass, *_ in loops.weights.values())
+    published = [one.joints[name] for name in one.inputs]
+    assert key.get('name') == 'start' and numbers(key.get('ctrl')) == pytest.approx(
+        [joint.of(start) for joint, start in zip(published, starts)])
+    for servo, joint, arm, drive in zip(
+            root.find('actuator'), published, arms.values(), one.inputs.values()):
+        turns = drive.input.turns
+        assert (servo.tag, servo.get('name'), servo.get('joint'), servo.get('dampratio')) == (
+            'position', joint.name, joint.name, '1')
+        assert float(servo.get('kp')) == pytest.approx(weight * (
+            arm if turns else 1.0 / arm) / 1e-3)
+        most = 10.0 * weight * (arm if turns else 1.0)
+        assert numbers(servo.get('forcerange')) == pytest.approx([-most, most])
+        assert numbers(servo.get('ctrlrange')) == pytest.approx(swept(joint, drive))
+    assert len(root.find('actuator')) == len(published)
+
+
+def check_sdf(one, found, root, pins, starts, ratios):
+    """Check all that an SDF says but its links."""
+    assert root.get('name') == 'm'
+    closed, plugins = cuts(one, found), []
+    for cut, met in closed.items():
+        joints, pose, ball, (mass, centre, about) = pins.pop(f'{cut}_pin')
+        (link, place), (other, _) = found.points[cut], found.points[met]
+        assert joints == {f'{cut}_hinge': ('revolute', link, f'{cut}_pin', [0.0, 0.0, 1.0]),
+                          f'{cut}_closed': ('fixed', other, f'{cut}_pin', None)}
+        assert pose[:3, :3] == pytest.approx(found.poses[link][:3, :3])
+        assert pose[:3, 3] == pytest.approx(place)
+        wanted = [row('sphere', GREY, bodies.size(one) / 40, place, place)]
+        check_seen({cut: ball}, {cut: wanted})
+        check_weight((mass, centre, about), weight_of(wanted, DENSITY))
+        plugins.append(('detachable-joint', 'DetachableJoint', {
+            'parent_link': other, 'child_model': '__model__', 'child_link': f'{cut}_pin'}))
+    assert not pins
+    published = {joint.name: [end - joint.of(start) for end in swept(joint, drive)]
+                 for joint, drive, start in zip(map(one.joints.get, one.inputs),
+                                                one.inputs.values(), starts)}
+    plugins += [('joint-state-publisher', 'JointStatePublisher', {}), *(
+        ('joint-position-controller', 'JointPositionController',
+         {'joint_name': name, 'use_velocity_commands': 'true'}) for name in published)]
+    assert [(each.attrib, {part.tag: part.text for part in each})
+            for each in root.findall('plugin')] == [
+        ({'filename': f'gz-sim-{file}-system', 'name': f'gz::sim::systems::{name}'}, values)
+        for file, name, values in plugins]
+    for joint in root.findall('joint'):
+        name, axis = joint.get('name'), joint.find('axis')
+        mimic, limit = (None if axis is None else axis.find(tag) for tag in ('mimic', 'limit'))
+        assert (mimic is None) == (name not in ratios)
+        if mimic is not None:
+            assert mimic.get('joint') == ratios[name][0]
+            assert [(part.tag, float(part.text)) for part in mimic] == [
+                ('multiplier', pytest.approx(ratios[name][1])), ('offset', 0.0),
+                ('reference', 0.0)]
+        assert [(part.tag, float(part.text)) for part in limit or ()] == [
+            (tag, pytest.approx(end)) for tag, end in zip(('lower', 'upper'), published.get(name, ()))]
+
+
+def cuts(one, file):
+    """Return the points that coincide with another one, by name."""
+    yokes = {f'm_{prefix}{link}_pin': f'm_{prefix}{pin}' for prefix in one.assembly().legs
+             for link, pin in one.linkage.yokes.items()}
+    return {**{name: bare(name) for name in file.points if '_cut' in name}, **yokes}
+
+
+def gears(one, starts):
+    """Return, of joints with gears, the input and the ratio of their published changes."""
+    found = {}
+    for i, driving in enumerate(one.inputs):
+        for prefix in one.assembly().legs:
+            step = 1e-4 * (np.arange(len(starts)) == i)
+            before, after = (posed(one, starts + way * step)[0] for way in (-1.0, 1.0))
+            names = [one.joints[name].name for name in (driving, *(
+                prefix + joint for joint in one.linkage.geared))]
+            by, *moved = [math.remainder(after[name] - before[name], math.tau) for name in names]
+            found.update((name, (names[0], change / by)) for name, change in zip(names[1:], moved)
+                         if abs(change) > 1e-9)
+    return found
+
+
+def swept(joint, drive):
+    return sorted(map(joint.of, drive.sweep or ()))
