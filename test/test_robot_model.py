@@ -16,10 +16,11 @@ from types import SimpleNamespace
 from unittest.mock import ANY
 from xml.etree import ElementTree
 
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 from linkage_ros import palette, scene
 from linkage_ros.linkage.output_range import ground_frame
 from linkage_ros.robot_model import bodies, mjcf, rviz, sdf, urdf
+from linkage_ros.robot_model.assembled import assembled
 from linkage_ros.robot_model.command import main
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
 import numpy as np
@@ -27,7 +28,7 @@ import pytest
 from test_simulators import model, simulated
 from test_urdf import in_space, MACHINES, OWN, posed
 
-QUICK = ('jansen', 'slotted_lever', 'walker of 3 pairs', 'engine with zeros elsewhere', 'five_bar',
+QUICK = ('jansen', 'slotted_lever', 'engine with zeros elsewhere', 'five_bar',
          'boom and arm', 'Scotch yoke', 'Cardan gears', 'scissor lift', 'five-bar with a gear')
 GREY, BLUE, ORANGE = ([round(part / 255, 3) for part in colour] + [1.0] for colour in (
     (0x8a, 0x8a, 0x8a), (0x00, 0x81, 0xc9), (0xc8, 0x78, 0x00)))
@@ -270,7 +271,7 @@ def scene_seen(one, thetas):
     def colour(link):
         return ORANGE if link in one.inputs else BLUE
 
-    for (prefix, leg), leg_ends in zip(one.assembly().legs.items(), ends.rows):
+    for prefix, leg_ends in zip(one.assembly().legs, ends.rows):
         spots = {name[len(f'm_{prefix}'):]: in_space(one.pose, place)
                  for name, place in places.items() if name.startswith(f'm_{prefix}')}
         joints = {link.name: link.joint for link in one.linkage.links}
@@ -419,7 +420,8 @@ def check_sdf(one, found, root, pins, starts, ratios):
                 ('multiplier', pytest.approx(ratios[name][1])), ('offset', 0.0),
                 ('reference', 0.0)]
         assert [(part.tag, float(part.text)) for part in limit or ()] == [
-            (tag, pytest.approx(end)) for tag, end in zip(('lower', 'upper'), published.get(name, ()))]
+            (tag, pytest.approx(end))
+            for tag, end in zip(('lower', 'upper'), published.get(name, ()))]
 
 
 def cuts(one, file):
@@ -446,3 +448,203 @@ def gears(one, starts):
 
 def swept(joint, drive):
     return sorted(map(joint.of, drive.sweep or ()))
+
+
+ARM = {'mechanisms': ['hand', 'arm'], 'arm.type': 'four_bar', 'hand.type': 'four_bar',
+       'hand.pose': [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]}
+
+
+@pytest.mark.parametrize('link', ['AB_link', 'B', 'B_cut'])
+def test_a_hand_on_an_arm_is_the_same_in_three_formats(link):
+    machines = scene.read({**ARM, 'hand.frame_id': f'arm_{link}'}).machines.values()
+    built = model(machines)
+    positions = {one.joints[name].name: one.joints[name].of(angle) for one in machines
+                 for name, angle in one.linkage.joint_angles(one.first.start).items()}
+    loops, root, at = read_mjcf(mjcf.write(built))
+    gazebo, robot, _ = read_sdf(sdf.write(built))
+    loops.check(gazebo)
+    loops.check(read_urdf(urdf.describe(machines, 'world'), positions))
+    assert at == pytest.approx(positions)
+    assert root.get('model') == robot.get('name') == 'linkages'
+    assert len(root.find('actuator')) == 2 and len(root.find('equality')) == 2
+
+
+@pytest.mark.parametrize('name', ['boom and arm', 'slotted_lever'])
+def test_all_is_as_thick_as_a_bar_asks_for(name):
+    one = simulated(name)
+
+    def shown(width=None):
+        robot = bodies.robot([one], 'world', width)
+        return {link: sorted(rows) for link, rows in read_sdf(
+            sdf.write(assembled(robot)))[0].seen.items()}
+
+    usual, size = shown(), bodies.size(one)
+    check_seen(shown(size / 40), usual)
+    check_seen(shown(0.3), {link: [[*first, thick * 0.3 / (size / 40), *ends]
+                                   for *first, thick, a, b, c, d, e, f in rows
+                                   for ends in [(a, b, c, d, e, f)]]
+                            for link, rows in usual.items()})
+
+
+def test_what_mujoco_finds_too_light_is_refused():
+    one = simulated('slotted_lever')
+    weights = read_sdf(sdf.write(model([one], density=1.0)))[0].weights
+    least = min(np.linalg.eigvalsh(about)[0] for link, (_, _, about) in weights.items()
+                if link != 'm_ground_link')
+    mjcf.write(model([one], density=1.001e-14 / least))
+    with pytest.raises(scene.SceneError, match='_link is too light for MuJoCo: give a larger '
+                       'scale, --width or --density'):
+        mjcf.write(model([one], density=0.999e-14 / least))
+
+
+YOKE = ['O ground 0 0', 'X ground 1 0', 'A crank O 1', 'C yoke A O along X', 'D block C {} 0']
+EYE = ['O ground 0 0', 'A crank O 1', 'x_crank_link rigid O A 1 1 left']
+FAR = ('m.pose, m.scale and m.dimensions must keep everything within 1e+30 m, not at {}')
+LONG = 'm.scale and m.dimensions must make the longest bar from 1e-30 to 1e+30 m long, not {}'
+
+
+@pytest.mark.parametrize('given, complaint', [
+    ({'m.pose': [0.0, 0.9e30] + [0.0] * 4}, ''),
+    ({'m.pose': [0.0, 1.1e30] + [0.0] * 4}, FAR.format('1.1e+30')),
+    ({'m.type': 'custom', 'm.joints': [line.format('0.9e30') for line in YOKE]}, ''),
+    ({'m.type': 'custom', 'm.joints': [line.format('1.1e30') for line in YOKE]},
+     LONG.format('1.1e+30')),
+    ({'m.type': 'custom', 'm.joints': ['O ground 0 0', 'A crank O 1', 'D ground 1.1e30 0']},
+     FAR.format('1.1e+30')),
+    ({'m.joint_names': ['block=m_block+1.1e30'], 'm.type': 'slider_crank'},
+     FAR.format('-1.1e+30')),
+    ({'m.scale': 0.99e30 / 120.0}, ''), ({'m.scale': 1.01e30 / 120.0}, LONG.format('1.01e+30')),
+    ({'m.scale': 1.01e-30 / 120.0}, ''), ({'m.scale': 0.99e-30 / 120.0}, LONG.format('9.9e-31')),
+    ({'frame_id': 'm_crank_link'},
+     "frame_id must differ from the links of the robot model, not be 'm_crank_link'"),
+    ({'mechanisms': ['m', 'm_x'], 'm.type': 'custom', 'm.joints': EYE, 'm_x.type': 'four_bar'},
+     'mechanisms must have other names: the robot model would have two links m_x_crank_link'),
+])
+def test_what_makes_no_model_is_refused(given, complaint):
+    found = scene.read({'mechanisms': ['m'], 'm.type': 'four_bar', **given})
+    try:
+        urdf.describe(found.machines.values(), found.frame_id)
+        assert not complaint
+    except scene.SceneError as error:
+        assert str(error) == complaint
+
+
+def test_a_linkage_in_space_makes_no_model():
+    machines = scene.load('examples/ankle.yaml').machines
+    with pytest.raises(scene.SceneError, match='^ankle is a linkage in space: pictures and robot '
+                       'models are of linkages in a plane$'):
+        model(machines.values())
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.floats(-10.0, 10.0), min_size=3, max_size=3),
+       st.lists(st.sampled_from([k * math.pi / 4.0 for k in range(-4, 5)])
+                | st.floats(-7.0, 7.0), min_size=3, max_size=3))
+def test_coordinates_of_a_pose_give_the_pose(place, angles):
+    pose = turned(*place, *angles)
+    found = bodies.coordinates(pose)
+    assert turned(*found) == pytest.approx(pose, abs=1e-8)
+    assert bodies.pose(*place, *angles) == pytest.approx(pose, abs=1e-12)
+    assert all(map(math.isfinite, found)) and abs(found[4]) <= 0.5 * math.pi + 1e-12
+
+
+def printed(capsys, *arguments):
+    assert main([*arguments]) == 0
+    return capsys.readouterr().out
+
+
+def test_the_command_prints_what_its_options_ask_for(tmp_path, capsys):
+    found = scene.load('config/slotted_lever.yaml')
+    file = tmp_path / 'scene.yaml'
+    file.write_text('/**:\n  ros__parameters:\n    mechanisms: [a, b]\n    a.type: four_bar\n'
+                    '    b.type: jansen\n    frame_id: base\n')
+    several = scene.load(str(file))
+    for options, machines, frame, width, density in (
+            ([], scene.read({}).machines.values(), 'world', None, 2700.0),
+            (['config/slotted_lever.yaml', '--width', '0.5', '--density', '7.8e3'],
+             found.machines.values(), found.frame_id, 0.5, 7800.0),
+            ([str(file), '--mechanism', 'b'], [several.machines['b']], 'base', None, 2700.0),
+            ([str(file), '--mechanism', 'b', 'a'], [several.machines[name] for name in 'ba'],
+             'base', None, 2700.0)):
+        robot = bodies.robot(machines, frame, width)
+        assert printed(capsys, *options, '--format', 'sdf') == (
+            sdf.write(assembled(robot, density)) + '\n')
+        assert printed(capsys, *options, '--format', 'mjcf') == (
+            mjcf.write(assembled(robot, density)) + '\n')
+        options = [word for word in options if word not in ('--density', '7.8e3')]
+        assert printed(capsys, *options) == printed(capsys, *options, '--format', 'urdf') == (
+            urdf.write(robot) + '\n')
+
+
+def test_the_command_s_help_names_its_options_units_and_defaults(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(['--help'])
+    text = ' '.join(capsys.readouterr().out.split())
+    assert end.value.code == 0
+    for fact in (
+            'usage: urdf [-h] [--mechanism NAME [NAME ...]] [--format {urdf,sdf,mjcf}] '
+            '[--width M] [--density KG/M3] [SCENE]', 'Print the robot model of a scene.',
+            "SCENE the scene's parameter file (default: the catalogue's linkages)",
+            'only these mechanisms of the scene', '(default: urdf)',
+            'thickness of a bar, with all other shapes in proportion (default: a 40th of the '
+            'longest)', 'density of all bodies of sdf and mjcf (default: 2700, aluminium)',
+            '--ros-args --params-file SCENE'):
+        assert fact in text
+
+
+@pytest.mark.parametrize('arguments, complaint', [
+    (['--density', '2700'], '--density is for sdf and mjcf only: the URDF has no masses'),
+    (['--width', '-1'], 'argument --width: must be from 1e-30 to 1e+30, not -1'),
+    (['--format', 'sdf', '--density', 'lead'],
+     'argument --density: must be from 1e-30 to 1e+30, not lead'),
+    (['--density', '2e30'], 'argument --density: must be from 1e-30 to 1e+30, not 2e30'),
+    (['--mechanism', 'leg'], "there is no mechanism 'leg'; allowed: water_drop, jansen, "),
+    (['--format', 'dae'], "argument --format: invalid choice: 'dae' (choose from "),
+    (['nowhere.yaml'], 'nowhere.yaml: No such file or directory')])
+def test_the_command_says_what_is_wrong(capsys, arguments, complaint):
+    assert main(arguments) == 1
+    result = capsys.readouterr()
+    assert not result.out and result.err.startswith(f'urdf: {complaint}')
+    assert result.err.count('\n') == 1
+
+
+@pytest.mark.parametrize('angles, pitch, yaw', [
+    ((math.pi / 2, 0.0, 0.0), 0.15, -math.pi / 2), ((0.0, 0.0, 0.7), 1.56, -math.pi / 2),
+    ((1.0, 0.0, 0.5), math.pi / 2 - 1.0, 0.5 - math.pi / 2),
+    ((math.pi / 2, 0.0, 2.0), 0.15, 2.0 - math.pi / 2), ((math.pi, 0.0, 0.0), 0.15, -math.pi / 2),
+    ((0.05, 0.0, 1.0), math.pi / 2 - 0.05, -math.pi / 2)])
+def test_rviz_s_camera_sees_all_of_a_scene_square_to_the_first_plane(angles, pitch, yaw):
+    machines = scene.read({
+        'mechanisms': ['m', 'n'], 'm.type': 'jansen', 'm.pose': [1.0, 2.0, 3.0, *angles],
+        'n.type': 'slider_crank', 'm.scale': 0.01, 'm.leg_pairs': 2, 'n.scale': 0.01,
+        'n.pose': [-1.0, 0.5, 0.0, 0.3, 0.2, 0.1], 'n.crank.sweep': [0.5, 2.0]}).machines
+    group = {'Class': 'rviz_common/Group', 'Name': 'one', 'Displays': [
+        {'Class': 'rviz_default_plugins/MarkerArray', 'Topic': {'Value': '/one/markers'}}]}
+    config = {'Visualization Manager': {
+        'Displays': [{'Class': 'Grid'}, group, {**group, 'Alpha': 1.0}, {'Class': 'Axes'}],
+        'Global Options': {}, 'Views': {'Current': {'Class': 'Orbit'}}}}
+    before = copy.deepcopy(config)
+    manager = rviz.adapted(config, machines, 'base')['Visualization Manager']
+    assert config == before
+    assert manager['Displays'] == [{'Class': 'Grid'}, *(
+        {'Class': 'rviz_common/Group', 'Name': name, 'Displays': [
+            {'Class': 'rviz_default_plugins/MarkerArray', 'Topic': {'Value': f'/{name}/markers'}}]}
+        for name in machines), {'Class': 'Axes'}]
+    view, places = manager['Views']['Current'], []
+    for one in machines.values():
+        ends = one.first.ends or (0.0, math.tau)
+        solution = one.assembly().solution(one.linkage.points)
+        for theta in np.linspace(*ends, 201):
+            solution.solve([theta])
+            for x, y in solution.rows.reshape(-1, 2):
+                # A mirrored walker is shown with both of its sides in all poses.
+                places += [in_space(one.pose, place) for place in (
+                    [(x, y), (-x, y)] if one.mirrored else [(x, y)])]
+    low, high = np.min(places, axis=0), np.max(places, axis=0)
+    focus, radius = (low + high) / 2, math.dist(low, high) / 2
+    assert [view['Focal Point'][axis] for axis in 'XYZ'] == pytest.approx(focus, abs=0.02 * radius)
+    # A view of 45 degrees, and a tenth more.
+    assert view['Distance'] * math.sin(math.pi / 8) == pytest.approx(1.1 * radius, rel=0.02)
+    assert view['Class'] == 'Orbit' and 0.0 <= view['Yaw'] < math.tau
+    assert (view['Pitch'], math.remainder(view['Yaw'] - yaw, math.tau)) == (
+        pytest.approx(pitch, abs=1e-6), pytest.approx(0.0, abs=1e-6))
