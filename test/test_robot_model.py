@@ -17,7 +17,7 @@ from unittest.mock import ANY
 from xml.etree import ElementTree
 
 from hypothesis import given, settings, strategies as st
-from linkage_ros import palette, scene
+from linkage_ros import scene
 from linkage_ros.linkage.output_range import ground_frame
 from linkage_ros.robot_model import bodies, mjcf, rviz, sdf, urdf
 from linkage_ros.robot_model.assembled import assembled
@@ -25,7 +25,7 @@ from linkage_ros.robot_model.command import main
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
 import numpy as np
 import pytest
-from test_simulators import model, simulated
+from test_simulators import model, simulated, some_quick
 from test_urdf import in_space, MACHINES, OWN, posed
 
 QUICK = ('jansen', 'slotted_lever', 'engine with zeros elsewhere', 'five_bar',
@@ -130,8 +130,9 @@ def read_urdf(text, positions):
             assert (kind == 'continuous') == (joint.find('limit') is None)
             kind = 'prismatic' if kind == 'prismatic' else 'revolute'
             axis = numbers(joint.find('axis').get('xyz'))
-            moved = np.array(axis) * positions[joint.get('name')]
-            pose = pose @ turned(*([*moved, 0, 0, 0] if kind == 'prismatic' else [0, 0, 0, *moved]))
+            moved, still = np.array(axis) * positions[joint.get('name')], (0, 0, 0)
+            pose = pose @ turned(*moved, *still) if kind == 'prismatic' else (
+                pose @ turned(*still, *moved))
         poses[name], owner = pose, name
         if name.endswith('_link'):
             found.poses[name] = pose
@@ -302,9 +303,7 @@ def bare(name):
     return name.partition('_cut')[0]
 
 
-@pytest.mark.parametrize('name', [
-    pytest.param(name, marks=() if name in QUICK else pytest.mark.long)
-    for name in [*MACHINES, *OWN]])
+@pytest.mark.parametrize('name', some_quick([*MACHINES, *OWN], QUICK))
 def test_three_formats_say_what_the_scene_has(name):
     one = simulated(name)
     built = model([one], density=DENSITY)
