@@ -12,16 +12,17 @@
 
 import copy
 import math
+import sys
 from types import SimpleNamespace
 from unittest.mock import ANY
 from xml.etree import ElementTree
 
 from hypothesis import given, settings, strategies as st
-from linkage_ros import scene
+from linkage_ros import command, scene
 from linkage_ros.linkage.output_range import ground_frame
 from linkage_ros.robot_model import bodies, mjcf, rviz, sdf, urdf
 from linkage_ros.robot_model.assembled import assembled
-from linkage_ros.robot_model.command import main
+from linkage_ros.robot_model.command import main, show
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ QUICK = ('jansen', 'slotted_lever', 'engine with zeros elsewhere', 'five_bar',
          'boom and arm', 'Scotch yoke', 'Cardan gears', 'scissor lift', 'five-bar with a gear')
 GREY, BLUE, ORANGE = ([round(part / 255, 3) for part in colour] + [1.0] for colour in (
     (0x8a, 0x8a, 0x8a), (0x00, 0x81, 0xc9), (0xc8, 0x78, 0x00)))
-DENSITY = 1234.5
+DENSITY, WIDTHS = 1234.5, {'boom and arm': 0.06, 'slotted_lever': 0.01}
 
 
 def turned(x, y, z, roll, pitch, yaw):
@@ -127,7 +128,9 @@ def read_urdf(text, positions):
         parent, kind = joint.find('parent').get('link'), joint.get('type')
         pose, axis = poses[parent] @ origin(joint), None
         if kind != 'fixed':
-            assert (kind == 'continuous') == (joint.find('limit') is None)
+            limit = joint.find('limit')
+            assert (kind == 'continuous') == (limit is None) and (limit is None or (
+                limit.get('effort'), limit.get('velocity')) == ('0', '0'))
             kind = 'prismatic' if kind == 'prismatic' else 'revolute'
             axis = numbers(joint.find('axis').get('xyz'))
             moved, still = np.array(axis) * positions[joint.get('name')], (0, 0, 0)
@@ -258,10 +261,10 @@ def check_weight(found, wanted):
         assert np.array(one) / size == pytest.approx(np.array(other) / size, abs=1e-4)
 
 
-def scene_seen(one, thetas):
+def scene_seen(one, thetas, width):
     """Return what is seen of the links of a scene, and the bare names of the points on them."""
     _, places = posed(one, thetas)
-    found, points, size = {}, {}, bodies.size(one)
+    found, points = {}, {}
     shown = shapes(one)
     ends = one.assembly().solution([end for shape in shown for end in (shape.start, shape.end)])
     ends.solve(thetas.tolist())
@@ -281,21 +284,21 @@ def scene_seen(one, thetas):
             on = [point for point in frame if point != joints.get(link)]
             points.setdefault(f'm_{name}_link', []).extend(f'm_{prefix}{point}' for point in on)
             for point in on or [joints[link]]:
-                add(name, 'sphere', GREY, size / 40, spots[point], spots[point])
+                add(name, 'sphere', GREY, width, spots[point], spots[point])
             for start, end in one.linkage.bars if link != 'ground' else ():
                 if {start, end} <= set(frame):
-                    add(name, 'cylinder', colour(link), size / 80, spots[start], spots[end])
+                    add(name, 'cylinder', colour(link), width / 2, spots[start], spots[end])
         for shape, (start, end) in zip(shown, leg_ends.reshape(-1, 2, 2)):
             link, slide = shape.start.link, shape.slide.name
-            look = {GUIDE: ('box', GREY, size / 80), BLOCK: ('box', colour(slide), size / 20),
-                    BARREL: ('cylinder', colour(slide), size / 32),
-                    ROD: ('cylinder', BLUE, size / 80)}[shape.kind]
+            look = {GUIDE: ('box', GREY, width / 2), BLOCK: ('box', colour(slide), 2.0 * width),
+                    BARREL: ('cylinder', colour(slide), 1.25 * width),
+                    ROD: ('cylinder', BLUE, width / 2)}[shape.kind]
             drawn = (*look, in_space(one.pose, start), in_space(one.pose, end))
             if link != 'ground' or row(*drawn) not in found['m_ground_link']:
                 add(link if link == 'ground' else prefix + link, *drawn)
     if len(one.assembly().legs) > 1:
         hub = in_space(one.pose, places['m_left0_' + one.linkage.links[0].joint])
-        add(one.linkage.links[0].name, 'sphere', GREY, size / 40, hub, hub)
+        add(one.linkage.links[0].name, 'sphere', GREY, width, hub, hub)
     return found, points
 
 
@@ -306,28 +309,32 @@ def bare(name):
 @pytest.mark.parametrize('name', some_quick([*MACHINES, *OWN], QUICK))
 def test_three_formats_say_what_the_scene_has(name):
     one = simulated(name)
-    built = model([one], density=DENSITY)
+    width = WIDTHS.get(name)
+    robot = bodies.robot([one], 'world', width)
+    built, width = assembled(robot, DENSITY), width or bodies.size(one) / 40
     starts = np.array([np.clip(drive.start, *drive.sweep or (-math.inf, math.inf))
                        for drive in one.inputs.values()])
     positions, places = posed(one, starts)
-    tree = read_urdf(urdf.describe([one], 'world'), positions)
-    wanted, points = scene_seen(one, starts)
+    tree = read_urdf(urdf.write(robot), positions)
+    wanted, points = scene_seen(one, starts, width)
     check_seen(tree.seen, wanted)
     for link, names in points.items():
         assert sorted(bare(point) for point, (on, _) in tree.points.items() if on == link) == (
             sorted(names))
-    loops, simulator, at = read_mjcf(mjcf.write(built))
-    gazebo, robot, pins = read_sdf(sdf.write(built))
+    texts = mjcf.write(built), sdf.write(built)
+    # People read it: a line for each element.
+    assert all(text.count('\n') >= text.count('/>') + text.count('</') - 1 for text in texts)
+    (loops, simulator, at), (gazebo, root, pins) = read_mjcf(texts[0]), read_sdf(texts[1])
     loops.check(gazebo)
     ratios = gears(one, starts)
     check_mjcf(one, loops, simulator, starts, places, ratios)
-    check_sdf(one, gazebo, robot, pins, starts, ratios)
+    check_sdf(one, gazebo, root, pins, starts, ratios, width)
     # What runs in a yoke's slot hangs on the yoke, with a pin where the point in the slot is.
     for prefix in one.assembly().legs:
         for link, pin in one.linkage.yokes.items():
             slot = f'm_{prefix}{link}_slot'
             place = in_space(one.pose, places[f'm_{prefix}{pin}'])
-            wanted[f'{slot}_link'] = [row('sphere', GREY, bodies.size(one) / 40, place, place)]
+            wanted[f'{slot}_link'] = [row('sphere', GREY, width, place, place)]
             check_seen({'': loops.seen.pop(f'{slot}_link')}, {'': wanted[f'{slot}_link']})
             assert loops.joints.pop(slot) == (
                 'prismatic', f'm_{prefix}{link}_link', f'{slot}_link', [1.0, 0.0, 0.0])
@@ -382,7 +389,7 @@ def check_mjcf(one, loops, root, starts, places, ratios):
     assert len(root.find('actuator')) == len(published)
 
 
-def check_sdf(one, found, root, pins, starts, ratios):
+def check_sdf(one, found, root, pins, starts, ratios, width):
     """Check all that an SDF says but its links."""
     assert root.get('name') == 'm'
     closed, plugins = cuts(one, found), []
@@ -393,7 +400,7 @@ def check_sdf(one, found, root, pins, starts, ratios):
                           f'{cut}_closed': ('fixed', other, f'{cut}_pin', None)}
         assert pose[:3, :3] == pytest.approx(found.poses[link][:3, :3])
         assert pose[:3, 3] == pytest.approx(place)
-        wanted = [row('sphere', GREY, bodies.size(one) / 40, place, place)]
+        wanted = [row('sphere', GREY, width, place, place)]
         check_seen({cut: ball}, {cut: wanted})
         check_weight((mass, centre, about), weight_of(wanted, DENSITY))
         plugins.append(('detachable-joint', 'DetachableJoint', {
@@ -468,23 +475,6 @@ def test_a_hand_on_an_arm_is_the_same_in_three_formats(link):
     assert len(root.find('actuator')) == 2 and len(root.find('equality')) == 2
 
 
-@pytest.mark.parametrize('name', ['boom and arm', 'slotted_lever'])
-def test_all_is_as_thick_as_a_bar_asks_for(name):
-    one = simulated(name)
-
-    def shown(width=None):
-        robot = bodies.robot([one], 'world', width)
-        return {link: sorted(rows) for link, rows in read_sdf(
-            sdf.write(assembled(robot)))[0].seen.items()}
-
-    usual, size = shown(), bodies.size(one)
-    check_seen(shown(size / 40), usual)
-    check_seen(shown(0.3), {link: [[*first, thick * 0.3 / (size / 40), *ends]
-                                   for *first, thick, a, b, c, d, e, f in rows
-                                   for ends in [(a, b, c, d, e, f)]]
-                            for link, rows in usual.items()})
-
-
 def test_what_mujoco_finds_too_light_is_refused():
     one = simulated('slotted_lever')
     weights = read_sdf(sdf.write(model([one], density=1.0)))[0].weights
@@ -547,6 +537,17 @@ def test_coordinates_of_a_pose_give_the_pose(place, angles):
     assert all(map(math.isfinite, found)) and abs(found[4]) <= 0.5 * math.pi + 1e-12
 
 
+def test_names_with_signs_of_xml_come_back():
+    frame, joint = """x<y> & "it's" é""", "a<b>& c'd"
+    found = scene.read({'mechanisms': ['m'], 'm.type': 'four_bar', 'm.frame_id': frame,
+                        'm.joint_names': [f'AB="{joint}"']})
+    text = urdf.describe(found.machines.values(), 'world')
+    tree = read_urdf(text, {'m_crank': 0.0, joint: 0.0, 'm_QB': 0.0})
+    assert ElementTree.fromstring(text).find('link').get('name') == frame
+    assert tree.joints['m_ground_link_fixed'][1] == frame
+    assert tree.joints[joint][:3] == ('revolute', 'm_crank_link', 'm_AB_link')
+
+
 def printed(capsys, *arguments):
     assert main([*arguments]) == 0
     return capsys.readouterr().out
@@ -605,6 +606,16 @@ def test_the_command_says_what_is_wrong(capsys, arguments, complaint):
     result = capsys.readouterr()
     assert not result.out and result.err.startswith(f'urdf: {complaint}')
     assert result.err.count('\n') == 1
+
+
+def test_the_command_has_one_scene_and_says_what_reads_it(capsys, monkeypatch):
+    with pytest.raises(command.RequestError, match='^give the scene either as SCENE or with '
+                       '--ros-args, not both$'):
+        show(['config/jansen.yaml'], scene.read({}))
+    monkeypatch.setitem(sys.modules, 'yaml', None)
+    assert main(['config/jansen.yaml']) == 1
+    assert capsys.readouterr().err == (
+        'urdf: yaml is not installed: pip install pyyaml, or apt install python3-yaml\n')
 
 
 @pytest.mark.parametrize('angles, pitch, yaw', [

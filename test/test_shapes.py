@@ -98,7 +98,14 @@ def test_what_slides_is_where_its_joints_say(name):
     ('excavator', [BARREL, ROD] * 3), ('boxer engine', [GUIDE, BLOCK]),
     ('guide on a coupler', [GUIDE, BLOCK]), ('rack and its image', [GUIDE, BLOCK])])
 def test_a_cylinder_is_barrel_and_rod_and_a_block_has_a_guide(name, kinds):
-    assert [shape.kind for shape in shapes.shapes(MACHINES[name]())] == kinds
+    one = MACHINES[name]()
+    found = shapes.shapes(one)
+    assert [shape.kind for shape in found] == kinds
+    assert shapes.drawn(one, one.linkage.points) == [
+        shape for shape in found if shape.kind != ROD]
+    for end in 'joint', 'tip':
+        hidden = {getattr(shape.slide, end) for shape in found}
+        assert shapes.drawn(one, set(one.linkage.points) - hidden) == []
 
 
 BOOM = 'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right'

@@ -218,24 +218,6 @@ def test_bodies_weigh_what_mujoco_finds_their_shapes_to_weigh():
     assert wide.solids[1].weight.mass == pytest.approx(2.0 * built.solids[1].weight.mass)
 
 
-ARM = {'mechanisms': ['hand', 'arm'], 'arm.type': 'four_bar', 'hand.type': 'four_bar'}
-
-
-@pytest.mark.parametrize('link', ['AB_link', 'B', 'B_cut'])
-def test_a_hand_is_carried_by_its_arm(link):
-    found = scene.read({**ARM, 'hand.frame_id': f'arm_{link}', 'hand.pose': [1.0] + [0.0] * 5})
-    robot = MuJoCo(mjcf.write(model(found.machines.values())))
-    assert robot.open() < 1e-12
-    home = {'AB_link': 'arm_A'}.get(link, 'arm_B')
-    places = robot.places([home, 'hand_O'])
-    assert math.dist(*places.values()) == pytest.approx(1.0)
-    robot.put({f'arm_{name}': angle for name, angle in
-               found.machines['arm'].linkage.joint_angles(1.0).items()})
-    moved = robot.places([home, 'hand_O'])
-    assert math.dist(*moved.values()) == pytest.approx(1.0)
-    assert math.dist(places['hand_O'], moved['hand_O']) > 0.1
-
-
 def test_a_start_out_of_reach_is_refused():
     with pytest.raises(scene.SceneError, match='m.cylinder.start and .* must be where m can be'):
         model([OWN['excavator']()])
