@@ -471,6 +471,8 @@ def test_a_hand_on_an_arm_is_the_same_in_three_formats(link):
     loops.check(gazebo)
     loops.check(read_urdf(urdf.describe(machines, 'world'), positions))
     assert at == pytest.approx(positions)
+    # What is fixed to the world is not weighed.
+    assert gazebo.weights.keys() - loops.weights.keys() == {'arm_ground_link'}
     assert root.get('model') == robot.get('name') == 'linkages'
     assert len(root.find('actuator')) == 2 and len(root.find('equality')) == 2
 
@@ -618,6 +620,13 @@ def test_the_command_has_one_scene_and_says_what_reads_it(capsys, monkeypatch):
         'urdf: yaml is not installed: pip install pyyaml, or apt install python3-yaml\n')
 
 
+GROUP = {'Class': 'rviz_common/Group', 'Name': 'one', 'Displays': [
+    {'Class': 'rviz_default_plugins/MarkerArray', 'Topic': {'Value': '/one/markers'}}]}
+RVIZ = {'Visualization Manager': {
+    'Displays': [{'Class': 'Grid'}, GROUP, {**GROUP, 'Alpha': 1.0}, {'Class': 'Axes'}],
+    'Global Options': {}, 'Views': {'Current': {'Class': 'Orbit'}}}}
+
+
 @pytest.mark.parametrize('angles, pitch, yaw', [
     ((math.pi / 2, 0.0, 0.0), 0.15, -math.pi / 2), ((0.0, 0.0, 0.7), 1.56, -math.pi / 2),
     ((1.0, 0.0, 0.5), math.pi / 2 - 1.0, 0.5 - math.pi / 2),
@@ -628,14 +637,9 @@ def test_rviz_s_camera_sees_all_of_a_scene_square_to_the_first_plane(angles, pit
         'mechanisms': ['m', 'n'], 'm.type': 'jansen', 'm.pose': [1.0, 2.0, 3.0, *angles],
         'n.type': 'slider_crank', 'm.scale': 0.01, 'm.leg_pairs': 2, 'n.scale': 0.01,
         'n.pose': [-1.0, 0.5, 0.0, 0.3, 0.2, 0.1], 'n.crank.sweep': [0.5, 2.0]}).machines
-    group = {'Class': 'rviz_common/Group', 'Name': 'one', 'Displays': [
-        {'Class': 'rviz_default_plugins/MarkerArray', 'Topic': {'Value': '/one/markers'}}]}
-    config = {'Visualization Manager': {
-        'Displays': [{'Class': 'Grid'}, group, {**group, 'Alpha': 1.0}, {'Class': 'Axes'}],
-        'Global Options': {}, 'Views': {'Current': {'Class': 'Orbit'}}}}
-    before = copy.deepcopy(config)
-    manager = rviz.adapted(config, machines, 'base')['Visualization Manager']
-    assert config == before
+    before = copy.deepcopy(RVIZ)
+    manager = rviz.adapted(RVIZ, machines, 'base')['Visualization Manager']
+    assert RVIZ == before
     assert manager['Displays'] == [{'Class': 'Grid'}, *(
         {'Class': 'rviz_common/Group', 'Name': name, 'Displays': [
             {'Class': 'rviz_default_plugins/MarkerArray', 'Topic': {'Value': f'/{name}/markers'}}]}
@@ -658,3 +662,11 @@ def test_rviz_s_camera_sees_all_of_a_scene_square_to_the_first_plane(angles, pit
     assert view['Class'] == 'Orbit' and 0.0 <= view['Yaw'] < math.tau
     assert (view['Pitch'], math.remainder(view['Yaw'] - yaw, math.tau)) == (
         pytest.approx(pitch, abs=1e-6), pytest.approx(0.0, abs=1e-6))
+
+
+@pytest.mark.parametrize('scale, distance', [(1e-6, 1.0), (0.01, ANY)])
+def test_rviz_s_camera_sees_what_some_inputs_cannot_reach_and_what_is_tiny(scale, distance):
+    machines = scene.read({'mechanisms': ['m'], 'm.type': 'five_bar', 'm.scale': scale}).machines
+    view = rviz.adapted(RVIZ, machines, 'base')['Visualization Manager']['Views']['Current']
+    assert view['Distance'] == distance
+    assert all(map(math.isfinite, (view['Distance'], *view['Focal Point'].values())))
