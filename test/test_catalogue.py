@@ -119,6 +119,7 @@ def test_the_scene_without_names_is_of_the_size_of_a_table():
      r"tracer 'a' is not a joint; allowed: O, A; did you mean A\?$"),
     (lambda: mechanisms.create('custom', joints=['O ground 0 0', 'A crank O q'], r=1.0, Q=2.0),
      r'.*"A crank O q": dimension q has no value; given: r, Q; did you mean Q\?$'),
+    (lambda: mechanisms.design('custom', ['O ground 0 0', 'A crank O 1'], None, ['a b']), ".*'a b'"),
     (lambda: mechanisms.create('custom', joints=['O ground 0 0']),
      'a linkage needs a line that drives it: crank or cylinder or carriage$'),
     *((lambda wrong=wrong: mechanisms.create('custom', joints=wrong),

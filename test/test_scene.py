@@ -28,6 +28,7 @@ from linkage_ros.scene.joint_names import quoted_name
 from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
+from test_rods import G1
 
 CONFIG = os.path.join(os.path.dirname(__file__), '..', 'config')
 CELL = {'mechanisms': ['cell'], 'cell.type': 'peaucellier'}
@@ -576,6 +577,35 @@ def test_loads_are_forces_of_joints_and_moments_of_links():
         'C': (-15.0, 0.5), 'OB': -2.0, 'B': (0.0, 3.0)}
 
 
+def test_a_load_of_a_linkage_in_space_has_three_components():
+    given = {**OWN, 'own.type': 'rods', 'own.joints': G1}
+    own = scene.read({**given, 'own.loads': ['pitch=2']}).machines['own']
+    assert own.in_space is True and own.loads == {'pitch': 2.0}
+    assert scene.read({}).machines['jansen'].in_space is False
+    point = own.linkage.points[0]
+    loaded = scene.read({**given, 'own.loads': [f'{point}=1 -2 3']}).machines['own']
+    assert loaded.loads == {point: (1.0, -2.0, 3.0)}
+    with pytest.raises(scene.SceneError, match=(
+            f"own.loads: a force must have the components x, y, z, not '{point}=1 -2'")):
+        scene.read({**given, 'own.loads': [f'{point}=1 -2']})
+
+
+def test_of_many_intervals_the_first_eight_are_named():
+    arcs = [(i, i + 1 / 3) for i in range(10)]
+    words = [f'[{i}, {i + 1 / 3:.6g}]' for i in range(10)]
+    assert scene.in_words(arcs[:8]) == ' or '.join(words[:8])
+    assert scene.in_words(arcs) == ' or '.join([*words[:8], '2 more'])
+
+
+@pytest.mark.parametrize('sweep, speed', [(None, 2.0), ((-0.5, 0.25), -3.0), ((-0.5, 0.25), 0.1)])
+def test_a_motion_that_is_moved_in_time_goes_on_as_it_would_have(sweep, speed):
+    motion = Motion(speed, sweep, 0.1, since=7, period=3)
+    for before in (7, 10 ** 9, 123456789012):
+        later = motion.moved(before, before + 5 * 10 ** 9)
+        for more in (0, 1, 3 * 10 ** 8, 10 ** 10):
+            assert later.at(before + 5 * 10 ** 9 + more) == motion.at(before + more)
+
+
 @pytest.mark.parametrize('offset', ['', '+0.5', '-7', '+12.5', '-100', '+3.1', '-3.3'])
 def test_the_travel_of_a_published_joint_is_that_of_its_values(offset):
     for sign, ends in itertools.product((1, -1), ((-0.3, 0.2), (-2.0, 2.5), (7.0, 7.5))):
@@ -727,10 +757,21 @@ def test_crank_driver_reads_whatever_its_motions_depend_on():
     assert found >= {'scale', 'a', 'speed', 'ratio', 'offset'}
 
 
-@pytest.mark.parametrize('turns, value', [(0, 0.3), (2, 0.3), (-4, 0.3), (1, -1.0), (-1, -1.0)])
-def test_a_start_may_be_off_by_whole_periods_but_not_by_a_part_of_one(turns, value):
-    motion = Motion(1.0, (-1.0, 1.0), 0.3 + math.tau * turns, period=2)
-    assert motion.at(0)[0] == pytest.approx(value, abs=1e-14)
+@pytest.mark.parametrize('turns', [True, False])
+def test_a_start_is_put_where_it_is_in_the_sweep_or_at_the_nearer_end(turns):
+    """An angle may be off by whole periods, a length by nothing."""
+    rng, insides = np.random.default_rng(6), 0
+    for _ in range(200):
+        period, low, width = int(rng.integers(1, 4)), rng.uniform(-30.0, 30.0), rng.uniform(0.1, 5)
+        start, high = rng.uniform(-60.0, 60.0), low + width
+        same = start + math.tau * period * np.arange(-30, 31) * turns
+        inside = same[(low <= same) & (same <= high)]
+        ends = min((abs(each - end), end) for each in same for end in (low, high))[1]
+        expected = inside if len(inside) else [ends]
+        found, speed = Motion(0.5, (low, high), start, 9, turns, period).at(9)
+        assert min(abs(found - each) for each in expected) < 1e-12
+        insides += len(inside) > 0
+    assert (20 if turns else 5) < insides < 180
 
 
 @pytest.mark.parametrize('start, end', [(0.0, 0.3), (0.25, 1.0), (0.1234, 0.6789), (0.9, 1.6),

@@ -8,21 +8,23 @@
 # express or implied. See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Names and values in messages: short, on one line, with the likeliest meaning suggested."""
+"""Messages are one short line, and suggest what was meant or what to install."""
 
 import enum
 import string
 
 from hypothesis import given, settings, strategies as st
-from linkage_ros import palette
+from linkage_ros import palette, scene
+from linkage_ros.command import chosen, Parser, RequestError, run
+from linkage_ros.optional import INSTALL, needs
 from linkage_ros.words import elided, listed, meant, plain_text, quoted, sentence
 import numpy as np
 import pytest
 
-ANY = st.one_of(st.text(max_size=200), st.text('ab\n\x00\u2028\ud800', max_size=6000))
+ANY = st.one_of(st.text(max_size=200), st.text('ab\n\x00\u2028\ud800', max_size=300))
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(ANY, st.integers(10, 100))
 def test_an_elided_text_is_its_beginning_on_one_line(text, most):
     found = elided(text, most)
@@ -32,7 +34,7 @@ def test_an_elided_text_is_its_beginning_on_one_line(text, most):
     assert elided(text) == elided(text, 60)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(ANY)
 def test_a_sentence_is_one_line_of_words_of_limited_length(text):
     found = sentence(text)
@@ -105,3 +107,91 @@ def test_colours_are_hexadecimal_and_their_parts_are_of_255():
         'ORANGE', 'SKY', 'GREEN', 'BLUE', 'VERMILION', 'PURPLE')] == [
         (230, 159, 0), (86, 180, 233), (0, 158, 115), (0, 114, 178), (213, 94, 0),
         (204, 121, 167)]
+
+
+def a_command(error):
+    """Return a command that ends with an error."""
+    def work(arguments):
+        assert arguments == ['a', 'b']
+        raise error
+
+    return work
+
+
+@pytest.mark.parametrize('error, text', [
+    (RequestError('no\n such \x00'), r'no such \x00'),
+    (scene.SceneError('a must be b'), 'a must be b'),
+    (ImportError('x is not installed'), 'x is not installed'), (OSError('no device'), 'no device'),
+    (PermissionError(13, 'Permission denied', '/etc/x'), '/etc/x: Permission denied'),
+    (KeyboardInterrupt(), 'interrupted')])
+def test_a_command_that_fails_says_why_in_one_sentence(capsys, error, text):
+    assert run('draw', a_command(error), ['a', 'b']) == 1
+    assert capsys.readouterr() == ('', f'draw: {text}\n')
+
+
+def test_a_command_that_works_ends_with_0_and_a_mistake_is_not_hidden(capsys):
+    assert run('draw', print, ['done']) == 0
+    assert capsys.readouterr() == ("['done']\n", '')
+    with pytest.raises(ValueError):
+        run('draw', a_command(ValueError()), ['a', 'b'])
+
+
+def test_a_file_that_is_not_there_is_suggested_by_its_name(capsys, tmp_path, monkeypatch):
+    (tmp_path / 'scene.yaml').touch()
+    monkeypatch.chdir(tmp_path)
+    for folder, end in ((f'{tmp_path}/', '; did you mean scene.yaml?'), ('none/', ''),
+                        ('', '; did you mean scene.yaml?')):
+        run('draw', lambda arguments: open(*arguments), [f'{folder}scen.yaml'])
+        assert capsys.readouterr().err == (
+            f'draw: {folder}scen.yaml: No such file or directory{end}\n')
+    run('draw', a_command(PermissionError(13, 'no', 'scen.yaml')), ['a', 'b'])
+    assert capsys.readouterr().err == 'draw: scen.yaml: no\n'
+
+
+def test_a_parser_names_the_option_that_was_meant():
+    parser = Parser('draw')
+    parser.add_argument('file', nargs='?')
+    parser.add_argument('--scale')
+    assert parser.parse_args(['x', '--scale', '2']).scale == '2'
+    for arguments, text in (
+            (['x', '--skale'], 'unrecognized arguments: --skale; did you mean --scale?'),
+            (['x', '-q', 'y'], 'unrecognized arguments: -q y'),
+            (['--scale'], 'argument --scale: expected one argument')):
+        with pytest.raises(RequestError) as refused:
+            parser.parse_args(arguments)
+        assert str(refused.value) == text
+
+
+def test_machines_are_chosen_by_their_names_in_order():
+    machines = scene.read({'mechanisms': ['klann', 'watt']}).machines
+    assert [each.name for each in chosen(machines, [])] == ['klann', 'watt']
+    assert [each.name for each in chosen(machines, ['watt', 'klann'])] == ['watt', 'klann']
+    with pytest.raises(RequestError, match=r"^there is no mechanism 'wat'; allowed: klann, watt; "
+                       r'did you mean watt\?$'):
+        chosen(machines, ['klann', 'wat'])
+
+
+@pytest.mark.parametrize('package', INSTALL)
+def test_a_package_that_is_missing_or_broken_is_named_with_the_way_to_install_it(package):
+    names = {'yaml': 'pyyaml', 'PIL': 'pillow', 'llvmlite': "'llvmlite>=0.44'"}
+    with pytest.raises(ModuleNotFoundError, match=f'^{package} is not installed: ') as missing:
+        with needs(package):
+            raise ModuleNotFoundError(name=package)
+    way = ('run colcon build in the workspace' if package == 'linkage_interfaces'
+           else f'pip install {names.get(package, package)}')
+    assert way in str(missing.value) and missing.value.name == package
+    with pytest.raises(ImportError, match=rf'^{package} is installed but cannot be used '
+                       r'\(ValueError: x+\.\.\.\): ') as broken:
+        with needs(package):
+            raise ValueError('x' * 400)
+    assert way in str(broken.value) and broken.value.name == package
+    assert not isinstance(broken.value, ModuleNotFoundError)
+
+
+def test_a_package_that_another_one_needs_is_the_one_at_fault():
+    for error, fault in ((ModuleNotFoundError(name='PIL.Image'), 'PIL'),
+                         (ImportError(name='PIL._imaging'), 'PIL'),
+                         (ModuleNotFoundError(name='kiwi'), 'matplotlib')):
+        with pytest.raises(ImportError, match=f'^{fault} is installed but'):
+            with needs('matplotlib'):
+                raise error
