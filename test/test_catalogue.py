@@ -12,10 +12,9 @@
 
 from fractions import Fraction
 from functools import partial
+from importlib.util import module_from_spec, spec_from_file_location
 import math
 from pathlib import Path
-import shutil
-import subprocess
 import sys
 
 from linkage_ros import mechanisms
@@ -119,7 +118,8 @@ def test_the_scene_without_names_is_of_the_size_of_a_table():
      r"tracer 'a' is not a joint; allowed: O, A; did you mean A\?$"),
     (lambda: mechanisms.create('custom', joints=['O ground 0 0', 'A crank O q'], r=1.0, Q=2.0),
      r'.*"A crank O q": dimension q has no value; given: r, Q; did you mean Q\?$'),
-    (lambda: mechanisms.design('custom', ['O ground 0 0', 'A crank O 1'], None, ['a b']), ".*'a b'"),
+    (lambda: mechanisms.design('custom', ['O ground 0 0', 'A crank O 1'], None, ['a b']),
+     "'a b' cannot name a dimension"),
     (lambda: mechanisms.create('custom', joints=['O ground 0 0']),
      'a linkage needs a line that drives it: crank or cylinder or carriage$'),
     *((lambda wrong=wrong: mechanisms.create('custom', joints=wrong),
@@ -129,28 +129,32 @@ def test_the_scene_without_names_is_of_the_size_of_a_table():
      'joints must be lines of text, but line 2 is 7$'),
     (lambda: mechanisms.create('custom', joints=['O ground 0 0'] * 2001),
      'joints must be up to 2000 lines, got more$'),
-    (lambda: mechanisms.create('custom', joints=['O ground 0 0'] * 2000), '.*O'),
 ])
 def test_what_is_no_mechanism_is_refused_with_what_is_allowed(call, reason):
     with pytest.raises(ValueError, match='^' + reason):
         call()
 
 
-@pytest.mark.long
 @pytest.mark.parametrize('text, said', [
-    ('', "module 'linkage_ros.mechanisms.broken' has no attribute 'DESIGN'"),
+    ('', "module 'linkage_ros.other.broken' has no attribute 'DESIGN'"),
     ('DESIGN = Design()', "name 'Design' is not defined"),
     ('DESIGN = ', 'invalid syntax'),
     (Path(mechanisms.TYPES['watt'].__file__).read_text(),
      "must have the name of its design, 'watt'")])
-def test_a_file_that_is_no_mechanism_is_named(tmp_path, text, said):
-    package = tmp_path / 'linkage_ros'
-    shutil.copytree(Path(mechanisms.__file__).parents[1], package)
-    (package / 'mechanisms' / 'broken.py').write_text(text)
-    ended = subprocess.run([sys.executable, '-c', 'import linkage_ros.mechanisms'], cwd=tmp_path,
-                           capture_output=True, text=True, timeout=60)
-    error = ended.stderr.splitlines()[-1]
-    assert error.startswith('ImportError: linkage_ros.mechanisms.broken ') and said in error
+def test_a_file_that_is_no_mechanism_is_named(tmp_path, monkeypatch, text, said):
+    (tmp_path / 'broken.py').write_text(text)
+    spec = spec_from_file_location('linkage_ros.other', mechanisms.__file__,
+                                   submodule_search_locations=[*mechanisms.__path__, str(tmp_path)])
+    other = module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, spec.name, other)
+    try:
+        with pytest.raises(ImportError) as refused:
+            spec.loader.exec_module(other)
+    finally:
+        for name in [name for name in sys.modules if name.startswith(f'{spec.name}.')]:
+            del sys.modules[name]
+    assert str(refused.value).startswith('linkage_ros.other.broken ')
+    assert said in str(refused.value)
 
 
 @pytest.mark.sample(3)
