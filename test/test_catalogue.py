@@ -143,8 +143,9 @@ def test_what_is_no_mechanism_is_refused_with_what_is_allowed(call, reason):
      "must have the name of its design, 'watt'")])
 def test_a_file_that_is_no_mechanism_is_named(tmp_path, monkeypatch, text, said):
     (tmp_path / 'broken.py').write_text(text)
+    folders = [*mechanisms.__path__, str(tmp_path)]
     spec = spec_from_file_location('linkage_ros.other', mechanisms.__file__,
-                                   submodule_search_locations=[*mechanisms.__path__, str(tmp_path)])
+                                   submodule_search_locations=folders)
     other = module_from_spec(spec)
     monkeypatch.setitem(sys.modules, spec.name, other)
     try:
