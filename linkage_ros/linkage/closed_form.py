@@ -119,13 +119,16 @@ class ClosedForm:
             return nothing
         gaps = [math.remainder(value - now, turn)
                 for value, now, turn in zip(values, start, problem.periods)]
-        steps = math.ceil(max(abs(gap) / scale for gap, scale in zip(gaps, problem.scales)) / STEP)
+        steps = math.ceil(min(LARGE, max(abs(gap) / scale for gap, scale in zip(
+            gaps, problem.scales))) / STEP)
         # In all turns of its inputs a mode is the same; which of them goes on is the nearest.
         turns = math.prod(map(len, self._inverse.turns))
         at = {mode // turns: near for mode, place in self._modes_near(start, near)
               if max(abs(x - y) / size for x, y, size in zip(place, near, problem.sizes)) < ALIKE}
         found: List[Found] = []
         for k in range(1, max(steps, 1) + 1):
+            if not at:
+                return nothing
             aim = values if k == max(steps, 1) else tuple(
                 now + k / steps * gap for now, gap in zip(start, gaps))
             going, found = at, []
