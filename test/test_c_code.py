@@ -117,7 +117,7 @@ def values(machine, count):
 def test_poses_and_rates_are_those_of_python(library, machines, name, count=300):
     machine = machines[name]
     inputs = values(machine, count)
-    *found, whole = solved(library(name), machine, inputs).T
+    *found, whole = solved(library, machine, inputs).T
     poses = expected(machine, inputs).T
     fields = 2 * len(machine.linkage.points) + len(machine.linkage.joints)
     assert np.array_equal(whole.astype(bool), np.isfinite(poses[:fields]).all(axis=0))
@@ -148,7 +148,7 @@ def test_the_inverse_finds_the_nearest_input(library, machines, name, output):
     plain = re.sub(r'\W+', '_', output).strip('_')
     field = plain if '.' in output or '(' in output else (
         'angle_' if linkage.is_angle(output) else 'slide_') + plain
-    invert = library(name)[f'{name}_{drive.input.name}_for_{field}_']
+    invert = library[f'{name}_{drive.input.name}_for_{field}_']
     low, high = drive.reach[0]
     for theta in rng.uniform(low, high, 60):
         value = float(linkage.joint_angles(theta / unit, [output])[output]) * size
@@ -245,7 +245,7 @@ def test_single_precision_is_as_good_as_it_says(machines, tmp_path):
 @pytest.mark.parametrize('turns', [100, 10_000])
 def test_an_inverse_is_found_after_any_number_of_turns(library, machines, turns):
     whole, lever = math.tau * turns, machines['slotted_lever'].linkage
-    invert = library('slotted_lever').slotted_lever_crank_for_angle_lever_
+    invert = library.slotted_lever_crank_for_angle_lever_
     for value in np.linspace(-0.4, 0.4, 50):
         found = ctypes.c_double()
         assert invert((ctypes.c_double * 2)(value, whole), ctypes.byref(found)) == 1
