@@ -299,7 +299,6 @@ def test_a_singular_pose_is_said(library, machines):
     assert status == 2 and velocity == 0.0 and np.isfinite(position)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
     machine, rng = machines[name], np.random.default_rng(4)
@@ -307,7 +306,7 @@ def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
     memory = Memory(library, name, n)
     assert memory.send(0, expected(machine, states(machine, 1)[0])[0])[0] == 0
     values = [math.nan, math.inf, -math.inf, 1e308, -1e300, 5e-324, 0.0, 1.0, 1e-3, 3.0]
-    for _ in range(3000):
+    for _ in range(400):
         side, given = int(rng.integers(2)), rng.choice(values, (3, n))
         status, found = memory.send(side, *given)
         assert 0 <= status < 8 and np.isfinite(found).all()
