@@ -199,29 +199,43 @@ def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, machines):
     assert status == 0 and position == pytest.approx(joint)
 
 
-@pytest.mark.parametrize('joints_, given, names, side, pairs', [
+CHOICES = [
     # A geared joint counts turns both ways, and so does an encoder on it.
     (GEARED, {}, [], 1, [(value, -0.5 * value) for value in (1.0, -6.4, -7.0, -20.0)]),
     (GEARED, {}, [], 0, [(40.0, -80.0)]),
-    (GEARED, {'m.crank.measures': 'crank2'}, ['m_crank'], 0, [(-20.0, 10.0), (1e4, -5e3)]),
+    (GEARED, {'crank.measures': 'crank2'}, ['crank'], 0, [(-20.0, 10.0), (1e4, -5e3)]),
     # With an offset it is published within a turn, so that half a turn of the crank is free.
-    (GEARED, {'m.crank.start': 3.0, 'm.joint_names': ['crank2=wheel+0.5']}, ['wheel'], 1,
+    (GEARED, {'crank.start': 3.0, 'joint_names': ['crank2=wheel+0.5']}, ['wheel'], 1,
      [(1.0, math.pi - 0.25), (-3.0, 1.75), (-3.0 - math.tau, 1.75)]),
-    (GEARED, {'m.joint_names': ['crank2=wheel+0.5']}, ['wheel'], 0, [(-2.0, 4.5 - math.tau)]),
+    (GEARED, {'joint_names': ['crank2=wheel+0.5']}, ['wheel'], 0, [(-2.0, 4.5 - math.tau)]),
     # A command is answered within the sweep, though another answer is nearer.
-    (SLOT, {'m.crank.start': -0.2, 'm.crank.sweep': [-0.3, 2.0]}, ['m_A.y'], 1,
+    (SLOT, {'crank.start': -0.2, 'crank.sweep': [-0.3, 2.0]}, ['A.y'], 1,
      [(0.02 * math.cos(0.9), 0.9)]),
-    (SLOT, {'m.crank.start': 7.0, 'm.crank.sweep': [6.5, 8.0]}, ['m_A.y'], 1,
+    (SLOT, {'crank.start': 7.0, 'crank.sweep': [6.5, 8.0]}, ['A.y'], 1,
      [(0.02 * math.cos(0.9), math.tau + 0.9)]),
     # A measured link may be beyond it.
-    (SLOT, {'m.crank.measures': 'A.y', 'm.crank.start': 0.5, 'm.crank.sweep': [0.2, 0.8]},
-     ['m_crank'], 0, [(0.02 * math.cos(0.9), 0.9)])])
-def test_the_right_one_of_several_inputs_is_chosen(tmp_path, joints_, given, names, side, pairs):
-    machine, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': joints_, **given}
-                          ).machines.values()
-    library = compiled(tmp_path, [machine], *names)
+    (SLOT, {'crank.measures': 'A.y', 'crank.start': 0.5, 'crank.sweep': [0.2, 0.8]},
+     ['crank'], 0, [(0.02 * math.cos(0.9), 0.9)])]
+
+
+@pytest.fixture(scope='module')
+def choosing(tmp_path_factory):
+    """Return the library of CHOICES."""
+    code = ''
+    for i, (joints_, given, names, *_) in enumerate(CHOICES):
+        machine, = scene.read({'mechanisms': [f'm{i}'], **{f'm{i}.{key}': value for key, value in {
+            'type': 'custom', 'joints': joints_, **given}.items()}}).machines.values()
+        code += header.written(machine, joints=[
+            each if each == 'wheel' else f'm{i}_{each}' for each in names])
+        code += CALLER.format(name=f'm{i}')
+    return loaded(tmp_path_factory.mktemp('choosing'), code)
+
+
+@pytest.mark.parametrize('i', range(len(CHOICES)))
+def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
+    *_, side, pairs = CHOICES[i]
     for position, expected_ in pairs:
-        status, (found, *_) = Memory(library, 'm', 1).send(side, [position])
+        status, (found, *_) = Memory(choosing, f'm{i}', 1).send(side, [position])
         assert status == 0 and found[0] == pytest.approx(expected_, rel=1e-12)
 
 
@@ -456,15 +470,9 @@ def test_mechanisms_of_any_names_are_classes_of_their_own(tmp_path):
                     package / 'include', *ROS, package / 'all.cpp'], check=True)
 
 
-@pytest.mark.slow
-def test_any_dimensions_are_those_of_python(tmp_path):
-    given = {'mechanisms': [*mechanisms.TYPES, 'odd'],
-             **{f'{name}.type': name for name in mechanisms.TYPES}, 'odd.type': 'custom',
-             'odd.dimensions.u': 0.5, 'odd.dimensions.w': 0.7, 'odd.joints': [
-                 'O ground 0 0', 'H ground w 0', 'R carriage O along H 0.1*w 0.9*w',
-                 'Q ground 0 w', 'B dyad R Q u+w 0.9 left', 'C rigid R B u w left']}
-    machines = scene.read(given).machines
-    library = loaded(tmp_path, ''.join(header.opened(machine) + f"""
+def opened(folder, machines, *flags):
+    """Return functions that place the first joint of mechanisms with any dimensions."""
+    library = loaded(folder, ''.join(header.opened(machine) + f"""
 const char *{name}_placed(const double *dimension, const double *q, double *position)
 {{
     static {name}_linkage c;
@@ -474,12 +482,31 @@ const char *{name}_placed(const double *dimension, const double *q, double *posi
         position[0] = {name}_at(&c, q, 1, &p) ? p.position[1][0] : NAN;
     return wrong;
 }}
-""" for name, machine in machines.items()))
+""" for name, machine in machines.items()), *flags)
+    functions = {name: library[f'{name}_placed'] for name in machines}
+    for function in functions.values():
+        function.restype = ctypes.c_char_p
+    return functions
+
+
+ODD = {'mechanisms': ['odd'], 'odd.type': 'custom', 'odd.dimensions.u': 0.5,
+       'odd.dimensions.w': 0.7, 'odd.dimensions.s': 0.1, 'odd.joints': [
+           'O ground s 0', 'H ground w 0', 'R carriage O along H 0.1*w 0.9*w', 'Q ground 0 w',
+           'B dyad R Q u+w 0.9 left', 'C rigid R B u w left']}
+
+
+@pytest.mark.parametrize('types, count', [
+    (['slotted_lever', 'five_bar'], 20),
+    pytest.param(list(mechanisms.TYPES), 60, marks=pytest.mark.slow)], ids=['few', 'all'])
+def test_any_dimensions_are_those_of_python(tmp_path, types, count):
+    machines = scene.read({**ODD, 'mechanisms': [*types, 'odd'],
+                           **{f'{name}.type': name for name in types}}).machines
+    functions = opened(tmp_path, machines)
     rng, tried = np.random.default_rng(7), 0
     for name, machine in machines.items():
-        place, linkage = library[f'{name}_placed'], machine.linkage
-        place.restype, output = ctypes.c_char_p, joints(machine)[0].output
-        for _ in range(60):
+        place, linkage = functions[name], machine.linkage
+        output = joints(machine)[0].output
+        for _ in range(count):
             own = {key: value * rng.choice([1.0, 1.0, rng.uniform(0.4, 2.0), -1.0],
                                            p=[0.3, 0.2, 0.45, 0.05])
                    for key, value in linkage.dimensions.items()}
@@ -503,7 +530,37 @@ const char *{name}_placed(const double *dimension, const double *q, double *posi
             assert position.value == pytest.approx(
                 expected, abs=1e-14, rel=1e-14, nan_ok=True), (name, own)
             tried += math.isfinite(position.value)
-    assert tried > 200
+    assert tried > len(machines) * count / 5
+
+
+@pytest.mark.parametrize('own, said', [
+    ({}, None), ({'s': -0.2, 'u': -0.1}, None), ({'v': -1.0}, 'v must be a positive number [m]'),
+    ({'v': 0.0}, 'v must be a positive number [m]'), ({'s': math.nan}, 's must be a number [m]'),
+    ({'s': math.inf}, 's must be a number [m]'), ({'v': math.inf}, 'v must be a positive number'),
+    ({'v': 0.1}, 'the bar B-D must be longer than zero'),
+    ({'v': 5.0}, 'no triangle has the sides at C: each must be shorter than the others'),
+    ({'u': 0.9}, 'the carriage must have a way to go')])
+def test_why_dimensions_cannot_be_is_said(strict, own, said):
+    place, count = strict
+    given = {'s': 0.1, 'u': 0.5, 'w': 0.7, 'v': 0.6} | own
+    found = place((ctypes.c_double * 4)(*given.values()), (ctypes.c_double * 1)(1.0),
+                  ctypes.byref(ctypes.c_double()))
+    assert count == 4 and (found is None if said is None else found.decode().startswith(said))
+
+
+@pytest.fixture(scope='module')
+def strict(tmp_path_factory):
+    """Return the function of a mechanism of all that may be wrong with dimensions."""
+    machines = scene.read({
+        'mechanisms': ['picky'], 'picky.type': 'custom', 'picky.dimensions.s': 0.1,
+        'picky.dimensions.u': 0.5, 'picky.dimensions.v': 0.6, 'picky.dimensions.w': 0.7,
+        'picky.joints': [
+            'O ground s 0', 'H ground 3 0', 'R carriage O along H u w', 'Q ground 0 1',
+            'B dyad R Q 0.9 0.8 left', 'C rigid R B v 0.8 left',
+            'D dyad B C v-0.2 0.7 left']}).machines
+    machine, = machines.values()
+    return (opened(tmp_path_factory.mktemp('strict'), machines)['picky'],
+            len(machine.linkage.dimensions))
 
 
 @pytest.mark.long
