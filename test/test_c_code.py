@@ -66,7 +66,7 @@ int {name}_{input}_for_{field}_(const {number} *given, {number} *found)
     return {name}_{input}_for_{field}(given[0], given[1], found);
 }}
 """
-REACHED = "int {name}_reached_({number} x) {{ return {name}_reaches(x); }}\n"
+REACHED = 'int {name}_reached_({number} x) {{ return {name}_reaches(x); }}\n'
 
 
 def compiled(folder, machines, single=False):

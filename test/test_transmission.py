@@ -15,20 +15,23 @@ ros2_control is not on the Python package index: what is generated is compiled a
 of its interface, `test/ros2_control`, written for these tests. No controller manager is run.
 """
 
+import ast
 from contextlib import suppress
 import ctypes
 import math
 from pathlib import Path
 import re
+import runpy
 import shutil
 import subprocess
 import sys
 from xml.etree import ElementTree
 
-from c_libraries import COMPILER, loaded, ROS, STAND_IN, STRICT
+from c_libraries import loaded, ROS, STAND_IN, STRICT
 from linkage_ros import mechanisms, scene
-from linkage_ros.c_code import header, transmission
+from linkage_ros.c_code import command, header, transmission
 from linkage_ros.c_code.axes import actuators, joints
+from linkage_ros.c_code.package import package
 import numpy as np
 import pytest
 from sweeps import EXHAUSTIVE, few_and_many
@@ -45,9 +48,11 @@ SCENE = {
     'mechanisms': ['lever', 'leg', 'boom', 'lift', 'rocker', 'beast', 'rack', 'int'],
     'lever.type': 'slotted_lever', 'lever.scale': 1e-3, 'lever.crank.source': 'servo',
     'lever.crank.ratio': -0.5, 'lever.crank.offset': 0.3, 'lever.crank.sweep': [-0.4, 0.4],
-    'lever.joint_names': ['lever=-flap+0.1'], 'lever.loads': ['L=0 -9.81', 'lever=0.02', 'slide=0.03'],
+    'lever.joint_names': ['lever=-flap+0.1'],
+    'lever.loads': ['L=0 -9.81', 'lever=0.02', 'slide=0.03'],
     'leg.type': 'five_bar', 'leg.crank.start': 1.9, 'leg.crank2.start': 1.24,
-    'leg.crank.ratio': 0.1, 'leg.crank2.offset': -0.2, 'leg.loads': ['P=3 -20', 'AP=0.5', 'CP=-0.7'],
+    'leg.crank.ratio': 0.1, 'leg.crank2.offset': -0.2,
+    'leg.loads': ['P=3 -20', 'AP=0.5', 'CP=-0.7'],
     'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
         'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C rigid O B 2 1.4 left'],
     'boom.cylinder.ratio': 0.001, 'boom.loads': ['C=0 -100'],
@@ -429,10 +434,10 @@ def proved(package, name, compiler, count, *flags):
     code = (package / 'src' / f'{name}.hpp').read_text()
     class_, space = re.search(r'struct (\w+)Code', code)[1], re.search(r'namespace (\w+)', code)[1]
     program = package / f'proof_{name}'
-    subprocess.run([compiler, '-std=c++17', *STRICT, '-O2', *flags, f'-DNAME={name}', f'-DCLASS={class_}',
-                    f'-DNAMESPACE={space}', '-isystem', STAND_IN / 'include', '-I',
-                    package / 'src', '-I', package / 'include', STAND_IN / 'proof.cpp', '-o',
-                    program, *ROS], check=True)
+    subprocess.run([compiler, '-std=c++17', *STRICT, '-O2', *flags, f'-DNAME={name}',
+                    f'-DCLASS={class_}', f'-DNAMESPACE={space}', '-isystem',
+                    STAND_IN / 'include', '-I', package / 'src', '-I', package / 'include',
+                    STAND_IN / 'proof.cpp', '-o', program, *ROS], check=True)
     ended = subprocess.run([program, str(count)], capture_output=True, text=True)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     tried, good = map(int, re.search(r'(\d+) states, (\d+)', ended.stdout).groups())
@@ -570,12 +575,12 @@ def test_a_package_is_built_and_tests_itself(tmp_path):
         pytest.skip('ament_cmake is not installed')
     package = written(tmp_path, ROOT / 'examples' / 'leg.yaml', '--mechanism', 'knee', 'hip')
     build = tmp_path / 'build'
-    for command in (
+    for each in (
             ['cmake', '-S', package, '-B', build, f'-DCMAKE_INSTALL_PREFIX={tmp_path / "install"}',
              f'-DCMAKE_PREFIX_PATH={STAND_IN / "cmake"};{sys.prefix}',
              f'-DPython3_EXECUTABLE={sys.executable}'],
             ['cmake', '--build', build, '--target', 'install'], ['ctest', '--test-dir', build]):
-        ended = subprocess.run(command, capture_output=True, text=True)
+        ended = subprocess.run(each, capture_output=True, text=True)
         assert ended.returncode == 0, ended.stdout + ended.stderr
     assert '2 tests' in ended.stdout or 'out of 2' in ended.stdout
     assert (tmp_path / 'install' / 'lib' / 'libleg_transmissions.so').is_file()
@@ -590,30 +595,113 @@ find_package(leg_transmissions REQUIRED)
 add_library(component SHARED {STAND_IN / 'component.cpp'})
 target_link_libraries(component leg_transmissions::status)
 """)
-    for command in (
+    for each in (
             ['cmake', '-S', component, '-B', tmp_path / 'other', '-DCMAKE_PREFIX_PATH='
              f'{tmp_path / "install"};{STAND_IN / "cmake"};{sys.prefix}',
              f'-DPython3_EXECUTABLE={sys.executable}'], ['cmake', '--build', tmp_path / 'other']):
-        ended = subprocess.run(command, capture_output=True, text=True)
+        ended = subprocess.run(each, capture_output=True, text=True)
         assert ended.returncode == 0, ended.stdout + ended.stderr
 
 
-def test_a_package_names_what_the_scene_names(tmp_path):
-    package = written(tmp_path, ROOT / 'examples' / 'leg.yaml')
-    described = ElementTree.parse(package / 'plugins.xml')
-    plugins = {each.get('name') for each in described.iter('class')}
-    pasted = ElementTree.fromstring(
-        f'<all>{(package / "urdf" / "transmissions.xml").read_text()}</all>')
-    assert {each.findtext('plugin') for each in pasted} == plugins and len(plugins) == 3
-    assert [each.find('actuator').get('name') for each in pasted] == [
-        'abduction_motor', 'hip_motor', 'knee_motor']
-    assert [each.find('joint').get('name') for each in pasted] == ['hip_roll', 'hip_pitch', 'knee']
-    assert ElementTree.parse(package / 'package.xml').findtext('name') == package.name
-    assert len((package / 'README.md').read_text().splitlines()) <= 30
+# The actuators and joints of some mechanisms: names, and roles.
+AXES = {'leg': ({'leg_crank': 'crank', 'leg_crank2': 'crank2'},
+                {'leg_crank': 'crank', 'leg_AP': 'AP'}),
+        'int': ({SCENE['int.crank.source']: 'crank'}, {'while/1:x': 'QB'}),
+        'boom': ({'boom_cylinder': 'cylinder'}, {'boom_OB': 'OB'}),
+        'lever': ({'servo': 'crank'}, {'flap': 'lever'})}
+
+
+@pytest.fixture(scope='module')
+def files(machines):
+    """Return the files of a package by their paths, as texts."""
+    made = package('robot_1', 'a<b>*/.yaml', [(machines[name], []) for name in AXES])
+    return {str(path): text for path, text in made.items()}
+
+
+def test_a_package_is_complete(files):
+    assert {*files} == {
+        'CMakeLists.txt', 'package.xml', 'README.md', 'plugins.xml', 'urdf/transmissions.xml',
+        'src/plugins.cpp', 'src/transmission-of.hpp',
+        'include/linkage_ros/linkage_transmission.hpp', *(
+            path.format(name) for name in AXES for path in (
+                'src/{}.hpp', 'src/{}_linkage.h', 'test/test_{}.cpp'))}
+    assert not any(re.search(r'@\w+@', text) for text in files.values())
+    assert {'robot_1_plugins'} == {found for text in files.values() for found in re.findall(
+        r'\b(\w+_plugins)\b|$', text) if found}
+    described = ElementTree.fromstring(files['package.xml'])
+    assert described.findtext('name') == 'robot_1'
+    assert 'Linkages of a<b>* /.yaml as' in described.findtext('description')
+    assert {each.text for each in described.iter('depend')} == set(re.findall(
+        r'find_package\((?!ament)(\w+)', files['CMakeLists.txt']))
+    assert 'project(robot_1 ' in files['CMakeLists.txt']
+    assert f'foreach(mechanism {" ".join(AXES)})' in files['CMakeLists.txt']
+    rows = [line for line in files['README.md'].splitlines() if line.startswith('| `')]
+    assert rows[0] == '| `robot_1/Leg` | leg_crank, leg_crank2 | leg_crank, leg_AP | ' \
+        'a, b, c, d, f |'
+    assert rows[2] == '| `robot_1/Boom` | boom_cylinder | boom_OB | none |' and len(rows) == 4
+    assert '# robot_1\n' in files['README.md'] and len(files['README.md'].splitlines()) <= 30
+
+
+def test_a_package_names_what_the_scene_names(files, machines):
+    plugins = ElementTree.fromstring(files['plugins.xml'])
+    pasted = ElementTree.fromstring(f'<all>{files["urdf/transmissions.xml"]}</all>',
+                                    ElementTree.XMLParser(target=ElementTree.TreeBuilder(
+                                        insert_comments=True)))
+    assert plugins.get('path') == 'robot_1' and len(plugins) == len(AXES)
+    assert re.findall(r'CLASS\(\s*(.*?), transmission_interface::TransmissionLoader\)',
+                      files['src/plugins.cpp']) == [each.get('type') for each in plugins]
+    assert re.findall('#include "(.*).hpp"', files['src/plugins.cpp'])[:-1] == [*AXES]
+    for (name, axes), plugin, own in zip(
+            AXES.items(), plugins, (each for each in pasted if each.tag == 'transmission')):
+        dimensions, code = machines[name].linkage.dimensions, files[f'src/{name}.hpp']
+        assert own.get('name') == name and own.findtext('plugin') == plugin.get('name')
+        assert plugin.get('name') == f'robot_1/{name.title()}'
+        assert plugin.get('type') == f'robot_1_plugins::{name.title()}Loader'
+        assert plugin.get('base_class_type') == 'transmission_interface::TransmissionLoader'
+        if name != 'int':
+            assert plugin.findtext('description') == (
+                f'The linkage {name} between {", ".join(axes[0])} and {", ".join(axes[1])}.')
+        for side, named in zip(('actuator', 'joint'), axes):
+            assert [{**each.attrib} for each in own.iter(side)] == [
+                {'name': each, 'role': role} for each, role in named.items()]
+            row, = re.findall(rf'array<Axis, size> {side}s{{{{(.*)}}}};', code)
+            assert [tuple(ast.literal_eval(f'b"{text}"').decode() for text in each)
+                    for each in re.findall(r'{"(.*?)", "(.*?)"}', row)] == [*named.items()]
+        notes = [each.text for each in own if not isinstance(each.tag, str)]
+        assert notes == [f' <param name="{key}">{value!r}</param> for another length [m] '
+                         for key, value in [*dimensions.items()][:1]]
+        count, rows = re.search(r'array<Dimension, (\d+)> dimensions{(.*)};', code).groups()
+        assert {key: float(value) for key, value in re.findall(r'{"(\w+)", (.*?)}', rows)} == {
+            **dimensions} and int(count) == len(dimensions)
+        assert f'size = {len(axes[0])};' in code and f'{name}_set(&c' in code
+        proof = files[f'test/test_{name}.cpp']
+        assert f'#include "{name}.hpp"' in proof and f'dimensions[{len(dimensions)} + 1]' in proof
+        assert f'robot_1_plugins::{name.title()}Code;' in proof and f'  {name}_linkage c;' in proof
+        assert files[f'src/{name}_linkage.h'] == header.opened(machines[name])
+        assert f'be given: {", ".join(dimensions) or "none"}.' in files[f'src/{name}_linkage.h']
+
+
+OPTIONS = ["SCENE the scene's parameter file",
+           '--mechanism NAME [NAME ...] only these mechanisms of the scene',
+           '--joints JOINT [JOINT ...] what a controller commands, by its name in the scene']
+
+
+@pytest.mark.parametrize('main, about, options', [
+    (transmission.main, 'Write the mechanisms of a scene as a ROS 2 package of transmissions', [
+        '--out DIR output folder; its name is the name of the package']),
+    (command.main, 'Print the mechanisms of a scene as C99 headers, one after another', [
+        '--output OUTPUT [OUTPUT ...] an inverse for each of these: a link, A.x, distance(A,B)',
+        '--float float instead of double'])])
+def test_options_are_described(capsys, main, about, options):
+    with pytest.raises(SystemExit, match='0'):
+        main(['--help'])
+    printed = ' '.join(capsys.readouterr().out.split())
+    assert [text for text in (about, *OPTIONS, *options) if text not in printed] == []
 
 
 @pytest.mark.parametrize('arguments, said', [
-    (['--out', '{0}/My-Package'], "must end in the package's name"),
+    *((['--out', '{0}/' + name], f"single underscores, a letter first, not '{name}'")
+      for name in ('My-Package', 'a', '1a', 'a__b', 'a_', 'a' * 65)),
     (['--out', '{0}'], 'or one written by this command'), ([], 'required: --out'),
     (['--out', '{0}/legs', '--joints', 'elbow'], "no mechanism has a joint 'elbow'"),
     (['--out', '{0}/legs', '--joints', 'kneee'], 'did you mean knee?')])
@@ -628,8 +716,17 @@ def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, sai
     assert (folder / 'notes.txt').read_text() == 'keep'
 
 
-def test_a_package_is_written_again(tmp_path):
-    package = written(tmp_path, ROOT / 'config' / 'jansen.yaml')
-    before = {path: path.read_text() for path in package.rglob('*.*')}
-    assert written(tmp_path, ROOT / 'config' / 'jansen.yaml') == package
-    assert {path: path.read_text() for path in package.rglob('*.*')} == before
+def test_a_package_is_written_again(tmp_path, capsys, monkeypatch):
+    path, named = ROOT / 'examples' / 'leg.yaml', ['--mechanism', 'knee', 'hip']
+    made = written(tmp_path, path, *named, '--joints', 'knee')
+    assert capsys.readouterr().out == f'{made}: knee, hip; see README.md\n'
+    before = {file: file.read_text() for file in made.rglob('*') if file.is_file()}
+    chosen = scene.load(path).machines
+    assert before == {made / file: text for file, text in package(
+        'leg_transmissions', 'leg.yaml', [(chosen['knee'], ['knee']), (chosen['hip'], [])]
+        ).items()}
+    monkeypatch.setattr('sys.argv', ['', str(path), *named, '--out', str(made)])
+    monkeypatch.delitem(sys.modules, 'linkage_ros.c_code.transmission')
+    with pytest.raises(SystemExit, match='0'):
+        runpy.run_module('linkage_ros.c_code.transmission', run_name='__main__')
+    assert {file: file.read_text() for file in made.rglob('*') if file.is_file()} == before
