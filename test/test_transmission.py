@@ -334,12 +334,35 @@ def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
         assert ((found == UNWRITTEN) == is_missing[:, None]).all()
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize('type_, given, chosen', [
+    # A chain of links from the ground.
+    ('five_bar', {}, ['m_crank', 'm_AP']), ('slider_crank', {}, ['m_block']),
+    ('klann', {}, ['m_BD']),
+    # With preference for those that have a name, on the links before them.
+    ('klann', {'joint_names': ['CF=knee']}, ['knee']),
+    ('klann', {'joint_names': ['AD=knee']}, ['m_BD']),
+    ('klann', {'joint_names': ['EF=knee', 'CF=toe']}, ['toe']),
+    ('five_bar', {'joint_names': ['crank2=hip', 'CP=knee']}, ['hip', 'knee']),
+    ('five_bar', {'joint_names': ['CP=knee']}, ['m_crank', 'm_AP']),
+    ('five_bar', {'joint_names': ['AP=knee', 'CP=other']}, ['m_crank', 'knee']),
+    # What is published comes first.
+    ('klann', {'joint_names': ['EF=knee'], 'only_named': True}, ['knee']),
+    ('klann', {'joint_names': ['crank=motor'], 'only_named': True}, ['motor'])])
+def test_joints_by_default(type_, given, chosen):
+    machine = scene.read({'mechanisms': ['m'], 'm.type': type_, **{
+        f'm.{key}': value for key, value in given.items()}}).machines['m']
+    assert [each.name for each in joints(machine)] == chosen
+
+
+def test_joints_by_default_have_no_barrel():
+    machine = scene.load(ROOT / 'config' / 'excavator.yaml').machines['excavator']
+    assert [each.output for each in joints(machine)] == ['OB', 'AD', 'EG']
+
+
 def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
-    leg, boom = machines['leg'], machines['boom']
-    assert [each.name for each in joints(leg)] == ['leg_crank', 'leg_AP']
+    leg = machines['leg']
     assert [each.output for each in joints(leg, ['leg_P.x', 'leg_P.y'])] == ['P.x', 'P.y']
-    assert [each.name for each in joints(boom)] == ['boom_OB']
+    assert [each.name for each in joints(machines['boom'])] == ['boom_OB']
     assert [each.name for each in actuators(machines['lever'])] == ['servo']
     for names, said in ((['knee'], "leg has no joint 'knee'; allowed: leg_crank"),
                         (['leg_AP'], 'leg has 2 inputs'), (['leg_AP', 'leg_AP'], 'as many')):
@@ -347,7 +370,7 @@ def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
             joints(leg, names)
     library = compiled(tmp_path, [leg], 'leg_P.x', 'leg_P.y')
     memory = Memory(library, 'leg', 2)
-    for inputs in states(leg, 50):
+    for inputs in states(leg, 15):
         place = outputs(leg, inputs, ['P.x', 'P.y'])
         memory.send(0, expected(leg, inputs)[0])
         status, (position, *_) = memory.send(1, place)
