@@ -168,11 +168,12 @@ POSES = {'boom': ['O', 'P', 'B', 'C', 'angle_OB ground', 'angle_barrel ground', 
                       'angle_AP crank', 'angle_CP crank2']}
 
 
-@pytest.mark.parametrize('name, single, times, inputs', [
-    ('boom', True, ', times 2', 'cylinder [m]'),
-    ('five_bar', False, '', 'crank [rad], crank2 [rad]'),
-    ('slotted_lever', False, ', times 0.001', 'crank [rad]')])
-def test_a_header_says_what_it_has(machines, name, single, times, inputs):
+@pytest.mark.parametrize('name, single, times, inputs, joints', [
+    ('boom', True, ', times 2', 'cylinder [m]', 'boom_OB [rad]'),
+    *(('five_bar', single, '', 'crank [rad], crank2 [rad]',
+       'five_bar_crank [rad], five_bar_AP [rad]') for single in (False, True)),
+    ('slotted_lever', False, ', times 0.001', 'crank [rad]', 'slotted_lever_lever [rad]')])
+def test_a_header_says_what_it_has(machines, name, single, times, inputs, joints):
     machine, number = machines[name], 'float' if single else 'double'
     text = header.written(machine, OUTPUTS.get(name, ())[:1], single)
     head, code = text.split('*/')[0], re.sub(
@@ -182,6 +183,8 @@ def test_a_header_says_what_it_has(machines, name, single, times, inputs):
     assert {key: float(value) for key, value in (
         each.split(' = ') for each in lengths[2].split(', ') if each)} == pytest.approx(
             dict(machine.linkage.dimensions), rel=1e-8)
+    actuators = ', '.join(f'{name}_{each}' for each in inputs.split(', '))
+    assert f'/* Actuators: {actuators}; joints: {joints}. */' in text
     assert f' * Input: {inputs}. Angles' in head and f'#ifndef {name.upper()}_LINKAGE_H\n' in text
     assert int(re.search('takes at most (.*) poses', head)[1]) == max(
         map(int, re.findall(r'(\d+) poses at most', text)))
@@ -190,7 +193,10 @@ def test_a_header_says_what_it_has(machines, name, single, times, inputs):
         (field.split()[0], f'/* to {field.split()[1]} [rad] */') if ' ' in field else (
             field if '_' in field else f'{field}_x, {field}_y', '/* [m] */')
         for field in POSES[name])]
-    # All numbers are of one kind.
+    # All numbers are of one kind; how good it is was measured for one input.
+    assert ('float: joints are off by' in head) == (single and name != 'five_bar')
+    assert ('float: how far joints are off was not measured' in head) == (
+        single and name == 'five_bar')
     literals = re.findall(r'(?<![\w.])(?:\d+\.\d*(?:e[-+]\d+)?|\d+e[-+]\d+)(f?)', code)
     assert set(literals) == {'f' * single} and ('DBL_MANT_DIG' in code) != single
     assert f'{"double" if single else "float"} ' not in code

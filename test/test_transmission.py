@@ -198,6 +198,11 @@ def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, machines):
     _, (good, *_) = memory.send(1, [inside], [1.0])
     status, (position, velocity, _) = memory.send(1, [outside], [1.0])
     assert status == 1 and position == good and velocity == 0.0
+    # The ends are in it.
+    for end in (-0.4, 0.4):
+        actuator, _, joint, _ = expected(machine, [end])
+        status, (position, *_) = memory.send(1, joint, [1.0])
+        assert status == 0 and position == pytest.approx(actuator, abs=1e-12)
     # What is measured there is what it is.
     actuator, _, joint, _ = expected(machine, [0.45])
     status, (position, *_) = memory.send(0, actuator)
@@ -661,6 +666,8 @@ def test_a_package_is_complete(files):
     rows = [line for line in files['README.md'].splitlines() if line.startswith('| `')]
     assert rows[0] == '| `robot_1/Leg` | leg_crank, leg_crank2 | leg_crank, leg_AP | ' \
         'a, b, c, d, f |'
+    assert rows[1] == (
+        '| `robot_1/Int` | a* / "b"/ ? ?/?%s ? | while/1:x | a, b, c, d, p |')
     assert rows[2] == '| `robot_1/Boom` | boom_cylinder | boom_OB | none |' and len(rows) == 4
     assert '# robot_1\n' in files['README.md'] and len(files['README.md'].splitlines()) <= 30
 
