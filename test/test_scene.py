@@ -672,6 +672,14 @@ def test_an_angle_is_in_a_turn_or_in_the_sweep():
     assert all(0.0 <= motion.at(0)[0] < math.tau for motion in turning)
 
 
+@pytest.mark.parametrize('low, high', [(0.0, 5e-324), (1e-200, 2e-200), (0.5, 0.5)])
+def test_a_sweep_shorter_than_a_step_stands_still(low, high):
+    motion = Motion(1.0, (low, high), 0.3)
+    for now in (0, 1, 10 ** 18):
+        assert low <= motion.at(now)[0] <= high or motion.at(now)[0] == 0.0
+        assert motion.changed(-1.0, (low, high), now).at(now)[0] == motion.at(now)[0]
+
+
 def test_a_start_outside_the_sweep_is_moved_to_its_nearer_end():
     assert Motion(1.0, (-0.5, 0.5), 2.0).at(0) == (0.5, -1.0)
     assert Motion(1.0, (-0.5, 0.5), math.tau - 0.1).at(0)[0] == pytest.approx(-0.1)
