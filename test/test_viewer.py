@@ -13,7 +13,10 @@
 import asyncio
 import cmath
 import contextlib
+import csv
+import dataclasses
 import gc
+import io
 import itertools
 import json
 import math
@@ -31,6 +34,7 @@ import time
 
 import numpy as np
 import pytest
+import yaml
 
 aiohttp = pytest.importorskip('aiohttp')
 pytest.importorskip('rclpy')
@@ -45,6 +49,7 @@ from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
+from linkage_ros.scene import slider  # noqa: E402
 from linkage_ros.scene.writing import without_defaults  # noqa: E402
 from linkage_ros.web import (  # noqa: E402
     curves,
@@ -273,21 +278,24 @@ def test_what_is_drawn_is_where_the_catalogue_says(show):
     assert len(curve) > 100 and away.max() < 0.01 * np.ptp(feet[:, 0])
 
 
-def test_every_slider_has_a_value_a_range_and_a_meaning(lever):
+def test_every_setting_is_described_as_the_scene_has_it(lever):
     async def look(url):
         async with Page(url) as page:
             return await page.cast('/lever', '/drop')
 
-    cast = asyncio.run(look(lever.viewer.url))
-    settings = {one['name']: one for one in cast['/lever']['settings']}
-    assert {'crank.speed', 'crank.start', 'dimensions.a', 'dimensions.b', 'dimensions.e'} <= set(
-        settings)
-    assert settings['dimensions.a']['value'] == 80.0
-    assert 0.0 < settings['dimensions.a']['low'] < 80.0 < settings['dimensions.a']['high']
-    assert (settings['crank.speed']['low'], settings['crank.speed']['high']) == (-100.0, 100.0)
-    assert '[rad/s]' in settings['crank.speed']['meaning']
-    assert settings['type'] == {**settings['type'], 'value': 'slotted_lever', 'fixed': True}
-    assert settings['points']['value'] == ['O', 'Q', 'A', 'L']
+    cast, whole = asyncio.run(look(lever.viewer.url)), scene.read(LEVER)
+    assert {key: (one['key'], one['name']) for key, one in cast.items()} == {
+        '/lever': ('/lever', 'lever'), '/drop': ('/drop', 'drop')}
+    shown = {f'{one["name"]}.{setting["name"]}': setting
+             for one in cast.values() for setting in one['settings']}
+    assert shown == {one.name: {
+        'name': one.name.partition('.')[2], 'value': value, 'kind': one.field.kind,
+        'meaning': one.field.meaning, 'allowed': one.field.allowed,
+        'fixed': one.field.read_only, 'low': low, 'high': high, 'step': step}
+        for one in whole.parameters if '.' in one.name
+        for value in [list(one.value) if isinstance(one.value, tuple) else one.value]
+        for ends in [slider.ends(whole, one)]
+        for low, high, step in [(*ends, int(one.field.kind == 'integer')) if ends else [None] * 3]}
 
 
 def test_a_slider_sets_the_node_that_owns_the_parameter(show):
@@ -514,11 +522,91 @@ def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(lever):
             await page.cast('/lever', '/drop')
             return await page.ask('tune', '/lever'), await page.ask('tune', '/drop')
 
-    lever_, drop = asyncio.run(use(lever.viewer.url))
-    low, high = lever_['travel']['dimensions.a']
-    assert low < 80.0 < high and lever_['fixed'] == ['O', 'Q']
-    assert lever_['bars']['dimensions.a'] == [['O', 'A']]
-    assert all(bar in drop['bars']['dimensions.a'] for bar in (['O', 'A'], ['C', 'B']))
+    whole = scene.read(LEVER)
+    for found, name, fixed, sides, bars in zip(
+            asyncio.run(use(lever.viewer.url)), ('lever', 'drop'), ('OQ', 'OC'),
+            ({'L': ['out', 'in']}, {}),
+            ({'a': ['OA'], 'b': ['OQ', 'QL'], 'e': []}, {'a': 'OC OA AB AP BP CB'.split()})):
+        assert {**found, 'id': 0} == {
+            'op': 'answer', 'id': 0, 'reason': '', 'fixed': list(fixed), 'sides': sides,
+            'bars': {f'dimensions.{key}': [list(pair) for pair in pairs]
+                     for key, pairs in bars.items()},
+            'travel': {one.name.partition('.')[2]: list(slider.ends(whole, one))
+                       for one in whole.parameters
+                       if one.name.startswith(f'{name}.dimensions.')}}
+
+
+def test_a_saved_file_has_what_defines_the_scene_and_what_is_changed(lever):
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            return (await page.ask('save', '/drop', values={'crank.speed': 2.5}))['text']
+
+    defined = {'lever.scale': 1.0, 'drop.scale': 1.0, **{
+        one.name: one.value for one in scene.read(LEVER).parameters if '.dimensions.' in one.name}}
+    assert yaml.safe_load(asyncio.run(use(lever.viewer.url))) == {'/**': {'ros__parameters': {
+        **LEVER, **defined, 'drop.crank.speed': 2.5}}}
+
+
+def test_what_is_exported_is_the_mechanism_as_it_is(lever):
+    async def use(url):
+        async with Page(url) as page:
+            await page.cast('/lever', '/drop')
+            return [(await page.ask('export', '/lever', form=form))['text']
+                    for form in ('csv', 'urdf', 'c')]
+
+    machine = scene.read(LEVER).machines['lever']
+    table, *others = asyncio.run(use(lever.viewer.url))
+    assert table == curves.exported(machine, [0.0], 'csv', '')
+    assert others == [urdf.describe([machine], 'world'), header.written(machine)]
+
+
+@pytest.mark.parametrize('name', ['excavator', 'jansen', 'peaucellier', 'scissor_lift'])
+def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
+    machine, = scene.load(str(ROOT / 'config' / f'{name}.yaml')).machines.values()
+    present = [1.02 * drive.start for drive in machine.inputs.values()]
+    heads, *rows = csv.reader(io.StringIO(curves.exported(machine, present, 'csv', 'world')))
+    table, linkage = np.array(rows, float).T, machine.linkage
+    input_, *others = linkage.inputs
+    outputs = {joint: 'rad' if linkage.is_angle(joint) else 'm' for joint in linkage.joints
+               if joint not in machine.inputs}
+    outputs.update((f'{point}.{axis}', 'm') for point in linkage.points
+                   if point not in linkage.grounded for axis in 'xy')
+    ratio = {'mm': '1', 'radrad': '1', 'radm': 'N·m/N', 'mrad': 'N/(N·m)'}
+    angles = {head.split()[2] for head in heads if head.startswith('transmission')}
+    assert heads == [f'{input_.name} [{input_.unit}]', *(
+        f'{kind} {output} [{unit}{per}]'
+        for kind, per in (('position', ''), ('velocity', '/s'), ('acceleration', '/s²'))
+        for output, unit in outputs.items()), *(
+        f'transmission angle {joint} [rad]' for joint in linkage.transmission_angles(
+            poses.theta_of([drive.start / machine.scale_of(key)
+                            for key, drive in machine.inputs.items()]))), *(
+        f'force ratio {output} [{ratio[unit + input_.unit]}]'
+        for output, unit in outputs.items())]
+    # Rounded, an end is outside the reach.
+    x = table[0, 1:-1]
+    own = [x / machine.scale_of(input_.name), *(
+        value / machine.scale_of(other.name) for other, value in zip(others, present[1:]))]
+    columns = dict(zip(heads, table[:, 1:-1]))
+    truth = linkage.joint_angles(poses.theta_of(own), list(outputs))
+    sharp = linkage.transmission_angles(poses.theta_of(own))
+    for joint in angles:
+        np.testing.assert_allclose(columns[f'transmission angle {joint} [rad]'], sharp[joint],
+                                   rtol=1e-9, atol=1e-9)
+    for output, unit in outputs.items():
+        position, speed, change = (columns[f'{kind} {output} [{unit}{per}]'] for kind, per in (
+            ('position', ''), ('velocity', '/s'), ('acceleration', '/s²')))
+        size = machine.scale_of(output)
+        np.testing.assert_allclose(position, size * truth[output], rtol=1e-9, atol=1e-9 * size)
+        inner = slice(60, -60)
+        for slope, values in ((speed, np.unwrap(position) if unit == 'rad' else position),
+                              (change, speed)):
+            np.testing.assert_allclose(np.gradient(values, x)[inner], slope[inner],
+                                       rtol=1e-2, atol=1e-9 * max(1.0, np.abs(position).max())
+                                       + 1e-2 * np.abs(slope[inner]).max())
+        known = np.isfinite(speed) & (np.abs(speed) > 1e-9 * np.abs(position).max())
+        force = columns[f'force ratio {output} [{ratio[unit + input_.unit]}]']
+        np.testing.assert_allclose(force[known] * speed[known], 1.0, rtol=1e-9)
 
 
 def test_the_page_is_sent_what_an_output_does_over_a_turn(lever):
@@ -546,29 +634,6 @@ def test_the_page_is_sent_what_an_output_does_over_a_turn(lever):
     # A kite lies flat at 0 and at pi: there it may be assembled in two ways.
     assert about_drop[0]['dead'] == [-math.pi, 0.0] and about_drop[0]['output'] == 'B'
     assert about_drop[0]['y'][180] in (0.0, math.pi)
-
-
-@pytest.mark.parametrize('name, output', [
-    ('excavator', 'T.y'), ('scissor_lift', 'P.y'), ('jansen', 'EF'), ('peaucellier', 'PB')])
-def test_velocity_and_acceleration_are_the_slopes_of_the_curves(name, output):
-    machine, = scene.load(str(ROOT / 'config' / f'{name}.yaml')).machines.values()
-    present = [drive.start for drive in machine.inputs.values()]
-    position, velocity, acceleration, _, force = (
-        curves.curve(machine, present, kind, None if kind == 'transmission angle' else output)
-        for kind in curves.KINDS)
-    x, inner = velocity['x'], slice(40, -40)
-    for curve, slope in ((position, velocity), (velocity, acceleration)):
-        slope = np.array(slope['y'], float)[inner]
-        y = np.array(curve['y'], float)[np.isin(curve['x'], x)]
-        np.testing.assert_allclose(np.gradient(y, x)[inner], slope,
-                                   atol=2e-3 * np.abs(slope).max())
-    if len(present) == 1:
-        own, unit = machine.scale_of(position['input']), machine.scale_of(output)
-        ratio = np.array(force['y'], float)
-        effort = machine.linkage.output_effort(output, np.array(force['x']) / own, own) / unit
-        known = np.isfinite(ratio) & np.isin(force['x'], x[inner])
-        assert known.sum() > 250
-        np.testing.assert_allclose(ratio[known], effort[known], rtol=1e-12)
 
 
 @pytest.mark.slow
@@ -637,6 +702,8 @@ def test_arrows_are_how_the_joints_move_in_the_picture(name, kind):
 
     found, h = poses.arrows(machine, starts, kind, speeds), 1e-4
     before, now, after = map(places, (-h, 0.0, h))
+    assert found.keys() == {'unit', 'at'}
+    assert found['unit'] == {'velocity': 'm/s', 'acceleration': 'm/s²'}[kind]
     assert set(found['at']) == set(machine.linkage.points) - set(machine.linkage.grounded)
     for joint, arrow in found['at'].items():
         slope = ((after[joint] - before[joint]) / (2.0 * h) if kind == 'velocity' else
@@ -662,6 +729,13 @@ def test_arrows_of_force_are_the_loads_and_what_holds_them():
     found = poses.arrows(machine, [0.5], 'force', {})
     effort, = machine.efforts([0.5])
     assert found == {'unit': 'N', 'at': {'L': (3.0, -4.0)}, 'efforts': {'crank': [effort, 'N·m']}}
+    digger, = scene.load(str(ROOT / 'config' / 'excavator.yaml')).machines.values()
+    present = [drive.start for drive in digger.inputs.values()]
+    assert poses.arrows(digger, present, 'force', {}) == {'unit': 'N', 'at': {}, 'efforts': {}}
+    loaded = dataclasses.replace(digger, loads={'T': (0.0, -9.0)})
+    assert poses.arrows(loaded, present, 'force', {}) == {
+        'unit': 'N', 'at': {'T': (0.0, -9.0)}, 'efforts': {
+            name: [effort, 'N'] for name, effort in zip(digger.inputs, loaded.efforts(present))}}
 
 
 @pytest.mark.parametrize('name, output', [
@@ -1239,13 +1313,26 @@ def walker(step, legs=2, frame='world', width=1.0):
 FILLED = walker(9) + bytes(3)
 
 
+def recorded(number, marker):
+    """Return the record of a marker's points."""
+    return struct.pack('<II', number, len(marker.points)) + np.array(
+        [(p.x, p.y, p.z) for p in marker.points], '<f4').tobytes()
+
+
 def unpacked(text):
     """Return the points of a message as they are drawn."""
     message = deserialize_message(text, MarkerArray)
-    return b''.join(
-        struct.pack('<II', marker.id, len(marker.points)) + np.array(
-            [(p.x, p.y, p.z) for p in marker.points], '<f4').tobytes()
-        for marker in message.markers)
+    return b''.join(recorded(marker.id, marker) for marker in message.markers)
+
+
+def look_of(marker):
+    """Return how a marker looks, part by part."""
+    place, turn, colour = marker.pose.position, marker.pose.orientation, marker.color
+    return {'mechanism': '/leg', 'frame': marker.header.frame_id, 'width': marker.scale.x,
+            'kind': {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'strip', Marker.SPHERE_LIST:
+                     'joints', Marker.TRIANGLE_LIST: 'triangles'}[marker.type],
+            'pose': [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w],
+            'colour': [colour.r, colour.g, colour.b, colour.a]}
 
 
 def feed_of_a_leg():
@@ -1255,14 +1342,28 @@ def feed_of_a_leg():
 
 def test_what_is_read_without_unpacking_is_what_unpacking_gives():
     topic = feed_of_a_leg()
-    looks = []
     for text in (walker(1), walker(2), walker(3), walker(4, legs=1), walker(5),
                  walker(6, width=2.0), walker(7, frame='earth'), walker(8), FILLED, FILLED):
         topic.newest = text
-        look, records = topic.drawn()
+        looks, records = topic.drawn()
         assert records == unpacked(text)
-        looks.append(look[0]['width'])
-    assert looks[5] == 2.0 * looks[0] == 2.0 * looks[7]
+        assert looks == {marker.id: look_of(marker) for marker in deserialize_message(
+            text, MarkerArray).markers}
+
+
+def test_of_a_message_what_is_deleted_or_no_line_joint_or_triangle_is_not_drawn():
+    topic = Feed('/leg/markers', '/leg', MarkerArray, lambda i: 7 + 2 * i, lambda *_: None)
+    message = deserialize_message(walker(1), MarkerArray)
+    bars, joints = message.markers
+    message.markers = [
+        Marker(type=Marker.LINE_LIST, action=Marker.DELETE), joints, Marker(type=Marker.CUBE), bars,
+        Marker(type=Marker.TRIANGLE_LIST), Marker(type=Marker.LINE_STRIP, points=bars.points)]
+    topic.newest = serialize_message(message)
+    shown = dict(zip((7, 9, 11, 13), [joints, bars, *message.markers[4:]]))
+    looks, records = topic.drawn()
+    assert looks == {number: look_of(marker) for number, marker in shown.items()}
+    assert [look['kind'] for look in looks.values()] == ['joints', 'lines', 'triangles', 'strip']
+    assert records == b''.join(recorded(*one) for one in shown.items())
 
 
 def test_from_its_second_message_on_a_topic_is_not_unpacked_whatever_else_is_in_it(monkeypatch):
