@@ -364,7 +364,7 @@ LOOKS = {
 @pytest.mark.parametrize('name, given, size, ids', [
     ('walker', WALKER, 0.01 * 65.7, {0, 1, 2, 5, 7, 8}),
     ('lever', {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}, 270.0,
-     {0, 1, 2, 3, 4, 5, 8}), ('boom', None, 2.2, {0, 1, 6, 7, 8})])
+     {0, 1, 2, 3, 4, 5, 8}), ('boom', None, 3.2, {0, 1, 6, 7, 8})])
 def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, given, size, ids):
     pose, given = [1.0, -2.0, 3.0, 0.4, -0.3, 2.5], given or BOOM
     node = graph.start(Kinematics, {
