@@ -553,6 +553,14 @@ def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(lever):
                        if one.name.startswith(f'{name}.dimensions.')}}
 
 
+def test_a_bar_follows_a_dimension_that_can_only_become_shorter():
+    # Longer, A, B and C are no triangle.
+    bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'custom', 'bar.dimensions.p': 4.0,
+                      'bar.joints': ['O ground 0 0', 'Q ground 4 0', 'A crank O 1',
+                                     'B dyad A Q 3 3 left', 'C rigid A B p 1 left']})
+    assert poses.tunable(bar, 'bar')['bars'] == {'dimensions.p': [('A', 'C')]}
+
+
 def test_a_saved_file_has_what_defines_the_scene_and_what_is_changed(lever):
     async def use(url):
         async with Page(url) as page:
