@@ -425,8 +425,8 @@ def test_a_trajectory_of_a_foot_and_a_bucket(graph, several_plan):
 
 REFUSED = [
     (['flap'], [([0.0], []), ([4.0], [])], r'point 1: flap cannot be 4: the lever reaches \[.*'),
-    (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions, and as many velocities or none, '
-     'not 2 and 0'),
+    (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions, and as many velocities or '
+     'none, not 2 and 0'),
     (['flap'], [([0.0], [1.0, 2.0])], 'point 0 must have 1 positions, and as many velocities or '
      'none, not 1 and 2'),
     (['flap', 'wing'], [([0.0, 0.0], [])], 'no output is called wing; an output is called '

@@ -352,7 +352,7 @@ def test_only_wanted_joints_are_drawn_in_the_order_they_are_wanted(graph):
     assert [marker.type for marker in bench.links_and_joints_at(0.4)] == [Marker.SPHERE_LIST]
 
 
-# Type, colour, width as a part of the longest bar, and the layer above the plane, by the marker's id.
+# Type, colour, width as a part of the longest bar, and layer above the plane, by the marker's id.
 LOOKS = {
     0: (Marker.LINE_LIST, 'BAR', 40, 0), 1: (Marker.SPHERE_LIST, 'JOINT', 20, 0),
     2: (Marker.LINE_STRIP, 'LOCUS', 100, -3), 3: (Marker.LINE_LIST, 'SLOT', 14, 1),

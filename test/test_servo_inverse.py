@@ -13,7 +13,6 @@
 import array
 import cmath
 import math
-import re
 import threading
 from types import SimpleNamespace
 
@@ -100,8 +99,8 @@ def test_one_angle_out_of_reach_does_not_spoil_the_others(call):
 
 
 LEVERS, MECHANISMS = 'slotted_lever', 'water_drop, jansen, peaucellier, slotted_lever'
-OUTPUTS = ('; allowed: distance(A,B) and angle(A,B) of two joints, crank, BC, AC, BE, AE, EF, DF, O.x, '
-           'O.y, B.x, B.y, A.x, A.y, ... (23)')
+OUTPUTS = ('; allowed: distance(A,B) and angle(A,B) of two joints, crank, BC, AC, BE, AE, EF, DF, '
+           'O.x, O.y, B.x, B.y, A.x, A.y, ... (23)')
 FAR = 'servo_near must be finite and within 1e+06 rad of zero'
 ONE = 'mechanism may be empty only if the scene has a single'
 
@@ -119,8 +118,8 @@ def cut(letter):
         *(({'servo_near': [bad]}, FAR) for bad in (math.nan, 1e308, -1.1 * scene.FARTHEST)),
         *(({'mechanism': name}, f'there is no mechanism {shown}; allowed: {LEVERS}')
           for name, shown in (('arm', "'arm'"), ('x' * 10 ** 6, cut('x')))),
-        ({'mechanism': 'slotted_levr'}, f"there is no mechanism 'slotted_levr'; allowed: {LEVERS}; "
-         'did you mean slotted_lever?'),
+        ({'mechanism': 'slotted_levr'}, f"there is no mechanism 'slotted_levr'; allowed: {LEVERS}"
+         '; did you mean slotted_lever?'),
         ({'mechanism': 'jansen'}, 'jansen is a jansen, not a slotted lever; name an output, or '
          f'use one of: {LEVERS}'),
         ({'output': 'C.y'}, f'{ONE} one; allowed: {MECHANISMS}'),
@@ -148,8 +147,8 @@ def test_a_request_that_cannot_be_answered_gets_the_reason_alone(graph, paramete
 
 
 @pytest.mark.parametrize('fields, message', [
-    ({'lever_angle': [0.1] + [1.0] * 9}, 'lever angles 1, 1, 1, 1, 1 and 4 more cannot be reached; '
-     'the lever reaches [-0.562536, 0.562536] rad, its maximum at the crank angle 2.13333 rad'),
+    ({'lever_angle': [0.1] + [1.0] * 9}, 'lever angles 1, 1, 1, 1, 1 and 4 more cannot be reached'
+     '; the lever reaches [-0.562536, 0.562536] rad, its maximum at the crank angle 2.13333 rad'),
     ({'lever_angle': [1e308], 'output': 'G.x', 'mechanism': 'jansen'},
      'values of G.x 1e+308 cannot be reached; G.x reaches [-0.357608, -0.0180657] m, its maximum '
      'at the crank angle 2.04479 rad'),
@@ -234,7 +233,8 @@ INPUTS_REFUSED = [
       for bad in (1e9, -1e9, math.nan)),
     ({'outputs': ['P.x']}, 'leg has 2 inputs: as many outputs are needed, not 1'),
     ({'outputs': ['P.x', 'Z.y']}, "five_bar has no output 'Z.y'; allowed: distance(A,B) and "
-     'angle(A,B) of two joints, crank, crank2, AP, CP, O.x, O.y, Q.x, Q.y, A.x, A.y, C.x, ... (14)'),
+     'angle(A,B) of two joints, crank, crank2, AP, CP, O.x, O.y, Q.x, Q.y, A.x, A.y, C.x, '
+     '... (14)'),
     ({'outputs': ['A.x', 'A.y']},
      'A.x, A.y do not determine all inputs: A.y depends on too few'),
     ({'mechanism': 'boom'}, 'mechanism must be one of leg, drop, or empty if a single one has '

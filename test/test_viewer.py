@@ -738,7 +738,8 @@ def test_arrows_are_how_the_joints_move_in_the_picture(name, kind):
 
 
 @pytest.mark.parametrize('name, input_, value, expected, reach', [
-    ('excavator', 'arm', 1.1, 1.1, ''), ('excavator', 'arm', 2.0, 1.5, 'arm reaches [0.94, 1.5] m'),
+    ('excavator', 'arm', 1.1, 1.1, ''),
+    ('excavator', 'arm', 2.0, 1.5, 'arm reaches [0.94, 1.5] m'),
     ('excavator', 'boom', -2.0, 0.8, 'boom reaches [0.8, 1.2] m'),
     ('jansen', 'crank', 7.0, 7.0 - math.tau, ''), ('jansen', 'crank', -3.0, -3.0, ''),
     ('peaucellier', 'crank', 1.0 - math.tau, 1.0, ''),
@@ -1077,7 +1078,8 @@ REQUESTS = [
     ('export', {}, "not understood: .* 'form'"),
     (50000 * 'x', {}, "unknown request 'x*[.]{3}x*'$"),
     ('pose', {'arrows': '"torque"'},
-     "^pose is not understood: arrows must be one of velocity, acceleration, force, not 'torque'$"),
+     '^pose is not understood: arrows must be one of velocity, acceleration, force, not '
+     "'torque'$"),
     ('pose', {'arrows': '"velocity"', 'speeds': '{"crank": "1"}'},
      "^pose is not understood: speeds must be finite numbers, not {'crank': '1'}$"),
     ('set', {'values': {'crank.source': '"x"'}}, '^lever.crank.source is no number, and the page '
@@ -1103,7 +1105,7 @@ def test_a_request_is_answered_whatever_it_holds(lever):
                 answers.append(await page.heard('answer', id=str(number)))
             return answers
 
-    for answer, (op, fields, reason) in zip(asyncio.run(use(lever.viewer.url)), REQUESTS):
+    for answer, (op, _, reason) in zip(asyncio.run(use(lever.viewer.url)), REQUESTS):
         assert re.search(reason, answer['reason']), (op[:20], reason)
         assert len(answer['reason']) < 300 and answer.keys() == {'op', 'id', 'reason'}
     assert (lever.values('lever.crank.speed'), lever.values('lever.leg_pairs')) == ([1.0], [1])
@@ -1379,8 +1381,8 @@ def test_the_viewer_describes_its_parameters(graph):
 
     viewer = graph.start(Viewer, {'or_any_port': True})
     assert known(viewer, 'host', 'port', 'or_any_port') == {
-        'host': ('127.0.0.1', True, 'Address to listen at; 127.0.0.1: for browsers on this machine '
-                 'alone. Whoever reaches it can move the scene.', []),
+        'host': ('127.0.0.1', True, 'Address to listen at; 127.0.0.1: for browsers on this '
+                 'machine alone. Whoever reaches it can move the scene.', []),
         'port': (8020, True, 'Port to listen at; 0: any that is free.', [(0, 65535, 1)]),
         'or_any_port': (True, True, 'Whether to listen at any free port where that one is taken.',
                         [])}
@@ -1396,8 +1398,8 @@ def test_where_a_port_is_taken_another_is_used_or_the_viewer_says_how(graph):
         other = graph.start(Viewer, {'port': port, 'or_any_port': True})
         assert asyncio.run(status(other.url)) == 200 and f':{port}/' not in other.url
         with pytest.raises(scene.SceneError, match=(
-                r'^the viewer cannot be started: .*in use; for another port use -p port:=8021, with '
-                'ros2 launch port:=8021, with make view PORT=8021; port 0 is any free one$')):
+                '^the viewer cannot be started: .*in use; for another port use -p port:=8021, '
+                'with ros2 launch port:=8021, with make view PORT=8021; port 0 is any free one$')):
             graph.start(Viewer, {'port': port})
     with pytest.raises(scene.SceneError, match='^the viewer cannot be started: .*[^e]$'):
         graph.start(Viewer, {'port': 0, 'host': '192.0.2.1', 'or_any_port': True})
@@ -1662,8 +1664,9 @@ def test_of_a_message_what_is_deleted_or_no_line_joint_or_triangle_is_not_drawn(
     message = deserialize_message(walker(1), MarkerArray)
     bars, joints = message.markers
     message.markers = [
-        Marker(type=Marker.LINE_LIST, action=Marker.DELETE), joints, Marker(type=Marker.CUBE), bars,
-        Marker(type=Marker.TRIANGLE_LIST), Marker(type=Marker.LINE_STRIP, points=bars.points)]
+        Marker(type=Marker.LINE_LIST, action=Marker.DELETE), joints, Marker(type=Marker.CUBE),
+        bars, Marker(type=Marker.TRIANGLE_LIST),
+        Marker(type=Marker.LINE_STRIP, points=bars.points)]
     topic.newest = serialize_message(message)
     shown = dict(zip((7, 9, 11, 13), [joints, bars, *message.markers[4:]]))
     looks, records = topic.drawn()
