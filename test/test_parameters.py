@@ -152,7 +152,9 @@ def test_every_parameter_is_described_as_the_scene_has_it(graph, kind):
     assert sorted(names) == sorted(node.fields) == sorted(
         name for name in node.get_parameters_by_prefix('') if name != 'use_sim_time'
         and not name.startswith(('start_type', 'qos_overrides')))
-    for one, about, type_ in zip(own, *Client(graph, node).about(names)):
+    abouts, types = Client(graph, node).about(names)
+    assert len(abouts) == len(types) == len(own)
+    for one, about, type_ in zip(own, abouts, types):
         kind, ends = Parameter.Type[one.field.kind.upper()].value, slider.ends(whole, one)
         assert scene.plain(node.get_parameter(one.name).value) == one.value
         assert type_ == kind
