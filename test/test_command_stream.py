@@ -127,6 +127,16 @@ def test_outputs_of_several_mechanisms_in_one_message(stream, graph):
     assert arrays['bar'][-1].data[0] == pytest.approx(1.3, abs=1e-12)
 
 
+def test_the_first_command_is_next_to_where_the_crank_is(stream, graph):
+    cranks = graph.node.create_publisher(JointState, 'crank_states', 10)
+    graph.until(cranks.get_subscription_count)
+    for _ in range(3):
+        cranks.publish(JointState(name=['bar_crank'], position=[-2.0]))
+    four_bar = mechanisms.create('four_bar')
+    rocker = float(four_bar.joint_angles(-1.9)['QB'])
+    assert stream.want(['bar_QB'], [rocker])['bar_crank'] == (pytest.approx(-1.9, abs=1e-9),)
+
+
 def test_what_cannot_be_had_is_held_and_said(stream, capfd):
     good = stream.want(['flap'], [flap(1.0)], [0.1])['servo']
     reasons = ((-2.0, 'the lever reaches'), (math.nan, 'a value must be finite'),

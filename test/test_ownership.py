@@ -175,6 +175,13 @@ def test_other_values_at_the_start_of_either_are_said_once_and_followed(graph, w
     graph.start(Kinematics, {**LEVER, A: 82.0})
     graph.until(lambda: of(service) == of(late) == 82.0)
     assert warned[2:] == [said.replace('81.0', '84.0')] * 2
+    # The same once more is news, too.
+    stop(graph, next(node for node in graph.executor.get_nodes() if isinstance(node, Kinematics)))
+    for node in service, late:
+        assert graph.set(node, lever__dimensions__a=84.0).successful
+    graph.start(Kinematics, {**LEVER, A: 82.0})
+    graph.until(lambda: of(service) == of(late) == 82.0)
+    assert warned[4:] == [said.replace('81.0', '84.0')] * 2
 
 
 def test_other_mechanisms_are_said_and_the_rest_is_followed(graph, warned):

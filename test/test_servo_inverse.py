@@ -194,7 +194,8 @@ def test_all_working_modes_of_a_foot_are_told_and_the_nearest_comes_first(graph)
     node = graph.start(ServoInverse, FIVE_BAR)
     client = graph.node.create_client(InputsFor, 'inputs_for')
     response = graph.call(client, InputsFor.Request(**FOOT))
-    assert response.success and response.names == ['leg_crank', 'motor']
+    assert response.success and response.message == ''
+    assert response.names == ['leg_crank', 'motor']
     lengths = mechanisms.create('five_bar').dimensions
     expected = {f'AP{"+-"[bends["AP"] < 0]} CP{"+-"[bends["CP"] < 0]}': inputs
                 for inputs, bends in five_bar(lengths, 0.06 + 0.15j)}
