@@ -98,6 +98,22 @@ def lever_of(servo, a=80.0, b=150.0):
     return math.atan2(a * math.sin(servo), b + a * math.cos(servo))
 
 
+# An excavator twice as large, in the middle of its strokes.
+DOUBLE = {'scale': 2.0, **{
+    f'{name}.{key}': value for name, ends in (
+        ('boom', [1.6, 2.4]), ('arm', [1.88, 3.0]), ('bucket', [1.72, 2.6]))
+    for key, value in (('sweep', ends), ('start', sum(ends) / 2.0))}}
+
+
+def machine_of(name, **changed):
+    """Return a mechanism of the examples with its values at the start, some changed."""
+    given = without_defaults(scene.load(str(ROOT / 'config' / f'{name}.yaml')))
+    key, = given['mechanisms']
+    machine = scene.read({**given, **{f'{key}.{one}': value for one, value in changed.items()}})
+    machine, = machine.machines.values()
+    return machine, [drive.start for drive in machine.inputs.values()]
+
+
 class Show:
     """The nodes of a scene and a viewer, at work in a thread of their own."""
 
@@ -537,6 +553,14 @@ def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(lever):
                        if one.name.startswith(f'{name}.dimensions.')}}
 
 
+def test_a_bar_follows_a_dimension_that_can_only_become_shorter():
+    # Longer, A, B and C are no triangle.
+    bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'custom', 'bar.dimensions.p': 4.0,
+                      'bar.joints': ['O ground 0 0', 'Q ground 4 0', 'A crank O 1',
+                                     'B dyad A Q 3 3 left', 'C rigid A B p 1 left']})
+    assert poses.tunable(bar, 'bar')['bars'] == {'dimensions.p': [('A', 'C')]}
+
+
 def test_a_saved_file_has_what_defines_the_scene_and_what_is_changed(lever):
     async def use(url):
         async with Page(url) as page:
@@ -564,8 +588,9 @@ def test_what_is_exported_is_the_mechanism_as_it_is(lever):
 
 @pytest.mark.parametrize('name', ['excavator', 'jansen', 'peaucellier', 'scissor_lift'])
 def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
-    machine, = scene.load(str(ROOT / 'config' / f'{name}.yaml')).machines.values()
-    present = [1.02 * drive.start for drive in machine.inputs.values()]
+    machine, present = machine_of(name, **{
+        'excavator': DOUBLE, 'scissor_lift': {'scale': 2.0, 'carriage.start': 2.4}}.get(name, {}))
+    present = [1.02 * value for value in present]
     heads, *rows = csv.reader(io.StringIO(curves.exported(machine, present, 'csv', 'world')))
     table, linkage = np.array(rows, float).T, machine.linkage
     input_, *others = linkage.inputs
@@ -712,24 +737,9 @@ def test_arrows_are_how_the_joints_move_in_the_picture(name, kind):
         assert arrow == pytest.approx(slope, rel=1e-4, abs=1e-6)
 
 
-# An excavator twice as large, in the middle of its strokes.
-DOUBLE = {'scale': 2.0, **{
-    f'{name}.{key}': value for name, ends in (
-        ('boom', [1.6, 2.4]), ('arm', [1.88, 3.0]), ('bucket', [1.72, 2.6]))
-    for key, value in (('sweep', ends), ('start', sum(ends) / 2.0))}}
-
-
-def machine_of(name, **changed):
-    """Return a mechanism of the examples with its values at the start, some changed."""
-    given = without_defaults(scene.load(str(ROOT / 'config' / f'{name}.yaml')))
-    key, = given['mechanisms']
-    machine = scene.read({**given, **{f'{key}.{one}': value for one, value in changed.items()}})
-    machine, = machine.machines.values()
-    return machine, [drive.start for drive in machine.inputs.values()]
-
-
 @pytest.mark.parametrize('name, input_, value, expected, reach', [
-    ('excavator', 'arm', 1.1, 1.1, ''), ('excavator', 'arm', 2.0, 1.5, 'arm reaches [0.94, 1.5] m'),
+    ('excavator', 'arm', 1.1, 1.1, ''),
+    ('excavator', 'arm', 2.0, 1.5, 'arm reaches [0.94, 1.5] m'),
     ('excavator', 'boom', -2.0, 0.8, 'boom reaches [0.8, 1.2] m'),
     ('jansen', 'crank', 7.0, 7.0 - math.tau, ''), ('jansen', 'crank', -3.0, -3.0, ''),
     ('peaucellier', 'crank', 1.0 - math.tau, 1.0, ''),
@@ -1068,7 +1078,8 @@ REQUESTS = [
     ('export', {}, "not understood: .* 'form'"),
     (50000 * 'x', {}, "unknown request 'x*[.]{3}x*'$"),
     ('pose', {'arrows': '"torque"'},
-     "^pose is not understood: arrows must be one of velocity, acceleration, force, not 'torque'$"),
+     '^pose is not understood: arrows must be one of velocity, acceleration, force, not '
+     "'torque'$"),
     ('pose', {'arrows': '"velocity"', 'speeds': '{"crank": "1"}'},
      "^pose is not understood: speeds must be finite numbers, not {'crank': '1'}$"),
     ('set', {'values': {'crank.source': '"x"'}}, '^lever.crank.source is no number, and the page '
@@ -1094,7 +1105,7 @@ def test_a_request_is_answered_whatever_it_holds(lever):
                 answers.append(await page.heard('answer', id=str(number)))
             return answers
 
-    for answer, (op, fields, reason) in zip(asyncio.run(use(lever.viewer.url)), REQUESTS):
+    for answer, (op, _, reason) in zip(asyncio.run(use(lever.viewer.url)), REQUESTS):
         assert re.search(reason, answer['reason']), (op[:20], reason)
         assert len(answer['reason']) < 300 and answer.keys() == {'op', 'id', 'reason'}
     assert (lever.values('lever.crank.speed'), lever.values('lever.leg_pairs')) == ([1.0], [1])
@@ -1370,8 +1381,8 @@ def test_the_viewer_describes_its_parameters(graph):
 
     viewer = graph.start(Viewer, {'or_any_port': True})
     assert known(viewer, 'host', 'port', 'or_any_port') == {
-        'host': ('127.0.0.1', True, 'Address to listen at; 127.0.0.1: for browsers on this machine '
-                 'alone. Whoever reaches it can move the scene.', []),
+        'host': ('127.0.0.1', True, 'Address to listen at; 127.0.0.1: for browsers on this '
+                 'machine alone. Whoever reaches it can move the scene.', []),
         'port': (8020, True, 'Port to listen at; 0: any that is free.', [(0, 65535, 1)]),
         'or_any_port': (True, True, 'Whether to listen at any free port where that one is taken.',
                         [])}
@@ -1387,8 +1398,8 @@ def test_where_a_port_is_taken_another_is_used_or_the_viewer_says_how(graph):
         other = graph.start(Viewer, {'port': port, 'or_any_port': True})
         assert asyncio.run(status(other.url)) == 200 and f':{port}/' not in other.url
         with pytest.raises(scene.SceneError, match=(
-                r'^the viewer cannot be started: .*in use; for another port use -p port:=8021, with '
-                'ros2 launch port:=8021, with make view PORT=8021; port 0 is any free one$')):
+                '^the viewer cannot be started: .*in use; for another port use -p port:=8021, '
+                'with ros2 launch port:=8021, with make view PORT=8021; port 0 is any free one$')):
             graph.start(Viewer, {'port': port})
     with pytest.raises(scene.SceneError, match='^the viewer cannot be started: .*[^e]$'):
         graph.start(Viewer, {'port': 0, 'host': '192.0.2.1', 'or_any_port': True})
@@ -1653,8 +1664,9 @@ def test_of_a_message_what_is_deleted_or_no_line_joint_or_triangle_is_not_drawn(
     message = deserialize_message(walker(1), MarkerArray)
     bars, joints = message.markers
     message.markers = [
-        Marker(type=Marker.LINE_LIST, action=Marker.DELETE), joints, Marker(type=Marker.CUBE), bars,
-        Marker(type=Marker.TRIANGLE_LIST), Marker(type=Marker.LINE_STRIP, points=bars.points)]
+        Marker(type=Marker.LINE_LIST, action=Marker.DELETE), joints, Marker(type=Marker.CUBE),
+        bars, Marker(type=Marker.TRIANGLE_LIST),
+        Marker(type=Marker.LINE_STRIP, points=bars.points)]
     topic.newest = serialize_message(message)
     shown = dict(zip((7, 9, 11, 13), [joints, bars, *message.markers[4:]]))
     looks, records = topic.drawn()
