@@ -36,8 +36,6 @@ from linkage_ros.render.picture import Picture  # noqa: E402
 from matplotlib.colors import to_rgb  # noqa: E402
 from PIL import Image  # noqa: E402
 
-pytestmark = pytest.mark.long
-
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / 'config'
 TABLE = [line.split() for line in (ROOT / 'pictures' / 'pictures.txt').read_text().splitlines()
@@ -67,6 +65,7 @@ def rows_of(file):
                 for row in csv.DictReader(lines)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('row', TABLE, ids=[Path(row[2]).name for row in TABLE])
 def test_every_picture_of_the_table_is_drawn(row, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
@@ -78,6 +77,7 @@ def test_every_picture_of_the_table_is_drawn(row, tmp_path, monkeypatch):
         assert getattr(image, 'n_frames', 1) == (3 if few else 1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('ending, args', [
     ('png', []), ('svg', []), ('gif', ['--frames', '4', '--trace', 'fading'])])
 def test_the_same_request_gives_the_same_bytes(tmp_path, ending, args):
@@ -85,6 +85,7 @@ def test_the_same_request_gives_the_same_bytes(tmp_path, ending, args):
     assert rendered(tmp_path, *args, config='all', ending=ending).read_bytes() == once
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not shutil.which('ffmpeg'), reason='ffmpeg is not installed')
 def test_an_mp4_has_the_same_bytes_each_time(tmp_path):
     once = rendered(tmp_path, '--frames', '3', ending='mp4').read_bytes()
@@ -112,6 +113,7 @@ def test_a_gif_has_the_frames_the_rate_the_loops_and_the_size_asked_for(tmp_path
         assert milliseconds == 230  # 7/30 s in hundredths
 
 
+@pytest.mark.long
 def test_a_turn_is_drawn_in_the_time_it_takes(tmp_path):
     data = tmp_path / 'joints.csv'
     rendered(tmp_path, '--fps', '10', '--turns', '2', '--size', '200x200', '--data', str(data),
@@ -122,6 +124,7 @@ def test_a_turn_is_drawn_in_the_time_it_takes(tmp_path):
     assert np.allclose(np.remainder(2.0 * np.array(times), math.tau), cranks, atol=1e-12)
 
 
+@pytest.mark.long
 def test_the_data_are_the_joints_as_solved_to_the_last_digit(tmp_path):
     data = tmp_path / 'joints.csv'
     rendered(tmp_path, '--frames', '25', '--size', '99x99', '--hide', 'axes,title',
@@ -138,6 +141,7 @@ def test_the_data_are_the_joints_as_solved_to_the_last_digit(tmp_path):
             assert row[f'{name}_{joint}_y'] == 0.005 * y
 
 
+@pytest.mark.long
 def test_the_bars_in_the_data_are_as_long_as_in_the_original_document(tmp_path):
     data = tmp_path / 'joints.csv'
     assert main([str(ROOT / 'pictures/jansen.yaml'), '--out', str(tmp_path / 'leg.gif'),
@@ -149,6 +153,7 @@ def test_the_bars_in_the_data_are_as_long_as_in_the_original_document(tmp_path):
         assert math.dist(*ends) == pytest.approx(length, rel=1e-13)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('type_', list(mechanisms.TYPES))
 def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
     one = machine(type_)
@@ -163,6 +168,7 @@ def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
     assert np.all(pixels < (box.x1 - 15, box.y1 - 15))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('args', [[], ['--show', 'dimensions'], ['--size', '600x460']])
 @pytest.mark.parametrize('config', ['all', 'slotted_lever', 'peaucellier', 'jansen'])
 def test_nothing_reaches_over_the_edge_of_a_picture(tmp_path, config, args):
@@ -184,6 +190,7 @@ def test_an_animation_shows_what_a_still_of_that_time_shows(tmp_path, type_, opt
     assert not np.array_equal(frame, picture.at(0.6))
 
 
+@pytest.mark.long
 def test_a_gif_keeps_the_colours_that_colour_blind_people_tell_apart(tmp_path):
     file = rendered(tmp_path, '--frames', '3', ending='gif')
     with Image.open(file) as image:
@@ -239,6 +246,7 @@ def test_a_foot_stands_on_the_lowest_part_of_its_curve():
     assert np.hypot(*np.diff(standing, axis=0).T).max() < 2.0  # one piece
 
 
+@pytest.mark.long
 def test_a_cylinder_is_drawn_from_base_to_rod_and_a_scribble_is_not():
     arm = scene.load(CONFIG / 'excavator.yaml').machines['excavator']
     picture = picture_of(arm)
@@ -328,6 +336,7 @@ def test_angles_and_ratio_of_a_slotted_lever_are_printed():
     assert texts_of(picture)[1:] == ['φ = 0.0°', 'φ/θ = –', f'dφ/dθ = {80 / 230:.3f}']
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('trace', TRACES)
 @pytest.mark.parametrize('type_', ['jansen', 'five_bar'])
 def test_every_trace_and_part_can_be_drawn(type_, trace):
@@ -410,6 +419,7 @@ def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
     assert set(tmp_path.iterdir()) == before
 
 
+@pytest.mark.long
 def test_a_crank_that_stands_still_has_a_picture(tmp_path):
     file = tmp_path / 'still.yaml'
     file.write_text('/**: {ros__parameters: {mechanisms: [water_drop, jansen], '
@@ -417,6 +427,7 @@ def test_a_crank_that_stands_still_has_a_picture(tmp_path):
     assert main([str(file), '--out', str(tmp_path / 'a.png'), '--angle', '90']) == 0
 
 
+@pytest.mark.long
 def test_an_angle_may_be_written_as_joint_lines_have_it(tmp_path):
     pictures = []
     for angle in ('60', '60deg', 'pi/3', '2*30'):
@@ -427,6 +438,7 @@ def test_an_angle_may_be_written_as_joint_lines_have_it(tmp_path):
     assert len(set(pictures)) == 1
 
 
+@pytest.mark.long
 def test_no_ros_is_needed(tmp_path):
     code = ('import sys; sys.modules.update(dict.fromkeys(["rclpy", "ament_index_python"])); '
             'from linkage_ros.render import main; sys.exit(main(sys.argv[1:]))')
@@ -436,6 +448,7 @@ def test_no_ros_is_needed(tmp_path):
     assert out.read_text().lstrip().startswith('<?xml')
 
 
+@pytest.mark.long
 def test_readings_are_written_beside_or_below_each_other():
     machines = [*scene.load(str(CONFIG / 'excavator.yaml')).machines.values(),
                 *scene.load(str(CONFIG / 'scissor_lift.yaml')).machines.values(),

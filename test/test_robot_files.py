@@ -835,14 +835,20 @@ def test_a_loop_is_closed_in_every_way_in_which_tools_write_it(imported, tmp_pat
         assert joints['elbow'] == pytest.approx(-angle, abs=1e-14)
 
 
-def euler(rng):
-    """Return three random angles, and the rotation by them about fixed x, y, z in turn."""
-    angles, turned = rng.uniform(-1.5, 1.5, 3), np.eye(3)
+def rotation(angles):
+    """Return the rotation by angles about fixed x, y, z in turn."""
+    turned = np.eye(3)
     for angle, (i, j) in zip(angles, ((1, 2), (2, 0), (0, 1))):
         step = np.eye(3)
         step[[i, j], [i, j]], step[j, i], step[i, j] = np.cos(angle), np.sin(angle), -np.sin(angle)
         turned = step @ turned
-    return angles, turned
+    return turned
+
+
+def euler(rng):
+    """Return three random angles, and the rotation by them."""
+    angles = rng.uniform(-1.5, 1.5, 3)
+    return angles, rotation(angles)
 
 
 @pytest.mark.parametrize('seed', range(4))
