@@ -13,7 +13,7 @@
 import math
 import re
 
-from linkage_ros import scene
+from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import check, closing, command, model, readers
 import numpy as np
 import pytest
@@ -24,6 +24,7 @@ from test_robot_files import (
     fixed,
     published,
     refused,
+    robot_of,
     ROBOTS,
     rotation,
     words,
@@ -189,6 +190,25 @@ def test_all_that_is_printed_of_a_robot(capsys, file):
                           if line.startswith('# '))
 
 
+def test_a_motor_that_had_to_move_is_named(capsys):
+    # The cylinder is longer than its pins can be apart.
+    assert command.main([str(ROBOTS / 'boom.urdf'), '--pose', 'boom_cylinder=5']) == 0
+    assert capsys.readouterr().err.startswith(
+        'from_robot: boom_cylinder moved: their loops cannot be closed where the file has them.\n'
+        'from_robot: Checked: boom_cylinder: in 240 poses of the robot, boom_cylinder from -0.3')
+
+
+@pytest.mark.parametrize('word', ['parallelogram', 'antiparallelogram', 'mirror'])
+@pytest.mark.parametrize('base', ['0.6 0', '0.5 -0.3'])
+def test_bars_that_mirror_others_have_a_word_of_their_own(word, base):
+    linkage = mechanisms.create('custom', joints=[
+        'A ground 0 0', f'B ground {base}', 'C crank A 0.2', f'D {word} A C B'])
+    given, reports, still = command.described(robot_of(linkage, 0.7))
+    ground, _, crank, line = given['crank.joints']
+    assert (ground, crank, line) == ('A ground 0 0', 'C crank A 0.2', f'D {word} A C B')
+    assert [line[:9] for line in reports] == ['Checked: '] * 2 and not still
+
+
 # What a dialect says of a loop: its kind, and in whose frame its place and axis are.
 SAID = {'joint of Gazebo': ('hinge', 'child'), 'universal joint of Gazebo': ('hinge', 'child'),
         'ball_constraint of Drake': ('ball', ''), 'linear_bushing_rpy of Drake': ('ball', ''),
@@ -270,7 +290,7 @@ def test_a_mechanism_that_cannot_move_is_not_checked():
 
 CYLINDER = """<mujoco><compiler angle="radian"/><worldbody><body name="shin">
   <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
-  <body name="foot" pos="0 0 0.1"><joint name="pitch" axis="0 1 0" range="-0.4 0.5"/>{mass}
+  <body name="foot" pos="0 0 0.1"><joint name="pitch" axis="0 1 0" range="{ends}"/>{mass}
     <site name="eye" pos="{eye}"/></body>
   <body name="barrel" pos="{base}"><joint name="ball" type="ball"/>{mass}
     <body name="rod"><joint name="ram" type="slide" axis="{way}"/>{mass}
@@ -279,15 +299,14 @@ CYLINDER = """<mujoco><compiler angle="radian"/><worldbody><body name="shin">
   <actuator><motor joint="ram"/></actuator></mujoco>"""
 
 
-@pytest.mark.parametrize('seed', range(3))
-def test_a_cylinder_in_space_turns_a_foot(tmp_path, capsys, seed):
+@pytest.mark.parametrize('ends, within', [('-0.4 0.5', ' within -0.4 0.5'), ('-4 4', '')])
+def test_a_cylinder_in_space_turns_a_foot(tmp_path, capsys, ends, within):
     pytest.importorskip('mujoco')
-    rng, file = np.random.default_rng(seed), tmp_path / 'robot.xml'
-    pivot = np.array([0.0, 0.0, 0.1])
-    base, eye = ((-0.6, 0.3, -0.8), (-0.5, -0.1, 0.2)) + 0.05 * rng.normal(size=(2, 3))
+    file = tmp_path / 'robot.xml'
+    pivot, base, eye = np.array([[0.0, 0.0, 0.1], [-0.6, 0.3, -0.8], [-0.5, -0.1, 0.2]])
     way = pivot + eye - base
     file.write_text(CYLINDER.format(
-        base=words(base), eye=words(eye), way=words(way),
+        ends=ends, base=words(base), eye=words(eye), way=words(way),
         mass='<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'))
     assert command.main([str(file)]) == 0
     out, err = capsys.readouterr()
@@ -297,6 +316,7 @@ def test_a_cylinder_in_space_turns_a_foot(tmp_path, capsys, seed):
     drive, = machine.inputs.values()
     assert (name, drive.source, machine.frame_id) == ('ram_rods', 'ram', 'shin')
     assert drive.start == pytest.approx(np.linalg.norm(way))
+    assert f'- pitch hinge ground at 0 0 0.1 axis 0 1 0{within} - ram' in ' '.join(out.split())
     for angle in np.linspace(-0.39, 0.49, 9):
         length = np.linalg.norm(pivot + rotation((0.0, angle, 0.0)) @ eye - base)
         assert published(machine, ram=length - np.linalg.norm(way)) == pytest.approx({
@@ -311,7 +331,7 @@ def test_a_file_of_mujoco_needs_no_meshes_and_no_names(tmp_path):
       <material name="c" texture="t"/></asset><worldbody><geom type="hfield" hfield="h"/>
       <body pos="1 2 3"><joint type="slide" axis="0 2 0" ref="0.5" range="0.1 0.7"/>
       <joint axis="1 0 0"/><geom type="mesh" mesh="m" material="c"/></body>
-      <body name="free"><freejoint/><geom size="1"/></body><body name="fixed"><geom size="1"/>
+      <body name="free"><freejoint/></body><body name="fixed"><geom size="1"/>
       </body></worldbody><equality><weld body1="free" body2="fixed" active="false"/></equality>
       </mujoco>""")
     robot = readers.read(str(file))
