@@ -10,7 +10,6 @@
 
 """Facts of a robot's file, each as it is read, printed or refused."""
 
-import math
 import re
 
 from linkage_ros import mechanisms, scene
