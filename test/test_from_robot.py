@@ -322,6 +322,22 @@ def test_a_cylinder_in_space_turns_a_foot(tmp_path, capsys, ends, within):
             'pitch': angle, 'ram': length - np.linalg.norm(way)}, abs=1e-9)
 
 
+@pytest.mark.parametrize('old, new, why', [
+    (' axis="0.1 -0.4 1.0"', ' axis="0.1 -0.4 0.9"', 'ram does not slide along the line of its '
+     'balls'),
+    ('joint="ram"', 'joint="pitch"', 'ball is a joint of type ball and no end of a rod'),
+    ('name="pitch" axis="0 1 0" range="-1 1"', 'name="pitch" type="ball"',
+     'equality0 holds foot to rod, which hangs on rods alone')])
+def test_what_rods_cannot_be_is_named(capsys, tmp_path, old, new, why):
+    pytest.importorskip('mujoco')
+    file, text = tmp_path / 'robot.xml', CYLINDER.format(
+        base='-0.6 0.3 -0.8', eye='-0.5 -0.1 0.1', way='0.1 -0.4 1.0', ends='-1 1',
+        mass='<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>')
+    assert old in text
+    file.write_text(text.replace(old, new))
+    assert refused(capsys, file).endswith(f'; as rods in space: {why}.\n')
+
+
 def test_a_file_of_mujoco_needs_no_meshes_and_no_names(tmp_path):
     pytest.importorskip('mujoco')
     file = tmp_path / 'robot.xml'

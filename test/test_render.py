@@ -355,6 +355,7 @@ def test_the_crank_is_where_it_was_asked_to_be(crank):
     for angle in np.linspace(-0.49, 0.99, 17):
         assert math.remainder(wheel.value(wheel.turns_to(angle)) - angle,
                               math.tau) == pytest.approx(0.0, abs=1e-12)
+        assert wheel.turns_to(angle + math.tau) == pytest.approx(wheel.turns_to(angle))
 
 
 @pytest.mark.parametrize('speeds, count, ratios', [
