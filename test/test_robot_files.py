@@ -196,7 +196,6 @@ LIMITS = [
      (math.radians(-40.0), math.radians(40.0)), '')]
 
 
-@pytest.mark.sample(6)
 @pytest.mark.parametrize('file, old, new, ends, why', LIMITS, ids=range(len(LIMITS)))
 def test_limits_of_a_motor_become_a_sweep_or_a_sentence(
         imported, tmp_path, file, old, new, ends, why):
@@ -301,11 +300,13 @@ def test_a_scene_is_held_against_its_robot_over_the_range_of_its_motor(tmp_path,
     assert ('# wrist has its ends 0.01 m apart along its axis' in text) == ('0.01' in place)
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize('old, new', [
-    (' parallelogram', ' antiparallelogram'), ('ground 0.3 0', 'ground 0.3 1e-8'),
-    ('=-shoulder', '=shoulder'), ('=elbow-1.57079632', '=elbow-1.57079633')])
-def test_a_mechanism_that_differs_from_its_robot_is_refused(old, new):
+@pytest.mark.parametrize('old, new, why', [
+    (' parallelogram', ' antiparallelogram', 'elbow is off by 1'),
+    ('ground 0.3 0', 'ground 0.3 1e-8', 'its loops stand open by 1e-08 m'),
+    ('=-shoulder', '=shoulder', 'shoulder is off by 3.1'),
+    ('=elbow-1.570', '=elbow-1.572', 'elbow is off by 0.002$'),
+    ('=elbow-1.57079632', '=elbow-1.57079633', 'its loops stand open by 3e-09 m$')])
+def test_a_mechanism_that_differs_from_its_robot_is_refused(old, new, why):
     robot = closing.closed(readers.read(str(ROBOTS / 'four_bar.urdf'))).robot
     given, *_ = command.described(robot)
 
@@ -318,7 +319,7 @@ def test_a_mechanism_that_differs_from_its_robot_is_refused(old, new):
     changed = [line.replace(old, new) for line in given[key]]
     assert changed != given[key]
     given[key] = changed
-    with pytest.raises(check.Difference, match='with motor at .* (is off|stand open) by'):
+    with pytest.raises(check.Difference, match=f'^with motor at .* {why}'):
         compared()
 
 
@@ -461,6 +462,8 @@ def pin(side):
 def test_what_is_left_out_is_named_with_the_reason(capsys, tmp_path):
     assert 'not planar: the axes of motor and shoulder are 11.3 degrees from it' in refused(
         capsys, written(tmp_path, 'four_bar.urdf', ('0 -1 0', '0 -1 0.2')))
+    assert 'not planar: the axes of motor and elbow are 11.3 degrees from it' in refused(
+        capsys, written(tmp_path, 'four_bar.urdf', ('"0 1 0"/>\n    <limit', '"0 1 0.2"/><limit')))
     assert 'its loops cannot be closed: they stay open by' in refused(
         capsys, written(tmp_path, 'four_bar.urdf', ('xyz="0 0 0.2"/><child_axis',
                                                     'xyz="0 0 2.2"/><child_axis')))
@@ -678,7 +681,6 @@ def test_a_pose_at_the_end_of_its_loops_is_no_side(capsys, tmp_path):
             in refused(capsys, file, '--driven', 'motor'))
 
 
-@pytest.mark.slow
 def test_a_joint_that_follows_another_is_geared_to_it(imported, tmp_path):
     axis, loops = '<axis xyz="0 -1 0"/>', tmp_path / 'loops.yaml'
     file = written(tmp_path, 'five_bar.urdf', (
@@ -686,7 +688,7 @@ def test_a_joint_that_follows_another_is_geared_to_it(imported, tmp_path):
     loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [3d], name_mot: [mot_front]}')
     machine, = imported(file, '--loops', loops).values()
     assert [drive.source for drive in machine.inputs.values()] == ['mot_front']
-    robot = LIBRARIES[0]((ROBOTS / 'five_bar.urdf').read_text())
+    robot = LIBRARIES[1]((ROBOTS / 'five_bar.urdf').read_text())
     for angle in np.linspace(-0.4, 0.4, 7):
         joints = {**published(machine, mot_front=angle), 'mot_back': 0.5 * angle}
         places = robot.places(joints, ['front_foot', 'back_foot'])
@@ -819,7 +821,7 @@ DIALECTS = {
         '<axis xyz="0 1 0"/></joint>', '')}
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('dialect', DIALECTS)
 def test_a_loop_is_closed_in_every_way_in_which_tools_write_it(imported, tmp_path, dialect):
     inside, loops = DIALECTS[dialect]
@@ -835,14 +837,20 @@ def test_a_loop_is_closed_in_every_way_in_which_tools_write_it(imported, tmp_pat
         assert joints['elbow'] == pytest.approx(-angle, abs=1e-14)
 
 
-def euler(rng):
-    """Return three random angles, and the rotation by them about fixed x, y, z in turn."""
-    angles, turned = rng.uniform(-1.5, 1.5, 3), np.eye(3)
+def rotation(angles):
+    """Return the rotation by angles about fixed x, y, z in turn."""
+    turned = np.eye(3)
     for angle, (i, j) in zip(angles, ((1, 2), (2, 0), (0, 1))):
         step = np.eye(3)
         step[[i, j], [i, j]], step[j, i], step[i, j] = np.cos(angle), np.sin(angle), -np.sin(angle)
         turned = step @ turned
-    return angles, turned
+    return turned
+
+
+def euler(rng):
+    """Return three random angles, and the rotation by them."""
+    angles = rng.uniform(-1.5, 1.5, 3)
+    return angles, rotation(angles)
 
 
 @pytest.mark.parametrize('seed', range(4))
@@ -1050,7 +1058,9 @@ def test_where_both_sides_fit_a_pose_has_to_choose(imported, capsys, tmp_path):
     file = written(tmp_path, 'four_bar.urdf', (
         'xyz="0 0 0.2"/><axis', f'xyz="0 0 0.2" rpy="0 {math.atan2(2.0, 3.0)!r} 0"/><axis'), (
         'xyz="0.3 0 0"/><axis', f'xyz="0.3 0 0" rpy="0 {-math.atan2(3.0, 2.0)!r} 0"/><axis'))
-    assert 'they close as well with' in refused(capsys, file, '--driven', 'motor')
+    _, *sides = re.search(r'close as well with (.*)=(.*) as with \1=(.*): choose by --pose \1=',
+                          refused(capsys, file, '--driven', 'motor')).groups()
+    assert len({*sides}) == 2
     found = [published(*imported(
         file, '--driven', 'motor', '--pose', f'elbow={side}').values(), motor=0.0)['elbow']
              for side in (-0.5, 0.5)]
