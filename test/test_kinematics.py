@@ -331,6 +331,16 @@ def test_an_angle_out_of_reach_is_passed_over_with_a_warning(graph):
                for m in bench.markers if m.markers[0].action == Marker.ADD)
 
 
+def test_a_joint_that_has_a_place_is_not_shown_where_the_linkage_cannot_be_assembled(graph):
+    bench = Bench(graph, 'cell', {**CELL, 'cell.points': ['A']}, joints=False)
+    assert places(bench.links_and_joints_at(1.0)[-1])[0] == pytest.approx(
+        [3.0 * math.cos(1.0), 3.0 * math.sin(1.0)])
+    del bench.markers[:]
+    bench.hand.send([2.0])
+    message, = graph.until(lambda: bench.markers)
+    assert {marker.action for marker in message.markers} == {Marker.DELETE}
+
+
 def test_a_leg_that_cannot_be_assembled_is_left_out_and_the_others_stay(graph):
     bench = Bench(graph, 'walker', {**WALKER, 'walker.dimensions.m': 24.0})
     state = bench.joints_at(0.2)
