@@ -617,7 +617,7 @@ def test_the_command_has_one_scene_and_says_what_reads_it(capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, 'yaml', None)
     assert main(['config/jansen.yaml']) == 1
     assert capsys.readouterr().err == (
-        'urdf: yaml is not installed: pip install pyyaml, or apt install python3-yaml\n')
+        'urdf: yaml is not installed: apt install python3-yaml, or pip install pyyaml\n')
 
 
 GROUP = {'Class': 'rviz_common/Group', 'Name': 'one', 'Displays': [

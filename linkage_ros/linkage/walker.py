@@ -84,11 +84,11 @@ class Solution:
         self.rows, self._function = layout.rows(self.values), function.at
         self._at_rest = layout.inputs * (0.0,)
         # Packing is faster than assignment to an array.
-        pack_row: Any = Struct(f'{self.rows.shape[1]}d').pack_into
-        pack_driven: Any = Struct(f'{layout.inputs + layout.speeds}d').pack_into
-        self._pack_row, self._pack_driven = pack_row, pack_driven
+        row: Any = Struct(f'{self.rows.shape[1]}d')
+        driven: Any = Struct(f'{layout.inputs + layout.speeds}d')
+        self._pack_row, self._pack_driven = row.pack_into, driven.pack_into
         # Each leg, with the place of its row [bytes].
-        self._legs = [(i * self.rows.strides[0], leg) for i, leg in enumerate(legs)]
+        self._legs = [(i * row.size, leg) for i, leg in enumerate(legs)]
         self._batch: Optional[Batch] = None
         if len(legs) > 1:
             with suppress(ImportError):
