@@ -105,6 +105,12 @@ nodes: build $(venv)/.tools ## Run the tests of the nodes alone; with PLAIN=1 wh
 long: build $(venv)/.tools ## Run the long tests; WHICH='long and not exhaustive' or WHICH=slow: in minutes
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m '$(or $(WHICH),long)'
 
+# Some minutes to an hour a room, and some minutes once for a state of the checkout.
+.PHONY: mutants
+mutants: build $(venv)/.tools .venv-mutants/.installed ## Put COUNT=40 random bugs into ROOM=scene; SEED=2: others; AGAIN=file: only what survived there
+	@$(in_ros) nice -n 10 python test/mutants.py --out $(build)/mutants \
+	  --room '$(ROOM)' --count $(or $(COUNT),40) --seed $(or $(SEED),1) $(if $(AGAIN),--again '$(AGAIN)')
+
 .PHONY: lint
 lint: .venv-lint/.installed ## Check style and types
 	@$(lint_bin)/ruff check .
@@ -170,7 +176,8 @@ $(venv)/.tools: $(venv)/.installed $(tools)
 .venv-docs/.installed: private export about := what draws and what makes the pages.
 .venv-lint/.installed: private export about := what checks style and types.
 .venv-lock/.installed: private export about := what pins the rest.
-.venv-docs/.installed .venv-lint/.installed .venv-lock/.installed: \
+.venv-mutants/.installed: private export about := what puts bugs into the package.
+.venv-docs/.installed .venv-lint/.installed .venv-lock/.installed .venv-mutants/.installed: \
 .venv-%/.installed: $(lock)/%.txt
 	@wheels/install.sh '$(PYTHON)' .venv-$* $<
 	@touch $@

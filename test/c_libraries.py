@@ -26,15 +26,15 @@ ROS = next(([f'-isystem{include}', f'-L{prefix}/lib', '-lrcutils', f'-Wl,-rpath,
             for include in (f'{prefix}/include/rcutils', f'{prefix}/include')
             if Path(include, 'rcutils', 'logging_macros.h').is_file()), [])
 COMPILER = shutil.which('cc') or shutil.which('gcc')
-STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror', '-O2')
+STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror')
 
 
-def loaded(folder, code):
+def loaded(folder, code, *flags):
     """Return the library of a text in C99, compiled in a folder of its own."""
     if not COMPILER:
         pytest.skip('there is no C compiler')
     source, library = folder / 'code.c', folder / 'code.so'
     source.write_text(code)
-    subprocess.run([COMPILER, '-std=c99', *STRICT, '-shared', '-fPIC', source, '-o', library,
-                    '-lm'], check=True)
+    subprocess.run([COMPILER, '-std=c99', *STRICT, *flags, '-shared', '-fPIC', source, '-o',
+                    library, '-lm'], check=True)
     return ctypes.CDLL(str(library))

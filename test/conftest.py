@@ -12,7 +12,6 @@
 
 import atexit
 from collections import defaultdict
-from functools import cache
 import gc
 import math
 import os
@@ -66,9 +65,8 @@ def machines(request):
 
 @pytest.fixture(scope='module')
 def library(request, machines, tmp_path_factory):
-    """Return a function that returns one of them as a C library, compiled once."""
-    return cache(lambda name: request.module.compiled(
-        tmp_path_factory.mktemp('c'), [machines[name]]))
+    """Return the C library of all of them."""
+    return request.module.compiled(tmp_path_factory.mktemp('c'), [*machines.values()])
 
 
 @pytest.fixture

@@ -170,15 +170,9 @@ class Solver:
 
     def _placed(self, values):
         """Return where the spots are, by leg; no other public function places them."""
-        legs = list(self.assembly.legs.values())
-        rows = np.empty((len(legs), 2 * len(self._spots)))
-        if self._spots:
-            batch = self.machine.linkage.legs(self._spots, (), (), rows)
-            for given, value in zip(batch.arguments, values):
-                given.fill(value)
-            batch.arguments[2 * len(values):].T[:] = legs
-            batch.solve()
-        return [dict(zip(self._spots, row.reshape(-1, 2).tolist())) for row in rows]
+        place, at_rest = self.machine.linkage.legs(self._spots, (), ()), [0.0] * len(values)
+        rows = [place(*values, *at_rest, *leg) for leg in self.assembly.legs.values()]
+        return [dict(zip(self._spots, zip(row[::2], row[1::2]))) for row in rows]
 
 
 def _on_each_side(legs):
@@ -484,13 +478,9 @@ class Bench:
 
     def compiled(self):
         """Wait until what is being compiled is there."""
-        self._until_idle('linkage_ros compiler')
-
-    def _until_idle(self, name):
-        # The threads of a pool have a number behind its name.
-        if not self._until(lambda: not any(
-                t.name.startswith(name) for t in threading.enumerate())):
-            raise Mismatch(f'the thread {name} does not end')
+        if not self._until(lambda: not any(thread.name.startswith('linkage_ros compiler')
+                                           for thread in threading.enumerate())):
+            raise Mismatch('the compiler does not end')
         self._drain()
 
     def send(self, text):
@@ -523,7 +513,9 @@ class Bench:
         if not result.successful and not result.reason:
             raise Mismatch('refused without a reason')
         # It is accepted at once, and acts when it is prepared.
-        self._until_idle('linkage_ros worker')
+        if not self._until(lambda: self.node.is_settled):
+            raise Mismatch('it is not adopted')
+        self._drain()
         after = self._contents()
         self._check_changed({topic for topic in after if after[topic] != before.get(topic)}
                             & before.keys() if not reason else set(), changed)

@@ -192,10 +192,10 @@ def test_a_call_by_name_adds_a_few_calls_to_the_inverse_below_it(bars, near):
             (lambda: inverse.nearest(*([x] for x in given)),
              lambda: bars.servo_for('QB', *given), 5),
             (lambda: inverse.nearest(*([x] for x in given)) if near else inverse.all(0.75),
-             lambda: bars.input_for('QB', *given), 15),
+             lambda: bars.input_for('QB', *given), 5),
             (lambda: inverse.follow([0.75], [0.5]), lambda: bars.follow('QB', 0.75, 0.5), 5),
             (lambda: bars.joint_rates(0.5, ('QB',)),
-             lambda: bars.output_effort('QB', 0.5, 2.0), 20)):
+             lambda: bars.output_effort('QB', 0.5, 2.0), 10)):
         below(), call()
         assert calls(call) - calls(below) <= most
 

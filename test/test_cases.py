@@ -121,7 +121,7 @@ def test_the_reach_is_where_all_joints_have_a_place(name):
     value = np.linspace(first.low, first.high, 4002)[1:-1]
     placed = np.all([np.isfinite(place).all(axis=-1) for place in linkage.solve(
         [value, *([x] * len(value) for x in held)] if held else value).values()], axis=0)
-    assert np.array_equal(first.on(arcs, value), placed) and placed.any()
+    assert [first.on(arcs, x) for x in value.tolist()] == placed.tolist() and placed.any()
     for end in (end for arc in arcs for end in arc):
         assert np.isfinite(list(linkage.solve([end, *held] if held else end).values())).all()
 
@@ -351,7 +351,7 @@ def test_the_reach_of_geared_cranks_is_that_of_one_turn_of_the_first(ratio):
         theta = np.linspace(-math.pi, math.pi, 4002)[1:-1]
         placed = np.isfinite(linkage.solve(theta)['P']).all(axis=1)
         arcs = linkage.reach()
-        assert np.array_equal(linkage.inputs[0].on(arcs, theta), placed)
+        assert [linkage.inputs[0].on(arcs, x) for x in theta.tolist()] == placed.tolist()
         for arc in arcs:
             assert np.isfinite(linkage.solve(np.linspace(*arc, 101))['P']).all()
         for place in linkage.solve(theta[placed][::400])['P']:

@@ -12,10 +12,9 @@
 
 from fractions import Fraction
 from functools import partial
+from importlib.util import module_from_spec, spec_from_file_location
 import math
 from pathlib import Path
-import shutil
-import subprocess
 import sys
 
 from linkage_ros import mechanisms
@@ -62,21 +61,101 @@ def test_the_catalogue_is_what_is_in_its_folder_the_first_four_in_front():
     assert list(mechanisms.TYPES) == [*mechanisms.CATALOGUE, *others]
 
 
-@pytest.mark.long
+# Tracer, dimensions in the order of the page, and those that may be negative: from the sources.
+DESIGNS = {
+    'water_drop': ('P', 'a=1', ''),
+    'jansen': ('G', 'a=38 b=41.5 c=39.3 d=40.1 e=55.8 f=39.4 g=36.7 h=65.7 i=49 j=50 k=61.9 l=7.8 '
+               'm=15', ''),
+    'peaucellier': ('C', 'r=3 a=9 b=4', ''), 'slotted_lever': ('L', 'a=80 b=150 e=0', 'e'),
+    'chebyshev_lambda': ('P', 'a=1', ''), 'five_bar': ('P', 'a=.09 b=.09 c=.09 d=.09 f=.118', ''),
+    'four_bar': ('P', 'a=40 b=120 c=80 d=100 p=60', 'p'), 'hoeken': ('P', 'a=1 b=2.5 d=2', ''),
+    'klann': ('G', 'm=.268 a=.59 b=.3206 c=.5221 d=1.1051 e=.5177 f=.8966 g=.8966 h=1.732 i=.59 '
+              'j=.176 k=.233 l=.616', ''),
+    'pantograph': ('T', 'a=1 b=2.5 c=2.5 d=5 g=3', ''),
+    'slider_crank': ('B', 'a=40 b=120 c=-20', 'c'),
+    'watt': ('P', 'a=3 c=2', ''), 'whitworth': ('R', 'a=150 b=100 c=120 d=400', '')}
+
+
+@pytest.mark.parametrize('kind', DESIGNS)
+def test_the_defaults_are_those_of_the_sources_and_only_offsets_may_be_negative(kind):
+    tracer, lengths, signed = DESIGNS[kind]
+    lengths = {name: float(length) for name, _, length in (
+        each.partition('=') for each in lengths.split())}
+    linkage = mechanisms.create(kind)
+    assert (linkage.type, linkage.tracer) == (kind, tracer)
+    assert mechanisms.defaults(kind) == linkage.dimensions == lengths
+    assert [*mechanisms.defaults(kind)] == [*lengths] and set(DESIGNS) == set(mechanisms.TYPES)
+    for name, length in lengths.items():
+        if name in signed:
+            assert mechanisms.create(kind, **{name: -0.1}).dimensions[name] == -0.1
+            continue
+        for wrong in (-length, 0.0):
+            with pytest.raises(ValueError, match=(
+                    f'^{kind}: dimension {name} must be positive, got {wrong}$')):
+                mechanisms.create(kind, **{name: wrong})
+
+
+def test_the_scene_without_names_is_of_the_size_of_a_table():
+    assert mechanisms.CATALOGUE == {
+        'water_drop': 0.1, 'jansen': 0.005, 'peaucellier': 0.1, 'slotted_lever': 0.002}
+
+
+@pytest.mark.parametrize('call, reason', [
+    (lambda: mechanisms.design('jansn'), "unknown mechanism type 'jansn'; allowed: water_drop, .*"
+     r'whitworth, custom, rods; did you mean jansen\?$'),
+    (lambda: mechanisms.create(None), 'unknown mechanism type None; allowed: .*, rods$'),
+    (lambda: mechanisms.create('watt', joints=['O ground 0 0']),
+     'joints and tracer are for type custom or rods, not for watt$'),
+    (lambda: mechanisms.create('watt', tracer='A'), 'joints and tracer are for type .* watt$'),
+    (lambda: mechanisms.defaults('custom'),
+     "no defaults for type 'custom'; allowed: water_drop, .*, whitworth$"),
+    (lambda: mechanisms.defaults(['watt']), 'no defaults for type '),
+    (lambda: mechanisms.design('custom', ['A ground 0 0'], dimensions=3),
+     'dimensions must be a list of names, got 3$'),
+    (lambda: mechanisms.create('custom', joints=['O ground 0 0', 'A crank O 1'], tracer=3),
+     'tracer must be the name of a joint, got 3$'),
+    (lambda: mechanisms.create('custom', joints=['O ground 0 0', 'A crank O 1'], tracer='a'),
+     r"tracer 'a' is not a joint; allowed: O, A; did you mean A\?$"),
+    (lambda: mechanisms.create('custom', joints=['O ground 0 0', 'A crank O q'], r=1.0, Q=2.0),
+     r'.*"A crank O q": dimension q has no value; given: r, Q; did you mean Q\?$'),
+    (lambda: mechanisms.design('custom', ['O ground 0 0', 'A crank O 1'], None, ['a b']),
+     "'a b' cannot name a dimension"),
+    (lambda: mechanisms.create('custom', joints=['O ground 0 0']),
+     'a linkage needs a line that drives it: crank or cylinder or carriage$'),
+    *((lambda wrong=wrong: mechanisms.create('custom', joints=wrong),
+       'joints must be a list of lines, one per joint, got ')
+      for wrong in (None, 'A crank O 1', b'A', [], {'A': 1}, {'A'}, 7)),
+    (lambda: mechanisms.create('custom', joints=['O ground 0 0', 7]),
+     'joints must be lines of text, but line 2 is 7$'),
+    (lambda: mechanisms.create('custom', joints=['O ground 0 0'] * 2001),
+     'joints must be up to 2000 lines, got more$'),
+])
+def test_what_is_no_mechanism_is_refused_with_what_is_allowed(call, reason):
+    with pytest.raises(ValueError, match='^' + reason):
+        call()
+
+
 @pytest.mark.parametrize('text, said', [
-    ('', "module 'linkage_ros.mechanisms.broken' has no attribute 'DESIGN'"),
+    ('', "module 'linkage_ros.other.broken' has no attribute 'DESIGN'"),
     ('DESIGN = Design()', "name 'Design' is not defined"),
     ('DESIGN = ', 'invalid syntax'),
     (Path(mechanisms.TYPES['watt'].__file__).read_text(),
      "must have the name of its design, 'watt'")])
-def test_a_file_that_is_no_mechanism_is_named(tmp_path, text, said):
-    package = tmp_path / 'linkage_ros'
-    shutil.copytree(Path(mechanisms.__file__).parents[1], package)
-    (package / 'mechanisms' / 'broken.py').write_text(text)
-    ended = subprocess.run([sys.executable, '-c', 'import linkage_ros.mechanisms'], cwd=tmp_path,
-                           capture_output=True, text=True, timeout=60)
-    error = ended.stderr.splitlines()[-1]
-    assert error.startswith('ImportError: linkage_ros.mechanisms.broken ') and said in error
+def test_a_file_that_is_no_mechanism_is_named(tmp_path, monkeypatch, text, said):
+    (tmp_path / 'broken.py').write_text(text)
+    folders = [*mechanisms.__path__, str(tmp_path)]
+    spec = spec_from_file_location('linkage_ros.other', mechanisms.__file__,
+                                   submodule_search_locations=folders)
+    other = module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, spec.name, other)
+    try:
+        with pytest.raises(ImportError) as refused:
+            spec.loader.exec_module(other)
+    finally:
+        for name in [name for name in sys.modules if name.startswith(f'{spec.name}.')]:
+            del sys.modules[name]
+    assert str(refused.value).startswith('linkage_ros.other.broken ')
+    assert said in str(refused.value)
 
 
 @pytest.mark.sample(3)

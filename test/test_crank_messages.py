@@ -19,7 +19,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from linkage_ros.nodes import kinematics  # noqa: E402
+from linkage_ros.nodes import kinematics, log  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from rclpy.logging import LoggingSeverity  # noqa: E402
 from rclpy.serialization import serialize_message  # noqa: E402
@@ -84,7 +84,8 @@ def test_bytes_that_are_no_joint_states_are_passed_over_with_one_warning(graph, 
     for _ in range(5):
         hand.send(text=text)
     said = graph.until(lambda: hand.warnings('no JointState'))
-    assert f'{len(text)} bytes' in said[0] and len(said[0]) < 400
+    assert said[0].startswith(f'crank_states: a message of {len(text)} bytes is ignored, since it '
+                              'is no JointState: ') and len(said[0]) < 400
     assert hand.moved(['jansen_crank'], [0.5], [1.0]).velocity[0] == 1.0
     assert len(hand.warnings('no JointState')) == 1
 
@@ -217,8 +218,20 @@ def test_names_that_are_no_inputs_are_said_once(graph):
     hand.send(['jansen_krank', 'wheel'], [0.1, 0.3])
     hand.moved(['jansen_crank'], [0.7])
     graph.until(lambda: hand.warnings('called wheel'))
-    assert len(hand.warnings('jansen_krank')) == 1
-    assert 'the inputs are jansen_crank' in hand.warnings('krank')[0]
+    assert hand.warnings('no input is called') == [
+        f'crank_states: no input is called {name}; the inputs are jansen_crank'
+        for name in ('jansen_krank', 'wheel')]
+
+
+def test_a_warning_is_repeated_when_its_time_is_over(graph, monkeypatch):
+    hand = Hand(graph, 'cell', {'mechanisms': ['cell'], 'cell.type': 'peaucellier'})
+    for seconds, count in ((60.0, 1), (0.0, 4), (60.0, 4)):
+        monkeypatch.setattr(log, 'SECONDS', seconds)
+        for angle in (2.0, 2.1, 2.2):
+            hand.send(['cell_crank'], [angle])
+        hand.moved(['cell_crank'], [0.5 + 0.01 * count])
+        graph.all_logged(hand.node, hand.said)
+        assert len(hand.warnings('cannot be assembled')) == count
 
 
 def test_a_stream_of_new_names_is_said_within_bounds(graph):

@@ -149,7 +149,7 @@ def test_what_hangs_on_a_cylinder_limits_its_stroke():
     low, high = linkage.inputs[0].low, linkage.inputs[0].high
     length = np.linspace(low, high, 4001)
     placed = np.isfinite(linkage.solve(length)['D']).all(axis=1)
-    held = linkage.inputs[0].on(linkage.reach(), length)
+    held = [linkage.inputs[0].on(linkage.reach(), x) for x in length.tolist()]
     assert placed.any() and np.count_nonzero(placed != held) <= 2
 
 

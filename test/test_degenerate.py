@@ -256,7 +256,7 @@ def test_the_reach_past_a_change_point_is_that_of_two_turns():
                     'R ground 4 -4', 'C dyad B R 3 2.5 left')
     reach, theta = found.reach(), np.linspace(-math.tau, math.tau, 8001)[:-1]
     placed = np.isfinite(found.solve(theta)['C']).all(-1)
-    inside = found.inputs[0].on(reach, theta)
+    inside = [found.inputs[0].on(reach, x) for x in theta.tolist()]
     assert placed.any() and not placed.all() and (placed == inside).all()
     assert all(-math.tau <= lo < math.tau and lo < hi for lo, hi in reach)
     # At pi the linkage changes to the side on which it is inside the reach, and back at -pi.

@@ -299,6 +299,14 @@ def test_the_table_of_engines_is_that_of_the_last_run(measured):
             == benchmark.engines.table(results['engines']))
 
 
+def test_every_file_that_the_architecture_names_is_there():
+    # The recipes write files of their own.
+    page = (ROOT / 'docs' / 'architecture.md').read_text().partition('## Recipes')[0]
+    files = set(re.findall(r'`((?:\w+/)*\w+\.py)`', page))
+    assert len(files) > 40 and not [file for file in files if not any(
+        (folder / file).exists() for folder in (ROOT, ROOT / 'linkage_ros'))]
+
+
 def test_every_call_that_the_pages_show_is_timed(measured, tmp_path, monkeypatch):
     from benchmark import calls, document
     monkeypatch.chdir(tmp_path)

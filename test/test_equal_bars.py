@@ -214,5 +214,5 @@ def test_a_walker_has_the_limits_too(start):
     assembly = folded_scene().assembly()
     solution = assembly.solution(('C',), ('AC', 'QC'))
     solution.solve([start])
-    assert np.isfinite(solution.values).all() and assembly.within_reach(start).all()
+    assert np.isfinite(solution.values).all() and all(assembly.within_reach(start))
     assert 0.5 in solution.values.tolist()

@@ -70,11 +70,11 @@ def test_a_changed_scene_is_what_all_values_read_anew_make(values):
 @pytest.mark.slow
 def test_of_a_change_to_one_only_that_is_read_prepared_and_announced(graph, monkeypatch):
     pytest.importorskip('rclpy')
-    from linkage_ros.nodes import driven_mechanism, kinematics, ownership
+    from linkage_ros.nodes import kinematics, mechanism_topics, ownership
     from rcl_interfaces.msg import ParameterEvent
 
     read, made = [], []
-    read_machine, model = scene.read_machine, driven_mechanism.MechanismModel
+    read_machine, model = scene.read_machine, mechanism_topics.MechanismModel
 
     def reading(name, given, old, strict):
         machine = read_machine(name, given, old, strict)
@@ -82,7 +82,7 @@ def test_of_a_change_to_one_only_that_is_read_prepared_and_announced(graph, monk
         return machine
 
     monkeypatch.setattr(scene, 'read_machine', reading)
-    monkeypatch.setattr(driven_mechanism, 'MechanismModel', lambda machine, *args: (
+    monkeypatch.setattr(mechanism_topics, 'MechanismModel', lambda machine, *args: (
         made.append(machine.name) or model(machine, *args)))
     node = graph.start(kinematics.Kinematics, MANY)
     assert read == made == MANY['mechanisms']

@@ -19,7 +19,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from linkage_ros import mechanisms, scene  # noqa: E402
+from linkage_ros import mechanisms, palette, scene  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
@@ -321,14 +321,24 @@ def test_an_angle_out_of_reach_is_passed_over_with_a_warning(graph):
     assert all(np.isfinite(m.position).all() and m.position[0] == 1.0 for m in bench.joints)
     message, = (m.msg for m in graph.all_logged(bench.node, logged)
                 if 'cell' in m.name and 'cannot be assembled' in m.msg)
-    assert 'cell cannot be assembled at crank angle 2 rad' in message
-    assert '[-1.17137, 1.17137]' in message
+    assert message == ('cell cannot be assembled at crank angle 2 rad; the reach is '
+                       '[-1.17137, 1.17137] rad')
     assert bench.set(cell__points=['A']).successful
     del bench.markers[:]
     bench.hand.send([2.0])
     bench.legs_at(1.0)
     assert all(math.atan2(*places(m.markers[0])[0][::-1]) == pytest.approx(1.0)
                for m in bench.markers if m.markers[0].action == Marker.ADD)
+
+
+def test_a_joint_that_has_a_place_is_not_shown_where_the_linkage_cannot_be_assembled(graph):
+    bench = Bench(graph, 'cell', {**CELL, 'cell.points': ['A']}, joints=False)
+    assert places(bench.links_and_joints_at(1.0)[-1])[0] == pytest.approx(
+        [3.0 * math.cos(1.0), 3.0 * math.sin(1.0)])
+    del bench.markers[:]
+    bench.hand.send([2.0])
+    message, = graph.until(lambda: bench.markers)
+    assert {marker.action for marker in message.markers} == {Marker.DELETE}
 
 
 def test_a_leg_that_cannot_be_assembled_is_left_out_and_the_others_stay(graph):
@@ -352,16 +362,52 @@ def test_only_wanted_joints_are_drawn_in_the_order_they_are_wanted(graph):
     assert [marker.type for marker in bench.links_and_joints_at(0.4)] == [Marker.SPHERE_LIST]
 
 
-def test_the_pose_of_the_plane_is_the_pose_of_the_markers(graph):
-    bench = Bench(graph, 'jansen', {
-        'jansen.pose': [1.0, 2.0, 3.0, math.pi / 2, 0.0, 0.0], 'frame_id': 'floor'})
-    for marker in bench.links_and_joints_at(0.3):
-        p, q = marker.pose.position, marker.pose.orientation
-        assert (p.x, p.y, p.z) == (1.0, 2.0, 3.0)
-        up = [2 * (q.x * q.y - q.w * q.z), 1 - 2 * (q.x ** 2 + q.z ** 2),
-              2 * (q.y * q.z + q.w * q.x)]
-        assert up == pytest.approx([0.0, 0.0, 1.0], abs=1e-15)
-        assert marker.header.frame_id == 'floor'
+# Type, colour, width as a part of the longest bar, and layer above the plane, by the marker's id.
+LOOKS = {
+    0: (Marker.LINE_LIST, 'BAR', 40, 0), 1: (Marker.SPHERE_LIST, 'JOINT', 20, 0),
+    2: (Marker.LINE_STRIP, 'LOCUS', 100, -3), 3: (Marker.LINE_LIST, 'SLOT', 14, 1),
+    4: (Marker.LINE_LIST, 'BAR', 22, 3), 5: (Marker.LINE_LIST, 'DRIVEN', 40, 2),
+    6: (Marker.LINE_LIST, 'DRIVEN', 22, 4), 7: (Marker.TRIANGLE_LIST, 'BAR', None, -1),
+    8: (Marker.TRIANGLE_LIST, 'EARTH', None, -2)}
+
+
+@pytest.mark.parametrize('name, given, size, ids', [
+    ('walker', WALKER, 0.01 * 65.7, {0, 1, 2, 5, 7, 8}),
+    ('lever', {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}, 270.0,
+     {0, 1, 2, 3, 4, 5, 8}), ('boom', None, 3.2, {0, 1, 6, 7, 8})])
+def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, given, size, ids):
+    pose, given = [1.0, -2.0, 3.0, 0.4, -0.3, 2.5], given or BOOM
+    node = graph.start(Kinematics, {
+        **given, f'{name}.pose': pose, f'{name}.frame_id': 'floor', 'frame_prefix': 'robot/'})
+    drawn, locus = graph.listen(MarkerArray, f'{name}/markers'), graph.listen(
+        Marker, f'{name}/locus', LATCHED)
+    machine, = node.scene.machines.values()
+    push = graph.crank([drive.source for drive in machine.inputs.values()])
+    markers = push([0.3] if len(ids) > 5 else [2.0, 1.1], drawn).markers
+    (cr, cp, cy), (sr, sp, sy) = np.cos(pose[3:]), np.sin(pose[3:])
+    # The third column of the rotation about x, then y, then z.
+    up = np.array([cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr])
+    if 2 in ids:
+        markers = [*markers, graph.until(locus.copy)[-1]]
+    assert {marker.id for marker in markers} == ids and len(markers) == len(ids)
+    for marker in markers:
+        type_, colour, part, layer = LOOKS[marker.id]
+        p, q, scale, rgba = (marker.pose.position, marker.pose.orientation, marker.scale,
+                             marker.color)
+        whole = part in (None, 20)
+        width = size / part if part else 1.0
+        assert (marker.ns, marker.type, marker.action, marker.header.frame_id) == (
+            name, type_, Marker.ADD, 'robot/floor')
+        assert [p.x, p.y, p.z] == pytest.approx(list(pose[:3] + layer * size / 250.0 * up))
+        assert [scale.x, scale.y, scale.z] == pytest.approx([width] + [width * whole] * 2)
+        assert [rgba.r, rgba.g, rgba.b, rgba.a] == pytest.approx(
+            [*palette.rgb(getattr(palette, colour)), 1.0], abs=1e-7)
+        assert 2.0 * np.array([q.x * q.z + q.w * q.y, q.y * q.z - q.w * q.x]) == pytest.approx(
+            up[:2])
+        face = palette.rgb(palette.PLATE if marker.id == 7 else getattr(palette, colour))
+        assert [pytest.approx([*face, 1.0], abs=1e-7)] * len(marker.colors) == [
+            [one.r, one.g, one.b, one.a] for one in marker.colors]
+        assert len(marker.colors) == (len(marker.points) // 3 if marker.id > 6 else 0)
 
 
 def test_roll_pitch_and_yaw_turn_about_fixed_axes():

@@ -98,12 +98,11 @@ def by_dimensions(name, values):
 
 def by_loop(name, values):
     pytest.importorskip('llvmlite')
-    rows = np.empty((values[0].size, 1))
-    batch = bound(name, True).batch(rows)
+    rows, pose = np.empty((values[0].size, 1)), bound(name)
+    batch = pose.batch(rows)
     batch.arguments[:] = values
-    batch.finish()
-    batch.solve()
-    assert batch.code
+    pose.variant.loop.result()
+    assert batch.solve()
     return rows[:, 0]
 
 

@@ -21,7 +21,6 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from linkage_ros.nodes import plan  # noqa: E402
 from oracle import Bench, everything, history, message, Mismatch, SCENES  # noqa: E402
 from ros_harness import Graph  # noqa: E402
 from sweeps import EXHAUSTIVE
@@ -68,18 +67,6 @@ def test_a_message_that_sets_nothing_off_ends_nothing(graph, parameters, steps):
     Bench(graph, parameters).run(steps)
 
 
-@pytest.fixture
-def machine_code(monkeypatch):
-    """Hold that machine code runs some messages, where llvmlite works."""
-    ran = []
-    if plan.plan_llvm:
-        run = plan.plan_llvm.LlvmBackend.run
-        monkeypatch.setattr(plan.plan_llvm.LlvmBackend, 'run', lambda backend, *args: (
-            ran.append(args) or run(backend, *args)))
-    yield
-    assert bool(ran) == bool(plan.plan_llvm)
-
-
 LOADED = {
     'a lever': {'mechanisms': ['a', 'b'], 'a.type': 'slotted_lever', 'b.type': 'jansen',
                 'a.loads': ['L=0 -9.81']},
@@ -88,7 +75,6 @@ LOADED = {
         'a.cylinder.source': 'a_crank'}}
 
 
-@pytest.mark.usefixtures('machine_code')
 @pytest.mark.parametrize('parameters', LOADED.values(), ids=LOADED)
 def test_efforts_are_there_whoever_sets_the_message_off(graph, parameters):
     Bench(graph, parameters).run([
@@ -102,7 +88,6 @@ PAIR = {'mechanisms': ['a', 'b'], 'a.type': 'jansen', 'b.type': 'peaucellier'}
 END = 2.0 * math.acos(5.0 / 6.0)
 
 
-@pytest.mark.usefixtures('machine_code')
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('by', [
     message({'a_crank': 0.3}, [math.nan]), message({'a_crank': 0.3}, [math.inf]),
@@ -121,7 +106,6 @@ MEASURED = {'mechanisms': ['a', 'b'], 'a.type': 'four_bar', 'a.crank.measures': 
             'b.type': 'slotted_lever'}
 
 
-@pytest.mark.usefixtures('machine_code')
 @pytest.mark.parametrize('bad', [9.0, math.nan, math.inf])
 def test_what_a_sensor_cannot_say_is_no_pose(graph, bad):
     bench = Bench(graph, MEASURED)
@@ -132,7 +116,6 @@ def test_what_a_sensor_cannot_say_is_no_pose(graph, bad):
     assert bench.model.states['a'].values == [pytest.approx(0.54, abs=0.1)]
 
 
-@pytest.mark.usefixtures('machine_code')
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('seed', range(5))
 def test_what_leaves_its_reach_leaves_the_picture(graph, seed):
@@ -143,21 +126,17 @@ def test_what_leaves_its_reach_leaves_the_picture(graph, seed):
         *(message({'b_crank': angle}, [1.0]) for angle in [0.1, 0.1, *near, *5 * [END + 0.1]])])
 
 
-@pytest.mark.usefixtures('machine_code')
 @pytest.mark.parametrize('turn', [-3, 1, 1000])
 def test_the_reach_is_the_same_in_any_turn(graph, turn):
     parameters = {'mechanisms': ['b'], 'b.type': 'peaucellier'}
     angles = [sign * (END + gap) + turn * math.tau
               for sign in (1.0, -1.0) for gap in (-1.0, -1e-6, 1e-6, 0.5)]
     bench = Bench(graph, parameters)
-    still = message({'b_crank': 0.1})
-    # A plan tries for machine code at its second message, and then now and then.
     bench.run([
-        *everything(parameters), *3 * [still], ('compiled',), *6 * [still],
+        *everything(parameters), message({'b_crank': 0.1}),
         *(message({'b_crank': angle}) for angle in angles)])
 
 
-@pytest.mark.usefixtures('machine_code')
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('name', ['an excavator', 'a reach that ends',
                                   'more legs than are solved one by one'])
@@ -174,19 +153,23 @@ def test_numbers_are_the_same_at_the_ends_of_the_reach_and_in_many_legs(graph, n
 
 
 WITHOUT = 'LINKAGE_ROS_WITHOUT_LLVMLITE'
+# What replaces llvmlite: nothing, and a package whose library cannot be loaded.
+REPLACED = {'missing': ('sitecustomize.py', "import sys\nsys.modules['llvmlite'] = None\n"),
+            'broken': ('llvmlite.py', "raise OSError('libllvmlite.so cannot be loaded')\n")}
 
 
-# `make nodes PLAIN=1` runs them so, too.
 @pytest.mark.long
 @pytest.mark.skipif(WITHOUT in os.environ, reason='this is without')
+@pytest.mark.parametrize('replaced', REPLACED)
 @pytest.mark.parametrize('which', [
     'not exhaustive', pytest.param('exhaustive', marks=pytest.mark.exhaustive)])
-def test_all_this_holds_without_llvmlite(tmp_path, which):
-    (tmp_path / 'sitecustomize.py').write_text(
-        "import sys\nsys.modules['llvmlite'] = None\n")
+def test_all_this_holds_without_llvmlite(tmp_path, which, replaced):
+    name, text = REPLACED[replaced]
+    (tmp_path / name).write_text(text)
     paths = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
     done = subprocess.run(
-        [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider', '-m', which, __file__],
+        [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider', '-m', which,
+         '-W', 'ignore:no machine code', __file__],
         env={**os.environ, 'PYTHONPATH': paths, WITHOUT: '1'}, cwd=Path(__file__).parents[1],
         capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-5000:]

@@ -19,6 +19,7 @@ pytest.importorskip('linkage_interfaces')
 
 from linkage_interfaces.srv import ServoInverse as Service  # noqa: E402
 from linkage_ros import scene  # noqa: E402
+from linkage_ros.nodes import ownership  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.ownership import LATCHED, TOPIC  # noqa: E402
@@ -84,6 +85,37 @@ def test_a_dimension_set_on_the_owner_is_everybodys_within_half_a_second(graph, 
     assert answer == alone.answer(request, Service.Response()).servo_angle
 
 
+@pytest.mark.parametrize('namespace', ['', '/left'])
+def test_the_owner_announces_all_shared_values_and_then_each_change(graph, monkeypatch, namespace):
+    monkeypatch.setattr(ownership, 'DEPTH', 3)
+    heard = graph.listen(ParameterEvent, f'{namespace}/{TOPIC}', LATCHED)
+    before = graph.node.get_clock().now().nanoseconds
+    owner = graph.start(Kinematics, LEVER, namespace=namespace)
+    graph.until(lambda: heard)
+    assert graph.set(owner, frame_id='map').successful
+    for a in (90.0, 91.0, 92.0, 93.0):
+        assert graph.set(owner, lever__dimensions__a=a, lever__scale=2.0).successful
+    graph.until(lambda: len(heard) == 5)
+
+    def shared(**values):
+        return {one.name: (Parameter.Type[one.field.kind.upper()], one.value)
+                for one in scene.read({**LEVER, **values}).parameters if one.field.shared}
+
+    def said(messages):
+        return {one.name: (one.type_, scene.plain(one.value))
+                for one in map(Parameter.from_parameter_msg, messages)}
+
+    double = Parameter.Type.DOUBLE
+    assert [(said(event.new_parameters), said(event.changed_parameters)) for event in heard] == [
+        (shared(), {}), ({}, {A: (double, 90.0), 'lever.scale': (double, 2.0)}),
+        ({}, {A: (double, 91.0)}), ({}, shared(**{A: 92.0, 'lever.scale': 2.0})),
+        ({}, {A: (double, 93.0)})]
+    times = [event.stamp.sec * 10 ** 9 + event.stamp.nanosec for event in heard]
+    assert before < times[0] and times == sorted(times)
+    assert {event.node for event in heard} == {f'{namespace}/kinematics'}
+    assert not any(event.deleted_parameters for event in heard)
+
+
 def test_nodes_of_other_namespaces_are_none_of_its_business(graph):
     owner = graph.start(Kinematics, LEVER, namespace='left')
     other = graph.start(ServoInverse, LEVER, namespace='right')
@@ -143,6 +175,13 @@ def test_other_values_at_the_start_of_either_are_said_once_and_followed(graph, w
     graph.start(Kinematics, {**LEVER, A: 82.0})
     graph.until(lambda: of(service) == of(late) == 82.0)
     assert warned[2:] == [said.replace('81.0', '84.0')] * 2
+    # The same once more is news, too.
+    stop(graph, next(node for node in graph.executor.get_nodes() if isinstance(node, Kinematics)))
+    for node in service, late:
+        assert graph.set(node, lever__dimensions__a=84.0).successful
+    graph.start(Kinematics, {**LEVER, A: 82.0})
+    graph.until(lambda: of(service) == of(late) == 82.0)
+    assert warned[4:] == [said.replace('81.0', '84.0')] * 2
 
 
 def test_other_mechanisms_are_said_and_the_rest_is_followed(graph, warned):

@@ -64,9 +64,11 @@ def test_all_files_name_one_version(arguments):
 
 def test_every_source_begins_with_the_notice_that_ament_copyright_knows():
     # As it reads files: comment marks and the way the lines are broken do not count.
-    sources = [path for path in ROOT.glob('**/*') if path.suffix in (
-        '.py', '.c', '.cpp', '.hpp', '.h', '.cmake') and not any(
-            part.startswith(('.', 'build', 'install')) for part in path.relative_to(ROOT).parts)]
+    folders = [path for path in ROOT.iterdir() if path.is_dir()
+               and not path.name.startswith(('.', 'build', 'install', 'log'))]
+    sources = [path for folder in (ROOT / '.ci', *folders) for path in folder.rglob('*')
+               if path.suffix in ('.py', '.c', '.cpp', '.hpp', '.h', '.cmake')] + [
+                   ROOT / 'setup.py']
     heads = {path: ' '.join(re.findall(r'[^\s#/*]\S*', path.read_text()[:1000]))
              for path in sources if not (path.parent / 'AMENT_IGNORE').exists()}
     notice, = {head[:head.index(' limitations under the License.')] for head in heads.values()

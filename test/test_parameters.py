@@ -25,8 +25,12 @@ from linkage_ros.nodes import scene_node as nodes
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
+from linkage_ros.scene import slider  # noqa: E402
 from rcl_interfaces.msg import (
+    FloatingPointRange,  # noqa: E402
+    IntegerRange,  # noqa: E402
     Parameter as ParameterMessage,  # noqa: E402
+    ParameterDescriptor,  # noqa: E402
     ParameterValue,  # noqa: E402
     SetParametersResult,  # noqa: E402
 )
@@ -138,6 +142,37 @@ def test_no_value_of_any_kind_ends_a_node_or_spoils_a_parameter(graph, kind):
 @pytest.mark.parametrize('kind', KINDS)
 def test_no_value_of_any_kind_spoils_any_parameter(graph, kind):
     assert refuse_all(graph, kind, list) > 1000
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_every_parameter_is_described_as_the_scene_has_it(graph, kind):
+    whole, node = scene.read(EVERYTHING), graph.start(kind, EVERYTHING)
+    own = [one for one in whole.parameters if node.get_name() in one.field.readers]
+    names = [one.name for one in own]
+    assert sorted(names) == sorted(node.fields) == sorted(
+        name for name in node.get_parameters_by_prefix('') if name != 'use_sim_time'
+        and not name.startswith(('start_type', 'qos_overrides')))
+    abouts, types = Client(graph, node).about(names)
+    assert len(abouts) == len(types) == len(own)
+    for one, about, type_ in zip(own, abouts, types):
+        kind, ends = Parameter.Type[one.field.kind.upper()].value, slider.ends(whole, one)
+        assert scene.plain(node.get_parameter(one.name).value) == one.value
+        assert type_ == kind
+        assert about == ParameterDescriptor(
+            name=one.name, type=kind, description=one.field.meaning, dynamic_typing=True,
+            additional_constraints=one.field.allowed, read_only=one.field.read_only,
+            integer_range=[IntegerRange(from_value=ends[0], to_value=ends[1], step=1)]
+            if ends and one.field.kind == 'integer' else [],
+            floating_point_range=[FloatingPointRange(from_value=ends[0], to_value=ends[1])]
+            if ends and one.field.kind == 'double' else [])
+
+
+@pytest.mark.parametrize('kind, line', [
+    (CrankDriver, 'ready: moves leg_crank, lever_crank, own_crank on crank_states at 50 Hz'),
+    (Kinematics, 'ready: moves leg, lever, own by crank_states'),
+    (ServoInverse, 'ready: answers servo_inverse for leg, lever, own')])
+def test_a_node_says_what_it_serves(graph, kind, line):
+    assert f'ready: {graph.start(kind, EVERYTHING).serves()}' == line
 
 
 def test_names_and_types_that_there_are_not_are_refused(graph):

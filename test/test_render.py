@@ -14,9 +14,11 @@ import csv
 import itertools
 import math
 from pathlib import Path
+import re
 import shutil
 import subprocess
 import sys
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -35,8 +37,6 @@ from linkage_ros.render.parts import DEFAULT, PARTS, TRACES  # noqa: E402
 from linkage_ros.render.picture import Picture  # noqa: E402
 from matplotlib.colors import to_rgb  # noqa: E402
 from PIL import Image  # noqa: E402
-
-pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / 'config'
@@ -67,6 +67,7 @@ def rows_of(file):
                 for row in csv.DictReader(lines)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('row', TABLE, ids=[Path(row[2]).name for row in TABLE])
 def test_every_picture_of_the_table_is_drawn(row, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
@@ -78,6 +79,7 @@ def test_every_picture_of_the_table_is_drawn(row, tmp_path, monkeypatch):
         assert getattr(image, 'n_frames', 1) == (3 if few else 1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('ending, args', [
     ('png', []), ('svg', []), ('gif', ['--frames', '4', '--trace', 'fading'])])
 def test_the_same_request_gives_the_same_bytes(tmp_path, ending, args):
@@ -85,6 +87,7 @@ def test_the_same_request_gives_the_same_bytes(tmp_path, ending, args):
     assert rendered(tmp_path, *args, config='all', ending=ending).read_bytes() == once
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not shutil.which('ffmpeg'), reason='ffmpeg is not installed')
 def test_an_mp4_has_the_same_bytes_each_time(tmp_path):
     once = rendered(tmp_path, '--frames', '3', ending='mp4').read_bytes()
@@ -114,22 +117,24 @@ def test_a_gif_has_the_frames_the_rate_the_loops_and_the_size_asked_for(tmp_path
 
 def test_a_turn_is_drawn_in_the_time_it_takes(tmp_path):
     data = tmp_path / 'joints.csv'
-    rendered(tmp_path, '--fps', '10', '--turns', '2', '--size', '200x200', '--data', str(data),
-             ending='gif')
+    rendered(tmp_path, '--fps', '2', '--turns', '2', '--size', '99x99', '--hide', 'axes,title',
+             '--data', str(data), ending='gif')
     times = [row['time'] for row in rows_of(data)]
     cranks = [row['jansen_crank'] for row in rows_of(data)]
-    assert len(times) == round(10 * 2 * math.tau / 2.0)  # two turns at 2 rad/s, 10 frames a second
+    assert len(times) == round(2 * 2 * math.tau / 2.0)  # two turns at 2 rad/s, 2 frames a second
+    assert times == pytest.approx(math.tau / len(times) * np.arange(len(times)))
     assert np.allclose(np.remainder(2.0 * np.array(times), math.tau), cranks, atol=1e-12)
 
 
+@pytest.mark.long
 def test_the_data_are_the_joints_as_solved_to_the_last_digit(tmp_path):
     data = tmp_path / 'joints.csv'
-    rendered(tmp_path, '--frames', '25', '--size', '99x99', '--hide', 'axes,title',
+    rendered(tmp_path, '--frames', '4', '--size', '99x99', '--hide', 'axes,title',
              '--data', str(data), config='strandbeest', ending='gif')
     leg = mechanisms.create('jansen')
     rows = rows_of(data)
-    assert len(rows) == 25
-    for row, (pair, side) in itertools.product(rows[::6], itertools.product(range(6), (1, -1))):
+    assert len(rows) == 4
+    for row, (pair, side) in itertools.product(rows, itertools.product(range(6), (1, -1))):
         theta = row['strandbeest_crank'] - math.tau * pair / 6
         solved = leg.solve(theta if side > 0 else math.pi - theta)
         name = f'strandbeest_{"left" if side > 0 else "right"}{pair}'
@@ -141,7 +146,8 @@ def test_the_data_are_the_joints_as_solved_to_the_last_digit(tmp_path):
 def test_the_bars_in_the_data_are_as_long_as_in_the_original_document(tmp_path):
     data = tmp_path / 'joints.csv'
     assert main([str(ROOT / 'pictures/jansen.yaml'), '--out', str(tmp_path / 'leg.gif'),
-                 '--frames', '9', '--data', str(data)]) == 0
+                 '--frames', '4', '--size', '99x99', '--hide', 'axes,title', '--data',
+                 str(data)]) == 0
     lengths = {'OA': 15.0, 'BC': 41.5, 'AC': 50.0, 'BD': 40.1, 'CD': 55.8, 'BE': 39.3,
                'AE': 61.9, 'EF': 36.7, 'DF': 39.4, 'EG': 49.0, 'FG': 65.7}
     for row, ((p, q), length) in itertools.product(rows_of(data), lengths.items()):
@@ -149,6 +155,7 @@ def test_the_bars_in_the_data_are_as_long_as_in_the_original_document(tmp_path):
         assert math.dist(*ends) == pytest.approx(length, rel=1e-13)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize('type_', list(mechanisms.TYPES))
 def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
     one = machine(type_)
@@ -163,6 +170,7 @@ def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
     assert np.all(pixels < (box.x1 - 15, box.y1 - 15))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize('args', [[], ['--show', 'dimensions'], ['--size', '600x460']])
 @pytest.mark.parametrize('config', ['all', 'slotted_lever', 'peaucellier', 'jansen'])
 def test_nothing_reaches_over_the_edge_of_a_picture(tmp_path, config, args):
@@ -185,7 +193,8 @@ def test_an_animation_shows_what_a_still_of_that_time_shows(tmp_path, type_, opt
 
 
 def test_a_gif_keeps_the_colours_that_colour_blind_people_tell_apart(tmp_path):
-    file = rendered(tmp_path, '--frames', '3', ending='gif')
+    file = rendered(tmp_path, '--frames', '2', '--size', '400x400', '--hide', 'axes,title',
+                    ending='gif')
     with Image.open(file) as image:
         seen = {colour for _, colour in image.convert('RGB').getcolors(1 << 16)}
     wanted = [palette.BAR, palette.DRIVEN, palette.LOCUS, palette.GREY, 'white']
@@ -225,7 +234,9 @@ def test_a_fading_trace_ends_at_the_tracer_and_begins_where_it_was_three_tenths_
         pieces = segments_of(picture)
         first, last = drop.linkage.solve(math.tau * np.array([turns - 0.3, turns]), ('P',))['P']
         assert np.allclose(pieces[-1][-1], last, atol=1e-12)
-        assert math.dist(pieces[0][0], first) < 0.04
+        assert math.dist(pieces[0][0], first) < 0.04 and len(pieces) == 216
+        colours = picture.panels[0].moving[0].artists[0].get_colors()
+        assert colours[[0, -1], :3] == pytest.approx(np.array([[1.0] * 3, to_rgb(palette.LOCUS)]))
 
 
 def test_a_foot_stands_on_the_lowest_part_of_its_curve():
@@ -239,6 +250,7 @@ def test_a_foot_stands_on_the_lowest_part_of_its_curve():
     assert np.hypot(*np.diff(standing, axis=0).T).max() < 2.0  # one piece
 
 
+@pytest.mark.long
 def test_a_cylinder_is_drawn_from_base_to_rod_and_a_scribble_is_not():
     arm = scene.load(CONFIG / 'excavator.yaml').machines['excavator']
     picture = picture_of(arm)
@@ -328,6 +340,7 @@ def test_angles_and_ratio_of_a_slotted_lever_are_printed():
     assert texts_of(picture)[1:] == ['φ = 0.0°', 'φ/θ = –', f'dφ/dθ = {80 / 230:.3f}']
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize('trace', TRACES)
 @pytest.mark.parametrize('type_', ['jansen', 'five_bar'])
 def test_every_trace_and_part_can_be_drawn(type_, trace):
@@ -342,17 +355,117 @@ def test_the_crank_is_where_it_was_asked_to_be(crank):
     for angle in np.linspace(-0.49, 0.99, 17):
         assert math.remainder(wheel.value(wheel.turns_to(angle)) - angle,
                               math.tau) == pytest.approx(0.0, abs=1e-12)
+        assert wheel.turns_to(angle + math.tau) == pytest.approx(wheel.turns_to(angle))
 
 
-def test_several_cranks_turn_as_fast_as_they_were_told_to():
-    five_bar = machine('five_bar', crank__speed=1.0, crank2__speed=-1.5, crank2__start=2.0)
+@pytest.mark.parametrize('speeds, count, ratios', [
+    ((1.0, -1.5), 2, (1.0, -1.5)), ((-2.0, 0.0), 1, (-1.0, 0.0)), ((0.0, 3.0), 1, (1.0, 1.0)),
+    ((1.0, math.pi), 24, (1.0, math.pi))])
+def test_several_cranks_turn_as_fast_as_they_were_told_to(speeds, count, ratios):
+    five_bar = machine('five_bar', crank__speed=speeds[0], crank2__speed=speeds[1],
+                       crank2__start=2.0)
     cycle = Cycle(five_bar)
-    assert cycle.turns == 2
+    assert cycle.turns == count and cycle.course.shape[:2] == (720 * count + 1, 1)
     for turns in (0.0, 0.3, 1.9):
-        wanted = math.tau * turns, 2.0 - 1.5 * math.tau * turns
+        wanted = math.tau * turns * ratios[0], 2.0 + ratios[1] * math.tau * turns
         thetas = cycle.pose(turns).inputs
         assert [math.remainder(t - w, math.tau) for t, w in zip(thetas, wanted)] == pytest.approx(
             [0.0, 0.0], abs=1e-12)
+
+
+def test_machines_side_by_side_have_one_time():
+    machines = [machine('four_bar', crank__speed=2.0), machine('slider_crank', crank__speed=-3.0),
+                machine('water_drop', crank__sweep=[-0.5, 1.0])]
+    picture = Picture(machines, (600, 400))
+    assert [one.get_subplotspec().get_geometry() for one in picture.figure.axes] == [
+        (2, 2, k, k) for k in range(3)]
+    assert picture.seconds(0.4) == pytest.approx(0.4 * math.pi)
+    picture.show(0.4)
+    first, second, third = picture.panels
+    assert first.values()[0] == pytest.approx(0.8 * math.pi)
+    assert second.values()[0] == pytest.approx(-1.2 * math.pi % math.tau)
+    seconds, speed = 0.4 * math.pi, third.machine.first.speed
+    place = (0.5 + seconds * speed) % 3.0
+    assert third.values()[0] == pytest.approx(-0.5 + min(place, 3.0 - place))
+    for panel, one in zip(picture.panels, machines):
+        names = [f'{joint}_{axis}' for joint in one.points for axis in 'xy']
+        assert {text.get_fontsize() for text in panel.moving[-1].artists} == {11.5}
+        assert panel.columns() == [f'{one.name}_{name}' for name in ('crank', *names)]
+        solved = one.linkage.solve(panel.values()[0])
+        assert panel.values()[1:] == pytest.approx(
+            [value for joint in one.points for value in solved[joint]])
+
+
+def test_options_have_these_defaults_and_limits(tmp_path):
+    from linkage_ros.render.command import parsed
+    given = {'scene': 'a', 'data': None, 'mechanisms': [], 'trace': 'whole', 'show': frozenset(),
+             'hide': frozenset(), 'size': (720, 720), 'angle': None, 'turns': None, 'fps': None,
+             'frames': None, 'loop': None, 'colours': None}
+    still, moving = tmp_path / 'a.SVG', tmp_path / 'a.gif'
+    assert vars(parsed(['a', '--out', str(still)])) == {**given, 'out': still, 'moving': False}
+    args = ['--turns', '1000', '--fps', '50', '--frames', '10000', '--loop', '65536', '--colours',
+            '2', '--size', '64x8192', '--mechanisms', 'b,c', '--show', 'floor', '--hide',
+            'axes,title', '--data', str(still)]
+    assert vars(parsed(['a', '--out', str(moving), *args])) == {
+        **given, 'out': moving, 'moving': True, 'turns': 1000.0, 'fps': 50.0, 'frames': 10000,
+        'loop': 65536, 'colours': 2, 'size': (64, 8192), 'mechanisms': ['b', 'c'],
+        'show': {'floor'}, 'hide': {'axes', 'title'}, 'data': still}
+
+
+def shapes_of(file):
+    """Return what an SVG draws: fill or stroke, width [pixels], and places [points], in order."""
+    for part in ElementTree.parse(file).getroot().iter():
+        style = dict(pair.split(': ') for pair in (part.get('style') or '').split('; ') if pair)
+        tag = part.tag.rpartition('}')[2]
+        if tag == 'use':
+            yield style['fill'], 0.0, [[float(part.get('x')), float(part.get('y'))]]
+        elif tag == 'path' and 'stroke-width' in style and style.get('fill') == 'none':
+            numbers = re.findall(r'-?[0-9.]+', part.get('d'))
+            yield style['stroke'], float(style['stroke-width']), np.reshape(
+                np.array(numbers, float), (-1, 2))
+
+
+@pytest.mark.parametrize('size, unit', [('1080x1100', 1.5), ('1700x1500', 2.0), ('320x200', 0.4)])
+def test_an_svg_has_every_part_in_its_order_where_it_was_solved(tmp_path, size, unit):
+    file, data = rendered(
+        tmp_path, '--angle', '50', '--hide', 'axes,labels,title', '--size', size, '--data',
+        str(tmp_path / 'a.csv'), config='slotted_lever', ending='svg'), tmp_path / 'a.csv'
+    (row,) = rows_of(data)
+    o, q = 0.0, -0.3j
+    a = 0.16 * np.exp(1j * (math.radians(50.0) + 0.5 * math.pi))
+    tip = q + 0.54 * (a - q) / abs(a - q)
+    assert row.pop('time') == row.pop('slotted_lever_crank') == pytest.approx(math.radians(50.0))
+    assert row == pytest.approx({
+        f'slotted_lever_{name}_{axis}': value for name, place in (
+            ('O', o), ('Q', q), ('A', a), ('L', tip)) for axis, value in (
+                ('x', place.real), ('y', place.imag))}, abs=1e-15)
+    drawn = [(colour, width, np.array(places) @ (1.0, -1j)) for colour, width, places in
+             shapes_of(file)]
+    # Pivots are drawn first, in the order of the joints: they tell the scale.
+    first, second = (places[0] for colour, _, places in drawn if colour == palette.EARTH)
+    places_of = [(o + (places - first) * (q - o) / (second - first)) for *_, places in drawn]
+    colours = [colour for colour, *_ in drawn]
+    assert colours == [
+        palette.GREY, palette.LOCUS, palette.EARTH, palette.EARTH, palette.BAR, palette.DARK,
+        '#ffffff', palette.DRIVEN, palette.DARK, palette.TRACK, *['#ffffff'] * 4, palette.LOCUS]
+    assert [width for _, width, _ in drawn] == pytest.approx([unit * width for width in (
+        1.6, 3.0, 0.0, 0.0, 5.5, 17.0, 13.5, 5.5, 12.5, 9.0, *[0.0] * 5)])
+    circle, trace, *_, bar, rim, slot, crank, edge, block = places_of[:10]
+    assert np.abs(circle) == pytest.approx(0.16, abs=1e-6)
+    assert np.ptp(np.angle(circle)) > 6.0
+    assert np.abs(trace - q) == pytest.approx(0.54, abs=1e-6)
+    assert bar == pytest.approx(np.array([q, tip]), abs=1e-6)
+    assert crank == pytest.approx(np.array([o, a]), abs=1e-6)
+    assert slot == pytest.approx(rim) and block == pytest.approx(edge)
+    assert block.mean() == pytest.approx(a, abs=1e-6)
+    along = (tip - q) / abs(tip - q)
+    for piece in (block, slot):
+        assert ((piece - q) / along).imag == pytest.approx(0.0, abs=1e-6)
+    # As far as the block moves on the lever: from where the crank points down to where up.
+    reach = ((slot - q) / along).real
+    assert min(reach) < 0.14 < 0.46 < max(reach) < 0.54
+    assert np.array(places_of[10:]).ravel() == pytest.approx(np.array([o, q, a, tip, tip]),
+                                                             abs=1e-6)
 
 
 @pytest.mark.parametrize('args, said', [
@@ -363,8 +476,8 @@ def test_several_cranks_turn_as_fast_as_they_were_told_to():
     (['jansen.yaml', 'all.yaml', '--out', 'a.png'], 'unrecognized arguments: all.yaml'),
     (['foreign.yaml', '--out', 'a.png'], "foreign.yaml must be YAML with '/**:'"),
     (['empty.yaml', '--out', 'a.png'], "empty.yaml must be YAML with '/**:'"),
-    (['date.yaml', '--out', 'a.png'], 'Cannot have a value before ros__parameters at line 1'),
-    (['itself.yaml', '--out', 'a.png'], 'Will not support aliasing at line 1'),
+    (['date.yaml', '--out', 'a.png'], 'such as /**, is expected in line 1'),
+    (['itself.yaml', '--out', 'a.png'], 'ROS does not support aliases in line 1'),
     (['.', '--out', 'a.png'], '.: Is a directory'),
     (['jansen.yaml', '--out', 'a.bmp'], '--out must end in .png, .svg, .gif, .mp4, not a.bmp'),
     (['jansen.yaml'], '--out'),
@@ -373,7 +486,18 @@ def test_several_cranks_turn_as_fast_as_they_were_told_to():
     (['jansen.yaml', '--out', 'a.png', '--fps', '30'], '--fps is for .gif and .mp4 only'),
     (['jansen.yaml', '--out', 'a.gif', '--angle', '30'], '--angle is for .png and .svg only'),
     (['jansen.yaml', '--out', 'a.gif', '--fps', '60'], '--fps must be at most 50'),
-    (['jansen.yaml', '--out', 'a.gif', '--fps', 'x'], 'number'),
+    (['jansen.yaml', '--out', 'a.gif', '--fps', 'x'], "--fps: invalid number value: 'x'"),
+    (['jansen.yaml', '--out', 'a.gif', '--fps', '241'], 'must be from 0.001 to 240, not 241'),
+    (['jansen.yaml', '--out', 'a.gif', '--turns', '1001'], 'must be from 0.001 to 1000, not 1001'),
+    (['jansen.yaml', '--out', 'a.gif', '--frames', '0'], 'must be from 1 to 10000, not 0'),
+    (['jansen.yaml', '--out', 'a.gif', '--frames', '1.5'], "invalid whole number value: '1.5'"),
+    (['jansen.yaml', '--out', 'a.gif', '--colours', '256'], 'must be from 2 to 255, not 256'),
+    (['jansen.yaml', '--out', 'a.mp4', '--colours', '9'], '--colours is for .gif only, not for'),
+    (['jansen.yaml', '--out', 'a.mp4', '--loop', '0'], '--loop is for .gif only, not for .mp4'),
+    (['jansen.yaml', '--out', 'a.mp4', '--size', '99x98'], '--size must be two even numbers'),
+    (['jansen.yaml', '--out', 'a.svg', '--size', '64x8193'], 'each side from 64 to 8192, not 64x'),
+    (['jansen.yaml', '--out', 'a.svg', '--size', '720'], 'must be like 720x720, each side from'),
+    (['excavator.yaml', '--out', 'a.svg', '--angle', '1'], '--angle is for a crank: excavator is'),
     (['jansen.yaml', '--out', 'a.gif', '--turns', '0'], 'from 0.001'),
     (['jansen.yaml', '--out', 'a.gif', '--turns', 'nan'], 'from 0.001'),
     (['jansen.yaml', '--out', 'a.gif', '--turns', '999'], 'frames, more than'),
@@ -410,6 +534,7 @@ def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
     assert set(tmp_path.iterdir()) == before
 
 
+@pytest.mark.long
 def test_a_crank_that_stands_still_has_a_picture(tmp_path):
     file = tmp_path / 'still.yaml'
     file.write_text('/**: {ros__parameters: {mechanisms: [water_drop, jansen], '
@@ -417,6 +542,7 @@ def test_a_crank_that_stands_still_has_a_picture(tmp_path):
     assert main([str(file), '--out', str(tmp_path / 'a.png'), '--angle', '90']) == 0
 
 
+@pytest.mark.long
 def test_an_angle_may_be_written_as_joint_lines_have_it(tmp_path):
     pictures = []
     for angle in ('60', '60deg', 'pi/3', '2*30'):
@@ -427,6 +553,7 @@ def test_an_angle_may_be_written_as_joint_lines_have_it(tmp_path):
     assert len(set(pictures)) == 1
 
 
+@pytest.mark.long
 def test_no_ros_is_needed(tmp_path):
     code = ('import sys; sys.modules.update(dict.fromkeys(["rclpy", "ament_index_python"])); '
             'from linkage_ros.render import main; sys.exit(main(sys.argv[1:]))')
@@ -436,6 +563,7 @@ def test_no_ros_is_needed(tmp_path):
     assert out.read_text().lstrip().startswith('<?xml')
 
 
+@pytest.mark.long
 def test_readings_are_written_beside_or_below_each_other():
     machines = [*scene.load(str(CONFIG / 'excavator.yaml')).machines.values(),
                 *scene.load(str(CONFIG / 'scissor_lift.yaml')).machines.values(),

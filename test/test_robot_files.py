@@ -20,10 +20,8 @@ import math
 from pathlib import Path
 import random
 import re
-import resource
-import subprocess
-import sys
 from tempfile import TemporaryDirectory
+import time
 from xml.etree import ElementTree
 
 from hypothesis import example, given, settings, strategies as st
@@ -198,7 +196,6 @@ LIMITS = [
      (math.radians(-40.0), math.radians(40.0)), '')]
 
 
-@pytest.mark.sample(6)
 @pytest.mark.parametrize('file, old, new, ends, why', LIMITS, ids=range(len(LIMITS)))
 def test_limits_of_a_motor_become_a_sweep_or_a_sentence(
         imported, tmp_path, file, old, new, ends, why):
@@ -303,11 +300,13 @@ def test_a_scene_is_held_against_its_robot_over_the_range_of_its_motor(tmp_path,
     assert ('# wrist has its ends 0.01 m apart along its axis' in text) == ('0.01' in place)
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize('old, new', [
-    (' parallelogram', ' antiparallelogram'), ('ground 0.3 0', 'ground 0.3 1e-8'),
-    ('=-shoulder', '=shoulder'), ('=elbow-1.57079632', '=elbow-1.57079633')])
-def test_a_mechanism_that_differs_from_its_robot_is_refused(old, new):
+@pytest.mark.parametrize('old, new, why', [
+    (' parallelogram', ' antiparallelogram', 'elbow is off by 1'),
+    ('ground 0.3 0', 'ground 0.3 1e-8', 'its loops stand open by 1e-08 m'),
+    ('=-shoulder', '=shoulder', 'shoulder is off by 3.1'),
+    ('=elbow-1.570', '=elbow-1.572', 'elbow is off by 0.002$'),
+    ('=elbow-1.57079632', '=elbow-1.57079633', 'its loops stand open by 3e-09 m$')])
+def test_a_mechanism_that_differs_from_its_robot_is_refused(old, new, why):
     robot = closing.closed(readers.read(str(ROBOTS / 'four_bar.urdf'))).robot
     given, *_ = command.described(robot)
 
@@ -320,7 +319,7 @@ def test_a_mechanism_that_differs_from_its_robot_is_refused(old, new):
     changed = [line.replace(old, new) for line in given[key]]
     assert changed != given[key]
     given[key] = changed
-    with pytest.raises(check.Difference, match='with motor at .* (is off|stand open) by'):
+    with pytest.raises(check.Difference, match=f'^with motor at .* {why}'):
         compared()
 
 
@@ -463,6 +462,8 @@ def pin(side):
 def test_what_is_left_out_is_named_with_the_reason(capsys, tmp_path):
     assert 'not planar: the axes of motor and shoulder are 11.3 degrees from it' in refused(
         capsys, written(tmp_path, 'four_bar.urdf', ('0 -1 0', '0 -1 0.2')))
+    assert 'not planar: the axes of motor and elbow are 11.3 degrees from it' in refused(
+        capsys, written(tmp_path, 'four_bar.urdf', ('"0 1 0"/>\n    <limit', '"0 1 0.2"/><limit')))
     assert 'its loops cannot be closed: they stay open by' in refused(
         capsys, written(tmp_path, 'four_bar.urdf', ('xyz="0 0 0.2"/><child_axis',
                                                     'xyz="0 0 2.2"/><child_axis')))
@@ -531,37 +532,35 @@ def test_whatever_is_in_a_file_it_is_read_or_refused_in_one_sentence(
         assert code == 0 or not out and err.count('\n') == 1, file.read_text()
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize('long', ['<!--{}-->', '<?of {}?>', '<material name="{}"/>'])
 def test_a_long_comment_costs_no_more_than_its_letters(tmp_path, long):
-    # A parser that is fed piece by piece reads what is unfinished anew with each piece: 20 s.
-    text = (ROBOTS / 'four_bar.urdf').read_text()
-    file = tmp_path / 'long.urdf'
-    file.write_text(text.replace('</robot>', long.format(10 ** 7 * 'x') + '</robot>'))
-    done = subprocess.run(
-        [sys.executable, '-m', 'linkage_ros.robot_files', str(file)], cwd=ROBOTS.parents[1],
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (10, 10)), capture_output=True,
-        text=True)
-    assert done.returncode == 0, done.stderr[:1000]
+    # A parser that is fed piece by piece reads what is unfinished anew with each piece: 20 s of
+    # the processor, and not the tenth of a second that it takes.
+    file = written(tmp_path, 'four_bar.urdf', (
+        '</robot>', long.format(10 ** 7 * 'x') + '</robot>'))
+    start = time.thread_time()
+    robot = readers.read(str(file))
+    assert time.thread_time() - start < 5.0
+    assert {*robot.positions} == {'motor', 'elbow', 'shoulder'}
 
 
-@given(st.text(max_size=40), st.sampled_from([1, 100]))
-@example('\x9b2J', 1)
-@example('\x1b]0;title\x07', 1)
-@example('x', 3000)
-@example('x y ', 3000)
-@settings(database=None, print_blob=True, deadline=None, max_examples=8)
-def test_a_name_of_the_file_is_never_more_than_text_in_the_terminal(name, times):
+@given(st.lists(st.text(max_size=40), min_size=4, max_size=4), st.sampled_from([1, 100]))
+@example(['\x9b2J'] * 4, 1)
+@example(['\x1b]0;title\x07'] * 4, 1)
+@example(['x', '', 'x y ', 'x'], 3000)
+@settings(database=None, print_blob=True, deadline=None, max_examples=3)
+def test_a_name_of_the_file_is_never_more_than_text_in_the_terminal(more, times):
     text = (ROBOTS / 'four_bar.urdf').read_text()
-    where = name * times
+    names = ('coupler', 'rocker', 'elbow', 'motor')
+    called = {name: name + times * each for name, each in zip(names, more)}
     with TemporaryDirectory() as folder, redirect_stderr(io.StringIO()) as err, redirect_stdout(
             io.StringIO()) as out:
         file = Path(folder, 'named.urdf')
         root = ElementTree.fromstring(text)
         for part in root.iter():
             for key in ('name', 'link', 'joint'):
-                if part.get(key) in ('coupler', 'rocker', 'elbow', 'motor'):
-                    part.set(key, part.get(key) + where)
+                if part.get(key) in called:
+                    part.set(key, called[part.get(key)])
         with suppress(UnicodeEncodeError):
             ElementTree.ElementTree(root).write(file, 'utf-8')
         command.main([str(file), '--driven', 'nobody'])
@@ -682,7 +681,6 @@ def test_a_pose_at_the_end_of_its_loops_is_no_side(capsys, tmp_path):
             in refused(capsys, file, '--driven', 'motor'))
 
 
-@pytest.mark.slow
 def test_a_joint_that_follows_another_is_geared_to_it(imported, tmp_path):
     axis, loops = '<axis xyz="0 -1 0"/>', tmp_path / 'loops.yaml'
     file = written(tmp_path, 'five_bar.urdf', (
@@ -690,7 +688,7 @@ def test_a_joint_that_follows_another_is_geared_to_it(imported, tmp_path):
     loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [3d], name_mot: [mot_front]}')
     machine, = imported(file, '--loops', loops).values()
     assert [drive.source for drive in machine.inputs.values()] == ['mot_front']
-    robot = LIBRARIES[0]((ROBOTS / 'five_bar.urdf').read_text())
+    robot = LIBRARIES[1]((ROBOTS / 'five_bar.urdf').read_text())
     for angle in np.linspace(-0.4, 0.4, 7):
         joints = {**published(machine, mot_front=angle), 'mot_back': 0.5 * angle}
         places = robot.places(joints, ['front_foot', 'back_foot'])
@@ -823,7 +821,7 @@ DIALECTS = {
         '<axis xyz="0 1 0"/></joint>', '')}
 
 
-@pytest.mark.sample(6)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('dialect', DIALECTS)
 def test_a_loop_is_closed_in_every_way_in_which_tools_write_it(imported, tmp_path, dialect):
     inside, loops = DIALECTS[dialect]
@@ -839,14 +837,20 @@ def test_a_loop_is_closed_in_every_way_in_which_tools_write_it(imported, tmp_pat
         assert joints['elbow'] == pytest.approx(-angle, abs=1e-14)
 
 
-def euler(rng):
-    """Return three random angles, and the rotation by them about fixed x, y, z in turn."""
-    angles, turned = rng.uniform(-1.5, 1.5, 3), np.eye(3)
+def rotation(angles):
+    """Return the rotation by angles about fixed x, y, z in turn."""
+    turned = np.eye(3)
     for angle, (i, j) in zip(angles, ((1, 2), (2, 0), (0, 1))):
         step = np.eye(3)
         step[[i, j], [i, j]], step[j, i], step[i, j] = np.cos(angle), np.sin(angle), -np.sin(angle)
         turned = step @ turned
-    return angles, turned
+    return turned
+
+
+def euler(rng):
+    """Return three random angles, and the rotation by them."""
+    angles = rng.uniform(-1.5, 1.5, 3)
+    return angles, rotation(angles)
 
 
 @pytest.mark.parametrize('seed', range(4))
@@ -1019,9 +1023,9 @@ def test_a_passive_joint_of_a_loop_is_no_input(imported, tmp_path):
     assert {*lost} == loop - {'spring'} and 'spring' in {*map(str, rest.values())}
 
 
-def test_a_loop_of_the_whole_robot_that_stands_open_is_named():
+def test_a_loop_of_the_whole_robot_that_stands_open_is_named(monkeypatch, capsys):
     # As if a passive joint were an input.
-    others, file = model.others, ROBOTS / 'wheel_leg.urdf'
+    others, whole, file = model.others, check.whole, ROBOTS / 'wheel_leg.urdf'
     robot = closing.closed(readers.read(str(file))).robot
     given, _, _ = command.described(robot)
     names = [line for line in given['hip.joint_names'] if 'bell' not in line]
@@ -1032,9 +1036,15 @@ def test_a_loop_of_the_whole_robot_that_stands_open_is_named():
     wrong = scene.read({**given, **still, 'hip.joint_names': names,
                         'mechanisms': ['hip', 'others']}).machines
     made = [check.Imported('hip', {}, [], {'hip': (-0.2, 0.3), 'crank_motor': (-0.3, 0.3)})]
-    assert len(check.whole(robot, machines, made)) == 1
-    _, line = check.whole(robot, wrong, made)
+    assert len(whole(robot, machines, made)) == 1
+    _, line = whole(robot, wrong, made)
     assert re.match('Open: the loops of bell_joint, .*, by 0.0[0-9]* m', line)
+    monkeypatch.setattr(check, 'whole', lambda robot, _, made: whole(robot, wrong, made))
+    assert command.main([str(file)]) == 1
+    out, err = capsys.readouterr()
+    assert re.search(r'\n# Open: the loops of bell_joint, .*\n/\*\*:\n', out)
+    assert re.search('\nfrom_robot: Open: the loops of bell_joint, .*\n'
+                     'from_robot: 1 loops of the whole robot stand open\n$', err)
 
 
 def test_xacro_has_to_be_run_first(capsys, tmp_path):
@@ -1048,7 +1058,9 @@ def test_where_both_sides_fit_a_pose_has_to_choose(imported, capsys, tmp_path):
     file = written(tmp_path, 'four_bar.urdf', (
         'xyz="0 0 0.2"/><axis', f'xyz="0 0 0.2" rpy="0 {math.atan2(2.0, 3.0)!r} 0"/><axis'), (
         'xyz="0.3 0 0"/><axis', f'xyz="0.3 0 0" rpy="0 {-math.atan2(3.0, 2.0)!r} 0"/><axis'))
-    assert 'they close as well with' in refused(capsys, file, '--driven', 'motor')
+    _, *sides = re.search(r'close as well with (.*)=(.*) as with \1=(.*): choose by --pose \1=',
+                          refused(capsys, file, '--driven', 'motor')).groups()
+    assert len({*sides}) == 2
     found = [published(*imported(
         file, '--driven', 'motor', '--pose', f'elbow={side}').values(), motor=0.0)['elbow']
              for side in (-0.5, 0.5)]

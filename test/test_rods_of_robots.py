@@ -90,6 +90,17 @@ def test_an_ankle_is_imported_with_the_limits_of_its_file(tmp_path, capsys, seed
     names = {called.name for called in machine.joints.values() if called.published}
     assert names == {'pitch', 'roll'} and machine.frame_id == 'shin'
     assert {drive.source for drive in machine.inputs.values()} == {'l', 'r'}
+    axes = [axis / np.linalg.norm(axis) for axis in (
+        ankle.first_axis, ankle.second_axis, *ankle.motor_axes)]
+    lines = [f'pitch hinge ground at {text(ankle.first)} axis {text(axes[0])} within -0.15 0.15',
+             f'roll hinge pitch at {text(ankle.second)} axis {text(axes[1])} within -0.12 0.12',
+             *(f'{name} motor ground at {text(place)} axis {text(axis)}'
+               for name, place, axis in zip('lr', ankle.motors, axes[2:])),
+             *(f'ball_{i} rod {name} {text(pivot)} roll {text(end)} length {math.dist(pivot, end)}'
+               for i, (name, pivot, end) in enumerate(zip('lr', ankle.pivots, ankle.ends)))]
+    given = ' '.join((tmp_path / 'robot.yaml').read_text().split()).partition('joints: - ')[2]
+    for word, there in zip(' - '.join(lines).split(), given.split()):
+        assert there == word or float(there) == pytest.approx(float(word), abs=1e-12)
     motors = np.random.default_rng(3).uniform(-0.1, 0.1, (2, 40))
     found = np.stack(list(machine.linkage.joint_angles(motors, ['pitch', 'roll']).values()))
     there = np.isfinite(found[0])

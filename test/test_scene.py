@@ -10,9 +10,13 @@
 
 """What a scene may be, what it says about one that cannot be, and how its cranks move. No ROS."""
 
+import dataclasses
 from glob import glob
+import itertools
 import math
 import os
+import pathlib
+import re
 from xml.etree import ElementTree
 
 from linkage_ros import mechanisms, scene
@@ -24,6 +28,7 @@ from linkage_ros.scene.joint_names import quoted_name
 from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
+from test_rods import G1
 
 CONFIG = os.path.join(os.path.dirname(__file__), '..', 'config')
 CELL = {'mechanisms': ['cell'], 'cell.type': 'peaucellier'}
@@ -352,9 +357,12 @@ def test_the_mechanisms_of_the_scene_of_all_stand_apart():
 
 @pytest.mark.parametrize('text, reason', [
     ('', 'scene.yaml must be YAML with'), ('{}', 'scene.yaml must be YAML with'),
-    ('mechanisms: [jansen]', 'Sequences can only be values and not keys in params'),
-    ('/**: 3', 'Cannot have a value before ros__parameters at line 1'),
-    ('/**: {', 'Error parsing a event near line 1'), ('[]', 'Sequences cannot be key at line 1')])
+    ('mechanisms: [jansen]', 'ros__parameters below the name of a node, .* is expected in line 1'),
+    ('/**: 3', 'ros__parameters below the name of a node, .* is expected in line 1'),
+    ('ros__parameters: {rate: 5.0}', 'ros__parameters must be below the name of a node'),
+    ('/**:\n  ros__parameters: {rate: }', 'a value is missing in line 2'),
+    ('/**: {', 'not a valid ROS parameter file: did not find expected .*, line [12]$'),
+    ('[1]', 'ros__parameters below the name of a node, .* is expected in line 1')])
 def test_a_file_that_is_no_scene_says_so(tmp_path, text, reason):
     pytest.importorskip('yaml')
     path = tmp_path / 'scene.yaml'
@@ -426,15 +434,193 @@ def test_a_slider_goes_nearly_as_far_as_a_crank_can_turn():
     assert 2.0 <= low < 2.2 and 5.8 < high <= 6.0
 
 
-def test_every_parameter_says_what_it_means_and_who_reads_it():
-    for parameter in scene.read({}).parameters:
-        field = parameter.field
-        assert field.meaning.endswith('.') and field.allowed and field.readers
-        name, _, what = parameter.name.partition('.')
-        assert field.read_only == (parameter.name == 'mechanisms' or what == 'type'
-                                   or what.endswith(('.source', '.measures'))
-                                   or what in ('leg_pairs', 'mirrored')
-                                   and name in ('water_drop', 'slotted_lever'))
+ACTUATED = {**OWN, 'own.dimensions.h': 0.0, 'own.dimensions.c': 2.0, 'own.joints': [
+    'O ground 0 0', 'P ground 1 h', 'B cylinder P O 1.5 left', 'C crank O c called tilt']}
+INPUT_KEYS = {
+    'start': ('double', 0.0, 'a finite number{turns}', '[{0}]'),
+    'sweep': ('double_array', (), 'a list of finite numbers, the lower end and the higher end, '
+              'within 1e+06 of zero, or none', '[{0}]'),
+    'source': ('string', '', 'a text of up to 1000 letters', ''),
+    'measures': ('string', '', 'a text of up to 1000 letters', ''),
+    'ratio': ('double', 1.0, 'a finite number, other than zero', '[1]'),
+    'offset': ('double', 0.0, 'a finite number', '[{0}]')}
+# Kind, default, allowed values, unit. The cylinder's length is from 0.5 to 2.5.
+PARAMETERS = {
+    'mechanisms': ('string_array', ('own',), 'a list of texts of up to 1000 letters, at least '
+                   'one, each once, of up to 64 letters, digits and single underscores, a letter '
+                   'first', ''),
+    'frame_id': ('string', 'world', 'a text of up to 1000 letters, 1 to 100 characters that can '
+                 'be seen, the first a letter, digit or _', ''),
+    'rate': ('double', 50.0, 'a finite number from 0 to 1000', '[Hz]'),
+    **dict.fromkeys(('frame_prefix', 'own.frame_id'), (
+        'string', '', 'a text of up to 1000 letters, up to 100 characters that can be seen, the '
+        'first a letter, digit or _', '')),
+    'own.type': ('string', 'custom', 'a text of up to 1000 letters, one of '
+                 + ', '.join((*mechanisms.TYPES, 'custom', 'rods')), ''),
+    'own.joints': ('string_array', tuple(ACTUATED['own.joints']),
+                   'a list of texts of up to 1000 letters', ''),
+    'own.tracer': ('string', '', 'a text of up to 1000 letters', ''),
+    'own.dimensions.h': ('double', 0.0, 'a finite number', '[m]'),
+    'own.dimensions.c': ('double', 2.0, 'a finite number above 0', '[m]'),
+    'own.branches.B': ('integer', 1, 'a whole number from -1 to 1', ''),
+    'own.scale': ('double', 1.0, 'a finite number above 0', ''),
+    'own.leg_pairs': ('integer', 1, 'a whole number from 1 to 50', ''),
+    'own.mirrored': ('bool', False, 'true or false', ''),
+    'own.points': ('string_array', ('O', 'P', 'B', 'C'),
+                   'a list of texts of up to 1000 letters', ''),
+    'own.pose': ('double_array', 6 * (0.0,), 'a list of finite numbers, six of them',
+                 '[m] [rad]'),
+    'own.only_named': ('bool', False, 'true or false', ''),
+    'own.joint_names': ('string_array', (), 'a list of texts of up to 1000 letters, such as '
+                        "'BC=left_shin', or 'EF=-left_ankle+0.35' for 0.35 minus its position",
+                        ''),
+    'own.loads': ('string_array', (), "a list of texts of up to 1000 letters, such as 'C=0 -9.81'"
+                  ", a force [N] at a joint, or 'EF=2.5', a moment [N m]", ''),
+    'own.cylinder.speed': ('double', 0.67, 'a finite number from -100 to 100', '[m/s]'),
+    'own.tilt.speed': ('double', 1.0, 'a finite number from -100 to 100', '[rad/s]'),
+    **{f'own.{name}.{key}': (kind, default, allowed.format(turns=turns), units.format(unit))
+       for name, unit, turns in (('cylinder', 'm', ''),
+                                 ('tilt', 'rad', ' from -12.5664 to 12.5664'))
+       for key, (kind, default, allowed, units) in INPUT_KEYS.items()}}
+
+
+def test_every_parameter_has_its_type_default_allowed_values_and_unit():
+    made = scene.read(ACTUATED)
+    assert {each.name: (each.field.kind, each.value, each.field.allowed, ' '.join(
+        re.findall(r'\[[^\]]*\]', each.field.meaning))) for each in made.parameters} == PARAMETERS
+    for each in made.parameters:
+        assert each.field.meaning.endswith('.') and '{' not in each.field.meaning
+        name, _, key = each.name[4:].partition('.')
+        assert name not in ('cylinder', 'tilt') or f'{name}' in each.field.meaning
+        assert key not in ('h', 'c', 'B') or f' {key} of the custom' in each.field.meaning
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        made.rate = 1.0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        made.machines['own'].scale = 2.0
+
+
+def test_the_nodes_that_use_a_parameter_are_those_of_the_page():
+    page = pathlib.Path(CONFIG, '../docs/nodes-and-topics.md').read_text()
+    rows = re.findall(r'^\| (`.*) \| (.*) \| (.*) \|$', page.partition(
+        '### Who owns a value')[2].partition('\n## ')[0], re.M)
+    every = ('crank_driver', 'kinematics', 'servo_inverse')
+    written = {name: (set(every if nodes == 'all nodes' else re.findall(
+        r'`(\w+)`', nodes.partition('(')[0])), change.startswith('restart'))
+        for names, nodes, change in rows for name in re.findall(r'`(\w+)`', names)}
+    found = {}
+    for each in (*scene.read(ACTUATED).parameters, *scene.read({}).parameters):
+        name = each.name.split('.')
+        key = name[1] if name[1:2] in (['dimensions'], ['branches']) else name[-1]
+        # A walker of one leg at most is no other while a node runs.
+        still = key in ('leg_pairs', 'mirrored') and name[0] not in ('jansen', 'peaucellier')
+        found.setdefault(key, (set(each.field.readers), each.field.read_only and not still))
+        assert each.field.shared == (len(each.field.readers) > 1)
+        assert each.field.read_only == (written[key][1] or still), each.name
+    assert found == written
+
+
+def test_scenes_of_the_same_values_are_equal_however_they_are_written():
+    few, all_ = scene.read({}), scene.read({'frame_id': 'world', 'jansen.scale': 0.005,
+                                            'jansen.leg_pairs': 1, 'jansen.dimensions.m': 15})
+    for name in few.machines:
+        one, other = few.machines[name], all_.machines[name]
+        assert one == other and repr(one) == repr(other) and 'Parameter(' not in repr(one)
+    assert few.machines['jansen'] != scene.read({'jansen.scale': 0.1}).machines['jansen']
+
+
+@pytest.mark.parametrize('given, reason', [
+    ({'own.tilt.ratio': 0.0}, 'own.tilt.ratio must be a finite number, other than zero, not 0.0'),
+    ({'own.tilt.measures': 'OC'}, 'own.tilt.measures must be empty: only a linkage with one input '
+     'can be solved for an output, and own has 2'),
+    ({'own.cylinder.sweep': [0.4, 1.0]},
+     'own.cylinder.sweep must be inside the reach [0.5, 2.5] m, not [0.4, 1.0]'),
+    ({'own.cylinder.start': 3.0},
+     'own.cylinder.start must be inside the reach [0.5, 2.5] m, not 3.0'),
+    ({'own.cylinder.sweep': [1.0, 1.0 + 1e-7]}, 'own.cylinder.sweep must be a list of finite '
+     'numbers, the lower end and the higher end, within 1e+06 of zero, or none, not '
+     '[1.0, 1.0000001]'),
+    ({'own.loads': ['C=1']}, "own.loads must be texts such as 'C=0 -9.81', a force [N] at a "
+     "joint, or 'EF=2.5', a moment [N m] on a link, each for a different one of O, P, B, C, "
+     "OB, barrel, cylinder, tilt, not 'C=1'; did you mean C?"),
+    ({'own.loads': ['C=1 2', 'C=1 2']}, "not 'C=1 2'"), ({'own.loads': ['OB=1 2']}, "'OB=1 2'"),
+    ({'own.loads': ['C=1 2 3']},
+     "own.loads: a force must have the components x, y, not 'C=1 2 3'"),
+    ({'mechanisms': ['klann'], 'klann.crank.measures': 'ZZ'}, 'klann.crank.measures: klann has no '
+     "output 'ZZ'"),
+    ({'mechanisms': ['klann'], 'klann.crank.measures': 'crank.x'}, 'klann.crank.measures: '),
+    ({'jansen.loads': ['BC=1'], 'jansen.leg_pairs': 2},
+     'jansen.loads must be empty for more than one leg'),
+    ({'jansen.loads': ['BC=1'], 'jansen.mirrored': True},
+     'jansen.loads must be empty for more than one leg'),
+])
+def test_settings_of_inputs_and_loads_that_cannot_be_are_refused(given, reason):
+    with pytest.raises(scene.SceneError) as refused:
+        scene.read({**ACTUATED, **given} if any(key.startswith('own') for key in given) else given)
+    assert reason in str(refused.value)
+
+
+def test_a_stroke_takes_three_seconds_by_default_and_its_lengths_are_scaled():
+    for scale, speed in ((1.0, 0.67), (0.25, 0.17), (1000.0, 100.0)):
+        made = scene.read({**ACTUATED, 'own.scale': scale}).machines['own'].inputs
+        stroke = made['cylinder']
+        assert (stroke.speed, made['tilt'].speed) == (speed, 1.0)
+        assert (stroke.input.low, stroke.input.high) == pytest.approx((0.5 * scale, 2.5 * scale))
+        assert stroke.reach == ((stroke.input.low, stroke.input.high),)
+        assert stroke.sweep == pytest.approx((0.52 * scale, 2.48 * scale))
+        assert made['tilt'].sweep is None and stroke.ends is None and stroke.is_plain
+        assert made['tilt'].source == 'own_tilt' and stroke.actuator == (1.0, 0.0)
+    swept = scene.read({**ACTUATED, 'own.cylinder.sweep': [1, 2], 'own.cylinder.ratio': 2.0})
+    drive = swept.machines['own'].inputs['cylinder']
+    assert drive.sweep == drive.ends == (1.0, 2.0) and drive.actuator == (2.0, 0.0)
+
+
+def test_loads_are_forces_of_joints_and_moments_of_links():
+    lines = ['C=-1.5e1 +.5', 'OB=-2', 'B=0  3']
+    assert scene.read({**ACTUATED, 'own.loads': lines}).machines['own'].loads == {
+        'C': (-15.0, 0.5), 'OB': -2.0, 'B': (0.0, 3.0)}
+
+
+def test_a_load_of_a_linkage_in_space_has_three_components():
+    given = {**OWN, 'own.type': 'rods', 'own.joints': G1}
+    own = scene.read({**given, 'own.loads': ['pitch=2']}).machines['own']
+    assert own.in_space is True and own.loads == {'pitch': 2.0}
+    assert scene.read({}).machines['jansen'].in_space is False
+    point = own.linkage.points[0]
+    loaded = scene.read({**given, 'own.loads': [f'{point}=1 -2 3']}).machines['own']
+    assert loaded.loads == {point: (1.0, -2.0, 3.0)}
+    with pytest.raises(scene.SceneError, match=(
+            f"own.loads: a force must have the components x, y, z, not '{point}=1 -2'")):
+        scene.read({**given, 'own.loads': [f'{point}=1 -2']})
+
+
+def test_of_many_intervals_the_first_eight_are_named():
+    arcs = [(i, i + 1 / 3) for i in range(10)]
+    words = [f'[{i}, {i + 1 / 3:.6g}]' for i in range(10)]
+    assert scene.in_words(arcs[:8]) == ' or '.join(words[:8])
+    assert scene.in_words(arcs) == ' or '.join([*words[:8], '2 more'])
+
+
+@pytest.mark.parametrize('sweep, speed', [(None, 2.0), ((-0.5, 0.25), -3.0), ((-0.5, 0.25), 0.1)])
+def test_a_motion_that_is_moved_in_time_goes_on_as_it_would_have(sweep, speed):
+    motion = Motion(speed, sweep, 0.1, since=7, period=3)
+    for before in (7, 10 ** 9, 123456789012):
+        later = motion.moved(before, before + 5 * 10 ** 9)
+        for more in (0, 1, 3 * 10 ** 8, 10 ** 10):
+            assert later.at(before + 5 * 10 ** 9 + more) == motion.at(before + more)
+
+
+@pytest.mark.parametrize('offset', ['', '+0.5', '-7', '+12.5', '-100', '+3.1', '-3.3'])
+def test_the_travel_of_a_published_joint_is_that_of_its_values(offset):
+    for sign, ends in itertools.product((1, -1), ((-0.3, 0.2), (-2.0, 2.5), (7.0, 7.5))):
+        joint = scene.read({'mechanisms': ['klann'], 'klann.joint_names': [
+            f'AD={"-" * (sign < 0)}a{offset}']}).machines['klann'].joints['AD']
+        values = joint.of(np.linspace(*ends, 10001))
+        plain = sign * np.linspace(*ends, 10001) + float(offset or 0.0)
+        assert np.exp(1j * values) == pytest.approx(np.exp(1j * plain), abs=1e-12)
+        assert not offset or abs(values).max() <= math.pi
+        jumps = np.abs(np.diff(values)).max() > 1.0
+        found = joint.travel(ends)
+        assert found is None if jumps else found == pytest.approx((values.min(), values.max()))
 
 
 def test_a_year_of_turning_loses_nothing():
@@ -484,6 +670,14 @@ def test_an_angle_is_in_a_turn_or_in_the_sweep():
         assert all(0.0 <= motion.at(now)[0] < math.tau for motion in turning)
         assert -0.5 <= swinging.at(now)[0] <= 0.25
     assert all(0.0 <= motion.at(0)[0] < math.tau for motion in turning)
+
+
+@pytest.mark.parametrize('low, high', [(0.0, 5e-324), (1e-200, 2e-200), (0.5, 0.5)])
+def test_a_sweep_shorter_than_a_step_stands_still(low, high):
+    motion = Motion(1.0, (low, high), 0.3)
+    for now in (0, 1, 10 ** 18):
+        assert low <= motion.at(now)[0] <= high or motion.at(now)[0] == 0.0
+        assert motion.changed(-1.0, (low, high), now).at(now)[0] == motion.at(now)[0]
 
 
 def test_a_start_outside_the_sweep_is_moved_to_its_nearer_end():
@@ -574,10 +768,21 @@ def test_crank_driver_reads_whatever_its_motions_depend_on():
     assert found >= {'scale', 'a', 'speed', 'ratio', 'offset'}
 
 
-@pytest.mark.parametrize('turns, value', [(0, 0.3), (2, 0.3), (-4, 0.3), (1, -1.0), (-1, -1.0)])
-def test_a_start_may_be_off_by_whole_periods_but_not_by_a_part_of_one(turns, value):
-    motion = Motion(1.0, (-1.0, 1.0), 0.3 + math.tau * turns, period=2)
-    assert motion.at(0)[0] == pytest.approx(value, abs=1e-14)
+@pytest.mark.parametrize('turns', [True, False])
+def test_a_start_is_put_where_it_is_in_the_sweep_or_at_the_nearer_end(turns):
+    """An angle may be off by whole periods, a length by nothing."""
+    rng, insides = np.random.default_rng(6), 0
+    for _ in range(200):
+        period, low, width = int(rng.integers(1, 4)), rng.uniform(-30.0, 30.0), rng.uniform(0.1, 5)
+        start, high = rng.uniform(-60.0, 60.0), low + width
+        same = start + math.tau * period * np.arange(-30, 31) * turns
+        inside = same[(low <= same) & (same <= high)]
+        ends = min((abs(each - end), end) for each in same for end in (low, high))[1]
+        expected = inside if len(inside) else [ends]
+        found, speed = Motion(0.5, (low, high), start, 9, turns, period).at(9)
+        assert min(abs(found - each) for each in expected) < 1e-12
+        insides += len(inside) > 0
+    assert 1 < insides < 180
 
 
 @pytest.mark.parametrize('start, end', [(0.0, 0.3), (0.25, 1.0), (0.1234, 0.6789), (0.9, 1.6),

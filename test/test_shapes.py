@@ -10,7 +10,12 @@
 
 """Barrels, rods, guides and blocks are where the joints say, in every pose and in every leg."""
 
+import cmath
+from itertools import combinations
+import math
+
 from linkage_ros import mechanisms, scene
+from linkage_ros.linkage.quantities import LinkPoint
 from linkage_ros.robot_model import shapes
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD
 import numpy as np
@@ -20,6 +25,9 @@ ENGINE = ('O ground 0 0', 'G ground 0 -20', 'A crank O 40', 'B slider A 120 G 0.
           'P rigid A B 50 90 left')
 MOVING = ('O ground 0 0', 'Q ground 1.6 0', 'A crank O 0.5', 'B dyad A Q 1.8 1 left',
           'D ground 0.8 1.2', 'S slider D 0.7 A along B out', 'T block S 0.1 0.2')
+CASSIE = ('O ground 0 0', 'F crank O 0.4', 'K rigid O F 0.07 0.35 right', 'A crank K 0.05 zero F',
+          'B dyad A F 0.35 0.06 right')
+FLAT = 'O ground 0 0', 'A crank O 1', 'P rigid O A 0.5 0.5 left'
 RACK = ('O ground 0 0', 'H ground 1 0.5', 'S carriage O along H 0.1 0.9', 'A ground 0.2 0.7',
         'B dyad S A 0.6 0.5 left', 'm mirrored O H')
 
@@ -59,13 +67,14 @@ def poses(one, count=40):
 
 @pytest.mark.parametrize('name', MACHINES)
 def test_what_slides_is_where_its_joints_say(name):
-    one, count = MACHINES[name](), 0
+    one, count, ends = MACHINES[name](), 0, {}
     size = one.scale * one.linkage.longest
     near = pytest.approx(0.0, abs=1e-13 * max(size, 1.0))
     for place, lengths, drawn in poses(one):
         for shape, (start, end) in drawn:
             link, count = shape.slide, count + 1
             along = (end - start) / abs(end - start)
+            ends.setdefault(shape, []).append((start, end))
             tip = (place[link.tip] - start) / along
             if shape.kind in (GUIDE, BLOCK):
                 assert tip.imag == near and 0.0 < tip.real < abs(end - start)
@@ -80,23 +89,88 @@ def test_what_slides_is_where_its_joints_say(name):
                 assert end - place[link.tip] == near
                 assert ((place[link.joint] - start) / along).imag == near
     assert count >= 40 * len(shapes.shapes(one))
+    if len(one.assembly().legs) == 1:
+        for shape, moved in ends.items():
+            assert shape.is_fixed == (np.ptp(moved, axis=0).max() < 1e-9 * size)
 
 
 @pytest.mark.parametrize('name, kinds', [
     ('excavator', [BARREL, ROD] * 3), ('boxer engine', [GUIDE, BLOCK]),
     ('guide on a coupler', [GUIDE, BLOCK]), ('rack and its image', [GUIDE, BLOCK])])
 def test_a_cylinder_is_barrel_and_rod_and_a_block_has_a_guide(name, kinds):
-    assert [shape.kind for shape in shapes.shapes(MACHINES[name]())] == kinds
+    one = MACHINES[name]()
+    found = shapes.shapes(one)
+    assert [shape.kind for shape in found] == kinds
+    assert shapes.drawn(one, one.linkage.points) == [
+        shape for shape in found if shape.kind != ROD]
+    for end in 'joint', 'tip':
+        hidden = {getattr(shape.slide, end) for shape in found}
+        assert shapes.drawn(one, set(one.linkage.points) - hidden) == []
 
 
-def test_a_barrel_takes_in_its_rod_and_the_rod_never_leaves_it():
-    one = MACHINES['excavator']()
-    for barrel, rod in zip(*[iter(shapes.shapes(one))] * 2):
-        low, high = one.inputs[barrel.slide.name].sweep
-        length = barrel.end.x - barrel.start.x
-        assert 0.5 * low <= length <= 0.9 * low
-        assert rod.end.x - rod.start.x == pytest.approx(high - length)
-        assert low - (rod.end.x - rod.start.x) >= 0.0
+BOOM = 'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right'
+
+
+@pytest.mark.parametrize('sweep, barrel', [
+    ([0.8, 0.9], 0.4), ([0.8, 1.4], 0.6), ([0.6, 1.4], 0.54), ([0.8, 1.2], 0.4)])
+def test_a_barrel_is_as_long_as_the_stroke_from_half_to_nine_tenths(sweep, barrel):
+    one = machine(joints=BOOM, scale=3.0, cylinder__sweep=[3.0 * end for end in sweep])
+    outer, rod = shapes.shapes(one)
+    assert (outer.start, outer.end.x, outer.end.y) == (
+        LinkPoint('barrel', 0.0, 0.0), pytest.approx(barrel), 0.0)
+    assert (rod.start.x, rod.start.y, rod.end) == (
+        pytest.approx(barrel - sweep[1]), 0.0, LinkPoint('cylinder', 0.0, 0.0))
+    assert not outer.is_fixed and not rod.is_fixed
+
+
+@pytest.mark.parametrize('sweep', [(0.0, math.tau), (0.3, 1.1)])
+def test_a_guide_is_longer_than_its_block_s_way_by_the_block(sweep):
+    # The pin of the crank, along and across the guide.
+    pin = (40.0 * np.exp(1j * np.linspace(*sweep, 100_000)) + 20.0j) / cmath.rect(1.0, 0.5)
+    way = pin.real + np.sqrt(120.0 ** 2 - pin.imag ** 2)
+    one = machine(joints=ENGINE, **({'crank__sweep': sweep} if sweep[0] else {}))
+    guide, block = shapes.shapes(one)
+    half = one.linkage.longest / 20.0
+    ends = [complex(end.x, end.y + 20.0) / cmath.rect(1.0, 0.5) for end in guide[2:]]
+    assert ends == pytest.approx([way.min() - half, way.max() + half], abs=0.02)
+    assert (guide.start.link, guide.is_fixed, block.is_fixed) == ('ground', True, False)
+    assert block[2:] == (LinkPoint('block', -half, 0.0), LinkPoint('block', half, 0.0))
+
+
+@pytest.mark.parametrize('name', ['jansen', 'gripper', 'Cassie', 'flat'])
+def test_plates_are_triangles_of_bars_that_are_not_flat(name):
+    linkage = mechanisms.create(name) if name == 'jansen' else mechanisms.create('custom', joints={
+        'gripper': ENGINE, 'Cassie': CASSIE, 'flat': FLAT}[name])
+    places = linkage.solve([0.3] * len(linkage.inputs) if len(linkage.inputs) > 1 else 0.3)
+    names, bars = linkage.points, {frozenset(bar) for bar in linkage.bars}
+
+    def area(*corners):
+        (a, b), (c, d) = (np.subtract(places[corner], places[corners[0]])
+                          for corner in corners[1:])
+        return abs(a * d - b * c)
+
+    wanted = {frozenset(corners) for corners in combinations(names, 3)
+              if bars.issuperset(map(frozenset, combinations(corners, 2)))
+              and area(*corners) > 1e-6 * linkage.longest ** 2}
+    found = shapes.plates(linkage, names)
+    assert {*map(frozenset, found)} == wanted and len(found) == len(wanted)
+    assert len(wanted) == {'jansen': 2, 'gripper': 1, 'Cassie': 1, 'flat': 0}[name]
+    some = [point for point in names if point not in next(iter(wanted), 'A')]
+    assert {*map(frozenset, shapes.plates(linkage, some))} == {
+        plate for plate in wanted if plate <= {*some}}
+
+
+def test_cranks_are_bars_that_inputs_turn_and_marks_are_below_the_ground():
+    toe = mechanisms.create('custom', joints=CASSIE)
+    assert shapes.cranks(toe) == [('O', 'F'), ('K', 'A')]
+    assert shapes.cranks(toe, 'ground') == [('O', 'F')]
+    assert shapes.cranks(MACHINES['rack and its image']().linkage) == []
+    engine = machine(joints=ENGINE).linkage
+    height = engine.longest / 15.0
+    assert shapes.marks(engine, ['G', 'A']) == [(
+        'G', *(LinkPoint('ground', pytest.approx(side * 0.6 * height),
+                         pytest.approx(-20.0 - height)) for side in (-1.0, 1.0)))]
+    assert [mark[0] for mark in shapes.marks(engine, engine.points)] == ['O', 'G']
 
 
 def test_a_guide_stays_on_the_link_that_it_is_on():

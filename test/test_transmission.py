@@ -15,20 +15,23 @@ ros2_control is not on the Python package index: what is generated is compiled a
 of its interface, `test/ros2_control`, written for these tests. No controller manager is run.
 """
 
+import ast
 from contextlib import suppress
 import ctypes
 import math
 from pathlib import Path
 import re
+import runpy
 import shutil
 import subprocess
 import sys
 from xml.etree import ElementTree
 
-from c_libraries import COMPILER, loaded, ROS, STAND_IN, STRICT
+from c_libraries import loaded, ROS, STAND_IN, STRICT
 from linkage_ros import mechanisms, scene
-from linkage_ros.c_code import header, transmission
+from linkage_ros.c_code import command, header, transmission
 from linkage_ros.c_code.axes import actuators, joints
+from linkage_ros.c_code.package import package
 import numpy as np
 import pytest
 from sweeps import EXHAUSTIVE, few_and_many
@@ -42,12 +45,14 @@ SCENES = [*sorted((ROOT / 'config').glob('*.yaml')), ROOT / 'examples' / 'leg.ya
 
 # All that a scene may say of actuators and joints.
 SCENE = {
-    'mechanisms': ['lever', 'leg', 'boom', 'lift', 'rocker', 'beast'],
+    'mechanisms': ['lever', 'leg', 'boom', 'lift', 'rocker', 'beast', 'rack', 'int'],
     'lever.type': 'slotted_lever', 'lever.scale': 1e-3, 'lever.crank.source': 'servo',
     'lever.crank.ratio': -0.5, 'lever.crank.offset': 0.3, 'lever.crank.sweep': [-0.4, 0.4],
-    'lever.joint_names': ['lever=-flap+0.1'], 'lever.loads': ['L=0 -9.81', 'lever=0.02'],
+    'lever.joint_names': ['lever=-flap+0.1'],
+    'lever.loads': ['L=0 -9.81', 'lever=0.02', 'slide=0.03'],
     'leg.type': 'five_bar', 'leg.crank.start': 1.9, 'leg.crank2.start': 1.24,
-    'leg.crank.ratio': 0.1, 'leg.crank2.offset': -0.2, 'leg.loads': ['P=3 -20'],
+    'leg.crank.ratio': 0.1, 'leg.crank2.offset': -0.2,
+    'leg.loads': ['P=3 -20', 'AP=0.5', 'CP=-0.7'],
     'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
         'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C rigid O B 2 1.4 left'],
     'boom.cylinder.ratio': 0.001, 'boom.loads': ['C=0 -100'],
@@ -56,13 +61,19 @@ SCENE = {
     'lift.crank.measures': 'QB', 'lift.crank.ratio': -2.0, 'lift.crank.start': 0.5,
     'lift.crank.sweep': [0.2, 2.2],
     'rocker.type': 'four_bar', 'rocker.crank.start': 1.0, 'rocker.loads': ['P=1 2'],
-    'beast.type': 'jansen', 'beast.leg_pairs': 3}
+    'beast.type': 'jansen', 'beast.leg_pairs': 3,
+    'rack.type': 'custom', 'rack.scale': 0.5, 'rack.carriage.ratio': -0.25, 'rack.joints': [
+        'O ground 0 0', 'R ground 1 0', 'A carriage O along R 0.1 0.7', 'Q ground 0 1',
+        'B dyad A Q 0.9 0.6 left'], 'rack.loads': ['B=2 -5'],
+    'int.type': 'four_bar', 'int.crank.source': 'a*/ "b"\\ ??/\n%s é',
+    'int.joint_names': ['QB=while/1:x']}
 GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
           'D crank Q 0.27 geared crank -2 0', 'B dyad A D 2.661 2.4 left']
 SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 out 0.08']
 UNWRITTEN = 0.123456789
 CALLER = """
 static {name}_memory {name}_m;
+const char *{name}_named(int side, int i) {{ return {name}_name(side, i); }}
 int {name}_started(void) {{ return {name}_begin(&{name}_m); }}
 int {name}_sent(int side, const double *from, double *to)
 {{
@@ -71,10 +82,10 @@ int {name}_sent(int side, const double *from, double *to)
 """
 
 
-def compiled(folder, machines, *names):
+def compiled(folder, machines, *names, flags=()):
     """Return a library with the actuators and joints of mechanisms."""
     return loaded(folder, ''.join(header.written(machine, joints=names) + CALLER.format(
-        name=machine.name) for machine in machines))
+        name=machine.name) for machine in machines), *flags)
 
 
 class Memory:
@@ -137,13 +148,12 @@ def expected(machine, inputs):
     return position, rates, joint, signs[:, None] * turning
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_both_ways_are_those_of_the_scene(library, machines, name):
     machine = machines[name]
     n = len(machine.inputs)
-    memory = Memory(library(name), name, n)
-    for inputs in states(machine, 100):
+    memory = Memory(library, name, n)
+    for inputs in states(machine, 20):
         actuator, by, joint, turning = expected(machine, inputs)
         speeds, torques = np.arange(1.0, n + 1.0), np.arange(2.0, n + 2.0)
         loads = np.array(machine.efforts(inputs)) if machine.loads else np.zeros(n)
@@ -162,41 +172,80 @@ def test_both_ways_are_those_of_the_scene(library, machines, name):
         np.testing.assert_allclose(held, np.linalg.solve(by.T, loads), rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.parametrize('name', ['boom', 'rack'])
+def test_what_is_beyond_the_stroke_is_out_of_reach(library, machines, name):
+    machine, memory = machines[name], Memory(library, name, 1)
+    (low, high), = machine.first.reach
+    for end, inwards in ((low, 1.0), (high, -1.0)):
+        inside, outside = ((end + way * inwards * 1e-6) / machine.first.ratio for way in (1, -1))
+        assert memory.send(0, [inside])[0] & 1 == 0 and memory.send(0, [outside])[0] & 1 == 1
+
+
+@pytest.mark.parametrize('name', SCENE['mechanisms'])
+def test_names_are_those_of_the_scene(library, machines, name):
+    machine, named = machines[name], library[f'{name}_named']
+    named.restype = ctypes.c_char_p
+    sources = [drive.source for drive in machine.inputs.values()]
+    commanded = [{'lever': 'flap', 'int': 'while/1:x', 'leg': 'leg_crank'}.get(name), 'leg_AP']
+    assert [named(0, i).decode() for i in range(len(sources))] == sources
+    assert commanded[0] is None or [named(1, i).decode() for i in range(
+        len(sources))] == commanded[:len(sources)]
+
+
 def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, machines):
-    machine, memory = machines['lever'], Memory(library('lever'), 'lever', 1)
+    machine, memory = machines['lever'], Memory(library, 'lever', 1)
     (inside, *_), (outside, *_) = (expected(machine, [angle])[2] for angle in (0.3, 0.45))
     _, (good, *_) = memory.send(1, [inside], [1.0])
     status, (position, velocity, _) = memory.send(1, [outside], [1.0])
     assert status == 1 and position == good and velocity == 0.0
+    # The ends are in it.
+    for end in (-0.4, 0.4):
+        actuator, _, joint, _ = expected(machine, [end])
+        status, (position, *_) = memory.send(1, joint, [1.0])
+        assert status == 0 and position == pytest.approx(actuator, abs=1e-12)
     # What is measured there is what it is.
     actuator, _, joint, _ = expected(machine, [0.45])
     status, (position, *_) = memory.send(0, actuator)
     assert status == 0 and position == pytest.approx(joint)
 
 
-@pytest.mark.parametrize('joints_, given, names, side, pairs', [
+CHOICES = [
     # A geared joint counts turns both ways, and so does an encoder on it.
     (GEARED, {}, [], 1, [(value, -0.5 * value) for value in (1.0, -6.4, -7.0, -20.0)]),
     (GEARED, {}, [], 0, [(40.0, -80.0)]),
-    (GEARED, {'m.crank.measures': 'crank2'}, ['m_crank'], 0, [(-20.0, 10.0), (1e4, -5e3)]),
+    (GEARED, {'crank.measures': 'crank2'}, ['crank'], 0, [(-20.0, 10.0), (1e4, -5e3)]),
     # With an offset it is published within a turn, so that half a turn of the crank is free.
-    (GEARED, {'m.crank.start': 3.0, 'm.joint_names': ['crank2=wheel+0.5']}, ['wheel'], 1,
+    (GEARED, {'crank.start': 3.0, 'joint_names': ['crank2=wheel+0.5']}, ['wheel'], 1,
      [(1.0, math.pi - 0.25), (-3.0, 1.75), (-3.0 - math.tau, 1.75)]),
-    (GEARED, {'m.joint_names': ['crank2=wheel+0.5']}, ['wheel'], 0, [(-2.0, 4.5 - math.tau)]),
+    (GEARED, {'joint_names': ['crank2=wheel+0.5']}, ['wheel'], 0, [(-2.0, 4.5 - math.tau)]),
     # A command is answered within the sweep, though another answer is nearer.
-    (SLOT, {'m.crank.start': -0.2, 'm.crank.sweep': [-0.3, 2.0]}, ['m_A.y'], 1,
+    (SLOT, {'crank.start': -0.2, 'crank.sweep': [-0.3, 2.0]}, ['A.y'], 1,
      [(0.02 * math.cos(0.9), 0.9)]),
-    (SLOT, {'m.crank.start': 7.0, 'm.crank.sweep': [6.5, 8.0]}, ['m_A.y'], 1,
+    (SLOT, {'crank.start': 7.0, 'crank.sweep': [6.5, 8.0]}, ['A.y'], 1,
      [(0.02 * math.cos(0.9), math.tau + 0.9)]),
     # A measured link may be beyond it.
-    (SLOT, {'m.crank.measures': 'A.y', 'm.crank.start': 0.5, 'm.crank.sweep': [0.2, 0.8]},
-     ['m_crank'], 0, [(0.02 * math.cos(0.9), 0.9)])])
-def test_the_right_one_of_several_inputs_is_chosen(tmp_path, joints_, given, names, side, pairs):
-    machine, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': joints_, **given}
-                          ).machines.values()
-    library = compiled(tmp_path, [machine], *names)
+    (SLOT, {'crank.measures': 'A.y', 'crank.start': 0.5, 'crank.sweep': [0.2, 0.8]},
+     ['crank'], 0, [(0.02 * math.cos(0.9), 0.9)])]
+
+
+@pytest.fixture(scope='module')
+def choosing(tmp_path_factory):
+    """Return the library of CHOICES."""
+    code = ''
+    for i, (joints_, given, names, *_) in enumerate(CHOICES):
+        machine, = scene.read({'mechanisms': [f'm{i}'], **{f'm{i}.{key}': value for key, value in {
+            'type': 'custom', 'joints': joints_, **given}.items()}}).machines.values()
+        code += header.written(machine, joints=[
+            each if each == 'wheel' else f'm{i}_{each}' for each in names])
+        code += CALLER.format(name=f'm{i}')
+    return loaded(tmp_path_factory.mktemp('choosing'), code)
+
+
+@pytest.mark.parametrize('i', range(len(CHOICES)))
+def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
+    *_, side, pairs = CHOICES[i]
     for position, expected_ in pairs:
-        status, (found, *_) = Memory(library, 'm', 1).send(side, [position])
+        status, (found, *_) = Memory(choosing, f'm{i}', 1).send(side, [position])
         assert status == 0 and found[0] == pytest.approx(expected_, rel=1e-12)
 
 
@@ -242,7 +291,7 @@ def test_joints_that_move_with_no_input_are_refused():
 
 
 def test_what_is_missing_is_said(library, machines):
-    machine, memory, nan = machines['rocker'], Memory(library('rocker'), 'rocker', 1), math.nan
+    machine, memory, nan = machines['rocker'], Memory(library, 'rocker', 1), math.nan
     actuator, _, joint, _ = expected(machine, [1.0])
     # A command in no known pose.
     status, found = memory.send(1, [nan], [1.0], [2.0])
@@ -265,7 +314,7 @@ def test_what_is_missing_is_said(library, machines):
 
 
 def test_a_singular_pose_is_said(library, machines):
-    machine, memory = machines['rocker'], Memory(library('rocker'), 'rocker', 1)
+    machine, memory = machines['rocker'], Memory(library, 'rocker', 1)
     dead = machine.linkage.extremes('QB')[0][0][1]
     _, (_, _, held) = memory.send(0, [1.0], [1.0], [1.0])
     status, (_, velocity, effort) = memory.send(0, [dead], [1.0], [2.0])
@@ -274,15 +323,14 @@ def test_a_singular_pose_is_said(library, machines):
     assert status == 2 and velocity == 0.0 and np.isfinite(position)
 
 
-@pytest.mark.sample(1)
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
     machine, rng = machines[name], np.random.default_rng(4)
     n = len(machine.inputs)
-    memory = Memory(library(name), name, n)
+    memory = Memory(library, name, n)
     assert memory.send(0, expected(machine, states(machine, 1)[0])[0])[0] == 0
     values = [math.nan, math.inf, -math.inf, 1e308, -1e300, 5e-324, 0.0, 1.0, 1e-3, 3.0]
-    for _ in range(3000):
+    for _ in range(400):
         side, given = int(rng.integers(2)), rng.choice(values, (3, n))
         status, found = memory.send(side, *given)
         assert 0 <= status < 8 and np.isfinite(found).all()
@@ -291,12 +339,35 @@ def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
         assert ((found == UNWRITTEN) == is_missing[:, None]).all()
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize('type_, given, chosen', [
+    # A chain of links from the ground.
+    ('five_bar', {}, ['m_crank', 'm_AP']), ('slider_crank', {}, ['m_block']),
+    ('klann', {}, ['m_BD']),
+    # With preference for those that have a name, on the links before them.
+    ('klann', {'joint_names': ['CF=knee']}, ['knee']),
+    ('klann', {'joint_names': ['AD=knee']}, ['m_BD']),
+    ('klann', {'joint_names': ['EF=knee', 'CF=toe']}, ['toe']),
+    ('five_bar', {'joint_names': ['crank2=hip', 'CP=knee']}, ['hip', 'knee']),
+    ('five_bar', {'joint_names': ['CP=knee']}, ['m_crank', 'm_AP']),
+    ('five_bar', {'joint_names': ['AP=knee', 'CP=other']}, ['m_crank', 'knee']),
+    # What is published comes first.
+    ('klann', {'joint_names': ['EF=knee'], 'only_named': True}, ['knee']),
+    ('klann', {'joint_names': ['crank=motor'], 'only_named': True}, ['motor'])])
+def test_joints_by_default(type_, given, chosen):
+    machine = scene.read({'mechanisms': ['m'], 'm.type': type_, **{
+        f'm.{key}': value for key, value in given.items()}}).machines['m']
+    assert [each.name for each in joints(machine)] == chosen
+
+
+def test_joints_by_default_have_no_barrel():
+    machine = scene.load(ROOT / 'config' / 'excavator.yaml').machines['excavator']
+    assert [each.output for each in joints(machine)] == ['OB', 'AD', 'EG']
+
+
 def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
-    leg, boom = machines['leg'], machines['boom']
-    assert [each.name for each in joints(leg)] == ['leg_crank', 'leg_AP']
+    leg = machines['leg']
     assert [each.output for each in joints(leg, ['leg_P.x', 'leg_P.y'])] == ['P.x', 'P.y']
-    assert [each.name for each in joints(boom)] == ['boom_OB']
+    assert [each.name for each in joints(machines['boom'])] == ['boom_OB']
     assert [each.name for each in actuators(machines['lever'])] == ['servo']
     for names, said in ((['knee'], "leg has no joint 'knee'; allowed: leg_crank"),
                         (['leg_AP'], 'leg has 2 inputs'), (['leg_AP', 'leg_AP'], 'as many')):
@@ -304,7 +375,7 @@ def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
             joints(leg, names)
     library = compiled(tmp_path, [leg], 'leg_P.x', 'leg_P.y')
     memory = Memory(library, 'leg', 2)
-    for inputs in states(leg, 50):
+    for inputs in states(leg, 15):
         place = outputs(leg, inputs, ['P.x', 'P.y'])
         memory.send(0, expected(leg, inputs)[0])
         status, (position, *_) = memory.send(1, place)
@@ -325,7 +396,8 @@ def test_random_linkages_go_both_ways(tmp_path, seeds):
                     for key, value in drawn.dimensions.items()}}
         with suppress(scene.SceneError):  # of lengths that allow no pose
             machines += scene.read(given).machines.values()
-    library, rng, back = compiled(tmp_path, machines), np.random.default_rng(1), 0
+    library, back = compiled(tmp_path, machines, flags=['-O2']), 0
+    rng = np.random.default_rng(1)
     for machine in machines:
         n, sizes = len(machine.inputs), np.array([each.size for each in joints(machine)])
         if library[f'{machine.name}_started']() == 0:
@@ -359,21 +431,13 @@ def test_all_ground_links_of_the_catalogue_but_one_are_closed_forms():
     assert len(closed) == 16 and [key for key in closed if not closed[key]] == [('klann', 'CF')]
 
 
-@pytest.mark.slow
-def test_names_of_any_letters_are_texts(tmp_path):
-    source = 'a*/ "b"\\ ??/\n%s é'
-    machine, = scene.read({
-        'mechanisms': ['int'], 'int.type': 'four_bar', 'int.crank.source': source,
-        'int.joint_names': ['QB=while/1:x']}).machines.values()
-    library = compiled(tmp_path, [machine])
-    text = (tmp_path / 'code.c').read_text()
-    assert 'INT_JOINT_WHILE_1_X = 0' in text and 'INT_ACTUATOR_A_B_S' in text
-    named = subprocess.run(
-        [COMPILER, '-x', 'c', '-', '-o', tmp_path / 'names', '-lm'], check=True, input=(
-            text + '#include <stdio.h>\nint main(void) { fputs(int_name(0, 0), stdout); }\n'
-        ).encode())
-    assert named.returncode == 0 and library
-    assert subprocess.run([tmp_path / 'names'], capture_output=True).stdout.decode() == source
+def test_enumerators_are_words_of_c(machines):
+    text = header.written(machines['int'])
+    assert 'enum { INT_JOINT_WHILE_1_X = 0 };' in text
+    assert re.search(r'enum { INT_ACTUATOR_A_B_S = 0 };', text)
+    both = header.written(machines['leg'])
+    assert 'enum { LEG_ACTUATOR_LEG_CRANK = 0, LEG_ACTUATOR_LEG_CRANK2 = 1 };' in both
+    assert 'enum { LEG_JOINT_LEG_CRANK = 0, LEG_JOINT_LEG_AP = 1 };' in both
 
 
 @pytest.mark.skipif(not shutil.which('avr-gcc'), reason='avr-gcc is not installed')
@@ -398,10 +462,10 @@ def proved(package, name, compiler, count, *flags):
     code = (package / 'src' / f'{name}.hpp').read_text()
     class_, space = re.search(r'struct (\w+)Code', code)[1], re.search(r'namespace (\w+)', code)[1]
     program = package / f'proof_{name}'
-    subprocess.run([compiler, '-std=c++17', *STRICT, *flags, f'-DNAME={name}', f'-DCLASS={class_}',
-                    f'-DNAMESPACE={space}', '-isystem', STAND_IN / 'include', '-I',
-                    package / 'src', '-I', package / 'include', STAND_IN / 'proof.cpp', '-o',
-                    program, *ROS], check=True)
+    subprocess.run([compiler, '-std=c++17', *STRICT, '-O2', *flags, f'-DNAME={name}',
+                    f'-DCLASS={class_}', f'-DNAMESPACE={space}', '-isystem',
+                    STAND_IN / 'include', '-I', package / 'src', '-I', package / 'include',
+                    STAND_IN / 'proof.cpp', '-o', program, *ROS], check=True)
     ended = subprocess.run([program, str(count)], capture_output=True, text=True)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     tried, good = map(int, re.search(r'(\d+) states, (\d+)', ended.stdout).groups())
@@ -439,15 +503,9 @@ def test_mechanisms_of_any_names_are_classes_of_their_own(tmp_path):
                     package / 'include', *ROS, package / 'all.cpp'], check=True)
 
 
-@pytest.mark.slow
-def test_any_dimensions_are_those_of_python(tmp_path):
-    given = {'mechanisms': [*mechanisms.TYPES, 'odd'],
-             **{f'{name}.type': name for name in mechanisms.TYPES}, 'odd.type': 'custom',
-             'odd.dimensions.u': 0.5, 'odd.dimensions.w': 0.7, 'odd.joints': [
-                 'O ground 0 0', 'H ground w 0', 'R carriage O along H 0.1*w 0.9*w',
-                 'Q ground 0 w', 'B dyad R Q u+w 0.9 left', 'C rigid R B u w left']}
-    machines = scene.read(given).machines
-    library = loaded(tmp_path, ''.join(header.opened(machine) + f"""
+def opened(folder, machines, *flags):
+    """Return functions that place the first joint of mechanisms with any dimensions."""
+    library = loaded(folder, ''.join(header.opened(machine) + f"""
 const char *{name}_placed(const double *dimension, const double *q, double *position)
 {{
     static {name}_linkage c;
@@ -457,12 +515,31 @@ const char *{name}_placed(const double *dimension, const double *q, double *posi
         position[0] = {name}_at(&c, q, 1, &p) ? p.position[1][0] : NAN;
     return wrong;
 }}
-""" for name, machine in machines.items()))
+""" for name, machine in machines.items()), *flags)
+    functions = {name: library[f'{name}_placed'] for name in machines}
+    for function in functions.values():
+        function.restype = ctypes.c_char_p
+    return functions
+
+
+ODD = {'mechanisms': ['odd'], 'odd.type': 'custom', 'odd.dimensions.u': 0.5,
+       'odd.dimensions.w': 0.7, 'odd.dimensions.s': 0.1, 'odd.joints': [
+           'O ground s 0', 'H ground w 0', 'R carriage O along H 0.1*w 0.9*w', 'Q ground 0 w',
+           'B dyad R Q u+w 0.9 left', 'C rigid R B u w left']}
+
+
+@pytest.mark.parametrize('types, count', [
+    (['slotted_lever', 'five_bar'], 20),
+    pytest.param(list(mechanisms.TYPES), 60, marks=pytest.mark.slow)], ids=['few', 'all'])
+def test_any_dimensions_are_those_of_python(tmp_path, types, count):
+    machines = scene.read({**ODD, 'mechanisms': [*types, 'odd'],
+                           **{f'{name}.type': name for name in types}}).machines
+    functions = opened(tmp_path, machines)
     rng, tried = np.random.default_rng(7), 0
     for name, machine in machines.items():
-        place, linkage = library[f'{name}_placed'], machine.linkage
-        place.restype, output = ctypes.c_char_p, joints(machine)[0].output
-        for _ in range(60):
+        place, linkage = functions[name], machine.linkage
+        output = joints(machine)[0].output
+        for _ in range(count):
             own = {key: value * rng.choice([1.0, 1.0, rng.uniform(0.4, 2.0), -1.0],
                                            p=[0.3, 0.2, 0.45, 0.05])
                    for key, value in linkage.dimensions.items()}
@@ -486,7 +563,37 @@ const char *{name}_placed(const double *dimension, const double *q, double *posi
             assert position.value == pytest.approx(
                 expected, abs=1e-14, rel=1e-14, nan_ok=True), (name, own)
             tried += math.isfinite(position.value)
-    assert tried > 200
+    assert tried > len(machines) * count / 5
+
+
+@pytest.mark.parametrize('own, said', [
+    ({}, None), ({'s': -0.2, 'u': -0.1}, None), ({'v': -1.0}, 'v must be a positive number [m]'),
+    ({'v': 0.0}, 'v must be a positive number [m]'), ({'s': math.nan}, 's must be a number [m]'),
+    ({'s': math.inf}, 's must be a number [m]'), ({'v': math.inf}, 'v must be a positive number'),
+    ({'v': 0.1}, 'the bar B-D must be longer than zero'),
+    ({'v': 5.0}, 'no triangle has the sides at C: each must be shorter than the others'),
+    ({'u': 0.9}, 'the carriage must have a way to go')])
+def test_why_dimensions_cannot_be_is_said(strict, own, said):
+    place, count = strict
+    given = {'s': 0.1, 'u': 0.5, 'w': 0.7, 'v': 0.6} | own
+    found = place((ctypes.c_double * 4)(*given.values()), (ctypes.c_double * 1)(1.0),
+                  ctypes.byref(ctypes.c_double()))
+    assert count == 4 and (found is None if said is None else found.decode().startswith(said))
+
+
+@pytest.fixture(scope='module')
+def strict(tmp_path_factory):
+    """Return the function of a mechanism of all that may be wrong with dimensions."""
+    machines = scene.read({
+        'mechanisms': ['picky'], 'picky.type': 'custom', 'picky.dimensions.s': 0.1,
+        'picky.dimensions.u': 0.5, 'picky.dimensions.v': 0.6, 'picky.dimensions.w': 0.7,
+        'picky.joints': [
+            'O ground s 0', 'H ground 3 0', 'R carriage O along H u w', 'Q ground 0 1',
+            'B dyad R Q 0.9 0.8 left', 'C rigid R B v 0.8 left',
+            'D dyad B C v-0.2 0.7 left']}).machines
+    machine, = machines.values()
+    return (opened(tmp_path_factory.mktemp('strict'), machines)['picky'],
+            len(machine.linkage.dimensions))
 
 
 @pytest.mark.long
@@ -496,12 +603,12 @@ def test_a_package_is_built_and_tests_itself(tmp_path):
         pytest.skip('ament_cmake is not installed')
     package = written(tmp_path, ROOT / 'examples' / 'leg.yaml', '--mechanism', 'knee', 'hip')
     build = tmp_path / 'build'
-    for command in (
+    for each in (
             ['cmake', '-S', package, '-B', build, f'-DCMAKE_INSTALL_PREFIX={tmp_path / "install"}',
              f'-DCMAKE_PREFIX_PATH={STAND_IN / "cmake"};{sys.prefix}',
              f'-DPython3_EXECUTABLE={sys.executable}'],
             ['cmake', '--build', build, '--target', 'install'], ['ctest', '--test-dir', build]):
-        ended = subprocess.run(command, capture_output=True, text=True)
+        ended = subprocess.run(each, capture_output=True, text=True)
         assert ended.returncode == 0, ended.stdout + ended.stderr
     assert '2 tests' in ended.stdout or 'out of 2' in ended.stdout
     assert (tmp_path / 'install' / 'lib' / 'libleg_transmissions.so').is_file()
@@ -516,30 +623,115 @@ find_package(leg_transmissions REQUIRED)
 add_library(component SHARED {STAND_IN / 'component.cpp'})
 target_link_libraries(component leg_transmissions::status)
 """)
-    for command in (
+    for each in (
             ['cmake', '-S', component, '-B', tmp_path / 'other', '-DCMAKE_PREFIX_PATH='
              f'{tmp_path / "install"};{STAND_IN / "cmake"};{sys.prefix}',
              f'-DPython3_EXECUTABLE={sys.executable}'], ['cmake', '--build', tmp_path / 'other']):
-        ended = subprocess.run(command, capture_output=True, text=True)
+        ended = subprocess.run(each, capture_output=True, text=True)
         assert ended.returncode == 0, ended.stdout + ended.stderr
 
 
-def test_a_package_names_what_the_scene_names(tmp_path):
-    package = written(tmp_path, ROOT / 'examples' / 'leg.yaml')
-    described = ElementTree.parse(package / 'plugins.xml')
-    plugins = {each.get('name') for each in described.iter('class')}
-    pasted = ElementTree.fromstring(
-        f'<all>{(package / "urdf" / "transmissions.xml").read_text()}</all>')
-    assert {each.findtext('plugin') for each in pasted} == plugins and len(plugins) == 3
-    assert [each.find('actuator').get('name') for each in pasted] == [
-        'abduction_motor', 'hip_motor', 'knee_motor']
-    assert [each.find('joint').get('name') for each in pasted] == ['hip_roll', 'hip_pitch', 'knee']
-    assert ElementTree.parse(package / 'package.xml').findtext('name') == package.name
-    assert len((package / 'README.md').read_text().splitlines()) <= 30
+# The actuators and joints of some mechanisms: names, and roles.
+AXES = {'leg': ({'leg_crank': 'crank', 'leg_crank2': 'crank2'},
+                {'leg_crank': 'crank', 'leg_AP': 'AP'}),
+        'int': ({SCENE['int.crank.source']: 'crank'}, {'while/1:x': 'QB'}),
+        'boom': ({'boom_cylinder': 'cylinder'}, {'boom_OB': 'OB'}),
+        'lever': ({'servo': 'crank'}, {'flap': 'lever'})}
+
+
+@pytest.fixture(scope='module')
+def files(machines):
+    """Return the files of a package by their paths, as texts."""
+    made = package('robot_1', 'a<b>*/.yaml', [(machines[name], []) for name in AXES])
+    return {str(path): text for path, text in made.items()}
+
+
+def test_a_package_is_complete(files):
+    assert {*files} == {
+        'CMakeLists.txt', 'package.xml', 'README.md', 'plugins.xml', 'urdf/transmissions.xml',
+        'src/plugins.cpp', 'src/transmission-of.hpp',
+        'include/linkage_ros/linkage_transmission.hpp', *(
+            path.format(name) for name in AXES for path in (
+                'src/{}.hpp', 'src/{}_linkage.h', 'test/test_{}.cpp'))}
+    assert not any(re.search(r'@\w+@', text) for text in files.values())
+    assert {'robot_1_plugins'} == {found for text in files.values() for found in re.findall(
+        r'\b(\w+_plugins)\b|$', text) if found}
+    described = ElementTree.fromstring(files['package.xml'])
+    assert described.findtext('name') == 'robot_1'
+    assert 'Linkages of a<b>* /.yaml as' in described.findtext('description')
+    assert {each.text for each in described.iter('depend')} == set(re.findall(
+        r'find_package\((?!ament)(\w+)', files['CMakeLists.txt']))
+    assert 'project(robot_1 ' in files['CMakeLists.txt']
+    assert f'foreach(mechanism {" ".join(AXES)})' in files['CMakeLists.txt']
+    rows = [line for line in files['README.md'].splitlines() if line.startswith('| `')]
+    assert rows[0] == '| `robot_1/Leg` | leg_crank, leg_crank2 | leg_crank, leg_AP | ' \
+        'a, b, c, d, f |'
+    assert rows[1] == (
+        '| `robot_1/Int` | a* / "b"/ ? ?/?%s ? | while/1:x | a, b, c, d, p |')
+    assert rows[2] == '| `robot_1/Boom` | boom_cylinder | boom_OB | none |' and len(rows) == 4
+    assert '# robot_1\n' in files['README.md'] and len(files['README.md'].splitlines()) <= 30
+
+
+def test_a_package_names_what_the_scene_names(files, machines):
+    plugins = ElementTree.fromstring(files['plugins.xml'])
+    pasted = ElementTree.fromstring(f'<all>{files["urdf/transmissions.xml"]}</all>',
+                                    ElementTree.XMLParser(target=ElementTree.TreeBuilder(
+                                        insert_comments=True)))
+    assert plugins.get('path') == 'robot_1' and len(plugins) == len(AXES)
+    assert re.findall(r'CLASS\(\s*(.*?), transmission_interface::TransmissionLoader\)',
+                      files['src/plugins.cpp']) == [each.get('type') for each in plugins]
+    assert re.findall('#include "(.*).hpp"', files['src/plugins.cpp'])[:-1] == [*AXES]
+    for (name, axes), plugin, own in zip(
+            AXES.items(), plugins, (each for each in pasted if each.tag == 'transmission')):
+        dimensions, code = machines[name].linkage.dimensions, files[f'src/{name}.hpp']
+        assert own.get('name') == name and own.findtext('plugin') == plugin.get('name')
+        assert plugin.get('name') == f'robot_1/{name.title()}'
+        assert plugin.get('type') == f'robot_1_plugins::{name.title()}Loader'
+        assert plugin.get('base_class_type') == 'transmission_interface::TransmissionLoader'
+        if name != 'int':
+            assert plugin.findtext('description') == (
+                f'The linkage {name} between {", ".join(axes[0])} and {", ".join(axes[1])}.')
+        for side, named in zip(('actuator', 'joint'), axes):
+            assert [{**each.attrib} for each in own.iter(side)] == [
+                {'name': each, 'role': role} for each, role in named.items()]
+            row, = re.findall(rf'array<Axis, size> {side}s{{{{(.*)}}}};', code)
+            assert [tuple(ast.literal_eval(f'b"{text}"').decode() for text in each)
+                    for each in re.findall(r'{"(.*?)", "(.*?)"}', row)] == [*named.items()]
+        notes = [each.text for each in own if not isinstance(each.tag, str)]
+        assert notes == [f' <param name="{key}">{value!r}</param> for another length [m] '
+                         for key, value in [*dimensions.items()][:1]]
+        count, rows = re.search(r'array<Dimension, (\d+)> dimensions{(.*)};', code).groups()
+        assert {key: float(value) for key, value in re.findall(r'{"(\w+)", (.*?)}', rows)} == {
+            **dimensions} and int(count) == len(dimensions)
+        assert f'size = {len(axes[0])};' in code and f'{name}_set(&c' in code
+        proof = files[f'test/test_{name}.cpp']
+        assert f'#include "{name}.hpp"' in proof and f'dimensions[{len(dimensions)} + 1]' in proof
+        assert f'robot_1_plugins::{name.title()}Code;' in proof and f'  {name}_linkage c;' in proof
+        assert files[f'src/{name}_linkage.h'] == header.opened(machines[name])
+        assert f'be given: {", ".join(dimensions) or "none"}.' in files[f'src/{name}_linkage.h']
+
+
+OPTIONS = ["SCENE the scene's parameter file",
+           '--mechanism NAME [NAME ...] only these mechanisms of the scene',
+           '--joints JOINT [JOINT ...] what a controller commands, by its name in the scene']
+
+
+@pytest.mark.parametrize('main, about, options', [
+    (transmission.main, 'Write the mechanisms of a scene as a ROS 2 package of transmissions', [
+        '--out DIR output folder; its name is the name of the package']),
+    (command.main, 'Print the mechanisms of a scene as C99 headers, one after another', [
+        '--output OUTPUT [OUTPUT ...] an inverse for each of these: a link, A.x, distance(A,B)',
+        '--float float instead of double'])])
+def test_options_are_described(capsys, main, about, options):
+    with pytest.raises(SystemExit, match='0'):
+        main(['--help'])
+    printed = ' '.join(capsys.readouterr().out.split())
+    assert [text for text in (about, *OPTIONS, *options) if text not in printed] == []
 
 
 @pytest.mark.parametrize('arguments, said', [
-    (['--out', '{0}/My-Package'], "must end in the package's name"),
+    *((['--out', '{0}/' + name], f"single underscores, a letter first, not '{name}'")
+      for name in ('My-Package', 'a', '1a', 'a__b', 'a_', 'a' * 65)),
     (['--out', '{0}'], 'or one written by this command'), ([], 'required: --out'),
     (['--out', '{0}/legs', '--joints', 'elbow'], "no mechanism has a joint 'elbow'"),
     (['--out', '{0}/legs', '--joints', 'kneee'], 'did you mean knee?')])
@@ -554,8 +746,17 @@ def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, sai
     assert (folder / 'notes.txt').read_text() == 'keep'
 
 
-def test_a_package_is_written_again(tmp_path):
-    package = written(tmp_path, ROOT / 'config' / 'jansen.yaml')
-    before = {path: path.read_text() for path in package.rglob('*.*')}
-    assert written(tmp_path, ROOT / 'config' / 'jansen.yaml') == package
-    assert {path: path.read_text() for path in package.rglob('*.*')} == before
+def test_a_package_is_written_again(tmp_path, capsys, monkeypatch):
+    path, named = ROOT / 'examples' / 'leg.yaml', ['--mechanism', 'knee', 'hip']
+    made = written(tmp_path, path, *named, '--joints', 'knee')
+    assert capsys.readouterr().out == f'{made}: knee, hip; see README.md\n'
+    before = {file: file.read_text() for file in made.rglob('*') if file.is_file()}
+    chosen = scene.load(path).machines
+    assert before == {made / file: text for file, text in package(
+        'leg_transmissions', 'leg.yaml', [(chosen['knee'], ['knee']), (chosen['hip'], [])]
+        ).items()}
+    monkeypatch.setattr('sys.argv', ['', str(path), *named, '--out', str(made)])
+    monkeypatch.delitem(sys.modules, 'linkage_ros.c_code.transmission')
+    with pytest.raises(SystemExit, match='0'):
+        runpy.run_module('linkage_ros.c_code.transmission', run_name='__main__')
+    assert {file: file.read_text() for file in made.rglob('*') if file.is_file()} == before

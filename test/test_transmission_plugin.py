@@ -132,16 +132,19 @@ class Component:
         """Measure actuators; return the status and the joints' positions, velocities, efforts."""
         self.actuator[:] = np.stack(np.broadcast_arrays(position, velocity, effort)).reshape(3, -1)
         self.joint[:] = UNWRITTEN
-        self._host.component_read(self._made)
-        return self._host.component_status(self._made), self.joint.copy()
+        return self.transmit('read'), self.joint.copy()
 
     def write(self, position=NAN, velocity=NAN, effort=NAN):
         """Command joints; return the status and the actuators' positions, velocities, efforts."""
         self.joint[:] = [np.broadcast_to(each, self.joint.shape[1]) for each in (
             position, velocity, effort)]
         self.actuator[:] = UNWRITTEN
-        self._host.component_write(self._made)
-        return self._host.component_status(self._made), self.actuator.copy()
+        return self.transmit('write'), self.actuator.copy()
+
+    def transmit(self, how):
+        """Read or write what is in the memory; return the status."""
+        getattr(self._host, f'component_{how}')(self._made)
+        return self._host.component_status(self._made)
 
 
 @pytest.fixture(scope='module')
@@ -238,7 +241,7 @@ def test_the_knee_moved_by_hand_stays(plugins):
             component.read(float(motor))
         component.joint[0] = bad
         component.actuator[0] = 4.0
-        component._host.component_write(component._made)
+        component.transmit('write')
         assert component.actuator[0] == 4.0
 
 
@@ -345,8 +348,8 @@ def test_a_motor_in_one_memory_for_states_and_commands_stays(plugins):
     actuator, _ = poses(machine, 1.9, 1.24)
     component.actuator[0] = actuator
     for _ in range(100):
-        component._host.component_read(component._made)
-        component._host.component_write(component._made)
+        component.transmit('read')
+        component.transmit('write')
     assert component.actuator[0] == pytest.approx(actuator, abs=1e-12)
 
 

@@ -43,7 +43,7 @@ def work(monkeypatch):
 
         def run(*drive):
             done[(assembly.linkage.type, *(len(part or ()) for part in wanted[:3]))] += 1
-            solve(*drive)
+            return solve(*drive)
 
         solution.solve = run
         return solution
@@ -200,10 +200,10 @@ def test_a_patched_message_reads_like_one_that_is_built(count):
 
     for build, kind, size in ((drawn, MarkerArray, 2 * count if count == 1 else 4 * count),
                               (joined, JointState, count), (joined, JointState, 2 * count)):
-        template = message_layout.Template(build, size)
+        template = message_layout.Template([build], size)
         for values in (random.normal(size=size), np.zeros(size), -np.arange(size) * 1e300):
             stamp = Time(sec=int(random.integers(2 ** 31)), nanosec=int(random.integers(10 ** 9)))
-            patched = template.patched(message_layout.pack(stamp), values)
+            patched, = template.patched(message_layout.pack(stamp), values)
             assert deserialize_message(patched, kind) == deserialize_message(
                 serialize_message(build(stamp, values)), kind)
 
@@ -219,8 +219,8 @@ def test_what_cannot_be_patched_is_published_as_an_ordinary_message(graph, monke
     assert plain.position[0] == 0.4 and plain.velocity[0] == 2.0
     monkeypatch.undo()
     patched = message_layout.Template(
-        lambda stamp, values: JointState(name=plain.name, position=values), len(plain.name))
-    text = patched.patched(message_layout.pack(Time()), np.array(plain.position))
+        [lambda stamp, values: JointState(name=plain.name, position=values)], len(plain.name))
+    text, = patched.patched(message_layout.pack(Time()), np.array(plain.position))
     read = deserialize_message(text, JointState)
     assert read.position == plain.position
     assert all(math.isfinite(x) for x in plain.position)

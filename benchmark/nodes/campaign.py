@@ -143,8 +143,9 @@ class Bench:
             # Who listens is told to those that spin, and machine code is made beside first ticks.
             for _ in range(4):
                 self.driver.until(lambda: False, COMPILING, executor)
-                assert self.driver.until(lambda: 'linkage_ros compiler' not in {
-                    thread.name for thread in threading.enumerate()}, executor=executor)
+                assert self.driver.until(lambda: not any(
+                    thread.name.startswith('linkage_ros compiler')
+                    for thread in threading.enumerate()), executor=executor)
                 for node in nodes.values():
                     _ticks(node, cranks, count)
             for _ in range(3 * self.rounds):

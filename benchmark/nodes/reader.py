@@ -21,7 +21,7 @@ from itertools import cycle, islice
 import statistics
 import time
 
-from linkage_ros.nodes.joint_state_reader import Numbers, Reader
+from linkage_ros.nodes.joint_state_reader import Reader
 from linkage_ros.nodes.message_layout import pack
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
@@ -32,10 +32,10 @@ SOURCES, JOINTS = (1, 2, 8, 9, 16, 64, 256, 300, 1000), (1, 10, 100, 1000, 3000,
 ROUNDS, NUMBERS = 7, 100_000
 
 
-def plain(text: bytes) -> Numbers:
-    """Return what a message says, deserialised."""
+def plain(text: bytes) -> tuple:
+    """Return the numbers of a message, deserialised."""
     message = deserialize_message(text, JointState)
-    return Numbers(pack(message.header.stamp), tuple(message.position), tuple(message.velocity))
+    return pack(message.header.stamp), *message.position, *message.velocity
 
 
 class Quick:
@@ -44,8 +44,8 @@ class Quick:
     def __init__(self):
         self._reader = Reader(lambda message: message.name)
 
-    def __call__(self, text: bytes) -> Numbers:
-        """Return what a message says."""
+    def __call__(self, text: bytes) -> tuple:
+        """Return the numbers of a message."""
         return self._reader.sender(text).read(text)
 
 

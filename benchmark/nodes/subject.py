@@ -26,7 +26,7 @@ import time
 
 from linkage_interfaces.srv import ServoInverse
 from linkage_ros import scene
-from linkage_ros.nodes import driven_mechanism, messages, scene_node
+from linkage_ros.nodes import mechanism_topics, messages, scene_node
 from linkage_ros.nodes.joint_state_reader import ANY
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.mechanism_model import MechanismModel
@@ -87,14 +87,25 @@ class Deaf(Node):
         pass
 
 
+class Unpatched:
+    """Publishers that never patch."""
+
+    def __init__(self, publishers):
+        self._publishers = publishers
+
+    def __getitem__(self, key):
+        """Return a publisher."""
+        publisher = self._publishers[key]
+        publisher.template = None
+        return publisher
+
+
 class FreshModel(MechanismModel):
     """Builds ordinary messages, as one writes it: new ones each time."""
 
-    def publisher(self, *args):
-        """Return a publisher that never patches."""
-        publisher = super().publisher(*args)
-        publisher.template = None
-        return publisher
+    def __init__(self, *args):
+        super().__init__(*args)
+        self.publishers = Unpatched(self.publishers)
 
     def marker_message(self, *args):
         """Return new markers."""
@@ -170,11 +181,11 @@ class Fresh(Kinematics):
 
     def __init__(self, **kwargs):
         # Other nodes in this process patch theirs.
-        driven_mechanism.MechanismModel = FreshModel
+        mechanism_topics.MechanismModel = FreshModel
         try:
             super().__init__(**kwargs)
         finally:
-            driven_mechanism.MechanismModel = MechanismModel
+            mechanism_topics.MechanismModel = MechanismModel
 
 
 KINDS = {'kinematics': Kinematics, 'fresh': Fresh, 'floor': Floor, 'relay': Relay,

@@ -22,9 +22,8 @@ from .axes import actuators, Axis, axis, joints, start
 from .code import Code, open_linkage
 from .inverses import Inverses
 from .names import comment, constants, distinct, field, filled, literal, prefix, template
-from ..formula.expression import arctangent, Real, real
+from ..formula.expression import arctangent, Real
 from ..formula.program import Program
-from ..linkage.builder import in_metres
 from ..scene import SceneMechanism
 
 # Limits by precision. A Jacobian is `singular` below this part of its size, and below `least` for
@@ -148,7 +147,7 @@ class Sides:
                      '    if (!is_rated)\n        return 1;', *rates]
             powers = [[code.times(by[j][len(names) + k], -load * size)
                        for k, (_, load) in enumerate(loads)] for j, size in enumerate(self.sizes)]
-            return [*self._strokes(), *body, *(
+            return [*body, *(
                 f'    p->load[{j}] = {" + ".join(each) or code.literal(0.0)};'
                 for j, each in enumerate(powers)), '    return 1;']
 
@@ -176,15 +175,6 @@ class Sides:
             turn = code.literal(math.tau)
             yield (f'    {place} -= {turn} * floor{code.suffix}({place} / {turn} + '
                    f'{code.literal(0.5)});')
-
-    def _strokes(self) -> Iterator[str]:
-        """Yield the code that refuses inputs beyond their strokes."""
-        for i, (drawn, input_, size) in enumerate(zip(
-                self.linkage.structure.built.inputs, self.machine.linkage.inputs, self.sizes)):
-            if not input_.turns:
-                low, high = (self.code.constant(in_metres(real(end)) / size, value / size)
-                             for end, value in zip(drawn[2:4], input_[2:4]))
-                yield f'    if (!(q[{i}] >= {low} && q[{i}] <= {high}))\n        return 0;'
 
     def _loads(self) -> Iterator[Tuple[str, float]]:
         """Yield outputs on which the scene's loads work, with their factors."""

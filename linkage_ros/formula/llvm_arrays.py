@@ -100,10 +100,10 @@ def _module(operations: Sequence, constants: Sequence[int],
     def lanes(array: ir.Value, offset: ir.Value) -> ir.Value:
         return builder.bitcast(builder.gep(array, [offset]), VECTOR.as_pointer())
 
-    with builder.each(last, first=first, step=LANES) as pose:
+    with builder.each(last, first, LANES) as i:
         # The last eight poses may overlap those before.
         latest = builder.sub(size, count(LANES))
-        at = builder.select(builder.icmp_signed('<', pose.i, latest), pose.i, latest)
+        at = builder.select(builder.icmp_signed('<', i, latest), i, latest)
         append(operations, known, _operators(builder), VECTOR, lambda index: builder.load(
             lanes(load(builder, arguments, count(index)), at), align=1))
         for column, number in enumerate(outputs):

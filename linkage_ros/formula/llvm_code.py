@@ -19,9 +19,8 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 import ctypes
-from dataclasses import dataclass
 from functools import partial
-from typing import Any, Callable, Dict, Iterator, Optional, Sequence
+from typing import Callable, Dict, Iterator, Sequence
 
 import llvmlite
 from llvmlite import binding as llvm, ir
@@ -72,33 +71,20 @@ class Builder(ir.IRBuilder):
         return self.call(function, operands)
 
     @contextmanager
-    def each(self, last: ir.Value, total: Optional[ir.Value] = None, first: Any = 0,
-             step: int = 1) -> Iterator[Turn]:
-        """Write a loop over numbers below `last`, optionally with an accumulated total."""
-        before, first = self.block, count(first) if isinstance(first, int) else first
+    def each(self, last: ir.Value, first: ir.Value, step: int = 1) -> Iterator[ir.Value]:
+        """Write a loop over the integers from `first` to `last`, exclusive; yield the integer."""
+        before = self.block
         head, body, end = (self.function.append_basic_block() for _ in range(3))
         self.branch(head)
         self.position_at_end(head)
-        turn = Turn(self.phi(COUNT), total and self.phi(total.type))
-        self.cbranch(self.icmp_signed('<', turn.i, last), body, end)
+        i = self.phi(COUNT)
+        self.cbranch(self.icmp_signed('<', i, last), body, end)
         self.position_at_end(body)
-        yield turn
-        after = self.add(turn.i, count(step))
-        for phi, start, then in ((turn.i, first, after), (turn.total, total, turn.then)):
-            if phi:
-                phi.add_incoming(start, before)
-                phi.add_incoming(then, self.block)
+        yield i
+        i.add_incoming(first, before)
+        i.add_incoming(self.add(i, count(step)), self.block)
         self.branch(head)
         self.position_at_end(end)
-
-
-@dataclass
-class Turn:
-    """An iteration of a loop: its number, and the total at its start and end."""
-
-    i: ir.Value
-    total: Optional[ir.Value]
-    then: Optional[ir.Value] = None
 
 
 class Loop:
@@ -111,8 +97,7 @@ class Loop:
 
     def __init__(self, operations: Sequence, constants: Sequence[int], outputs: Sequence[int]):
         self._engine = compiled(_module(operations, constants, outputs))
-        self.address = self._engine.get_function_address('loop')
-        self.run = LOOP_SIGNATURE(self.address)
+        self.run = LOOP_SIGNATURE(self._engine.get_function_address('loop'))
 
     @staticmethod
     def arguments(given: np.ndarray, constants: np.ndarray, out: np.ndarray) -> tuple:
@@ -142,11 +127,11 @@ def _module(operations: Sequence, constants: Sequence[int],
         array.add_attribute('noalias')
     builder = Builder(loop.append_basic_block())
     known = {number: load(builder, given, count(i)) for i, number in enumerate(constants)}
-    with builder.each(poses) as pose:
+    with builder.each(poses, count(0)) as i:
         append(operations, known, builder.operations(), NUMBER, lambda index: load(
-            builder, arguments, builder.add(builder.mul(count(index), poses), pose.i)))
+            builder, arguments, builder.add(builder.mul(count(index), poses), i)))
         for column, number in enumerate(outputs):
-            place = builder.add(builder.mul(pose.i, by_pose),
+            place = builder.add(builder.mul(i, by_pose),
                                 builder.mul(count(column), by_output))
             builder.store(known[number], builder.gep(out, [place]))
     builder.ret_void()

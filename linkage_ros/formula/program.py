@@ -19,7 +19,7 @@ code for a pose has no branches for them.
 
 from __future__ import annotations
 
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import chain, count
@@ -411,10 +411,14 @@ class Pose:
         return self.variant.arrays.solve(given, self._given)
 
     def batch(self, rows: np.ndarray) -> Batch:
-        """Return a batch that is solved repeatedly, into rows (poses, outputs)."""
-        # Poses one by one have the same bits as machine code.
-        return Batch(self._one_by_one, self.variant.loop if self._accelerate else None,
-                     self._given, self.variant.arguments, rows)
+        """
+        Return poses to solve repeatedly by machine code, into rows (poses, outputs).
+
+        Raises ImportError without an llvmlite that works.
+        """
+        with needs('llvmlite'):
+            from . import llvm_code  # noqa: F401
+        return Batch(self.variant.loop, self._given, self.variant.arguments, rows)
 
     def _in_python(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
         return self._one_by_one(given, size) if size < FEW_POSES else self._blocks(given, size)
@@ -444,46 +448,48 @@ class Pose:
 
 class Batch:
     """
-    Poses that are solved repeatedly, in arrays at fixed addresses.
+    Poses that are solved repeatedly by machine code, in arrays at fixed addresses.
 
-    The user writes `arguments` (arguments, poses); `solve` writes outputs to `rows` (poses,
-    outputs).
+    Parameters
+    ----------
+    loop : Future of Loop
+        The machine code; if it fails, a warning has the reason.
+    constants : float array
+        The values of dimensions that it uses.
+    arguments : int
+        Number of arguments of a pose, whose values the user writes to the array `arguments`
+        (arguments, poses).
+    rows : float array (poses, outputs)
+        Where the outputs are written.
+
     """
 
-    def __init__(self, in_python: Callable, loop: Optional[Future], constants: np.ndarray,
-                 arguments: int, rows: np.ndarray):
-        self.arguments, self.rows = np.zeros((arguments, len(rows))), rows
-        self._in_python = in_python
-        self._loop, self._constants = loop, constants
-        self._run: Optional[Callable] = None
+    def __init__(self, loop: Future, constants: np.ndarray, arguments: int, rows: np.ndarray):
+        self.arguments = np.zeros((arguments, len(rows)))
+        self._loop: Optional[Future] = loop
+        self._code: Any = None
+        self._constants, self._rows = constants, rows
 
-    @property
-    def code(self) -> Optional[tuple]:
-        """Address and arguments of the machine code, see `Loop`; None until it is compiled."""
-        self._adopt_code()
-        return (self._code.address, *self._code_arguments) if self._run else None
+    def solve(self, shared: Sequence[Any] = ()) -> bool:
+        """
+        Fill the rows; return False, without effect, as long as there is no machine code.
 
-    def finish(self) -> None:
-        """Wait for the machine code, if it is being compiled."""
-        if self._loop:
-            wait([self._loop])
+        `shared` are the values of the first arguments if all poses have the same.
+        """
+        if self._loop and self._loop.done():
+            self._adopt(self._loop)
+        if self._code is None:
+            return False
+        for row, value in zip(self.arguments, shared):
+            row.fill(value)
+        self._code.run(*self._code_arguments)
+        return True
 
-    def solve(self) -> None:
-        """Fill the rows, by plain Python until the machine code is compiled."""
-        self._adopt_code()
-        if self._run:
-            self._run(*self._code_arguments)
-        else:
-            self.rows[:] = self._in_python(self.arguments, len(self.rows)).T
-
-    def _adopt_code(self) -> None:
-        if not self._loop or not self._loop.done():
-            return
-        loop, self._loop = self._loop, None
+    def _adopt(self, loop: Future) -> None:
+        self._loop = None
         if error := loop.exception():
             warnings.warn(f'no machine code, plain Python is used: {error}', stacklevel=4)
             return
         self._code = loop.result()
         self._code_arguments = self._code.arguments(
-            self.arguments, self._constants, self.rows.T)
-        self._run = self._code.run
+            self.arguments, self._constants, self._rows.T)

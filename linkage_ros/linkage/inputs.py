@@ -135,19 +135,20 @@ class Input(NamedTuple):
         """Return whether the input is cut off at a value: a turn at pi, a stroke at its end."""
         return value in (self.low, self.high)
 
-    def on(self, arcs: Sequence[Arc], value: Any) -> Any:
+    def on(self, arcs: Sequence[Arc], value: float) -> bool:
         """
-        Return whether values lie on arcs, up to whole turns and rounding.
+        Return whether a value lies on one of the arcs, up to whole turns and rounding.
 
         Arcs of a part of a period say nothing of values outside it: these count as on them.
         """
-        value, slack = np.asarray(value), ROUNDED_END * self.size
-        with np.errstate(invalid='ignore'):
-            ahead = [value - low + slack for low, _ in arcs]
-            ahead = [gap % self.turn for gap in ahead] if self.wraps else ahead
-            unknown = self.is_part and ((value < self.low) | (self.high < value))
-            return unknown | np.any([(gap >= 0.0) & (gap <= high - low + 2.0 * slack)
-                                     for gap, (low, high) in zip(ahead, arcs)], axis=0)
+        if self.is_part and (value < self.low or self.high < value):
+            return True
+        slack = ROUNDED_END * self.size
+        for low, high in arcs:
+            ahead = value - low + slack
+            if 0.0 <= (ahead % self.turn if self.wraps else ahead) <= high - low + 2.0 * slack:
+                return True
+        return False
 
     def holds(self, arc: Arc, low: float, high: float) -> bool:
         """Return whether an arc contains another, up to whole turns."""

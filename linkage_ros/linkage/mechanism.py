@@ -33,7 +33,7 @@ from .inverse import extremes_of, Inverse, segments_of, Solution
 from .quantities import LinkPoint, Points, structure_of
 from ..cache import Cache
 from ..formula.expression import derivative, Real, real
-from ..formula.program import Batch, evaluate, Pose, Program
+from ..formula.program import evaluate, Pose, Program
 from ..optional import needs
 from ..words import listed, meant, plain_text, quoted
 
@@ -418,20 +418,17 @@ class Mechanism:
                                               ('rates', rates)))
         return self.bound('parts', requested)
 
-    def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...],
-             rows: np.ndarray) -> Batch:
+    def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]) -> Pose:
         """
-        Return legs like this one on the same inputs, to be solved again and again.
+        Return the function that solves a leg like this one.
 
-        An accelerated mechanism's are solved by machine code as soon as that is there, without
-        waiting for it; the numbers are the same. For each leg is given: the value of each input
-        [rad or m], its speed [rad/s or m/s], and the numbers of its `Leg`. Into the leg's row go
-        x, y of each point (a joint, or a `LinkPoint` on a link), the angles of `joints` [rad; a
-        slide: m], and the velocities of the links in `moving`.
+        Its arguments are floats: the value of each input [rad or m], its speed [rad/s or m/s], and
+        the numbers of the `Leg`. It returns x, y of each point (a joint, or a `LinkPoint` on a
+        link), the angles of `joints` [rad; a slide: m], and the velocities of the links in
+        `moving`.
         """
-        pose = self.cache.get_or_make(('legs', points, joints, moving), lambda: self._legs(
+        return self.cache.get_or_make(('legs', points, joints, moving), lambda: self._legs(
             points, joints, moving))
-        return pose.batch(rows)
 
     def _legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]) -> Pose:
         lengths, unit = dict(self.lengths), self.lengths[UNIT.args[0]]

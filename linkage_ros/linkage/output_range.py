@@ -35,7 +35,7 @@ def common_reach(assembly: Assembly) -> Sequence[Arc]:
         return assembly.reach
     ends = [leg.lag + (leg.start + leg.side * end)
             for leg in assembly.legs.values() for arc in assembly.reach for end in arc]
-    return reachable_arcs(ends, lambda theta: bool(assembly.within_reach(theta).all()))
+    return reachable_arcs(ends, lambda theta: all(assembly.within_reach(theta)))
 
 
 def ground_frame(linkage: Mechanism) -> Dict[str, Tuple[float, float]]:

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arguments import numbers
-from ..words import listed, quoted
+from ..words import listed, plain_text, quoted
 
 if TYPE_CHECKING:
     from .mechanism import Inputs, Mechanism
@@ -48,6 +48,7 @@ def _powers(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike],
             by: int) -> Iterator[np.ndarray]:
     """Yield each load's work per unit of an input."""
     for name, load in loads.items():
+        name = plain_text(name)
         force = numbers(f'the load on {name}', load)
         if name in linkage.points:
             if force.shape[-1:] != (len(linkage.axes),):

@@ -15,17 +15,17 @@ Pair j of N has its left leg at theta - 2 pi j/N and its right leg, the mirror i
 leg at pi - (theta - 2 pi j/N), on the same crank pin.
 """
 
-from functools import cached_property
+from contextlib import suppress
 import math
 from struct import Struct
-from typing import Callable, List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, List, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 
 from .curves import drawn
 from .mechanism import Mechanism
 from .quantities import Leg, LinkPoint
-from ..formula.program import Batch
+from ..formula.program import Batch, Pose
 
 
 class Layout(NamedTuple):
@@ -72,34 +72,47 @@ class Layout(NamedTuple):
 
 class Solution:
     """
-    The numbers of a `Layout`, in an array at a fixed address.
+    A solver of all legs, and the numbers of its last solution: `values`, in a `Layout`.
 
-    The batch writes the solved legs to its rows; see `Mechanism.legs`.
+    `function` is the result of `Mechanism.legs`. Several legs are solved by machine code, where
+    llvmlite works and as soon as the code is compiled; otherwise by plain Python, which
+    returns the same bits.
     """
 
-    def __init__(self, layout: Layout, values: np.ndarray, batch: Batch):
-        self.layout, self.values, self.rows = layout, values, batch.rows
-        self.batch = batch
-        self._inputs = list(batch.arguments[:layout.inputs])
-        self._speeds = list(batch.arguments[layout.inputs:2 * layout.inputs])
-        self._driven = layout.driven(values)
-        self._pack: Callable = Struct(f'{self._driven.size}d').pack_into
+    def __init__(self, layout: Layout, legs: Sequence[Leg], function: Pose):
+        self.layout, self.values = layout, np.zeros(layout.size)
+        self.rows, self._function = layout.rows(self.values), function.at
+        self._at_rest = layout.inputs * (0.0,)
+        # Packing is faster than assignment to an array.
+        row: Any = Struct(f'{self.rows.shape[1]}d')
+        driven: Any = Struct(f'{layout.inputs + layout.speeds}d')
+        self._pack_row, self._pack_driven = row.pack_into, driven.pack_into
+        # Each leg, with the place of its row [bytes].
+        self._legs = [(i * row.size, leg) for i, leg in enumerate(legs)]
+        self._batch: Optional[Batch] = None
+        if len(legs) > 1:
+            with suppress(ImportError):
+                self._batch = function.batch(self.rows)
+                self._batch.arguments[2 * layout.inputs:].T[:] = legs
 
-    def finish(self) -> None:
-        """Wait for the compilation that would delay the first solution."""
-        self.batch.finish()
+    def solve(self, inputs: Sequence[float], speeds: Sequence[Any] = ()) -> bool:
+        """
+        Solve at inputs [rad or m] and, for velocities, their speeds [per second].
 
-    def solve(self, inputs: Sequence[float], speeds: Sequence[float] = ()) -> None:
-        """Solve at inputs [rad or m] and, for velocities, their speeds [per second]."""
-        if not self.layout.speeds:
-            speeds = ()
-        for row, value in zip(self._inputs, inputs):
-            row.fill(value)
-        for row, speed in zip(self._speeds, speeds):
-            row.fill(speed)
-        # Packing is faster than assignment to a slice of an array.
-        self._pack(self._driven, 0, *inputs, *speeds)
-        self.batch.solve()
+        Return True if all numbers are finite; if they are huge, it may return False, too.
+        """
+        driven = (*inputs, *speeds) if self.layout.speeds else (*inputs,)
+        arguments = driven if self.layout.speeds else (*inputs, *self._at_rest)
+        total = sum(driven)
+        self._pack_driven(self.values, self.rows.nbytes, *driven)
+        if self._batch and self._batch.solve(arguments):
+            # `vdot` overflows without the warning of `dot`.
+            return math.isfinite(total) and math.isfinite(np.vdot(self.rows, self.rows))
+        for place, leg in self._legs:
+            row = self._function(*arguments, *leg)
+            self._pack_row(self.values, place, *row)
+            total += sum(row)
+        return math.isfinite(total)
 
 
 class Assembly:
@@ -135,13 +148,6 @@ class Assembly:
         """Return the joints of all legs, with their legs' prefixes."""
         return [prefix + joint for prefix in self.legs for joint in self.joints]
 
-    @cached_property
-    def _fastest(self) -> Mechanism:
-        try:
-            return self.linkage.accelerated()
-        except ImportError:
-            return self.linkage
-
     def solution(self, points: Sequence[Union[str, LinkPoint]] = (), joints: Sequence[str] = (),
                  rates: Optional[Sequence[str]] = None, efforts: int = 0) -> Solution:
         """
@@ -153,25 +159,16 @@ class Assembly:
         rates = tuple(rates or ())
         layout = Layout(len(self.legs), inputs, len(self.linkage.axes) * len(points), len(joints),
                         len(rates), inputs if moving else 0, efforts)
-        values = np.zeros(layout.size)
-        batch = self._fastest.legs(
-            tuple(points), tuple(joints), rates, layout.rows(values))
-        batch.arguments[2 * layout.inputs:].T[:] = list(self.legs.values())
-        return Solution(layout, values, batch)
+        return Solution(layout, [*self.legs.values()], self.linkage.legs(
+            tuple(points), tuple(joints), rates))
 
-    def within_reach(self, value: float) -> np.ndarray:
+    def within_reach(self, value: float) -> List[bool]:
         """Return which legs can be assembled at a value [rad or m] of the input, by its reach."""
         first = self.linkage.inputs[0]
         if not first.turns:
-            return first.on(self.reach, [value / self._scale])
-        return first.on(self.reach, [leg.start + leg.side * (value - leg.lag)
-                                     for leg in self.legs.values()])
-
-    def own_inputs(self) -> List[Tuple[float, float]]:
-        """Return for each leg the factor and the offset from the first input to its own."""
-        if not self.linkage.inputs[0].turns:
-            return [(1.0 / self._scale, 0.0)]
-        return [(leg.side, leg.start - leg.side * leg.lag) for leg in self.legs.values()]
+            return [first.on(self.reach, value / self._scale)]
+        return [first.on(self.reach, leg.start + leg.side * (value - leg.lag))
+                for leg in self.legs.values()]
 
     def locus(self, name: str) -> np.ndarray:
         """

@@ -18,7 +18,6 @@ import math
 import time
 from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Sequence
 
-import numpy as np
 from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -184,25 +183,25 @@ class CommandStream:
                 reasons.append(str(error))
         return targets, unknown, reasons
 
-    def _interpret(self, message: JointState) -> tuple[list[Target], bool]:
-        """Return the targets of a sender's messages, and whether these have velocities."""
+    def _interpret(self, message: JointState) -> tuple[list[Target], int, bool]:
+        """Return a sender's targets, its count of positions, and whether it has velocities."""
         targets, unknown, reasons = self._targets(message.name[:len(message.position)])
         for reason in reasons:
             # Throttled, because each message of some senders is interpreted.
             self._throttle.warn(reason, partial('wanted_states: {}'.format, reason))
         if unknown := self._unknown.new(unknown):
             self._logger.warning(f'wanted_states: {_no_output(unknown)}{self._unknown.ending}')
-        return targets, len(message.velocity) == len(message.name)
+        return targets, len(message.position), len(message.velocity) == len(message.name)
 
     def _receive(self, data: bytes) -> None:
         if not self._commands.has_subscribers and not any(
                 one.has_subscribers for one in self._arrays.values()):
             return
         sender = self._reader.sender(data)
-        (targets, known), (stamp, positions, speeds) = sender.meaning, sender.read(data)
+        (targets, count, known), (stamp, *numbers) = sender.routes, sender.read(data)
         if stamp == NEVER:
             stamp = pack_time(self._clock.now().nanoseconds)
-        commands = [self._command(target, stamp, positions, speeds if known else None)
+        commands = [self._command(target, stamp, numbers, numbers[count:] if known else None)
                     for target in targets]
         if found := [command for command in commands if command]:
             self._send(stamp, found)
@@ -269,8 +268,7 @@ class CommandStream:
                     unpack(stamp), names, values, speeds if moving else (),
                     efforts if all(map(math.isfinite, efforts)) else ()))
             else:
-                self._publishers[names, moving].publish(
-                    stamp, [np.array(values + speeds * moving)])
+                self._publishers[names, moving].publish(stamp, values + speeds * moving)
         for command in commands:
             publisher = self._arrays[command.target.machine.name]
             if publisher.has_subscribers:
@@ -280,8 +278,8 @@ class CommandStream:
         names, moving = key
         n = len(names)
         return PatchedPublisher(
-            self._commands.publisher, lambda stamp, values: joint_states(
-                stamp, names, values[:n], values[n:]), (1 + moving) * n, self._logger)
+            [(self._commands.publisher, lambda stamp, values: joint_states(
+                stamp, names, values[:n], values[n:]))], (1 + moving) * n, self._logger)
 
     def _receive_trajectory(self, message: JointTrajectory) -> None:
         if not self._trajectories.has_subscribers:

@@ -84,8 +84,8 @@ class CrankDriver(scene_node.SceneNode):
             return
         n = len(sources)
         self._names, self._message = sources, PatchedPublisher(
-            self._publisher,
-            lambda stamp, values: joint_states(stamp, sources, values[:n], values[n:]),
+            [(self._publisher,
+              lambda stamp, values: joint_states(stamp, sources, values[:n], values[n:]))],
             2 * n, self.get_logger())
 
     def _set_rate(self, rate: float) -> None:
@@ -120,7 +120,7 @@ class CrankDriver(scene_node.SceneNode):
         now = self._follow_clock()
         if self._publisher.has_subscribers:
             positions, speeds = zip(*[self._position(*sent, now) for sent in self._sent])
-            self._message.publish(pack_time(now), [positions + speeds])
+            self._message.publish(pack_time(now), positions + speeds)
 
     def _position(self, key: Tuple[str, str], drive: scene.InputSettings,
                   now: int) -> Tuple[float, float]:

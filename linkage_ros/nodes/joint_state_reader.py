@@ -21,7 +21,7 @@ from array import array
 from collections import OrderedDict
 from contextlib import suppress
 from struct import Struct
-from typing import Any, Callable, Dict, NamedTuple, Optional, Set, Tuple
+from typing import Any, Callable, Dict, Optional, Set, Tuple
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -39,22 +39,15 @@ LONGEST = 1 << 16
 # While a cache is full, the layout of only one in SAMPLED unknown messages is determined.
 SAMPLED = 256
 
-
-class Numbers(NamedTuple):
-    """Stamp of a message (see `pack`), positions [rad or m] and velocities [rad/s or m/s]."""
-
-    stamp: bytes
-    positions: Tuple[float, ...]
-    velocities: Tuple[float, ...]
+# A packed stamp (bytes), then floats.
+Numbers = Tuple[Any, ...]
 
 
-def subscribe(node: Any, topic: str, receive: Callable[[bytes], None],
-              failed: Callable[[], None] = lambda: None) -> None:
+def subscribe(node: Any, topic: str, receive: Callable[[bytes], None]) -> None:
     """
     Subscribe a SceneNode to joint states; `receive` is called with each serialised message.
 
-    If it raises Unreadable, a throttled warning is logged. Any other exception is reported, and
-    `failed` is called.
+    If it raises Unreadable, a throttled warning is logged. Any other exception is reported.
     """
     throttle = Throttle(node.get_logger())
 
@@ -67,7 +60,6 @@ def subscribe(node: Any, topic: str, receive: Callable[[bytes], None],
                                           f'since it is no JointState: {reason}'))
         except Exception as error:
             node.report(topic, error)
-            failed()
 
     node.create_subscription(JointState, topic, receive_or_ignore, ANY, raw=True)
 
@@ -76,7 +68,7 @@ class Reader:
     """
     Cache of the senders of serialised joint states.
 
-    `interpret` is called with the first message of each sender. Its result is the `meaning` of all
+    `interpret` is called with the first message of each sender. Its result are the `routes` of all
     messages of this sender, so it must not depend on the numbers in the message.
     """
 
@@ -87,9 +79,15 @@ class Reader:
         self._masks: Dict[int, Set[int]] = {}
         self._senders: OrderedDict[Tuple[int, int, int], Sender] = OrderedDict()
         self._missed = 0
+        self._last: Optional[Sender] = None
 
     def sender(self, data: bytes) -> Sender:
         """Return the sender of a serialised message; raise Unreadable if it is no JointState."""
+        if self._last is None or not self._last.has_sent(data):
+            self._last = self._looked_up(data)
+        return self._last
+
+    def _looked_up(self, data: bytes) -> Sender:
         size, masks = len(data), self._masks.get(len(data), set())
         number = int.from_bytes(data, 'little') if masks else 0
         for mask in masks:
@@ -122,54 +120,49 @@ class Sender:
 
     Attributes
     ----------
-    meaning : object
+    routes : object
         What `interpret` returned for its first message.
     size : int
         Length of its messages [bytes]; 0: places are unknown, so that it reads its first message
         only.
     mask, same : int
         Mask of the constant bytes, and their values, both as little-endian integers.
-    positions, velocities : int
-        Offsets of the first position and the first velocity in a message [bytes].
 
     """
 
-    def __init__(self, data: bytes, message: JointState, meaning: Any, has_layout: bool):
-        self.meaning, self.size = meaning, 0
-        numbers = Numbers(pack(message.header.stamp), tuple(message.position),
-                          tuple(message.velocity))
-        self._first: Tuple[bytes, Optional[Numbers]] = data, numbers
+    def __init__(self, data: bytes, message: JointState, routes: Any, has_layout: bool):
+        self.routes, self.size, self.mask, self.same = routes, 0, 0, 0
+        self._numbers: Optional[Numbers] = (
+            pack(message.header.stamp), *message.position, *message.velocity)
         if has_layout:
             with suppress(NoLayout):
-                self._set_layout(data, MessageLayout(data, message), numbers)
+                self._set_layout(data, MessageLayout(data, message))
 
-    def _set_layout(self, data: bytes, layout: MessageLayout, numbers: Numbers) -> None:
-        (self.positions, self._count), (self.velocities, count) = layout.numbers[:2]
-        end = self.positions + 8 * self._count
-        self._unpack = Struct(f'<{HEADER}x8s{self.positions - HEADER - 8}x{self._count}d'
-                              f'{self.velocities - end}x{count}d').unpack_from
-        # Integers are the fastest to compare and look up for messages this short.
-        self.mask = int.from_bytes(layout.fixed, 'little')
-        self.same = int.from_bytes(data, 'little') & self.mask
-        if _bits(self._unpacked(data)) == _bits(numbers):
-            self.size, self._first = len(data), (b'', None)
+    def _set_layout(self, data: bytes, layout: MessageLayout) -> None:
+        (positions, count), (velocities, others) = layout.numbers[:2]
+        unpack = Struct(f'<{HEADER}x8s{positions - HEADER - 8}x{count}d'
+                        f'{velocities - positions - 8 * count}x{others}d').unpack_from
+        if _bits(unpack(data)) == _bits(self._numbers):
+            # Integers are the fastest to compare and look up for messages this short.
+            self.size, self.mask = len(data), int.from_bytes(layout.fixed, 'little')
+            self.same = int.from_bytes(data, 'little') & self.mask
+            self._numbers, self._unpack = None, unpack
 
     def has_sent(self, data: bytes) -> bool:
-        """Return whether a serialised message is one of this sender's."""
-        if not self.size:
-            return data is self._first[0]
-        return len(data) == self.size and int.from_bytes(data, 'little') & self.mask == self.same
+        """Return whether a serialised message has this sender's known length and bytes."""
+        return (len(data) == self.size > 0
+                and int.from_bytes(data, 'little') & self.mask == self.same)
 
     def read(self, data: bytes) -> Numbers:
-        """Return the numbers of one of this sender's messages."""
-        return self._first[1] or self._unpacked(data)
+        """
+        Return the numbers of one of this sender's messages.
 
-    def _unpacked(self, data: bytes) -> Numbers:
-        numbers, end = self._unpack(data), 1 + self._count
-        return Numbers(numbers[0], numbers[1:end], numbers[end:])
+        They are the stamp (see `pack`), the positions [rad or m], then the velocities [per second]
+        if there are any.
+        """
+        return self._numbers or self._unpack(data)
 
 
-def _bits(numbers: Numbers) -> tuple:
+def _bits(numbers: Any) -> tuple:
     """Return the numbers as bytes, because as a float, NaN is unequal to itself."""
-    return numbers.stamp, *(array('d', each).tobytes()
-                            for each in (numbers.positions, numbers.velocities))
+    return numbers[0], array('d', numbers[1:]).tobytes()

@@ -15,17 +15,16 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 import time
-from typing import Any, Callable, Dict, Iterable, List, Tuple
+from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Tuple
 
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node, shutdown
-from .driven_mechanism import DrivenMechanism
 from .log import NAMES, Once
 from .mechanism_model import MechanismModel
-from .message_layout import pack_time
-from .plan import Planner, Route
+from .mechanism_topics import MechanismTopics
+from .message_layout import NEVER, pack_time
 from .scene_joint_states import SceneJointStates
 from .. import scene
 from ..robot_model import bodies, urdf
@@ -37,11 +36,21 @@ MISSING_AFTER = 5.0
 DELETION_TIMEOUT = 0.1
 
 
+class InputSource(NamedTuple):
+    """An input, and the indices of its source joint's numbers in a sender's messages."""
+
+    mechanism: MechanismTopics
+    input: int
+    position: int
+    # 0: the messages have no velocities.
+    velocity: int
+
+
 class Kinematics(scene_node.SceneNode):
     """Solves mechanisms at the inputs from `crank_states`, only for topics with subscribers."""
 
     def __init__(self, **kwargs: Any):
-        self._mechanisms: Dict[str, DrivenMechanism] = {}
+        self._mechanisms: Dict[str, MechanismTopics] = {}
         self._models: Dict[str, MechanismModel] = {}
         super().__init__(scene.KINEMATICS, **kwargs)
         self._clashing = Once(NAMES)
@@ -50,27 +59,33 @@ class Kinematics(scene_node.SceneNode):
         for name, machine in self.scene.machines.items():
             for i, drive in enumerate(machine.inputs.values()):
                 self._inputs.setdefault(drive.source, []).append((name, i))
-        self._scene_joint_states = SceneJointStates(self, self._inputs, self._invalidate)
-        self._mechanisms.update((name, DrivenMechanism(self, machine, self._invalidate))
-                                for name, machine in self.scene.machines.items())
-        self._planner = Planner([*self._mechanisms.values()], self._scene_joint_states,
-                                joint_state_reader.Reader(self._interpret),
-                                lambda: pack_time(self.get_clock().now().nanoseconds))
+        self._scene_joint_states = SceneJointStates(self, self._inputs)
+        self._mechanisms.update((name, MechanismTopics(self, mechanism))
+                                for name, mechanism in self.scene.machines.items())
+        self._reader = joint_state_reader.Reader(self._interpret)
+        # That of the last message that set an input.
+        self._stamp = NEVER
         self._own: frozenset = frozenset()
         self._missing, self._unknown = set(self._inputs), Once(NAMES)
         self._missing_timer = self.create_timer(
             MISSING_AFTER, self.guarded('the check for missing inputs', self._warn_of_missing),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
+        for machine in self.scene.machines.values():
+            if len(machine.assembly().legs) > 1:
+                self._log_machine_code(machine.linkage)
+                break
+        joint_state_reader.subscribe(self, 'crank_states', self._receive)
+
+    def _log_machine_code(self, linkage: Any) -> None:
+        """Log why there is no machine code for the legs of a walker, if there is none."""
         try:
-            next(iter(self.scene.machines.values())).linkage.accelerated()
+            linkage.accelerated()
         except ImportError as error:
             # Whoever has not installed it knows; whoever has, does not know that it is broken.
             is_missing = isinstance(error, ModuleNotFoundError)
             log = self.get_logger().info if is_missing else self.get_logger().warning
             log(f'plain Python is used instead of machine code, with the same results: {error}')
-        joint_state_reader.subscribe(
-            self, 'crank_states', self._planner.process, self._planner.discard)
 
     def serves(self) -> str:
         """Return the mechanisms' names, in words."""
@@ -103,17 +118,16 @@ class Kinematics(scene_node.SceneNode):
                    if model is not self._models.get(name)]
         is_first, self._models = not self._models, models
         self._own = frozenset(joint.name for model in models.values()
-                              for joint in model.machine.joints.values())
+                              for joint in model.mechanism.joints.values())
         self._check_clashes()
         for one in changed:
             one.adopt(models[one.name])
-        self._invalidate()
         if not is_first:
-            self._planner.publish(changed)
+            self._publish(changed)
         self.later([*(partial(self._latched, one, models[one.name]) for one in changed),
                     partial(self._robot, models)])
 
-    def _latched(self, one: DrivenMechanism, model: MechanismModel) -> Callable[[], None]:
+    def _latched(self, one: MechanismTopics, model: MechanismModel) -> Callable[[], None]:
         """Build a mechanism's latched messages; return a function to publish them."""
         latched = model.latched()
         return lambda: one.publish_latched(latched) if one.model is model else None
@@ -122,7 +136,7 @@ class Kinematics(scene_node.SceneNode):
         """Build the scene's robot model; return a function to publish it."""
         # With `only_named`, the joints belong to a robot model that is published elsewhere.
         robots = [model.robot for model in models.values()
-                  if model.robot and not model.machine.only_named]
+                  if model.robot and not model.mechanism.only_named]
         text = ''
         try:
             text = urdf.write(bodies.together(robots)) if robots else ''
@@ -139,17 +153,42 @@ class Kinematics(scene_node.SceneNode):
         for one in self._mechanisms.values():
             one.wait_for_deletions(deadline)
 
-    def _invalidate(self) -> None:
-        self._planner.invalidate()
+    def _receive(self, data: bytes) -> None:
+        """Set the inputs by a serialised message, and publish the mechanisms that it moves."""
+        sender = self._reader.sender(data)
+        sources, moved = sender.routes
+        if not moved:
+            return
+        numbers = sender.read(data)
+        stamp = numbers[0]
+        if stamp == NEVER:
+            stamp = pack_time(self.get_clock().now().nanoseconds)
+        for mechanism, i, position, velocity in sources:
+            mechanism.receive(i, numbers[position], numbers[velocity] if velocity else None)
+            mechanism.stamp = stamp
+        self._stamp = stamp
+        self._publish(moved)
 
-    def _interpret(self, message: JointState) -> Tuple[Tuple[Route, ...], bool]:
-        """Return the routes from a sender's joints, and whether it sends velocities."""
-        indices = dict(zip(message.name, range(len(message.position))))
-        routes = tuple(Route(self._mechanisms[mechanism], i, index)
-                       for name, index in indices.items()
-                       for mechanism, i in self._inputs.get(name, ()))
+    def _publish(self, moved: Iterable[MechanismTopics]) -> None:
+        """Publish mechanisms at their present inputs, and the joint states of the scene."""
+        in_scene = self._scene_joint_states.has_subscribers
+        for mechanism in moved:
+            mechanism.publish(in_scene)
+        if in_scene:
+            self._scene_joint_states.publish(self._stamp, tuple(
+                (mechanism.model, state) for mechanism in self._mechanisms.values()
+                if (state := mechanism.state_in_scene())))
+
+    def _interpret(self, message: JointState) -> Tuple[List[InputSource], List[MechanismTopics]]:
+        """Return the inputs that a sender's messages set, and the mechanisms that they move."""
+        count, moving = len(message.position), len(message.velocity) == len(message.name)
+        # Index 0 of a message's numbers is its stamp.
+        indices = dict(zip(message.name, range(1, 1 + count)))
+        sources = [InputSource(self._mechanisms[mechanism], i, index, moving and count + index)
+                   for name, index in indices.items()
+                   for mechanism, i in self._inputs.get(name, ())]
         self._check_names(message.name, indices)
-        return routes, len(message.velocity) == len(message.name)
+        return sources, [*dict.fromkeys(source.mechanism for source in sources)]
 
     def _check_names(self, names: Iterable[str], received: Iterable[str]) -> None:
         """Warn once of each unknown name; record source joints whose position is received."""
@@ -167,9 +206,9 @@ class Kinematics(scene_node.SceneNode):
         """Warn once of each joint that has the name of another mechanism's source on its topic."""
         clashes = self._clashing.new(
             joint.name for name, model in self._models.items()
-            for key, joint in model.machine.joints.items()
+            for key, joint in model.mechanism.joints.items()
             if joint.published and joint.name in self._scene_joint_states.omitted
-            and key not in model.machine.inputs
+            and key not in model.mechanism.inputs
             and name not in dict(self._inputs[joint.name]))
         if clashes:
             self.get_logger().warning(

@@ -12,10 +12,10 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import combinations
 import math
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from sensor_msgs.msg import JointState
@@ -34,7 +34,7 @@ from ..robot_model import bodies, shapes, urdf
 PUBLISHERS = 128
 
 
-class Validity(NamedTuple):
+class AssemblyState(NamedTuple):
     """
     Which numbers of a solution are valid, so that they are published.
 
@@ -66,21 +66,30 @@ class MechanismModel:
 
     `frame_id` is the frame of its pose; in markers, this name has the prefix `prefix`. Raises
     SceneError if no robot model can be made of a planar mechanism.
+
+    Attributes
+    ----------
+    regular : Cache
+        The regular state of a solution, by what this contains: joints, markers, velocities (bool).
+    publishers : Cache
+        The publisher of a state, by the state and the topics of joint states and of markers; a
+        topic is an rclpy publisher, or None if its message is left out.
+
     """
 
-    def __init__(self, machine: scene.SceneMechanism, frame_id: str, prefix: str):
-        self.machine, self.made_of = machine, (machine, frame_id, prefix)
-        self.inputs = list(machine.inputs.values())
-        self.robot = None if machine.in_space else bodies.robot([machine], frame_id)
-        self.assembly = machine.assembly()
+    def __init__(self, mechanism: scene.SceneMechanism, frame_id: str, prefix: str, logger: Any):
+        self.mechanism, self.made_of = mechanism, (mechanism, frame_id, prefix)
+        self.inputs = list(mechanism.inputs.values())
+        self.robot = None if mechanism.in_space else bodies.robot([mechanism], frame_id)
+        self.assembly = mechanism.assembly()
         self._names, self._signs, self._offsets, self._published, self._wrapped = map(
-            np.array, zip(*machine.joints.values()))
+            np.array, zip(*mechanism.joints.values()))
         self._is_plain = bool((self._signs > 0.0).all()) and not self._offsets.any()
-        drawn = machine.name, prefix + frame_id, machine.pose
-        self._points, shown = _shown(machine)
-        self._drawn = *drawn, bodies.size(machine), shown
-        self._solutions, self._conversions = Cache(), Cache(self._conversion)
-        self._publishers = Cache(size=PUBLISHERS)
+        drawn = mechanism.name, prefix + frame_id, mechanism.pose
+        self._points, shown = _shown(mechanism)
+        self._drawn = *drawn, bodies.size(mechanism), shown
+        self._conversions, self._logger = Cache(self._conversion), logger
+        self.regular, self.publishers = Cache(self._regular), Cache(self._publisher, PUBLISHERS)
 
     @cached_property
     def marker_array(self) -> messages.Markers:
@@ -90,78 +99,85 @@ class MechanismModel:
     def latched(self) -> Tuple[str, Optional[Any]]:
         """Return the URDF, '' for a spatial linkage, and the locus's marker, None without one."""
         drawn, size = self._drawn[:3], self._drawn[3]
-        curve = self.assembly.locus(self.machine.tracer)
+        curve = self.assembly.locus(self.mechanism.tracer)
         return (urdf.write(self.robot) if self.robot else '',
                 messages.locus(*drawn, curve, size) if len(curve) > 1 else None)
 
-    def solution(self, joints: bool, markers: bool, moving: bool) -> Solution:
-        """Return a solver for joint states, for markers and, if `moving`, for velocities."""
+    def _regular(self, wanted: Tuple[bool, bool, bool]) -> AssemblyState:
+        joints, markers, moving = wanted
         # With several inputs, only the joint angles show whether the linkage is assembled.
         joints = joints or len(self.inputs) > 1
         names = self.assembly.joints if joints else ()
-        return self._solutions.get_or_make((joints, markers, moving), lambda: (
-            self.assembly.solution(
-                self._points if markers else (), names, names if joints and moving else None,
-                len(self.inputs) if self.machine.loads else 0)))
+        solution = self.assembly.solution(
+            self._points if markers else (), names, names if joints and moving else None,
+            len(self.inputs) if self.mechanism.loads else 0)
+        return AssemblyState(
+            solution, None, solution.layout.speeds > 0, solution.layout.efforts > 0)
 
-    def regular(self, solution: Solution) -> Validity:
-        """Return the validity of a regular solution."""
-        return Validity(solution, None, solution.layout.speeds > 0, solution.layout.efforts > 0)
-
-    def validity(self, solution: Solution, inputs: np.ndarray) -> Validity:
-        """Return the validity of a solution at positions and speeds `inputs`, (2, inputs)."""
-        layout, values, validity = solution.layout, solution.values, self.regular(solution)
-        assembled = None
-        if self.assembly.is_limited:
-            assembled = self.assembly.within_reach(inputs[0, 0])
-        # One sum of squares tests whether all are finite; `vdot` overflows without the warning of
-        # `dot`.
-        if not math.isfinite(np.vdot(values, values)):
-            finite = np.isfinite(solution.rows[:, :layout.posed]).all(axis=1)
-            finite &= bool(np.isfinite(inputs[0]).all())
-            assembled = finite if assembled is None else assembled & finite
-            rates = solution.rows[assembled, layout.posed:]
-            validity = validity._replace(
-                has_velocities=validity.has_velocities and bool(
-                    np.isfinite(rates).all() and np.isfinite(inputs[1]).all()),
-                has_efforts=validity.has_efforts and bool(
-                    np.isfinite(layout.effort(values)).all()))
-        if assembled is None or assembled.all():
-            return validity
-        return validity._replace(assembled=assembled.tobytes())
-
-    def conversion(self, layout: Layout) -> Optional[Tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    def solve(self, regular: AssemblyState, inputs: Sequence[float],
+              speeds: Sequence[Optional[float]]) -> AssemblyState:
         """
-        Return how solved values become published ones, or None if they are equal.
+        Fill the solution of a regular state with published values; return their state.
 
-        A published value is factor * value + offset, with factors (values,) and offsets (values,).
-        The angles at the indices in the third array are then wrapped to (-pi, pi].
+        `inputs` are positions [rad or m]; the speeds [per second] may be None without velocities.
         """
-        return None if self._is_plain else self._conversions[layout]
+        layout, values = regular.solution.layout, regular.solution.values
+        is_finite = regular.solution.solve(inputs, speeds)
+        if layout.efforts:
+            efforts = self.mechanism.efforts(inputs)
+            layout.effort(values)[:] = efforts
+            is_finite = is_finite and all(map(math.isfinite, efforts))
+        if not self._is_plain:
+            self._convert(values, *self._conversions[layout])
+        within = self.assembly.within_reach(inputs[0]) if self.assembly.is_limited else ()
+        return regular if is_finite and all(within) else self._check_assembly(regular, within)
+
+    def _check_assembly(self, regular: AssemblyState, within: Sequence[bool]) -> AssemblyState:
+        """Return the state of solved values; `within` are the legs in reach, () if all are."""
+        solution, layout = regular.solution, regular.solution.layout
+        driven = layout.driven(solution.values)
+        assembled = np.isfinite(solution.rows[:, :layout.posed]).all(axis=1)
+        assembled &= bool(np.isfinite(driven[:layout.inputs]).all())
+        if within:
+            assembled &= within
+        rates = np.append(solution.rows[assembled, layout.posed:], driven[layout.inputs:])
+        return AssemblyState(
+            solution, None if assembled.all() else assembled.tobytes(),
+            regular.has_velocities and bool(np.isfinite(rates).all()),
+            regular.has_efforts and bool(np.isfinite(layout.effort(solution.values)).all()))
+
+    def _convert(self, values: np.ndarray, factors: np.ndarray, offsets: np.ndarray,
+                 wrapped: np.ndarray) -> None:
+        """Convert joint values, in place, to their published signs, offsets and turns."""
+        with np.errstate(invalid='ignore'):
+            values *= factors
+            values += offsets
+            values[wrapped] -= math.tau * np.round(values[wrapped] / math.tau)
 
     def _conversion(self, layout: Layout) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the arguments of `_convert`: factors, offsets, and indices of angles to wrap."""
         none = np.zeros(len(self._signs))
         return (_arranged(layout, 1.0, self._signs, self._signs),
                 _arranged(layout, 0.0, self._offsets, none),
                 np.flatnonzero(_arranged(layout, 0.0, self._wrapped, none)))
 
-    def publisher(self, publisher: Any, build: Callable, validity: Validity, logger: Any
-                  ) -> PatchedPublisher:
-        """Return a publisher that patches the message which `build` makes of a solution."""
-        return self._publishers.get_or_make((publisher, validity), lambda: PatchedPublisher(
-            publisher, lambda stamp, values: build(validity, values, stamp),
-            validity.solution.layout.size, logger))
+    def _publisher(self, key: Tuple[AssemblyState, Tuple[Any, Any]]) -> PatchedPublisher:
+        state, topics = key
+        builders = self.joint_message, self.marker_message
+        return PatchedPublisher(
+            [(topic, partial(build, state)) for topic, build in zip(topics, builders) if topic],
+            state.solution.layout.size, self._logger)
 
-    def joint_message(self, validity: Validity, values: np.ndarray, stamp: Any) -> JointState:
+    def joint_message(self, state: AssemblyState, stamp: Any, values: np.ndarray) -> JointState:
         """Build the joint states of the assembled legs from a solution's values."""
-        names, positions, velocities, efforts = self.joints(validity, values)
+        names, positions, velocities, efforts = self.joints(state, values)
         return messages.joint_states(
-            stamp, names.tolist(), positions, velocities if validity.has_velocities else (),
-            efforts if validity.has_efforts else ())
+            stamp, names.tolist(), positions, velocities if state.has_velocities else (),
+            efforts if state.has_efforts else ())
 
-    def joints(self, validity: Validity, values: np.ndarray) -> List[np.ndarray]:
+    def joints(self, state: AssemblyState, values: np.ndarray) -> List[np.ndarray]:
         """Return published joints: names, positions, velocities (empty if unsolved), efforts."""
-        layout, n, legs = validity.solution.layout, len(self.inputs), validity.legs()
+        layout, n, legs = state.solution.layout, len(self.inputs), state.legs()
         chosen = self._published.copy()
         chosen[n:].reshape(layout.legs, -1)[np.isin(np.arange(layout.legs), legs, invert=True)] = 0
         rows, driven = layout.rows(values), layout.driven(values)
@@ -171,20 +187,20 @@ class MechanismModel:
         return [self._names[chosen], positions[chosen],
                 velocities[chosen] if layout.speeds else velocities[:0], efforts[chosen]]
 
-    def marker_message(self, validity: Validity, values: np.ndarray, stamp: Any) -> MarkerArray:
+    def marker_message(self, state: AssemblyState, stamp: Any, values: np.ndarray) -> MarkerArray:
         """Build the markers of the assembled legs from a solution's values."""
-        layout, legs = validity.solution.layout, validity.legs()
+        layout, legs = state.solution.layout, state.legs()
         places = layout.rows(values)[legs, :layout.coordinates].reshape(
-            len(legs), -1, len(self.machine.linkage.axes))
+            len(legs), -1, len(self.mechanism.linkage.axes))
         # Left and right legs alternate. The first leg of each side draws the ground of that side.
-        _, grounded = np.unique(legs % (1 + self.machine.mirrored), return_index=True)
+        _, grounded = np.unique(legs % (1 + self.mechanism.mirrored), return_index=True)
         return self.marker_array.message(stamp, places, sorted(grounded))
 
 
-def _shown(machine: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
+def _shown(mechanism: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
     """Return the markers' points and, by marker id, the point indices of each line or plate."""
-    linkage, names = machine.linkage, machine.points
-    if machine.in_space:
+    linkage, names = mechanism.linkage, mechanism.points
+    if mechanism.in_space:
         return _shown_spatial(linkage, names)
     cranks, plates = shapes.cranks(linkage), shapes.plates(linkage, names)
     # The edges of a plate are not drawn as bars, too: the message is smaller.
@@ -196,9 +212,9 @@ def _shown(machine: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
         messages.GUIDES_ID: [], messages.BODIES_ID: [], messages.CRANKS_ID: cranks,
         messages.DRIVEN_ID: [], messages.PLATES_ID: plates,
         messages.GROUND_ID: shapes.marks(linkage, names)}
-    for shape in shapes.drawn(machine, names):
+    for shape in shapes.drawn(mechanism, names):
         id_ = (messages.GUIDES_ID if shape.kind == shapes.GUIDE else messages.DRIVEN_ID
-               if shape.slide.name in machine.inputs else messages.BODIES_ID)
+               if shape.slide.name in mechanism.inputs else messages.BODIES_ID)
         pieces[id_].append((shape.start, shape.end))
     points = (*names, *(point for several in pieces.values() for piece in several
                         for point in piece if isinstance(point, LinkPoint)))

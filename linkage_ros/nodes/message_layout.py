@@ -19,7 +19,7 @@ use, against a message that rclpy serialises or deserialises.
 from __future__ import annotations
 
 import struct
-from typing import Any, Callable, List, Tuple
+from typing import Any, Callable, List, Sequence, Tuple
 
 from builtin_interfaces.msg import Time
 import numpy as np
@@ -165,49 +165,53 @@ class MessageLayout:
 
 class Template:
     """
-    A serialised message whose stamps and float64 values are patched in place.
+    Serialised messages whose stamps and float64 values are patched in place.
 
-    `build(stamp, values)` makes the message of a Time and an array (count,); each number in its
-    sequences of float64 is one of these values or zero. Raises NoLayout if a patched message
-    differs from a built one.
+    Each of `builds` makes a message of a Time and an array (count,); each number in its sequences
+    of float64 is one of these values or zero. Raises NoLayout if a patched message differs from a
+    built one.
     """
 
-    def __init__(self, build: Callable, count: int):
+    def __init__(self, builds: Sequence[Callable], count: int):
         # In a message built from 1, 2, 3, ... each number is the index of its value.
-        message = build(Time(sec=1), np.arange(1.0, count + 1.0))
-        data = serialize_message(message)
-        layout = MessageLayout(data, message)
-        # Numbers are aligned to 8 bytes after the header; LEAD aligns them in memory, too.
-        self._bytes = bytearray(LEAD + data + bytes(-(len(data) - HEADER) % 8))
-        self.message = memoryview(self._bytes)[len(LEAD):len(LEAD) + len(data)]
-        self._stamps = [slice(len(LEAD) + place, len(LEAD) + place + _STAMP.size)
-                        for place in layout.stamps if any(data[place:place + _STAMP.size])]
-        self._numbers = np.frombuffer(self._bytes, float, offset=len(LEAD) + HEADER)
-        # A table of all numbers of the message: zero, the values, then its other eight-byte words.
+        stamp, values = Time(sec=1), np.arange(1.0, count + 1.0)
+        self._bytes, self._stamps, parts = bytearray(), [], []
+        for build in builds:
+            message = build(stamp, values)
+            data = serialize_message(message)
+            layout = MessageLayout(data, message)
+            # Numbers are aligned to 8 bytes after the header; LEAD aligns them in memory, too.
+            start = len(self._bytes) + len(LEAD)
+            self._bytes += LEAD + data + bytes(-(len(data) - HEADER) % 8)
+            self._stamps += [slice(start + place, start + place + _STAMP.size)
+                             for place in layout.stamps if any(data[place:place + _STAMP.size])]
+            parts.append((layout, start, start + len(data)))
+        self._messages = [memoryview(self._bytes)[start:end] for _, start, end in parts]
+        self._numbers = np.frombuffer(self._bytes, float)
+        # A table of all numbers of the messages: zero, the values, then all eight-byte words.
         self._table = np.concatenate([np.zeros(count + 1), self._numbers])
         self._values = self._table[1:count + 1]
         self._sources = np.arange(count + 1, len(self._table))
-        for place, size in layout.numbers:
-            start = (place - HEADER) // 8
-            self._sources[start:start + size] = self._numbers[start:start + size]
-        self._check(build, layout, count)
+        for layout, start, _ in parts:
+            for place, size in layout.numbers:
+                first = (start + place) // 8
+                self._sources[first:first + size] = self._numbers[first:first + size]
+        layouts = [layout for layout, *_ in parts]
+        self._check(builds, layouts, count)
 
-    def patched(self, stamp: bytes, values: Any) -> bytes:
-        """Return the serialised message with a packed stamp and values (count,)."""
+    def patched(self, stamp: bytes, values: Any) -> List[bytes]:
+        """Return the serialised messages with a packed stamp and values (count,)."""
         self._values[:] = values
-        self._table.take(self._sources, out=self._numbers, mode='clip')
+        self._table.take(self._sources, None, self._numbers, 'clip')
+        data = self._bytes
         for place in self._stamps:
-            self._bytes[place] = stamp
-        return bytes(self.message)
+            data[place] = stamp
+        return [bytes(message) for message in self._messages]
 
-    def places(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return arrays: byte offsets of values in `message`, their indices, offsets of stamps."""
-        own = np.flatnonzero((self._sources > 0) & (self._sources <= len(self._values)))
-        return HEADER + 8 * own, self._sources[own] - 1, np.array(
-            [place.start - len(LEAD) for place in self._stamps], int)
-
-    def _check(self, build: Callable, layout: MessageLayout, count: int) -> None:
+    def _check(self, builds: Sequence[Callable], layouts: Sequence[MessageLayout], count: int
+               ) -> None:
         stamp, values = Time(sec=12, nanosec=345), np.linspace(-1.5, 7.25, count)
-        if not layout.is_same(self.patched(pack(stamp), values),
-                              serialize_message(build(stamp, values))):
+        if not all(layout.is_same(data, serialize_message(build(stamp, values)))
+                   for layout, data, build in zip(
+                       layouts, self.patched(pack(stamp), values), builds)):
             raise NoLayout('a patched message differs from one that rclpy serialises')

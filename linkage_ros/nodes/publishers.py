@@ -12,9 +12,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable, Optional, Sequence
+from typing import Any, Callable, Sequence, Tuple
 
-import numpy as np
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -27,48 +26,54 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 class TrackedPublisher:
     """
-    A publisher whose flag `has_subscribers` is updated by events, not by a query per message.
+    A publisher that events tell whether it has subscribers, so that no message needs a query.
 
-    `own` is the number of this process's subscriptions, which do not count. `changed` is called on
-    the thread of rclpy's executor when the flag has changed.
+    `own` is the number of this process's subscriptions, which do not count.
+
+    Attributes
+    ----------
+    has_subscribers : bool
+        Whether there are any.
+    subscribed : Publisher, optional
+        The publisher if there are any, else None.
+
     """
 
-    def __init__(self, node: Node, type_: Any, name: str, qos: Any,
-                 changed: Callable[[], None] = lambda: None, own: int = 0):
-        self.has_subscribers, self._own, self._changed = False, own, changed
+    def __init__(self, node: Node, type_: Any, name: str, qos: Any, own: int = 0):
+        self.has_subscribers, self.subscribed, self._own = False, None, own
         self.publisher = node.create_publisher(
             type_, name, qos, event_callbacks=PublisherEventCallbacks(matched=self._count))
         self.publish = self.publisher.publish
 
     def _count(self, _: Any) -> None:
-        has_subscribers = self.publisher.get_subscription_count() > self._own
-        if has_subscribers != self.has_subscribers:
-            self.has_subscribers = has_subscribers
-            self._changed()
+        self.has_subscribers = self.publisher.get_subscription_count() > self._own
+        self.subscribed = self.publisher if self.has_subscribers else None
 
 
 class PatchedPublisher:
     """
-    Publishes a message again and again with new values; `build` and `count` as for Template.
+    Publishes messages again and again with new values.
 
-    If the message cannot be patched, a warning is logged, `template` is None, and every message
-    is built.
+    `parts` are, for each message, its publisher and its builder; builders and `count` are as for
+    Template. If a message cannot be patched, a warning is logged, `template` is None, and every
+    message is built.
     """
 
-    def __init__(self, publisher: Any, build: Callable, count: int, logger: Any):
-        self.publisher = publisher
-        self._build = build
-        self.template: Optional[Template] = None
+    def __init__(self, parts: Sequence[Tuple[Any, Callable]], count: int, logger: Any):
+        self._parts, self.template = parts, None
+        self._publish = [publisher.publish for publisher, _ in parts]
         try:
-            self.template = Template(build, count)
+            self.template = Template([build for _, build in parts], count)
         except NoLayout as reason:
-            logger.warning(f'{publisher.topic_name}: {reason}; each message is built anew, which '
-                           'takes longer', once=True)
+            topics = ', '.join(publisher.topic_name for publisher, _ in parts)
+            logger.warning(f'{topics}: {reason}; each message is built anew, which takes longer',
+                           once=True)
 
-    def publish(self, stamp: bytes, values: Sequence[Any]) -> None:
-        """Publish the message with a packed stamp and the numbers of all arrays `values`."""
-        joined: Any = np.concatenate(values) if len(values) > 1 else values[0]
+    def publish(self, stamp: bytes, values: Any) -> None:
+        """Publish the messages with a packed stamp and values (count,)."""
         if self.template:
-            self.publisher.publish(self.template.patched(stamp, joined))
+            for publish, data in zip(self._publish, self.template.patched(stamp, values)):
+                publish(data)
         else:
-            self.publisher.publish(self._build(unpack(stamp), joined))
+            for publish, (_, build) in zip(self._publish, self._parts):
+                publish(build(unpack(stamp), values))

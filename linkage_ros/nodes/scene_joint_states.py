@@ -12,19 +12,23 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable, Iterable, List, Optional, Sequence, Tuple
+from functools import partial
+from typing import Any, Iterable, Tuple
 
 import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from .mechanism_model import MechanismModel, Validity
+from .mechanism_model import AssemblyState, MechanismModel
 from .messages import joint_states
 from .publishers import LATCHED, PatchedPublisher, TrackedPublisher
 from ..cache import Cache
 
-# Cached publishers, one for each combination of validities.
+# Cached publishers: the legs of walkers may leave their reach one by one.
 PUBLISHERS = 16
+
+# The model and the state of each mechanism in a message.
+Parts = Tuple[Tuple[MechanismModel, AssemblyState], ...]
 
 
 class SceneJointStates:
@@ -32,8 +36,7 @@ class SceneJointStates:
     Publishes `joint_states` and `robot_description`.
 
     If `crank_states` is remapped to `joint_states`, the source joints `sources` are on that topic
-    already, and are not published again. `changed` is called when the first subscriber comes and
-    when the last leaves.
+    already, and are not published again.
 
     Attributes
     ----------
@@ -42,11 +45,10 @@ class SceneJointStates:
 
     """
 
-    def __init__(self, node: Any, sources: Iterable[str], changed: Callable[[], None]):
+    def __init__(self, node: Any, sources: Iterable[str]):
         same = node.resolve_topic_name('joint_states') == node.resolve_topic_name('crank_states')
         # If the topics are the same, the node's own subscription does not count.
-        self._joint_states = TrackedPublisher(
-            node, JointState, 'joint_states', 10, changed, int(same))
+        self._joint_states = TrackedPublisher(node, JointState, 'joint_states', 10, int(same))
         self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
         self.omitted = frozenset(sources if same else ())
         self._logger = node.get_logger()
@@ -64,30 +66,27 @@ class SceneJointStates:
             self._description = urdf
             self._descriptions.publish(String(data=urdf))
 
-    def message(self, mechanisms: Iterable[Any]) -> Optional[Tuple[PatchedPublisher, List]]:
-        """Return a publisher of assembled mechanisms' joints, and its arrays, or None."""
-        parts = tuple((one.model, one.validity) for one in mechanisms
-                      if one.validity and one.validity.any_assembled)
-        if not parts:
-            return None
-        return self._publishers[parts], [one.solution.values for _, one in parts]
+    def publish(self, stamp: bytes, parts: Parts) -> None:
+        """Publish the joints of assembled mechanisms with a packed stamp; nothing if none is."""
+        if parts:
+            self._publishers[parts].publish(
+                stamp, np.concatenate([state.solution.values for _, state in parts]))
 
-    def _publisher(self, parts: Sequence[Tuple[MechanismModel, Validity]]) -> PatchedPublisher:
-        return PatchedPublisher(
-            self._joint_states.publisher,
-            lambda stamp, values: self._build(parts, values, stamp),
-            sum(one.solution.layout.size for _, one in parts), self._logger)
+    def _publisher(self, parts: Parts) -> PatchedPublisher:
+        return PatchedPublisher([(self._joint_states.publisher, partial(self._build, parts))],
+                                sum(state.solution.layout.size for _, state in parts),
+                                self._logger)
 
-    def _build(self, parts: Sequence[Tuple[MechanismModel, Validity]], values: np.ndarray,
-               stamp: Any) -> JointState:
+    def _build(self, parts: Parts, stamp: Any, values: np.ndarray) -> JointState:
         """Build the message from the consecutive values of the solutions."""
-        ends = np.cumsum([one.solution.layout.size for _, one in parts])
+        ends = np.cumsum([state.solution.layout.size for _, state in parts])
         names, positions, velocities, efforts = map(np.concatenate, zip(
-            *(model.joints(one, own)
-              for (model, one), own in zip(parts, np.split(values, ends)))))
+            *(model.joints(state, own)
+              for (model, state), own in zip(parts, np.split(values, ends)))))
         chosen = [name not in self.omitted for name in names]
-        moving = all(one.has_velocities for _, one in parts)
-        loaded = {one.has_efforts for _, one in parts if one.solution.layout.efforts} == {True}
+        moving = all(state.has_velocities for _, state in parts)
+        loaded = {state.has_efforts for _, state in parts
+                  if state.solution.layout.efforts} == {True}
         return joint_states(
             stamp, names[chosen].tolist(), positions[chosen], velocities[chosen] if moving else (),
             efforts[chosen] if loaded else ())

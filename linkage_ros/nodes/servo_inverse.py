@@ -107,16 +107,16 @@ class ServoInverse(scene_node.SceneNode):
         return response
 
     def _interpret(self, message: JointState) -> List[Tuple[str, int]]:
-        """Return the names of the scene's sources in a message, and their places."""
-        return [(name, place) for place, name in enumerate(message.name[:len(message.position)])
-                if name in self._sources]
+        """Return the scene's sources in a message, and the indices of their positions."""
+        return [(name, index) for index, name in enumerate(
+            message.name[:len(message.position)], 1) if name in self._sources]
 
     def _receive(self, text: bytes) -> None:
         # `kinematics` logs unreadable messages.
         with suppress(Unreadable):
             sender = self._reader.sender(text)
-            positions = sender.read(text).positions
-            self._positions.update((name, positions[place]) for name, place in sender.meaning)
+            numbers = sender.read(text)
+            self._positions.update((name, numbers[index]) for name, index in sender.routes)
 
 
 def solve(inverse: InverseRequest, request: Any, response: Any) -> None:

@@ -13,9 +13,11 @@
 from __future__ import annotations
 
 from collections import deque
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import suppress
 from functools import partial
-import threading
-from typing import Any, Callable, Deque, Dict, Iterable, Optional, Tuple
+from threading import Lock
+from typing import Any, Callable, Deque, Dict, Iterable, Optional
 
 # Longest wait for the worker when a node ends [s].
 TIMEOUT = 0.1
@@ -28,94 +30,75 @@ Job = Callable[[], Optional[Callable[[], None]]]
 
 class Worker:
     """
-    A thread that runs jobs one after the other, and ends when none is left.
+    A thread that runs jobs one after the other.
 
-    The function that a job returns is called on the thread of rclpy's executor. `failed` is called
-    with the kind of job and the exception that it or its function has raised.
+    The function that a job returns is called on the thread of rclpy's executor, before the next
+    job runs: a queue of such calls would delay messages. `failed` is called with the kind of job
+    and the exception that it or its function has raised.
     """
 
     def __init__(self, node: Any, failed: Callable[[str, Exception], None]):
         self._node, self._failed = node, failed
-        self._lock = threading.Lock()
+        self._thread = ThreadPoolExecutor(1, 'linkage_ros worker')
+        self._lock, self._is_busy, self._has_ended = Lock(), False, False
         # The newest job of each kind; these run before the others.
         self._newest: Dict[str, Job] = {}
         self._others: Deque[Job] = deque()
-        self._thread: Optional[threading.Thread] = None
-        self._ended = threading.Event()
-        # Set when rclpy's executor has called a job's result, or will not call it any more.
-        self._called = threading.Event()
 
     def replace(self, kind: str, job: Job) -> None:
         """Queue a job; it replaces a job of the same kind that has not begun."""
-        with self._lock:
-            self._newest[kind] = job
-            self._start()
+        self._newest[kind] = job
+        self._run_next()
 
     def add(self, jobs: Iterable[Job]) -> None:
         """Queue jobs; they run when no job from `replace` is left."""
-        with self._lock:
-            self._others.extend(jobs)
-            self._start()
+        self._others.extend(jobs)
+        self._run_next()
 
     def is_newest(self, kind: str) -> bool:
         """Return whether a running job of this kind should go on: no newer one is queued."""
-        return kind not in self._newest and not self._ended.is_set()
+        return kind not in self._newest and not self._has_ended
 
     def end(self) -> None:
         """Drop the queued jobs, and wait up to TIMEOUT for the running one."""
         with self._lock:
-            self._ended.set()
-            self._called.set()
-            thread = self._thread
-        if thread is not None and thread is not threading.current_thread():
-            thread.join(TIMEOUT)
+            is_first, self._has_ended = not self._has_ended, True
+        if is_first:
+            last = self._thread.submit(lambda: None)
+            self._thread.shutdown(wait=False)
+            wait([last], TIMEOUT)
 
-    def _start(self) -> None:
-        if self._thread is None and not self._ended.is_set():
-            self._thread = threading.Thread(target=self._run, name='linkage_ros worker',
-                                            daemon=True)
-            self._thread.start()
-
-    def _run(self) -> None:
-        while chosen := self._next_job():
-            kind, job = chosen
-            try:
-                act = job()
-            except Exception as error:
-                self._failed(kind, error)
-            else:
-                if act:
-                    self._hand_over(kind, act)
-
-    def _next_job(self) -> Optional[Tuple[str, Job]]:
+    def _run_next(self) -> None:
         with self._lock:
-            if self._ended.is_set() or not (self._newest or self._others):
-                self._thread = None
-                return None
-            if self._newest:
-                kind = next(iter(self._newest))
-                return kind, self._newest.pop(kind)
-            return OTHER, self._others.popleft()
-
-    def _hand_over(self, kind: str, act: Callable[[], None]) -> None:
-        """Call `act` on rclpy's executor and wait: a queue of such calls would delay messages."""
-        executor = self._node.executor
-        with self._lock:
-            if executor is None or self._ended.is_set():
+            if self._is_busy or self._has_ended or not (self._newest or self._others):
                 return
-            self._called.clear()
-        try:
-            executor.create_task(partial(self._act, kind, act))
-        except AttributeError:
-            # Jazzy's executor has been shut down.
-            return
-        self._called.wait()
+            self._is_busy = True
+            kind = next(iter(self._newest), OTHER)
+            job = self._newest.pop(kind, None) or self._others.popleft()
+            self._thread.submit(self._run, kind, job)
 
-    def _act(self, kind: str, act: Callable[[], None]) -> None:
+    def _run(self, kind: str, job: Job) -> None:
+        act = None
         try:
-            if not self._ended.is_set():
+            act = job()
+        except Exception as error:
+            self._failed(kind, error)
+        executor = self._node.executor
+        if act and executor and not self._has_ended:
+            # Jazzy's executor raises it once it has been shut down.
+            with suppress(AttributeError):
+                executor.create_task(partial(self._call, kind, act))
+        else:
+            self._end_of_job()
+
+    def _call(self, kind: str, act: Callable[[], None]) -> None:
+        try:
+            if not self._has_ended:
                 act()
         except Exception as error:
             self._failed(kind, error)
-        finally:
-            self._called.set()
+        self._end_of_job()
+
+    def _end_of_job(self) -> None:
+        self._is_busy = False
+        self._run_next()

@@ -19,7 +19,7 @@ from __future__ import annotations
 from cmath import phase
 from itertools import combinations
 import math
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Set, Tuple
 
 import numpy as np
 
@@ -59,6 +59,8 @@ class Drawing(Dyads):
         self.drives: List[Source] = []
         self.measured: Optional[Joint] = None
         self.limits: Dict[str, Limits] = {}
+        # Tips of triangles that are a dyad: they turn with a link of their own.
+        self._tips: Set[str] = set()
         self.driven = [joint for joint in loop.joints if joint.name in drives]
         pins: List[Dict[str, complex]] = []
         for joint in loop.joints:
@@ -158,6 +160,7 @@ class Drawing(Dyads):
             except ValueError:
                 # No word places a second joint on this block or barrel.
                 return None
+            self._tips.add(tip)
             along = self.on[body][tip] - self.on[body][pin]
             link = bar_name(pin, tip)
         return link, joint.motion(body), phase(along / self.parts[base].along)
@@ -175,7 +178,8 @@ class Drawing(Dyads):
         # A bar parallel to the one body that hangs on the other.
         try:
             tip, end = self.other(body, pin)
-            aside = next((name for name in self.on[base] if self.home[name] == base), '') \
+            aside = next((name for name in self.on[base]
+                          if self.home[name] == base and name not in self._tips), '') \
                 or self._triangle(base, pin)
         except ValueError:
             return None

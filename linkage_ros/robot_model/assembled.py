@@ -157,12 +157,10 @@ def _slots(machine: SceneMechanism, bodies: Sequence[Body], positions: Dict[str,
 
 
 def weight(pieces: Sequence[Piece], density: float) -> Weight:
-    """Return the common weight of pieces of a density [kg/m^3]; zero without pieces."""
-    solids = np.array([_solid(piece) for piece in pieces]).reshape(-1, 3)
+    """Return the common weight of one or more pieces of a density [kg/m^3]."""
+    solids = np.array([_solid(piece) for piece in pieces])
     masses = density * solids[:, 0]
     mass = float(masses.sum())
-    if not mass:
-        return Weight(0.0, (0.0, 0.0), (0.0,) * 4)
     x, y = masses @ [piece.pose[:2] for piece in pieces] / mass
     moments = np.zeros(4)
     for own, (along, across), piece in zip(masses, masses[:, None] * solids[:, 1:], pieces):

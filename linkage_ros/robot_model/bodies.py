@@ -253,8 +253,6 @@ def _numbers(robot: Robot) -> Iterator[float]:
     for body in robot.bodies:
         yield from body.pose
         yield from body.joint.travel or () if body.joint else ()
-        for piece in body.pieces:
-            yield from (*piece.start, *piece.end, piece.length)
         for point in body.points:
             yield from point.place
 

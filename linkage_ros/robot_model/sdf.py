@@ -101,13 +101,12 @@ def _add_link(robot: ElementTree.Element, solid: Solid) -> None:
     link = add(robot, 'link', name=solid.name)
     add(link, 'pose', *solid.pose, relative_to=solid.parent or '__model__')
     mass, centre, moments = solid.weight
-    if mass:
-        inertial = add(link, 'inertial')
-        add(inertial, 'pose', *centre, *[0.0] * 4)
-        add(inertial, 'mass', mass)
-        inertia = add(inertial, 'inertia')
-        for tag, moment in zip(('ixx', 'iyy', 'izz', 'ixy'), moments):
-            add(inertia, tag, moment)
+    inertial = add(link, 'inertial')
+    add(inertial, 'pose', *centre, *[0.0] * 4)
+    add(inertial, 'mass', mass)
+    inertia = add(inertial, 'inertia')
+    for tag, moment in zip(('ixx', 'iyy', 'izz', 'ixy'), moments):
+        add(inertia, tag, moment)
     for i, piece in enumerate(solid.pieces):
         _add_visual(link, f'{solid.name}_{i}', piece)
 

@@ -25,7 +25,7 @@ from typing import Any, Dict, List, Optional, Tuple
 
 from .input_settings import FARTHEST, in_words, InputSettings, START
 from .joint_names import check_distinct
-from .parameter_file import overrides
+from .parameter_file import overrides, sections
 from .parameters import (
     ALL,
     DRIVER,
@@ -93,7 +93,8 @@ class Scene:
 
 def load(path: str) -> Scene:
     """Read a scene from a parameter file, as nodes without a namespace do; needs PyYAML."""
-    found = {node: overrides(path, f'/{node}') for node in ALL}
+    given = sections(path)
+    found = {node: overrides(given, f'/{node}') for node in ALL}
     if not any(own is not None for own in found.values()):
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:'")
     values = {node: own or {} for node, own in found.items()}

@@ -11,227 +11,181 @@
 """
 Read ROS parameter files without ROS. Needs PyYAML.
 
-Syntax of numbers, matching of node names, precedence of sections and error messages are those of
-rcl_yaml_param_parser (https://github.com/ros2/rcl).
+The types of values, the matching of node names and the precedence of sections are those of
+rcl_yaml_param_parser (https://github.com/ros2/rcl). What it reads in a surprising way is refused.
 """
 
 from __future__ import annotations
 
-from fractions import Fraction
 from functools import reduce
+import math
 import re
 import sys
-from typing import Any, Dict, Iterable, List, Optional, Tuple
+from typing import Any, Dict, Iterator, Optional, Sequence, Set, Tuple
 
 from .parameters import SceneError
+from ..cache import cached
 from ..optional import needs
-from ..words import quoted
+from ..words import elided, quoted
 
 KEY = 'ros__parameters'
-# Kinds of values. If a parameter is given values of several kinds, the first of these wins.
-KINDS = {bool: 'bool', int: 'integer', float: 'double', str: 'string'}
-TRUE = {'Y', 'y', *(word for low in ('yes', 'true', 'on')
-                    for word in (low, low.title(), low.upper()))}
-FALSE = {'N', 'n', *(word for low in ('no', 'false', 'off')
-                     for word in (low, low.title(), low.upper()))}
 TEXT = 'tag:yaml.org,2002:str'
-_WHOLE = re.compile(r'\s*[+-]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)', re.ASCII)
-_DECIMAL = re.compile(r'\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?', re.ASCII)
-_HEXADECIMAL = re.compile(r'\s*[+-]?0[xX]([\da-f]+\.?[\da-f]*|\.[\da-f]+)([pP][+-]?\d+)?',
-                          re.ASCII | re.IGNORECASE)
-_SPECIAL = re.compile(r'\s*[+-]?(inf(inity)?|nan(\(\w*\))?)', re.ASCII | re.IGNORECASE)
-_DOTTED = re.compile(r'[+-]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)')
+BOOL, INTEGER, DOUBLE, UNCLEAR = '!bool', '!integer', '!double', '!unclear'
+# What unquoted text is; any other is a string. ROS reads what is unclear as a number, too.
+TYPES = {
+    BOOL: r'(y|Y|yes|Yes|YES|on|On|ON|true|True|TRUE'
+          r'|n|N|no|No|NO|off|Off|OFF|false|False|FALSE)\Z',
+    INTEGER: r'[+-]?(0|[1-9][0-9]*|0[xX][0-9a-fA-F]+)\Z',
+    DOUBLE: r'([+-]?(?!0[0-9]+\Z)([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?'
+            r'|[+-]?\.(inf|Inf|INF)|\.(nan|NaN|NAN))\Z',
+    UNCLEAR: r'(?ai:[+-]?(0[0-9]+|inf(inity)?|nan(\(\w*\))?'
+             r'|0x([0-9a-f]+\.?[0-9a-f]*|\.[0-9a-f]+)(p[+-]?[0-9]+)?))\Z'}
 _TOKEN = re.compile(r'\*\*?|[A-Za-z_]\w*', re.ASCII)
 
+# The values in a file, by the names of the nodes of each section.
+Sections = Dict[str, Dict[str, Any]]
 
-def overrides(path: str, node: str) -> Optional[Dict[str, Any]]:
-    """
-    Return the parameter values in a file for a node, by parameter name.
 
-    `node` is its full name, such as '/kinematics'. None means that no section matches it. Raises
-    SceneError with the reason of rcl if rcl would refuse the file.
-    """
+def sections(path: str) -> Sections:
+    """Return the sections of a parameter file; raise SceneError, with the line, if it is none."""
     with needs('yaml'):
         import yaml
 
-        loader = getattr(yaml, 'CLoader', yaml.Loader)
-    reader = _Reader()
+        loader = _loader(yaml)
+    found: Sections = {}
     try:
         with open(path, 'rb') as file:
-            reader.read(yaml.parse(file, Loader=loader))
-    except (yaml.YAMLError, UnicodeError, RecursionError):
-        reason = f'Error parsing a event near line {reader.line}'
-    except ValueError as error:
-        reason = str(error)
-    else:
-        return reader.values_of(node)
-    raise SceneError(f'{path} is not a valid ROS parameter file: {reason}')
+            root = yaml.compose(file, Loader=loader)
+        if root is not None and root.value:
+            _refuse_aliases(root, set())
+            _add_sections(found, root, ())
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        mark = getattr(error, 'problem_mark', None)
+        problem = f'{getattr(error, "problem", "")}, line {mark.line + 1}' if mark else str(error)
+        reason = elided(problem, 300)
+        raise SceneError(f'{path} is not a valid ROS parameter file: {reason}') from None
+    return found
 
 
-class _Reader:
-    """State of the parser: the parameters so far, and where it is in the nested names."""
+def overrides(found: Sections, node: str) -> Optional[Dict[str, Any]]:
+    """
+    Return the values for a node, by parameter name; later sections override earlier ones.
 
-    def __init__(self) -> None:
-        # Parameters by section: the name of each, and its values by kind.
-        self.nodes: Dict[str, List[Tuple[str, Dict[Any, Any]]]] = {}
-        self.line = 0
-        self._at_key, self._in_list = True, False
-        self._list_kind: Optional[type] = None
-        self._in_parameters, self._depth, self._is_new = False, 0, False
-        self._node_names: List[str] = []
-        self._space, self._spaces = '', 0
-        self._own: List[Tuple[str, Dict[Any, Any]]] = []
-        self._place = 0
+    `node` is its full name, such as '/kinematics'. None means that no section matches it.
+    """
+    matching = [values for name, values in found.items() if _pattern(name).fullmatch(node)]
+    return {name: value for values in matching
+            for name, value in values.items()} if matching else None
 
-    def values_of(self, node: str) -> Optional[Dict[str, Any]]:
-        """Return the values in all sections that match a node, of which later ones win."""
-        found = [own for name, own in self.nodes.items() if _pattern(name).fullmatch(node)]
-        if not found:
-            return None
-        return {name: next((values[kind] for kind in (*KINDS, *map(_list_of, KINDS))
-                            if kind in values), None)
-                for own in found for name, values in own}
 
-    def read(self, events: Iterable[Any]) -> None:
-        """Process all YAML events; raise ValueError where rcl would refuse one."""
-        for event in events:
-            self.line = event.start_mark.line + 1
-            handler = getattr(self, f'_{type(event).__name__[:-5]}', None)
-            if handler:
-                handler(event)
+def is_text(text: str) -> bool:
+    """Return whether unquoted text is a string."""
+    return not any(re.match(pattern, text) for pattern in TYPES.values())
 
-    def _Scalar(self, event: Any) -> None:
-        if self._at_key:
-            self._key(event.value)
-            self._at_key = False
-            return
-        if not self._in_parameters or not self._own:
-            raise ValueError(f'Cannot have a value before {KEY} at line {self.line}')
-        self._value(_read(event, self.line))
-        self._at_key = not self._in_list
 
-    def _Alias(self, event: Any) -> None:
-        raise ValueError(f'Will not support aliasing at line {self.line}')
+@cached(1)
+def _loader(yaml: Any) -> Any:
+    """Return a parser of YAML that marks each value with its type for ROS."""
+    class Loader(getattr(yaml, 'CBaseLoader', yaml.BaseLoader)):  # type: ignore[misc]
+        pass
 
-    def _SequenceStart(self, event: Any) -> None:
-        if self._at_key:
-            raise ValueError(f'Sequences cannot be key at line {self.line}')
-        if not self._in_parameters:
-            raise ValueError('Sequences can only be values and not keys in params. '
-                             f'Error at line {self.line}')
-        self._in_list, self._list_kind = True, None
+    for tag, pattern in TYPES.items():
+        Loader.add_implicit_resolver(tag, re.compile(pattern), None)
+    return Loader
 
-    def _SequenceEnd(self, event: Any) -> None:
-        self._in_list, self._at_key = False, True
 
-    def _MappingStart(self, event: Any) -> None:
-        self._depth += 1
-        self._at_key = True
-        self._is_new = not self._in_parameters or self._depth - len(self._node_names) != 2
+def _refuse_aliases(node: Any, visited: Set[int]) -> None:
+    if id(node) in visited:
+        raise ValueError(f'ROS does not support aliases{_line(node)}')
+    visited.add(id(node))
+    for child in node.value if node.id != 'scalar' else ():
+        for part in child if node.id == 'mapping' else (child,):
+            _refuse_aliases(part, visited)
 
-    def _MappingEnd(self, event: Any) -> None:
-        if self._in_parameters:
-            if self._spaces:
-                self._spaces -= 1
-                self._space = self._space.rpartition('.')[0] if self._spaces else ''
-            else:
-                self._in_parameters = False
-        elif self._depth == len(self._node_names) + 1 and self._node_names:
-            self._node_names.pop()
-        self._depth -= 1
 
-    def _key(self, key: str) -> None:
-        if not key:
-            raise ValueError(f'No key at line {self.line}')
-        if self._in_parameters:
-            self._parameter(key)
-        elif not key.startswith(KEY):
-            self._node_names.append(key)
+def _add_sections(found: Sections, node: Any, names: Tuple[str, ...]) -> None:
+    """Add the sections below the names of namespaces and nodes."""
+    for key, value in _items(node, f'{KEY} below the name of a node, such as /**, is expected'):
+        if key == KEY:
+            _add_values(found.setdefault(_checked(names), {}), value, '')
         else:
-            if not self._node_names:
-                raise ValueError(f'There are no node names before {KEY} at line {self.line}')
-            name = _checked(reduce(lambda space, own: f'{space.removesuffix("/")}/{own}',
-                                   self._node_names))
-            self._own = self.nodes.setdefault(name, [])
-            self._in_parameters = True
-
-    def _parameter(self, key: str) -> None:
-        """Begin a parameter; one whose value is a mapping becomes the first in this mapping."""
-        if self._is_new:
-            self._space, self._is_new = self._own[self._place][0], False
-            self._spaces += 1
-        name = self._space or key
-        self._place = next((i for i, (other, _) in enumerate(self._own) if other == name),
-                           len(self._own))
-        if self._place == len(self._own):
-            self._own.append((name, {}))
-        if self._space:
-            self._own[self._place] = f'{name}.{key}', self._own[self._place][1]
-
-    def _value(self, value: Any) -> None:
-        values, kind = self._own[self._place][1], type(value)
-        if not self._in_list:
-            values[kind] = value
-        elif self._list_kind is None:
-            self._list_kind, values[_list_of(kind)] = kind, [value]
-        elif self._list_kind is kind:
-            values[_list_of(kind)].append(value)
-        else:
-            raise ValueError(f"Sequence should be of same type. Value type '{KINDS[kind]}' do "
-                             f'not belong at line_num {self.line}')
+            _add_sections(found, value, (*names, key))
 
 
-def _list_of(kind: type) -> str:
-    return f'list of {kind.__name__}'
+def _add_values(values: Dict[str, Any], node: Any, prefix: str) -> None:
+    for key, value in _items(node, 'names with values are expected'):
+        name, is_mapping = prefix + key, value.id == 'mapping'
+        if is_mapping and prefix and '.' in key:
+            raise ValueError(f'ROS loses track of names below {quoted(key)}, which has a point'
+                             f'{_line(value)}')
+        if is_mapping and name not in values:
+            _add_values(values, value, f'{name}.')
+            continue
+        new = None if is_mapping else _value(value)
+        if is_mapping or name in values and _kind(values[name]) != _kind(new):
+            raise ValueError(f'{quoted(name)} is given twice, with different types{_line(value)}')
+        values[name] = new
 
 
-def _read(event: Any, line: int) -> Any:
-    """Return the value of a YAML scalar event; raise ValueError if it is empty."""
-    text = event.value
-    is_quoted = event.style in ('"', "'")
-    if not text and not is_quoted:
-        raise ValueError(f'No value at line {line}')
-    return text if is_quoted or event.tag == TEXT else plain(text)
+def _items(node: Any, reason: str) -> Iterator[Tuple[str, Any]]:
+    """Yield the entries of a mapping; raise ValueError with a reason if it has none."""
+    if node.id != 'mapping' or not node.value:
+        raise ValueError(f'{reason}{_line(node)}')
+    for key, value in node.value:
+        if key.id != 'scalar' or not key.value:
+            raise ValueError(f'a name is expected{_line(key)}')
+        yield key.value, value
 
 
-def plain(text: str) -> Any:
-    """Return the value that rcl reads from unquoted text: bool, int, float or str."""
-    if text in TRUE or text in FALSE:
-        return text in TRUE
-    if _WHOLE.fullmatch(text):
-        base = 16 if 'x' in text.lower() else 8 if text.strip().lstrip('+-')[0] == '0' else 10
-        number = int(text, base) if len(text) < 100 else sys.maxsize + 1
+def _kind(value: Any) -> Any:
+    return (list, type(value[0])) if isinstance(value, list) else type(value)
+
+
+def _value(node: Any) -> Any:
+    """Return the value of a node; None for an empty list, which has no type for ROS."""
+    if node.id == 'scalar':
+        return _scalar(node)
+    values = [_scalar(child) for child in node.value]
+    if len(set(map(type, values))) > 1:
+        raise ValueError(f'a list must have values of one type{_line(node)}')
+    return values or None
+
+
+def _scalar(node: Any) -> Any:
+    text, low = node.value, str(node.value).lower()
+    if node.id != 'scalar':
+        raise ValueError(f'a list must have no lists or names in it{_line(node)}')
+    if node.style in ('"', "'"):
+        return text
+    if not text:
+        raise ValueError(f'a value is missing{_line(node)}')
+    if node.tag == BOOL:
+        return low in ('y', 'yes', 'on', 'true')
+    if node.tag == INTEGER:
+        number = int(text, 16 if 'x' in low else 10)
         if -sys.maxsize - 1 <= number <= sys.maxsize:
             return number
-    found = _number(text)
-    return text if found is None else found
+    elif node.tag == DOUBLE:
+        real = float(low.replace('.inf', 'inf').replace('.nan', 'nan'))
+        is_tiny = abs(real) < sys.float_info.min and re.search('[1-9]', low.partition('e')[0])
+        if math.isinf(real) == ('inf' in low) and not is_tiny:
+            return real
+    elif node.tag == TEXT and (node.style not in ('|', '>') or is_text(text.strip())):
+        return text
+    raise ValueError(f'{quoted(text)} is unclear or out of range{_line(node)}: write a decimal '
+                     'number, .inf, .nan, or text in quotes')
 
 
-def _number(text: str) -> Optional[float]:
-    """Parse a number as C's strtod does; return None if it is invalid or out of range."""
-    if _DOTTED.fullmatch(text):
-        return float(text.replace('.', ''))
-    if _SPECIAL.fullmatch(text):
-        return float(text.partition('(')[0])
-    if _HEXADECIMAL.fullmatch(text):
-        try:
-            return float.fromhex(text)
-        except OverflowError:
-            return None
-    if not _DECIMAL.fullmatch(text):
-        return None
-    number, digits = float(text), text.lower().partition('e')[0]
-    if abs(number) >= sys.float_info.min:
-        return number if abs(number) <= sys.float_info.max else None
-    is_zero = not digits.strip(' +-0.')
-    return number if is_zero or number and Fraction(text) == Fraction(number) else None
+def _line(node: Any) -> str:
+    return f' in line {node.start_mark.line + 1}'
 
 
-def _checked(name: str) -> str:
-    """Return a section's name; raise ValueError if it is not a valid node name."""
+def _checked(names: Sequence[str]) -> str:
+    """Return the name of a section; raise ValueError if nodes cannot have it."""
+    name = reduce(lambda space, own: f'{space.removesuffix("/")}/{own}', names) if names else ''
     if not all(map(_TOKEN.fullmatch, name.removeprefix('/').split('/'))):
-        raise ValueError("node name must not contain characters other than alphanumerics or '_', "
-                         f'got {quoted(name)}')
+        raise ValueError(f'{KEY} must be below the name of a node, such as /**, not '
+                         f'{quoted(name)}')
     return name
 
 

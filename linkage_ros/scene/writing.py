@@ -17,7 +17,7 @@ from textwrap import indent
 from typing import Any, Dict, Mapping
 
 from . import read, Scene, SceneError
-from .parameter_file import plain, TEXT
+from .parameter_file import is_text, TEXT
 from ..optional import needs
 
 
@@ -30,7 +30,7 @@ def in_yaml(values: Mapping[str, Any]) -> str:
         """Quotes texts that ROS would read as another type, such as y, nan and 1e5."""
 
     Dumper.add_representer(str, lambda dumper, text: dumper.represent_scalar(
-        TEXT, text, None if isinstance(plain(text), str) else "'"))
+        TEXT, text, None if is_text(text) else "'"))
     texts = ['/**:', '  ros__parameters:']
     for name, value in values.items():
         written = list(value) if isinstance(value, tuple) else value

@@ -88,7 +88,8 @@ class Server:
     def __init__(self, view: SceneView, bridge: Bridge, host: str, port: int) -> None:
         self._view = view
         self._bridge = bridge
-        self._host = host
+        # Listening at '' in both families of addresses, each would have a free port of its own.
+        self._host = host or '0.0.0.0'
         self._clients: set[Client] = set()
         # The connections whose request is being answered.
         self._answered: set[Any] = set()
@@ -101,7 +102,7 @@ class Server:
     @property
     def url(self) -> str:
         """Return the page's address for a browser on this machine."""
-        host = {'0.0.0.0': '127.0.0.1', '::': '::1', '': '127.0.0.1'}.get(self._host, self._host)
+        host = {'0.0.0.0': '127.0.0.1', '::': '::1'}.get(self._host, self._host)
         return f'http://{f"[{host}]" if ":" in host else host}:{self.port}/'
 
     def stop(self) -> None:
@@ -178,7 +179,7 @@ class Server:
         except ValueError:
             return False
         # A numeric address cannot be directed to another machine.
-        return address.is_loopback or self._host in ('', '0.0.0.0', '::')
+        return address.is_loopback or self._host in ('0.0.0.0', '::')
 
     async def _connect(self, request: web.Request) -> Any:
         socket_ = Socket(

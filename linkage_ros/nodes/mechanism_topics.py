@@ -1,0 +1,202 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A mechanism of `kinematics`: the state of its inputs, its solution and its topics."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import AbstractSet, Any, List, Optional, Sequence, Tuple
+
+import numpy as np
+from rclpy.duration import Duration
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from visualization_msgs.msg import Marker, MarkerArray
+
+from . import messages
+from .log import Throttle
+from .mechanism_model import AssemblyState, MechanismModel
+from .message_layout import NEVER
+from .publishers import LATCHED, TrackedPublisher
+from .. import scene
+
+
+class MechanismTopics:
+    """
+    The state and the topics of a mechanism.
+
+    Attributes
+    ----------
+    inputs : list
+        Last positions [rad or m] of the inputs; None: not received yet.
+    speeds : list
+        Their speeds [rad/s or m/s]; None: not in the last message of the input.
+    stamp : bytes
+        The packed stamp of the last message that set an input.
+    model : MechanismModel
+        The adopted model; there is one before the first message arrives.
+    state : AssemblyState, optional
+        That of the solution at the present inputs; None: not solved yet.
+
+    """
+
+    model: MechanismModel
+
+    def __init__(self, node: Any, mechanism: scene.SceneMechanism):
+        name = self.name = mechanism.name
+        self._joint_states = TrackedPublisher(node, JointState, f'{name}/joint_states', 10)
+        self._markers = TrackedPublisher(node, MarkerArray, f'{name}/markers', 1)
+        self._locus = node.create_publisher(Marker, f'{name}/locus', LATCHED)
+        self._description = node.create_publisher(String, f'{name}/robot_description', LATCHED)
+        self._logger = node.get_logger().get_child(name)
+        self._throttle = Throttle(self._logger)
+        self.inputs: List[Any] = [None] * len(mechanism.inputs)
+        self.speeds: List[Optional[float]] = [None] * len(mechanism.inputs)
+        self.stamp = NEVER
+        self.state: Optional[AssemblyState] = None
+        # The last position of a source joint, and the last input that one has given.
+        self._position = math.nan
+        self._near: Optional[float] = None
+        # Ids of the displayed markers, whether the locus is displayed, and the last robot model.
+        self._displayed: AbstractSet[int] = frozenset()
+        self._has_locus, self._described = False, ''
+
+    def receive(self, i: int, position: float, speed: Optional[float]) -> None:
+        """Set input `i` by the position of its source joint and, if known, its speed."""
+        model = self.model
+        value, self.speeds[i] = model.mechanism.from_source(
+            model.inputs[i], position, speed, self._near)
+        self.inputs[i], self._position = value, position
+        if math.isfinite(value):
+            self._near = value
+
+    def publish(self, in_scene: bool) -> None:
+        """Solve for the subscribers, and for the scene's joint states if `in_scene`; publish."""
+        topics = self._joint_states.subscribed, self._markers.subscribed
+        if None in self.inputs or not (in_scene or any(topics)):
+            # The last solution is that of earlier inputs.
+            self.state = None
+            return
+        state = self._solve(self._regular(self.model, in_scene))
+        if state.any_assembled and any(topics):
+            self.model.publishers[state, topics].publish(self.stamp, state.solution.values)
+
+    def state_in_scene(self) -> Optional[AssemblyState]:
+        """Return the present state for the scene's joint states; None without assembled legs."""
+        if None in self.inputs:
+            return None
+        regular, state = self._regular(self.model, True), self.state
+        if state is None or state.solution is not regular.solution:
+            state = self._solve(regular)
+        return state if state.any_assembled else None
+
+    def _regular(self, model: MechanismModel, in_scene: bool) -> AssemblyState:
+        return model.regular[in_scene or self._joint_states.has_subscribers,
+                             self._markers.has_subscribers, None not in self.speeds]
+
+    def _solve(self, regular: AssemblyState) -> AssemblyState:
+        """Solve at the present inputs; display or delete markers if the state has changed."""
+        before, self.state = self.state, None
+        state = self.state = self.model.solve(regular, self.inputs, self.speeds)
+        if state.assembled is not None:
+            self._throttle.warn('reach', self._out_of_reach)
+        if not state.any_assembled:
+            self._delete(self._displayed)
+        elif state != before and self._markers.has_subscribers:
+            self._displayed = self.model.marker_array.ids
+        return state
+
+    def prepared(self, mechanism: scene.SceneMechanism, frame_id: str, prefix: str,
+                 in_scene: bool) -> MechanismModel:
+        """Return a model, with messages for the present subscribers, or the equal present one."""
+        before, inputs = getattr(self, 'model', None), [*self.inputs]
+        if before and before.made_of == (mechanism, frame_id, prefix):
+            return before
+        model = MechanismModel(mechanism, frame_id, prefix, self._logger)
+        # This runs in the worker's thread, while subscribers may change.
+        topics = self._joint_states.subscribed, self._markers.subscribed
+        if before and None not in inputs and (in_scene or any(topics)):
+            regular = self._regular(model, in_scene)
+            regular.solution.solve(inputs, [0.0] * len(inputs))
+            if any(topics):
+                # Building its messages takes longest.
+                model.publishers[regular, topics]
+        return model
+
+    def adopt(self, model: MechanismModel) -> None:
+        """Replace the model, and delete those markers that the new model does not have."""
+        self.model, self.state = model, None
+        self._delete(self._displayed - model.marker_array.ids)
+
+    def publish_latched(self, latched: Tuple[str, Optional[Marker]]) -> None:
+        """Publish the robot model if it has changed; publish the locus, or delete it if None."""
+        description, locus = latched
+        if description != self._described:
+            self._described = description
+            self._description.publish(String(data=description))
+        self._set_locus(locus)
+
+    def clear(self) -> None:
+        """Delete the markers and the locus."""
+        self._delete(self._displayed)
+        self._set_locus(None)
+
+    def wait_for_deletions(self, deadline: float) -> None:
+        """Wait for subscribers to acknowledge deletions, up to a monotonic time [s]."""
+        for publisher in (self._markers.publisher, self._locus):
+            publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - time.monotonic())))
+
+    def _set_locus(self, locus: Optional[Marker]) -> None:
+        if locus or self._has_locus:
+            self._locus.publish(locus or messages.deleted(self.name, messages.LOCUS_ID))
+        self._has_locus = bool(locus)
+
+    def _delete(self, ids: AbstractSet[int]) -> None:
+        if ids:
+            self._displayed = self._displayed - ids
+            self._markers.publish(MarkerArray(
+                markers=[messages.deleted(self.name, id_) for id_ in sorted(ids)]))
+
+    def _out_of_reach(self) -> str:
+        assembled = [*self.state.legs()] if self.state else []
+        missing = {leg: f'{self.name}_{prefix}'.rstrip('_') for leg, prefix in enumerate(
+            self.model.assembly.legs) if leg not in assembled}
+        legs, inputs = ', '.join(missing.values()), self.model.inputs
+        if inputs[0].measures and math.isnan(self.inputs[0]):
+            return (f'{legs} cannot be assembled: {inputs[0].source} is at {self._position:.6g}, '
+                    f'out of reach of {inputs[0].measures}')
+        at = ', '.join(f'{one.input.quantity} {value:.6g} {one.input.unit}'
+                       for one, value in zip(inputs, self.inputs))
+        if len(inputs) > 1:
+            return f'{legs} cannot be assembled at {at}: no place for "{self._unplaced()}"'
+        first, *others = missing
+        of = f' of {missing[first]}' if others else ''
+        return (f'{legs} cannot be assembled at {at}; the reach{of} is '
+                f'{scene.in_words(self._reach(inputs[0], first))} {inputs[0].input.unit}')
+
+    def _unplaced(self) -> str:
+        """Return the first joint line that has no place at the present inputs."""
+        mechanism = self.model.mechanism
+        own = [value / mechanism.scale_of(name)
+               for name, value in zip(mechanism.inputs, self.inputs)]
+        found = {**mechanism.linkage.solve(own), **mechanism.linkage.joint_angles(own)}
+        return next((line.text for line in mechanism.linkage.design.lines
+                     if any(np.isnan(found.get(name, 0.0)).any() for name in line.names)), '')
+
+    def _reach(self, settings: scene.InputSettings, leg: int) -> Sequence[Tuple[float, float]]:
+        """Return the reach of a leg, by the crank that all legs have in common."""
+        if len(self.model.assembly.legs) == 1:
+            return settings.reach
+        lag, start, side, _ = [*self.model.assembly.legs.values()][leg]
+        arcs = [sorted(lag + side * (end - start) for end in arc) for arc in settings.reach]
+        turns = [settings.input.turns_of(low) for low, _ in arcs]
+        return sorted((low - turn, high - turn) for (low, high), turn in zip(arcs, turns))

@@ -1,0 +1,371 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Facts of a robot's file, each as it is read, printed or refused."""
+
+import re
+
+from linkage_ros import mechanisms, scene
+from linkage_ros.robot_files import check, closing, command, model, readers
+import numpy as np
+import pytest
+from test_robot_files import (
+    CUT,
+    DIALECTS,
+    euler,
+    fixed,
+    published,
+    refused,
+    robot_of,
+    ROBOTS,
+    rotation,
+    words,
+    written,
+)
+
+TREE = ('<robot name="r">{}<joint name="j" type="revolute"><parent link="a"/><child link="b"/>{}'
+        '</joint>{}</robot>').format
+AB, ABC = '<link name="a"/><link name="b"/>', '<link name="a"/><link name="b"/><link name="c"/>'
+
+
+def hinge(name, parent, child, more=''):
+    return (f'<joint name="{name}" type="revolute"><parent link="{parent}"/>'
+            f'<child link="{child}"/>{more}</joint>')
+
+
+def sdf(*parts):
+    return ('<sdf version="1.9"><model name="m"><link name="a"/><link name="b"/>'
+            f'{pin("j", "a", "b")}{"".join(parts)}</model></sdf>')
+
+
+def pin(name, parent, child, kind='revolute', more=''):
+    return (f'<joint name="{name}" type="{kind}"><parent>{parent}</parent><child>{child}</child>'
+            f'{more}</joint>')
+
+
+FAULTS = {
+    TREE(ABC, '', hinge('j', 'b', 'c')): ": two joints are called 'j'",
+    TREE(ABC, '', hinge('k', 'b', 'c') + hinge('l', 'c', 'b')):
+        ": there are two of <joint> for 'b', which may have one",
+    TREE(ABC + '<link name="d"/>', '', hinge('k', 'c', 'd') + hinge('l', 'd', 'c')):
+        ': c hangs on itself',
+    TREE(AB + '<link name="b"/>', '', ''): ": there are two of <link> for 'b', which may have one",
+    TREE(AB, '', hinge('k', 'b', 'c')): ": joint k is on 'c', which is no link",
+    TREE(AB, '<origin xyz="1e9 0 0"/>', ''):
+        " cannot be read: '1e9 0 0 0 0 0' must be 6 numbers within 1e+09",
+    TREE(ABC, '<origin xyz="6e8 0 0"/>', hinge('k', 'b', 'c', '<origin xyz="6e8 0 0"/>')):
+        ': joint k must be within 1e+09 m',
+    TREE(AB, '<axis xyz="0 0 0"/>', ''): ': the axis of joint j has no length',
+    TREE(AB, '', '<loop_joint name="w" type="revolute"><link1 link="a"/><link2 link="x"/>'
+         '</loop_joint>'): " names 'x', which is not there",
+    TREE(AB, '', '<linear_bushing_rpy><bushing_frameA name="f"/><bushing_frameC name="b"/>'
+         '</linear_bushing_rpy>'): " names 'f', which is not there",
+    sdf(pin('k', 'a', 'f'), '<frame name="f" attached_to="g"/><frame name="g" attached_to="f"/>'):
+        ' has links or frames that hang on themselves',
+    sdf(pin('k', 'a', 'x')): ": k names 'x', which is not there",
+    sdf('<link name="c"><pose relative_to="y"/></link>'): ": c names 'y', which is not there",
+    sdf('<link name="a"/>'): ": there are two of <link> for 'a', which may have one",
+    sdf('<model name="n">', pin('k', 'q', 'q'), '</model>'):
+        ": n::k names 'q', which is not there",
+    sdf(pin('g', 'a', 'b', 'gearbox', '<gearbox_reference_body>b</gearbox_reference_body>')):
+        ': gearbox g turns b against b, on no joint',
+    sdf('<include><uri>empty</uri></include>'): ': {}/empty/model.sdf has no model'}
+
+
+@pytest.mark.parametrize('text', FAULTS, ids=range(len(FAULTS)))
+def test_a_fault_of_a_file_is_named(capsys, tmp_path, text):
+    (tmp_path / 'empty').mkdir()
+    (tmp_path / 'empty' / 'model.sdf').write_text('<sdf version="1.9"/>')
+    file = tmp_path / 'robot.xml'
+    file.write_text(text)
+    assert refused(capsys, file) == f'from_robot: {file}{FAULTS[text].format(tmp_path)}\n'
+
+
+POSES = ' must be JOINT=VALUE, its value in rad or m'
+
+
+@pytest.mark.parametrize('file, args, why', [
+    ('four_bar.sdf', ['--loops', 'a'], f'{ROBOTS}/four_bar.sdf has its own loops; --loops is for '
+     'a URDF'),
+    ('four_bar.urdf', ['--pose', 'motor'], f"'motor'{POSES}"),
+    ('four_bar.urdf', ['--pose', 'elbow=0', 'motor=a'], f"'motor=a'{POSES}"),
+    ('four_bar.urdf', ['--hold', '=1'], f"'=1'{POSES}"),
+    ('four_bar.urdf', ['--hold', 'motor=1e9'], f"'motor=1e9'{POSES}"),
+    ('four_bar.urdf', ['--hold', 'motr=1'], "there is no joint 'motr'; allowed: motor, elbow, "
+     'shoulder; did you mean motor?'),
+    ('four_bar.sdf', ['--pose', 'joint_D=1'], 'joint_D closes a loop, so that other joints say '
+     'where it is')])
+def test_an_option_that_cannot_be_is_named(capsys, file, args, why):
+    assert refused(capsys, ROBOTS / file, *args) == f'from_robot: {why}\n'
+
+
+def test_a_loop_of_a_joint_that_is_no_hinge_slide_or_ball_is_left_out(capsys, tmp_path):
+    file = written(tmp_path, 'four_bar.urdf', ('"wrist" type="revolute"', '"wrist" type="screw"'))
+    assert refused(capsys, file) == (
+        'from_robot: Left out: base_link, crank, coupler, rocker: not planar: wrist is a joint of '
+        'type screw; as rods in space: wrist close loops that have more than rods in them.\n')
+    file = written(tmp_path, 'four_bar.urdf', ('type="continuous"', 'type="spherical"'), (
+        'type="revolute"', 'type="spherical"'))
+    assert 'not planar: no hinge says in which plane; ' in refused(capsys, file)
+    file.write_text(re.sub('xyz="0(.3)? 0 0(.2)?"', 'xyz="0 0 0"', (
+        ROBOTS / 'four_bar.urdf').read_text()))
+    assert 'all its joints are at one place' in refused(capsys, file)
+
+
+SCENES = {
+    # The cylinder is as long as its pins are apart, plus the position of its joint.
+    'boom.urdf': (['--pose', 'boom_cylinder=0.1', '--hold', 'swing=0.25'], ' hold:=swing=0.25', """
+# Checked: boom_cylinder: in 240 poses of the robot, boom_cylinder from -0.3 to 0.3, its loops \
+stand open by 0 m at most.
+# Checked: the whole robot: in 120 poses, its loops stand open by 0 m at most.
+/**:
+  ros__parameters:
+    mechanisms:
+    - boom_cylinder
+    boom_cylinder.type: custom
+    boom_cylinder.joints:
+    - A ground 0 0
+    - B ground 0.3 0.3964
+    - C cylinder B A 1.04858 left
+    boom_cylinder.frame_id: turret
+    boom_cylinder.pose: [0.0, 0.0, 0.0, -1.5707963, 0.0, 0.0]
+    boom_cylinder.cylinder.source: boom_cylinder
+    boom_cylinder.cylinder.ratio: 1.0
+    boom_cylinder.cylinder.offset: 0.98779
+    boom_cylinder.cylinder.start: 1.08779
+    boom_cylinder.joint_names:
+    - AC=boom_joint+0.9
+    - barrel=barrel_joint+1.3
+    boom_cylinder.only_named: true
+    boom_cylinder.cylinder.sweep: [0.68779, 1.28779]
+"""),
+    # By its keyframe, the crank is 0.7 rad from upright.
+    'four_bar.xml': ([], '', """
+# Checked: motor: in 240 poses of the robot, motor from -2.442 to 3.842, its loops stand open by \
+0 m at most.
+# Checked: the whole robot: in 120 poses, its loops stand open by 0 m at most.
+/**:
+  ros__parameters:
+    mechanisms:
+    - motor
+    motor.type: custom
+    motor.joints:
+    - A ground 0 0
+    - B ground 0.3 0
+    - C crank A 0.2
+    - D parallelogram A C B
+    motor.frame_id: world
+    motor.pose: [0.0, 0.0, 0.0, -1.5707963, 0.0, 0.0]
+    motor.crank.source: motor
+    motor.crank.ratio: 1.0
+    motor.crank.offset: -1.5707963
+    motor.crank.start: -0.8707963
+    motor.joint_names:
+    - CD=elbow-1.5707963
+    - BD=-shoulder-1.5707963
+    motor.only_named: true
+""")}
+
+
+@pytest.mark.parametrize('file', SCENES)
+def test_all_that_is_printed_of_a_robot(capsys, file):
+    if file.endswith('xml'):
+        pytest.importorskip('mujoco')
+    args, more, text = SCENES[file]
+    assert command.main([str(ROBOTS / file), *args]) == 0
+    out, err = (re.sub(r'-?\d+\.\d+', lambda found: repr(round(float(found[0]), 7) + 0.0),
+                       re.sub(r'\b\de-1\d m', '0 m', each)) for each in capsys.readouterr())
+    assert out == (
+        f'# From {ROBOTS}/{file}. Its joints on /joint_states, and its model:\n# ros2 launch '
+        f'linkage_ros robot.launch.py robot:={ROBOTS}/{file} scene:=SCENE.yaml{more}{text}')
+    assert err == ''.join(f'from_robot: {line[2:]}\n' for line in text.splitlines()
+                          if line.startswith('# '))
+
+
+def test_a_motor_that_had_to_move_is_named(capsys):
+    # The cylinder is longer than its pins can be apart.
+    assert command.main([str(ROBOTS / 'boom.urdf'), '--pose', 'boom_cylinder=5']) == 0
+    assert capsys.readouterr().err.startswith(
+        'from_robot: boom_cylinder moved: their loops cannot be closed where the file has them.\n'
+        'from_robot: Checked: boom_cylinder: in 240 poses of the robot, boom_cylinder from -0.3')
+
+
+@pytest.mark.parametrize('word', ['parallelogram', 'antiparallelogram', 'mirror'])
+@pytest.mark.parametrize('base', ['0.6 0', '0.5 -0.3'])
+def test_bars_that_mirror_others_have_a_word_of_their_own(word, base):
+    linkage = mechanisms.create('custom', joints=[
+        'A ground 0 0', f'B ground {base}', 'C crank A 0.2', f'D {word} A C B'])
+    given, reports, still = command.described(robot_of(linkage, 0.7))
+    ground, _, crank, line = given['crank.joints']
+    assert (ground, crank, line) == ('A ground 0 0', 'C crank A 0.2', f'D {word} A C B')
+    assert [line[:9] for line in reports] == ['Checked: '] * 2 and not still
+
+
+# What a dialect says of a loop: its kind, and in whose frame its place and axis are.
+SAID = {'joint of Gazebo': ('hinge', 'child'), 'universal joint of Gazebo': ('hinge', 'child'),
+        'ball_constraint of Drake': ('ball', ''), 'linear_bushing_rpy of Drake': ('ball', ''),
+        'frames of onshape-to-robot': ('ball', ''), 'links of example-parallel-robots': (
+            'ball', ''), 'joints of example-parallel-robots': ('ball', ''),
+        'balls of Robonex': ('ball', ''), 'a rod that detaches': ('fixed', 'parent'),
+        'closures of solidworks_urdf_exporter2': ('hinge', 'world')}
+
+
+@pytest.mark.parametrize('dialect', [*DIALECTS, 'frames with axes', 'a stiff bushing'])
+def test_a_loop_is_where_a_dialect_says(tmp_path, dialect):
+    # The ends stand apart, as the links of the file are turned at random.
+    pytest.importorskip('yaml')
+    rng = np.random.default_rng(len(dialect))
+    inside, loops = DIALECTS.get(dialect) or DIALECTS['frames of onshape-to-robot']
+    tilted = rotation((1.0, 2.0, 3.0)) @ [0.0, 1.0, 0.0]
+    if dialect == 'frames with axes':
+        inside += fixed('coupler', 'closing_w_1_z', [0.3, 0.0, 0.0] + 2.0 * tilted) + fixed(
+            'rocker', 'closing_w_2_z', (0.0, 2.0, 0.2))
+    if dialect == 'a stiff bushing':
+        inside = DIALECTS['linear_bushing_rpy of Drake'][0].replace('1e4 0 1e4', '1e4 1 1e4')
+    (one, on_one), (two, on_two) = euler(rng), euler(rng)
+    text = CUT.sub(inside, (ROBOTS / 'four_bar.urdf').read_text())
+    for old, angles in (('"0 0 0.2"/><axis xyz="0 1 0"/>\n', one), ('"0.3 0 0"/><axis', two)):
+        assert text.count(old) == 1
+        text = text.replace(old, old.replace('/>', f' rpy="{words(angles)}"/>', 1))
+    file, more = tmp_path / 'robot.urdf', tmp_path / 'loops.yaml'
+    file.write_text(text)
+    more.write_text(loops)
+    robot = readers.read(str(file), loops and str(more))
+    tree = {*'motor elbow shoulder pin_joint'.split(), ''}
+    cut = [joint for joint in robot.joints if joint.name not in tree and joint.kind != 'fixed'
+           or '=' in joint.name][0]
+    kind, where = SAID.get(dialect, ('hinge', ''))
+    kind = {'frames with axes': 'hinge', 'a stiff bushing': 'fixed'}.get(dialect, kind)
+    assert cut.kind == kind and cut.bodies[0] in ('coupler', 'wrist_a', 'closing_w_1')
+    ends = {'': (np.array([0.0, 0.0, 0.2]) + on_one @ [0.3, 0.0, 0.0],
+                 np.array([0.3, 0.0, 0.0]) + on_two @ [0.0, 0.0, 0.2])}
+    ends['child'], ends['parent'] = ends[''][1:] * 2, (np.array([0.0, 0.0, 0.2]),) * 2
+    ends['world'] = (np.array([0.3, 0.0, 0.2]),) * 2
+    assert cut.places == (pytest.approx(ends[where][0]), pytest.approx(ends[where][1]))
+    assert cut.is_cut == (where in ('', 'world'))
+    if kind == 'hinge':
+        axes = {'': (on_one, on_two), 'child': (on_two, on_two), 'world': (np.eye(3),) * 2}[where]
+        axes = [turned @ [0.0, 1.0, 0.0] for turned in axes]
+        if dialect == 'frames with axes':
+            axes[0] = on_one @ tilted
+        assert cut.axes == (pytest.approx(axes[0]), pytest.approx(axes[1]))
+    assert robot.driven == (['motor'] if 'motor' in loops else [])
+
+
+def test_joints_that_no_mechanism_publishes_are_one_of_cranks(tmp_path):
+    # What is held stays where it is held, what follows another goes with it.
+    file = tmp_path / 'robot.urdf'
+    file.write_text(TREE(
+        ABC + '<link name="d"/>', '', hinge('k 2', 'b', 'c', (
+            '<mimic joint="j" multiplier="-0.5" offset="0.1"/>')) + hinge('l', 'c', 'd')))
+    robot = readers.read(str(file))
+    given, lost = model.others(robot, {}, {'l': 0.25, 'nobody': 1.0})
+    assert not lost and given == {
+        'others.type': 'custom', 'others.only_named': True, 'others.joints': [
+            'A ground 0 0', 'B1 crank A 1', 'B2 crank A 1', 'B3 crank A 1'],
+        'others.joint_names': ['crank2="k 2"'], **{
+            f'others.{crank}.{key}': value for crank, source, ratio, offset, start in (
+                ('crank', 'j', 1.0, 0.0, 0.0), ('crank2', 'j', -0.5, 0.1, 0.1),
+                ('crank3', 'l', 1.0, 0.0, 0.25)) for key, value in (
+                    ('source', source), ('ratio', ratio), ('offset', offset), ('start', start),
+                    ('speed', 0.0))}}
+    assert model.others(readers.read(str(ROBOTS / 'four_bar.sdf')), scene.read(command.described(
+        readers.read(str(ROBOTS / 'four_bar.sdf')))[0]).machines, {}) == ({}, [])
+
+
+def test_a_mechanism_that_cannot_move_is_not_checked():
+    robot = closing.closed(readers.read(str(ROBOTS / 'four_bar.urdf'))).robot
+    machine = scene.read(command.described(robot)[0]).machines['motor']
+    with pytest.raises(check.Difference, match='^it could not be checked in more than 0 poses$'):
+        check.compared(robot, machine, ['motor'], {'motor': (0.0, 0.0)}, 0.0)
+
+
+CYLINDER = """<mujoco><compiler angle="radian"/><worldbody><body name="shin">
+  <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+  <body name="foot" pos="0 0 0.1"><joint name="pitch" axis="0 1 0" range="{ends}"/>{mass}
+    <site name="eye" pos="{eye}"/></body>
+  <body name="barrel" pos="{base}"><joint name="ball" type="ball"/>{mass}
+    <body name="rod"><joint name="ram" type="slide" axis="{way}"/>{mass}
+      <site name="end" pos="{way}"/></body></body></body></worldbody>
+  <equality><connect site1="end" site2="eye"/></equality>
+  <actuator><motor joint="ram"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize('ends, within', [('-0.4 0.5', ' within -0.4 0.5'), ('-4 4', '')])
+def test_a_cylinder_in_space_turns_a_foot(tmp_path, capsys, ends, within):
+    pytest.importorskip('mujoco')
+    file = tmp_path / 'robot.xml'
+    pivot, base, eye = np.array([[0.0, 0.0, 0.1], [-0.6, 0.3, -0.8], [-0.5, -0.1, 0.2]])
+    way = pivot + eye - base
+    file.write_text(CYLINDER.format(
+        ends=ends, base=words(base), eye=words(eye), way=words(way),
+        mass='<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'))
+    assert command.main([str(file)]) == 0
+    out, err = capsys.readouterr()
+    assert 'in 240 poses of the robot, ram from ' in err and 'Left out' not in err
+    file.with_suffix('.yaml').write_text(out)
+    (name, machine), = scene.load(str(file.with_suffix('.yaml'))).machines.items()
+    drive, = machine.inputs.values()
+    assert (name, drive.source, machine.frame_id) == ('ram_rods', 'ram', 'shin')
+    assert drive.start == pytest.approx(np.linalg.norm(way))
+    assert f'- pitch hinge ground at 0 0 0.1 axis 0 1 0{within} - ram' in ' '.join(out.split())
+    for angle in np.linspace(-0.39, 0.49, 9):
+        length = np.linalg.norm(pivot + rotation((0.0, angle, 0.0)) @ eye - base)
+        assert published(machine, ram=length - np.linalg.norm(way)) == pytest.approx({
+            'pitch': angle, 'ram': length - np.linalg.norm(way)}, abs=1e-9)
+
+
+@pytest.mark.parametrize('old, new, why', [
+    (' axis="0.1 -0.4 1.0"', ' axis="0.1 -0.4 0.9"', 'ram does not slide along the line of its '
+     'balls'),
+    ('joint="ram"', 'joint="pitch"', 'ball is a joint of type ball and no end of a rod'),
+    ('name="pitch" axis="0 1 0" range="-1 1"', 'name="pitch" type="ball"',
+     'equality0 holds foot to rod, which hangs on rods alone')])
+def test_what_rods_cannot_be_is_named(capsys, tmp_path, old, new, why):
+    pytest.importorskip('mujoco')
+    file, text = tmp_path / 'robot.xml', CYLINDER.format(
+        base='-0.6 0.3 -0.8', eye='-0.5 -0.1 0.1', way='0.1 -0.4 1.0', ends='-1 1',
+        mass='<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>')
+    assert old in text
+    file.write_text(text.replace(old, new))
+    assert refused(capsys, file).endswith(f'; as rods in space: {why}.\n')
+
+
+def test_a_file_of_mujoco_needs_no_meshes_and_no_names(tmp_path):
+    pytest.importorskip('mujoco')
+    file = tmp_path / 'robot.xml'
+    file.write_text("""<mujoco><asset><mesh name="m" file="none.obj"/><hfield name="h"
+      file="none.png" size="1 1 1 1"/><texture name="t" type="2d" file="none.png"/>
+      <material name="c" texture="t"/></asset><worldbody><geom type="hfield" hfield="h"/>
+      <body pos="1 2 3"><joint type="slide" axis="0 2 0" ref="0.5" range="0.1 0.7"/>
+      <joint axis="1 0 0"/><geom type="mesh" mesh="m" material="c"/></body>
+      <body name="free"><freejoint/></body><body name="fixed"><geom size="1"/>
+      </body></worldbody><equality><weld body1="free" body2="fixed" active="false"/></equality>
+      </mujoco>""")
+    robot = readers.read(str(file))
+    assert robot.root == 'world' and robot.frames['body1'][:3, 3].tolist() == [1.0, 2.0, 3.0]
+    assert [(joint.name, joint.kind, joint.bodies, joint.position, joint.limits)
+            for joint in robot.joints] == [
+        ('joint0', 'slide', ('world', 'body1/joint0'), 0.5, (0.1, 0.7)),
+        ('joint1', 'hinge', ('body1/joint0', 'body1'), 0.0, None),
+        ('joint2', 'free', ('world', 'free'), None, None),
+        ('fixed', 'fixed', ('world', 'fixed'), None, None)]
+    assert robot.joints[0].axes[0].tolist() == [0.0, 1.0, 0.0] and not robot.driven
+
+
+@pytest.mark.parametrize('said', ['', ' canonical_link="d"'])
+def test_a_model_of_an_sdf_stands_for_its_link(tmp_path, said):
+    file = tmp_path / 'model.sdf'
+    file.write_text(sdf(
+        f'<model name="n"{said}><model name="o"><link name="c"/></model><link name="d"/></model>',
+        pin('k', 'b', 'n'), pin('l', 'n', 'a')))
+    ends = [joint.bodies for joint in readers.read(str(file)).joints]
+    there = 'n::d' if said else 'n::o::c'
+    assert ends == [('a', 'b'), ('b', there), (there, 'a')]

@@ -1,0 +1,672 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Everything that a URDF, an SDF and an MJCF of a scene say, against the scene. No ROS."""
+
+import copy
+import math
+import sys
+from types import SimpleNamespace
+from unittest.mock import ANY
+from xml.etree import ElementTree
+
+from hypothesis import given, settings, strategies as st
+from linkage_ros import command, scene
+from linkage_ros.linkage.output_range import ground_frame
+from linkage_ros.robot_model import bodies, mjcf, rviz, sdf, urdf
+from linkage_ros.robot_model.assembled import assembled
+from linkage_ros.robot_model.command import main, show
+from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
+import numpy as np
+import pytest
+from test_simulators import model, simulated, some_quick
+from test_urdf import in_space, MACHINES, OWN, posed
+
+QUICK = ('jansen', 'slotted_lever', 'engine with zeros elsewhere', 'five_bar',
+         'boom and arm', 'Scotch yoke', 'Cardan gears', 'scissor lift', 'five-bar with a gear')
+GREY, BLUE, ORANGE = ([round(part / 255, 3) for part in colour] + [1.0] for colour in (
+    (0x8a, 0x8a, 0x8a), (0x00, 0x81, 0xc9), (0xc8, 0x78, 0x00)))
+DENSITY, WIDTHS = 1234.5, {'boom and arm': 0.06, 'slotted_lever': 0.01}
+
+
+def turned(x, y, z, roll, pitch, yaw):
+    """Return a pose as a matrix: about the fixed axes x, y and z in turn."""
+    made = np.eye(4)
+    for angle, (i, j) in zip((roll, pitch, yaw), ((1, 2), (2, 0), (0, 1))):
+        turn = np.eye(4)
+        turn[i, i] = turn[j, j] = math.cos(angle)
+        turn[j, i], turn[i, j] = math.sin(angle), -math.sin(angle)
+        made = turn @ made
+    made[:3, 3] = x, y, z
+    return made
+
+
+def numbers(text):
+    return [float(word) for word in (text or '').split()]
+
+
+def row(shape, colour, thickness, start, end):
+    """Return what is seen as numbers, whichever of its ends is first."""
+    ends = sorted([[round(value, 7) + 0.0 for value in end] for end in (start, end)])
+    return [('sphere', 'cylinder', 'box').index(shape), *colour, thickness, *ends[0], *ends[1]]
+
+
+def seen(shape, colour, sizes, pose):
+    """Return a visual in a file as numbers; a cylinder is along z, a box along x."""
+    assert shape != 'box' or sizes[1] == sizes[2]
+    thickness, length = {'sphere': lambda r: (r, 0.0), 'cylinder': lambda r, long: (r, long),
+                         'box': lambda long, wide, _: (wide, long)}[shape](*sizes)
+    along = pose[:3, 2 if shape == 'cylinder' else 0] * 0.5 * length
+    return row(shape, colour, thickness, pose[:3, 3] - along, pose[:3, 3] + along)
+
+
+class Read(SimpleNamespace):
+    """
+    What a file says.
+
+    Attributes
+    ----------
+    poses : dict
+        Of each link in space, as a matrix.
+    seen : dict
+        Of each link its visuals, in space.
+    joints : dict
+        Of each joint kind, parent, child and axis.
+    points : dict
+        Of each point its link and its place in space.
+    weights : dict
+        Of each link that has one mass, and centre and inertia, both in space.
+
+    """
+
+    def __init__(self):
+        super().__init__(poses={}, seen={}, joints={}, points={}, weights={})
+
+    def weigh(self, name, mass, place, xx, yy, zz, *others):
+        xy, xz, yz = others or (0.0, 0.0, 0.0)
+        pose = self.poses[name]
+        about = pose[:3, :3] @ [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] @ pose[:3, :3].T
+        self.weights[name] = mass, (pose @ [*place, 1.0])[:3], about
+
+    def check(self, other):
+        """Check that another file has the same links, joints and points."""
+        for what in 'poses', 'seen', 'points':
+            assert vars(self)[what].keys() == vars(other)[what].keys()
+        for name, pose in self.poses.items():
+            assert pose == pytest.approx(other.poses[name], abs=1e-9), name
+        for name, (link, place) in self.points.items():
+            assert link == other.points[name][0]
+            assert place == pytest.approx(other.points[name][1], abs=1e-9)
+        check_seen(self.seen, other.seen)
+        assert self.joints == other.joints
+
+
+def check_seen(found, wanted):
+    assert {name for name in found if found[name]} == {name for name in wanted if wanted[name]}
+    for name, rows in found.items():
+        assert np.array(sorted(rows)) == pytest.approx(np.array(sorted(wanted[name])), abs=1e-6)
+
+
+def read_urdf(text, positions):
+    """Return what a URDF says where its joints have positions."""
+    root, found = ElementTree.fromstring(text), Read()
+    assert {each.tag for each in root} == {'material', 'link', 'joint'}
+    colours = {each.get('name'): numbers(each.find('color').get('rgba'))
+               for each in root.findall('material')}
+    joints = {joint.find('child').get('link'): joint for joint in root.iter('joint')}
+    first, *links = root.findall('link')
+    poses = {first.get('name'): np.eye(4)}
+    for link in links:
+        name, joint = link.get('name'), joints[link.get('name')]
+        parent, kind = joint.find('parent').get('link'), joint.get('type')
+        pose, axis = poses[parent] @ origin(joint), None
+        if kind != 'fixed':
+            limit = joint.find('limit')
+            assert (kind == 'continuous') == (limit is None) and (limit is None or (
+                limit.get('effort'), limit.get('velocity')) == ('0', '0'))
+            kind = 'prismatic' if kind == 'prismatic' else 'revolute'
+            axis = numbers(joint.find('axis').get('xyz'))
+            moved, still = np.array(axis) * positions[joint.get('name')], (0, 0, 0)
+            pose = pose @ turned(*moved, *still) if kind == 'prismatic' else (
+                pose @ turned(*still, *moved))
+        poses[name], owner = pose, name
+        if name.endswith('_link'):
+            found.poses[name] = pose
+            found.joints[joint.get('name')] = (
+                kind, found.points.get(parent, [parent])[0], name, axis)
+        else:
+            assert joint.get('name') == f'{name}_fixed' and kind == 'fixed'
+            owner, found.points[name] = parent, (parent, pose[:3, 3])
+        for visual in link.iter('visual'):
+            shape, = visual.find('geometry')
+            sizes = numbers(' '.join(filter(None, map(shape.get, ('size', 'radius', 'length')))))
+            found.seen.setdefault(owner, []).append(seen(
+                shape.tag, colours[visual.find('material').get('name')], sizes,
+                pose @ origin(visual)))
+    return found
+
+
+def origin(element):
+    at = element.find('origin')
+    return np.eye(4) if at is None else turned(*numbers(at.get('xyz')), *numbers(at.get('rpy')))
+
+
+def read_sdf(text):
+    """Return what an SDF says, without the pins that close its loops, and these by name."""
+    root, found = ElementTree.fromstring(text)[0], Read()
+    pins = {}
+    for link in root.findall('link'):
+        name, base = link.get('name'), link.find('pose').get('relative_to')
+        pose = turned(*numbers(link.findtext('pose')))
+        found.poses[name] = pose if base == '__model__' else found.poses[base] @ pose
+        found.seen[name] = []
+        for i, visual in enumerate(link.findall('visual')):
+            assert visual.get('name') == f'{name}_{i}'
+            shape, = visual.find('geometry')
+            ambient, diffuse = (numbers(visual.findtext(f'material/{way}'))
+                                for way in ('ambient', 'diffuse'))
+            assert ambient == diffuse
+            found.seen[name].append(seen(
+                shape.tag, ambient, [value for size in shape for value in numbers(size.text)],
+                found.poses[name] @ turned(*numbers(visual.findtext('pose')))))
+        if (inertial := link.find('inertial')) is not None:
+            *place, roll, pitch, yaw = numbers(inertial.findtext('pose'))
+            assert not (roll or pitch or yaw)
+            found.weigh(name, float(inertial.findtext('mass')), place,
+                        *(float(inertial.findtext(f'inertia/i{way}'))
+                          for way in ('xx', 'yy', 'zz', 'xy')), 0.0, 0.0)
+    for frame in root.findall('frame'):
+        link = frame.get('attached_to')
+        place = (found.poses[link] @ turned(*numbers(frame.findtext('pose'))))[:3, 3]
+        found.points[frame.get('name')] = link, place
+    for joint in root.findall('joint'):
+        axis = joint.findtext('axis/xyz')
+        said = (joint.get('type'), joint.findtext('parent'), joint.findtext('child'),
+                axis and numbers(axis))
+        if said[2].endswith('_link'):
+            found.joints[joint.get('name')] = said
+        else:
+            pins.setdefault(said[2], {})[joint.get('name')] = said
+    return found, root, {name: (joints, *(vars(found)[what].pop(name)
+                                          for what in ('poses', 'seen', 'weights')))
+                         for name, joints in pins.items()}
+
+
+def read_mjcf(text):
+    """Return what an MJCF says of its bodies, and the positions of its joints."""
+    root, found, positions = ElementTree.fromstring(text), Read(), {}
+    compiler = root.find('compiler')
+    assert compiler.attrib == {'angle': 'radian', 'eulerseq': 'XYZ'}
+
+    def pose(element):
+        return turned(*numbers(element.get('pos')), *numbers(element.get('euler') or '0 0 0'))
+
+    def read(body, parent, at):
+        for child in body.findall('body'):
+            name = child.get('name')
+            found.poses[name] = there = at @ pose(child)
+            found.seen[name] = []
+            joint, moves = f'{name}_fixed', ('fixed', parent, name, None)
+            for each in child.findall('joint'):
+                joint, kind = each.get('name'), {'slide': 'prismatic', 'hinge': 'revolute'}
+                moves = kind[each.get('type')], parent, name, numbers(each.get('axis'))
+                positions[joint] = float(each.get('ref'))
+            found.joints[joint] = moves
+            for geom in child.findall('geom'):
+                shape, sizes = geom.get('type'), np.array(numbers(geom.get('size')))
+                sizes *= {'box': 2.0, 'sphere': 1.0, 'cylinder': [1.0, 2.0]}[shape]
+                found.seen[name].append(seen(
+                    shape, numbers(geom.get('rgba')), sizes, there @ pose(geom)))
+            for site in child.findall('site'):
+                found.points[site.get('name')] = name, (there @ pose(site))[:3, 3]
+            for inertial in child.findall('inertial'):
+                found.weigh(name, float(inertial.get('mass')), numbers(inertial.get('pos')),
+                            *numbers(inertial.get('fullinertia')))
+            read(child, name, there)
+
+    read(root.find('worldbody'), 'world', np.eye(4))
+    return found, root, positions
+
+
+def weight_of(rows, density):
+    """Return mass, centre and inertia of visuals in space, by the formulas of textbooks."""
+    parts = []
+    for shape, *_, r, x, y, z, u, v, w in rows:
+        start, end = np.array([x, y, z]), np.array([u, v, w])
+        long = math.dist(start, end)
+        along = (end - start) / long if long else np.zeros(3)
+        volume, own, across = [
+            (4 / 3 * math.pi * r ** 3, 2 / 5 * r ** 2, 2 / 5 * r ** 2),
+            (math.pi * r ** 2 * long, r ** 2 / 2, r ** 2 / 4 + long ** 2 / 12),
+            (r ** 2 * long, r ** 2 / 6, (r ** 2 + long ** 2) / 12)][int(shape)]
+        about = across * np.eye(3) + (own - across) * np.outer(along, along)
+        parts.append((density * volume, (start + end) / 2, about))
+    mass = sum(part for part, _, _ in parts)
+    centre = sum(part * place for part, place, _ in parts) / mass
+    return mass, centre, sum(part * (about + np.dot(place - centre, place - centre) * np.eye(3)
+                                     - np.outer(place - centre, place - centre))
+                             for part, place, about in parts)
+
+
+def check_weight(found, wanted):
+    for one, other in zip(found, wanted):
+        size = np.abs(other).max()
+        assert np.array(one) / size == pytest.approx(np.array(other) / size, abs=1e-4)
+
+
+def scene_seen(one, thetas, width):
+    """Return what is seen of the links of a scene, and the bare names of the points on them."""
+    _, places = posed(one, thetas)
+    found, points = {}, {}
+    shown = shapes(one)
+    ends = one.assembly().solution([end for shape in shown for end in (shape.start, shape.end)])
+    ends.solve(thetas.tolist())
+
+    def add(link, *visual):
+        found.setdefault(f'm_{link}_link', []).append(row(*visual))
+
+    def colour(link):
+        return ORANGE if link in one.inputs else BLUE
+
+    for prefix, leg_ends in zip(one.assembly().legs, ends.rows):
+        spots = {name[len(f'm_{prefix}'):]: in_space(one.pose, place)
+                 for name, place in places.items() if name.startswith(f'm_{prefix}')}
+        joints = {link.name: link.joint for link in one.linkage.links}
+        for link, frame in {'ground': ground_frame(one.linkage), **one.linkage.frames}.items():
+            name = link if link == 'ground' else prefix + link
+            on = [point for point in frame if point != joints.get(link)]
+            points.setdefault(f'm_{name}_link', []).extend(f'm_{prefix}{point}' for point in on)
+            for point in on or [joints[link]]:
+                add(name, 'sphere', GREY, width, spots[point], spots[point])
+            for start, end in one.linkage.bars if link != 'ground' else ():
+                if {start, end} <= set(frame):
+                    add(name, 'cylinder', colour(link), width / 2, spots[start], spots[end])
+        for shape, (start, end) in zip(shown, leg_ends.reshape(-1, 2, 2)):
+            link, slide = shape.start.link, shape.slide.name
+            look = {GUIDE: ('box', GREY, width / 2), BLOCK: ('box', colour(slide), 2.0 * width),
+                    BARREL: ('cylinder', colour(slide), 1.25 * width),
+                    ROD: ('cylinder', BLUE, width / 2)}[shape.kind]
+            drawn = (*look, in_space(one.pose, start), in_space(one.pose, end))
+            if link != 'ground' or row(*drawn) not in found['m_ground_link']:
+                add(link if link == 'ground' else prefix + link, *drawn)
+    if len(one.assembly().legs) > 1:
+        hub = in_space(one.pose, places['m_left0_' + one.linkage.links[0].joint])
+        add(one.linkage.links[0].name, 'sphere', GREY, width, hub, hub)
+    return found, points
+
+
+def bare(name):
+    return name.partition('_cut')[0]
+
+
+@pytest.mark.parametrize('name', some_quick([*MACHINES, *OWN], QUICK))
+def test_three_formats_say_what_the_scene_has(name):
+    one = simulated(name)
+    width = WIDTHS.get(name)
+    robot = bodies.robot([one], 'world', width)
+    built, width = assembled(robot, DENSITY), width or bodies.size(one) / 40
+    starts = np.array([np.clip(drive.start, *drive.sweep or (-math.inf, math.inf))
+                       for drive in one.inputs.values()])
+    positions, places = posed(one, starts)
+    tree = read_urdf(urdf.write(robot), positions)
+    wanted, points = scene_seen(one, starts, width)
+    check_seen(tree.seen, wanted)
+    for link, names in points.items():
+        assert sorted(bare(point) for point, (on, _) in tree.points.items() if on == link) == (
+            sorted(names))
+    texts = mjcf.write(built), sdf.write(built)
+    # People read it: a line for each element.
+    assert all(text.count('\n') >= text.count('/>') + text.count('</') - 1 for text in texts)
+    (loops, simulator, at), (gazebo, root, pins) = read_mjcf(texts[0]), read_sdf(texts[1])
+    loops.check(gazebo)
+    ratios = gears(one, starts)
+    check_mjcf(one, loops, simulator, starts, places, ratios)
+    check_sdf(one, gazebo, root, pins, starts, ratios, width)
+    # What runs in a yoke's slot hangs on the yoke, with a pin where the point in the slot is.
+    for prefix in one.assembly().legs:
+        for link, pin in one.linkage.yokes.items():
+            slot = f'm_{prefix}{link}_slot'
+            place = in_space(one.pose, places[f'm_{prefix}{pin}'])
+            wanted[f'{slot}_link'] = [row('sphere', GREY, width, place, place)]
+            check_seen({'': loops.seen.pop(f'{slot}_link')}, {'': wanted[f'{slot}_link']})
+            assert loops.joints.pop(slot) == (
+                'prismatic', f'm_{prefix}{link}_link', f'{slot}_link', [1.0, 0.0, 0.0])
+            on, where = loops.points.pop(f'm_{prefix}{link}_pin')
+            assert on == f'{slot}_link' and where == pytest.approx(place)
+            assert loops.poses.pop(on)[:3, 3] == pytest.approx(place) and at.pop(slot) == 0.0
+    loops.check(tree)
+    assert at == pytest.approx(positions)
+    assert gazebo.weights.keys() == wanted.keys() and loops.weights.keys() == {
+        link for link in wanted if link != 'm_ground_link'}
+    for file in loops, gazebo:
+        for link, weight in file.weights.items():
+            check_weight(weight, weight_of(wanted[link], DENSITY))
+
+
+def check_mjcf(one, loops, root, starts, places, ratios):
+    """Check all that an MJCF says but its bodies."""
+    size, links = bodies.size(one), {link.name: link for link in one.linkage.links}
+    assert (root.tag, root.get('model')) == ('mujoco', 'm')
+    leg = f'm_{next(iter(one.assembly().legs))}'
+    arms = {name: math.dist(places[leg + links[name].joint], places[leg + links[name].tip])
+            if drive.input.turns else size for name, drive in one.inputs.items()}
+    step = 1e-3 * math.sqrt(min([1.0, *arms.values()]))
+    assert [[each.tag, each.attrib] for each in root if each.tag in ('option', 'keyframe')] == [
+        ['option', {'timestep': ANY, 'integrator': 'implicitfast'}], ['keyframe', {}]]
+    assert float(root.find('option').get('timestep')) == pytest.approx(step)
+    (geom, equality), (key,) = root.find('default'), root.find('keyframe')
+    assert geom.attrib == {'contype': '0', 'conaffinity': '0'}
+    assert numbers(equality.get('solref')) == pytest.approx([2.0 * step, 1.0])
+    assert numbers(equality.get('solimp')) == [0.9999, 0.9999, 1.0]
+    assert {tuple(sorted(each.items())) for each in root.findall('equality/connect')} == {
+        (('name', cut), ('site1', met), ('site2', cut)) for cut, met in cuts(one, loops).items()}
+    assert [(joint.attrib, numbers(joint.attrib.pop('polycoef')))
+            for joint in root.findall('equality/joint')] == [
+        ({'joint1': name, 'joint2': other}, pytest.approx([0.0, ratio, 0.0, 0.0, 0.0], abs=1e-6))
+        for name, (other, ratio) in ratios.items()]
+    # A servo gives way by a thousandth [rad, or of the longest bar], and pulls ten times as much.
+    weight = 9.81 * sum(mass for mass, *_ in loops.weights.values())
+    published = [one.joints[name] for name in one.inputs]
+    assert key.get('name') == 'start' and numbers(key.get('ctrl')) == pytest.approx(
+        [joint.of(start) for joint, start in zip(published, starts)])
+    for servo, joint, arm, drive in zip(
+            root.find('actuator'), published, arms.values(), one.inputs.values()):
+        turns = drive.input.turns
+        assert (servo.tag, servo.get('name'), servo.get('joint'), servo.get('dampratio')) == (
+            'position', joint.name, joint.name, '1')
+        assert float(servo.get('kp')) == pytest.approx(weight * (
+            arm if turns else 1.0 / arm) / 1e-3)
+        most = 10.0 * weight * (arm if turns else 1.0)
+        assert numbers(servo.get('forcerange')) == pytest.approx([-most, most])
+        assert numbers(servo.get('ctrlrange')) == pytest.approx(swept(joint, drive))
+    assert len(root.find('actuator')) == len(published)
+
+
+def check_sdf(one, found, root, pins, starts, ratios, width):
+    """Check all that an SDF says but its links."""
+    assert root.get('name') == 'm'
+    closed, plugins = cuts(one, found), []
+    for cut, met in closed.items():
+        joints, pose, ball, (mass, centre, about) = pins.pop(f'{cut}_pin')
+        (link, place), (other, _) = found.points[cut], found.points[met]
+        assert joints == {f'{cut}_hinge': ('revolute', link, f'{cut}_pin', [0.0, 0.0, 1.0]),
+                          f'{cut}_closed': ('fixed', other, f'{cut}_pin', None)}
+        assert pose[:3, :3] == pytest.approx(found.poses[link][:3, :3])
+        assert pose[:3, 3] == pytest.approx(place)
+        wanted = [row('sphere', GREY, width, place, place)]
+        check_seen({cut: ball}, {cut: wanted})
+        check_weight((mass, centre, about), weight_of(wanted, DENSITY))
+        plugins.append(('detachable-joint', 'DetachableJoint', {
+            'parent_link': other, 'child_model': '__model__', 'child_link': f'{cut}_pin'}))
+    assert not pins
+    published = {joint.name: [end - joint.of(start) for end in swept(joint, drive)]
+                 for joint, drive, start in zip(map(one.joints.get, one.inputs),
+                                                one.inputs.values(), starts)}
+    plugins += [('joint-state-publisher', 'JointStatePublisher', {}), *(
+        ('joint-position-controller', 'JointPositionController',
+         {'joint_name': name, 'use_velocity_commands': 'true'}) for name in published)]
+    assert [(each.attrib, {part.tag: part.text for part in each})
+            for each in root.findall('plugin')] == [
+        ({'filename': f'gz-sim-{file}-system', 'name': f'gz::sim::systems::{name}'}, values)
+        for file, name, values in plugins]
+    for joint in root.findall('joint'):
+        name, axis = joint.get('name'), joint.find('axis')
+        mimic, limit = (None if axis is None else axis.find(tag) for tag in ('mimic', 'limit'))
+        assert (mimic is None) == (name not in ratios)
+        if mimic is not None:
+            assert mimic.get('joint') == ratios[name][0]
+            assert [(part.tag, float(part.text)) for part in mimic] == [
+                ('multiplier', pytest.approx(ratios[name][1])), ('offset', 0.0),
+                ('reference', 0.0)]
+        assert [(part.tag, float(part.text)) for part in limit or ()] == [
+            (tag, pytest.approx(end))
+            for tag, end in zip(('lower', 'upper'), published.get(name, ()))]
+
+
+def cuts(one, file):
+    """Return the points that coincide with another one, by name."""
+    yokes = {f'm_{prefix}{link}_pin': f'm_{prefix}{pin}' for prefix in one.assembly().legs
+             for link, pin in one.linkage.yokes.items()}
+    return {**{name: bare(name) for name in file.points if '_cut' in name}, **yokes}
+
+
+def gears(one, starts):
+    """Return, of joints with gears, the input and the ratio of their published changes."""
+    found = {}
+    for i, driving in enumerate(one.inputs):
+        for prefix in one.assembly().legs:
+            step = 1e-4 * (np.arange(len(starts)) == i)
+            before, after = (posed(one, starts + way * step)[0] for way in (-1.0, 1.0))
+            names = [one.joints[name].name for name in (driving, *(
+                prefix + joint for joint in one.linkage.geared))]
+            by, *moved = [math.remainder(after[name] - before[name], math.tau) for name in names]
+            found.update((name, (names[0], change / by)) for name, change in zip(names[1:], moved)
+                         if abs(change) > 1e-9)
+    return found
+
+
+def swept(joint, drive):
+    return sorted(map(joint.of, drive.sweep or ()))
+
+
+ARM = {'mechanisms': ['hand', 'arm'], 'arm.type': 'four_bar', 'hand.type': 'four_bar',
+       'hand.pose': [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]}
+
+
+@pytest.mark.parametrize('link', ['AB_link', 'B', 'B_cut'])
+def test_a_hand_on_an_arm_is_the_same_in_three_formats(link):
+    machines = scene.read({**ARM, 'hand.frame_id': f'arm_{link}'}).machines.values()
+    built = model(machines)
+    positions = {one.joints[name].name: one.joints[name].of(angle) for one in machines
+                 for name, angle in one.linkage.joint_angles(one.first.start).items()}
+    loops, root, at = read_mjcf(mjcf.write(built))
+    gazebo, robot, _ = read_sdf(sdf.write(built))
+    loops.check(gazebo)
+    loops.check(read_urdf(urdf.describe(machines, 'world'), positions))
+    assert at == pytest.approx(positions)
+    # What is fixed to the world is not weighed.
+    assert gazebo.weights.keys() - loops.weights.keys() == {'arm_ground_link'}
+    assert root.get('model') == robot.get('name') == 'linkages'
+    assert len(root.find('actuator')) == 2 and len(root.find('equality')) == 2
+
+
+def test_what_mujoco_finds_too_light_is_refused():
+    one = simulated('slotted_lever')
+    weights = read_sdf(sdf.write(model([one], density=1.0)))[0].weights
+    least = min(np.linalg.eigvalsh(about)[0] for link, (_, _, about) in weights.items()
+                if link != 'm_ground_link')
+    mjcf.write(model([one], density=1.001e-14 / least))
+    with pytest.raises(scene.SceneError, match='_link is too light for MuJoCo: give a larger '
+                       'scale, --width or --density'):
+        mjcf.write(model([one], density=0.999e-14 / least))
+
+
+YOKE = ['O ground 0 0', 'X ground 1 0', 'A crank O 1', 'C yoke A O along X', 'D block C {} 0']
+EYE = ['O ground 0 0', 'A crank O 1', 'x_crank_link rigid O A 1 1 left']
+FAR = ('m.pose, m.scale and m.dimensions must keep everything within 1e+30 m, not at {}')
+LONG = 'm.scale and m.dimensions must make the longest bar from 1e-30 to 1e+30 m long, not {}'
+
+
+@pytest.mark.parametrize('given, complaint', [
+    ({'m.pose': [0.0, 0.9e30] + [0.0] * 4}, ''),
+    ({'m.pose': [0.0, 1.1e30] + [0.0] * 4}, FAR.format('1.1e+30')),
+    ({'m.type': 'custom', 'm.joints': [line.format('0.9e30') for line in YOKE]}, ''),
+    ({'m.type': 'custom', 'm.joints': [line.format('1.1e30') for line in YOKE]},
+     LONG.format('1.1e+30')),
+    ({'m.type': 'custom', 'm.joints': ['O ground 0 0', 'A crank O 1', 'D ground 1.1e30 0']},
+     FAR.format('1.1e+30')),
+    ({'m.joint_names': ['block=m_block+1.1e30'], 'm.type': 'slider_crank'},
+     FAR.format('-1.1e+30')),
+    ({'m.scale': 0.99e30 / 120.0}, ''), ({'m.scale': 1.01e30 / 120.0}, LONG.format('1.01e+30')),
+    ({'m.scale': 1.01e-30 / 120.0}, ''), ({'m.scale': 0.99e-30 / 120.0}, LONG.format('9.9e-31')),
+    ({'frame_id': 'm_crank_link'},
+     "frame_id must differ from the links of the robot model, not be 'm_crank_link'"),
+    ({'mechanisms': ['m', 'm_x'], 'm.type': 'custom', 'm.joints': EYE, 'm_x.type': 'four_bar'},
+     'mechanisms must have other names: the robot model would have two links m_x_crank_link'),
+])
+def test_what_makes_no_model_is_refused(given, complaint):
+    found = scene.read({'mechanisms': ['m'], 'm.type': 'four_bar', **given})
+    try:
+        urdf.describe(found.machines.values(), found.frame_id)
+        assert not complaint
+    except scene.SceneError as error:
+        assert str(error) == complaint
+
+
+def test_a_linkage_in_space_makes_no_model():
+    machines = scene.load('examples/ankle.yaml').machines
+    with pytest.raises(scene.SceneError, match='^ankle is a linkage in space: pictures and robot '
+                       'models are of linkages in a plane$'):
+        model(machines.values())
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.floats(-10.0, 10.0), min_size=3, max_size=3),
+       st.lists(st.sampled_from([k * math.pi / 4.0 for k in range(-4, 5)])
+                | st.floats(-7.0, 7.0), min_size=3, max_size=3))
+def test_coordinates_of_a_pose_give_the_pose(place, angles):
+    pose = turned(*place, *angles)
+    found = bodies.coordinates(pose)
+    assert turned(*found) == pytest.approx(pose, abs=1e-8)
+    assert bodies.pose(*place, *angles) == pytest.approx(pose, abs=1e-12)
+    assert all(map(math.isfinite, found)) and abs(found[4]) <= 0.5 * math.pi + 1e-12
+
+
+def test_names_with_signs_of_xml_come_back():
+    frame, joint = """x<y> & "it's" é""", "a<b>& c'd"
+    found = scene.read({'mechanisms': ['m'], 'm.type': 'four_bar', 'm.frame_id': frame,
+                        'm.joint_names': [f'AB="{joint}"']})
+    text = urdf.describe(found.machines.values(), 'world')
+    tree = read_urdf(text, {'m_crank': 0.0, joint: 0.0, 'm_QB': 0.0})
+    assert ElementTree.fromstring(text).find('link').get('name') == frame
+    assert tree.joints['m_ground_link_fixed'][1] == frame
+    assert tree.joints[joint][:3] == ('revolute', 'm_crank_link', 'm_AB_link')
+
+
+def printed(capsys, *arguments):
+    assert main([*arguments]) == 0
+    return capsys.readouterr().out
+
+
+def test_the_command_prints_what_its_options_ask_for(tmp_path, capsys):
+    found = scene.load('config/slotted_lever.yaml')
+    file = tmp_path / 'scene.yaml'
+    file.write_text('/**:\n  ros__parameters:\n    mechanisms: [a, b]\n    a.type: four_bar\n'
+                    '    b.type: jansen\n    frame_id: base\n')
+    several = scene.load(str(file))
+    for options, machines, frame, width, density in (
+            ([], scene.read({}).machines.values(), 'world', None, 2700.0),
+            (['config/slotted_lever.yaml', '--width', '0.5', '--density', '7.8e3'],
+             found.machines.values(), found.frame_id, 0.5, 7800.0),
+            ([str(file), '--mechanism', 'b'], [several.machines['b']], 'base', None, 2700.0),
+            ([str(file), '--mechanism', 'b', 'a'], [several.machines[name] for name in 'ba'],
+             'base', None, 2700.0)):
+        robot = bodies.robot(machines, frame, width)
+        assert printed(capsys, *options, '--format', 'sdf') == (
+            sdf.write(assembled(robot, density)) + '\n')
+        assert printed(capsys, *options, '--format', 'mjcf') == (
+            mjcf.write(assembled(robot, density)) + '\n')
+        options = [word for word in options if word not in ('--density', '7.8e3')]
+        assert printed(capsys, *options) == printed(capsys, *options, '--format', 'urdf') == (
+            urdf.write(robot) + '\n')
+
+
+def test_the_command_s_help_names_its_options_units_and_defaults(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(['--help'])
+    text = ' '.join(capsys.readouterr().out.split())
+    assert end.value.code == 0
+    for fact in (
+            'usage: urdf [-h] [--mechanism NAME [NAME ...]] [--format {urdf,sdf,mjcf}] '
+            '[--width M] [--density KG/M3] [SCENE]', 'Print the robot model of a scene.',
+            "SCENE the scene's parameter file (default: the catalogue's linkages)",
+            'only these mechanisms of the scene', '(default: urdf)',
+            'thickness of a bar, with all other shapes in proportion (default: a 40th of the '
+            'longest)', 'density of all bodies of sdf and mjcf (default: 2700, aluminium)',
+            '--ros-args --params-file SCENE'):
+        assert fact in text
+
+
+@pytest.mark.parametrize('arguments, complaint', [
+    (['--density', '2700'], '--density is for sdf and mjcf only: the URDF has no masses'),
+    (['--width', '-1'], 'argument --width: must be from 1e-30 to 1e+30, not -1'),
+    (['--format', 'sdf', '--density', 'lead'],
+     'argument --density: must be from 1e-30 to 1e+30, not lead'),
+    (['--density', '2e30'], 'argument --density: must be from 1e-30 to 1e+30, not 2e30'),
+    (['--mechanism', 'leg'], "there is no mechanism 'leg'; allowed: water_drop, jansen, "),
+    (['--format', 'dae'], "argument --format: invalid choice: 'dae' (choose from "),
+    (['nowhere.yaml'], 'nowhere.yaml: No such file or directory')])
+def test_the_command_says_what_is_wrong(capsys, arguments, complaint):
+    assert main(arguments) == 1
+    result = capsys.readouterr()
+    assert not result.out and result.err.startswith(f'urdf: {complaint}')
+    assert result.err.count('\n') == 1
+
+
+def test_the_command_has_one_scene_and_says_what_reads_it(capsys, monkeypatch):
+    with pytest.raises(command.RequestError, match='^give the scene either as SCENE or with '
+                       '--ros-args, not both$'):
+        show(['config/jansen.yaml'], scene.read({}))
+    monkeypatch.setitem(sys.modules, 'yaml', None)
+    assert main(['config/jansen.yaml']) == 1
+    assert capsys.readouterr().err == (
+        'urdf: yaml is not installed: apt install python3-yaml, or pip install pyyaml\n')
+
+
+GROUP = {'Class': 'rviz_common/Group', 'Name': 'one', 'Displays': [
+    {'Class': 'rviz_default_plugins/MarkerArray', 'Topic': {'Value': '/one/markers'}}]}
+RVIZ = {'Visualization Manager': {
+    'Displays': [{'Class': 'Grid'}, GROUP, {**GROUP, 'Alpha': 1.0}, {'Class': 'Axes'}],
+    'Global Options': {}, 'Views': {'Current': {'Class': 'Orbit'}}}}
+
+
+@pytest.mark.parametrize('angles, pitch, yaw', [
+    ((math.pi / 2, 0.0, 0.0), 0.15, -math.pi / 2), ((0.0, 0.0, 0.7), 1.56, -math.pi / 2),
+    ((1.0, 0.0, 0.5), math.pi / 2 - 1.0, 0.5 - math.pi / 2),
+    ((math.pi / 2, 0.0, 2.0), 0.15, 2.0 - math.pi / 2), ((math.pi, 0.0, 0.0), 0.15, -math.pi / 2),
+    ((0.05, 0.0, 1.0), math.pi / 2 - 0.05, -math.pi / 2)])
+def test_rviz_s_camera_sees_all_of_a_scene_square_to_the_first_plane(angles, pitch, yaw):
+    machines = scene.read({
+        'mechanisms': ['m', 'n'], 'm.type': 'jansen', 'm.pose': [1.0, 2.0, 3.0, *angles],
+        'n.type': 'slider_crank', 'm.scale': 0.01, 'm.leg_pairs': 2, 'n.scale': 0.01,
+        'n.pose': [-1.0, 0.5, 0.0, 0.3, 0.2, 0.1], 'n.crank.sweep': [0.5, 2.0]}).machines
+    before = copy.deepcopy(RVIZ)
+    manager = rviz.adapted(RVIZ, machines, 'base')['Visualization Manager']
+    assert RVIZ == before
+    assert manager['Displays'] == [{'Class': 'Grid'}, *(
+        {'Class': 'rviz_common/Group', 'Name': name, 'Displays': [
+            {'Class': 'rviz_default_plugins/MarkerArray', 'Topic': {'Value': f'/{name}/markers'}}]}
+        for name in machines), {'Class': 'Axes'}]
+    view, places = manager['Views']['Current'], []
+    for one in machines.values():
+        ends = one.first.ends or (0.0, math.tau)
+        solution = one.assembly().solution(one.linkage.points)
+        for theta in np.linspace(*ends, 201):
+            solution.solve([theta])
+            for x, y in solution.rows.reshape(-1, 2):
+                # A mirrored walker is shown with both of its sides in all poses.
+                places += [in_space(one.pose, place) for place in (
+                    [(x, y), (-x, y)] if one.mirrored else [(x, y)])]
+    low, high = np.min(places, axis=0), np.max(places, axis=0)
+    focus, radius = (low + high) / 2, math.dist(low, high) / 2
+    assert [view['Focal Point'][axis] for axis in 'XYZ'] == pytest.approx(focus, abs=0.02 * radius)
+    # A view of 45 degrees, and a tenth more.
+    assert view['Distance'] * math.sin(math.pi / 8) == pytest.approx(1.1 * radius, rel=0.02)
+    assert view['Class'] == 'Orbit' and 0.0 <= view['Yaw'] < math.tau
+    assert (view['Pitch'], math.remainder(view['Yaw'] - yaw, math.tau)) == (
+        pytest.approx(pitch, abs=1e-6), pytest.approx(0.0, abs=1e-6))
+
+
+@pytest.mark.parametrize('scale, distance', [(1e-6, 1.0), (0.01, ANY)])
+def test_rviz_s_camera_sees_what_some_inputs_cannot_reach_and_what_is_tiny(scale, distance):
+    machines = scene.read({'mechanisms': ['m'], 'm.type': 'five_bar', 'm.scale': scale}).machines
+    view = rviz.adapted(RVIZ, machines, 'base')['Visualization Manager']['Views']['Current']
+    assert view['Distance'] == distance
+    assert all(map(math.isfinite, (view['Distance'], *view['Focal Point'].values())))

@@ -1,0 +1,316 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Actuators of a scene and the outputs that they move: scale, ratios, offsets, sensors and sweeps.
+
+The truth is the same linkage built at full size without a scene, its poses and their differences.
+"""
+
+import itertools
+import math
+import re
+
+from linkage_ros import mechanisms, scene
+from linkage_ros.scene.inverse_request import InverseRequest, present_inputs
+import numpy as np
+import pytest
+from truth.working_modes import five_bar
+
+BOOM = ('O ground 0 0', 'P ground x -y', 'B cylinder P O l right called boom',
+        'A rigid O B s t right')
+ARM = (*BOOM, 'C rigid O A u v left', 'D cylinder C A w left called arm', 'H rigid A D q r right')
+LENGTHS = dict(zip('xylstuvwqr', (
+    0.3, 0.3964, 1.04858, 2.4, 1.5, 1.45, 1.12156, 0.41031, 1.3, 1.66)))
+SHORT = {key: LENGTHS[key] for key in 'xylst'}
+# Type, dimensions, joint lines, parameters, outputs, and inputs at full size.
+CASES = {
+    'lever': ('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 10.0}, (), {
+        'scale': 0.25, 'crank.ratio': -0.5, 'crank.offset': 0.3, 'crank.sweep': [-2.9, 2.8],
+        'crank.start': 0.4, 'loads': ['L=3 -4', 'lever=-7']}, ('lever',), [(0.9,), (-2.2,)]),
+    'pump': ('slider_crank', {'a': 40.0, 'b': 120.0, 'c': -20.0}, (), {
+        'scale': 0.25, 'crank.ratio': 3.0, 'crank.offset': -0.2, 'loads': ['B=-3 2']},
+        ('block',), [(0.7,), (-2.0,)]),
+    'boom': ('custom', SHORT, BOOM, {
+        'scale': 4.0, 'boom.ratio': 0.5, 'boom.offset': 0.25, 'boom.sweep': [2.6, 5.6],
+        'boom.start': 3.5, 'loads': ['A=0 -9', 'OB=5']}, ('A.x',), [(3.7,), (5.1,)]),
+    'angle': ('custom', SHORT, BOOM, {
+        'scale': 4.0, 'boom.ratio': -2.0, 'boom.start': 4.0}, ('OB',), [(3.7,), (5.1,)]),
+    'pair': ('five_bar', mechanisms.defaults('five_bar'), (), {
+        'scale': 2.0, 'crank2.ratio': 0.5, 'crank2.offset': 0.3, 'crank.start': 1.9,
+        'crank2.start': 1.24, 'loads': ['P=2 -5']}, ('P.x', 'P.y'), [(1.9, 1.24), (1.7, 1.4)]),
+    'arm': ('custom', LENGTHS, ARM, {
+        'scale': 0.5, 'boom.sweep': [0.3, 0.7], 'boom.start': 0.5, 'arm.sweep': [0.4, 0.75],
+        'arm.start': 0.5, 'arm.ratio': -4.0, 'arm.offset': 1.0, 'loads': ['H=1 -8', 'OB=3']},
+        ('H.x', 'H.y'), [(0.5, 0.6), (0.62, 0.45)]),
+    'mixed': ('custom', LENGTHS, ARM, {
+        'scale': 0.5, 'boom.start': 0.5, 'boom.ratio': 2.0, 'arm.start': 0.5},
+        ('OB', 'H.y'), [(0.5, 0.6), (0.62, 0.45)]),
+}
+
+
+class Case:
+    """A mechanism of a scene, and the same linkage at full size."""
+
+    def __init__(self, name, **more):
+        type_, lengths, lines, given, self.outputs, self.inputs = CASES[name]
+        self.given, self.scale = {**given, **more}, given['scale']
+        own = {'joints': list(lines)} if lines else {}
+        self.machine = scene.read({'mechanisms': ['m'], **{
+            f'm.{key}': value for key, value in {
+                'type': type_, **own, **self.given,
+                **{f'dimensions.{key}': value for key, value in lengths.items()}}.items()
+        }}).machines['m']
+        self.linkage = mechanisms.create(type_, **own, **{
+            key: self.scale * value for key, value in lengths.items()})
+        self.drives = [*self.machine.inputs.values()]
+        self.ratios = [self.given.get(f'{key}.ratio', 1.0) for key in self.machine.inputs]
+        self.offsets = [self.given.get(f'{key}.offset', 0.0) for key in self.machine.inputs]
+
+    def at(self, inputs, outputs=()):
+        """Return outputs at inputs at full size, each a number or an array."""
+        theta = inputs if len(self.drives) > 1 else inputs[0]
+        found = {**self.linkage.joint_angles(theta), **{
+            f'{name}.{axis}': place[..., 'xy'.index(axis)]
+            for name, place in self.linkage.solve(theta).items() for axis in 'xy'}}
+        return [found[name][()] for name in outputs or self.outputs]
+
+    def jacobian(self, inputs, outputs=()):
+        """Return d output / d input, (outputs, inputs), by differences."""
+        columns = []
+        for i, drive in enumerate(self.drives):
+            step = 1e-5 * (1.0 if drive.input.turns else self.scale)
+            beside = [[*inputs[:i], inputs[i] + side * step, *inputs[i + 1:]] for side in (1, -1)]
+            high, low = (np.array(self.at(each, outputs)) for each in beside)
+            columns.append((high - low) / (2.0 * step))
+        return np.transpose(columns)
+
+    def positions(self, inputs):
+        """Return the actuators' positions at inputs."""
+        return [(value - offset) / ratio for value, ratio, offset in zip(
+            inputs, self.ratios, self.offsets)]
+
+
+@pytest.fixture(params=[(name, i) for name in CASES for i in (0, 1)],
+                ids=lambda each: f'{each[0]}{each[1]}')
+def posed(request):
+    """Return each case, inputs, the outputs there, and the solver of the inverse."""
+    name, i = request.param
+    case = Case(name)
+    inputs = case.inputs[i]
+    return case, inputs, case.at(inputs), InverseRequest(case.machine, case.outputs)
+
+
+def near(found, expected):
+    """Assert that numbers are equal up to rounding."""
+    np.testing.assert_allclose(np.array(found, float), np.array(expected, float), 1e-9, 1e-9)
+
+
+def test_the_positions_for_outputs_are_those_that_give_them_and_rates_are_slopes(posed):
+    case, inputs, values, request = posed
+    positions = case.positions(inputs)
+    near(request.positions_of(inputs), positions)
+    near(request.inputs_of(positions), inputs)
+    slopes = (case.jacobian(inputs) * case.ratios).T.ravel()
+    for shape in ((), (1,), (3,)):
+        given, beside = ([np.full(shape, each) if shape else float(each) for each in numbers]
+                         for numbers in (values, [p + 1e-3 for p in positions]))
+        for start in (beside, [np.ravel(each)[:1] if shape else each for each in beside]):
+            found, rates = request.positions(given, start)
+            assert [np.shape(each) for each in (*found, *rates)] == (
+                len(found) + len(rates)) * [shape]
+            near(np.moveaxis(found, 0, -1), np.broadcast_to(positions, (*shape, len(found))))
+            np.testing.assert_allclose(np.moveaxis(rates, 0, -1), np.broadcast_to(
+                slopes, (*shape, len(rates))), 1e-6, 1e-6)
+    found, _ = request.positions(values)
+    near(case.at(request.inputs_of(found)), values)
+
+
+def test_a_command_continues_from_the_last_inputs_at_the_speed_of_the_outputs(posed):
+    case, inputs, values, request = posed
+    speeds = [0.3, -0.7][:len(values)]
+    for jumps in (False, True):
+        command = request.command(values, speeds, [value + 1e-3 for value in inputs], jumps)
+        near(command.inputs, inputs)
+        near(command.positions, case.positions(inputs))
+        moved = case.jacobian(inputs) @ np.multiply(command.speeds, case.ratios)
+        np.testing.assert_allclose(moved, speeds, 1e-6, 1e-6)
+        assert request.command(values, None, inputs, jumps).speeds is None
+
+
+def test_all_answers_are_in_their_sweeps_the_nearest_first(posed):
+    case, inputs, values, request = posed
+    answers = request.answers(values, inputs)
+    near(answers[0].inputs, inputs)
+    sizes = [drive.input.size for drive in case.drives]
+    for start in (None, inputs, [value + 7.0 * size for value, size in zip(inputs, sizes)]):
+        own = start or [drive.start for drive in case.drives]
+        found = request.answers(values, start)
+        away = [math.hypot(*((a - b) / size for a, b, size in zip(each.inputs, own, sizes)))
+                for each in found]
+        assert away == sorted(away) and len(found) == len(answers)
+        for each in found:
+            near(case.at(each.inputs), values)
+            assert each.mode and not each.is_singular
+            for drive, value in zip(case.drives, each.inputs):
+                low, high = drive.ends or (drive.input.low, drive.input.high)
+                assert low <= value <= high or drive.ends is None and drive.input.turns
+    if len(inputs) == 1:
+        low, high = case.drives[0].ends or case.drives[0].reach[0]
+        gap = case.at([np.linspace(low, high, 2000)])[0] - values[0]
+        assert len(answers) == np.count_nonzero((gap[1:] > 0.0) != (gap[:-1] > 0.0))
+
+
+def test_efforts_do_the_work_of_the_loads(posed):
+    case, inputs, _, _ = posed
+    work = np.zeros(len(inputs))
+    for load in case.given.get('loads', ()):
+        name, _, figures = load.partition('=')
+        outputs = [f'{name}.x', f'{name}.y'] if ' ' in figures else [name]
+        work += np.array([*map(float, figures.split())]) @ case.jacobian(inputs, outputs)
+    np.testing.assert_allclose(case.machine.efforts(inputs), -work, 1e-6, 1e-7)
+
+
+@pytest.mark.parametrize('name, output', [
+    ('lever', 'lever'), ('lever', 'slide'), ('pump', 'block'), ('boom', 'OB'), ('boom', 'A.x'),
+    ('angle', 'B.y')])
+def test_a_sensor_gives_the_input_and_an_input_the_sensor(name, output):
+    case = Case(name)
+    key, = case.machine.inputs
+    case = Case(name, **{f'{key}.measures': output, f'{key}.ratio': 2.0, f'{key}.offset': 0.125})
+    drive, = case.drives
+    assert drive.source == f'm_{output}' and drive.actuator == (1.0, 0.0) and not drive.is_plain
+    for (value,), speed in itertools.product(case.inputs, (0.0, -0.6)):
+        (read,), (slope,) = case.at([value], [output]), case.jacobian([value], [output])[0]
+        position, rate = case.machine.to_source(drive, value, speed)
+        near([position], [(read - 0.125) / 2.0])
+        assert rate == pytest.approx(slope * speed / 2.0, rel=1e-6, abs=1e-9)
+        near(case.machine.from_source(drive, position, rate, value + 1e-3), [value, speed])
+        assert case.machine.from_source(drive, position, None, value)[1] is None
+        # Without the last input the start counts; another source is not known.
+        first, _ = case.machine.from_source(drive, position, None, None)
+        near(first, case.machine.from_source(drive, position, None, drive.start)[0])
+        assert present_inputs(case.machine, {drive.source: position, 'other': 9.0}) == [first]
+        assert present_inputs(case.machine, {}) == [math.inf]
+    if not case.machine.linkage.is_angle(output):
+        assert math.isnan(case.machine.from_source(drive, 1e6, 1.0, 0.0)[0])
+        assert present_inputs(case.machine, {drive.source: 1e6}) == [math.inf]
+
+
+def test_where_the_way_leads_out_of_the_sweep_one_input_jumps_into_it():
+    """A crank slider without offset has its block where it is at the opposite crank angle."""
+    block = 40.0 * math.cos(0.9) + math.sqrt(120.0 ** 2 - (40.0 * math.sin(0.9)) ** 2)
+    for sweep, near_, expected in (
+            ([0.2, 1.5], -0.5, 0.9), ([-1.5, -0.2], 0.5, -0.9), ([-1.5, 1.5], -0.5, -0.9),
+            ([-1.5, 0.9], 0.5, 0.9), ([0.9, 1.5], -0.5, 0.9), ([-0.8, 0.8], 0.5, math.nan),
+            ([5.0, 6.0], 0.5, math.tau - 0.9)):
+        machine = scene.read({'mechanisms': ['m'], 'm.type': 'slider_crank', 'm.scale': 0.5,
+                              'm.dimensions.c': 0.0, 'm.crank.sweep': sweep}).machines['m']
+        for jumps in (False, True):
+            near(InverseRequest(machine, ['block']).command(
+                [0.5 * block], None, [near_], jumps).inputs, [expected])
+        near(machine.measured('block', 0.5 * block, near_)[0], expected)
+
+
+@pytest.mark.parametrize('turn', [-1, 0])
+def test_a_sensor_s_input_continues_where_another_answer_is_nearer(turn):
+    """A slotted lever returns quickly: the slow answer is the farther one from its extreme."""
+    extreme, pin = math.acos(-80.0 / 150.0), 2.0
+    sweep = [turn * math.tau + end for end in (-1.9, 4.0)]
+    machine = scene.read({'mechanisms': ['m'], 'm.type': 'slotted_lever',
+                          'm.crank.sweep': sweep, 'm.crank.start': sweep[0]}).machines['m']
+    lever = math.atan2(80.0 * math.sin(pin - 0.7), 150.0 + 80.0 * math.cos(pin - 0.7))
+    last = turn * math.tau + extreme - 0.02
+    fast = machine.linkage.input_for('lever', lever).max() + turn * math.tau
+    assert abs(fast - last) < last - (turn * math.tau + pin - 0.7)
+    near(machine.measured('lever', lever, last)[0], turn * math.tau + pin - 0.7)
+    near(InverseRequest(machine, ['lever']).command([lever], None, [last]).inputs,
+         [turn * math.tau + pin - 0.7])
+
+
+@pytest.mark.parametrize('scale', [0.5, 4.0])
+def test_several_inputs_jump_only_if_they_may(scale):
+    foot = 0.06 + 0.12j
+    modes = [inputs for inputs, _ in five_bar(mechanisms.defaults('five_bar'), foot)]
+    start = max(modes)
+    ends = [min(inputs[0] for inputs in modes) - 0.1, start[0] - 0.1]
+    given = {'mechanisms': ['m'], 'm.type': 'five_bar', 'm.scale': scale}
+    swept = {**given, 'm.crank.sweep': ends, 'm.crank.start': ends[0]}
+    values = [scale * foot.real, scale * foot.imag]
+    for parameters in (given, swept):
+        request = InverseRequest(scene.read(parameters).machines['m'], ['P.x', 'P.y'])
+        inside = [mode for mode in modes if parameters is given or mode[0] < ends[1]]
+        expected = sorted(inside, key=lambda mode: math.dist(mode, start))
+        for jumps in (False, True):
+            found = request.command(values, [0.1, 0.0], start, jumps)
+            near(found.inputs, expected[0] if jumps or parameters is given else 2 * [math.nan])
+        near(sorted(answer.inputs for answer in request.answers(values)), sorted(inside))
+    assert inside and len(inside) < len(modes)
+
+
+@pytest.mark.parametrize('name', ['lever', 'pump', 'boom', 'angle'])
+@pytest.mark.parametrize('part', [(0.3, 0.8), (0.1, 0.4), None])
+def test_a_value_out_of_reach_is_told_the_range_or_the_input_that_it_needs(name, part):
+    case = Case(name)
+    (key, drive), = case.machine.inputs.items()
+    low, high = whole = drive.reach[0]
+    ends = part and [low + each * (high - low) for each in part]
+    case = Case(name, **{f'{key}.sweep': ends or [], f'{key}.start': ends[0] if ends else low})
+    request, output = InverseRequest(case.machine, case.outputs), case.outputs[0]
+    low, high = ends or whole
+    inputs = np.linspace(low, high, 20001)
+    values, everywhere = (case.at([each])[0] for each in (inputs, np.linspace(*whole, 20001)))
+    limit = f'{key}.sweep [{low:.6g}, {high:.6g}]' if ends else 'the reach'
+    unit = 'rad' if drive.input.turns else 'm'
+    for sign, end in ((-1.0, 'minimum'), (1.0, 'maximum')):
+        at = np.argmax(sign * values)
+        for edge in {values[at], sign * (sign * everywhere).max()}:
+            value = edge + sign * 0.01 * np.ptp(values)
+            found = request.reason(value)
+            if sign * value < (sign * everywhere).max():
+                figure, place, side = re.fullmatch(
+                    rf'(\S+) needs the {key} at (\S+) {unit}, outside {re.escape(limit)}: '
+                    r'beyond its (\w+) end', found).groups()
+                assert figure == f'{value:.6g}'
+                near_, = case.at([float(place)])
+                assert near_ == pytest.approx(value, abs=1e-4 * np.ptp(values))
+                away = {'lower': low - float(place), 'upper': float(place) - high}
+                assert away[side] > 0.0
+                # No other input that gives the value is closer to an end.
+                beyond = np.linspace(0.0, 0.999 * away[side], 999)
+                for side_inputs in (low - beyond, high + beyond):
+                    gap = sign * (case.at([side_inputs])[0] - value)
+                    assert not (gap > 0.0).any()
+                continue
+            what = 'the lever' if output == 'lever' else output
+            least, most, place, rest = re.fullmatch(
+                rf'{what} reaches \[(\S+), (\S+)\] '
+                rf'{"rad" if case.machine.linkage.is_angle(output) else "m"}, its {end} at the '
+                rf'{key} {drive.input.kind} (\S+) {unit}\b(.*)', found).groups()
+            np.testing.assert_allclose([float(least), float(most)],
+                                       [values.min(), values.max()], 1e-5)
+            assert float(place) == pytest.approx(inputs[at], abs=1e-3 * (high - low))
+            side = {0: 'lower', 20000: 'upper'}.get(at)
+            assert rest == (f', the {side} end of {limit}' if side else '')
+    assert request.reason(math.nan) == request.reason(math.inf) == 'a value must be finite'
+
+
+@pytest.mark.parametrize('far', [1e9, -1.7e308])
+@pytest.mark.parametrize('kind, outputs, size', [
+    ('slider_crank', ['block'], 0.001), ('slotted_lever', ['L.x'], 0.001),
+    ('five_bar', ['P.x', 'P.y'], 1.0)])
+def test_a_value_far_beyond_the_reach_is_refused_at_once(kind, outputs, size, far):
+    machine = scene.read({'mechanisms': ['m'], 'm.type': kind, **{
+        f'm.dimensions.{key}': size * value for key, value in mechanisms.defaults(kind).items()
+    }}).machines['m']
+    start = [1.9, 1.24][:len(outputs)]
+    found = InverseRequest(machine, outputs).command([far] * len(outputs), None, start, True)
+    assert np.isnan(found.inputs).all() and np.isnan(found.positions).all()

@@ -1,0 +1,197 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Messages are one short line, and suggest what was meant or what to install."""
+
+import enum
+import string
+
+from hypothesis import given, settings, strategies as st
+from linkage_ros import palette, scene
+from linkage_ros.command import chosen, Parser, RequestError, run
+from linkage_ros.optional import INSTALL, needs
+from linkage_ros.words import elided, listed, meant, plain_text, quoted, sentence
+import numpy as np
+import pytest
+
+ANY = st.one_of(st.text(max_size=200), st.text('ab\n\x00\u2028\ud800', max_size=300))
+
+
+@settings(max_examples=20)
+@given(ANY, st.integers(10, 100))
+def test_an_elided_text_is_its_beginning_on_one_line(text, most):
+    found = elided(text, most)
+    escaped = ''.join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    assert found.isprintable() and len(found) == min(most, len(escaped))
+    assert found == (escaped if len(escaped) <= most else escaped[:most - 3] + '...')
+    assert elided(text) == elided(text, 60)
+
+
+@settings(max_examples=20)
+@given(ANY)
+def test_a_sentence_is_one_line_of_words_of_limited_length(text):
+    found = sentence(text)
+    assert len(found) <= 4000 and found.isprintable()
+    words = text.split()
+    assert len(' '.join(words)) > 4000 or max(map(len, words), default=0) > 40 or (
+        found.split() == [elided(word, 300) for word in words])
+
+
+def test_a_sentence_keeps_words_of_up_to_299_letters():
+    assert sentence(f' {"x" * 299}\n{"y" * 300} ') == f'{"x" * 299} {"y" * 296}...'
+    assert len(sentence('ab ' * 2000)) == 4000 and sentence('ab ' * 2000).endswith('...')
+
+
+class Unwritable:
+    """A value that cannot write itself."""
+
+    def __repr__(self):
+        raise RuntimeError
+
+
+@pytest.mark.parametrize('value, text', [
+    ('a', "'a'"), (1.5, '1.5'), (None, 'None'), ([1, 'b'], "[1, 'b']"), (('x',), "('x',)"),
+    ('x' * 100, f"'{'x' * 27}...{'x' * 28}'"), ([7] * 30, f'[{"7, " * 18}7,...'),
+    pytest.param(10 ** 5000, 'a int', id='digits'), (10 ** 70, f'1{"0" * 27}...{"0" * 29}'),
+    ([[[[[1]]]]], '[[[[...]]]]'), ({'k': 2}, "{'k': 2}"), ('\n', r"'\n'")])
+def test_a_value_is_quoted_as_python_writes_it_shortened(value, text):
+    assert quoted(value) == text and len(text) <= 60
+
+
+def test_a_value_that_cannot_write_itself_is_named_by_its_class():
+    assert quoted(Unwritable()).startswith('<Unwritable instance at 0x')
+
+
+@pytest.mark.parametrize('names, text', [
+    ([], 'none'), (['a'], 'a'), (['a', 'bc'], 'a, bc'), (['x' * 40], 'x' * 27 + '...'),
+    (['x' * 28] * 2, f'{"x" * 28}, {"x" * 28}'), (['x' * 30] * 2, f'{"x" * 30}, ... (2)'),
+    ([c * 10 for c in 'abcdefg'],
+     'aaaaaaaaaa, bbbbbbbbbb, cccccccccc, dddddddddd, eeeeeeeeee, ... (7)')])
+def test_a_list_names_the_first_and_counts_all(names, text):
+    assert listed(iter(names)) == text
+    assert listed(names, 10 ** 6) == (', '.join(names) or 'none')
+
+
+@pytest.mark.parametrize('word, names, name', [
+    ('jansn', ['klann', 'jansen'], 'jansen'), ('BC', ['bc', 'BD'], 'bc'), ('x', ['jansen'], None),
+    (None, ['None'], None), ('', ['a'], None), ('abcdefghij', ['abcdefg___'], 'abcdefg___'),
+    ('abcdefghij', ['abcdef____'], None), ('x' * 70, ['x' * 60], 'x' * 60),
+    ('ab', ['abc', 'ab'], 'ab'), ('x' * 60, ['x' * 70], f'{"x" * 57}...')])
+def test_the_most_similar_name_is_meant(word, names, name):
+    assert meant(word, names) == ('' if name is None else f'; did you mean {name}?')
+
+
+def test_a_text_of_any_class_becomes_plain_and_all_else_stays():
+    kind = enum.Enum('kind', {'leg': 'jansen'}, type=str)
+    for text in (np.str_('jansen'), kind.leg, 'jansen'):
+        assert type(plain_text(text)) is str and plain_text(text) == 'jansen'
+    assert plain_text(7) == 7 and plain_text(None) is None
+
+
+def test_colours_are_hexadecimal_and_their_parts_are_of_255():
+    colours = {name: value for name, value in vars(palette).items() if name.isupper()}
+    assert len(colours) > 20
+    for value in colours.values():
+        assert value[0] == '#' and len(value) == 7 and set(value[1:]) <= set(string.hexdigits)
+        assert palette.rgb(value) == pytest.approx(
+            [part / 255 for part in bytes.fromhex(value[1:])], abs=5.1e-4)
+    # Okabe and Ito, "Color Universal Design".
+    assert [tuple(bytes.fromhex(colours[name][1:])) for name in (
+        'ORANGE', 'SKY', 'GREEN', 'BLUE', 'VERMILION', 'PURPLE')] == [
+        (230, 159, 0), (86, 180, 233), (0, 158, 115), (0, 114, 178), (213, 94, 0),
+        (204, 121, 167)]
+
+
+def a_command(error):
+    """Return a command that ends with an error."""
+    def work(arguments):
+        assert arguments == ['a', 'b']
+        raise error
+
+    return work
+
+
+@pytest.mark.parametrize('error, text', [
+    (RequestError('no\n such \x00'), r'no such \x00'),
+    (scene.SceneError('a must be b'), 'a must be b'),
+    (ImportError('x is not installed'), 'x is not installed'), (OSError('no device'), 'no device'),
+    (PermissionError(13, 'Permission denied', '/etc/x'), '/etc/x: Permission denied'),
+    (KeyboardInterrupt(), 'interrupted')])
+def test_a_command_that_fails_says_why_in_one_sentence(capsys, error, text):
+    assert run('draw', a_command(error), ['a', 'b']) == 1
+    assert capsys.readouterr() == ('', f'draw: {text}\n')
+
+
+def test_a_command_that_works_ends_with_0_and_a_mistake_is_not_hidden(capsys):
+    assert run('draw', print, ['done']) == 0
+    assert capsys.readouterr() == ("['done']\n", '')
+    with pytest.raises(ValueError):
+        run('draw', a_command(ValueError()), ['a', 'b'])
+
+
+def test_a_file_that_is_not_there_is_suggested_by_its_name(capsys, tmp_path, monkeypatch):
+    (tmp_path / 'scene.yaml').touch()
+    monkeypatch.chdir(tmp_path)
+    for folder, end in ((f'{tmp_path}/', '; did you mean scene.yaml?'), ('none/', ''),
+                        ('', '; did you mean scene.yaml?')):
+        run('draw', lambda arguments: open(*arguments), [f'{folder}scen.yaml'])
+        assert capsys.readouterr().err == (
+            f'draw: {folder}scen.yaml: No such file or directory{end}\n')
+    run('draw', a_command(PermissionError(13, 'no', 'scen.yaml')), ['a', 'b'])
+    assert capsys.readouterr().err == 'draw: scen.yaml: no\n'
+
+
+def test_a_parser_names_the_option_that_was_meant():
+    parser = Parser('draw')
+    parser.add_argument('file', nargs='?')
+    parser.add_argument('--scale')
+    assert parser.parse_args(['x', '--scale', '2']).scale == '2'
+    for arguments, text in (
+            (['x', '--skale'], 'unrecognized arguments: --skale; did you mean --scale?'),
+            (['x', '-q', 'y'], 'unrecognized arguments: -q y'),
+            (['--scale'], 'argument --scale: expected one argument')):
+        with pytest.raises(RequestError) as refused:
+            parser.parse_args(arguments)
+        assert str(refused.value) == text
+
+
+def test_machines_are_chosen_by_their_names_in_order():
+    machines = scene.read({'mechanisms': ['klann', 'watt']}).machines
+    assert [each.name for each in chosen(machines, [])] == ['klann', 'watt']
+    assert [each.name for each in chosen(machines, ['watt', 'klann'])] == ['watt', 'klann']
+    with pytest.raises(RequestError, match=r"^there is no mechanism 'wat'; allowed: klann, watt; "
+                       r'did you mean watt\?$'):
+        chosen(machines, ['klann', 'wat'])
+
+
+@pytest.mark.parametrize('package', INSTALL)
+def test_a_package_that_is_missing_or_broken_is_named_with_the_way_to_install_it(package):
+    names = {'yaml': 'pyyaml', 'PIL': 'pillow', 'llvmlite': "'llvmlite>=0.44'"}
+    with pytest.raises(ModuleNotFoundError, match=f'^{package} is not installed: ') as missing:
+        with needs(package):
+            raise ModuleNotFoundError(name=package)
+    way = ('run colcon build in the workspace' if package == 'linkage_interfaces'
+           else f'pip install {names.get(package, package)}')
+    assert way in str(missing.value) and missing.value.name == package
+    with pytest.raises(ImportError, match=rf'^{package} is installed but cannot be used '
+                       r'\(ValueError: x+\.\.\.\): ') as broken:
+        with needs(package):
+            raise ValueError('x' * 400)
+    assert way in str(broken.value) and broken.value.name == package
+    assert not isinstance(broken.value, ModuleNotFoundError)
+
+
+def test_a_package_that_another_one_needs_is_the_one_at_fault():
+    for error, fault in ((ModuleNotFoundError(name='PIL.Image'), 'PIL'),
+                         (ImportError(name='PIL._imaging'), 'PIL'),
+                         (ModuleNotFoundError(name='kiwi'), 'matplotlib')):
+        with pytest.raises(ImportError, match=f'^{fault} is installed but'):
+            with needs('matplotlib'):
+                raise error
