@@ -86,7 +86,8 @@ class InverseProblem:
         """Return the outputs, angles as directions, over one input; the others are spread."""
         inputs = spread(self.linkage.inputs, len(values))
         inputs[by] = values
-        rows = zip(self.forward.over(*inputs), self.angular, self.scales)
+        # A value repeats only where the linkage can be assembled again.
+        rows = zip(self.linkage.checked(self.outputs).over(*inputs), self.angular, self.scales)
         return np.concatenate([[np.cos(row), np.sin(row)] if angular else [row / scale]
                                for row, angular, scale in rows])
 

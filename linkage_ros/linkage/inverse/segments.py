@@ -47,6 +47,8 @@ SPECIAL, BEYOND = 1e-13, 1e-9
 # Next to an end at which its rate is infinite, a value is the end's if so many ulps of the input
 # change the output as much, up to the second [part of the output's size].
 ULPS, STEEPEST = 64.0, 1e-6
+# An end of the reach is so many ulps inside.
+INSIDE = 2.0
 # The output's error between samples [part of its range]; cells narrower than the second [rad] are
 # only divided where it jumps, by more than the third [part of its range].
 EXPLAINED, NARROW, JUMP = 1e-4, 1e-6, 0.05
@@ -119,6 +121,10 @@ class Segments:
         marks = distinct((near.value for near in near_zeros if near.gap <= NEAR * near.size),
                          counted)
         self.jumps: List[float] = []
+        # The pose at an end is there also when whole turns are added to it.
+        arcs = [(lo if counted.is_cut(lo) else lo + INSIDE * np.spacing(max(abs(lo), math.pi)),
+                 hi if counted.is_cut(hi) else hi - INSIDE * np.spacing(max(abs(hi), math.pi)))
+                for lo, hi in arcs]
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
         if not 0 < len(runs) <= MAX_RUNS * max(1.0, sum(hi - lo for lo, hi in arcs) / math.tau) \
                 or not self._moves(runs):
