@@ -13,7 +13,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, List, Optional, Sequence, Tuple
+from typing import Any, List, Optional, Sequence
 
 import numpy as np
 
@@ -83,11 +83,11 @@ def _slack(problem: InverseProblem, by: int, speeds: Sequence[Any], low: Any, hi
     return far + ULPS * (4.0 * size + abs(low) + abs(high))
 
 
-def choose_arrays(problem: InverseProblem, inputs: np.ndarray, rates: np.ndarray,
-                  near: Optional[Sequence[np.ndarray]], limits: Limits
-                  ) -> Tuple[np.ndarray, np.ndarray]:
-    """Return what `choose` does for columns of solutions (solutions, inputs, m)."""
-    n, places = problem.n, inputs.copy()
+def choose_arrays(problem: InverseProblem, solutions: np.ndarray,
+                  near: Optional[Sequence[np.ndarray]], limits: Limits) -> np.ndarray:
+    """Return what `choose` does for columns of solutions (solutions, inputs and rates, m)."""
+    n, solutions = problem.n, solutions.copy()
+    places, inputs, rates = solutions[:, :n], solutions[:, :n].copy(), solutions[:, n:]
     for by, (x, turn, ends) in enumerate(zip(places.swapaxes(0, 1), problem.turns, limits)):
         if near is not None and turn < math.inf:
             x += turn * np.rint((near[by] - x) / turn)
@@ -114,6 +114,4 @@ def choose_arrays(problem: InverseProblem, inputs: np.ndarray, rates: np.ndarray
             before |= tied & (gap < -TIE)
             tied &= np.abs(gap) <= TIE
         best = np.where(valid[k] & (before | ~valid[best, column]), k, best)
-    known = valid[best, column]
-    return (np.where(known, places[best, :, column].T, math.nan),
-            np.where(known, rates[best, :, column].T, math.nan))
+    return np.where(valid[best, column], solutions[best, :, column].T, math.nan)

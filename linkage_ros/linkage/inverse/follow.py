@@ -36,21 +36,21 @@ STEPS, SHORTEST, LONGEST = 200, 1e-10, 0.7
 
 
 def follow(problem: InverseProblem, values: Sequence[float], near: Sequence[float],
-           segments: Optional[Segments]) -> Optional[Found]:
+           source: object) -> Optional[Found]:
     """Return the solution, with the whole turns of `near`, and its rates; None if none."""
     start = problem.forward.at(*near)[:problem.n]
     if not all(map(math.isfinite, start)):
         return None
     found: Optional[Found]
-    if segments:
+    if isinstance(source, Segments):
         input_ = problem.inputs[0]
         turns = input_.turns_of(near[0])
-        way = segments.follow(values[0], start[0], (near[0] - turns) / input_.step,
+        way = source.follow(values[0], start[0], (near[0] - turns) / input_.step,
                               problem.turns[0])
         if not way:
             return None
         bracket, passed = way
-        found = refine(problem, values, (), bracket)
+        found = refine(problem, values, bracket)
         near = (turns + passed + bracket[2],)
     else:
         found, near = _followed(problem, values, near, start)

@@ -22,12 +22,13 @@ from __future__ import annotations
 
 from itertools import chain, combinations
 import math
-from typing import Callable, Iterator, List, Optional, Sequence, Set, Tuple, TYPE_CHECKING
+from typing import Callable, Iterator, List, Sequence, Set, Tuple, TYPE_CHECKING
 
 import numpy as np
 
 from .problem import InverseProblem
-from .segments import Bracket, segments_of
+from .refine import refine_inside
+from .segments import segments_of
 from ..quantities import Names
 from ...words import listed
 
@@ -91,9 +92,8 @@ class Grid:
         if not self.is_held:
             self._check_independent()
 
-    def candidates(self, values: Sequence[float]
-                   ) -> Iterator[Tuple[Tuple[float, ...], Optional[Bracket]]]:
-        """Yield inputs next to which the outputs may have some values, and their bracket."""
+    def candidates(self, values: Sequence[float]) -> Iterator[Tuple[float, ...]]:
+        """Yield inputs next to which the outputs may have some values."""
         start = [0.5 * (input_.low + input_.high) for input_ in self._inputs]
         for place, by in self._held.items():
             start[by] = values[place] / self._sizes[by]
@@ -106,16 +106,20 @@ class Grid:
                 found = np.concatenate([found[:0], *(
                     self._solutions(q, target, rows, columns) for q in found)])
         for q in found * self._sizes:
-            yield tuple(q.tolist()), None
+            yield tuple(q.tolist())
 
-    def _on_segments(self, row: int, values: Sequence[float]
-                     ) -> Iterator[Tuple[Tuple[float, ...], Bracket]]:
-        held = {by: values[place] for place, by in self._held.items()}
-        others = [held[by] for by in range(1, len(values))]
-        problem = self._problem
-        for bracket in segments_of(problem.linkage, problem.outputs[row], others).brackets(
-                values[row]):
-            yield (bracket[2], *others), bracket
+    def _on_segments(self, row: int, values: Sequence[float]) -> Iterator[Tuple[float, ...]]:
+        problem, held = self._problem, {by: values[place] for place, by in self._held.items()}
+        others, n = [held[by] for by in range(1, len(values))], len(values)
+
+        def at(x: float) -> Sequence[float]:
+            return problem.rated.at(x, *others)[row:row + n + 1:n]
+
+        for bracket in segments_of(problem.linkage, problem.outputs[row], others).candidates(
+                values[row:row + 1]):
+            if found := refine_inside(at, values[row], problem.periods[row], problem.scales[row],
+                                      problem.sizes[0], bracket):
+                yield (found[0], *others)
 
     def _missed(self, q: np.ndarray, target: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return the errors of the outputs from their target, and the Jacobian, per row of q."""

@@ -51,6 +51,8 @@ from ...words import listed, quoted
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
 
+# Arrays are solved in blocks that stay in a processor's cache, and few values as floats.
+BLOCK, FEW = 4096, 32
 # Below this margin a pose is singular, and signs are 0.
 SINGULAR = 1e-6
 
@@ -151,12 +153,10 @@ class Inverse:
         return self._n == 1 or self.closed is not None
 
     @cached_property
-    def _segments(self) -> Optional[Segments]:
-        return segments_of(self.linkage, self.outputs[0]) if self._n == 1 else None
-
-    @cached_property
-    def _source(self) -> Union[Modes, Grid]:
-        """Return what yields candidates of several inputs."""
+    def _source(self) -> Union[Segments, Modes, Grid]:
+        """Return what yields candidates."""
+        if self._n == 1:
+            return segments_of(self.linkage, self.outputs[0])
         return Modes(self._problem, self.closed) if self.closed else Grid(self._problem)
 
     def __reduce__(self) -> Tuple[Any, ...]:
@@ -254,9 +254,9 @@ class Inverse:
 
         """
         rows = _broadcast(self._each(values))
-        inputs, rates = (np.moveaxis(part, 0, -1).reshape(
-            part.shape[1], *rows[0].shape, len(part)) for part in self._all_arrays(rows))
-        return inputs, rates
+        found = self._all_arrays(rows)
+        found = np.moveaxis(found, 0, -1).reshape(len(found[0]), *rows[0].shape, len(found))
+        return found[:self._n], found[self._n:]
 
     def _all(self, values: Sequence[float]) -> List[Found]:
         """Return all solutions in order, none for values that are not finite."""
@@ -264,39 +264,37 @@ class Inverse:
             return []
         problem = self._problem
         values = problem.reduced(values)
-        candidates: Any = [((), bracket) for bracket in self._segments.brackets(
-            values[0])] if self._segments else self._source.candidates(values)
-        found = [solution for inputs, bracket in candidates
-                 if (solution := refine(problem, values, inputs, bracket))]
+        found = [solution for candidate in self._source.candidates(values)
+                 if (solution := refine(problem, values, candidate))]
         return distinct(problem, found) if len(found) > 1 else found
 
-    def _all_arrays(self, rows: Sequence[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:
-        """Return all solutions (solutions, inputs, m) in order, and rates, padded with NaN."""
-        problem, n = self._problem, self._n
-        values = problem.reduced_arrays(np.stack([row.ravel() for row in rows]))
-        count, found = values.shape[1], []
-        if self._segments:
-            for place, bracket in self._segments.bracket_arrays(values[0]):
-                part = np.full((2, 1, count), math.nan)
-                part[:, :, place] = refine_arrays(
-                    problem, values[:, place], np.empty((1, 0)), bracket)
-                found.append(part)
-            inputs, rates = (np.stack([part[k] for part in found]) if found else np.full(
-                (1, 1, count), math.nan) for k in (0, 1))
-        elif isinstance(self._source, Modes):
-            modes = self._source.candidate_arrays(values)
-            inputs, rates = (np.moveaxis(part.reshape(len(part), len(modes), count), 1, 0)
-                             for part in refine_arrays(
-                                 problem, np.tile(values, len(modes)),
-                                 np.moveaxis(modes, 0, 1).reshape(n, len(modes) * count)))
-        else:
+    def _all_arrays(self, rows: Sequence[np.ndarray]) -> np.ndarray:
+        """Return all solutions in order (solutions, inputs and rates, m), padded with NaN."""
+        values = self._problem.reduced_arrays(np.stack([row.ravel() for row in rows]))
+        blocks = [self._block(values[:, k:k + BLOCK]) for k in range(
+            0, max(values.shape[1], 1), BLOCK)]
+        most = max(map(len, blocks))
+        return np.concatenate([np.pad(block, ((0, most - len(block)), (0, 0), (0, 0)),
+                                      constant_values=math.nan) for block in blocks], axis=2)
+
+    def _block(self, values: np.ndarray) -> np.ndarray:
+        """Return all solutions for values (outputs, m), as `_all_arrays` does."""
+        problem, n, count = self._problem, self._n, values.shape[1]
+        if count <= FEW or isinstance(self._source, Grid):
             each = [self._all(column) for column in values.T.tolist()]
-            most = max(map(len, each), default=0) or 1
-            inputs, rates = (np.full((most, size, count), math.nan) for size in (n, n * n))
+            found = np.full((max(map(len, each), default=0) or 1, n + n * n, count), math.nan)
             for k, solutions in enumerate(each):
-                for i, solution in enumerate(solutions):
-                    inputs[i, :, k], rates[i, :, k] = solution
-        return distinct_arrays(problem, inputs, rates)
+                for i, (inputs, rates) in enumerate(solutions):
+                    found[i, :, k] = *inputs, *rates
+            return found
+        parts = self._source.candidate_arrays(values)
+        found = np.full((len(parts) or 1, n + n * n, count), math.nan)
+        if parts:
+            place = np.concatenate([place for place, _ in parts])
+            row = np.repeat(np.arange(len(parts)), [len(place) for place, _ in parts])
+            found[row, :, place] = refine_arrays(problem, values[:, place], np.concatenate(
+                [candidates for _, candidates in parts], axis=1)).T
+        return distinct_arrays(problem, found)
 
     # --- arguments ---
 
@@ -391,10 +389,9 @@ class Inverse:
             return cast(Tuple[Any, Any], tuple(
                 tuple(np.reshape(part, (len(alone), -1)).T.reshape(-1, *shape))
                 for part in (zip(*alone) if alone else ([], []))))
-        inputs, rates = self._all_arrays(rows[:self._n])
-        found = choose_arrays(self._problem, inputs, rates, rows[self._n:] or None, limits)
-        return cast(Tuple[Any, Any], tuple(
-            tuple(row.reshape(shape) for row in part) for part in found))
+        found = [row.reshape(shape) for row in choose_arrays(
+            self._problem, self._all_arrays(rows[:self._n]), rows[self._n:] or None, limits)]
+        return tuple(found[:self._n]), tuple(found[self._n:])
 
     def path(self, values: Sequence[ArrayLike], near: Optional[ArrayLike] = None,
              ends: Ends = None) -> Tuple[Any, Any]:
@@ -422,16 +419,15 @@ class Inverse:
             raise self._miscounted(values, 'values')
         if beside and (there := self._in_turns('path', rows, beside, limits)):
             return there
-        inputs, rates = self._all_arrays(rows)
-        found = []
-        for x, r in zip(inputs.transpose(2, 0, 1).tolist(), rates.transpose(2, 0, 1).tolist()):
-            solution = choose(problem, [(i, j) for i, j in zip(x, r) if i[0] == i[0]], beside,
+        found, n = [], self._n
+        for each in self._all_arrays(rows).transpose(2, 0, 1).tolist():
+            solution = choose(problem, [(x[:n], x[n:]) for x in each if x[0] == x[0]], beside,
                               limits)
             found.append([*solution[0], *solution[1]])
             if solution[0][0] == solution[0][0]:
                 beside = solution[0]
-        columns = np.array(found).reshape(-1, self._n + self._n ** 2).T
-        return tuple(columns[:self._n]), tuple(columns[self._n:])
+        columns = np.array(found).reshape(-1, n + n * n).T
+        return tuple(columns[:n]), tuple(columns[n:])
 
     def follow(self, values: ArrayLike, near: ArrayLike) -> Found:
         """
@@ -458,7 +454,7 @@ class Inverse:
         if known and (there := self._in_turns('follow', values, near)):
             return there
         return known and follow(self._problem, self._problem.reduced(values), near,
-                                self._segments) or (
+                                self._source) or (
             (math.nan,) * self._n, (math.nan,) * self._n ** 2)
 
     # --- the working mode ---
@@ -505,10 +501,3 @@ def _broadcast(values: Sequence[Any]) -> Sequence[np.ndarray]:
 def _sign(value: float, size: float) -> int:
     return int(np.sign(value)) if abs(value) > SINGULAR * size else 0
 
-
-def _is_above(least: float, answer: Found) -> bool:
-    return answer[0][0] >= least
-
-
-def _is_below(most: float, answer: Found) -> bool:
-    return answer[0][0] <= most

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from itertools import product
 import math
-from typing import Iterator, Sequence, Tuple
+from typing import Iterator, List, Sequence, Tuple
 
 import numpy as np
 
@@ -31,18 +31,19 @@ class Modes:
         rows = [value + turn for mode in closed.modes for turns in product(*closed.turns)
                 for value, turn in zip(mode.inputs, turns)]
         self._pose = problem.linkage.bind(Program(rows, problem.n, closed.arguments))
-        self._shape = len(rows) // problem.n, problem.n
 
-    def candidates(self, values: Sequence[float]) -> Iterator[Tuple[Tuple[float, ...], None]]:
+    def candidates(self, values: Sequence[float]) -> Iterator[Tuple[float, ...]]:
         """Yield the inputs of each mode that can be assembled."""
         flat, n = self._pose.at(*values), self._problem.n
         for start in range(0, len(flat), n):
             inputs = flat[start:start + n]
             if math.isfinite(sum(inputs)):
-                yield inputs, None
+                yield inputs
 
-    def candidate_arrays(self, values: np.ndarray) -> np.ndarray:
-        """Return the inputs of each mode for values (outputs, m), shape (modes, inputs, m)."""
-        pose = self._pose
+    def candidate_arrays(self, values: np.ndarray) -> List[Tuple[np.ndarray, np.ndarray]]:
+        """Return for each mode the places of values (outputs, m) that it has, with inputs."""
+        pose, m = self._pose, values.shape[1]
         over = pose.over if self._problem.linkage.is_accelerated else pose.searched
-        return over(*values).reshape(*self._shape, values.shape[1])
+        modes = over(*values).reshape(-1, self._problem.n, m)
+        places = [np.flatnonzero(np.isfinite(inputs).all(axis=0)) for inputs in modes]
+        return [(place, inputs[:, place]) for place, inputs in zip(places, modes)]

@@ -20,22 +20,20 @@ from __future__ import annotations
 
 from itertools import combinations
 import math
-from typing import List, Optional, Sequence, Tuple
+from typing import Callable, List, Optional, Sequence, Tuple
 
 import numpy as np
 
 from .problem import Found, InverseProblem
 from .segments import Bracket, SPECIAL, STEEPEST
 
-# Errors in units of 2^-53 of an output's size: rounding, where refinement stops; and the largest
-# of a solution, which rounding of all joints on the way may explain.
+# Errors in units of rounding (half an ulp of the output's size and of the inputs times the rates):
+# where refinement stops; and the largest of a solution, which rounding of all joints may explain.
 ROUNDED, ACCEPTED = 2.0, 64.0
-# A larger error than this part of the output's size belongs to another assembly.
-OTHER = 0.1
-# A longer step leads to another solution [rad, sizes].
-LONGEST = 0.1
-# Steps at most: bisection alone needs one per bit of a float.
-MAX_STEPS = 64
+# A larger error [sizes], or a longer step [rad, sizes], leads to another solution.
+FAR = 0.1
+# Steps at most: bisection alone needs one per bit of a float; arrays leave few after so many.
+MAX_STEPS, MAX_PASSES = 64, 4
 # Two solutions are one if they are no farther apart than SPECIAL [rad, sizes], or than this and
 # the rates say that the outputs differ by no more than SPECIAL [sizes].
 NEIGHBOURS = 1e-4
@@ -43,12 +41,18 @@ NEIGHBOURS = 1e-4
 _UNIT = 2.0 ** -53
 
 
-def refine(problem: InverseProblem, values: Sequence[float], inputs: Tuple[float, ...],
-           bracket: Optional[Bracket] = None) -> Optional[Found]:
-    """Return the solution at a candidate, with its rates; None if there is none."""
-    if bracket:
-        return _refine_inside(problem, values, inputs[1:], bracket)
-    at, n, least, found = problem.forward.at, problem.n, math.inf, None
+def refine(problem: InverseProblem, values: Sequence[float], candidate: Sequence[float]
+           ) -> Optional[Found]:
+    """
+    Return the solution at a candidate, with its rates; None if there is none.
+
+    A candidate is a `Bracket` of one input, or values of several inputs.
+    """
+    if problem.n == 1:
+        inside = refine_inside(problem.forward.at, values[0], problem.periods[0],
+                               problem.scales[0], problem.sizes[0], candidate)
+        return inside and (problem.wrapped(inside[:1]), inside[1:])
+    inputs, at, n, least, found = tuple(candidate), problem.forward.at, problem.n, math.inf, None
     for _ in range(MAX_STEPS):
         row = at(*inputs)
         gaps = [math.remainder(y - x, turn) if -math.inf < y < math.inf else math.nan
@@ -57,13 +61,13 @@ def refine(problem: InverseProblem, values: Sequence[float], inputs: Tuple[float
         if not missed < least:
             break
         least, found = missed, (inputs, row, gaps)
-        if not ROUNDED * _UNIT < missed <= OTHER:
+        if not ROUNDED * _UNIT < missed <= FAR:
             break
         step = _step(problem, gaps, row)
-        if not all([abs(x) <= LONGEST * size for x, size in zip(step, problem.sizes)]):
+        if not all([abs(x) <= FAR * size for x, size in zip(step, problem.sizes)]):
             break
         inputs = tuple([x - by for x, by in zip(inputs, step)])
-    if not found or least > OTHER:
+    if not found or least > FAR:
         return None
     inputs, row, gaps = found
     # Where rates are low, rounding is that of the outputs alone.
@@ -73,24 +77,26 @@ def refine(problem: InverseProblem, values: Sequence[float], inputs: Tuple[float
     return problem.wrapped(inputs), row[n:]
 
 
-def _refine_inside(problem: InverseProblem, values: Sequence[float], others: Sequence[float],
-                   bracket: Bracket) -> Optional[Found]:
-    """Return the solution in a bracket of the first input; the others are fixed."""
+def refine_inside(at: Callable, value: float, period: float, scale: float, size: float,
+                  bracket: Bracket) -> Optional[Tuple[float, float]]:
+    """
+    Return the input in a bracket at which an output has a value, and the rate; None if none.
+
+    `at` returns the output and its rate. Newton's method stays inside the bracket.
+    """
     low, high, x, sign = bracket
-    at, n, value, period = problem.rated.at, problem.n, values[0], problem.periods[0]
-    enough, least, best = ROUNDED * _UNIT * problem.scales[0], math.inf, math.nan
-    x = x if low <= x <= high else 0.5 * (low + high)
-    found: Sequence[float] = ()
+    x, best, least = x if low <= x <= high else 0.5 * (low + high), (math.nan, math.nan), math.inf
     for _ in range(MAX_STEPS):
-        row = at(x, *others)
-        gap, rate = row[0] - value, row[n]
+        output, rate = at(x)
+        gap = output - value
         if not -period <= 2.0 * gap <= period:
             gap = math.remainder(gap, period) if -math.inf < gap < math.inf else math.nan
+        rounding = _UNIT * (scale + abs(rate) * max(abs(x), size))
         if abs(gap) < least:
-            least, best, found = abs(gap), x, row
-            if least <= enough:
+            least, best = abs(gap), (x, rate)
+            if least <= ROUNDED * rounding:
                 break
-        elif least <= enough * (ACCEPTED / ROUNDED):
+        elif least <= ACCEPTED * rounding:
             break
         low, high = (x, high) if gap * sign < 0.0 else (low, x)
         x = x - gap / rate if rate else math.nan
@@ -99,19 +105,15 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], others: Seq
             if x in (low, high):
                 break
     # At a jump or in noise both sides enclose values that the output never has.
-    if not least <= STEEPEST * problem.scales[0]:
+    if not least <= STEEPEST * scale:
         return None
-    if not -math.inf < found[n] < math.inf:
-        found = _beside(problem, best, others) or found
-    return problem.wrapped((best, *others)), tuple(found[n:])
-
-
-def _beside(problem: InverseProblem, x: float, others: Sequence[float] = ()
-            ) -> Optional[Sequence[float]]:
-    """Return outputs and rates at the nearest float that has rates, for an end of a segment."""
-    near = (x + side * 2.0 ** k * math.ulp(x) for k in range(MAX_STEPS // 2) for side in (1, -1))
-    rows = (problem.rated.at(y, *others) for y in near)
-    return next((row for row in rows if math.isfinite(row[problem.n])), None)
+    x, rate = best
+    if not -math.inf < rate < math.inf:
+        # At an end of a segment, those of the nearest float that has rates.
+        near = (x + side * 2.0 ** k * math.ulp(x) for k in range(MAX_STEPS // 2)
+                for side in (1, -1))
+        rate = next(filter(math.isfinite, (at(y)[1] for y in near)), rate)
+    return x, rate
 
 
 def _step(problem: InverseProblem, gaps: Sequence[float], row: Sequence[float]) -> Sequence[float]:
@@ -125,58 +127,44 @@ def _step(problem: InverseProblem, gaps: Sequence[float], row: Sequence[float]) 
     return _step_arrays(problem, np.reshape(gaps, (n, 1)), np.reshape(row, (-1, 1)))[:, 0].tolist()
 
 
-def refine_arrays(problem: InverseProblem, values: np.ndarray, inputs: np.ndarray,
-                  bracket: Optional[Bracket] = None) -> Tuple[np.ndarray, np.ndarray]:
+def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.ndarray
+                  ) -> np.ndarray:
     """
-    Return what `refine` does for columns of values and of candidates.
+    Return what `refine` does for columns of values (outputs, m) and of candidates.
 
-    Both have the shape (inputs, m), those of a bracket (m,). The solutions have the shape
-    (inputs, m), their rates (inputs * outputs, m); NaN where there is none.
+    The solutions have the shape (inputs and rates, m), NaN where there is none.
     """
-    n, count = problem.n, values.shape[1]
-    found, least = np.full((2 * n + n * n, count), np.nan), np.full(count, np.inf)
-    going = np.flatnonzero(np.isfinite(inputs).all(axis=0)) if not bracket else np.arange(count)
-    if bracket:
-        low, high, seed, sign = bracket
+    n, inputs, count = problem.n, candidates.copy(), values.shape[1]
+    if n == 1:
+        low, high, seed, _ = candidates
         inputs = np.where((low <= seed) & (seed <= high), seed, 0.5 * (low + high))[None]
-    else:
-        inputs = inputs[:, going]
-    for _ in range(MAX_STEPS):
-        with np.errstate(all='ignore'):
-            rows = problem.over(*inputs)
-            gaps = _gaps(problem, rows, values[:, going])
-            error = _errors(problem, gaps, rows, inputs)
+    rows, least = np.full((n + n * n, count), np.nan), np.full(count, np.inf)
+    x, going = inputs, np.arange(count)
+    with np.errstate(all='ignore'):
+        for _ in range(MAX_PASSES):
+            new = problem.over(*x)
+            gaps = _gaps(problem, new, values[:, going])
+            error = _errors(problem, gaps, new, x)
             better = error < least[going]
             at = going[better]
-            least[at] = error[better]
-            found[:n, at], found[n:, at] = inputs[:, better], rows[:, better]
-            more = ~(error <= ROUNDED) & (
-                better | (least[going] > ACCEPTED) if bracket else better)
-            if bracket:
-                x, behind = inputs[0], gaps[0] * sign < 0.0
-                low, high = np.where(behind, x, low), np.where(behind, high, x)
-                guess, middle = x - gaps[0] / rows[1], 0.5 * (low + high)
-                inside = (low < guess) & (guess < high)
-                more &= inside | ((low < middle) & (middle < high))
-                low, high, sign = low[more], high[more], sign[more]
-                inputs = np.where(inside, guess, middle)[None, more]
-            else:
-                step = _step_arrays(problem, gaps, rows)
-                more &= (error <= OTHER / _UNIT) & (
-                    np.abs(step) <= LONGEST * np.reshape(problem.sizes, (n, 1))).all(axis=0)
-                inputs = (inputs - step)[:, more]
-        going = going[more]
-        if not len(going):
-            break
-    accepted = least <= ACCEPTED
-    if bracket:
-        with np.errstate(invalid='ignore'):
-            accepted |= np.abs(_gaps(problem, found[1:], values)[0]) <= (
-                STEEPEST * problem.scales[0])
-        for place in np.flatnonzero(accepted & ~np.isfinite(found[2])):
-            found[2, place] = (_beside(problem, float(found[0, place])) or found[1:, place])[1]
-    found[:, ~accepted] = np.nan
-    return problem.wrapped_arrays(found[:n]), found[2 * n:]
+            inputs[:, at], rows[:, at], least[at] = x[:, better], new[:, better], error[better]
+            better &= (error > ROUNDED) & (error <= FAR / _UNIT)
+            if not better.any():
+                break
+            x = x[:, better] - _step_arrays(problem, gaps[:, better], new[:, better])
+            going = going[better]
+            if n == 1:
+                x = x.clip(low[going], high[going])
+        # A part needs more steps, or rates from beside it.
+        left = ~(least <= ACCEPTED) | ~np.isfinite(rows[1]) if n == 1 else (
+            least > ACCEPTED) & (least <= FAR / _UNIT)
+        inputs[:, ~(least <= ACCEPTED)] = np.nan
+    solutions = np.concatenate([problem.wrapped_arrays(inputs), rows[n:]])
+    for k in np.flatnonzero(left).tolist():
+        found = refine(problem, values[:, k].tolist(), candidates[:, k].tolist())
+        solutions[:, k] = (*found[0], *found[1]) if found else math.nan
+    solutions[:, np.isnan(solutions[0])] = np.nan
+    return solutions
 
 
 def _gaps(problem: InverseProblem, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -241,28 +229,27 @@ def distinct(problem: InverseProblem, solutions: Sequence[Found]) -> List[Found]
     return found
 
 
-def distinct_arrays(problem: InverseProblem, inputs: np.ndarray, rates: np.ndarray
-                    ) -> Tuple[np.ndarray, np.ndarray]:
-    """Return solutions (solutions, inputs, m) in order, without those that are one of others."""
-    def ordered() -> None:
-        order = np.lexsort(np.nan_to_num(inputs, nan=np.inf).swapaxes(0, 1)[::-1], axis=0)
-        for part in (inputs, rates):
-            part[:] = np.take_along_axis(part, order[:, None], 0)
-
-    ordered()
-    count, places = len(inputs), np.arange(inputs.shape[2])
-    last = np.isfinite(inputs[:, 0]).sum(axis=0).clip(1) - 1
+def distinct_arrays(problem: InverseProblem, solutions: np.ndarray) -> np.ndarray:
+    """Return solutions (solutions, inputs and rates, m) in order, one of those that are one."""
+    n, solutions = problem.n, _ordered(problem, solutions)
+    count, places = len(solutions), np.arange(solutions.shape[2])
+    last = np.isfinite(solutions[:, 0]).sum(axis=0).clip(1) - 1
     # Of one input only neighbours can be one, a turn apart too.
     pairs = [(k, np.full_like(last, i)) for k, i in combinations(range(count), 2)
-             if problem.n > 1 or k + 1 == i] + [(0, last)] * (count > 1)
+             if n > 1 or k + 1 == i] + [(0, last)] * (count > 1)
+    again = False
     for k, i in pairs:
-        apart = np.max([problem.apart(by, inputs[k, by], inputs[i, by, places])
-                        for by in range(problem.n)], axis=0)
+        apart = np.max([problem.apart(by, solutions[k, by], solutions[i, by, places])
+                        for by in range(n)], axis=0)
         for place in np.flatnonzero((apart <= NEIGHBOURS) & (i > k)):
-            one, other = ((tuple(inputs[j, :, place].tolist()), tuple(rates[j, :, place].tolist()))
-                          for j in (k, i[place]))
+            one, other = ((tuple(x[:n]), tuple(x[n:])) for x in solutions[
+                [k, i[place]], :, place].tolist())
             if same(problem, one, other):
-                inputs[i[place], :, place] = rates[i[place], :, place] = math.nan
-    ordered()
-    most = max(int(np.isfinite(inputs[:, 0]).sum(axis=0).max(initial=0)), 1)
-    return inputs[:most], rates[:most]
+                solutions[i[place], :, place], again = math.nan, True
+    solutions = _ordered(problem, solutions) if again else solutions
+    return solutions[:max(int(np.isfinite(solutions[:, 0]).any(axis=1).sum()), 1)]
+
+
+def _ordered(problem: InverseProblem, solutions: np.ndarray) -> np.ndarray:
+    order = np.lexsort(solutions[:, :problem.n].swapaxes(0, 1)[::-1], axis=0)
+    return np.take_along_axis(solutions, order[:, None], 0)

@@ -65,9 +65,9 @@ NOISY = 1e9
 MAX_SAMPLES, MAX_RUNS = 10000, 100
 
 
-# Two inputs between which an output has a value once, a first estimate, and the sign of the rate:
-# floats or arrays, inputs in rad or m. A special input has no width.
-Bracket = Tuple[Any, Any, Any, Any]
+# Two inputs [rad or m] between which an output has a value once, a first estimate, and the sign of
+# the rate. A special input has no width.
+Bracket = Sequence[float]
 
 
 class Segment(NamedTuple):
@@ -78,7 +78,7 @@ class Segment(NamedTuple):
     ----------
     theta, value : float array (samples,)
         The input in its size, and the output times the sign of its rate; both ascend.
-    cells : float array (samples - 1, 8)
+    cells : float array (8, samples - 1)
         For an estimate between two samples: see `_estimate`.
     sign : float
         1.0 where the output rises, -1.0 where it falls.
@@ -137,22 +137,33 @@ class Segments:
         for number, other in enumerate(self._following):
             if other is not None:
                 self._preceding[other] = number
-        # What one value needs: the range in which a segment has answers, its sign, the range
-        # without its ends, and its samples.
-        rounded, units = SPECIAL * size, np.array([self._unit, self._unit, *[1.0] * 6])
-        self._rows = [(
-            float(segment.value[0] - self._slack(segment, 0, before)),
-            float(segment.value[-1] + self._slack(segment, -1, after)),
-            segment.sign, float(segment.value[0] + rounded), float(segment.value[-1] - rounded),
-            (segment.theta * self._unit).tolist(), segment.value.tolist(),
-            [*map(tuple, (segment.cells * units).tolist())])
-            for segment, before, after in zip(self.all, self._preceding, self._following)]
+        self._rows = [self._row(*each) for each in zip(self.all, self._preceding, self._following)]
+
+    def _row(self, segment: Segment, before: Optional[int], after: Optional[int]) -> Tuple:
+        """
+        Return what values need.
+
+        This is the range in which the segment has answers, its sign, and samples and cells. The
+        outer cells have no width: those of values that are answered by the end of the segment.
+        """
+        theta, value, cells, sign = segment
+        rounded, ends = SPECIAL * self._size, [0, -1]
+        low = float(value[0] - self._slack(segment, 0, before))
+        high = float(value[-1] + self._slack(segment, -1, after))
+        inner = value.clip(value[0] + rounded, value[-1] - rounded)
+        none, one = np.zeros(2), np.ones(2)
+        special = np.stack([theta[ends], none, value[ends], one, one, none, none, none])
+        cells = np.column_stack([special[:, 0], cells, special[:, 1]])
+        cells[:2] *= self._unit
+        arrays = np.pad(theta, 1, 'edge') * self._unit, np.pad(inner, 1), cells
+        return low, high, sign, arrays, tuple(part.tolist() for part in arrays[:2]), [
+            *map(tuple, cells.T.tolist())]
 
     # --- candidates ---
 
-    def brackets(self, value: float) -> List[Bracket]:
-        """Return a bracket for each input that has a value."""
-        found, period = [], self._period
+    def candidates(self, values: Sequence[float]) -> List[Bracket]:
+        """Return a bracket for each input that has the value."""
+        (value,), found, period = values, [], self._period
         for row in self._rows:
             low, high, sign = row[:3]
             target = sign * value
@@ -163,21 +174,19 @@ class Segments:
                 target += period
         return found
 
-    def bracket_arrays(self, values: np.ndarray) -> List[Tuple[np.ndarray, Bracket]]:
-        """Return for each segment the places of values (n,) that it has, and their brackets."""
-        found, period, unit = [], self._period, self._unit
-        for (low, high, sign, start, end, *_), (theta, value, cells, _) in zip(
-                self._rows, self.all):
-            target = sign * values
+    def candidate_arrays(self, values: np.ndarray) -> List[Tuple[np.ndarray, np.ndarray]]:
+        """Return for each segment the places of values (1, n) that it has, and brackets."""
+        found, period = [], self._period
+        for low, high, sign, (theta, samples, cells), *_ in self._rows:
+            target = sign * values[0]
             if period < math.inf:
                 target = target + period * np.ceil((low - target) / period)
             while len(place := np.flatnonzero((low <= target) & (target <= high))):
                 goal = target[place]
-                i = np.clip(value.searchsorted(goal, 'right') - 1, 0, len(cells) - 1)
-                ends = [goal <= start, goal >= end], [theta[0], theta[-1]]
-                lo, hi, seed = (unit * np.select(*ends, x) for x in (
-                    theta[i], theta[i + 1], _estimate(goal, *cells[i].T)))
-                found.append((place, (lo, hi, seed, np.full(len(place), sign))))
+                i = samples[1:-1].searchsorted(goal, 'right')
+                found.append((place, np.stack([
+                    theta[i], theta[i + 1], _estimate(goal, *cells[:, i]),
+                    np.full(len(place), sign)])))
                 target = target + period
         return found
 
@@ -198,17 +207,17 @@ class Segments:
         target = float(np.interp(near, theta, values))
         target += math.remainder(sign * now - target, self._period) + sign * gap
         for _ in range(2 * len(self.all)):
-            low, high, *_, inputs, samples, _ = self._rows[number]
+            low, high, *_ = row = self._rows[number]
             if low <= target <= high:
-                return _bracket(target, self._rows[number]), passed
+                return _bracket(target, row), passed
             other = (self._following if target > high else self._preceding)[number]
             if other is None:
                 break
-            ends = (-1, 0) if target > high else (0, -1)
+            (one, two), there = ((-1, 0) if target > high else (0, -1)), self.all[other]
             # The same value, or whole periods from it.
-            target += self._rows[other][6][ends[1]] - samples[ends[0]]
-            passed += turn * round((inputs[ends[0]] - self._rows[other][5][ends[1]]) / turn) \
-                if turn < math.inf else 0.0
+            target += float(there.value[two] - self.all[number].value[one])
+            gap = float(self.all[number].theta[one] - there.theta[two]) * self._unit
+            passed += turn * round(gap / turn) if turn < math.inf else 0.0
             number = other
         return None
 
@@ -403,7 +412,7 @@ def _cells(theta: np.ndarray, value: np.ndarray, rate: np.ndarray) -> np.ndarray
     slow = np.where(slow < change, slow.clip(1e-300), change.clip(1e-300))
     known = np.isfinite(fast)
     bend = np.where(known, 3.0 * change - 2.0 * slow - np.where(known, fast, 0.0), change - slow)
-    return np.column_stack([
+    return np.stack([
         np.where(start, theta[:-1], theta[1:]), np.where(start, width, -width),
         np.where(start, value[:-1], value[1:]), np.where(start, 1.0, -1.0), slow, change - slow,
         bend, change - slow - bend])
@@ -419,10 +428,6 @@ def _estimate(target: Any, start: Any, width: Any, value: Any, side: Any, slow: 
 
 
 def _bracket(target: float, row: Tuple) -> Bracket:
-    _, _, sign, start, end, theta, value, cells = row
-    if target <= start:
-        return theta[0], theta[0], theta[0], sign
-    if target >= end:
-        return theta[-1], theta[-1], theta[-1], sign
-    i = bisect_right(value, target) - 1
+    _, _, sign, _, (theta, samples), cells = row
+    i = bisect_right(samples, target, 1, len(samples) - 1) - 1
     return theta[i], theta[i + 1], _estimate(target, *cells[i]), sign
