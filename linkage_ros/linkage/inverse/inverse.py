@@ -23,6 +23,7 @@ import math
 from typing import (
     Any,
     cast,
+    Iterator,
     List,
     Mapping,
     NamedTuple,
@@ -270,12 +271,16 @@ class Inverse:
 
     def _all_arrays(self, rows: Sequence[np.ndarray]) -> np.ndarray:
         """Return all solutions in order (solutions, inputs and rates, m), padded with NaN."""
-        values = self._problem.reduced_arrays(np.stack([row.ravel() for row in rows]))
-        blocks = [self._block(values[:, k:k + BLOCK]) for k in range(
-            0, max(values.shape[1], 1), BLOCK)]
+        blocks = [*self._blocks(rows)]
         most = max(map(len, blocks))
         return np.concatenate([np.pad(block, ((0, most - len(block)), (0, 0), (0, 0)),
                                       constant_values=math.nan) for block in blocks], axis=2)
+
+    def _blocks(self, rows: Sequence[np.ndarray]) -> Iterator[np.ndarray]:
+        """Yield what `_all_arrays` returns in blocks, at least one."""
+        values = self._problem.reduced_arrays(np.stack([row.ravel() for row in rows]))
+        for k in range(0, max(values.shape[1], 1), BLOCK):
+            yield self._block(values[:, k:k + BLOCK])
 
     def _block(self, values: np.ndarray) -> np.ndarray:
         """Return all solutions for values (outputs, m), as `_all_arrays` does."""
@@ -290,10 +295,11 @@ class Inverse:
         parts = self._source.candidate_arrays(values)
         found = np.full((len(parts) or 1, n + n * n, count), math.nan)
         if parts:
-            place = np.concatenate([place for place, _ in parts])
-            row = np.repeat(np.arange(len(parts)), [len(place) for place, _ in parts])
-            found[row, :, place] = refine_arrays(problem, values[:, place], np.concatenate(
-                [candidates for _, candidates in parts], axis=1)).T
+            places, candidates = zip(*parts)
+            solved = refine_arrays(problem, values[:, np.concatenate(places)], np.concatenate(
+                candidates, axis=1))
+            for row, place in zip(found, places):
+                row[:, place], solved = solved[:, :len(place)], solved[:, len(place):]
         return distinct_arrays(problem, found)
 
     # --- arguments ---
@@ -389,8 +395,9 @@ class Inverse:
             return cast(Tuple[Any, Any], tuple(
                 tuple(np.reshape(part, (len(alone), -1)).T.reshape(-1, *shape))
                 for part in (zip(*alone) if alone else ([], []))))
-        found = [row.reshape(shape) for row in choose_arrays(
-            self._problem, self._all_arrays(rows[:self._n]), rows[self._n:] or None, limits)]
+        found = np.concatenate([choose_arrays(self._problem, block, [
+            row[k * BLOCK:(k + 1) * BLOCK] for row in rows[self._n:]] or None, limits)
+            for k, block in enumerate(self._blocks(rows[:self._n]))], axis=1).reshape(-1, *shape)
         return tuple(found[:self._n]), tuple(found[self._n:])
 
     def path(self, values: Sequence[ArrayLike], near: Optional[ArrayLike] = None,

@@ -32,8 +32,8 @@ from .segments import Bracket, SPECIAL, STEEPEST
 ROUNDED, ACCEPTED = 2.0, 64.0
 # A larger error [sizes], or a longer step [rad, sizes], leads to another solution.
 FAR = 0.1
-# Steps at most: bisection alone needs one per bit of a float; arrays leave few after so many.
-MAX_STEPS, MAX_PASSES = 64, 4
+# Steps at most: bisection alone needs one per bit of a float.
+MAX_STEPS = 64
 # Two solutions are one if they are no farther apart than SPECIAL [rad, sizes], or than this and
 # the rates say that the outputs differ by no more than SPECIAL [sizes].
 NEIGHBOURS = 1e-4
@@ -134,36 +134,35 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
 
     The solutions have the shape (inputs and rates, m), NaN where there is none.
     """
-    n, inputs, count = problem.n, candidates.copy(), values.shape[1]
-    if n == 1:
-        low, high, seed, _ = candidates
-        inputs = np.where((low <= seed) & (seed <= high), seed, 0.5 * (low + high))[None]
-    rows, least = np.full((n + n * n, count), np.nan), np.full(count, np.inf)
-    x, going = inputs, np.arange(count)
+    n, inputs = problem.n, candidates
     with np.errstate(all='ignore'):
-        for _ in range(MAX_PASSES):
-            new = problem.over(*x)
-            gaps = _gaps(problem, new, values[:, going])
-            error = _errors(problem, gaps, new, x)
-            better = error < least[going]
-            at = going[better]
-            inputs[:, at], rows[:, at], least[at] = x[:, better], new[:, better], error[better]
-            better &= (error > ROUNDED) & (error <= FAR / _UNIT)
-            if not better.any():
-                break
-            x = x[:, better] - _step_arrays(problem, gaps[:, better], new[:, better])
-            going = going[better]
-            if n == 1:
-                x = x.clip(low[going], high[going])
+        if n == 1:
+            # Estimates need a step; closed forms may be right.
+            low, high, seed, _ = candidates
+            inputs = np.where((low <= seed) & (seed <= high), seed, 0.5 * (low + high))[None]
+            rows = problem.over(*inputs)
+            inputs = np.fmin(np.fmax(
+                inputs - _step_arrays(problem, _gaps(problem, rows, values), rows), low), high)
+        rows = problem.over(*inputs)
+        gaps = _gaps(problem, rows, values)
+        error = _errors(problem, gaps, rows, inputs)
+        again = np.flatnonzero((error > ROUNDED) & (error <= FAR / _UNIT))
+        x = inputs[:, again] - _step_arrays(problem, gaps[:, again], rows[:, again])
+        new = problem.over(*x)
+        less = _errors(problem, _gaps(problem, new, values[:, again]), new, x)
+        better = less < error[again]
+        if n == 1:
+            better &= (low[again] <= x[0]) & (x[0] <= high[again])
+        again = again[better]
+        inputs[:, again], rows[:, again], error[again] = x[:, better], new[:, better], less[better]
         # A part needs more steps, or rates from beside it.
-        left = ~(least <= ACCEPTED) | ~np.isfinite(rows[1]) if n == 1 else (
-            least > ACCEPTED) & (least <= FAR / _UNIT)
-        inputs[:, ~(least <= ACCEPTED)] = np.nan
+        left = ~(error <= ACCEPTED) | ~np.isfinite(rows[1]) if n == 1 else (
+            error > ACCEPTED) & (error <= FAR / _UNIT)
     solutions = np.concatenate([problem.wrapped_arrays(inputs), rows[n:]])
+    solutions[:, ~(error <= ACCEPTED)] = np.nan
     for k in np.flatnonzero(left).tolist():
         found = refine(problem, values[:, k].tolist(), candidates[:, k].tolist())
         solutions[:, k] = (*found[0], *found[1]) if found else math.nan
-    solutions[:, np.isnan(solutions[0])] = np.nan
     return solutions
 
 
@@ -193,6 +192,8 @@ def _errors(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray,
 def _step_arrays(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Return what `_step` does for columns."""
     n = problem.n
+    if n == 1:
+        return gaps / rows[1]
     if n == 2:
         a, b, c, d = rows[2:]
         return np.stack([gaps[0] * d - gaps[1] * c, gaps[1] * a - gaps[0] * b]) / (a * d - b * c)
