@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from ..mechanism import Mechanism
 
 # Arrays are solved in blocks that stay in a processor's cache, and few values as floats.
-BLOCK, FEW = 4096, 32
+BLOCK, FEW = 8192, 32
 # Below this margin a pose is singular, and signs are 0.
 SINGULAR = 1e-6
 
@@ -298,8 +298,12 @@ class Inverse:
             places, candidates = zip(*parts)
             solved = refine_arrays(problem, values[:, np.concatenate(places)], np.concatenate(
                 candidates, axis=1))
-            for row, place in zip(found, places):
-                row[:, place], solved = solved[:, :len(place)], solved[:, len(place):]
+            filled = np.zeros(count, int)
+            for place in places:
+                found[filled[place], :, place] = solved[:, :len(place)].T
+                filled[place] += 1
+                solved = solved[:, len(place):]
+            found = found[:max(filled.max(initial=0), 1)]
         return distinct_arrays(problem, found)
 
     # --- arguments ---
@@ -395,9 +399,10 @@ class Inverse:
             return cast(Tuple[Any, Any], tuple(
                 tuple(np.reshape(part, (len(alone), -1)).T.reshape(-1, *shape))
                 for part in (zip(*alone) if alone else ([], []))))
-        found = np.concatenate([choose_arrays(self._problem, block, [
+        chosen = np.concatenate([choose_arrays(self._problem, block, [
             row[k * BLOCK:(k + 1) * BLOCK] for row in rows[self._n:]] or None, limits)
-            for k, block in enumerate(self._blocks(rows[:self._n]))], axis=1).reshape(-1, *shape)
+            for k, block in enumerate(self._blocks(rows[:self._n]))], axis=1)
+        found = [row.reshape(shape) for row in chosen]
         return tuple(found[:self._n]), tuple(found[self._n:])
 
     def path(self, values: Sequence[ArrayLike], near: Optional[ArrayLike] = None,

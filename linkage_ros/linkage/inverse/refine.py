@@ -252,5 +252,8 @@ def distinct_arrays(problem: InverseProblem, solutions: np.ndarray) -> np.ndarra
 
 
 def _ordered(problem: InverseProblem, solutions: np.ndarray) -> np.ndarray:
+    first = np.where(np.isnan(solutions[:, 0]), np.inf, solutions[:, 0])
+    if problem.n == 1 and (first[1:] >= first[:-1]).all():
+        return solutions
     order = np.lexsort(solutions[:, :problem.n].swapaxes(0, 1)[::-1], axis=0)
     return np.take_along_axis(solutions, order[:, None], 0)
