@@ -12,7 +12,7 @@
 
 from __future__ import annotations
 
-from typing import Callable, Iterable, List, Sequence, TYPE_CHECKING
+from typing import Callable, Iterable, List, Optional, Sequence, TYPE_CHECKING
 
 import numpy as np
 
@@ -41,11 +41,16 @@ def distinct(values: Iterable[float], input_: Input) -> List[float]:
 
 
 class Analysis:
-    """Motion of a linkage with its first input; the other inputs are fixed."""
+    """
+    Motion of a linkage with its first input; the other inputs are fixed.
 
-    def __init__(self, linkage: Mechanism, others: Sequence[float] = ()):
+    `first` is the first input over a part of its period, by default over all of it.
+    """
+
+    def __init__(self, linkage: Mechanism, others: Sequence[float] = (),
+                 first: Optional[Input] = None):
         self._linkage, self._others = linkage, tuple(others)
-        self._first = linkage.inputs[0]
+        self._first = first or linkage.inputs[0]
 
     # From here on the first input is in units of its step.
 
@@ -61,9 +66,12 @@ class Analysis:
 
     def reach(self) -> List[Arc]:
         """Return the reach in arcs, none of them on both sides of an end of a turn."""
-        size = self._first.step
-        return [part for lo, hi in self._linkage.reach(*self._others)
-                for part in self._first.counted().within(lo / size, hi / size)]
+        size, first = self._first.step, self._first.counted()
+        arcs = [(lo / size, hi / size) for lo, hi in self._linkage.reach(*self._others)]
+        if self._first.turn < self._linkage.inputs[0].turn:
+            arcs = [(max(lo, first.low), min(hi, first.high)) for lo, hi in arcs
+                    if lo < first.high and hi > first.low]
+        return [part for arc in arcs for part in first.within(*arc)]
 
     def curve(self, kind: str, name: object) -> Callable:
         """Return the function from the first input to numbers, and each one's rate by it."""
@@ -87,4 +95,5 @@ class Analysis:
                 self.curve('closures', ()), arc, self._first.counted(), rounding,
                 np.array([x in folds for x in closures]))]
 
-        return self._linkage.cache.get_or_make(('near zeros', *self._others), find)
+        return self._linkage.cache.get_or_make(
+            ('near zeros', self._first.period, *self._others), find)

@@ -157,7 +157,7 @@ class Inverse:
     def _source(self) -> Union[Segments, Modes, Grid]:
         """Return what yields candidates."""
         if self._n == 1:
-            return segments_of(self.linkage, self.outputs[0])
+            return segments_of(self.linkage, self.outputs[0], (), self.inputs[0])
         return Modes(self._problem, self.closed) if self.closed else Grid(self._problem)
 
     def __reduce__(self) -> Tuple[Any, ...]:

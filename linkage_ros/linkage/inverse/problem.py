@@ -79,7 +79,8 @@ class InverseProblem:
             return input_
         rates = [self.linkage.gear(name, by)[0] for name in self.linkage.geared_to(by)]
         periods = (1.0, *(1.0 / abs(rate) for rate in rates if rate))
-        return next((each for each in (input_._replace(period=period) for period in periods)
+        return next((each for each in (input_._replace(
+            period=period, low=-math.pi * period, high=math.pi * period) for period in periods)
                      if each.wraps and is_periodic(partial(self._outputs_over, by), each)), input_)
 
     def _outputs_over(self, by: int, values: np.ndarray) -> np.ndarray:

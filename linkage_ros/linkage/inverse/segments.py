@@ -17,7 +17,6 @@ of them the output has each value of its range once; docs/accuracy.md has the ru
 
 from __future__ import annotations
 
-from bisect import bisect_right
 import math
 from typing import (
     Any,
@@ -132,14 +131,14 @@ class Segments:
         self.all = [segment for run in runs for segment in self._monotone(*run)]
         self.all.sort(key=lambda segment: float(segment.theta[0]))
         turn = counted.turn if counted.wraps else math.inf
-        self._following = [self._continued(segment, turn) for segment in self.all]
-        self._preceding: List[Optional[int]] = [None] * len(self.all)
-        for number, other in enumerate(self._following):
-            if other is not None:
-                self._preceding[other] = number
-        self._rows = [self._row(*each) for each in zip(self.all, self._preceding, self._following)]
+        # The segment, if any, on which the output goes on after the last input of each.
+        following = [self._continues(*pair, turn) for pair in zip(
+            self.all, self.all[1:] + self.all[:1])]
+        self._preceding = following[-1:] + following[:-1]
+        self._following = following
+        self._rows = [self._row(*each) for each in zip(self.all, *self._slack())]
 
-    def _row(self, segment: Segment, before: Optional[int], after: Optional[int]) -> Tuple:
+    def _row(self, segment: Segment, below: float, above: float) -> Tuple:
         """
         Return what values need.
 
@@ -148,16 +147,13 @@ class Segments:
         """
         theta, value, cells, sign = segment
         rounded, ends = SPECIAL * self._size, [0, -1]
-        low = float(value[0] - self._slack(segment, 0, before))
-        high = float(value[-1] + self._slack(segment, -1, after))
-        inner = value.clip(value[0] + rounded, value[-1] - rounded)
         none, one = np.zeros(2), np.ones(2)
         special = np.stack([theta[ends], none, value[ends], one, one, none, none, none])
         cells = np.column_stack([special[:, 0], cells, special[:, 1]])
         cells[:2] *= self._unit
-        arrays = np.pad(theta, 1, 'edge') * self._unit, np.pad(inner, 1), cells
-        return low, high, sign, arrays, tuple(part.tolist() for part in arrays[:2]), [
-            *map(tuple, cells.T.tolist())]
+        return (float(value[0] - below), float(value[-1] + above), sign,
+                np.concatenate([theta[:1], theta, theta[-1:]]) * self._unit,
+                value.clip(value[0] + rounded, value[-1] - rounded), cells)
 
     # --- candidates ---
 
@@ -179,13 +175,13 @@ class Segments:
         found, period = [], self._period
         # They are searched faster in order.
         order = values[0].argsort()
-        for low, high, sign, (theta, samples, cells), *_ in self._rows:
+        for low, high, sign, theta, samples, cells in self._rows:
             target = sign * values[0, order]
             if period < math.inf:
                 target = target + period * np.ceil((low - target) / period)
             while len(inside := np.flatnonzero((low <= target) & (target <= high))):
                 goal = target[inside]
-                i = samples[1:-1].searchsorted(goal, 'right')
+                i = samples.searchsorted(goal, 'right')
                 found.append((order[inside], np.stack([
                     theta[i], theta[i + 1], _estimate(goal, *cells.take(i, axis=1)),
                     np.full(len(i), sign)])))
@@ -212,10 +208,11 @@ class Segments:
             low, high, *_ = row = self._rows[number]
             if low <= target <= high:
                 return _bracket(target, row), passed
-            other = (self._following if target > high else self._preceding)[number]
-            if other is None:
+            if not (self._following if target > high else self._preceding)[number]:
                 break
-            (one, two), there = ((-1, 0) if target > high else (0, -1)), self.all[other]
+            one, two, other = (-1, 0, number + 1) if target > high else (0, -1, number - 1)
+            other %= len(self.all)
+            there = self.all[other]
             # The same value, or whole periods from it.
             target += float(there.value[two] - self.all[number].value[one])
             gap = float(self.all[number].theta[one] - there.theta[two]) * self._unit
@@ -346,41 +343,43 @@ class Segments:
             yield Segment(theta[part], values, _cells(theta[part], values, sign * rate[part]),
                           sign)
 
-    def _slack(self, segment: Segment, end: int, other: Optional[int]) -> float:
-        """Return how far beyond an end of a segment values are that end's."""
-        if other is not None:
-            there = self.all[other]
-            return SPECIAL * self._size + abs(float(self._difference(
-                there.value[-1 - end] - segment.value[end])))
-        # An end is a float, too: next to it the output may change quickly.
-        x, inside = segment.theta[end], segment.theta[-1 - end] - segment.theta[end]
-        beside = x + np.copysign(ULPS * np.spacing(max(abs(x), 1.0)), inside)
-        step = abs(self._difference(float(self._curve(np.array([beside]))[0, 0])
-                                    - segment.sign * segment.value[end]))
-        return float(np.fmin(max(BEYOND * self._size, step), STEEPEST * self._size))
+    def _slack(self) -> List[np.ndarray]:
+        """Return how far below and above each segment values are those of its ends."""
+        found: List[np.ndarray] = []
+        for end, goes_on, side in ((0, self._preceding, -1), (-1, self._following, 1)):
+            x, other, value, sign, there = np.array([
+                (segment.theta[end], segment.theta[-1 - end], segment.value[end], segment.sign,
+                 self.all[(i + side) % len(self.all)].value[-1 - end])
+                for i, segment in enumerate(self.all)]).reshape(-1, 5).T
+            # An end is a float, too: next to it the output may change quickly.
+            beside = x + np.copysign(ULPS * np.spacing(np.maximum(abs(x), 1.0)), other - x)
+            change = np.abs(self._difference(self._curve(beside)[0] - sign * value))
+            found.append(np.where(
+                goes_on, SPECIAL * self._size + np.abs(self._difference(there - value)),
+                np.fmin(np.fmax(change, BEYOND * self._size), STEEPEST * self._size)))
+        return found
 
-    def _continued(self, segment: Segment, turn: float) -> Optional[int]:
-        """Return the number of the segment on which the output goes on after the last input."""
-        for number, other in enumerate(self.all):
-            apart = other.theta[0] - segment.theta[-1]
-            if turn < math.inf:
-                apart -= turn * round(apart / turn)
-            if other.sign == segment.sign and abs(apart) <= SPECIAL and abs(self._difference(
-                    other.value[0] - segment.value[-1])) <= BEYOND * self._size:
-                return number
-        return None
+    def _continues(self, segment: Segment, other: Segment, turn: float) -> bool:
+        """Return whether the output goes on from a segment to the next one."""
+        apart = float(other.theta[0] - segment.theta[-1])
+        return other.sign == segment.sign and abs(
+            math.remainder(apart, turn)) <= SPECIAL and bool(abs(self._difference(
+                other.value[0] - segment.value[-1])) <= BEYOND * self._size)
 
 
-def segments_of(linkage: Mechanism, output: str, others: Sequence[float] = ()) -> Segments:
-    """Return the segments of an output over the first input; the others are fixed."""
+def segments_of(linkage: Mechanism, output: str, others: Sequence[float] = (),
+                first: Optional[Input] = None) -> Segments:
+    """Return the segments of an output over the first input; see `Analysis`."""
+    first = first or linkage.inputs[0]
+
     def make() -> Segments:
-        analysis, first = Analysis(linkage, others), linkage.inputs[0]
+        analysis = Analysis(linkage, others, first)
         period = math.inf if not linkage.is_angle(output) else (
             math.tau if output != first.name else first.turn if first.wraps else math.inf)
         return Segments(analysis.curve('output', output), analysis.reach(), analysis.near_zeros(),
                         first, period, 1.0 if linkage.is_angle(output) else linkage.longest)
 
-    return linkage.cache.get_or_make(('segments', output, *others), make)
+    return linkage.cache.get_or_make(('segments', output, first.period, *others), make)
 
 
 def extremes_of(linkage: Mechanism, output: str, arcs: Optional[Sequence[Arc]],
@@ -430,6 +429,6 @@ def _estimate(target: Any, start: Any, width: Any, value: Any, side: Any, slow: 
 
 
 def _bracket(target: float, row: Tuple) -> Bracket:
-    _, _, sign, _, (theta, samples), cells = row
-    i = bisect_right(samples, target, 1, len(samples) - 1) - 1
-    return theta[i], theta[i + 1], _estimate(target, *cells[i]), sign
+    _, _, sign, theta, samples, cells = row
+    i = samples.searchsorted(target, 'right')
+    return (*theta[i:i + 2].tolist(), _estimate(target, *cells[:, i].tolist()), sign)
