@@ -254,6 +254,8 @@ class Segments:
         """Yield samples as inputs, values, rates and noise, cut where the output jumps."""
         theta = np.concatenate([sampled(*arc) for arc in _cut([(lo, hi)], marks)])
         theta = ascending(theta)
+        if len(theta) < 2:
+            return
         known = np.isfinite(self._curve(theta[[0, -1]])[0])
         if not known.all():
             # The last input inside: an end may be rounded, or an arm without length at it.
