@@ -177,7 +177,8 @@ def _error(output, x, value):
     reached, *beside = output.at(np.array([x, x + step, x - step])).tolist()
     # What an ulp of the input changes, on the side where there is a pose; and what 64 do.
     change = np.nanmax([0.0, *output.away(beside, reached)]) / 4.0
-    far = output.at(np.array([x + 32.0 * step, x - 32.0 * step]))
+    far = 64.0 * np.spacing(max(abs(x), first.size))
+    far = output.at(np.array([x + far, x - far]))
     return float(output.away(reached, value)) / (2.0 ** -53 * output.size + change), reached, min(
         1e-6 * output.size, 2.0 * np.nanmax([0.0, *output.away(far, reached)]))
 

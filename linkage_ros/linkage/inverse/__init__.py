@@ -15,5 +15,8 @@ from .inverse import Inverse, Solution
 from .linkage import InverseLinkage, Mode
 from .segments import extremes_of, Segments, segments_of
 
-__all__ = ['CLOSE', 'extremes_of', 'Inverse', 'InverseLinkage', 'Mode', 'Segments', 'segments_of',
-           'Solution']
+# The former name of a solution; deprecated.
+Answer = Solution
+
+__all__ = ['Answer', 'CLOSE', 'extremes_of', 'Inverse', 'InverseLinkage', 'Mode', 'Segments',
+           'segments_of', 'Solution']

@@ -22,11 +22,11 @@ from __future__ import annotations
 
 from itertools import chain, combinations
 import math
-from typing import Callable, Iterator, List, Sequence, Set, Tuple, TYPE_CHECKING
+from typing import Callable, Iterator, List, Sequence, Set, Tuple, TYPE_CHECKING, Union
 
 import numpy as np
 
-from .problem import InverseProblem
+from .problem import Found, InverseProblem
 from .refine import refine_inside
 from .segments import segments_of
 from ..quantities import Names
@@ -92,8 +92,8 @@ class Grid:
         if not self.is_held:
             self._check_independent()
 
-    def candidates(self, values: Sequence[float]) -> Iterator[Tuple[float, ...]]:
-        """Yield inputs next to which the outputs may have some values."""
+    def candidates(self, values: Sequence[float]) -> Iterator[Union[Found, Tuple[float, ...]]]:
+        """Yield inputs next to which the outputs may have some values, or solutions."""
         start = [0.5 * (input_.low + input_.high) for input_ in self._inputs]
         for place, by in self._held.items():
             start[by] = values[place] / self._sizes[by]
@@ -108,7 +108,7 @@ class Grid:
         for q in found * self._sizes:
             yield tuple(q.tolist())
 
-    def _on_segments(self, row: int, values: Sequence[float]) -> Iterator[Tuple[float, ...]]:
+    def _on_segments(self, row: int, values: Sequence[float]) -> Iterator[Found]:
         problem, held = self._problem, {by: values[place] for place, by in self._held.items()}
         others, n = [held[by] for by in range(1, len(values))], len(values)
 
@@ -119,7 +119,7 @@ class Grid:
                 values[row:row + 1]):
             if found := refine_inside(at, values[row], problem.periods[row], problem.scales[row],
                                       problem.sizes[0], bracket):
-                yield (found[0], *others)
+                yield (found[0], *others), tuple(problem.rated.at(found[0], *others)[n:])
 
     def _missed(self, q: np.ndarray, target: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return the errors of the outputs from their target, and the Jacobian, per row of q."""

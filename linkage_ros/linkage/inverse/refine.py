@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from itertools import combinations
 import math
-from typing import Callable, List, Optional, Sequence, Tuple
+from typing import Any, Callable, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -41,18 +41,25 @@ NEIGHBOURS = 1e-4
 _UNIT = 2.0 ** -53
 
 
-def refine(problem: InverseProblem, values: Sequence[float], candidate: Sequence[float]
+def refine(problem: InverseProblem, values: Sequence[float], candidate: Sequence[Any]
            ) -> Optional[Found]:
     """
     Return the solution at a candidate, with its rates; None if there is none.
 
-    A candidate is a `Bracket` of one input, or values of several inputs.
+    A candidate is a `Bracket` of one input, values of several inputs, or a solution.
     """
+    if isinstance(candidate[0], tuple):
+        return problem.wrapped(candidate[0]), candidate[1]
     if problem.n == 1:
         inside = refine_inside(problem.forward.at, values[0], problem.periods[0],
                                problem.scales[0], problem.sizes[0], candidate)
         return inside and (problem.wrapped(inside[:1]), inside[1:])
     inputs, at, n, least, found = tuple(candidate), problem.forward.at, problem.n, math.inf, None
+    if not math.isfinite(sum(at(*inputs)[:n])):
+        # Rounding may have led out of the reach.
+        near = ((*inputs[:by], inputs[by] + ulps * math.ulp(inputs[by]), *inputs[by + 1:])
+                for ulps in (2.0, -2.0, 16.0, -16.0) for by in range(n))
+        inputs = next((x for x in near if math.isfinite(sum(at(*x)[:n]))), inputs)
     for _ in range(MAX_STEPS):
         row = at(*inputs)
         gaps = [math.remainder(y - x, turn) if -math.inf < y < math.inf else math.nan
@@ -156,8 +163,8 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
         again = again[better]
         inputs[:, again], rows[:, again], error[again] = x[:, better], new[:, better], less[better]
         # A part needs more steps, or rates from beside it.
-        left = ~(error <= ACCEPTED) | ~np.isfinite(rows[1]) if n == 1 else (
-            error > ACCEPTED) & (error <= FAR / _UNIT)
+        left = ~(error <= ACCEPTED) | ~np.isfinite(rows[1]) if n == 1 else ~(
+            (error <= ACCEPTED) | (error > FAR / _UNIT))
     solutions = np.concatenate([problem.wrapped_arrays(inputs), rows[n:]])
     solutions[:, ~(error <= ACCEPTED)] = np.nan
     for k in np.flatnonzero(left).tolist():
