@@ -205,9 +205,8 @@ def _step_arrays(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray) ->
         a, b, c, d = rows[2:]
         return np.stack([gaps[0] * d - gaps[1] * c, gaps[1] * a - gaps[0] * b]) / (a * d - b * c)
     jacobian = rows[n:].reshape(n, n, rows.shape[1]).T
-    jacobian[~np.isfinite(jacobian).all(axis=(1, 2))] = np.eye(n)
-    singular = np.linalg.det(jacobian) == 0.0
-    jacobian[singular] = np.inf * np.eye(n)
+    with np.errstate(all='ignore'):
+        jacobian[~(np.abs(np.linalg.det(jacobian)) > 0.0)] = np.nan
     return np.linalg.solve(jacobian, gaps.T[..., None])[..., 0].T
 
 

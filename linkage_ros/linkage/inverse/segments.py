@@ -33,7 +33,7 @@ from typing import (
 import numpy as np
 
 from ..analysis import Analysis, distinct
-from ..curves import ascending, extremes, refined, sampled, turns
+from ..curves import ascending, extremes, LEAST, refined, sampled, turns
 from ..dead_points import NEAR, NearZero
 from ..inputs import Arc, Input
 
@@ -46,7 +46,7 @@ SPECIAL, BEYOND = 1e-13, 1e-9
 # Next to an end at which its rate is infinite, a value is the end's if so many ulps of the input
 # change the output as much, up to the second [part of the output's size].
 ULPS, STEEPEST = 64.0, 1e-6
-# An end of the reach is so many ulps inside.
+# An end of the reach is answered by an input so many ulps inside.
 INSIDE = 2.0
 # The output's error between samples [part of its range]; cells narrower than the second [rad] are
 # only divided where it jumps, by more than the third [part of its range].
@@ -120,10 +120,7 @@ class Segments:
         marks = distinct((near.value for near in near_zeros if near.gap <= NEAR * near.size),
                          counted)
         self.jumps: List[float] = []
-        # The pose at an end is there also when whole turns are added to it.
-        arcs = [(lo if counted.is_cut(lo) else lo + INSIDE * np.spacing(max(abs(lo), math.pi)),
-                 hi if counted.is_cut(hi) else hi - INSIDE * np.spacing(max(abs(hi), math.pi)))
-                for lo, hi in arcs]
+        self._ends = {end for arc in arcs for end in arc if not counted.is_cut(end)}
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
         if not 0 < len(runs) <= MAX_RUNS * max(1.0, sum(hi - lo for lo, hi in arcs) / math.tau) \
                 or not self._moves(runs):
@@ -147,12 +144,15 @@ class Segments:
         """
         theta, value, cells, sign = segment
         rounded, ends = SPECIAL * self._size, [0, -1]
+        # At an end of the reach there is a pose also when whole turns are added.
+        start, end = (x + side * INSIDE * math.ulp(max(abs(x), math.pi)) * (x in self._ends)
+                      for x, side in zip(theta[ends].tolist(), (1.0, -1.0)))
         none, one = np.zeros(2), np.ones(2)
-        special = np.stack([theta[ends], none, value[ends], one, one, none, none, none])
+        special = np.stack([(start, end), none, value[ends], one, one, none, none, none])
         cells = np.column_stack([special[:, 0], cells, special[:, 1]])
         cells[:2] *= self._unit
         return (float(value[0] - below), float(value[-1] + above), sign,
-                np.concatenate([theta[:1], theta, theta[-1:]]) * self._unit,
+                np.array([start, *theta.clip(start, end), end]) * self._unit,
                 value.clip(value[0] + rounded, value[-1] - rounded), cells)
 
     # --- candidates ---
@@ -262,6 +262,7 @@ class Segments:
             inside, _ = refined(lambda x: np.isfinite(self._curve(x.ravel())[0]).reshape(
                 x.shape), theta[[1, -2]], theta[[0, -1]])
             theta[[0, -1]] = np.where(known, theta[[0, -1]], inside)
+            self._ends.update(inside)
         most = MAX_SAMPLES + 4 * len(theta)
         theta, jumped = self._divided(theta, most)
         if len(theta) > most:
@@ -330,6 +331,7 @@ class Segments:
             rising = rate[places] >= 0.0
             at, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
                 x.shape) == rising[:, None], theta[places], theta[places + 1])
+        at = np.where(np.abs(at) < LEAST, 0.0, at)
         found = self._curve(at)[0] if len(at) else at
         # An extreme may be the one input at which an arm has no length and no direction.
         at = np.where(np.isfinite(found), at, theta[places])
