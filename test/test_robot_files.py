@@ -542,8 +542,8 @@ def test_a_long_comment_costs_no_more_than_its_letters(tmp_path, long):
 @given(st.lists(st.text(max_size=40), min_size=4, max_size=4), st.sampled_from([1, 100]))
 @example(['\x9b2J'] * 4, 1)
 @example(['\x1b]0;title\x07'] * 4, 1)
-@example(['x', '', 'x y ', 'x'], 600)
-@settings(database=None, print_blob=True, deadline=None, max_examples=3)
+@example(['x', '', 'x y ', 'x'], 1500)
+@settings(max_examples=3)
 def test_a_name_of_the_file_is_never_more_than_text_in_the_terminal(more, times):
     text = (ROBOTS / 'four_bar.urdf').read_text()
     names = ('coupler', 'rocker', 'elbow', 'motor')
