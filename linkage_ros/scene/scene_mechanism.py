@@ -132,10 +132,10 @@ class SceneMechanism:
         """
         drive, own, unit = self.first, self.scale_of(self.first.input.name), self.scale_of(output)
         ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
-        inverse = self.linkage.inverse(output)
-        (found,), (rate,) = inverse.follow((value / unit,), (near / own,))
+        inverse, values, seed = self.linkage.inverse(output), (value / unit,), (near / own,)
+        (found,), (rate,) = inverse.follow(values, seed)
         if not (ends[0] <= found <= ends[1] if ends else found == found):
-            (found,), (rate,) = inverse.nearest((value / unit,), (near / own,), (ends,))
+            (found,), (rate,) = inverse.nearest(values, seed, (ends,))
         return found * own, rate * unit / own
 
     def from_source(self, drive: InputSettings, position: float, speed: Optional[float],
