@@ -52,8 +52,7 @@ TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
 JOINTS = Field('string_array', 'The linkage, one line per joint.', readers=ALL, read_only=True)
 TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', readers=ALL,
                read_only=True)
-DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', positive=True,
-                  readers=ALL)
+DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', readers=ALL)
 BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1, readers=ALL)
 SCALE = Field('double', 'Factor of every length.', positive=True, readers=ALL)
 LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
