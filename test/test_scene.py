@@ -443,6 +443,12 @@ def test_a_slider_goes_nearly_as_far_as_a_crank_can_turn():
     assert 2.0 <= low < 2.2 and 5.8 < high <= 6.0
 
 
+def test_the_slider_of_a_length_that_nothing_limits_changes_it_by_nine_times_itself():
+    _, sliders = lengths(SIGNED)
+    ends, = [ends for name, _, ends in sliders if name.endswith('.v')]
+    assert ends == pytest.approx((-3.0, 2.4), abs=0.06)
+
+
 ACTUATED = {**OWN, 'own.dimensions.h': 0.0, 'own.dimensions.c': 2.0, 'own.joints': [
     'O ground 0 0', 'P ground 1 h', 'B cylinder P O 1.5 left', 'C crank O c called tilt']}
 INPUT_KEYS = {
