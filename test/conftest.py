@@ -17,10 +17,14 @@ import math
 import os
 
 from domains import Domain
+from hypothesis import settings
 import pytest
 
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+# A failure prints how to repeat it; a run depends on no earlier one.
+settings.register_profile('repeatable', database=None, print_blob=True, deadline=None)
+settings.load_profile('repeatable')
 # Of whatever a test starts that is not told another.
 _domain = Domain()
 atexit.register(_domain.release)
@@ -66,7 +70,10 @@ def machines(request):
 @pytest.fixture(scope='module')
 def library(request, machines, tmp_path_factory):
     """Return the C library of all of them."""
-    return request.module.compiled(tmp_path_factory.mktemp('c'), [*machines.values()])
+    from c_libraries import shared
+
+    with shared(tmp_path_factory, request.module.__name__) as folder:
+        return request.module.compiled(folder, [*machines.values()])
 
 
 @pytest.fixture
