@@ -38,18 +38,18 @@ def choose(problem: InverseProblem, solutions: Sequence[Found], near: Optional[S
     input, the least at which the output increases, else the least; of several, the one with the
     least first input. An input beyond an end by rounding of the outputs is at the end.
     """
-    best, sizes, n = None, problem.sizes, problem.n
+    best, sizes, n, limited = None, problem.sizes, problem.n, any(limits)
     chosen: Found = (math.nan,) * n, (math.nan,) * (n * n)
     for inputs, rates in solutions:
         places = inputs if near is None else problem.beside(inputs, near)
-        if any(limits):
+        if limited:
             places = tuple([_inside(problem, by, place, rates, ends, near is None) if ends
                             else place for by, (place, ends) in enumerate(zip(places, limits))])
             if any([x != x for x in places]):
                 continue
         order = [rates[0] < 0.0 and n == 1, *[x / size for x, size in zip(inputs, sizes)]] \
-            if near is None else [math.sqrt(sum([
-                ((x - y) / size) ** 2 for x, y, size in zip(places, near, sizes)]))]
+            if near is None else [math.hypot(*[
+                (x - y) / size for x, y, size in zip(places, near, sizes)])]
         if best is None or _before(order, best):
             best, chosen = order, (places, rates)
     return chosen
@@ -57,7 +57,10 @@ def choose(problem: InverseProblem, solutions: Sequence[Found], near: Optional[S
 
 def _before(order: Sequence[float], other: Sequence[float]) -> bool:
     """Return whether numbers precede others in lexicographic order; rounding is a tie."""
-    return next((x < y for x, y in zip(order, other) if abs(x - y) > TIE), False)
+    for x, y in zip(order, other):
+        if abs(x - y) > TIE:
+            return x < y
+    return False
 
 
 def _inside(problem: InverseProblem, by: int, place: float, rates: Sequence[float],
