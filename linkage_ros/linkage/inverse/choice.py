@@ -45,7 +45,7 @@ def choose(problem: InverseProblem, solutions: Sequence[Found], near: Optional[S
         if limited:
             places = tuple([_inside(problem, by, place, rates, ends, near is None) if ends
                             else place for by, (place, ends) in enumerate(zip(places, limits))])
-            if any([x != x for x in places]):
+            if not math.isfinite(sum(places)):
                 continue
         order = [rates[0] < 0.0 and n == 1, *[x / size for x, size in zip(inputs, sizes)]] \
             if near is None else [math.hypot(*[

@@ -46,7 +46,7 @@ def follow(problem: InverseProblem, values: Sequence[float], near: Sequence[floa
         input_ = problem.inputs[0]
         turns = input_.turns_of(near[0])
         way = source.follow(values[0], start[0], (near[0] - turns) / input_.step,
-                              problem.turns[0])
+                            problem.turns[0])
         if not way:
             return None
         bracket, passed = way

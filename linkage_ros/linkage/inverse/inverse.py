@@ -512,4 +512,3 @@ def _broadcast(values: Sequence[Any]) -> Sequence[np.ndarray]:
 
 def _sign(value: float, size: float) -> int:
     return int(np.sign(value)) if abs(value) > SINGULAR * size else 0
-

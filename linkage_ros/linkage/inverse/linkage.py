@@ -469,4 +469,3 @@ def _constant(value: complex) -> Complex:
     exact = [0.0 if abs(part) < 1e-16 else math.copysign(1.0, part)
              if abs(abs(part) - 1.0) < 1e-16 else part for part in (value.real, value.imag)]
     return Complex(*exact)
-

@@ -71,7 +71,7 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Sequence
         if not ROUNDED * _UNIT < missed <= FAR:
             break
         step = _step(problem, gaps, row)
-        if not all([abs(x) <= FAR * size for x, size in zip(step, problem.sizes)]):
+        if not sum([abs(x) / size for x, size in zip(step, problem.sizes)]) <= FAR:
             break
         inputs = tuple([x - by for x, by in zip(inputs, step)])
     if not found or least > FAR:
@@ -231,7 +231,7 @@ def distinct(problem: InverseProblem, solutions: Sequence[Found]) -> List[Found]
     for solution in sorted(solutions):
         # Of one input only neighbours can be one, a turn apart too.
         beside = found if problem.n > 1 else found[-1:] + found[:1]
-        if not any([same(problem, solution, other) for other in beside]):
+        if not any(same(problem, solution, other) for other in beside):
             found.append(solution)
     return found
 

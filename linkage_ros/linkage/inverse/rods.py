@@ -47,4 +47,3 @@ def taken_apart(linkage: Mechanism, outputs: Names) -> Optional[InverseLinkage]:
                               modes, ((0.0,),) * n, {})
     except ValueError:
         return None
-
