@@ -93,12 +93,13 @@ def refine_inside(at: Callable, value: float, period: float, scale: float, size:
     """
     low, high, x, sign = bracket
     x, best, least = x if low <= x <= high else 0.5 * (low + high), (math.nan, math.nan), math.inf
+    most = STEEPEST / ACCEPTED * scale
     for _ in range(MAX_STEPS):
         output, rate = at(x)
         gap = output - value
         if not -period <= 2.0 * gap <= period:
             gap = math.remainder(gap, period) if -math.inf < gap < math.inf else math.nan
-        rounding = _UNIT * (scale + abs(rate) * max(abs(x), size))
+        rounding = min(_UNIT * (scale + abs(rate) * max(abs(x), size)), most)
         if abs(gap) < least:
             least, best = abs(gap), (x, rate)
             if least <= ROUNDED * rounding:
