@@ -405,6 +405,15 @@ def test_the_ends_of_every_slider_are_whole_stops(given):
     assert len(numbers) > 3
 
 
+@pytest.mark.parametrize('ratio', [-2.0, 1.0])
+def test_the_sliders_of_ratio_and_offset_move_an_input(ratio):
+    made = scene.read({**SIGNED, 'own.crank.ratio': ratio})
+    found = {p.name: slider.ends(made, p) for p in made.parameters
+             if p.name in ('own.crank.ratio', 'own.crank.offset')}
+    assert found['own.crank.ratio'] == pytest.approx(sorted((0.1 * ratio, 10.1 * ratio)), abs=0.2)
+    assert found['own.crank.offset'] == pytest.approx((-math.pi, math.pi), abs=0.1)
+
+
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('given, stops', [
     *((given, 3) for given in (*map(TYPES.get, ('water_drop', 'peaucellier', 'slotted_lever')),
