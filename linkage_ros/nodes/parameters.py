@@ -77,8 +77,8 @@ class SceneParameters:
             node.undeclare_parameter(name)
         self._declare(own)
         # The scene that a change leads to, what differs in it, and why it is refused.
-        self._next, self._difference, self._refusal = self.scene, [], ''
-        self._is_read = False
+        self._next, self._refusal, self._is_read = self.scene, '', False
+        self._difference: list[scenes.Parameter] = []
         node.add_pre_set_parameters_callback(self._read)
         node.add_on_set_parameters_callback(self._answer)
         node.add_post_set_parameters_callback(self._adopt)
@@ -167,8 +167,9 @@ class SceneParameters:
                 if one.name in values else one for one in parameters] + self._derived(values)
 
     def _unknown(self, name: str) -> str:
-        there = f'; set it on {scenes.OWNER}' if name in self.followed else ''
-        return f'{elided(name)} is not a parameter of {self._node.get_fully_qualified_name()}{there}'
+        owner = f'; set it on {scenes.OWNER}' if name in self.followed else ''
+        node = self._node.get_fully_qualified_name()
+        return f'{elided(name)} is not a parameter of {node}{owner}'
 
     def _prepare(self, values: Mapping[str, Any], strict: bool) -> None:
         """Read the scene with changed values; raise SceneError if it is refused."""

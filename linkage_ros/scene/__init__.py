@@ -43,9 +43,9 @@ from .scene_mechanism import FRAME, FRAME_NAME, FRAME_RULE, read_machine, SceneM
 from .. import mechanisms
 from ..words import plain_text, quoted
 
-__all__ = ['changed', 'InputSettings', 'DRIVER', 'FARTHEST', 'in_words', 'INVERSE', 'KINEMATICS',
-           'load', 'SceneMechanism', 'OWNER', 'Parameter', 'plain', 'read', 'Scene', 'SceneError',
-           'START']
+__all__ = ['changed', 'InputSettings', 'DRIVER', 'FARTHEST', 'Field', 'in_words', 'INVERSE',
+           'KINEMATICS', 'load', 'SceneMechanism', 'OWNER', 'Parameter', 'plain', 'read', 'Scene',
+           'SceneError', 'START']
 
 _NAME = re.compile(r'(?=.{1,64}$)[A-Za-z](_?[A-Za-z0-9])*')
 
