@@ -104,15 +104,17 @@ class Follower:
         """Adopt what waits, together or else by mechanism; return the reasons of refusals."""
         present = self._present(self._waiting)
         waiting = {name: value for name, value in self._waiting.items() if value != present[name]}
-        self._waiting, reasons = {}, []
-        if waiting and self._parameters.follow(waiting):
-            for mechanism in sorted({name.partition('.')[0] for name in waiting}):
-                own = {name: value for name, value in waiting.items()
-                       if name.partition('.')[0] == mechanism}
-                if reason := self._parameters.follow(own):
-                    self._waiting.update(own)
-                    reasons.append(reason)
-        return reasons
+        parts: Dict[str, Dict[str, Any]] = {}
+        for name, value in waiting.items():
+            parts.setdefault(name.partition('.')[0], {})[name] = value
+        self._waiting = waiting
+        if not waiting or not self._parameters.follow(waiting):
+            parts = {}
+        refused = {mechanism: reason for mechanism, part in parts.items()
+                   if (reason := self._parameters.follow(part))}
+        self._waiting = {name: value for mechanism in refused
+                         for name, value in parts[mechanism].items()}
+        return [*refused.values()]
 
     def _present(self, names: Iterable[str]) -> Dict[str, Any]:
         """Return this node's values of all parameters of the mechanisms that names begin with."""
