@@ -95,9 +95,13 @@ def test_the_workflow_runs_what_has_to_be_green():
     workflow = (ROOT / '.github/workflows/ci.yml').read_text()
     jobs = yaml.safe_load(workflow)['jobs']
     steps = [step['run'] for job in jobs.values() for step in job['steps'] if 'run' in step]
-    assert set().union(*map(made, steps)) == made((ROOT / '.ci/run').read_text())
-    assert set(jobs['test']['strategy']['matrix']['distro']) == {
-        file.stem for file in (ROOT / 'wheels').glob('*.txt') if 'ros-rclpy' in file.read_text()}
+    # The nodes without llvmlite are its alone.
+    assert set().union(*map(made, steps)) == made(
+        (ROOT / '.ci/run').read_text()) - {'ready'} | {'nodes'}
+    for job in ('test', 'long'):
+        assert set(jobs[job]['strategy']['matrix']['distro']) == {
+            file.stem for file in (ROOT / 'wheels').glob('*.txt')
+            if 'ros-rclpy' in file.read_text()}
 
 
 def test_both_manifests_say_where_the_repository_is():

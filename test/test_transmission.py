@@ -27,7 +27,7 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-from c_libraries import loaded, ROS, STAND_IN, STRICT
+from c_libraries import loaded, ROS, shared, STAND_IN, STRICT
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import command, header, transmission
 from linkage_ros.c_code.axes import actuators, joints
@@ -238,7 +238,8 @@ def choosing(tmp_path_factory):
         code += header.written(machine, joints=[
             each if each == 'wheel' else f'm{i}_{each}' for each in names])
         code += CALLER.format(name=f'm{i}')
-    return loaded(tmp_path_factory.mktemp('choosing'), code)
+    with shared(tmp_path_factory, 'choosing') as folder:
+        return loaded(folder, code)
 
 
 @pytest.mark.parametrize('i', range(len(CHOICES)))
