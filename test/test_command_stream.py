@@ -179,7 +179,7 @@ def test_names_that_somebody_makes_up_do_not_fill_the_log(stream, capfd):
     for number in range(60):
         stream.want(['flap', f'wing{number}'], [flap(0.2), 1.0])
     said = [line for line in capfd.readouterr().err.splitlines() if 'no output is called' in line]
-    assert 'called wing0;' in said[0] and len(said) == log.NAMES
+    assert 'called wing0;' in said[0] and len(said) == log.MAX_NAMES
     assert 'no more will be named' in said[-1]
 
 
@@ -365,7 +365,7 @@ def test_a_first_command_is_searched_beside_the_messages(graph, searches):
 
 def test_why_there_is_no_first_command_is_searched_seldom_and_beside_the_messages(
         graph, searches, capfd, monkeypatch):
-    monkeypatch.setattr('linkage_ros.nodes.command_stream.PAUSES', 1e9)
+    monkeypatch.setattr('linkage_ros.nodes.command_stream.SEARCH_PAUSE_RATIO', 1e9)
     stream = Stream(graph, SEVERAL)
     for _ in range(3):
         assert stream.want(FOOT + SEARCHED, [*LINE[:2], 1e4, -150.0, 100.0]).keys() == {
@@ -458,7 +458,7 @@ REFUSED = [
 
 
 def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd, monkeypatch):
-    monkeypatch.setattr('linkage_ros.nodes.command_stream.MOST_POINTS', 4)
+    monkeypatch.setattr('linkage_ros.nodes.command_stream.MAX_POINTS', 4)
     logged = []
 
     def reasons():

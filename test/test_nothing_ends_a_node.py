@@ -243,7 +243,7 @@ def ends_quietly(process, number):
     process.interrupt(number)
     code, printed = process.end()
     assert code == 0 and 'Traceback' not in printed and 'rror' not in printed, printed
-    assert of_ended() - others - before < before + shutdown.TIMEOUT
+    assert of_ended() - others - before < before + shutdown.TIMEOUT_S
     return printed
 
 

@@ -384,7 +384,7 @@ SEARCHED = {'mechanism': 'jansen', 'output': 'G.x'}
                       'up to 10000 at once')])
 def test_an_answer_that_others_would_wait_for_is_refused(
         graph, monkeypatch, count, longest, request_, text):
-    monkeypatch.setattr('linkage_ros.nodes.servo_inverse.LONGEST', longest)
+    monkeypatch.setattr('linkage_ros.nodes.servo_inverse.MAX_CPU_TIME_S', longest)
     response = ask(graph.start(ServoInverse), [0.1] * count, **request_)
     assert not response.success and text in response.message
 

@@ -65,7 +65,7 @@ class MechanismTopics:
         self.state: Optional[AssemblyState] = None
         # The last position of a source joint, and the last input that one has given.
         self._position = math.nan
-        self._near: Optional[float] = None
+        self._seed: Optional[float] = None
         # Ids of the displayed markers, whether the locus is displayed, and the last robot model.
         self._displayed: AbstractSet[int] = frozenset()
         self._has_locus, self._described = False, ''
@@ -74,10 +74,10 @@ class MechanismTopics:
         """Set input `i` by the position of its source joint and, if known, its speed."""
         model = self.model
         value, self.speeds[i] = model.mechanism.from_source(
-            model.inputs[i], position, speed, self._near)
+            model.inputs[i], position, speed, self._seed)
         self.inputs[i], self._position = value, position
         if math.isfinite(value):
-            self._near = value
+            self._seed = value
 
     def publish(self, in_scene: bool) -> None:
         """Solve for the subscribers, and for the scene's joint states if `in_scene`; publish."""
@@ -176,8 +176,9 @@ class MechanismTopics:
                 measured = settings.measures and (
                     f'{self._position:.6g}, out of reach of {settings.measures}')
                 return f'{failure}: {settings.source} is at {measured or value}'
-        failure += ' at ' + ', '.join(f'{settings.input.quantity} {value:.6g} {settings.input.unit}'
-                                      for settings, value in zip(inputs, self.inputs))
+        failure += ' at ' + ', '.join(
+            f'{settings.input.quantity} {value:.6g} {settings.input.unit}'
+            for settings, value in zip(inputs, self.inputs))
         first, *others = missing
         reach, value, input_ = self._reach(inputs[0], first), self.inputs[0], inputs[0].input
         if len(inputs) > 1 or any(input_.holds(arc, value, value) for arc in reach):
