@@ -242,8 +242,9 @@ def test_the_ordinary_colcon_build_of_a_workspace_is_enough(copy, tmp_path, layo
     clean['COLCON_DEFAULTS_FILE'] = str(defaults)
     script = f"""
         colcon build {layout} >&2 && source install/setup.bash && cd / &&
-        python -c 'from linkage_ros.nodes import servo_inverse as node
-print(node.__file__, node.ServoInverseType.__module__)' && echo $AMENT_PREFIX_PATH
+        python -c 'from linkage_interfaces.srv import ServoInverse
+from linkage_ros.nodes import servo_inverse
+print(servo_inverse.__file__, ServoInverse.__module__)' && echo $AMENT_PREFIX_PATH
         """
     ended = subprocess.run(['bash', '-c', script], cwd=tmp_path, env=clean, timeout=300,
                            text=True, capture_output=True)

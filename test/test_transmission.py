@@ -530,7 +530,7 @@ ODD = {'mechanisms': ['odd'], 'odd.type': 'custom', 'odd.dimensions.u': 0.5,
 
 
 @pytest.mark.parametrize('types, count', [
-    (['slotted_lever', 'five_bar'], 20),
+    (['slotted_lever', 'five_bar', 'four_bar'], 20),
     pytest.param(list(mechanisms.TYPES), 60, marks=pytest.mark.slow)], ids=['few', 'all'])
 def test_any_dimensions_are_those_of_python(tmp_path, types, count):
     machines = scene.read({**ODD, 'mechanisms': [*types, 'odd'],
