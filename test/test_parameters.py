@@ -409,10 +409,11 @@ def test_messages_are_handled_between_requests_that_come_at_once(graph, executor
         client.ask(SetParameters, parameters=[_message('leg.scale', 0.5)])
         graph.until(lambda: handled == [0.5])
         crank.publish(JointState(name=['leg_crank']))
-        for value in wanted:
+        # The last one is refused.
+        for value in [*wanted, -1.0]:
             client.ask(SetParameters, parameters=[_message('leg.scale', value)])
         asked.set()
-        graph.until(lambda: wanted[-1] in handled)
+        graph.until(lambda: wanted[-1] in handled and node.is_settled)
     finally:
         asked.set()
         over.set()
