@@ -453,6 +453,31 @@ def test_a_mistake_while_a_scene_is_prepared_leaves_the_one_before(graph, monkey
     assert node.adopted[-1][1] == 4.0
 
 
+@pytest.mark.parametrize('refused', [
+    ('leg.type', 'klann'), ('leg.crank.source', 'shaft'), ('leg.scale', -1.0),
+    ('leg.dimensions.m', 900.0), ('leg.nobody', 1.0), ('use_sim_time', 3)])
+def test_what_was_refused_keeps_nothing_from_being_accepted(graph, refused):
+    node = graph.start(Kinematics, LEG)
+    client = Client(graph, node)
+    for scale in (2.0, 3.0):
+        bad = client.set(refused)[0]
+        assert not bad.successful and bad.reason
+        # A parameter that somebody declares later is none of the scene's business.
+        node.declare_parameter(f'own{scale:g}', 1.0)
+        assert client.set(('leg.scale', scale))[0].successful
+        assert node.scene.machines['leg'].scale == scale
+    # The same objects once more, though others were set meanwhile.
+    both = [Parameter('use_sim_time', value=False), Parameter('leg.scale', value=5.0)]
+    for scale in (5.0, 3.0):
+        assert node.set_parameters_atomically(both).successful
+        assert node.scene.machines['leg'].scale == 5.0
+        assert client.set(('leg.scale', scale))[0].successful
+    together = client.call(SetParametersAtomically, parameters=[
+        _message('leg.scale', 4.0), _message(*refused)]).result
+    node.declare_parameter('own', 1.0)
+    assert not together.successful and node.scene.machines['leg'].scale == 3.0
+
+
 def test_what_others_have_to_say_about_a_parameter_counts(graph):
     node = graph.start(Slow, LEG)
     node.add_on_set_parameters_callback(lambda parameters: SetParametersResult(

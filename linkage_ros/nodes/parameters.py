@@ -76,12 +76,15 @@ class SceneParameters:
         for name in of_scene:
             node.undeclare_parameter(name)
         self._declare(own)
-        # The scene that a change leads to, what differs in it, and why it is refused.
-        self._next, self._refusal, self._is_read = self.scene, '', False
+        # The scene that a change leads to, what differs in it, why it is refused, and the first
+        # of its parameters: rclpy calls back for other ones, too.
+        self._next, self._refusal = self.scene, ''
         self._difference: list[scenes.Parameter] = []
+        self._first: Any = None
+        self._follows = False
         node.add_pre_set_parameters_callback(self._read)
         node.add_on_set_parameters_callback(self._answer)
-        node.add_post_set_parameters_callback(self._adopt)
+        node.add_post_set_parameters_callback(self._accept)
 
     def set_together(self, messages: Sequence[ParameterMessage]) -> dict[int, SetParametersResult]:
         """
@@ -103,15 +106,16 @@ class SceneParameters:
 
     def follow(self, values: Mapping[str, Any]) -> str:
         """Adopt values of parameters of another node; return the reason of a refusal, or ''."""
+        self._refusal = ''
         try:
             self._prepare(values, strict=False)
         except scenes.SceneError as error:
             return str(error)
         if derived := self._derived(()):
-            self._is_read = True
+            self._first, self._follows = derived[0], True
             self._node.set_parameters_atomically(derived)
         else:
-            self._adopt(derived)
+            self._adopt()
         return ''
 
     def ranged(self, name: str, descriptor: ParameterDescriptor) -> ParameterDescriptor:
@@ -141,9 +145,12 @@ class SceneParameters:
 
     def _read(self, parameters: list[Parameter]) -> list[Parameter]:
         """Read the changed scene; return the parameters in their declared types, and derived."""
-        if self._is_read:
-            self._is_read = False
+        if self._follows:
+            self._follows = False
             return parameters
+        # rclpy may have refused what was read before.
+        self._refusal, self._difference = '', []
+        self._first = parameters[0] if parameters else None
         for parameter in parameters:
             if not self._node.has_parameter(parameter.name):
                 raise Undeclared(self._unknown(parameter.name))
@@ -158,9 +165,11 @@ class SceneParameters:
             self._node.report('a changed parameter', error)
             self._refusal = elided(f'internal error: {error!r}', 299)
             return parameters
-        return self._derived(values) + [Parameter(
+        typed = [Parameter(
             parameter.name, _kind(self.fields[parameter.name]), values[parameter.name])
             if parameter.name in values else parameter for parameter in parameters]
+        self._first = typed[0] if typed else None
+        return typed + self._derived(values)
 
     def _unknown(self, name: str) -> str:
         owner = f'; set it on {scenes.OWNER}' if name in self.followed else ''
@@ -169,9 +178,9 @@ class SceneParameters:
 
     def _prepare(self, values: Mapping[str, Any], strict: bool) -> None:
         """Read the scene with changed values; raise SceneError if it is refused."""
-        self._next = scenes.changed(self.scene, values, strict) if values else self.scene
-        self._check(self._next)
-        self._difference = self._next.changed_from(self.scene)
+        changed = scenes.changed(self.scene, values, strict) if values else self.scene
+        self._check(changed)
+        self._next, self._difference = changed, changed.changed_from(self.scene)
 
     def _checked(self, parameter: Parameter) -> Any:
         """Return the value of a parameter of the scene, valid by itself; raise SceneError."""
@@ -188,11 +197,18 @@ class SceneParameters:
                 if parameter.name in self.fields and parameter.name not in given
                 and not parameter.field.read_only]
 
-    def _answer(self, _: Any) -> SetParametersResult:
-        reason, self._refusal = self._refusal, ''
+    def _is_read(self, parameters: list[Parameter]) -> bool:
+        return any(parameter is self._first for parameter in parameters)
+
+    def _answer(self, parameters: list[Parameter]) -> SetParametersResult:
+        reason = self._refusal if self._is_read(parameters) else ''
         return SetParametersResult(successful=not reason, reason=reason)
 
-    def _adopt(self, _: Any) -> None:
+    def _accept(self, parameters: list[Parameter]) -> None:
+        if self._is_read(parameters):
+            self._adopt()
+
+    def _adopt(self) -> None:
         difference, self._difference = self._difference, []
         if difference:
             self.scene = self._next
