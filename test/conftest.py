@@ -17,10 +17,14 @@ import math
 import os
 
 from domains import Domain
+from hypothesis import settings
 import pytest
 
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+# A failure prints how to repeat it; a run depends on no earlier one.
+settings.register_profile('repeatable', database=None, print_blob=True, deadline=None)
+settings.load_profile('repeatable')
 # Of whatever a test starts that is not told another.
 _domain = Domain()
 atexit.register(_domain.release)

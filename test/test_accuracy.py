@@ -113,14 +113,14 @@ def test_the_inverse_of_the_lever_is_right_on_both_branches(half):
 
 @given(theta=st.floats(-1e10, 1e10), a=st.floats(0.01, 100.0), b=st.floats(0.01, 100.0),
        e=st.floats(-100.0, 100.0).filter(lambda e: e == 0.0 or abs(e) > 1e-6))
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25, derandomize=True)
 def test_any_lever_at_any_angle_is_right(theta, a, b, e):
     check(measure(mechanisms.create('slotted_lever', a=a, b=b, e=e), [theta]))
 
 
 @given(theta=st.floats(-4.0, 4.0), r=st.floats(0.1, 10.0), a=st.floats(0.1, 10.0),
        b=st.floats(0.1, 10.0))
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25, derandomize=True)
 def test_any_inversor_at_any_angle_is_right(theta, r, a, b):
     check(measure(mechanisms.create('peaucellier', r=r, a=a, b=b), [theta]))
 

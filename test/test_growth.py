@@ -11,8 +11,10 @@
 """What many mechanisms share, and what a change to one of them leaves alone, counted."""
 
 import gc
+import math
 import weakref
 
+from hypothesis import given, settings, strategies as st
 from linkage_ros import scene
 from linkage_ros.linkage import mechanism, output_range
 import pytest
@@ -51,20 +53,44 @@ def test_a_linkage_that_nobody_holds_is_gone_after_some_others():
     assert gone() is None
 
 
-@pytest.mark.parametrize('values', [
-    {'m3.scale': 2.0}, {'m3.dimensions.a': 1.01, 'm4.pose': [1.0] * 6}, {'frame_id': 'map'},
-    {'m3.joint_names': ['AB=knee']}, {'m3.nonsense': 1.0}, {'nobody.scale': 1.0},
-    {'m3.scale': -1.0}, {'m3.joint_names': ['AB=knee'], 'm5.joint_names': ['AB=knee']}])
-def test_a_changed_scene_is_what_all_values_read_anew_make(values):
-    def outcome(read):
-        try:
-            return read().parameters
-        except scene.SceneError as error:
-            return str(error)
+# Of some parameters of the scene, values that are allowed and values that are not.
+CHANGES = {
+    **{f'm{i}.{key}': values for i in (3, 4) for key, values in {
+        'scale': (2.0, 1, 5e-324, 0.0, -1.0, math.nan, '2'),
+        'dimensions.a': (1.01, 30.0, 1e9, 0.0),
+        'pose': ([1.0] * 6, [0.0] * 5, [math.inf] * 6),
+        'joint_names': ([], ['crank=wheel'], ['crank=-wheel+1'], ['wheel=crank'], 'crank=wheel'),
+        'crank.start': (0.1, 3.0, 100.0), 'crank.speed': (-1.0, 1e3),
+        'type': ('slider_crank', 'four_bar', 'fourbar'), 'nonsense': (1.0,)}.items()},
+    'frame_id': ('map', '', 1), 'rate': (0.0, 20.0, -1.0), 'nobody.scale': (1.0,),
+    'mechanisms': (['m4', 'm3'], ['m3', 'm3'], [])}
 
-    before = scene.read(MANY)
-    assert outcome(lambda: scene.changed(before, values)) == outcome(
-        lambda: scene.read({**MANY, **values}))
+
+def outcome(read, *args):
+    """Return a scene's parameters, or why there is none, and the scene."""
+    try:
+        made = read(*args)
+    except scene.SceneError as error:
+        return str(error), None
+    return made.parameters, made
+
+
+VALUE = st.sampled_from(sorted(CHANGES)).flatmap(
+    lambda name: st.tuples(st.just(name), st.sampled_from(CHANGES[name])))
+
+
+@settings(max_examples=40)
+@given(st.lists(st.lists(VALUE, min_size=1, max_size=3).map(dict), max_size=6))
+def test_a_scene_with_any_history_is_what_its_values_read_anew_make(history):
+    values = {'mechanisms': ['m3', 'm4'], 'm3.type': 'four_bar', 'm4.type': 'slider_crank'}
+    made = scene.read(values)
+    for change in history:
+        before = made.parameters
+        found, new = outcome(scene.changed, made, change)
+        assert found == outcome(scene.read, {**values, **change})[0]
+        assert made.parameters == before
+        if new:
+            values, made = {**values, **change}, new
 
 
 @pytest.mark.slow

@@ -548,7 +548,7 @@ def test_a_long_comment_costs_no_more_than_its_letters(tmp_path, long):
 @example(['\x9b2J'] * 4, 1)
 @example(['\x1b]0;title\x07'] * 4, 1)
 @example(['x', '', 'x y ', 'x'], 3000)
-@settings(database=None, print_blob=True, deadline=None, max_examples=3)
+@settings(max_examples=3)
 def test_a_name_of_the_file_is_never_more_than_text_in_the_terminal(more, times):
     text = (ROBOTS / 'four_bar.urdf').read_text()
     names = ('coupler', 'rocker', 'elbow', 'motor')

@@ -527,7 +527,7 @@ def test_a_linkage_in_space_makes_no_model():
         model(machines.values())
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.floats(-10.0, 10.0), min_size=3, max_size=3),
        st.lists(st.sampled_from([k * math.pi / 4.0 for k in range(-4, 5)])
                 | st.floats(-7.0, 7.0), min_size=3, max_size=3))

@@ -405,6 +405,15 @@ def test_the_ends_of_every_slider_are_whole_stops(given):
     assert len(numbers) > 3
 
 
+@pytest.mark.parametrize('ratio', [-2.0, 1.0])
+def test_the_sliders_of_ratio_and_offset_move_an_input(ratio):
+    made = scene.read({**SIGNED, 'own.crank.ratio': ratio})
+    found = {p.name: slider.ends(made, p) for p in made.parameters
+             if p.name in ('own.crank.ratio', 'own.crank.offset')}
+    assert found['own.crank.ratio'] == pytest.approx(sorted((0.1 * ratio, 10.1 * ratio)), abs=0.2)
+    assert found['own.crank.offset'] == pytest.approx((-math.pi, math.pi), abs=0.1)
+
+
 @pytest.mark.sample(2)
 @pytest.mark.parametrize('given, stops', [
     *((given, 3) for given in (*map(TYPES.get, ('water_drop', 'peaucellier', 'slotted_lever')),
@@ -432,6 +441,12 @@ def test_a_slider_goes_nearly_as_far_as_a_crank_can_turn():
     _, sliders = lengths({**SIGNED, 'own.dimensions.r': 3.0})
     (low, high), = [ends for name, _, ends in sliders if name.endswith('.r')]
     assert 2.0 <= low < 2.2 and 5.8 < high <= 6.0
+
+
+def test_the_slider_of_a_length_that_nothing_limits_changes_it_by_nine_times_itself():
+    _, sliders = lengths(SIGNED)
+    ends, = [ends for name, _, ends in sliders if name.endswith('.v')]
+    assert ends == pytest.approx((-3.0, 2.4), abs=0.06)
 
 
 ACTUATED = {**OWN, 'own.dimensions.h': 0.0, 'own.dimensions.c': 2.0, 'own.joints': [

@@ -88,11 +88,11 @@ class InputSettings:
     speed: float
     start: float
     sweep: Optional[Arc]
-    ends: Optional[Arc] = None
-    source: str = ''
-    ratio: float = 1.0
-    offset: float = 0.0
-    measures: str = ''
+    ends: Optional[Arc]
+    source: str
+    ratio: float
+    offset: float
+    measures: str
     period: int = 1
 
     @cached_property

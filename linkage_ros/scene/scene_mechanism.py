@@ -52,8 +52,7 @@ TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
 JOINTS = Field('string_array', 'The linkage, one line per joint.', readers=ALL, read_only=True)
 TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', readers=ALL,
                read_only=True)
-DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', positive=True,
-                  readers=ALL)
+DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', readers=ALL)
 BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1, readers=ALL)
 SCALE = Field('double', 'Factor of every length.', positive=True, readers=ALL)
 LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
@@ -132,10 +131,10 @@ class SceneMechanism:
         """
         drive, own, unit = self.first, self.scale_of(self.first.input.name), self.scale_of(output)
         ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
-        inverse = self.linkage.inverse(output)
-        (found,), (rate,) = inverse.follow((value / unit,), (near / own,))
+        inverse, values, seed = self.linkage.inverse(output), (value / unit,), (near / own,)
+        (found,), (rate,) = inverse.follow(values, seed)
         if not (ends[0] <= found <= ends[1] if ends else found == found):
-            (found,), (rate,) = inverse.nearest((value / unit,), (near / own,), (ends,))
+            (found,), (rate,) = inverse.nearest(values, seed, (ends,))
         return found * own, rate * unit / own
 
     def from_source(self, drive: InputSettings, position: float, speed: Optional[float],

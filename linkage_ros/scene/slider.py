@@ -54,7 +54,10 @@ def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
         reach = machine.inputs[what].reach
         ends = [value, *(end for arc in reach for end in arc)]
         return _in_whole_steps(value, min(ends), max(ends))
-    return _in_whole_steps(value, 0.1 * value, 10.1 * value)
+    if machine and key == 'offset':
+        half = math.pi * machine.inputs[what].input.size
+        return _in_whole_steps(value, value - half, value + half)
+    return _in_whole_steps(value, *sorted((0.1 * value, 10.1 * value)))
 
 
 def _required_range(machine: SceneMechanism) -> Optional[Arc]:
