@@ -98,12 +98,14 @@ class Kinematics(scene_node.SceneNode):
             if machine.in_space:
                 continue
             if machine is not before:
-                bodies.size(machine)
-            # Dimensions and sweeps cannot invalidate a robot model, whose limits take long.
+                bodies.check_range(machine)
+            # Nothing else that has changed can invalidate a robot model, whose limits take long.
             alike = replace(machine, linkage=before.linkage, reach=before.reach,
-                            inputs=before.inputs)
-            if alike != before or new.frame_id != self.scene.frame_id:
-                bodies.robot([alike], new.frame_id)
+                            inputs=before.inputs, pose=before.pose, points=before.points,
+                            frame_id=before.frame_id)
+            frame_id = machine.frame_id or new.frame_id
+            if alike != before or frame_id.startswith(f'{name}_'):
+                bodies.robot([replace(alike, frame_id=frame_id)], frame_id)
 
     def prepare(self, new: scene.Scene) -> Any:
         """Return a model of each mechanism by name; unchanged mechanisms keep their models."""

@@ -22,7 +22,7 @@ from typing import Any, Iterable, List, Optional, Tuple, Type
 from ..cache import cached
 from ..words import elided, listed, meant, MESSAGE, quoted
 
-# The nodes that use parameters; OWNER decides the value of a parameter that several nodes use.
+# The nodes that use parameters; OWNER owns each that it uses.
 DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
 OWNER = KINEMATICS
 
@@ -94,9 +94,9 @@ class Field:
         return _with(self, ('meaning', self.meaning.format(*words)), *other.items())
 
     @property
-    def shared(self) -> bool:
-        """Whether several nodes use the parameter."""
-        return len(self.readers) > 1
+    def owner(self) -> str:
+        """Return the node that declares the parameter and announces its value to the others."""
+        return OWNER if OWNER in self.readers else self.readers[0]
 
     @property
     def allowed(self) -> str:
