@@ -273,7 +273,7 @@ def test_what_is_drawn_is_where_the_catalogue_says(show):
     async def look(url):
         async with Page(url) as page:
             await browser.until(lambda: len(page.drawn('/leg', 'joints')) and len(
-                page.drawn('/leg', 'strip')))
+                page.drawn('/leg', 'locus')))
             return page
 
     page = asyncio.run(look(show(LEG).viewer.url))
@@ -285,12 +285,12 @@ def test_what_is_drawn_is_where_the_catalogue_says(show):
     assert not joints[:, 2].any()
     # Bars, the crank among them, and two plates instead of the bars around them.
     ends = page.drawn('/leg', 'lines').reshape(-1, 2, 3)
-    plates = page.drawn('/leg', 'triangles')[:6].reshape(-1, 3, 3)
+    plates = page.drawn('/leg', 'plates').reshape(-1, 3, 3)
     lengths = np.concatenate([ends[:, 0] - ends[:, 1], *(plates - np.roll(plates, 1, axis=1))])
     np.testing.assert_allclose(np.sort(np.linalg.norm(lengths, axis=1)),
                                sorted(leg.bar_lengths[bar] for bar in leg.bars), rtol=1e-6)
     feet = leg.solve(np.linspace(0.0, math.tau, 721), ('G',))['G']
-    curve = page.drawn('/leg', 'strip')[:, :2]
+    curve = page.drawn('/leg', 'locus')[:, :2]
     away = np.linalg.norm(curve[:, None] - feet, axis=2).min(axis=1)
     assert len(curve) > 100 and away.max() < 0.01 * np.ptp(feet[:, 0])
 
@@ -301,18 +301,20 @@ def test_every_setting_is_described_as_the_scene_has_it(lever):
             return await page.cast('/lever', '/drop')
 
     cast, whole = asyncio.run(look(lever.viewer.url)), scene.read(LEVER)
+    groups = {'crank.speed': 'speeds', 'crank.start': 'starts', 'branches.L': 'branches',
+              **{f'dimensions.{key}': 'dimensions' for key in 'abe'},
+              **dict.fromkeys(('scale', 'crank.ratio', 'crank.offset', 'only_named'), 'more')}
     assert {key: (one['key'], one['name']) for key, one in cast.items()} == {
         '/lever': ('/lever', 'lever'), '/drop': ('/drop', 'drop')}
     shown = {f'{one["name"]}.{setting["name"]}': setting
              for one in cast.values() for setting in one['settings']}
     assert shown == {one.name: {
         'name': one.name.partition('.')[2], 'value': value, 'kind': one.field.kind,
-        'meaning': one.field.meaning, 'allowed': one.field.allowed,
-        'fixed': one.field.read_only, 'low': low, 'high': high, 'step': step}
+        'meaning': one.field.meaning, 'allowed': one.field.allowed, 'unit': one.field.unit,
+        'low': low, 'high': high, 'group': groups.get(one.name.partition('.')[2], '')}
         for one in whole.parameters if '.' in one.name
         for value in [list(one.value) if isinstance(one.value, tuple) else one.value]
-        for ends in [slider.ends(whole, one)]
-        for low, high, step in [(*ends, int(one.field.kind == 'integer')) if ends else [None] * 3]}
+        for low, high in [slider.ends(whole, one) or (None, None)]}
 
 
 def test_a_slider_sets_the_node_that_owns_the_parameter(show):
@@ -433,7 +435,7 @@ def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
             return answer
 
     answer = asyncio.run(use(running.viewer.url))
-    servo, lever = answer['inputs']['crank']['value'], answer['outputs']['lever']
+    servo, lever = answer['inputs']['crank'], answer['outputs']['lever']
     assert lever_of(servo) == pytest.approx(0.4, abs=1e-12)
     slope = (lever_of(servo + 1e-6) - lever_of(servo - 1e-6)) / 2e-6
     assert lever['rates'] == [pytest.approx(slope, abs=1e-8)]
@@ -506,7 +508,7 @@ def test_any_joint_of_any_leg_is_brought_where_it_can_be(show):
             return answer
 
     crank = asyncio.run(use(running.viewer.url))['inputs']['crank']
-    assert math.remainder(crank['value'] - theta, math.tau) == pytest.approx(0.0, abs=1e-6)
+    assert math.remainder(crank - theta, math.tau) == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.slow
@@ -540,12 +542,11 @@ def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(lever):
             return await page.ask('tune', '/lever'), await page.ask('tune', '/drop')
 
     whole = scene.read(LEVER)
-    for found, name, fixed, sides, bars in zip(
+    for found, name, fixed, bars in zip(
             asyncio.run(use(lever.viewer.url)), ('lever', 'drop'), ('OQ', 'OC'),
-            ({'L': ['out', 'in']}, {}),
             ({'a': ['OA'], 'b': ['OQ', 'QL'], 'e': []}, {'a': 'OC OA AB AP BP CB'.split()})):
         assert {**found, 'id': 0} == {
-            'op': 'answer', 'id': 0, 'reason': '', 'fixed': list(fixed), 'sides': sides,
+            'op': 'answer', 'id': 0, 'reason': '', 'fixed': list(fixed),
             'bars': {f'dimensions.{key}': [list(pair) for pair in pairs]
                      for key, pairs in bars.items()},
             'travel': {one.name.partition('.')[2]: list(slider.ends(whole, one))
@@ -656,7 +657,7 @@ def test_the_page_is_sent_what_an_output_does_over_a_turn(lever):
         np.testing.assert_allclose(y[known], values[np.isin(x, np.array(said['x'])[known])],
                                    rtol=2e-5, atol=2e-7)
     assert [said['units'][1] for said in about_lever] == ['rad', 'rad/s', 'rad/s²', 'rad', '']
-    assert about_lever[0]['reach'] == [[-math.pi, math.pi]] and about_lever[0]['dead'] == []
+    assert about_lever[0]['ends'] == about_lever[0]['dead'] == []
     # A kite lies flat at 0 and at pi: there it may be assembled in two ways.
     assert about_drop[0]['dead'] == [-math.pi, 0.0] and about_drop[0]['output'] == 'B'
     assert about_drop[0]['y'][180] in (0.0, math.pi)
@@ -698,7 +699,7 @@ def test_what_a_sensor_cannot_be_at_is_nowhere_on_the_page(show):
         async with Page(url) as page:
             async def carriage(told):
                 crank_states.publish(JointState(name=['lift_cylinder'], position=[told]))
-                value = (await page.ask('pose', '/lift'))['inputs']['carriage']['value']
+                value = (await page.ask('pose', '/lift'))['inputs']['carriage']
                 assert math.isfinite(value)
                 return value
 
@@ -855,9 +856,7 @@ def test_a_pose_of_several_inputs_is_described_whole():
                 for name, value in angles.items()}
 
     assert found.keys() == {'inputs', 'outputs'}
-    assert found['inputs'] == {
-        name: {'value': value, 'unit': 'm', 'arcs': [drive.ends]}
-        for (name, drive), value in zip(digger.inputs.items(), present)}
+    assert found['inputs'] == dict(zip(digger.inputs, present))
     assert list(found['outputs']) == [
         *(joint for joint in linkage.joints if joint not in digger.inputs), 'T.x', 'T.y']
     truth, h = at(present), 1e-6
@@ -1475,7 +1474,7 @@ def test_an_input_that_is_moved_is_there_until_messages_say_otherwise(graph, sho
         async with Page(url) as page:
             async def crank(value=None):
                 want = {} if value is None else {'want': {'output': 'crank', 'value': value}}
-                return (await page.ask('pose', '/leg', **want))['inputs']['crank']['value']
+                return (await page.ask('pose', '/leg', **want))['inputs']['crank']
 
             async def after(*angles):
                 for angle in angles:
@@ -1637,7 +1636,7 @@ def look_of(marker):
     """Return how a marker looks, part by part."""
     place, turn, colour = marker.pose.position, marker.pose.orientation, marker.color
     return {'mechanism': '/leg', 'frame': marker.header.frame_id, 'width': marker.scale.x,
-            'kind': {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'strip', Marker.SPHERE_LIST:
+            'kind': {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'locus', Marker.SPHERE_LIST:
                      'joints', Marker.TRIANGLE_LIST: 'triangles'}[marker.type],
             'pose': [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w],
             'colour': [colour.r, colour.g, colour.b, colour.a]}
@@ -1671,7 +1670,7 @@ def test_of_a_message_what_is_deleted_or_no_line_joint_or_triangle_is_not_drawn(
     shown = dict(zip((7, 9, 11, 13), [joints, bars, *message.markers[4:]]))
     looks, records = topic.drawn()
     assert looks == {number: look_of(marker) for number, marker in shown.items()}
-    assert [look['kind'] for look in looks.values()] == ['joints', 'lines', 'triangles', 'strip']
+    assert [look['kind'] for look in looks.values()] == ['joints', 'lines', 'triangles', 'locus']
     assert records == b''.join(recorded(*one) for one in shown.items())
 
 
@@ -1871,7 +1870,7 @@ def test_nodes_that_end_and_come_again_are_drawn_again(graph, show):
 
     async def come_and_go(page, scene):
         kinematics = graph.start(Kinematics, scene)
-        await browser.until(lambda: len(page.drawn(f'/{scene["mechanisms"][0]}', 'strip')))
+        await browser.until(lambda: len(page.drawn(f'/{scene["mechanisms"][0]}', 'locus')))
         page.forget()
         graph.end(kinematics)
         await page.heard('scene', mechanisms=[])
@@ -2881,7 +2880,7 @@ import('/picture.js').then(({ Picture }) => {
       canvas: { clientWidth: 390, clientHeight: 380 } });
     picture.at = (x, y) => [x, y];
     picture.text = (name, x, y) => written.push([x, y, picture.context.measureText(name).width]);
-    picture.names([{ mechanism: { value: () => points }, look: { kind: 'joints', width: 6 },
+    picture.names([{ mechanism: { points }, look: { kind: 'joints', width: 6 },
       places: Float64Array.from(places.flat()) }]);
     return [places, written];
   });
@@ -2993,7 +2992,7 @@ def test_where_an_input_is_that_nobody_has_named_is_not_guessed(graph, show):
                 crank_states.publish(JointState(name=['leg_crank'], position=[2.0]))
                 return (await page.ask('pose', '/leg')).get('inputs')
 
-            return reason, (await browser.until(heard))['crank']['value']
+            return reason, (await browser.until(heard))['crank']
 
     reason, value = asyncio.run(use(running.viewer.url))
     assert reason == 'the crank is not known yet: no message names leg_crank'

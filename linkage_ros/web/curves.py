@@ -26,8 +26,11 @@ from ..words import listed, meant, quoted
 SAMPLES = 361
 KINDS = POSITION, VELOCITY, ACCELERATION, TRANSMISSION, FORCE = (
     'position', 'velocity', 'acceleration', 'transmission angle', 'force ratio')
-# What has no pole.
+# Quantities without poles, and the power of the speed with which the others grow.
 BOUNDED = POSITION, TRANSMISSION
+POWERS = {VELOCITY: 1, ACCELERATION: 2}
+# An end of the reach this near to a dead point [rad, or of the stroke] is that dead point.
+SAME = 1e-9
 # Units of the force ratio, by the units of output and input.
 FORCES = {('rad', 'm'): 'N·m/N', ('m', 'rad'): 'N/(N·m)'}
 
@@ -58,6 +61,12 @@ class Sweep:
             [own, *others], [1.0 / sizes[0], *still], [0.0, *still]))
         self.values, self.reach, self.dead = (
             np.multiply(each, sizes[0]) for each in (own, reach, dead))
+
+    def ends(self) -> list[float]:
+        """Return the ends of the reach that are no dead points; a full rotation has none."""
+        drive = self._machine.first.input
+        return [] if drive.is_whole(self.reach) else [end for end in self.reach.ravel().tolist()
+            if (drive.apart(end, self.dead) > SAME * drive.size).all()]
 
     def names(self, kind: str) -> list[str]:
         """Return the joints with a transmission angle, or the outputs."""
@@ -104,9 +113,20 @@ class Sweep:
         return np.sort([*at, *(dead for dead in self.dead if x[0] < dead < x[-1])])
 
 
+def plots(machine: SceneMechanism) -> dict[str, str]:
+    """Return of what each of KINDS is plotted: an 'output' or a 'joint'; {} for no plot."""
+    return {} if machine.in_space else {
+        kind: 'joint' if kind == TRANSMISSION else 'output' for kind in KINDS}
+
+
 def curve(machine: SceneMechanism, present: Sequence[float], kind: str = POSITION,
           output: Optional[str] = None) -> dict[str, Any]:
-    """Return one of KINDS over the first input: x and y in `units`, y None where it has none."""
+    """
+    Return one of KINDS over the first input: x and y in `units`, y None where it has none.
+
+    `dead` are the dead points, `ends` the other ends of the reach; y grows with the `power` of the
+    input's speed.
+    """
     if kind not in KINDS:
         raise ValueError(f'kind must be one of {", ".join(KINDS)}, not {quoted(kind)}')
     sweep = Sweep(machine, present, dense_ends=kind in BOUNDED)
@@ -125,9 +145,8 @@ def curve(machine: SceneMechanism, present: Sequence[float], kind: str = POSITIO
         known = np.isfinite(y)
         y[known] = np.unwrap(y[known])
     return {'input': sweep.input.name, 'output': output, 'names': names,
-            'units': [sweep.input.unit, unit], 'x': x.tolist(),
-            'y': list(map(shown, y.tolist())), 'reach': sweep.reach.tolist(),
-            'dead': sweep.dead.tolist()}
+            'units': [sweep.input.unit, unit], 'power': POWERS.get(kind, 0), 'x': x.tolist(),
+            'y': list(map(shown, y.tolist())), 'ends': sweep.ends(), 'dead': sweep.dead.tolist()}
 
 
 def exported(machine: SceneMechanism, present: Sequence[float], form: str, frame_id: str) -> str:

@@ -26,6 +26,7 @@ from ..words import listed, quoted
 
 ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
 _, ACCELERATION, FORCE = ARROWS
+SIGNS = '+1', '−1'
 # Change of a dimension that detects dependent bars, as a fraction of the longest bar.
 NUDGE = 1e-6
 # Tolerance of an input at its end.
@@ -50,12 +51,31 @@ class Reach:
         return f'{self.name} reaches {in_words(self.arcs)} {self.unit}'
 
 
+def drawn(machine: SceneMechanism) -> dict[str, Any]:
+    """
+    Describe what the page needs to know of a mechanism beside its parameters and markers.
+
+    `points` are the joints of a leg in markers, `legs` the number of legs, `pairs` of those on one
+    side. Each input has its unit, allowed `arcs` [rad or m], `turn` [rad] after which poses repeat
+    (None: never), and default speed. `sides` are the words for a branch of +1 and of -1.
+    """
+    return {
+        'space': machine.in_space, 'points': machine.points, 'pairs': machine.leg_pairs,
+        'legs': machine.leg_pairs * (1 + machine.mirrored),
+        'sides': {name: machine.linkage.line_of(name).sides or SIGNS
+                  for name in machine.linkage.branches},
+        'inputs': {name: {
+            'unit': drive.input.unit, 'arcs': arcs(drive), 'speed': drive.default_speed,
+            'turn': drive.input.turn if drive.input.wraps else None}
+            for name, drive in machine.inputs.items()}}
+
+
 def described(machine: SceneMechanism, present: Sequence[float]) -> dict[str, Any]:
     """
     Describe a mechanism at inputs `present` [rad or m], in the scene's size.
 
-    Each input has value, allowed arcs and unit; each output of the first leg has value, unit, and
-    d output / d input for each input, zero where it is rounding.
+    Each input has its value; each output of the first leg has value, unit, and d output / d input
+    for each input, zero where it is rounding.
     """
     linkage, names = machine.linkage, [
         *(name for name in machine.linkage.joints if name not in machine.inputs),
@@ -69,8 +89,7 @@ def described(machine: SceneMechanism, present: Sequence[float]) -> dict[str, An
     units = [machine.scale_of(name) * (1.0 if drive.input.turns else linkage.longest)
              for name, drive in machine.inputs.items()]
     return {
-        'inputs': {name: {'value': value, 'unit': drive.input.unit, 'arcs': arcs(drive)}
-                   for (name, drive), value in zip(machine.inputs.items(), present)},
+        'inputs': dict(zip(machine.inputs, present)),
         'outputs': {name: {
             'value': _rounded(float(values[name]) * machine.scale_of(name), sizes[name]),
             'unit': 'rad' if linkage.is_angle(name) else 'm',
@@ -165,7 +184,7 @@ def _input_at(machine: SceneMechanism, present: Sequence[float], name: str,
     near = min((min(max(float(drive.input.beside(value, (low + high) / 2.0)), low), high)
                 for low, high in ends), key=lambda end: drive.input.apart(end, value))
     whole = drive.input.is_whole(ends)
-    new = math.remainder(value, math.tau) if whole else near
+    new = float(drive.input.wrapped(value)) if whole else near
     inputs = [new if key == name else old for key, old in zip(machine.inputs, present)]
     own = [value / machine.scale_of(key) for key, value in zip(machine.inputs, inputs)]
     places = machine.linkage.solve(theta_of(own))
@@ -228,15 +247,13 @@ def tunable(scene_: Scene, name: str) -> dict[str, Any]:
     Return the range of each dimension of a mechanism, and its dependent bars.
 
     `travel` holds [low, high] by parameter, `bars` pairs of joints, `fixed` the joints that do not
-    move, `sides` the words for a branch of +1 and of -1.
+    move.
     """
     machine = scene_.machines[name]
     start = f'{name}.dimensions.'
     travel = {parameter.name[len(name) + 1:]: slider.ends(scene_, parameter)
               for parameter in machine.parameters if parameter.name.startswith(start)}
     return {'travel': travel, 'fixed': list(ground_frame(machine.linkage)),
-            'sides': {name: machine.linkage.line_of(name).sides
-                      for name in machine.linkage.branches},
             'bars': {key: _bars(machine.linkage, key.partition('.')[2]) for key in travel}}
 
 

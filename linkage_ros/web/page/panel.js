@@ -21,7 +21,6 @@ class Section {
     this.mechanism = mechanism;
     this.motion = new Motion(mechanism, connection, !folded, refuse);
     this.plot = new Plot(mechanism, connection, this.motion);
-    this.plot.element.hidden = mechanism.inSpace;
     this.motion.place.after(this.plot.element);
     this.motion.onshow = () => this.plot.look();
     this.tuning = new Tuning(mechanism, connection, !folded, own => light(mechanism, own));
