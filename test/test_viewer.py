@@ -317,6 +317,59 @@ def test_every_setting_is_described_as_the_scene_has_it(lever):
         for low, high in [slider.ends(whole, one) or (None, None)]}
 
 
+EXAMPLES = [*sorted((ROOT / 'config').glob('*.yaml')), *sorted((ROOT / 'examples').glob('*.yaml'))]
+
+
+@pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
+def test_the_page_is_told_what_it_draws_and_moves(path):
+    for name, machine in scene.load(str(path)).machines.items():
+        told = json.loads(json.dumps(poses.drawn(machine), allow_nan=False))
+        legs = machine.assembly().legs
+        assert told['legs'] == len(legs) and told['pairs'] == sum(
+            leg.side > 0 for leg in legs.values())
+        assert told['space'] == (machine.linkage.type == 'rods')
+        assert told['points'] == list(machine.points)
+        assert told['sides'].keys() == machine.linkage.branches.keys()
+        default = scene.read({'mechanisms': [name], **{
+            key: value for key, value in machine.values.items() if not key.endswith('.speed')}})
+        assert told['inputs'].keys() == machine.inputs.keys()
+        for key, drive in default.machines[name].inputs.items():
+            assert told['inputs'][key]['speed'] == drive.speed != 0.0
+            assert told['inputs'][key]['unit'] == ('rad' if drive.input.turns else 'm')
+            turn = told['inputs'][key]['turn']
+            assert (turn is not None) == drive.input.turns
+            start = [one.start for one in machine.inputs.values()]
+            other = [value + (turn or 0.0) * (one == key) for one, value in zip(machine.inputs, start)]
+            for joint, place in machine.linkage.solve(poses.theta_of(start)).items():
+                np.testing.assert_allclose(
+                    machine.linkage.solve(poses.theta_of(other))[joint], place, atol=1e-9)
+
+
+@pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
+def test_the_unit_of_a_parameter_is_that_of_its_description(path):
+    for one in scene.load(str(path)).parameters:
+        said = re.findall(r'\[(.*?)\]', one.field.meaning)
+        assert '{' not in one.field.meaning + one.field.unit
+        if one.field.kind == 'double':
+            assert one.field.unit == ''.join(said).replace('1', ''), one.name
+
+
+@pytest.mark.slow
+def test_a_page_is_told_of_legs_that_are_added(show):
+    async def use(url):
+        async with Page(url) as page:
+            first = (await page.cast('/leg'))['/leg']
+            assert await page.set('/leg', leg_pairs=3) == ''
+            said = await page.heard('value', name='leg_pairs', value=3)
+            assert await page.set('/leg', mirrored=False) == ''
+            return first, said['drawn'], (await page.heard(
+                'value', name='mirrored', value=False))['drawn']
+
+    first, more, fewer = asyncio.run(use(show(LEG).viewer.url))
+    assert [(one['legs'], one['pairs']) for one in (first, more, fewer)] == [
+        (1, 1), (6, 3), (3, 3)]
+
+
 def test_a_slider_sets_the_node_that_owns_the_parameter(show):
     running = show(LEVER)
 
@@ -756,6 +809,21 @@ def test_an_input_goes_where_it_is_wanted_or_as_near_as_it_gets(
     if missed:
         assert missed == poses.Reach(input_, tuple(poses.arcs(machine.inputs[input_])),
                                      machine.inputs[input_].input.unit)
+
+
+GEARED = {'mechanisms': ['gear'], 'gear.type': 'custom', 'gear.joints': [
+    'O ground 0 0', 'M crank O 0.01', 'A crank O 1 geared crank 1/5 0']}
+
+
+@pytest.mark.parametrize('value', [4.0, -15.7, 12.6])
+def test_a_geared_input_goes_where_it_is_wanted_in_all_of_its_period(value):
+    gear = scene.read(GEARED).machines['gear']
+    inputs, missed = poses.reached(gear, [0.0], {'output': 'crank', 'value': value})
+    assert (inputs, missed) == ([value], None)
+    # It can be set to start there.
+    assert scene.read({**GEARED, 'gear.crank.start': value}).machines['gear'].first.start == value
+    again, _ = poses.reached(gear, [0.0], {'output': 'crank', 'value': value + 10.0 * math.pi})
+    assert again == pytest.approx([value], abs=1e-12)
 
 
 def test_an_input_goes_to_the_nearest_of_two_arcs_and_not_where_nothing_can_be_assembled():
@@ -2687,6 +2755,22 @@ def test_a_reload_and_another_viewer_keep_what_is_seen_and_a_lost_connection_is_
         await seen.page.click('document.getElementById("whole")')
         await browser.until(lambda: page.value('document.getElementById("whole").hidden'))
         page.complaints.clear()
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_a_phone_may_reload_the_page_as_often_as_it_likes(show, looked_at):
+    running = show({**without_defaults(scene.load(str(ROOT / 'config' / 'all.yaml'))), 'rate': 20.0})
+
+    async def doing(seen):
+        await seen.page.resize(390, 844, 'light')
+        for _ in range(180):
+            await seen.page.open(running.viewer.url)
+            await browser.until(lambda: seen.page.value(
+                'document.querySelectorAll("section").length === 4 && '
+                '/[1-9] pictures/.test(document.getElementById("status").textContent)'))
 
     looked_at(running, doing)
 

@@ -36,7 +36,8 @@ FASTEST = 100.0
 
 SPEED = Field('double', 'Speed of the {0} [{unit}].', -FASTEST, FASTEST, readers=(DRIVER,),
               unit='{1}/s', group=SPEEDS)
-TURNS = {'low': -4.0 * math.pi, 'high': 4.0 * math.pi}
+# Farthest start of an angle [rad], if its period is no longer.
+FARTHEST_START = 4.0 * math.pi
 START = Field('double', 'Initial value of the {0} [{unit}]; a new value moves it there.',
               readers=(DRIVER,), unit='{1}', group=STARTS)
 SOURCE = Field('string', 'Source joint, whose position in messages gives the {0}; empty: '
@@ -144,8 +145,10 @@ def read_settings(name: str, linkage: Mechanism, input_: Input, reach: Tuple[Arc
 def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values,
           old: Optional[InputSettings], strict: bool) -> InputSettings:
     speed_field, start_field, sweep_field = (
-        field.about(input_.name, input_.unit, **(TURNS if field is START and input_.turns else {}))
-        for field in (SPEED, START, SWEEP))
+        field.about(input_.name, input_.unit) for field in (SPEED, START, SWEEP))
+    if input_.turns:
+        farthest = max(FARTHEST_START, input_.high)
+        start_field = start_field.about(low=-farthest, high=farthest)
     name = f'{name}.{input_.name}'
     speed = values.take(f'{name}.speed', speed_field, _default_speed(input_, reach))
     has_start = values.unused(f'{name}.start')

@@ -170,8 +170,8 @@ export class Motion {
 
   /** Request the present pose, with the chosen arrows at the inputs' speeds when it plays. */
   async look() {
-    if (this.looking || !this.connection.opened) return;
-    const { key, arrows: { kind } } = this.mechanism;
+    const { key, inputs, arrows: { kind } } = this.mechanism;
+    if (this.looking || !this.connection.opened || !Object.keys(inputs).length) return;
     this.looking = true;
     const answer = await this.connection.ask({ op: 'pose', mechanism: key, ...kind && { arrows: kind, speeds: this.speeds } });
     this.looking = false;

@@ -253,9 +253,6 @@ export class Plot {
     this.sight = sight;
     const here = this.inside(present * this.units[0].factor);
     const left = this.plot.valToPos(here, 'x');
-    // At the start of a new turn the mark jumps without an animation.
-    this.now.classList.toggle('jumps', Math.abs(left - this.left) > this.plot.over.clientWidth / 2);
-    this.left = left;
     this.now.style.transform = `translateX(${left}px)`;
     const { idx } = this.plot.cursor;
     const [x, y] = idx === null || idx === undefined
