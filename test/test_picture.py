@@ -121,10 +121,10 @@ def test_the_locus_has_the_feet_of_both_sides(graph):
     curve, other = np.split(np.array([(p.x, p.y) for p in one_side.points]), 2)
     # The lines of a curve end where the next begin, and no line joins the two curves.
     assert (curve[1:-1:2] == curve[2::2]).all() and (other == curve * (-1.0, 1.0)).all()
-    feet = 0.01 * create('jansen').solve(np.linspace(0.0, math.tau, 500), ('G',))['G']
+    feet = 0.01 * create('jansen').solve(np.linspace(0.0, math.tau, 5000), ('G',))['G']
     for foot, line in ((feet, curve), (feet * (-1.0, 1.0), other)):
         away = np.hypot(*np.moveaxis(foot[:, None] - line, -1, 0))
-        assert away.min(axis=1).max() < 0.01 and away.min(axis=0).max() < 2e-3
+        assert away.min(axis=1).max() < 0.01 and away.min(axis=0).max() < 5e-4
     assert graph.set(node, walker__mirrored=False).successful
     strip = graph.until(lambda: loci[-1].type == Marker.LINE_STRIP and loci[-1])
     assert np.array_equal([(p.x, p.y) for p in strip.points], [curve[0], *curve[1::2]])
