@@ -51,6 +51,18 @@ def test_a_signal_ends_a_node_quietly(harness, name, stop):
     assert process.end() == (0, '')
 
 
+def test_a_program_that_a_node_ran_in_gets_its_signals_back(harness):
+    from linkage_ros.nodes.shutdown import ShutdownHandler
+
+    def handlers():
+        return [signal.getsignal(stop) for stop in (signal.SIGINT, signal.SIGTERM)]
+
+    before = handlers()
+    with ShutdownHandler() as shutdown:
+        assert not set(handlers()) & set(before) and not shutdown.is_over
+    assert handlers() == before and signal.set_wakeup_fd(-1) == -1
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('name', EXECUTABLES)

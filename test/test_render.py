@@ -155,7 +155,7 @@ def test_the_bars_in_the_data_are_as_long_as_in_the_original_document(tmp_path):
         assert math.dist(*ends) == pytest.approx(length, rel=1e-13)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('type_', list(mechanisms.TYPES))
 def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
     one = machine(type_)
@@ -180,6 +180,7 @@ def test_nothing_reaches_over_the_edge_of_a_picture(tmp_path, config, args):
     assert all((edge == 255).all() for edge in edges)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('type_, options', [
     ('slotted_lever', {}), ('jansen', {'leg_pairs': 2}), ('peaucellier', {})])
 def test_an_animation_shows_what_a_still_of_that_time_shows(tmp_path, type_, options):
@@ -343,7 +344,7 @@ def test_angles_and_ratio_of_a_slotted_lever_are_printed():
     assert texts_of(picture)[1:] == ['φ = 0.0°', 'φ/θ = –', f'dφ/dθ = {80 / 230:.3f}']
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('trace', TRACES)
 @pytest.mark.parametrize('type_', ['jansen', 'five_bar'])
 def test_every_trace_and_part_can_be_drawn(type_, trace):
