@@ -44,7 +44,7 @@ import browser  # noqa: E402
 from geometry_msgs.msg import Point  # noqa: E402
 from linkage_ros import mechanisms, palette, scene  # noqa: E402
 from linkage_ros.c_code import header  # noqa: E402
-from linkage_ros.nodes import message_layout, messages  # noqa: E402
+from linkage_ros.nodes import message_layout, messages, ownership  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
@@ -58,7 +58,6 @@ from linkage_ros.web import (  # noqa: E402
     poses,
     scene_view,
     server,
-    settings,
 )
 from linkage_ros.web.feed import Feed  # noqa: E402
 from linkage_ros.web.scene_view import LATCHED  # noqa: E402
@@ -403,38 +402,52 @@ def test_a_refusal_says_why_and_changes_nothing(lever, values, reason):
             return await page.set('/lever', **values)
 
     assert re.search(reason, asyncio.run(use(lever.viewer.url)))
-    assert lever.values('lever.dimensions.a') == [80.0] * 3
-    assert lever.values('lever.dimensions.b') == [150.0] * 3
+    assert lever.values('lever.dimensions.a') == [80.0]
+    assert lever.values('lever.dimensions.b') == [150.0]
 
 
-def test_what_kinematics_does_not_show_is_set_on_the_node_that_does(graph, show):
-    def other(name, value):
-        def made(**kwargs):
-            node = rclpy.create_node(name, **kwargs)
-            node.declare_parameter('lever.dimensions.b', value)
-            node.declare_parameter('lever.spring', value)
-            return node
-        return made
+def test_what_nobody_announces_is_not_on_the_page(graph, show):
+    def other(**kwargs):
+        node = rclpy.create_node('a_node', **kwargs)
+        node.declare_parameter('lever.dimensions.b', 1.0)
+        node.declare_parameter('lever.spring', 1.0)
+        return node
 
-    def before():
-        # Their names come before that of kinematics.
-        before.first, before.second = (graph.start(other(name, value)) for name, value in (
-            ('a_node', 1.0), ('b_node', 2.0)))
+    running = show(LEVER, before=lambda: graph.start(other))
 
-    running = show(LEVER, before=before)
+    async def use(url):
+        async with Page(url) as page:
+            cast = await page.cast('/lever', '/drop')
+            assert await page.set('/lever', dimensions__b=152.0) == ''
+            return {one['name'] for one in cast['/lever']['settings']}
+
+    assert 'spring' not in asyncio.run(use(running.viewer.url))
+    assert running.value(Kinematics, 'lever.dimensions.b') == 152.0
+
+
+def test_announcements_that_make_no_sense_change_nothing(graph, show):
+    running = show(LEVER)
+    publisher = graph.node.create_publisher(
+        ParameterEvent, ownership.TOPIC, ownership.LATCHED)
+    odd = [ParameterMessage(name='lever.scale', value=ParameterValue(type=200)), *(
+        Parameter(name, value=value).to_parameter_msg() for name, value in (
+            ('lever.scale', 'wide'), ('mechanisms', [b'l']), ('', 1.0), ('lever.crank.speed', 3)))]
 
     async def use(url):
         async with Page(url) as page:
             await page.cast('/lever', '/drop')
-            await page.shown('/lever', 'dimensions.b', 150.0)
-            await page.shown('/lever', 'spring', 1.0)
+            for node in ('', '/nobody', 'x' * 1000):
+                for part in (odd, odd[:1], odd[1:2]):
+                    publisher.publish(ParameterEvent(node=node, new_parameters=part))
+            publisher.publish(ParameterEvent(node='/crank_driver', changed_parameters=[
+                Parameter('lever.crank.speed', value=3.25).to_parameter_msg()]))
+            await page.heard('value', mechanism='/lever', name='crank.speed', value=3.25)
             assert await page.set('/lever', dimensions__b=152.0) == ''
-            assert await page.set('/lever', spring=3) == ''
+            await page.heard('value', mechanism='/lever', name='dimensions.b', value=152.0)
+            return await page.ask('pose', '/lever')
 
-    asyncio.run(use(running.viewer.url))
-    assert running.value(Kinematics, 'lever.dimensions.b') == 152.0
-    assert [node.get_parameter(f'lever.{name}').value for node in (before.first, before.second)
-            for name in ('dimensions.b', 'spring')] == [1.0, 3.0, 2.0, 2.0]
+    answer = asyncio.run(use(running.viewer.url))
+    assert answer['reason'] == '' and 'crank' in answer['inputs']
 
 
 @pytest.mark.slow
@@ -716,23 +729,17 @@ def test_the_page_is_sent_what_an_output_does_over_a_turn(lever):
     assert about_drop[0]['y'][180] in (0.0, math.pi)
 
 
-@pytest.mark.slow
-def test_a_node_that_is_silent_at_first_is_waited_for_and_not_guessed(show, monkeypatch):
-    asked, answered = settings.RemoteNode.parameters, asyncio.Event()
-
-    async def late(self, prefixes, known=()):
-        if self.name == '/kinematics' and not answered.is_set():
-            raise scene_view.NoAnswer('busy')
-        return await asked(self, prefixes, known)
-
-    monkeypatch.setattr(settings.RemoteNode, 'parameters', late)
-    running = show({**LEG, 'leg.scale': 0.5})
+def test_a_node_that_is_silent_at_first_is_waited_for_and_not_guessed(graph, show):
+    # Markers that somebody publishes before `kinematics` announces their mechanism.
+    graph.node.create_publisher(MarkerArray, 'leg/markers', 1)
+    graph.node.create_publisher(Marker, 'leg/locus', LATCHED)
+    running = show({}, kinds=())
 
     async def use(url):
         async with Page(url) as page:
             await browser.until(lambda: any(said.get('mechanisms') for said in page.said))
             reasons = [(await page.ask(op, '/leg'))['reason'] for op in ('pose', 'tune', 'curve')]
-            answered.set()
+            running.nodes.extend(graph.start(kind, {**LEG, 'leg.scale': 0.5}) for kind in NODES)
             await page.cast('/leg')
             return reasons, await page.ask('pose', '/leg')
 
@@ -1511,27 +1518,18 @@ def test_a_viewer_that_ends_says_so_to_its_pages(show):
 
 
 def test_a_node_that_does_not_answer_is_named(graph, show, monkeypatch):
-    def other(**kwargs):
-        node = rclpy.create_node('a_node', **kwargs)
-        node.declare_parameter('leg.spring', 1.0)
-        return node
-
-    def before():
-        before.node = graph.start(other)
-
-    running = show(LEG, before=before)
+    running = show(LEG)
 
     async def use(url):
         async with Page(url) as page:
             await page.cast('/leg')
-            await page.shown('/leg', 'spring', 1.0)
             monkeypatch.setattr(bridge, 'SECONDS_TO_ANSWER', 0.1)
-            graph.executor.remove_node(before.node)
-            return await page.set('/leg', spring=2.0)
+            graph.executor.remove_node(running.nodes[NODES.index(Kinematics)])
+            return await page.set('/leg', scale=2.0)
 
     assert asyncio.run(use(running.viewer.url)) == (
-        '/a_node/set_parameters_atomically does not answer')
-    assert before.node.get_parameter('leg.spring').value == 1.0
+        '/kinematics/set_parameters_atomically does not answer')
+    assert running.values('leg.scale') == [1.0]
 
 
 def test_an_input_that_is_moved_is_there_until_messages_say_otherwise(graph, show, monkeypatch):

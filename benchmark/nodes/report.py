@@ -34,6 +34,8 @@ CPU = 1.0
 # The longest gap around a change, the answer to a request of a hundred sets [ms], and the start of
 # 64 mechanisms by that of a bare node: a fifth more than it was.
 GAP, HUNDRED, START = 15.0, 30.0, 1.24
+# What a change may take of the executor [ms], by its kind.
+CHANGED = {'dimension': 3.0, 'points': 1.0, 'pose': 1.0, 'frame_id': 1.0}
 
 
 def found(result, column, name):
@@ -235,9 +237,18 @@ def change_targets(rows):
                   key=lambda row: row['gap'])
     lines = [[f'longest gap around one request, median ({longest["kind"]})', f'<= {GAP:.0f} ms',
               f'{longest["gap"]:.1f} ms', met(longest['gap'], GAP)]]
-    return lines + [['a hundred sets in one request', f'<= {HUNDRED:.0f} ms',
-                     f'{row["answered"]:.1f} ms', met(row['answered'], HUNDRED)]
-                    for row in rows if row['kind'] == '100 in one request']
+    for row in rows:
+        if row['kind'] == '100 in one request':
+            lines += [['a hundred sets in one request', f'<= {HUNDRED:.0f} ms',
+                       f'{row["answered"]:.1f} ms', met(row['answered'], HUNDRED)]]
+        if row['kind'] in CHANGED and 'executor' in row:
+            lines += [[f'executor for a {row["kind"]}', f'<= {CHANGED[row["kind"]]:.0f} ms',
+                       f'{row["executor"]:.2f} ms', met(row['executor'], CHANGED[row['kind']])]]
+        if 'delay' in row:
+            lines += [['a message that 100 requests at once delay, 200 Hz', f'<= {HUNDRED:.0f} ms',
+                       f'{row["delay"]:.1f} ms', met(row['delay'], HUNDRED)],
+                      ['the same, messages lost', '0', row['lost'], met(row['lost'], 0)]]
+    return lines
 
 
 def growth_targets(rows):
@@ -455,11 +466,11 @@ def stream(result):
 def changes(result):
     """Return how long poses are held up by a change."""
     return ('12 legs at 500 Hz: the longest time between two poses around a change, its median '
-            'and the longest, and when the change was answered [ms]. A hundred requests are a '
-            'hundred changes, for which there is no target.\n\n' + table(
-                ['change', 'node', 'gap', 'longest', 'answered after'],
-                [[row['kind'], column, *(f'{row[name]:.1f}'
-                                         for name in ('gap', 'longest', 'answered'))]
+            'and the longest, when the change was answered, and the CPU time of the executor for '
+            'one [ms]. A hundred requests are a hundred changes.\n\n' + table(
+                ['change', 'node', 'gap', 'longest', 'answered after', 'executor'],
+                [[row['kind'], column, *(f'{row[name]:.1f}' if row.get(name) else ''
+                                         for name in ('gap', 'longest', 'answered', 'executor'))]
                  for column in COLUMNS for row in found(result, column, 'changes')]))
 
 

@@ -104,32 +104,35 @@ class Follower:
         """Adopt what waits, together or else by mechanism; return the reasons of refusals."""
         present = self._present(self._waiting)
         waiting = {name: value for name, value in self._waiting.items() if value != present[name]}
-        self._waiting, reasons = {}, []
-        if waiting and self._parameters.follow(waiting):
-            for mechanism in sorted({name.partition('.')[0] for name in waiting}):
-                own = {name: value for name, value in waiting.items()
-                       if name.partition('.')[0] == mechanism}
-                if reason := self._parameters.follow(own):
-                    self._waiting.update(own)
-                    reasons.append(reason)
-        return reasons
+        parts: Dict[str, Dict[str, Any]] = {}
+        for name, value in waiting.items():
+            parts.setdefault(name.partition('.')[0], {})[name] = value
+        self._waiting = waiting
+        if not waiting or not self._parameters.follow(waiting):
+            parts = {}
+        refused = {mechanism: reason for mechanism, part in parts.items()
+                   if (reason := self._parameters.follow(part))}
+        self._waiting = {name: value for mechanism in refused
+                         for name, value in parts[mechanism].items()}
+        return [*refused.values()]
 
     def _present(self, names: Iterable[str]) -> Dict[str, Any]:
         """Return this node's values of all parameters of the mechanisms that names begin with."""
-        machines = self._parameters.scene.machines
-        return {one.name: one.value for name in {name.partition('.')[0] for name in names}
-                if name in machines for one in machines[name].parameters}
+        mechanisms = self._parameters.scene.machines
+        return {parameter.name: parameter.value
+                for mechanism in {name.partition('.')[0] for name in names} & mechanisms.keys()
+                for parameter in mechanisms[mechanism].parameters}
 
     def _compare(self, event: ParameterEvent, mechanisms: Iterable[str],
                  there: Mapping[str, Any], here: Mapping[str, Any]) -> None:
         """Compare a full announcement with this node's mechanisms: equal ones are followed."""
-        fields, machines = self._parameters.followed, self._parameters.scene.machines
+        fields, present = self._parameters.followed, self._parameters.scene.machines.keys()
         started = event.node != self._owner or event.new_parameters
         self._owner, self._waiting = event.node, {}
         unlike = {name.partition('.')[0]: name for name in there
                   if fields[name].read_only and here[name] != there[name]}
-        missing = set(machines) ^ set(mechanisms)
-        self._mechanisms = machines.keys() - missing - unlike.keys()
+        missing = present ^ set(mechanisms)
+        self._mechanisms = present - missing - unlike.keys()
         self._warn('unlike', [f'{name} is {quoted(here[name])} here and '
                               f'{quoted(there[name])} there' for name in unlike.values()],
                    'another mechanism, which is not followed')

@@ -61,16 +61,16 @@ class SceneParameters:
                  changed: Callable[[list[scenes.Parameter]], None]):
         self._node, self._check, self._changed = node, check, changed
         # An empty list in a parameter file has neither type nor value.
-        given = {name: () if one.value is None else scenes.plain(one.value)
-                 for name, one in node.get_parameters_by_prefix('').items()}
+        given = {name: () if parameter.value is None else scenes.plain(parameter.value)
+                 for name, parameter in node.get_parameters_by_prefix('').items()}
         self.scene = scenes.read(given)
-        own = [one for one in self.scene.parameters if role == one.field.owner]
-        self.fields = {one.name: one.field for one in own}
-        self.followed = {one.name: one.field for one in self.scene.parameters
-                         if role in one.field.readers and one.name not in self.fields}
+        own = [parameter for parameter in self.scene.parameters if role == parameter.field.owner]
+        self.fields = {parameter.name: parameter.field for parameter in own}
+        self.followed = {parameter.name: parameter.field for parameter in self.scene.parameters
+                         if role in parameter.field.readers and parameter.name not in self.fields}
         # An input that has left its start is not checked to be in its sweep.
         self._is_strict = role in scenes.START.readers
-        of_scene = given.keys() & {one.name for one in self.scene.parameters}
+        of_scene = given.keys() & {parameter.name for parameter in self.scene.parameters}
         self.is_given = bool(of_scene)
         # A parameter is declared by its owner alone.
         for name in of_scene:
@@ -91,13 +91,13 @@ class SceneParameters:
         the change is refused, there are no results.
         """
         valid = {}
-        for i, one in enumerate(messages):
+        for i, message in enumerate(messages):
             with suppress(scenes.SceneError, KeyError, ValueError):
-                parameter = Parameter.from_parameter_msg(one)
+                parameter = Parameter.from_parameter_msg(message)
                 self._checked(parameter)
                 valid[i] = parameter
         # Of a repeated name the last value counts.
-        last = {one.name: one for one in valid.values()}
+        last = {parameter.name: parameter for parameter in valid.values()}
         result = self._node.set_parameters_atomically([*last.values()])
         return dict.fromkeys(valid, result) if result.successful else {}
 
@@ -132,29 +132,30 @@ class SceneParameters:
 
     def _declare(self, own: Sequence[scenes.Parameter]) -> None:
         descriptors = {field: _descriptor(field, field.read_only)
-                       for field in {one.field for one in own}}
+                       for field in {parameter.field for parameter in own}}
         # The value of an empty list does not imply its type.
-        empty = [one for one in own if one.value == ()]
+        empty = [parameter for parameter in own if parameter.value == ()]
         self._node.declare_parameters('', [
-            (one.name, one.value, copy(descriptors[one.field])) if one.value != () else
-            (one.name, None, _descriptor(one.field, read_only=False)) for one in own],
-            ignore_override=True)
-        self._node.set_parameters_atomically([_parameter(one) for one in empty])
-        for one in empty:
-            if one.field.read_only:
-                self._node.set_descriptor(one.name, descriptors[one.field])
+            (parameter.name, None, _descriptor(parameter.field, read_only=False))
+            if parameter in empty else
+            (parameter.name, parameter.value, copy(descriptors[parameter.field]))
+            for parameter in own], ignore_override=True)
+        self._node.set_parameters_atomically([_parameter(parameter) for parameter in empty])
+        for parameter in empty:
+            if parameter.field.read_only:
+                self._node.set_descriptor(parameter.name, descriptors[parameter.field])
 
     def _read(self, parameters: list[Parameter]) -> list[Parameter]:
         """Read the changed scene; return the parameters in their declared types, and derived."""
         if self._is_read:
             self._is_read = False
             return parameters
-        for one in parameters:
-            if not self._node.has_parameter(one.name):
-                raise Undeclared(self._unknown(one.name))
+        for parameter in parameters:
+            if not self._node.has_parameter(parameter.name):
+                raise Undeclared(self._unknown(parameter.name))
         try:
-            values = {one.name: self._checked(one) for one in parameters
-                      if one.name in self.fields}
+            values = {parameter.name: self._checked(parameter) for parameter in parameters
+                      if parameter.name in self.fields}
             self._prepare(values, self._is_strict)
         except scenes.SceneError as error:
             self._refusal = str(error)
@@ -163,8 +164,9 @@ class SceneParameters:
             self._node.report('a changed parameter', error)
             self._refusal = elided(f'internal error: {error!r}', 299)
             return parameters
-        return [Parameter(one.name, _kind(self.fields[one.name]), values[one.name])
-                if one.name in values else one for one in parameters] + self._derived(values)
+        return self._derived(values) + [Parameter(
+            parameter.name, _kind(self.fields[parameter.name]), values[parameter.name])
+            if parameter.name in values else parameter for parameter in parameters]
 
     def _unknown(self, name: str) -> str:
         owner = f'; set it on {scenes.OWNER}' if name in self.followed else ''
@@ -188,8 +190,9 @@ class SceneParameters:
 
     def _derived(self, given: Any) -> list[Parameter]:
         """Return those whose defaults depend on others that have changed."""
-        return [_parameter(one) for one in self._difference if one.name in self.fields
-                and one.name not in given and not one.field.read_only]
+        return [_parameter(parameter) for parameter in self._difference
+                if parameter.name in self.fields and parameter.name not in given
+                and not parameter.field.read_only]
 
     def _answer(self, _: Any) -> SetParametersResult:
         reason, self._refusal = self._refusal, ''

@@ -46,14 +46,14 @@ except ImportError:
 
 # Longest wait for an event [s]: some builds of the EventsExecutor do not wait without a limit.
 # They loop at full load and ignore signals.
-LONGEST_WAIT = 1.0
+MAX_WAIT_S = 1.0
 
 # Longest time for which the worker thread delays a message [s]. At shorter intervals, it would
 # interrupt the processing of messages, and more of them would be late.
-SWITCH_INTERVAL = 0.0005
+SWITCH_INTERVAL_S = 0.0005
 
 # Time between two checks for another node of the same name [s].
-SECONDS_BETWEEN_CHECKS = 2.0
+NAMESAKE_CHECK_PERIOD_S = 2.0
 
 
 class SceneNode(Node):
@@ -115,7 +115,7 @@ class SceneNode(Node):
         if self._role != scenes.OWNER:
             Follower(self, self._parameters_of_scene)
         self._namesakes = self.create_timer(
-            SECONDS_BETWEEN_CHECKS, self.guarded('a check of names', self._warn_of_namesake),
+            NAMESAKE_CHECK_PERIOD_S, self.guarded('a check of names', self._warn_of_namesake),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def check(self, new: scenes.Scene) -> None:
@@ -272,7 +272,7 @@ def run_together(make: Callable[[], Iterable[Node]], name: str, args: Any = None
 
 def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_class: Any,
          shutdown: ShutdownHandler) -> int:
-    sys.setswitchinterval(SWITCH_INTERVAL)
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         _refuse_arguments(args)
@@ -321,7 +321,7 @@ def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
             executor.add_node(node)
         while rclpy.ok() and not shutdown.is_over:
             try:
-                executor.spin_once(timeout_sec=LONGEST_WAIT)
+                executor.spin_once(timeout_sec=MAX_WAIT_S)
             except ExternalShutdownException:
                 raise
             except Exception as error:

@@ -53,6 +53,7 @@ MARKERS_TYPE, LOCUS_TYPE = 'visualization_msgs/msg/MarkerArray', 'visualization_
 INPUTS_TYPE = 'sensor_msgs/msg/JointState'
 SECONDS_BETWEEN_LOOKS = 1.0
 SECONDS_TO_LINGER = 1.0
+SECONDS_TO_ANNOUNCE = 1.0
 SECONDS_TO_ARRIVE, ARRIVED = 1.0, 1e-6
 # Parameters that define a scene, which a saved file always has.
 DEFINES = re.compile(r'mechanisms|[^.]+\.(type|scale|dimensions\..+)')
@@ -391,18 +392,23 @@ class SceneView:
         return []
 
     async def _change(self, marked: Published, announced: Published,
-                      input_topics: Mapping[str, Sequence[str]]) -> None:
+                      input_topics: dict[str, list[str]]) -> None:
         nodes = {node for _, publishers in announced for node, _ in publishers}
         for gone in self._announced.keys() - nodes:
             del self._announced[gone]
-        owners = {topic[:-len(MARKERS)]: owners for topic, owners in marked}
+        owners = {topic[:-len(MARKERS)]: [node for node, _ in own] for topic, own in marked}
         await self._bridge.ask(
             self._open, list(owners), nodes, [topic for topic, _ in announced],
             {topic for topics in input_topics.values() for topic in topics})
-        mechanisms = {key: ShownMechanism(key, own[0][0], {}, tuple(
-            topic for node, _ in own for topic in input_topics.get(node, ())))
-            for key, own in owners.items()}
-        for mechanism in mechanisms.values():
+        with suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(self._hear(nodes), SECONDS_TO_ANNOUNCE)
+        self._seen = marked, announced, input_topics
+        mechanisms = {}
+        for key, own in owners.items():
+            # Others may publish on its topics, too.
+            own.sort(key=lambda node: not self._announced.get(node, {}).get('mechanisms'))
+            mechanism = mechanisms[key] = ShownMechanism(key, own[0], {}, tuple(
+                topic for node in own for topic in input_topics[node]))
             # A node that starts has not announced its parameters.
             with suppress(Refused):
                 mechanism.settings = await self._aside(partial(
@@ -410,6 +416,12 @@ class SceneView:
         self._mechanisms = mechanisms
         for client in self.clients:
             self._show(client)
+
+    async def _hear(self, nodes: Collection[str]) -> None:
+        """Wait until some nodes have announced their parameters."""
+        while not self._announced.keys() >= set(nodes):
+            self._news.clear()
+            await self._news.wait()
 
     def _values(self, owner: str) -> dict[str, tuple[str, Any]]:
         """Return node and value of each parameter of an owner's mechanisms, by full name."""
