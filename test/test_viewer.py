@@ -338,7 +338,8 @@ def test_the_page_is_told_what_it_draws_and_moves(path):
             turn = told['inputs'][key]['turn']
             assert (turn is not None) == drive.input.turns
             start = [one.start for one in machine.inputs.values()]
-            other = [value + (turn or 0.0) * (one == key) for one, value in zip(machine.inputs, start)]
+            other = [value + (turn or 0.0) * (one == key)
+                     for one, value in zip(machine.inputs, start)]
             for joint, place in machine.linkage.solve(poses.theta_of(start)).items():
                 np.testing.assert_allclose(
                     machine.linkage.solve(poses.theta_of(other))[joint], place, atol=1e-9)
@@ -2760,7 +2761,8 @@ def test_a_reload_and_another_viewer_keep_what_is_seen_and_a_lost_connection_is_
 @pytest.mark.long
 @needs_browser
 def test_a_phone_may_reload_the_page_as_often_as_it_likes(show, looked_at):
-    running = show({**without_defaults(scene.load(str(ROOT / 'config' / 'all.yaml'))), 'rate': 20.0})
+    given = without_defaults(scene.load(str(ROOT / 'config' / 'all.yaml')))
+    running = show({**given, 'rate': 20.0})
 
     async def doing(seen):
         await seen.page.resize(390, 844, 'light')

@@ -12,7 +12,6 @@
 
 from contextlib import contextmanager
 import csv
-import math
 from pathlib import Path
 import subprocess
 import tempfile

@@ -59,14 +59,11 @@ class Sweep:
         self._size, still = sizes[0], [0.0] * len(others)
         self._inputs, self._speeds, self._still = (theta_of(values) for values in (
             [own, *others], [1.0 / sizes[0], *still], [0.0, *still]))
-        self.values, self.reach, self.dead = (
-            np.multiply(each, sizes[0]) for each in (own, reach, dead))
-
-    def ends(self) -> list[float]:
-        """Return the ends of the reach that are no dead points; a full rotation has none."""
-        drive = self._machine.first.input
-        return [] if drive.is_whole(self.reach) else [end for end in self.reach.ravel().tolist()
-            if (drive.apart(end, self.dead) > SAME * drive.size).all()]
+        self.values, self.dead = (np.multiply(each, sizes[0]) for each in (own, dead))
+        # The ends of the reach that are no dead points; a full rotation has none.
+        self.ends = [] if self.input.is_whole(reach) else [
+            end for end in np.multiply(np.ravel(reach), sizes[0]).tolist()
+            if (self.input.apart(end, self.dead) > SAME * self.input.size).all()]
 
     def names(self, kind: str) -> list[str]:
         """Return the joints with a transmission angle, or the outputs."""
@@ -146,7 +143,7 @@ def curve(machine: SceneMechanism, present: Sequence[float], kind: str = POSITIO
         y[known] = np.unwrap(y[known])
     return {'input': sweep.input.name, 'output': output, 'names': names,
             'units': [sweep.input.unit, unit], 'power': POWERS.get(kind, 0), 'x': x.tolist(),
-            'y': list(map(shown, y.tolist())), 'ends': sweep.ends(), 'dead': sweep.dead.tolist()}
+            'y': list(map(shown, y.tolist())), 'ends': sweep.ends, 'dead': sweep.dead.tolist()}
 
 
 def exported(machine: SceneMechanism, present: Sequence[float], form: str, frame_id: str) -> str:

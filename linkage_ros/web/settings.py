@@ -52,8 +52,8 @@ class Setting:
     def described(self) -> dict[str, Any]:
         """Return its description for the page, which has a control for it in a group, or none."""
         low, high = self.ends or (None, None)
-        has_control = not self.field.read_only and self.field.kind in ALLOWS and (
-            self.field.kind == 'bool' or low is not None and low < high)
+        has_control = not self.field.read_only and (
+            self.field.kind == 'bool' or self.ends is not None and self.ends[0] < self.ends[1])
         return {'name': self.name, 'value': self.value, 'kind': self.field.kind,
                 'meaning': self.field.meaning, 'allowed': self.field.allowed,
                 'unit': self.field.unit, 'low': low, 'high': high,
