@@ -66,23 +66,23 @@ def main() -> int:
 
 def show():
     """Observe the nodes, report and draw; raise DemoError if something is wrong."""
-    machines = scene.load(SCENE).machines
+    mechanisms = scene.load(SCENE).machines
     try:
-        received, answer = observe(machines)
+        received, answer = observe(mechanisms)
     except (AssertionError, RuntimeError) as error:
         raise DemoError(error) from None
     report_motions(received)
-    report_answer(next(one for one in machines.values() if one.linkage.type == 'slotted_lever'),
+    report_answer(next(one for one in mechanisms.values() if one.linkage.type == 'slotted_lever'),
                   answer)
     draw(received)
     print(NEXT)
 
 
-def observe(machines):
+def observe(mechanisms):
     """Return the messages of the mechanisms, and the response of the service."""
     with Domain() as domain, Nodes(SCENE, domain.id) as nodes, Graph(domain.id) as graph:
         print(f'Running three nodes on {SCENE.name}, ROS_DOMAIN_ID {domain.id} ...', flush=True)
-        received = [Received(machine, graph) for machine in machines.values()]
+        received = [Received(mechanism, graph) for mechanism in mechanisms.values()]
         inverse = graph.node.create_client(ServoInverse, 'servo_inverse')
 
         def wait(held):
@@ -108,7 +108,7 @@ def report_motions(received):
     """Print a line for each mechanism; raise DemoError if the length of a bar is wrong."""
     print('\nmechanism        messages  rate [Hz]  length error  traced curve [m]')
     for one in received:
-        print(f'{one.machine.name:14} {len(one.times):10} {one.rate:10.1f}  '
+        print(f'{one.mechanism.name:14} {len(one.times):10} {one.rate:10.1f}  '
               f'{one.length_error():12.1e}  {" x ".join(f"{side:.3g}" for side in one.extent)}')
     print('(length error: largest of all bars and messages, as a part of the longest bar)')
     worst = max(one.length_error() for one in received)
@@ -116,9 +116,9 @@ def report_motions(received):
         raise DemoError(f'the length of a bar is wrong by {worst:.1e} of the longest bar')
 
 
-def report_answer(machine, answer):
+def report_answer(mechanism, answer):
     """Print a line for each lever angle; raise DemoError if a response is wrong."""
-    a, b, e = (machine.linkage.dimensions[key] for key in 'abe')
+    a, b, e = (mechanism.linkage.dimensions[key] for key in 'abe')
     print('\nlever [deg]  servo [deg]  d lever / d servo  error [rad]')
     for lever, servo, reduction, reachable in zip(
             LEVER_ANGLES, answer.servo_angle, answer.reduction, answer.reachable):
@@ -140,10 +140,10 @@ def draw(received):
     OUT.mkdir(exist_ok=True)
     print(f'\nDrawing the messages to {OUT} ...', flush=True)
     for one in received:
-        picture = Picture([one.machine], PORTRAIT_SIZE, 'whole', DEFAULT, [one])
+        picture = Picture([one.mechanism], PORTRAIT_SIZE, 'whole', DEFAULT, [one])
         picture.arrange([PORTRAIT_TURNS])
-        files.still(picture, PORTRAIT_TURNS, OUT / f'{one.machine.name}.png')
-    picture = Picture([one.machine for one in received], ANIMATION_SIZE, 'whole',
+        files.still(picture, PORTRAIT_TURNS, OUT / f'{one.mechanism.name}.png')
+    picture = Picture([one.mechanism for one in received], ANIMATION_SIZE, 'whole',
                       DEFAULT_IN_MOTION - {'axes'}, received)
     times = np.arange(0.0, ANIMATED_SECONDS, 1.0 / FRAMES_PER_SECOND) / picture.period
     picture.arrange(times)

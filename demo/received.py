@@ -29,14 +29,14 @@ class Received:
     those of a Cycle, but of the messages. Turns are counted from the time `start` [s].
     """
 
-    def __init__(self, machine, graph):
-        self.machine, self.start = machine, 0.0
+    def __init__(self, mechanism, graph):
+        self.mechanism, self.start = mechanism, 0.0
         self._states, self._markers, self._loci = (
-            graph.listen(type_, f'{machine.name}/{topic}', qos) for type_, topic, qos in (
+            graph.listen(type_, f'{mechanism.name}/{topic}', qos) for type_, topic, qos in (
                 (JointState, 'joint_states', 10), (MarkerArray, 'markers', 10),
                 (Marker, 'locus', LATCHED)))
-        self.prefixes = tuple(machine.assembly().legs)
-        self.period = Wheel(machine.first).period
+        self.prefixes = tuple(mechanism.assembly().legs)
+        self.period = Wheel(mechanism.first).period
 
     @property
     def is_complete(self) -> bool:
@@ -49,8 +49,8 @@ class Received:
                   for state in self._states}
         arrays = {_seconds(array.markers[0]): array.markers for array in self._markers}
         self.times = np.array(sorted(states.keys() & arrays.keys()))
-        self._inputs = [tuple(states[time][f'{self.machine.name}_{name}']
-                              for name in self.machine.inputs) for time in self.times]
+        self._inputs = [tuple(states[time][f'{self.mechanism.name}_{name}']
+                              for name in self.mechanism.inputs) for time in self.times]
         # As in a Cycle: joints, guides and bodies.
         self.course = np.concatenate([
             np.array([_points(marker) for marker in markers]).reshape(
@@ -71,9 +71,9 @@ class Received:
 
     def length_error(self) -> float:
         """Return the largest error of a bar's length, as a part of the longest bar."""
-        linkage, scale = self.machine.linkage, self.machine.scale
+        linkage, scale = self.mechanism.linkage, self.mechanism.scale
         lengths = scale * np.array([linkage.bar_lengths[bar] for bar in linkage.bars])
-        first, last = (self.course[:, :, [self.machine.points.index(name) for name in names]]
+        first, last = (self.course[:, :, [self.mechanism.points.index(name) for name in names]]
                        for names in zip(*linkage.bars))
         received = np.hypot(*np.moveaxis(last - first, -1, 0))
         return float(np.max(np.abs(received - lengths)) / (scale * linkage.longest))

@@ -388,7 +388,7 @@ def test_machines_side_by_side_have_one_time():
     first, second, third = picture.panels
     assert first.values()[0] == pytest.approx(0.8 * math.pi)
     assert second.values()[0] == pytest.approx(-1.2 * math.pi % math.tau)
-    seconds, speed = 0.4 * math.pi, third.machine.first.speed
+    seconds, speed = 0.4 * math.pi, third.mechanism.first.speed
     place = (0.5 + seconds * speed) % 3.0
     assert third.values()[0] == pytest.approx(-0.5 + min(place, 3.0 - place))
     for panel, one in zip(picture.panels, machines):

@@ -28,7 +28,7 @@ FINEST = 100  # the unit of time in a GIF is a hundredth of a second
 # Fonts as outlines, and names from a fixed salt: an SVG that is the same everywhere.
 SVG = {'svg.hashsalt': 'linkage_ros', 'svg.fonttype': 'path'}
 
-# Options of ffmpeg for files without time, place and machine.
+# Options of ffmpeg for files without time, place and mechanism.
 REPRODUCIBLE = ('-threads', '1', '-fflags', '+bitexact', '-flags:v', '+bitexact',
                 '-map_metadata', '-1')
 

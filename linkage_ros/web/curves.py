@@ -43,14 +43,15 @@ class Sweep:
     position bends too much for even samples.
     """
 
-    def __init__(self, machine: SceneMechanism, present: Sequence[float],
+    def __init__(self, mechanism: SceneMechanism, present: Sequence[float],
                  dense_ends: bool = False) -> None:
-        self.linkage, self.input, self._machine = machine.linkage, machine.first.input, machine
-        sizes = [machine.scale_of(name) for name in machine.inputs]
+        self._mechanism, self.linkage = mechanism, mechanism.linkage
+        self.input = mechanism.first.input
+        sizes = [mechanism.scale_of(name) for name in mechanism.inputs]
         others = [value / size for value, size in zip(present, sizes)][1:]
         reach, dead = self.linkage.reach(*others), self.linkage.dead_points(*others)
         if not reach:
-            raise Refused(f'{machine.name} cannot be assembled where its other inputs are')
+            raise Refused(f'{mechanism.name} cannot be assembled where its other inputs are')
         # A NaN separates two arcs.
         own = ascending(np.concatenate([
             *(sampled(low, high, 0, SAMPLES) if dense_ends and not self.input.is_whole(reach)
@@ -70,7 +71,7 @@ class Sweep:
         linkage = self.linkage
         if kind == TRANSMISSION:
             return list(linkage.transmission_angles(self._inputs))
-        return [*(name for name in linkage.joints if name not in self._machine.inputs),
+        return [*(name for name in linkage.joints if name not in self._mechanism.inputs),
                 *(f'{joint}.{axis}' for joint in linkage.points if joint not in linkage.grounded
                   for axis in 'xy')]
 
@@ -84,7 +85,7 @@ class Sweep:
     @np.errstate(all='ignore')
     def of(self, kind: str, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return a quantity of each name in the scene's size; not finite where there is none."""
-        linkage, inputs, size = self.linkage, self._inputs, self._machine.scale_of
+        linkage, inputs, size = self.linkage, self._inputs, self._mechanism.scale_of
         if kind == TRANSMISSION:
             return linkage.transmission_angles(inputs, names)
         if kind == FORCE:
@@ -110,13 +111,13 @@ class Sweep:
         return np.sort([*at, *(dead for dead in self.dead if x[0] < dead < x[-1])])
 
 
-def plots(machine: SceneMechanism) -> dict[str, str]:
+def plots(mechanism: SceneMechanism) -> dict[str, str]:
     """Return of what each of KINDS is plotted: an 'output' or a 'joint'; {} for no plot."""
-    return {} if machine.in_space else {
+    return {} if mechanism.in_space else {
         kind: 'joint' if kind == TRANSMISSION else 'output' for kind in KINDS}
 
 
-def curve(machine: SceneMechanism, present: Sequence[float], kind: str = POSITION,
+def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSITION,
           output: Optional[str] = None) -> dict[str, Any]:
     """
     Return one of KINDS over the first input: x and y in `units`, y None where it has none.
@@ -126,7 +127,7 @@ def curve(machine: SceneMechanism, present: Sequence[float], kind: str = POSITIO
     """
     if kind not in KINDS:
         raise ValueError(f'kind must be one of {", ".join(KINDS)}, not {quoted(kind)}')
-    sweep = Sweep(machine, present, dense_ends=kind in BOUNDED)
+    sweep = Sweep(mechanism, present, dense_ends=kind in BOUNDED)
     names = sweep.names(kind)
     output = names[0] if names and output is None else output or ''
     if not (output in names or kind != TRANSMISSION and sweep.linkage.has_output(output)):
@@ -146,15 +147,15 @@ def curve(machine: SceneMechanism, present: Sequence[float], kind: str = POSITIO
             'y': list(map(shown, y.tolist())), 'ends': sweep.ends, 'dead': sweep.dead.tolist()}
 
 
-def exported(machine: SceneMechanism, present: Sequence[float], form: str, frame_id: str) -> str:
+def exported(mechanism: SceneMechanism, present: Sequence[float], form: str, frame_id: str) -> str:
     """Return a text: 'csv', all kinds of all outputs in rad and m; 'urdf'; or 'c'."""
     if form == 'urdf':
-        return urdf.describe([machine], machine.frame_id or frame_id)
+        return urdf.describe([mechanism], mechanism.frame_id or frame_id)
     if form == 'c':
-        return header.written(machine)
+        return header.written(mechanism)
     if form != 'csv':
         raise ValueError(f'form must be csv, urdf or c, not {quoted(form)}')
-    sweep, text = Sweep(machine, present), io.StringIO()
+    sweep, text = Sweep(mechanism, present), io.StringIO()
     columns = {f'{sweep.input.name} [{sweep.input.unit}]': sweep.values, **{
         f'{kind} {name} [{sweep.unit(kind, name) or 1}]': values for kind in KINDS
         for name, values in sweep.of(kind, sweep.names(kind)).items()}}
