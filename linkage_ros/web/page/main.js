@@ -82,7 +82,7 @@ const connection = new Connection({
     const known = new Map(mechanisms);
     mechanisms.clear();
     for (const one of described) {
-      const mechanism = known.get(one.key) ?? new Mechanism(one);
+      const mechanism = known.get(one.key) ?? new Mechanism(one, connection);
       mechanism.describe(one);
       // Mechanisms of one name in two namespaces have distinct titles.
       mechanism.title = described.some(({ key, name }) => name === one.name && key !== one.key) ? one.key.slice(1) : one.name;
@@ -95,7 +95,7 @@ const connection = new Connection({
   },
 
   look({ number, mechanism, ...look }) {
-    const drawn = mechanisms.get(mechanism) ?? new Mechanism({ key: mechanism });
+    const drawn = mechanisms.get(mechanism) ?? new Mechanism({ key: mechanism }, connection);
     mechanisms.set(mechanism, drawn);
     drawn.markers.set(number, { points: new Float32Array(), ...drawn.markers.get(number), look });
     picture.refit(mechanism);
@@ -133,7 +133,7 @@ const connection = new Connection({
 });
 arithmetic.ask = text => connection.ask({ op: 'read', text });
 
-const panel = new Panel(at('panel'), connection, light, refuse);
+const panel = new Panel(at('panel'), light, refuse);
 
 /** Draw once before the next refresh of the screen, then call `after`. */
 function draw(after) {

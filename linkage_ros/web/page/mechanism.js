@@ -9,7 +9,8 @@ import { History } from './history.js';
 const UNKNOWN = { settings: [], points: [], legs: 1, pairs: 1, inputs: {}, sides: {}, curves: {} };
 
 export class Mechanism {
-  constructor(described) {
+  constructor(described, connection) {
+    this.connection = connection;
     this.markers = new Map();
     this.lastMarkers = performance.now();
     /** Ranges and bars of dimensions, and fixed joints; empty until the viewer has answered. */
@@ -24,6 +25,11 @@ export class Mechanism {
     Object.assign(this, UNKNOWN, described);
     this.settings = new Map(this.settings.map(setting => [setting.name, setting]));
     this.history.begin();
+  }
+
+  /** Request something of the mechanism; return the answer. */
+  ask(op, fields) {
+    return this.connection.ask({ op, mechanism: this.key, ...fields });
   }
 
   value(name) {

@@ -108,8 +108,8 @@ class OutputRow {
 
 /** The part of the panel that moves one mechanism; calls `onshow` when its pose has been received. */
 export class Motion {
-  constructor(mechanism, connection, open, refuse) {
-    Object.assign(this, { mechanism, connection, inputs: new Map(), outputs: new Map(), reason: new Reason() });
+  constructor(mechanism, open, refuse) {
+    Object.assign(this, { mechanism, inputs: new Map(), outputs: new Map(), reason: new Reason() });
     /** The last speeds other than zero, by parameter. */
     this.playing = {};
     this.play = button('', () => this.stopOrPlay(), { hidden: !mechanism.group('speeds').length });
@@ -120,14 +120,14 @@ export class Motion {
     this.dragged = new Newest(async want => {
       const answer = await this.want(want);
       this.say(answer);
-      if (this.connection.opened) refuse(answer.reason);
+      if (mechanism.connection.opened) refuse(answer.reason);
     });
     this.renderPlay();
   }
 
   stopOrPlay() {
     const values = Object.fromEntries(Object.entries(this.speeds).map(([name, speed]) => [`${name}.speed`, this.moves ? 0 : speed]));
-    this.connection.ask({ op: 'set', mechanism: this.mechanism.key, values }).then(answer => this.say(answer));
+    this.mechanism.ask('set', { values }).then(answer => this.say(answer));
   }
 
   /** The speed of the first input when it plays. */
@@ -158,7 +158,7 @@ export class Motion {
 
   /** Request a value of an output, or a place of a joint. */
   async want(want) {
-    const answer = await this.connection.ask({ op: 'pose', mechanism: this.mechanism.key, want });
+    const answer = await this.mechanism.ask('pose', { want });
     if (answer.inputs) this.show(answer);
     if (answer.reach) answer.reason = inWords(answer.reach);
     return answer;
@@ -170,10 +170,10 @@ export class Motion {
 
   /** Request the present pose, with the chosen arrows at the inputs' speeds when it plays. */
   async look() {
-    const { key, inputs, arrows: { kind } } = this.mechanism;
-    if (this.looking || !this.connection.opened || !Object.keys(inputs).length) return;
+    const { connection, inputs, arrows: { kind } } = this.mechanism;
+    if (this.looking || !connection.opened || !Object.keys(inputs).length) return;
     this.looking = true;
-    const answer = await this.connection.ask({ op: 'pose', mechanism: key, ...kind && { arrows: kind, speeds: this.speeds } });
+    const answer = await this.mechanism.ask('pose', kind && { arrows: kind, speeds: this.speeds });
     this.looking = false;
     if (answer.inputs) this.show(answer);
     else if (!this.inputs.size) this.say(answer);

@@ -63,8 +63,8 @@ function path(plot) {
 }
 
 export class Plot {
-  constructor(mechanism, connection, motion) {
-    Object.assign(this, { mechanism, connection, motion, chosen: {}, sight: '' });
+  constructor(mechanism, motion) {
+    Object.assign(this, { mechanism, motion, chosen: {}, sight: '' });
     this.kind = this.choice('Quantity', Object.keys(mechanism.curves));
     this.output = this.choice('Output', []);
     this.other = element('input', { type: 'text', placeholder: 'distance(A,C)', ariaLabel: 'Another output', onchange: () => {
@@ -131,9 +131,7 @@ export class Plot {
 
   async ask() {
     const { kind: { value: kind }, about } = this;
-    const [answer] = await Promise.all([this.connection.ask({
-      op: 'curve', mechanism: this.mechanism.key, kind, output: this.chosen[about],
-    }), library()]);
+    const [answer] = await Promise.all([this.mechanism.ask('curve', { kind, output: this.chosen[about] }), library()]);
     this.reason.say(answer.reason);
     if (answer.reason) this.chosen[about] = this.curve?.about === about ? this.curve.output : undefined;
     if (answer.reason || about !== this.about || !this.element.open) return;

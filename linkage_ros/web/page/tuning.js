@@ -17,8 +17,8 @@ function labelled({ name, group }, inputs) {
 
 export class Tuning {
   /** Calls `light` with the dimension whose bars light up, or an empty text. */
-  constructor(mechanism, connection, open, light) {
-    Object.assign(this, { mechanism, connection, light, controls: new Map(), reason: new Reason() });
+  constructor(mechanism, open, light) {
+    Object.assign(this, { mechanism, light, controls: new Map(), reason: new Reason() });
     this.undoing = button('Undo', () => this.undo());
     this.resetting = button('Reset', () => this.reset());
     this.speeds = this.rows('speeds');
@@ -65,7 +65,7 @@ export class Tuning {
   }
 
   async set(name, value, gesture, before) {
-    const answer = await this.connection.ask({ op: 'set', mechanism: this.mechanism.key, values: { [name]: value } });
+    const answer = await this.mechanism.ask('set', { values: { [name]: value } });
     if (!answer.reason && before !== value) this.mechanism.history.remember(name, before, gesture);
     this.renderTools();
     return answer;
@@ -87,15 +87,15 @@ export class Tuning {
 
   /** Set several values at once; return whether they were accepted. */
   async put(values) {
-    const { reason } = await this.connection.ask({ op: 'set', mechanism: this.mechanism.key, values });
+    const { reason } = await this.mechanism.ask('set', { values });
     this.reason.say(reason && `Refused: ${reason}`);
     for (const name of Object.keys(values)) this.controls.get(name)?.reason.say('');
     return !reason;
   }
 
   async save() {
-    const { name, key, playing } = this.mechanism;
-    const { reason, text } = await this.connection.ask({ op: 'save', mechanism: key, values: playing });
+    const { name, playing } = this.mechanism;
+    const { reason, text } = await this.mechanism.ask('save', { values: playing });
     this.reason.say(reason && `Not saved: ${reason}`);
     if (text) download(`${name}.yaml`, text);
   }
@@ -104,7 +104,7 @@ export class Tuning {
   refresh() {
     clearTimeout(this.resting);
     this.resting = setTimeout(async () => {
-      const tunable = await this.connection.ask({ op: 'tune', mechanism: this.mechanism.key });
+      const tunable = await this.mechanism.ask('tune');
       if ([...this.controls.values()].some(({ held }) => held)) return this.refresh();
       if (tunable.reason) return;
       this.mechanism.tunable = tunable;
