@@ -109,8 +109,8 @@ def gaps(driver, line, client, kind):
     return found, took
 
 
-def crowd(driver, line, client):
-    """Return how many messages 100 requests at once cost, and the longest delays of one [ms]."""
+def crowd(driver, line, client, kind):
+    """Return how many messages requests at once cost, and the longest delays of one [ms]."""
     heard, delays, lost = {}, [], 0
     topic = f'/{line.process.name}/{scenes.topics(SCENE)[0].name}'
     ear = driver.node.create_subscription(
@@ -119,7 +119,7 @@ def crowd(driver, line, client):
     with turning(line, CROWD_RATE) as sent:
         driver.wait(1.0)
         for i in range(ROUNDS):
-            requests = made(CHANGES[CROWD](i))
+            requests = made(CHANGES[kind](i))
             driver.wait(BREAK)
             first = len(sent)
             change(driver, client, requests)
@@ -133,14 +133,15 @@ def crowd(driver, line, client):
 
 
 def executor(driver, process, client, kind):
-    """Return the CPU time of the executor for each change [ms]."""
+    """Return the CPU time [ms] of the executor until a change is answered, and until the end."""
     found = []
     for i in range(4 * ROUNDS):
         requests, start = made(CHANGES[kind](i)), process.executor()
         change(driver, client, requests)
-        driver.wait(0.05)
-        found.append(1e3 * (process.executor() - start))
-    return float(np.median(found))
+        answered = process.executor()
+        driver.wait(0.1)
+        found.append([1e3 * (answered - start), 1e3 * (process.executor() - start)])
+    return np.median(found, axis=0).tolist()
 
 
 def measure(bench):
@@ -151,16 +152,19 @@ def measure(bench):
         line = driver.line(process, SCENE, scenes.topics(SCENE))
         client = driver.node.create_client(SetParameters, '/changed/kinematics/set_parameters')
         rows, cpus = [], {kind: executor(driver, process, client, kind)
-                          for kind in CHANGES if '100' not in kind}
-        lost, delays = crowd(driver, line, client)
+                          for kind in CHANGES if '100' not in kind and kind != 'none'}
+        crowds = {kind: crowd(driver, line, client, kind) for kind in ('none', CROWD)}
         with turning(line):
             driver.wait(2.0)
             for kind in CHANGES:
                 found, took = gaps(driver, line, client, kind)
                 rows.append({'kind': kind, 'gap': float(np.median(found)),
                              'longest': float(max(found)), 'answered': float(np.median(took)),
-                             'executor': cpus.get(kind)})
-        rows[-1].update(lost=lost, delay=float(np.median(delays)), most=float(max(delays)))
+                             **dict(zip(('validated', 'executor'), cpus.get(kind, ())))})
+        for row in rows:
+            if row['kind'] in crowds:
+                row['lost'], delays = crowds[row['kind']]
+                row['delay'] = float(np.median(delays))
         line.close()
     finally:
         process.end()

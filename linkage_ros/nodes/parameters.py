@@ -131,19 +131,13 @@ class SceneParameters:
         return descriptor
 
     def _declare(self, own: Sequence[scenes.Parameter]) -> None:
-        descriptors = {field: _descriptor(field, field.read_only)
-                       for field in {parameter.field for parameter in own}}
+        descriptors = {parameter.field: _descriptor(parameter.field) for parameter in own}
         # The value of an empty list does not imply its type.
-        empty = [parameter for parameter in own if parameter.value == ()]
-        self._node.declare_parameters('', [
-            (parameter.name, None, _descriptor(parameter.field, read_only=False))
-            if parameter in empty else
-            (parameter.name, parameter.value, copy(descriptors[parameter.field]))
-            for parameter in own], ignore_override=True)
-        self._node.set_parameters_atomically([_parameter(parameter) for parameter in empty])
-        for parameter in empty:
-            if parameter.field.read_only:
-                self._node.set_descriptor(parameter.name, descriptors[parameter.field])
+        empty = [_parameter(parameter) for parameter in own if parameter.value == ()]
+        self._node.declare_parameters('', [(
+            parameter.name, None if parameter.value == () else parameter.value,
+            copy(descriptors[parameter.field])) for parameter in own], ignore_override=True)
+        self._node.set_parameters_atomically(empty)
 
     def _read(self, parameters: list[Parameter]) -> list[Parameter]:
         """Read the changed scene; return the parameters in their declared types, and derived."""
@@ -214,9 +208,9 @@ def _parameter(parameter: scenes.Parameter) -> Parameter:
     return Parameter(parameter.name, _kind(parameter.field), parameter.value)
 
 
-def _descriptor(field: Any, read_only: bool) -> ParameterDescriptor:
+def _descriptor(field: Any) -> ParameterDescriptor:
     """Return the descriptor of a field, without its name."""
     # Dynamic typing lets the field refuse a wrong type with its own message.
     return ParameterDescriptor(
-        description=field.meaning, read_only=read_only, type=_kind(field).value,
+        description=field.meaning, read_only=field.read_only, type=_kind(field).value,
         additional_constraints=field.allowed, dynamic_typing=True)

@@ -73,8 +73,10 @@ class SceneNode(Node):
         self._worker = Worker(self, incidents.report)
         self._announcer: Optional[Announcer] = None
         self._adopted: Optional[scenes.Scene] = None
-        # Number of answered requests to set parameters.
-        self._answered = 0
+        # Numbers of requests to set parameters: answered, and waiting.
+        self._answered = self._waiting = 0
+        # The scene that was passed to the worker last.
+        self._passed: Optional[scenes.Scene] = None
         with self._or_destroyed():
             self._parameters_of_scene = SceneParameters(self, name, self.check, self._changed)
         self._role = name
@@ -180,12 +182,14 @@ class SceneNode(Node):
 
         In a turn the executor runs all that is waiting: messages wait for one request at most.
         """
-        answered = -1
+        answered, self._waiting = -1, self._waiting + 1
         while answered != self._answered:
             answered = self._answered
             await _turn()
-        self._answered += 1
-        return self._respond(callback, request, response)
+        self._answered, self._waiting = self._answered + 1, self._waiting - 1
+        response = self._respond(callback, request, response)
+        self._pass_scene()
+        return response
 
     async def _set_parameters(self, callback: Callable, request: Any, response: Any) -> Any:
         """Set valid parameters together or, if that is refused, each by `callback` of rclpy."""
@@ -205,10 +209,15 @@ class SceneNode(Node):
         """Prepare the newest scene, and announce the changed parameters."""
         if type(self).prepare is SceneNode.prepare:
             self._adopt(self.scene, self.scene)
-        else:
-            self._worker.replace('a changed scene', partial(self._prepared, self.scene))
+        self._pass_scene()
         if self._announcer:
             self._announcer.announce(changed)
+
+    def _pass_scene(self) -> None:
+        """Pass a changed scene to the worker, unless waiting requests may change it again."""
+        if not (self._waiting or self.is_settled or self._passed is self.scene):
+            self._passed = self.scene
+            self._worker.replace('a changed scene', partial(self._prepared, self.scene))
 
     def _prepared(self, new: scenes.Scene) -> Callable[[], None]:
         """Prepare a scene; return a function that adopts it."""
