@@ -1646,7 +1646,7 @@ def test_make_view_and_make_demo_end_quietly_when_nobody_reads_what_they_print(a
 
 @pytest.mark.long
 @pytest.mark.parametrize('parameters, named', [
-    ({'port': 'taken'}, 'address already in use'), ({'port': 'taken'}, 'by PORT=8021'),
+    ({'port': 'taken'}, 'address already in use'), ({'port': 'taken'}, 'make view PORT=8021'),
     ({'port': 70000}, 'port'),
     ({'port': 'eighty'}, 'port'), ({'host': '192.0.2.1'}, '192.0.2.1'),
 ])

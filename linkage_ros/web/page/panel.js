@@ -73,7 +73,7 @@ export class Panel {
   show(mechanisms, folded) {
     const before = this.sections;
     this.sections = new Map(mechanisms.map(one => {
-      const built = JSON.stringify([folded, one.title, [...one.settings.values()].map(({ value, ...rest }) => rest)]);
+      const built = JSON.stringify([folded, one.title, one.curves, Object.keys(one.inputs), [...one.settings.values()].map(({ value, ...rest }) => rest)]);
       const old = before.get(one.key);
       return [one.key, old?.built === built ? old : new Section(one, this, folded).after(old, built)];
     }));

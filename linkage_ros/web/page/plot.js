@@ -119,7 +119,7 @@ export class Plot {
 
   /** Request the curve again. */
   refresh() {
-    if (this.element.open) this.asked.offer();
+    if (this.element.open && this.about) this.asked.offer();
   }
 
   /** Update the plot after a change of a parameter. */
