@@ -113,6 +113,9 @@ def test_a_gif_has_the_frames_the_rate_the_loops_and_the_size_asked_for(tmp_path
             image.seek(frame)
             milliseconds += image.info['duration']
         assert milliseconds == 230  # 7/30 s in hundredths
+    again = rendered(tmp_path, '--frames', '2', '--size', '200x200', ending='gif')
+    with Image.open(again) as image:
+        assert image.info['loop'] == 0  # without an end
 
 
 def test_a_turn_is_drawn_in_the_time_it_takes(tmp_path):
@@ -592,3 +595,14 @@ def test_no_name_is_on_a_joint_or_on_another(name):
     joints = [text.axes.transData.transform(text.xy) for text in names]
     assert not any(box.contains(*joint) for box in boxes for joint in joints)
     assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
+
+
+@pytest.mark.parametrize('rows', [1, 3])
+def test_names_see_how_far_they_are_from_the_nearest_line(rows):
+    rng = np.random.default_rng(rows)
+    points, starts, ends = (rng.normal(size=(*shape, 2)) @ (1, 1j)
+                            for shape in ((3, 7), (rows, 5), (rows, 5)))
+    ends[:, 0] = starts[:, 0]
+    along = starts[..., None] + np.linspace(0.0, 1.0, 2001) * (ends - starts)[..., None]
+    nearest = np.abs(points[:, :, None] - along.reshape(rows, 1, -1)).min(axis=2)
+    np.testing.assert_allclose(layers.clearance(points, starts, ends), nearest, atol=2e-3)
