@@ -424,24 +424,33 @@ class SceneView:
             await self._news.wait()
 
     def _values(self, owner: str) -> dict[str, tuple[str, Any]]:
-        """Return node and value of each parameter of an owner's mechanisms, by full name."""
-        names = self._announced.get(owner, {}).get('mechanisms', ())
-        nodes = [node for node in self._announced if _space(node) == _space(owner)]
-        return {name: (node, value) for node in sorted(nodes, key=lambda node: node == owner)
-                for name, value in self._announced[node].items()
-                if '.' not in name or name.partition('.')[0] in names}
+        """Return node and value of each parameter of an owner's scene, by full name."""
+        own, whole = self._announced.get(owner, {}), self._scenes.get(owner)
+        values = {name: (owner, value) for name, value in own.items()}
+        others = {parameter.name: parameter.field for parameter in (
+            whole.parameters if whole else ()) if parameter.name not in own}
+        for node in self._announced.keys() - {owner}:
+            for name in self._announced[node].keys() & others.keys():
+                # Any node may announce anything.
+                if _space(node) == _space(owner):
+                    with suppress(scene.SceneError):
+                        values[name] = node, others[name].checked(
+                            name, self._announced[node][name])
+        return values
 
     def _scene(self, mechanism: ShownMechanism) -> scene.Scene:
         """Return the scene of a mechanism; raise Refused if its parameters are not announced."""
-        values = {name: value for name, (_, value) in self._values(mechanism.owner).items()}
-        if mechanism.name not in values.get('mechanisms', ()):
+        owner = mechanism.owner
+        if mechanism.name not in self._announced.get(owner, {}).get('mechanisms', ()):
             raise Refused(f'the parameters of {mechanism.name} are not known yet')
         try:
-            whole = scene.read(values, self._scenes.get(mechanism.owner), strict=False)
+            # First that of the owner, which knows the names of others' parameters.
+            for _ in range(1 if owner in self._scenes else 2):
+                values = {name: value for name, (_, value) in self._values(owner).items()}
+                self._scenes[owner] = scene.read(values, self._scenes.get(owner), strict=False)
         except scene.SceneError as error:
             raise Refused(str(error)) from None
-        self._scenes[mechanism.owner] = whole
-        return whole
+        return self._scenes[owner]
 
     def _settings(self, mechanism: ShownMechanism, whole: scene.Scene) -> dict[str, Setting]:
         """Return the announced parameters of a mechanism; the ends of sliders take long."""
@@ -507,6 +516,7 @@ class SceneView:
         """Adopt announced values, and forward those that have changed to the pages."""
         if event.new_parameters:
             self._announced[event.node] = {}
+            self._scenes.pop(event.node, None)
         values, changed = self._announced.setdefault(event.node, {}), set()
         for parameter in (*event.new_parameters, *event.changed_parameters):
             # Any node may announce values of unknown types.
