@@ -11,7 +11,8 @@ const RESTED = 300;
 /** A parameter's name without the part that its group in the panel implies. */
 function labelled({ name, group }, inputs) {
   const [first, second] = name.split('.');
-  if (group === 'more') return name;
+  // A long name is broken behind a point or an underscore, before it is anywhere else.
+  if (group === 'more') return name.replace(/[._]/g, '$&\u200b');
   return inputs > 1 && (group === 'speeds' || group === 'starts') ? `${second} of ${first}` : second;
 }
 
