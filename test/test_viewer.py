@@ -271,7 +271,7 @@ def test_what_is_drawn_is_where_the_catalogue_says(show):
     async def look(url):
         async with Page(url) as page:
             await browser.until(lambda: len(page.drawn('/leg', 'joints')) and len(
-                page.drawn('/leg', 'strip')))
+                page.drawn('/leg', 'locus')))
             return page
 
     page = asyncio.run(look(show(LEG).viewer.url))
@@ -283,12 +283,12 @@ def test_what_is_drawn_is_where_the_catalogue_says(show):
     assert not joints[:, 2].any()
     # Bars, the crank among them, and two plates instead of the bars around them.
     ends = page.drawn('/leg', 'lines').reshape(-1, 2, 3)
-    plates = page.drawn('/leg', 'triangles')[:6].reshape(-1, 3, 3)
+    plates = page.drawn('/leg', 'plates').reshape(-1, 3, 3)
     lengths = np.concatenate([ends[:, 0] - ends[:, 1], *(plates - np.roll(plates, 1, axis=1))])
     np.testing.assert_allclose(np.sort(np.linalg.norm(lengths, axis=1)),
                                sorted(leg.bar_lengths[bar] for bar in leg.bars), rtol=1e-6)
     feet = leg.solve(np.linspace(0.0, math.tau, 721), ('G',))['G']
-    curve = page.drawn('/leg', 'strip')[:, :2]
+    curve = page.drawn('/leg', 'locus')[:, :2]
     away = np.linalg.norm(curve[:, None] - feet, axis=2).min(axis=1)
     assert len(curve) > 100 and away.max() < 0.01 * np.ptp(feet[:, 0])
 
@@ -299,18 +299,74 @@ def test_every_setting_is_described_as_the_scene_has_it(lever):
             return await page.cast('/lever', '/drop')
 
     cast, whole = asyncio.run(look(lever.viewer.url)), scene.read(LEVER)
+    groups = {'crank.speed': 'speeds', 'crank.start': 'starts', 'branches.L': 'branches',
+              **{f'dimensions.{key}': 'dimensions' for key in 'abe'},
+              **dict.fromkeys(('scale', 'crank.ratio', 'crank.offset', 'only_named'), 'more')}
     assert {key: (one['key'], one['name']) for key, one in cast.items()} == {
         '/lever': ('/lever', 'lever'), '/drop': ('/drop', 'drop')}
     shown = {f'{one["name"]}.{setting["name"]}': setting
              for one in cast.values() for setting in one['settings']}
     assert shown == {one.name: {
         'name': one.name.partition('.')[2], 'value': value, 'kind': one.field.kind,
-        'meaning': one.field.meaning, 'allowed': one.field.allowed,
-        'fixed': one.field.read_only, 'low': low, 'high': high, 'step': step}
+        'meaning': one.field.meaning, 'allowed': one.field.allowed, 'unit': one.field.unit,
+        'low': low, 'high': high, 'group': groups.get(one.name.partition('.')[2], '')}
         for one in whole.parameters if '.' in one.name
         for value in [list(one.value) if isinstance(one.value, tuple) else one.value]
-        for ends in [slider.ends(whole, one)]
-        for low, high, step in [(*ends, int(one.field.kind == 'integer')) if ends else [None] * 3]}
+        for low, high in [slider.ends(whole, one) or (None, None)]}
+
+
+EXAMPLES = [*sorted((ROOT / 'config').glob('*.yaml')), *sorted((ROOT / 'examples').glob('*.yaml'))]
+
+
+@pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
+def test_the_page_is_told_what_it_draws_and_moves(path):
+    for name, machine in scene.load(str(path)).machines.items():
+        told = json.loads(json.dumps(poses.drawn(machine), allow_nan=False))
+        legs = machine.assembly().legs
+        assert told['legs'] == len(legs) and told['pairs'] == sum(
+            leg.side > 0 for leg in legs.values())
+        assert told['space'] == (machine.linkage.type == 'rods')
+        assert told['points'] == list(machine.points)
+        assert told['sides'].keys() == machine.linkage.branches.keys()
+        default = scene.read({'mechanisms': [name], **{
+            key: value for key, value in machine.values.items() if not key.endswith('.speed')}})
+        assert told['inputs'].keys() == machine.inputs.keys()
+        for key, drive in default.machines[name].inputs.items():
+            assert told['inputs'][key]['speed'] == drive.speed != 0.0
+            assert told['inputs'][key]['unit'] == ('rad' if drive.input.turns else 'm')
+            turn = told['inputs'][key]['turn']
+            assert (turn is not None) == drive.input.turns
+            start = [one.start for one in machine.inputs.values()]
+            other = [value + (turn or 0.0) * (one == key)
+                     for one, value in zip(machine.inputs, start)]
+            for joint, place in machine.linkage.solve(poses.theta_of(start)).items():
+                np.testing.assert_allclose(
+                    machine.linkage.solve(poses.theta_of(other))[joint], place, atol=1e-9)
+
+
+@pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
+def test_the_unit_of_a_parameter_is_that_of_its_description(path):
+    for one in scene.load(str(path)).parameters:
+        said = re.findall(r'\[(.*?)\]', one.field.meaning)
+        assert '{' not in one.field.meaning + one.field.unit
+        if one.field.kind == 'double':
+            assert one.field.unit == ''.join(said).replace('1', ''), one.name
+
+
+@pytest.mark.slow
+def test_a_page_is_told_of_legs_that_are_added(show):
+    async def use(url):
+        async with Page(url) as page:
+            first = (await page.cast('/leg'))['/leg']
+            assert await page.set('/leg', leg_pairs=3) == ''
+            said = await page.heard('value', name='leg_pairs', value=3)
+            assert await page.set('/leg', mirrored=False) == ''
+            return first, said['drawn'], (await page.heard(
+                'value', name='mirrored', value=False))['drawn']
+
+    first, more, fewer = asyncio.run(use(show(LEG).viewer.url))
+    assert [(one['legs'], one['pairs']) for one in (first, more, fewer)] == [
+        (1, 1), (6, 3), (3, 3)]
 
 
 def test_a_slider_sets_the_node_that_owns_the_parameter(show):
@@ -447,7 +503,7 @@ def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
             return answer
 
     answer = asyncio.run(use(running.viewer.url))
-    servo, lever = answer['inputs']['crank']['value'], answer['outputs']['lever']
+    servo, lever = answer['inputs']['crank'], answer['outputs']['lever']
     assert lever_of(servo) == pytest.approx(0.4, abs=1e-12)
     slope = (lever_of(servo + 1e-6) - lever_of(servo - 1e-6)) / 2e-6
     assert lever['rates'] == [pytest.approx(slope, abs=1e-8)]
@@ -520,7 +576,7 @@ def test_any_joint_of_any_leg_is_brought_where_it_can_be(show):
             return answer
 
     crank = asyncio.run(use(running.viewer.url))['inputs']['crank']
-    assert math.remainder(crank['value'] - theta, math.tau) == pytest.approx(0.0, abs=1e-6)
+    assert math.remainder(crank - theta, math.tau) == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.slow
@@ -554,12 +610,11 @@ def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(lever):
             return await page.ask('tune', '/lever'), await page.ask('tune', '/drop')
 
     whole = scene.read(LEVER)
-    for found, name, fixed, sides, bars in zip(
+    for found, name, fixed, bars in zip(
             asyncio.run(use(lever.viewer.url)), ('lever', 'drop'), ('OQ', 'OC'),
-            ({'L': ['out', 'in']}, {}),
             ({'a': ['OA'], 'b': ['OQ', 'QL'], 'e': []}, {'a': 'OC OA AB AP BP CB'.split()})):
         assert {**found, 'id': 0} == {
-            'op': 'answer', 'id': 0, 'reason': '', 'fixed': list(fixed), 'sides': sides,
+            'op': 'answer', 'id': 0, 'reason': '', 'fixed': list(fixed),
             'bars': {f'dimensions.{key}': [list(pair) for pair in pairs]
                      for key, pairs in bars.items()},
             'travel': {one.name.partition('.')[2]: list(slider.ends(whole, one))
@@ -670,7 +725,7 @@ def test_the_page_is_sent_what_an_output_does_over_a_turn(lever):
         np.testing.assert_allclose(y[known], values[np.isin(x, np.array(said['x'])[known])],
                                    rtol=2e-5, atol=2e-7)
     assert [said['units'][1] for said in about_lever] == ['rad', 'rad/s', 'rad/s²', 'rad', '']
-    assert about_lever[0]['reach'] == [[-math.pi, math.pi]] and about_lever[0]['dead'] == []
+    assert about_lever[0]['ends'] == about_lever[0]['dead'] == []
     # A kite lies flat at 0 and at pi: there it may be assembled in two ways.
     assert about_drop[0]['dead'] == [-math.pi, 0.0] and about_drop[0]['output'] == 'B'
     assert about_drop[0]['y'][180] in (0.0, math.pi)
@@ -706,7 +761,7 @@ def test_what_a_sensor_cannot_be_at_is_nowhere_on_the_page(show):
         async with Page(url) as page:
             async def carriage(told):
                 crank_states.publish(JointState(name=['lift_cylinder'], position=[told]))
-                value = (await page.ask('pose', '/lift'))['inputs']['carriage']['value']
+                value = (await page.ask('pose', '/lift'))['inputs']['carriage']
                 assert math.isfinite(value)
                 return value
 
@@ -763,6 +818,21 @@ def test_an_input_goes_where_it_is_wanted_or_as_near_as_it_gets(
     if missed:
         assert missed == poses.Reach(input_, tuple(poses.arcs(machine.inputs[input_])),
                                      machine.inputs[input_].input.unit)
+
+
+GEARED = {'mechanisms': ['gear'], 'gear.type': 'custom', 'gear.joints': [
+    'O ground 0 0', 'M crank O 0.01', 'A crank O 1 geared crank 1/5 0']}
+
+
+@pytest.mark.parametrize('value', [4.0, -15.7, 12.6])
+def test_a_geared_input_goes_where_it_is_wanted_in_all_of_its_period(value):
+    gear = scene.read(GEARED).machines['gear']
+    inputs, missed = poses.reached(gear, [0.0], {'output': 'crank', 'value': value})
+    assert (inputs, missed) == ([value], None)
+    # It can be set to start there.
+    assert scene.read({**GEARED, 'gear.crank.start': value}).machines['gear'].first.start == value
+    again, _ = poses.reached(gear, [0.0], {'output': 'crank', 'value': value + 10.0 * math.pi})
+    assert again == pytest.approx([value], abs=1e-12)
 
 
 def test_an_input_goes_to_the_nearest_of_two_arcs_and_not_where_nothing_can_be_assembled():
@@ -863,9 +933,7 @@ def test_a_pose_of_several_inputs_is_described_whole():
                 for name, value in angles.items()}
 
     assert found.keys() == {'inputs', 'outputs'}
-    assert found['inputs'] == {
-        name: {'value': value, 'unit': 'm', 'arcs': [drive.ends]}
-        for (name, drive), value in zip(digger.inputs.items(), present)}
+    assert found['inputs'] == dict(zip(digger.inputs, present))
     assert list(found['outputs']) == [
         *(joint for joint in linkage.joints if joint not in digger.inputs), 'T.x', 'T.y']
     truth, h = at(present), 1e-6
@@ -1474,7 +1542,7 @@ def test_an_input_that_is_moved_is_there_until_messages_say_otherwise(graph, sho
         async with Page(url) as page:
             async def crank(value=None):
                 want = {} if value is None else {'want': {'output': 'crank', 'value': value}}
-                return (await page.ask('pose', '/leg', **want))['inputs']['crank']['value']
+                return (await page.ask('pose', '/leg', **want))['inputs']['crank']
 
             async def after(*angles):
                 for angle in angles:
@@ -1579,7 +1647,7 @@ def test_make_view_and_make_demo_end_quietly_when_nobody_reads_what_they_print(a
 
 @pytest.mark.long
 @pytest.mark.parametrize('parameters, named', [
-    ({'port': 'taken'}, 'address already in use'), ({'port': 'taken'}, 'by PORT=8021'),
+    ({'port': 'taken'}, 'address already in use'), ({'port': 'taken'}, 'make view PORT=8021'),
     ({'port': 70000}, 'port'),
     ({'port': 'eighty'}, 'port'), ({'host': '192.0.2.1'}, '192.0.2.1'),
 ])
@@ -1636,7 +1704,7 @@ def look_of(marker):
     """Return how a marker looks, part by part."""
     place, turn, colour = marker.pose.position, marker.pose.orientation, marker.color
     return {'mechanism': '/leg', 'frame': marker.header.frame_id, 'width': marker.scale.x,
-            'kind': {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'strip', Marker.SPHERE_LIST:
+            'kind': {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'locus', Marker.SPHERE_LIST:
                      'joints', Marker.TRIANGLE_LIST: 'triangles'}[marker.type],
             'pose': [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w],
             'colour': [colour.r, colour.g, colour.b, colour.a]}
@@ -1670,7 +1738,7 @@ def test_of_a_message_what_is_deleted_or_no_line_joint_or_triangle_is_not_drawn(
     shown = dict(zip((7, 9, 11, 13), [joints, bars, *message.markers[4:]]))
     looks, records = topic.drawn()
     assert looks == {number: look_of(marker) for number, marker in shown.items()}
-    assert [look['kind'] for look in looks.values()] == ['joints', 'lines', 'triangles', 'strip']
+    assert [look['kind'] for look in looks.values()] == ['joints', 'lines', 'triangles', 'locus']
     assert records == b''.join(recorded(*one) for one in shown.items())
 
 
@@ -1840,7 +1908,7 @@ def test_nodes_that_end_and_come_again_are_drawn_again(graph, show):
 
     async def come_and_go(page, scene):
         kinematics = graph.start(Kinematics, scene)
-        await browser.until(lambda: len(page.drawn(f'/{scene["mechanisms"][0]}', 'strip')))
+        await browser.until(lambda: len(page.drawn(f'/{scene["mechanisms"][0]}', 'locus')))
         page.forget()
         graph.end(kinematics)
         await page.heard('scene', mechanisms=[])
@@ -2663,6 +2731,23 @@ def test_a_reload_and_another_viewer_keep_what_is_seen_and_a_lost_connection_is_
 
 @pytest.mark.long
 @needs_browser
+def test_a_phone_may_reload_the_page_as_often_as_it_likes(show, looked_at):
+    given = without_defaults(scene.load(str(ROOT / 'config' / 'all.yaml')))
+    running = show({**given, 'rate': 20.0})
+
+    async def doing(seen):
+        await seen.page.resize(390, 844, 'light')
+        for _ in range(180):
+            await seen.page.open(running.viewer.url)
+            await browser.until(lambda: seen.page.value(
+                'document.querySelectorAll("section").length === 4 && '
+                'document.querySelectorAll("section tbody tr").length > 3'))
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
 def test_mechanisms_of_one_name_in_two_namespaces_are_told_apart(graph, show, looked_at):
     for space in ('left', 'right'):
         for kind in (CrankDriver, Kinematics):
@@ -2850,7 +2935,7 @@ import('/picture.js').then(({ Picture }) => {
       canvas: { clientWidth: 390, clientHeight: 380 } });
     picture.at = (x, y) => [x, y];
     picture.text = (name, x, y) => written.push([x, y, picture.context.measureText(name).width]);
-    picture.names([{ mechanism: { value: () => points }, look: { kind: 'joints', width: 6 },
+    picture.names([{ mechanism: { points }, look: { kind: 'joints', width: 6 },
       places: Float64Array.from(places.flat()) }]);
     return [places, written];
   });
@@ -2962,7 +3047,7 @@ def test_where_an_input_is_that_nobody_has_named_is_not_guessed(graph, show):
                 crank_states.publish(JointState(name=['leg_crank'], position=[2.0]))
                 return (await page.ask('pose', '/leg')).get('inputs')
 
-            return reason, (await browser.until(heard))['crank']['value']
+            return reason, (await browser.until(heard))['crank']
 
     reason, value = asyncio.run(use(running.viewer.url))
     assert reason == 'the crank is not known yet: no message names leg_crank'

@@ -102,7 +102,8 @@ class MechanismModel:
         drawn, size = self._drawn[:3], self._drawn[3]
         curve = self.assembly.locus(self.mechanism.tracer)
         return (urdf.write(self.robot) if self.robot else '',
-                messages.locus(*drawn, curve, size) if len(curve) > 1 else None)
+                messages.locus(*drawn, curve, size, self.mechanism.mirrored)
+                if len(curve) > 1 else None)
 
     def _regular(self, wanted: Tuple[bool, bool, bool]) -> AssemblyState:
         joints, markers, moving = wanted

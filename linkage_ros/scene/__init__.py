@@ -59,7 +59,8 @@ FRAME_ID = Field('string', 'Frame of the poses.', readers=(KINEMATICS,),
 FRAME_PREFIX = Field(
     'string', 'Prefix of the frames of markers and loci, as in robot_state_publisher.',
     readers=(KINEMATICS,), rule=FRAME_RULE, pattern=FRAME)
-RATE = Field('double', 'Rate of crank messages [Hz]; 0: none.', 0.0, 1000.0, readers=(DRIVER,))
+RATE = Field('double', 'Rate of crank messages [Hz]; 0: none.', 0.0, 1000.0, readers=(DRIVER,),
+             unit='Hz')
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,8 @@ from ..words import elided, listed, meant, MESSAGE, quoted
 DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
 OWNER = KINEMATICS
 
+GROUPS = DIMENSIONS, BRANCHES, SPEEDS, STARTS = 'dimensions', 'branches', 'speeds', 'starts'
+
 # Parameters that rclpy declares.
 _ROS = re.compile(r'(use_sim_time|start_type_description_service)$')
 
@@ -63,7 +65,7 @@ class Field:
     kind : str
         One of KINDS.
     meaning : str
-        Description, with the unit in brackets.
+        Description, with the unit in brackets, as {unit}.
     low, high : float, optional
         Ends of the allowed range; None: no range.
     positive : bool
@@ -76,6 +78,10 @@ class Field:
         Nodes that use the parameter.
     read_only : bool
         Whether a change needs a restart.
+    unit : str
+        Unit of its numbers; empty: none.
+    group : str
+        Kind of the parameter where there are many of one kind: one of GROUPS, or empty.
 
     """
 
@@ -88,10 +94,14 @@ class Field:
     pattern: re.Pattern = TEXT
     readers: Tuple[str, ...] = ()
     read_only: bool = False
+    unit: str = ''
+    group: str = ''
 
     def about(self, *words: str, **other: Any) -> Field:
-        """Return a copy with `words` for {0}, {1}, ... in the meaning, and `other` attributes."""
-        return _with(self, ('meaning', self.meaning.format(*words)), *other.items())
+        """Return a copy with `words` for {0}, {1}, ... in meaning and unit, `other` attributes."""
+        unit = self.unit.format(*words)
+        return _with(self, ('meaning', self.meaning.format(*words, unit=unit)), ('unit', unit),
+                     *other.items())
 
     @property
     def owner(self) -> str:

@@ -331,9 +331,17 @@ class SceneView:
 
     def _show(self, client: OpenPage) -> None:
         client.tell(SCENE, {'op': 'scene', 'mechanisms': [
-            mechanism.described() for mechanism in self._mechanisms.values()]})
+            {**mechanism.described(), **self._drawn(mechanism)}
+            for mechanism in self._mechanisms.values()]})
         for feed in self.feeds():
             client.offer(feed)
+
+    def _drawn(self, mechanism: ShownMechanism) -> dict[str, Any]:
+        """Describe what the page needs beside the parameters; {} until these are announced."""
+        with suppress(Refused):
+            machine = self._scene(mechanism).machines[mechanism.name]
+            return {**poses.drawn(machine), 'curves': curves.plots(machine)}
+        return {}
 
     async def _watch(self) -> None:
         while True:
@@ -521,12 +529,14 @@ class SceneView:
                     changed.add(parameter.name)
                     values[parameter.name] = value
         for mechanism in self._mechanisms.values():
-            for setting in mechanism.settings.values():
-                if setting.node == event.node and setting.full_name in changed:
-                    message = {'op': 'value', 'mechanism': mechanism.key, 'name': setting.name,
-                               'value': setting.value}
-                    for client in self.clients:
-                        client.tell((mechanism.key, setting.name), message)
+            settings = [setting for setting in mechanism.settings.values()
+                        if setting.node == event.node and setting.full_name in changed]
+            drawn = self._drawn(mechanism) if settings else {}
+            for setting in settings:
+                message = {'op': 'value', 'mechanism': mechanism.key, 'name': setting.name,
+                           'value': setting.value, 'drawn': drawn}
+                for client in self.clients:
+                    client.tell((mechanism.key, setting.name), message)
 
 
 def _store(positions: dict[str, float], message: JointState) -> None:

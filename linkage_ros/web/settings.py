@@ -50,12 +50,14 @@ class Setting:
         return list(map(shown, value)) if isinstance(value, tuple) else shown(value)
 
     def described(self) -> dict[str, Any]:
-        """Return its description for the page."""
+        """Return its description for the page, which has a control for it in a group, or none."""
         low, high = self.ends or (None, None)
+        has_control = not self.field.read_only and (
+            self.field.kind == 'bool' or self.ends is not None and self.ends[0] < self.ends[1])
         return {'name': self.name, 'value': self.value, 'kind': self.field.kind,
                 'meaning': self.field.meaning, 'allowed': self.field.allowed,
-                'fixed': self.field.read_only, 'low': low, 'high': high,
-                'step': self.ends and int(self.field.kind == 'integer')}
+                'unit': self.field.unit, 'low': low, 'high': high,
+                'group': (self.field.group or 'more') if has_control else ''}
 
     def asked(self, value: Any) -> Any:
         """Return a parameter message with a value from JSON; ValueError if it is not allowed."""
