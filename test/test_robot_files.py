@@ -1038,7 +1038,8 @@ def test_a_loop_of_the_whole_robot_that_stands_open_is_named(monkeypatch, capsys
     made = [check.Imported('hip', {}, [], {'hip': (-0.2, 0.3), 'crank_motor': (-0.3, 0.3)})]
     assert len(whole(robot, machines, made)) == 1
     _, line = whole(robot, wrong, made)
-    assert re.match('Open: the loops of bell_joint, .*, by 0.0[0-9]* m', line)
+    assert re.match('Open: the loops of bell_joint, .*: with hip at -0.0.*, bell_joint at 0 its '
+                    'loops stand open by 9.2e-05 m', line)
     monkeypatch.setattr(check, 'whole', lambda robot, _, made: whole(robot, wrong, made))
     assert command.main([str(file)]) == 1
     out, err = capsys.readouterr()
