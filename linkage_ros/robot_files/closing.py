@@ -155,7 +155,7 @@ def _fault(component: Component, poses: Poses, motors: List[str], followers: Lis
                 f'all is: name these by --driven, as in --driven '
                 f'{shlex.join(component.chosen(ways, motors))}')
     fixed = component.columns_of(motors + followers)
-    loose, count = component.loose(poses, motors + followers) if motors else ([], 0)
+    loose, count = component.loose(poses, motors + followers)
     if not count:
         return ''
     if len(component.free_ways(poses, fixed)) > component.nullity(fixed):

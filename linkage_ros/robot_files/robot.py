@@ -31,6 +31,10 @@ KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical'
 FARTHEST = 1e9
 
 
+class NotDriven(ValueError):
+    """The motors do not determine the poses of a loop."""
+
+
 class Limits(NamedTuple):
     """Between which positions a joint moves [rad or m], by the limits of some joints."""
 
