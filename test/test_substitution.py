@@ -11,6 +11,7 @@
 """Random faults in the scenes of random robots: the check by substitution finds each of them."""
 
 from contextlib import suppress
+import math
 import re
 from unittest.mock import patch
 
@@ -19,6 +20,8 @@ from linkage_ros.command import RequestError
 from linkage_ros.robot_files import check
 from linkage_ros.robot_files.command import described
 import numpy as np
+import pytest
+from sweeps import EXHAUSTIVE
 from test_robot_files import random_robot
 
 FAULTS = 10
@@ -65,38 +68,50 @@ def with_length(given, rng):
 KINDS = with_sign, with_offset, with_side, with_length
 
 
-def faults_found(seed, count=FAULTS):
-    """Return how many faults of a random robot's scene are tried, and those not found."""
-    rng, missed, tried = np.random.default_rng(seed), [], 0
-    if not (made := random_robot(seed)):
-        return 0, []
-    with patch.object(check, 'compared', wraps=check.compared) as spy, suppress(RequestError):
-        given, *_ = described(made[2])
-    for call in spy.call_args_list:
-        robot, machine, driven, ends, slack = call.args
-        ends = {name: (max(low, robot.positions[name] - 0.1), min(
-            high, robot.positions[name] + 0.1)) for name, (low, high) in ends.items()}
-        own = {key.partition('.')[2]: value for key, value in given.items()
-               if key.startswith(f'{machine.name}.')}
-        with suppress(check.Difference):
-            check.compared(robot, machine, driven, ends, slack)
-            for _ in range(count):
-                values = {key: value[:] if isinstance(value, list) else value
-                          for key, value in own.items()}
-                with suppress(IndexError):
-                    (kind := rng.choice(KINDS))(values, rng)
-                    tried += 1
-                    if not is_found(robot, machine.name, values, driven, ends, slack):
-                        missed.append((seed, kind.__name__, values['joints'],
-                                       values['joint_names'], own['joints'], own['joint_names']))
-    return tried, missed
-
-
-def is_found(robot, name, values, driven, ends, slack):
+def is_found(robot, machine, values, driven, ends, slack):
+    """Tell whether the check finds a fault; what changes no position is none."""
+    name = machine.name
     try:
         wrong = scene.read({'mechanisms': [name], **{
             f'{name}.{key}': value for key, value in values.items()}}).machines[name]
         check.compared(robot, wrong, driven, ends, slack)
     except (check.Difference, scene.SceneError):
         return True
-    return False
+    parts = [[drive.ratio * np.linspace(*ends[drive.source], 9) + drive.offset
+              for drive in machine.inputs.values()]] * 2
+    (one, other) = (each.linkage.joint_angles(part if len(part) > 1 else part[0])
+                    for each, part in zip((machine, wrong), parts))
+    off = [machine.joints[link].of(one[link]) - wrong.joints[link].of(other[link])
+           for link in machine.joints if machine.joints[link].published]
+    return np.nanmax(np.abs(off - math.tau * np.round(np.divide(off, math.tau)))) < 1e-9
+
+
+def faults(seed):
+    """Yield each fault of a random robot's scene, and whether it is found."""
+    rng, made = np.random.default_rng(seed), random_robot(seed)
+    with patch.object(check, 'compared', wraps=check.compared) as spy, suppress(RequestError):
+        given = described(made[2])[0] if made else {}
+    for call in spy.call_args_list:
+        robot, machine, driven, ends, slack = call.args
+        ends = {name: (max(low, robot.positions[name] - 0.1), min(
+            high, robot.positions[name] + 0.1)) for name, (low, high) in ends.items()}
+        own = {key.partition('.')[2]: value for key, value in given.items()
+               if key.startswith(f'{machine.name}.')}
+        if not own:
+            continue
+        for _ in range(FAULTS):
+            values = {key: value[:] if isinstance(value, list) else value
+                      for key, value in own.items()}
+            kind = KINDS[rng.integers(len(KINDS))]
+            with suppress(IndexError):
+                kind(values, rng)
+                yield (seed, kind.__name__, values['joints'], values['joint_names']), is_found(
+                    robot, machine, values, driven, ends, slack)
+
+
+@pytest.mark.parametrize('seeds', [range(5), pytest.param(range(5, 60), marks=pytest.mark.long),
+                                   pytest.param(range(60, 240), marks=EXHAUSTIVE)])
+def test_every_fault_of_a_scene_is_found(seeds):
+    tried = [fault for seed in seeds for fault in faults(seed)]
+    assert not [fault for fault, found in tried if not found]
+    assert len(tried) > 5 * len(seeds)
