@@ -112,10 +112,10 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
     loops = _Loops(component, [machine], {name: robot.source(name) for name in driven},
                    {source: robot.positions[source] for source in ends}, slack)
     loops.check_start()
-    corners = np.array([*ends.values()]).T
-    loops.enter(*corners)
+    low, high = corners = np.array([*ends.values()]).T
+    loops.enter(low, high)
     walk, beyond = loops.walk_to(corners if len(ends) == 1 else np.random.default_rng(1).uniform(
-        *corners, (PATHS, len(ends))), POSES, FEWEST)
+        low, high, (PATHS, len(ends))), POSES, FEWEST)
     if (count := walk.good.sum()) < FEWEST:
         raise Difference(f'it could not be checked in more than {count} poses')
     ranges = {source: loops.range_of(walk.joints[source][walk.good], first)
@@ -346,7 +346,7 @@ class _Loops:
         component = self._component
         here = [self._poses, *(each.some([path]) for each in walk.poses[:step])]
         if not math.isnan(walk.gaps[path, step]) and component.columns_of(
-                component.names & walk.joints.keys()).all():
+                [*component.names & walk.joints.keys()]).all():
             return True
         motors = {name: walk.joints[name][path, [step]] for name in self._motors}
         last, fixed = here[-1], component.columns_of([*motors])

@@ -44,7 +44,9 @@ def assembled(robot: Robot, density: float = DENSITY) -> Robot:
              for point in body.points}
     made = replace(robot, parts=[], motors=[], gears={}, density=density)
     for part in robot.parts:
-        machine = part.machine
+        if not (machine := part.machine):
+            made.parts.append(part)
+            continue
         starts = {name: Motion.of(drive).at(0)[0] for name, drive in machine.inputs.items()}
         positions, rates = _solved(machine, starts)
         bodies = []
@@ -53,7 +55,7 @@ def assembled(robot: Robot, density: float = DENSITY) -> Robot:
             u, v, *turned = body.pose
             bodies.append(replace(body, parent=home, pose=(u + x, v + y, *turned), position=(
                 positions.get(body.joint.name, 0.0) if body.joint else 0.0)))
-        made.parts.append(Part(machine, bodies))
+        made.parts.append(Part(bodies, machine))
         tips = {link.name: link.tip for link in machine.linkage.links}
         mass = sum(weight(body.solid, density).mass for body in bodies[1:])
         for name, drive in machine.inputs.items():

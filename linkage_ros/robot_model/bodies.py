@@ -171,10 +171,10 @@ class Body:
 
 @dataclass(eq=False)
 class Part:
-    """The bodies of one mechanism, parents first."""
+    """The bodies of one mechanism, or of a robot's file; parents first."""
 
-    machine: SceneMechanism
     bodies: List[Body]
+    machine: Optional[SceneMechanism] = None
 
     @cached_property
     def joints(self) -> List[str]:
@@ -286,7 +286,7 @@ def together(robots: Sequence[Robot]) -> Robot:
 
 def _robot(machine: SceneMechanism, frame_id: str, width: Optional[float]) -> Robot:
     bodies = list(_Tree(machine, width).bodies(frame_id))
-    made = Robot(machine.name, frame_id, [Part(machine, bodies)])
+    made = Robot(machine.name, frame_id, [Part(bodies, machine)])
     made.check_names(f'{machine.name}.joints')
     for value in _numbers(made):
         if not abs(value) <= LARGEST:

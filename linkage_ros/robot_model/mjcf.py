@@ -20,6 +20,7 @@ Format: MuJoCo's XML reference (mujoco.readthedocs.io).
 from __future__ import annotations
 
 import math
+from typing import Mapping, Sequence
 from xml.etree import ElementTree
 
 import numpy as np
@@ -49,9 +50,10 @@ def write(model: Robot) -> str:
     add(usual, 'geom', contype='0', conaffinity='0')
     add(usual, 'equality', solref=numbers(2.0 * step, 1.0), solimp='0.9999 0.9999 1')
     elements = {model.root: add(root, 'worldbody')}
+    sweeps = {motor.joint: motor.sweep for motor in model.motors if motor.sweep}
     moving = set()
     for body in model.bodies:
-        element = elements[body.name] = _add_body(elements[body.parent], body)
+        element = elements[body.name] = _add_body(elements[body.parent], body, sweeps)
         if body.joint or body.parent in moving:
             moving.add(body.name)
             _add_weight(element, body, model.density)
@@ -69,13 +71,16 @@ def write(model: Robot) -> str:
     return ElementTree.tostring(root, encoding='unicode')
 
 
-def _add_body(parent: ElementTree.Element, body: Body) -> ElementTree.Element:
+def _add_body(parent: ElementTree.Element, body: Body, sweeps: Mapping[str, Sequence[float]]
+              ) -> ElementTree.Element:
     made = add(parent, 'body', name=body.name, pos=numbers(*body.start[:3]),
                euler=numbers(*body.start[3:]))
     if joint := body.joint:
         kind = 'slide' if joint.kind == 'prismatic' else 'hinge'
-        add(made, 'joint', name=joint.name, type=kind, axis=numbers(*joint.axis),
-            ref=numbers(body.position))
+        moved = add(made, 'joint', name=joint.name, type=kind, axis=numbers(*joint.axis),
+                    ref=numbers(body.position))
+        if joint.name in sweeps:
+            moved.set('range', numbers(*sweeps[joint.name]))
     for piece in body.solid:
         _add_piece(made, piece)
     for point in body.points:
