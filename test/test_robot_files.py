@@ -581,14 +581,14 @@ def test_what_is_missing_is_said_in_one_sentence(capsys, tmp_path):
         capsys, ROBOTS / 'five_bar.urdf', '--loops', loops)
 
 
-PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], actuated_joints: [motor]}'
+PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], independent: [motor]}'
 
 
 @pytest.mark.parametrize('text, why', [
     (PIN % 'parent_xzy', "pin_loops[0] has no key 'parent_xzy'; allowed: name, parent, child, "
      'parent_xyz, child_xyz, axis; did you mean parent_xyz?'),
-    (PIN.replace('actuated', 'actated') % 'parent_xyz', "the file has no key 'actated_joints'; "
-     'allowed: closures, .*; did you mean actuated_joints?'),
+    (PIN.replace('independent', 'indepndent') % 'parent_xyz', "the file has no key 'indepndent'; "
+     'allowed: closures, .*; did you mean independent?'),
     ('{closures: [{link_a: coupler, link_b: rocker, 7: 8}]}', 'closures[0] has no key 7; '
      'allowed: link_a, link_b, point, axis\n')])
 def test_an_unknown_key_of_a_file_of_loops_is_refused(capsys, tmp_path, text, why):
@@ -876,7 +876,7 @@ def test_the_axis_of_a_joint_of_gazebo_is_seen_as_the_file_says(tmp_path, seed, 
 
 
 BALLS = '{pin_loops: [], ball_loops: [{parent: coupler, child: rocker, parent_xyz: [0.3, 0, 0], ' \
-    'child_xyz: [0, 0, 0.2]}], ball_upgrades: [elbow], actuated_joints: [motor]}'
+    'child_xyz: [0, 0, 0.2]}], joint_name: [elbow], joint_type: [SPHERICAL], independent: [motor]}'
 PAIRS = '{closed_loop: [[wrist_a, wrist_b]], type: [3d], name_mot: [motor], ' \
     'joint_name: [elbow], joint_type: [%s]}'
 

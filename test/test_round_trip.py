@@ -153,7 +153,8 @@ def random_machine(seed):
     except ValueError:
         return None
     for _ in range(30 if 1e-3 < linkage.longest < 1e3 else 0):
-        values = [rng.uniform(each.low, each.high) for each in linkage.inputs]
+        values = [rng.uniform(max(each.low, -12.0), min(each.high, 12.0))
+                  for each in linkage.inputs]
         if not any(np.isnan(place).any() for place in linkage.solve(
                 values if len(values) > 1 else values[0]).values()):
             sweeps = {f'm.{each.name}.sweep': [value - 0.01 * each.size, value + 0.01 * each.size]
