@@ -10,6 +10,7 @@
 
 """What is written of a robot model is read again: read(write(x)) = x in URDF, SDF and MJCF."""
 
+from contextlib import suppress
 import math
 from pathlib import Path
 
@@ -157,15 +158,18 @@ def random_machine(seed):
                   for each in linkage.inputs]
         if not any(np.isnan(place).any() for place in linkage.solve(
                 values if len(values) > 1 else values[0]).values()):
-            sweeps = {f'm.{each.name}.sweep': [value - 0.01 * each.size, value + 0.01 * each.size]
-                      for each, value in zip(linkage.inputs, values) if rng.random() < 0.5}
-            return scene.read({
+            given = {
                 'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': design.joints,
                 'm.pose': rng.normal(size=6).tolist(),
                 **{f'm.branches.{key}': side for key, side in (design.branches or {}).items()},
                 **{f'm.dimensions.{key}': value for key, value in design.dimensions.items()},
-                **{f'm.{each.name}.start': value for each, value in zip(linkage.inputs, values)},
-                **sweeps}).machines['m']
+                **{f'm.{each.name}.start': value for each, value in zip(linkage.inputs, values)}}
+            with suppress(scene.SceneError):
+                # Not all of it need be in the reach.
+                return scene.read({**given, **{
+                    f'm.{each.name}.sweep': [value - 0.01 * each.size, value + 0.01 * each.size]
+                    for each, value in zip(linkage.inputs, values)}}).machines['m']
+            return scene.read(given).machines['m']
     return None
 
 
