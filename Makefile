@@ -65,7 +65,7 @@ view: build ## Show SCENE=config/all.yaml in the browser, at PORT=8020
 	@$(in_ros) PYTHONPATH=$$PYTHONPATH:test exec python demo/view.py '$(SCENE)' '$(PORT)'
 
 .PHONY: bench
-bench: build $(venv)/.tools .venv-bench/.installed ## Measure run time against error, stability, and the nodes
+bench: ready .venv-bench/.installed ## Measure run time against error, stability, and the nodes
 	@.venv-bench/bin/python -m benchmark.run
 	@.venv-bench/bin/python -m benchmark.stability
 	@.venv-bench/bin/python -m benchmark.report
@@ -88,26 +88,26 @@ docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/ and 
 	@echo 'Documentation: docs/_build/html/index.html'
 
 .PHONY: test
-test: build $(venv)/.tools ## Run the tests, but for the long ones, and say what they cover
+test: ready ## Run the tests, but for the long ones, and say what they cover
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m slipcover --source linkage_ros \
 	  --json --out $(build)/coverage.json -m pytest -n 2 --dist worksteal -m 'not long'
 	@python .ci/coverage.py $(build)/coverage.json
 
 # What starts nodes runs alike without machine code.
 .PHONY: nodes
-nodes: build $(venv)/.tools ## Run the tests of the nodes alone; with PLAIN=1 where llvmlite is not installed
+nodes: ready ## Run the tests of the nodes alone; with PLAIN=1 where llvmlite is not installed
 	@$(if $(PLAIN),! python -c 'import llvmlite' 2>/dev/null)
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m 'not long' \
 	  $$(grep -lE 'ros_harness|\(graph' test/test_*.py)
 
 # Hours; what is left without those that are marked exhaustive takes minutes.
 .PHONY: long
-long: build $(venv)/.tools ## Run the long tests; WHICH='long and not exhaustive' or WHICH=slow: in minutes
+long: ready ## Run the long tests; WHICH='long and not exhaustive' or WHICH=slow: in minutes
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m '$(or $(WHICH),long)'
 
 # Some minutes to an hour a room, and some minutes once for a state of the checkout.
 .PHONY: mutants
-mutants: build $(venv)/.tools .venv-mutants/.installed ## Put COUNT=40 random bugs into ROOM=scene; SEED=2: others; AGAIN=file: only what survived there
+mutants: ready .venv-mutants/.installed ## Put COUNT=40 random bugs into ROOM=scene; SEED=2: others; AGAIN=file: only what survived there
 	@$(in_ros) nice -n 10 python test/mutants.py --out $(build)/mutants \
 	  --room '$(ROOM)' --count $(or $(COUNT),40) --seed $(or $(SEED),1) $(if $(AGAIN),--again '$(AGAIN)')
 
@@ -132,6 +132,9 @@ lock: .venv-lock/.installed ## Pin with hashes what wheels/*.txt ask for; UPGRAD
 
 .PHONY: build
 build: $(install)/.built ## Build both packages
+
+.PHONY: ready
+ready: build $(venv)/.tools ## Build, and install what the tests need
 
 .PHONY: clean
 clean: ## Remove everything that was made

@@ -10,7 +10,9 @@
 
 """C code as a library of this process, compiled without a warning."""
 
+from contextlib import contextmanager
 import ctypes
+import fcntl
 import os
 from pathlib import Path
 import shutil
@@ -29,12 +31,25 @@ COMPILER = shutil.which('cc') or shutil.which('gcc')
 STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror')
 
 
+@contextmanager
+def shared(tmp_path_factory, name):
+    """Give one process at a time a folder that all that run the tests have."""
+    folder = tmp_path_factory.getbasetemp()
+    if 'PYTEST_XDIST_WORKER' in os.environ:
+        folder = folder.parent
+    (folder / name).mkdir(exist_ok=True)
+    with open(folder / f'{name}.lock', 'w') as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield folder / name
+
+
 def loaded(folder, code, *flags):
-    """Return the library of a text in C99, compiled in a folder of its own."""
+    """Return the library of a text in C99, compiled in a folder of its own or found there."""
     if not COMPILER:
         pytest.skip('there is no C compiler')
     source, library = folder / 'code.c', folder / 'code.so'
-    source.write_text(code)
-    subprocess.run([COMPILER, '-std=c99', *STRICT, *flags, '-shared', '-fPIC', source, '-o',
-                    library, '-lm'], check=True)
+    if not library.exists() or source.read_text() != code:
+        source.write_text(code)
+        subprocess.run([COMPILER, '-std=c99', *STRICT, *flags, '-shared', '-fPIC', source, '-o',
+                        library, '-lm'], check=True)
     return ctypes.CDLL(str(library))

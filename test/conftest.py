@@ -70,7 +70,10 @@ def machines(request):
 @pytest.fixture(scope='module')
 def library(request, machines, tmp_path_factory):
     """Return the C library of all of them."""
-    return request.module.compiled(tmp_path_factory.mktemp('c'), [*machines.values()])
+    from c_libraries import shared
+
+    with shared(tmp_path_factory, request.module.__name__) as folder:
+        return request.module.compiled(folder, [*machines.values()])
 
 
 @pytest.fixture

@@ -473,12 +473,9 @@ def test_any_names_of_a_scene_are_names_in_c(tmp_path, language):
 LOADED = [['B=0 -9.81'], ['B=3 0', 'A=0 1', 'QB=0'], ['C=1 2', 'AB=-0.0', 'B=0 0']]
 
 
-@pytest.mark.parametrize('compiler, language', [pytest.param(
-    compiler, language, marks=pytest.mark.skipif(
-        not shutil.which(compiler), reason=f'{compiler} is not installed'))
-    for compiler, language in (('gcc', 'c99'), ('g++', 'c++17'), ('clang', 'c99'),
-                               ('clang++', 'c++17'), ('tcc', 'c99'))])
-def test_loads_compile_without_a_warning(tmp_path, compiler, language):
+@pytest.fixture(scope='module')
+def with_loads(tmp_path_factory):
+    """Return a C file of linkages with LOADED: of double, of float, and open."""
     machines = [*scene.read({
         'mechanisms': [f'm{i}{kind}' for i in range(len(LOADED)) for kind in 'dfo'],
         **{f'm{i}{kind}.{key}': value for i, loads in enumerate(LOADED) for kind in 'dfo'
@@ -487,17 +484,27 @@ def test_loads_compile_without_a_warning(tmp_path, compiler, language):
                    'O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left',
                    'C rigid A B 0.6 0.6 left']}.items()}}).machines.values()]
     # A compiler does not warn of what a header that is included does not use.
-    (tmp_path / 'all.h').write_text(''.join([
+    folder = tmp_path_factory.mktemp('loads')
+    (folder / 'all.h').write_text(''.join([
         *(header.written(machine, ['QB']) for machine in machines[::3]),
         *(header.written(machine, ['B.y'], True) for machine in machines[1::3]),
         *map(header.opened, machines[2::3])]))
-    file = tmp_path / 'code.c'
+    file = folder / 'code.c'
     file.write_text('#include "all.h"\nint main(void) { return 0; }\n')
+    return file
+
+
+@pytest.mark.parametrize('compiler, language', [pytest.param(
+    compiler, language, marks=pytest.mark.skipif(
+        not shutil.which(compiler), reason=f'{compiler} is not installed'))
+    for compiler, language in (('gcc', 'c99'), ('g++', 'c++17'), ('clang', 'c99'),
+                               ('clang++', 'c++17'), ('tcc', 'c99'))])
+def test_loads_compile_without_a_warning(with_loads, tmp_path, compiler, language):
     ended = subprocess.run([
         compiler, *(['-c', '-o', tmp_path / 'code.o'] if compiler == 'tcc' else [
             '-fsyntax-only', '-x', language.rstrip('179')]),
         f'-std={language}', '-Wall', '-Wextra', '-Wconversion', '-Wpedantic', '-Wshadow',
-        '-Werror', file], capture_output=True, text=True)
+        '-Werror', with_loads], capture_output=True, text=True)
     assert not ended.returncode, ended.stderr[:2000]
 
 

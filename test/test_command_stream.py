@@ -289,7 +289,7 @@ def test_a_foot_and_a_bucket_go_in_along_a_line_and_back_out(graph):
         [place for array in arrays for place in array[-1].data], actuators_at(0.0), rtol=1e-11))
 
 
-def test_of_several_inputs_no_command_outlives_a_change_of_the_geometry(graph):
+def test_of_several_inputs_no_command_outlives_a_change_of_the_geometry(graph, capfd):
     stream = Stream(graph, {
         'mechanisms': ['leg', 'other', 'bar'], 'leg.type': 'five_bar', 'leg.crank.start': 1.9,
         'leg.crank2.start': 1.24, 'other.type': 'five_bar', 'other.crank.start': 1.9,
@@ -300,6 +300,8 @@ def test_of_several_inputs_no_command_outlives_a_change_of_the_geometry(graph):
     assert graph.set(stream.node, leg__dimensions__a=0.085).successful
     held = stream.want(names, [*far, *far, 1.2])
     assert held == {name: at for name, at in good.items() if not name.startswith('leg')}
+    assert stream.want([FOOT[0], 'bar_QB'], [9.0, 1.2]).keys() == {'bar_crank'}
+    assert f'leg has 2 inputs: name 2 of its outputs, not {FOOT[0]}' in capfd.readouterr().err
 
 
 @pytest.mark.slow

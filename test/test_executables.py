@@ -36,6 +36,18 @@ def harness():
     return ros_harness
 
 
+@pytest.mark.parametrize('module', [
+    'c_code.command', 'c_code.transmission', 'render.command', 'robot_files.command',
+    'robot_model.command'])
+def test_the_help_of_a_command_explains_each_of_its_options(capsys, module):
+    with pytest.raises(SystemExit):
+        import_module(f'linkage_ros.{module}').main(['--help'])
+    options = re.findall(r'^  (-.*(?:\n {4}.*)*)', capsys.readouterr().out, re.M)
+    for option in options:
+        assert re.fullmatch(r'-\S+(?: \S+)*(?:  +|\n +)\w[^\n]{3,}(\n.*)*', option), option
+    assert len(options) > 3
+
+
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('name, stop', [
     ('crank_driver', signal.SIGINT), ('kinematics', signal.SIGTERM),
@@ -49,6 +61,18 @@ def test_a_signal_ends_a_node_quietly(harness, name, stop):
     assert re.search(rf'\[{name}\]: ready: .*water_drop', first)
     process.interrupt(stop)
     assert process.end() == (0, '')
+
+
+def test_a_program_that_a_node_ran_in_gets_its_signals_back(harness):
+    from linkage_ros.nodes.shutdown import ShutdownHandler
+
+    def handlers():
+        return [signal.getsignal(stop) for stop in (signal.SIGINT, signal.SIGTERM)]
+
+    before = handlers()
+    with ShutdownHandler() as shutdown:
+        assert not set(handlers()) & set(before) and not shutdown.is_over
+    assert handlers() == before and signal.set_wakeup_fd(-1) == -1
 
 
 @pytest.mark.slow

@@ -26,10 +26,10 @@ RATIOS = {'1/64': 64, '1/80': 80, '1/100': 100, '0.31': 100, '22/7': 7, '3/7': 7
           '0.999': 1000, '1/1000': 1000, '0.12345': 20000, '2/3+1/7919': 23757,
           'sqrt(2)': math.inf, 'pi': math.inf, '8': 1, '180': 1, '-1000': 1}
 # Turns of the motor in which is asked.
-TURNS = 0.0, 13.3, -31.4, 4711.8, -1e5
+TURNS = 0.0, 13.3, -1e5
 
 # Fractions and a speed-up whose first question is quick.
-QUICK = '1/3', '1/80', '0.31', '180'
+QUICK = '1/3', '0.31', '180'
 
 
 def motor(ratio, *more):
@@ -122,7 +122,7 @@ def test_as_many_answers_as_brute_force_finds(ratio):
 def test_the_reach_is_where_it_can_be_assembled(ratio):
     found = limited(ratio)
     first, = found.inputs
-    theta = np.random.default_rng(0).uniform(first.low, first.high, 20001)
+    theta = np.random.default_rng(0).uniform(first.low, first.high, 4001)
     whole = np.isfinite(found.solve(theta)['B']).all(axis=1)
     assert whole.any() and not whole.all()
     reach = found.reach()

@@ -342,35 +342,3 @@ def test_a_script_ends_that_leaves_a_changed_scene_to_a_node_that_no_longer_spin
     with Graph() as graph:
         subprocess.run([sys.executable, '-c', SCRIPT], timeout=DEADLINE, check=True, env={
             **os.environ, 'ROS_DOMAIN_ID': str(graph.context.get_domain_id())})
-
-
-# --- without llvmlite --------------------------------------------------------------------------
-
-
-@pytest.fixture
-def without_llvmlite(tmp_path, monkeypatch):
-    """Let the processes that are started find no llvmlite."""
-    (tmp_path / 'sitecustomize.py').write_text(
-        "import sys\nsys.modules['llvmlite'] = None\n")
-    monkeypatch.setenv('PYTHONPATH', os.pathsep.join(
-        [str(tmp_path), os.environ.get('PYTHONPATH', '')]))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('name', ['kinematics', 'scene'])
-def test_without_llvmlite_a_message_that_nobody_listens_to_ends_nothing(
-        processes, without_llvmlite, name):
-    process = Process(name, CONFIG / 'jansen.yaml')
-    processes.append(process)
-    with Graph(process.domain) as graph:
-        turn, answers = graph.crank(['jansen_crank']), []
-        publisher = graph.node.create_publisher(JointState, 'crank_states', 10)
-        graph.until(lambda: process.has_ended or publisher.get_subscription_count())
-        for angle in (0.1, 0.2, 0.3):
-            publisher.publish(JointState(name=['jansen_crank'], position=[angle]))
-        answers = graph.listen(JointState, 'jansen/joint_states')
-        graph.until(lambda: process.has_ended or graph.node.count_publishers(
-            'jansen/joint_states'))
-        assert not process.has_ended, process.end()[1]
-        turn([0.4], answers)
-        ends_quietly(process, signal.SIGINT)

@@ -143,6 +143,10 @@ def test_a_node_moves_without_machine_code_and_says_why_once(harness, tmp_path, 
     process = harness.Process(name, walker, env=path(tmp_path))
     try:
         with harness.Graph(process.domain) as graph:
+            # One message before anybody listens.
+            publisher = graph.node.create_publisher(JointState, 'crank_states', 10)
+            graph.until(lambda: process.has_ended or publisher.get_subscription_count())
+            publisher.publish(JointState(name=['jansen_crank'], position=[0.1]))
             answers = graph.listen(JointState, 'jansen/joint_states')
             graph.until(lambda: process.has_ended or graph.node.count_publishers(
                 'jansen/joint_states'))

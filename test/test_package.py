@@ -95,9 +95,13 @@ def test_the_workflow_runs_what_has_to_be_green():
     workflow = (ROOT / '.github/workflows/ci.yml').read_text()
     jobs = yaml.safe_load(workflow)['jobs']
     steps = [step['run'] for job in jobs.values() for step in job['steps'] if 'run' in step]
-    assert set().union(*map(made, steps)) == made((ROOT / '.ci/run').read_text())
-    assert set(jobs['test']['strategy']['matrix']['distro']) == {
-        file.stem for file in (ROOT / 'wheels').glob('*.txt') if 'ros-rclpy' in file.read_text()}
+    # The nodes without llvmlite are its alone.
+    assert set().union(*map(made, steps)) == made(
+        (ROOT / '.ci/run').read_text()) - {'ready'} | {'nodes'}
+    for job in ('test', 'long'):
+        assert set(jobs[job]['strategy']['matrix']['distro']) == {
+            file.stem for file in (ROOT / 'wheels').glob('*.txt')
+            if 'ros-rclpy' in file.read_text()}
 
 
 def test_both_manifests_say_where_the_repository_is():
@@ -238,8 +242,9 @@ def test_the_ordinary_colcon_build_of_a_workspace_is_enough(copy, tmp_path, layo
     clean['COLCON_DEFAULTS_FILE'] = str(defaults)
     script = f"""
         colcon build {layout} >&2 && source install/setup.bash && cd / &&
-        python -c 'from linkage_ros.nodes import servo_inverse as node
-print(node.__file__, node.ServoInverseType.__module__)' && echo $AMENT_PREFIX_PATH
+        python -c 'from linkage_interfaces.srv import ServoInverse
+from linkage_ros.nodes import servo_inverse
+print(servo_inverse.__file__, ServoInverse.__module__)' && echo $AMENT_PREFIX_PATH
         """
     ended = subprocess.run(['bash', '-c', script], cwd=tmp_path, env=clean, timeout=300,
                            text=True, capture_output=True)

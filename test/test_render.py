@@ -113,6 +113,9 @@ def test_a_gif_has_the_frames_the_rate_the_loops_and_the_size_asked_for(tmp_path
             image.seek(frame)
             milliseconds += image.info['duration']
         assert milliseconds == 230  # 7/30 s in hundredths
+    again = rendered(tmp_path, '--frames', '2', '--size', '200x200', ending='gif')
+    with Image.open(again) as image:
+        assert image.info['loop'] == 0  # without an end
 
 
 def test_a_turn_is_drawn_in_the_time_it_takes(tmp_path):
@@ -155,7 +158,7 @@ def test_the_bars_in_the_data_are_as_long_as_in_the_original_document(tmp_path):
         assert math.dist(*ends) == pytest.approx(length, rel=1e-13)
 
 
-@pytest.mark.sample(5)
+@pytest.mark.sample(3)
 @pytest.mark.parametrize('type_', list(mechanisms.TYPES))
 def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
     one = machine(type_)
@@ -180,6 +183,7 @@ def test_nothing_reaches_over_the_edge_of_a_picture(tmp_path, config, args):
     assert all((edge == 255).all() for edge in edges)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize('type_, options', [
     ('slotted_lever', {}), ('jansen', {'leg_pairs': 2}), ('peaucellier', {})])
 def test_an_animation_shows_what_a_still_of_that_time_shows(tmp_path, type_, options):
@@ -340,7 +344,7 @@ def test_angles_and_ratio_of_a_slotted_lever_are_printed():
     assert texts_of(picture)[1:] == ['φ = 0.0°', 'φ/θ = –', f'dφ/dθ = {80 / 230:.3f}']
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize('trace', TRACES)
 @pytest.mark.parametrize('type_', ['jansen', 'five_bar'])
 def test_every_trace_and_part_can_be_drawn(type_, trace):
@@ -588,3 +592,14 @@ def test_no_name_is_on_a_joint_or_on_another(name):
     joints = [text.axes.transData.transform(text.xy) for text in names]
     assert not any(box.contains(*joint) for box in boxes for joint in joints)
     assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
+
+
+@pytest.mark.parametrize('rows', [1, 3])
+def test_names_see_how_far_they_are_from_the_nearest_line(rows):
+    rng = np.random.default_rng(rows)
+    points, starts, ends = (rng.normal(size=(*shape, 2)) @ (1, 1j)
+                            for shape in ((3, 7), (rows, 5), (rows, 5)))
+    ends[:, 0] = starts[:, 0]
+    along = starts[..., None] + np.linspace(0.0, 1.0, 2001) * (ends - starts)[..., None]
+    nearest = np.abs(points[:, :, None] - along.reshape(rows, 1, -1)).min(axis=2)
+    np.testing.assert_allclose(layers.clearance(points, starts, ends), nearest, atol=2e-3)

@@ -629,9 +629,9 @@ def test_the_travel_of_a_published_joint_is_that_of_its_values(offset):
     for sign, ends in itertools.product((1, -1), ((-0.3, 0.2), (-2.0, 2.5), (7.0, 7.5))):
         joint = scene.read({'mechanisms': ['klann'], 'klann.joint_names': [
             f'AD={"-" * (sign < 0)}a{offset}']}).machines['klann'].joints['AD']
-        values = joint.of(np.linspace(*ends, 10001))
-        plain = sign * np.linspace(*ends, 10001) + float(offset or 0.0)
-        assert np.exp(1j * values) == pytest.approx(np.exp(1j * plain), abs=1e-12)
+        values = joint.of(np.linspace(*ends, 1001))
+        plain = sign * np.linspace(*ends, 1001) + float(offset or 0.0)
+        assert abs(np.exp(1j * values) - np.exp(1j * plain)).max() < 1e-12
         assert not offset or abs(values).max() <= math.pi
         jumps = np.abs(np.diff(values)).max() > 1.0
         found = joint.travel(ends)

@@ -27,7 +27,7 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-from c_libraries import loaded, ROS, STAND_IN, STRICT
+from c_libraries import loaded, ROS, shared, STAND_IN, STRICT
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import command, header, transmission
 from linkage_ros.c_code.axes import actuators, joints
@@ -238,7 +238,8 @@ def choosing(tmp_path_factory):
         code += header.written(machine, joints=[
             each if each == 'wheel' else f'm{i}_{each}' for each in names])
         code += CALLER.format(name=f'm{i}')
-    return loaded(tmp_path_factory.mktemp('choosing'), code)
+    with shared(tmp_path_factory, 'choosing') as folder:
+        return loaded(folder, code)
 
 
 @pytest.mark.parametrize('i', range(len(CHOICES)))
@@ -529,7 +530,7 @@ ODD = {'mechanisms': ['odd'], 'odd.type': 'custom', 'odd.dimensions.u': 0.5,
 
 
 @pytest.mark.parametrize('types, count', [
-    (['slotted_lever', 'five_bar'], 20),
+    (['slotted_lever', 'five_bar', 'four_bar'], 20),
     pytest.param(list(mechanisms.TYPES), 60, marks=pytest.mark.slow)], ids=['few', 'all'])
 def test_any_dimensions_are_those_of_python(tmp_path, types, count):
     machines = scene.read({**ODD, 'mechanisms': [*types, 'odd'],

@@ -24,7 +24,7 @@ import shutil
 import subprocess
 import weakref
 
-from c_libraries import ROS, STAND_IN, STRICT
+from c_libraries import ROS, shared, STAND_IN, STRICT
 from linkage_ros import scene
 from linkage_ros.c_code.package import package
 import numpy as np
@@ -85,13 +85,15 @@ class Plugins:
                 (made / path).parent.mkdir(parents=True, exist_ok=True)
                 (made / path).write_text(text, encoding='utf-8')
             library = folder / f'lib{name}.so'
-            subprocess.run([*compile_, '-I', made / 'include', made / 'src' / 'plugins.cpp', '-o',
-                            library, *ROS], check=True)
+            if not library.exists():
+                subprocess.run([*compile_, '-I', made / 'include', made / 'src' / 'plugins.cpp',
+                                '-o', library, *ROS], check=True)
             self.machines.update(machines)
             self.libraries.update(dict.fromkeys(machines, (library, f'{name}_plugins')))
         host = folder / 'component.so'
-        subprocess.run([*compile_, '-I', made / 'include', STAND_IN / 'component.cpp', '-o', host,
-                        '-ldl'], check=True)
+        if not host.exists():
+            subprocess.run([*compile_, '-I', made / 'include', STAND_IN / 'component.cpp', '-o',
+                            host, '-ldl'], check=True)
         self.host = ctypes.CDLL(str(host))
         self.host.component_made.restype = ctypes.c_void_p
         self.host.component_problem.restype = ctypes.c_char_p
@@ -147,10 +149,11 @@ class Component:
         return self._host.component_status(self._made)
 
 
-@pytest.fixture(scope='module')
+@pytest.fixture(scope='session')
 def plugins(tmp_path_factory):
     """Return the compiled packages."""
-    return Plugins(tmp_path_factory.mktemp('plugins'))
+    with shared(tmp_path_factory, 'plugins') as folder:
+        return Plugins(folder)
 
 
 def poses(machine, *crank):

@@ -200,7 +200,7 @@ def _literal(single: bool) -> Callable[[float], str]:
         if math.isinf(value):
             return f'({"-" * (value < 0.0)}INFINITY)'
         text = _shortest(value) if single else repr(float(value))
-        return f'({text}{f})' if value < 0.0 else text + f
+        return text + f
 
     return literal
 
