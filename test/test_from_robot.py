@@ -18,6 +18,7 @@ import shlex
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import check, closing, command, model, readers
+from linkage_ros.robot_files.spatial import posed
 import numpy as np
 import pytest
 from test_robot_files import (
@@ -353,6 +354,29 @@ def test_a_fold_is_left_by_a_line_that_is_printed(capsys, tmp_path):
     assert len(sides) == 2 and 'parallelogram' in found
 
 
+def test_a_pose_next_to_a_fold_leaves_bars_free(capsys, tmp_path):
+    file = tmp_path / 'folded.urdf'
+    file.write_text(FOLDED.format('continuous'))
+    robot = posed(readers.read(str(file)), {'motor': 1e-4, 'shoulder': 1e-4, 'elbow': -1e-4})
+    why = closing.closed(robot).faults['motor']
+    assert 'bars lie in line where the file has them, which leaves ' in why
+    (side,) = choices(why)
+    assert command.main([str(file), *side]) == 0
+    assert 'Left out' not in capsys.readouterr().err
+
+
+def test_a_joint_without_a_range_is_the_one_to_hold(capsys, tmp_path):
+    file, loops = tmp_path / 'five_bar.urdf', tmp_path / 'loops.yaml'
+    knee = '"front_knee" type="continuous">'
+    text = (ROBOTS / 'five_bar.urdf').read_text()
+    assert knee in text
+    file.write_text(text.replace(
+        knee, '"front_knee" type="revolute"><limit lower="0" upper="0"/>'))
+    loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [3d], name_mot: [mot_front]}')
+    line = refused(capsys, file, '--loops', loops)
+    assert re.search('or --hold front_knee=.*; the limits of front_knee leave no range', line)
+
+
 def test_a_fold_outside_the_limits_starts_inside_them(capsys, tmp_path):
     file = tmp_path / 'folded.urdf'
     file.write_text(FOLDED.format('revolute').replace(
@@ -386,7 +410,8 @@ def refusals():
     for name in ('closing', 'planar', 'loops', 'rods', 'check'):
         tree = ast.parse(Path(command.__file__).with_name(f'{name}.py').read_text())
         for node in ast.walk(tree):
-            is_reason = isinstance(node, ast.FunctionDef) and node.name in ('_fault', '_why')
+            is_reason = isinstance(node, ast.FunctionDef) and node.name in (
+                '_fault', '_why', '_elsewhere')
             for part in ast.walk(node) if is_reason else [node]:
                 if isinstance(part, (ast.Raise, ast.Return) if is_reason else ast.Raise):
                     yield from (each.value.strip(' :;,') for each in ast.walk(part)
@@ -402,7 +427,7 @@ def test_the_table_of_messages_has_all_refusals_and_no_others():
     assert len(rows) > 20
     assert not [each for each in refusals() if each not in known]
     quotes = [quote.strip(' :') for row in rows for quote in re.findall('`(.*?)`', row)]
-    others = {'choose by', 'not driven'}
+    others = {'choose by', 'not driven', 'free: choose another pose by'}
     assert not [quote for quote in quotes if quote not in said and quote not in others
                 and not quote.startswith('m, more')]
 

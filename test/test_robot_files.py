@@ -672,8 +672,12 @@ def test_a_pose_at_the_end_of_its_loops_is_no_side(capsys, tmp_path):
         'xyz="0 0 0.2"/><axis', f'xyz="0 0 0.2" rpy="0 {math.atan2(2.0, 3.0)!r} 0"/><axis'), (
         'xyz="0.3 0 0"/><axis', f'xyz="0.3 0 0" rpy="0 {-math.atan2(3.0, 2.0)!r} 0"/><axis'), (
         '<parent_origin xyz="0.3 0 0"/>', f'<parent_origin xyz="{13 ** 0.5 / 10 - 0.2!r} 0 0"/>'))
-    assert ('its loops end where the file has motor: choose another pose by --pose motor='
-            in refused(capsys, file, '--driven', 'motor'))
+    line = refused(capsys, file, '--driven', 'motor')
+    assert 'its loops end where the file has motor: choose another pose by --pose motor=' in line
+    # What is printed leads on: the loops do not let the motor inside its limits.
+    more = line.rstrip('.\n').partition('--pose ')[2].split()
+    assert command.main([str(file), '--driven', 'motor', '--pose', *more]) == 0
+    assert 'motor, from -2 to -1: its loops do not reach them' in capsys.readouterr().err
 
 
 def test_a_joint_that_follows_another_is_geared_to_it(imported, tmp_path):

@@ -159,10 +159,11 @@ def _fault(component: Component, poses: Poses, motors: List[str], followers: Lis
     if not count:
         return ''
     if len(component.free_ways(poses, fixed)) > component.nullity(fixed):
-        return (f'bars lie in line where the file has them, which leaves {listed(loose)} free: '
-                f'choose another pose by {_elsewhere(component, motors)}')
+        return (f'bars lie in line where the file has them, which leaves {listed(loose)} free'
+                + _elsewhere(component, motors))
     found = component.free_ways(poses, fixed)[:, component.columns_of(loose)]
-    stiff = [joint.name for joint in component.joints if joint.name in loose and joint.no_limits]
+    stiff = [joint.name for joint in component.joints if joint.name in loose
+             and joint.no_limits.endswith('no range')]
     more = component.chosen(found, loose, stiff)
     why = f'; the limits of {listed(stiff)} leave no range' if stiff else ''
     at = component.read(poses)
@@ -172,13 +173,14 @@ def _fault(component: Component, poses: Poses, motors: List[str], followers: Lis
 
 
 def _elsewhere(component: Component, motors: List[str]) -> str:
-    """Return the option of the stiffest pose of some that motors may have in their limits."""
-    poses = _searched(component, component.columns_of([]))
-    is_good = (component.gap(poses) < CLOSED) & component.within(poses, True)
-    stiff = component.stiffness(poses, component.columns_of(motors)) * is_good
+    """Return the option of the stiffest of other closed poses, inside limits if there are any."""
+    poses = _searched(component, component.columns_of([]), 0.0)
+    other = np.max(np.abs(component.away(poses.positions)), axis=1) > DISTINCT
+    stiff = component.stiffness(poses, component.columns_of(motors)) * other * (
+        component.gap(poses) < CLOSED) * np.where(component.within(poses, True), 1.0, 1e-6)
     best = poses.some(np.array([int(np.argmax(stiff))]))
-    return option('pose', component.written(best, np.ones(len(best.positions[0]), bool))) \
-        if stiff.any() else f'--pose {motors[0]}=...'
+    return f': choose another pose by {option("pose", component.written(best, True))}' \
+        if stiff.any() else ', and no other pose is found: lengths or places in the file are wrong'
 
 
 def _choice(questions: Sequence[Question], why: str) -> ValueError:
@@ -229,8 +231,8 @@ def _folded(component: Component, poses: Poses, motors: List[str], aside: np.nda
                 f'with {where} {name} is at {first:.3g} as well as at {second:.3g}',
                 [component.written(both.some([k]), mask) for k in (0, 1)])]
     if ends:
-        raise ValueError(f'its loops end where the file has {listed(motors)}: choose another '
-                         f'pose by {_elsewhere(component, motors)}')
+        raise ValueError(f'its loops end where the file has {listed(motors)}'
+                         + _elsewhere(component, motors))
     return []
 
 
@@ -288,7 +290,7 @@ def nearest(component: Component, names: List[str], followers: List[str]) -> Tup
     return poses, report
 
 
-def _searched(component: Component, fixed: np.ndarray) -> Poses:
+def _searched(component: Component, fixed: np.ndarray, pull: float = 1e-2) -> Poses:
     """Return poses of random starts, the first that of the file, closed as far as they can be."""
     columns = len(fixed)
     count = max(2, min(STARTS, 400_000 // max(columns, 1) ** 2))
@@ -296,4 +298,4 @@ def _searched(component: Component, fixed: np.ndarray) -> Poses:
     spread = np.linspace(0.0, 2.0, count)[:, None] * ~fixed
     poses = component.stepped(component.at_start(count), component.unit * spread * rng.uniform(
         -1.0, 1.0, (count, columns)))
-    return component.closed(component.closed(poses, fixed, 40, 1e-2), fixed, 12)
+    return component.closed(component.closed(poses, fixed, 40, pull), fixed, 12)

@@ -107,6 +107,11 @@ class Joint:
         return self.position or 0.0
 
     @property
+    def range(self) -> Tuple[float, float]:
+        """Return its limits [rad or m], infinite ones without any."""
+        return self.limits or (-math.inf, math.inf)
+
+    @property
     def chain(self) -> List[Tuple['Joint', float]]:
         """
         Return the hinges of a ball from its first body to its second, if all have positions.

@@ -290,7 +290,7 @@ class Component:
         """Return a step of joints by some part [rad, or of the size], within their limits."""
         step = np.zeros(len(self._column))
         for i in map(self._names.index, names):
-            low, high = self._elements[i].joint.limits or (-math.inf, math.inf)
+            low, high = self._elements[i].joint.range
             column, start = self._first[i], self._starts[i]
             change = part * self.unit[column]
             if not low <= start + change <= high:
@@ -405,7 +405,7 @@ class Component:
         """Return positions inside their limits, by a part of the range, of joints outside."""
         found = {}
         for each in (each.joint for each in self._elements if each.joint.position is not None):
-            low, high = each.limits or (-math.inf, math.inf)
+            low, high = each.range
             if not low <= each.start <= high:
                 aside = part * min(high - low, 1.0)
                 found[each.name] = low + aside if each.start < low else high - aside
@@ -413,11 +413,10 @@ class Component:
 
     def within(self, poses: Poses, elements: Any) -> np.ndarray:
         """Return in which poses elements with names are inside the limits of their joints."""
-        found = np.ones(len(poses.positions), bool)
+        found, at = np.ones(len(poses.positions), bool), self.read(poses)
         for i in np.flatnonzero(self._named & elements):
-            low, high = self._elements[i].joint.limits or (-math.inf, math.inf)
-            at = self.read(poses)[self._names[i]]
-            found &= (low <= at) & (at <= high)
+            low, high = self._elements[i].joint.range
+            found &= (low <= at[self._names[i]]) & (at[self._names[i]] <= high)
         return found
 
     def chosen(self, ways: np.ndarray, names: Sequence[str], first: Sequence[str] = ()
@@ -430,11 +429,11 @@ class Component:
                 found.append(i)
         return [own[i] for i in found]
 
-    def written(self, poses: Poses, elements: np.ndarray) -> Dict[str, str]:
-        """Return the positions of elements with names in the first pose, where they moved."""
+    def written(self, poses: Poses, elements: Any) -> Dict[str, str]:
+        """Return the positions of elements with names in the first pose."""
         found = self.read(poses.some(np.arange(1)))
-        return {name: f'{found[name][0]:.6g}' for i, name in enumerate(self._names)
-                if self._named[i] and elements[i] and abs(found[name][0] - self._starts[i]) > 1e-9}
+        return {self._names[i]: f'{found[self._names[i]][0]:.6g}'
+                for i in np.flatnonzero(self._named & elements)}
 
     def moves(self, poses: Poses) -> Dict[str, np.ndarray]:
         """Return the displacement of each body on its parent in the first pose."""
