@@ -8,14 +8,14 @@
 # express or implied. See the License for the specific language governing permissions and
 # limitations under the License.
 
+
 """The nodes of linkage_ros as processes of their own, as `ros2 run` would start them."""
 
 import os
-from pathlib import Path
 import signal
 import subprocess
+import sys
 
-from ament_index_python.packages import get_package_prefix, PackageNotFoundError
 from linkage_ros.command import RequestError
 
 EXECUTABLES = ('crank_driver', 'kinematics', 'servo_inverse')
@@ -29,29 +29,18 @@ class DemoError(RequestError):
 class Nodes:
     """The running nodes of a scene, with a viewer if it has a port; leaves none behind."""
 
-    def __init__(self, scene_file: Path, domain: int, viewer_port=None):
-        try:
-            folder = Path(get_package_prefix('linkage_ros'), 'lib', 'linkage_ros')
-        except PackageNotFoundError:
-            raise DemoError('linkage_ros is not installed where ROS looks: build it and source '
-                            'install/setup.bash') from None
-        self._commands = {name: [folder / name, '--ros-args', '--params-file', scene_file]
-                          for name in EXECUTABLES}
+    def __init__(self, scene_file, domain, viewer_port=None):
+        environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
+        arguments = {name: ['--params-file', scene_file] for name in EXECUTABLES}
         if viewer_port is not None:
-            self._commands['viewer'] = [
-                folder / 'viewer', '--ros-args', '-p', f'port:={viewer_port}']
-        self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(domain)}
-        self._processes = {}
+            arguments['viewer'] = ['-p', f'port:={viewer_port}']
+        # In sessions of their own: Ctrl-C reaches the demo alone, which ends the nodes.
+        self._processes = {name: subprocess.Popen(
+            [sys.executable, '-c', f'from linkage_ros import executables; executables.{name}()',
+             '--ros-args', *own], env=environment, start_new_session=True)
+            for name, own in arguments.items()}
 
     def __enter__(self):
-        for name, command in self._commands.items():
-            try:
-                # In a session of its own: Ctrl-C reaches the demo alone, which ends the nodes.
-                self._processes[name] = subprocess.Popen(
-                    command, env=self._environment, start_new_session=True)
-            except OSError as error:
-                self.stop()
-                raise DemoError(f'{name} cannot be started: {error}') from None
         return self
 
     def __exit__(self, *_):

@@ -20,6 +20,7 @@ import tempfile
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
+from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -27,7 +28,9 @@ from linkage_ros import scene
 from linkage_ros.robot_files import model, readers
 from linkage_ros.scene.writing import in_yaml
 
-# Name, default, and what it does.
+SWITCH = ['true', 'false', 'True', 'False']
+
+# Name, default, and description.
 ARGUMENTS = (
     ('robot', None, 'MJCF, SDF or URDF of the robot.'),
     ('scene', None, 'What from_robot has printed of it.'),
@@ -42,7 +45,8 @@ ON_JOINT_STATES = [('crank_states', 'joint_states')]
 def generate_launch_description():
     """Return the arguments and what depends on them."""
     return LaunchDescription([
-        *(DeclareLaunchArgument(name, default_value=default, description=description)
+        *(DeclareLaunchArgument(name, default_value=default, description=description,
+                                choices=SWITCH if default in SWITCH else None)
           for name, default, description in ARGUMENTS),
         OpaqueFunction(function=_started)])
 
@@ -61,8 +65,9 @@ def _started(context):
         file.write_text(in_yaml({'mechanisms': [*shown.machines, model.OTHERS], **rest}))
         files.append(str(file))
     text = ParameterValue(model.description(chosen['robot'], loops), value_type=str)
-    nodes = ['kinematics'] + ['crank_driver'] * (chosen['simulated'].lower() in ('true', '1'))
     reports = [LogInfo(msg=f'robot.launch.py: {model.not_published(lost)}')] * bool(lost)
+    is_simulated = IfCondition(LaunchConfiguration('simulated')).evaluate(context)
+    nodes = ('kinematics', 'crank_driver') if is_simulated else ('kinematics',)
     return [*reports,
             Node(package='robot_state_publisher', executable='robot_state_publisher',
                  parameters=[{'robot_description': text, 'publish_frequency': 100.0}]),

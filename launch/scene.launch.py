@@ -9,23 +9,22 @@
 # limitations under the License.
 
 """
-Bring up a scene: its nodes, and what it is looked at with.
+Bring up a scene: its nodes, the viewer's page, and on request RViz and robot models.
 
     ros2 launch linkage_ros scene.launch.py scene:=strandbeest rviz:=true
 """
 
 from pathlib import Path
-import re
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.conditions import IfCondition
 from launch.logging import launch_config
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from linkage_ros import scene
-from linkage_ros.optional import needs
 from linkage_ros.robot_model import rviz, urdf
 from linkage_ros.words import meant
 import yaml
@@ -37,10 +36,9 @@ VIEWER = 'viewer'
 RVIZ_CONFIG = 'linkage.rviz'
 # Without a robot model nothing else publishes a transform, and RViz would know of no frame.
 FRAME = 'linkages'
-YES, NO = ('true', '1', 'yes', 'on'), ('false', '0', 'no', 'off')
-LARGEST_PORT = 65535
+SWITCH = ['true', 'false', 'True', 'False']
 
-# Name, default, and what it does.
+# Name, default, and description.
 ARGUMENTS = (
     ('scene', 'all', 'Scene: a name in config/ without its ending, or the path of a file.'),
     ('namespace', '', 'Namespace of all nodes and topics.'),
@@ -59,85 +57,48 @@ ARGUMENTS = (
 def generate_launch_description():
     """Return the arguments and what depends on them."""
     return LaunchDescription([
-        *(DeclareLaunchArgument(name, default_value=default, description=description)
+        *(DeclareLaunchArgument(name, default_value=default, description=description,
+                                choices=SWITCH if default in SWITCH else None)
           for name, default, description in ARGUMENTS),
         OpaqueFunction(function=_started),
     ])
 
 
 def _started(context):
-    chosen = {name: LaunchConfiguration(name).perform(context) for name, *_ in ARGUMENTS}
-    apart, viewer, rviz_wanted, robot_model, use_sim_time = (
-        switched(name, chosen[name])
-        for name in ('apart', 'viewer', 'rviz', 'robot_model', 'use_sim_time'))
-    listens = listening(chosen['port'])
+    text = {name: LaunchConfiguration(name).perform(context) for name, *_ in ARGUMENTS}
+    has = {name: IfCondition(LaunchConfiguration(name)).evaluate(context)
+           for name, default, _ in ARGUMENTS if default in SWITCH}
     share = Path(get_package_share_directory(PACKAGE))
-    path = _scene_path(share, chosen['scene'])
+    path = _scene_path(share, text['scene'])
     shown = scene.load(str(path))
-    prefix = chosen['frame_prefix'].strip('/')
+    prefix = text['frame_prefix'].strip('/')
     prefix = f'{prefix}/' if prefix else shown.frame_prefix
-    common = {'namespace': chosen['namespace'], 'output': 'screen'}
-    time = {'use_sim_time': use_sim_time}
-    # First what may not be installed: then nothing is left running.
-    nodes = []
-    if robot_model:
-        nodes += [_robot(machine, shown.frame_id, chosen['namespace'], prefix, time)
-                  for machine in shown.machines.values()]
-    if rviz_wanted:
+    common = {'namespace': text['namespace'], 'output': 'screen'}
+    time = {'use_sim_time': has['use_sim_time']}
+    # First the packages that may not be installed: then nothing is left running.
+    nodes = [_robot(machine, shown.frame_id, text['namespace'], prefix, time)
+             for machine in shown.machines.values() if has['robot_model']]
+    if has['rviz']:
         config = rviz.adapted(
             yaml.safe_load((share / 'config' / RVIZ_CONFIG).read_text()), shown.machines,
-            shown.frame_id, chosen['namespace'], robot_model, prefix)
+            shown.frame_id, text['namespace'], has['robot_model'], prefix)
         # Among the logs of this launch, so that nothing is left behind elsewhere.
         adapted = Path(launch_config.log_dir, RVIZ_CONFIG)
         adapted.write_text(yaml.safe_dump(config))
         nodes.append(Node(package='rviz2', executable='rviz2', arguments=['-d', str(adapted)],
                           parameters=[time], **common))
-    if prefix and (robot_model or rviz_wanted):
-        nodes.append(_transform(shown.frame_id, prefix + shown.frame_id, time, common))
-    elif rviz_wanted and not robot_model:
-        nodes.append(_transform(shown.frame_id, FRAME, time, common))
-    if viewer:
-        nodes.append(_viewer(listens, common))
+    if has['rviz'] and not has['robot_model'] or prefix and has['robot_model']:
+        nodes.append(Node(
+            package='tf2_ros', executable='static_transform_publisher', parameters=[time],
+            arguments=['--frame-id', shown.frame_id, '--child-frame-id',
+                       prefix + shown.frame_id if prefix else FRAME], **common))
+    if has['viewer']:
+        port = f'port:={text["port"]}' if text['port'] else 'or_any_port:=true'
+        nodes.append(Node(package=PACKAGE, executable=VIEWER, ros_arguments=['-p', port],
+                          **common))
     return nodes + [Node(package=PACKAGE, executable=name, **common,
                          parameters=[str(path), time, {'frame_prefix': prefix}])
-                    for name in (NODES if apart else TOGETHER)]
-
-
-def switched(name, text):
-    """Return whether an argument is true; raise RuntimeError if it is neither true nor false."""
-    word = text.strip().lower()
-    if word not in YES + NO:
-        raise RuntimeError(f'{name} must be true or false, not {text!r}')
-    return word in YES
-
-
-def numbered(name, text):
-    """Return the number of a port; raise RuntimeError if it is none."""
-    if not re.fullmatch(r'\s*[0-9]{1,5}\s*', text) or int(text) > LARGEST_PORT:
-        raise RuntimeError(f'{name} must be a whole number from 0 to {LARGEST_PORT}, not {text!r}')
-    return int(text)
-
-
-def listening(port):
-    """Return where the viewer listens, as its parameters."""
-    # A viewer of another namespace has the usual port, or is about to.
-    return {'port': numbered('port', port)} if port else {'or_any_port': True}
-
-
-def _transform(frame, child, time, common):
-    """Return what says that a frame is where another is."""
-    return Node(package='tf2_ros', executable='static_transform_publisher', parameters=[time],
-                arguments=['--frame-id', frame, '--child-frame-id', child], **common)
-
-
-def _viewer(listens, common):
-    """Return what serves the page, or what says why that cannot be."""
-    try:
-        with needs('aiohttp'):
-            from aiohttp import web  # noqa: F401
-    except ImportError as error:
-        return LogInfo(msg=f'The viewer is left out: {error}.')
-    return Node(package=PACKAGE, executable=VIEWER, parameters=[listens], **common)
+                    for name in (NODES if has['apart'] else TOGETHER)]
 
 
 def _scene_path(share, name):

@@ -84,6 +84,6 @@ def graph(monkeypatch):
     from ros_harness import Graph
 
     # However slow the machine is, what is logged now and then is logged once.
-    monkeypatch.setattr(log, 'SECONDS', math.inf)
+    monkeypatch.setattr(log, 'THROTTLE_S', math.inf)
     with Graph() as one:
         yield one

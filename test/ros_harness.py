@@ -19,6 +19,8 @@ import sys
 import time
 
 from domains import Domain
+from linkage_ros import scene
+from linkage_ros.nodes.kinematics import Kinematics
 from rcl_interfaces.msg import Log
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -129,6 +131,14 @@ class Graph:
         # What is accepted acts when it has been prepared.
         self.until(lambda: getattr(node, 'is_settled', True))
         return result
+
+    def change(self, follower, parameters, **values):
+        """Set parameters on a `kinematics` of these parameters, and wait until a node follows."""
+        wanted = {name.replace('__', '.'): scene.plain(value) for name, value in values.items()}
+        owner = next((node for node in self._nodes if isinstance(node, Kinematics)), None)
+        assert self.set(owner or self.start(Kinematics, parameters), **wanted).successful
+        self.until(lambda: wanted == {one.name: one.value for one in follower.scene.parameters
+                                      if one.name in wanted})
 
     def call(self, client, request):
         """Return what a service answers."""

@@ -179,7 +179,7 @@ def test_names_that_somebody_makes_up_do_not_fill_the_log(stream, capfd):
     for number in range(60):
         stream.want(['flap', f'wing{number}'], [flap(0.2), 1.0])
     said = [line for line in capfd.readouterr().err.splitlines() if 'no output is called' in line]
-    assert 'called wing0;' in said[0] and len(said) == log.NAMES
+    assert 'called wing0;' in said[0] and len(said) == log.MAX_NAMES
     assert 'no more will be named' in said[-1]
 
 
@@ -196,7 +196,7 @@ def test_hostile_bytes_end_nothing(stream, graph):
 
 def test_a_change_of_the_geometry_is_minded(stream, graph):
     for a in (80.0, 90.0):
-        assert graph.set(stream.node, lever__dimensions__a=a).successful
+        graph.change(stream.node, LEVER, lever__dimensions__a=a)
         servo, = stream.want(['lever_A.y'], [40.0])['servo']
         assert a * math.cos(0.5 * servo + 0.25) == pytest.approx(40.0, abs=1e-12)
 
@@ -290,14 +290,15 @@ def test_a_foot_and_a_bucket_go_in_along_a_line_and_back_out(graph):
 
 
 def test_of_several_inputs_no_command_outlives_a_change_of_the_geometry(graph, capfd):
-    stream = Stream(graph, {
+    given = {
         'mechanisms': ['leg', 'other', 'bar'], 'leg.type': 'five_bar', 'leg.crank.start': 1.9,
         'leg.crank2.start': 1.24, 'other.type': 'five_bar', 'other.crank.start': 1.9,
-        'other.crank2.start': 1.24, 'bar.type': 'four_bar'})
+        'other.crank2.start': 1.24, 'bar.type': 'four_bar'}
+    stream = Stream(graph, given)
     names, far = [*FOOT, 'other_P.x', 'other_P.y', 'bar_QB'], [9.0, 9.0]
     good = stream.want(names, [*LINE[:2], *LINE[:2], 1.2])
     assert stream.want(names, [*far, *far, 1.2]) == good
-    assert graph.set(stream.node, leg__dimensions__a=0.085).successful
+    graph.change(stream.node, given, leg__dimensions__a=0.085)
     held = stream.want(names, [*far, *far, 1.2])
     assert held == {name: at for name, at in good.items() if not name.startswith('leg')}
     assert stream.want([FOOT[0], 'bar_QB'], [9.0, 1.2]).keys() == {'bar_crank'}
@@ -313,7 +314,7 @@ def test_of_several_inputs_what_cannot_be_had_is_held_and_said(graph, capfd):
     for place in ([0.059, 0.5], [math.nan, 0.16], [math.inf, -1e300], [0.059, -0.16]):
         held = stream.want(FOOT, place, [0.1, 0.0])
         assert held == {name: (position, 0.0) for name, (position, _) in good.items()}
-    assert graph.set(stream.node, leg__dimensions__a=0.085).successful
+    graph.change(stream.node, SEVERAL, leg__dimensions__a=0.085)
     changed = [row for row, _ in five_bar({**LEG, 'a': 0.085}, complex(*LINE[:2]))]
     found = stream.want([*FOOT, *BUCKET[:2]], LINE[:4].tolist())
     assert found.keys() == good.keys()
@@ -366,7 +367,7 @@ def test_a_first_command_is_searched_beside_the_messages(graph, searches):
 
 def test_why_there_is_no_first_command_is_searched_seldom_and_beside_the_messages(
         graph, searches, capfd, monkeypatch):
-    monkeypatch.setattr('linkage_ros.nodes.command_stream.PAUSES', 1e9)
+    monkeypatch.setattr('linkage_ros.nodes.command_stream.SEARCH_PAUSE_RATIO', 1e9)
     stream = Stream(graph, SEVERAL)
     for _ in range(3):
         assert stream.want(FOOT + SEARCHED, [*LINE[:2], 1e4, -150.0, 100.0]).keys() == {
@@ -459,7 +460,7 @@ REFUSED = [
 
 
 def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd, monkeypatch):
-    monkeypatch.setattr('linkage_ros.nodes.command_stream.MOST_POINTS', 4)
+    monkeypatch.setattr('linkage_ros.nodes.command_stream.MAX_POINTS', 4)
     logged = []
 
     def reasons():

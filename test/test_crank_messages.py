@@ -226,7 +226,7 @@ def test_names_that_are_no_inputs_are_said_once(graph):
 def test_a_warning_is_repeated_when_its_time_is_over(graph, monkeypatch):
     hand = Hand(graph, 'cell', {'mechanisms': ['cell'], 'cell.type': 'peaucellier'})
     for seconds, count in ((60.0, 1), (0.0, 4), (60.0, 4)):
-        monkeypatch.setattr(log, 'SECONDS', seconds)
+        monkeypatch.setattr(log, 'THROTTLE_S', seconds)
         for angle in (2.0, 2.1, 2.2):
             hand.send(['cell_crank'], [angle])
         hand.moved(['cell_crank'], [0.5 + 0.01 * count])
@@ -255,7 +255,7 @@ class Patience:
     def __init__(self, graph, node):
         self._graph = graph
         self._timer, = (timer for timer in node.timers
-                        if timer.timer_period_ns == 1e9 * kinematics.MISSING_AFTER)
+                        if timer.timer_period_ns == 1e9 * kinematics.MISSING_AFTER_S)
 
     @property
     def waits(self):

@@ -299,6 +299,47 @@ def test_the_table_of_engines_is_that_of_the_last_run(measured):
             == benchmark.engines.table(results['engines']))
 
 
+JOURNEYS = {
+    'The life of a crank message': lambda graph, node, crank, heard: crank([0.4], heard),
+    'A change of a parameter': lambda graph, node, crank, heard: graph.set(node, m__scale=2.0)}
+
+
+@pytest.mark.parametrize('heading', JOURNEYS)
+def test_the_files_of_a_journey_are_those_that_run(graph, heading):
+    pytest.importorskip('rclpy')
+    from linkage_ros.nodes import ownership
+    from linkage_ros.nodes.kinematics import Kinematics
+    from rcl_interfaces.msg import ParameterEvent
+    from sensor_msgs.msg import JointState
+
+    page = (ROOT / 'docs' / 'architecture.md').read_text()
+    steps = re.findall(r'^\d\. .*(?:\n   .*)*', page.partition(f'## {heading}')[2].partition(
+        '\n## ')[0], re.MULTILINE)
+    named = {file for step in steps for file in re.findall(r'`((?:nodes|linkage)/\w+\.py)`', step)}
+    node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': 'jansen'})
+    crank, heard = graph.crank(['m_crank']), graph.listen(JointState, 'm/joint_states')
+    announced = graph.listen(ParameterEvent, ownership.TOPIC, ownership.LATCHED)
+    # The last that the worker does at a start.
+    graph.until(lambda: announced)
+    for angle in (0.2, 0.3):
+        crank([angle], heard)
+    ran, room = set(), str(ROOT / 'linkage_ros') + '/'
+
+    def called(frame, event, _):
+        if event == 'call' and frame.f_code.co_filename.startswith(room):
+            ran.add(frame.f_code.co_filename.removeprefix(room))
+
+    sys.setprofile(called)
+    try:
+        JOURNEYS[heading](graph, node, crank, heard)
+    finally:
+        sys.setprofile(None)
+    assert len(named) >= 5 and named <= ran, named - ran
+    if heading == 'The life of a crank message':
+        assert {file for file in ran if file.startswith('nodes/')} <= named | {
+            'nodes/scene_joint_states.py'}
+
+
 def test_every_file_that_the_architecture_names_is_there():
     # The recipes write files of their own.
     page = (ROOT / 'docs' / 'architecture.md').read_text().partition('## Recipes')[0]

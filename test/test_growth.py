@@ -115,7 +115,7 @@ def test_of_a_change_to_one_only_that_is_read_prepared_and_announced(graph, monk
     heard = graph.listen(ParameterEvent, ownership.TOPIC, ownership.LATCHED)
     graph.until(lambda: heard)
     assert {p.name for p in heard[0].new_parameters} == {
-        p.name for p in node.scene.parameters if p.field.shared}
+        p.name for p in node.scene.parameters if p.field.owner == scene.KINEMATICS}
     assert graph.set(node, m7__scale=2.5).successful
     graph.until(lambda: len(heard) == 2)
     assert [p.name for p in heard[1].changed_parameters] == ['m7.scale']

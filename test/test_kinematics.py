@@ -310,6 +310,25 @@ def test_of_several_inputs_the_line_without_a_place_is_named(graph, parameters, 
         f'no place for "{line}"'}
 
 
+@pytest.mark.parametrize('type_, positions, said', [
+    ('four_bar', [math.nan], ': m_crank is at nan'),
+    ('peaucellier', [math.inf], ': m_crank is at inf'),
+    ('five_bar', [0.3, -math.inf], ': m_crank2 is at -inf'),
+    ('peaucellier', [2.0], ' at crank angle 2 rad; the reach is [-1.17137, 1.17137] rad'),
+    # In the reach as far as so large an angle can tell.
+    ('peaucellier', [1e300], ' at crank angle 1e+300 rad: no place for "B C D inversor P A a b"')])
+def test_a_limit_is_named_only_if_it_was_left(graph, type_, positions, said):
+    heard = graph.log()
+    node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': type_})
+    graph.listen(JointState, 'm/joint_states')
+    graph.until(lambda: node.count_subscribers('/rosout'))
+    push = graph.crank([settings.source for settings in node.scene.machines['m'].inputs.values()])
+    graph.until(lambda: push.send(positions) and [
+        m for m in heard if 'cannot be assembled' in m.msg])
+    assert {m.msg for m in heard if 'cannot be assembled' in m.msg} == {
+        f'm cannot be assembled{said}'}
+
+
 def test_an_angle_out_of_reach_is_passed_over_with_a_warning(graph):
     logged = graph.log()
     bench = Bench(graph, 'cell', CELL)
@@ -392,6 +411,9 @@ def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, g
     assert {marker.id for marker in markers} == ids and len(markers) == len(ids)
     for marker in markers:
         type_, colour, part, layer = LOOKS[marker.id]
+        if (name, marker.id) == ('walker', 2):
+            # Both curves of mirrored legs, as a list of lines.
+            type_ = Marker.LINE_LIST
         p, q, scale, rgba = (marker.pose.position, marker.pose.orientation, marker.scale,
                              marker.color)
         whole = part in (None, 20)

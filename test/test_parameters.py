@@ -25,7 +25,6 @@ from linkage_ros.nodes import scene_node as nodes
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from linkage_ros.scene import slider  # noqa: E402
 from rcl_interfaces.msg import (
     FloatingPointRange,  # noqa: E402
     IntegerRange,  # noqa: E402
@@ -40,7 +39,9 @@ from rcl_interfaces.srv import (  # noqa: E402
     SetParameters,
     SetParametersAtomically,
 )
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
+from sensor_msgs.msg import JointState  # noqa: E402
 
 LEG = {'mechanisms': ['leg'], 'leg.type': 'jansen'}
 EVERYTHING = {
@@ -147,7 +148,7 @@ def test_no_value_of_any_kind_spoils_any_parameter(graph, kind):
 @pytest.mark.parametrize('kind', KINDS)
 def test_every_parameter_is_described_as_the_scene_has_it(graph, kind):
     whole, node = scene.read(EVERYTHING), graph.start(kind, EVERYTHING)
-    own = [one for one in whole.parameters if node.get_name() in one.field.readers]
+    own = [one for one in whole.parameters if node.get_name() == one.field.owner]
     names = [one.name for one in own]
     assert sorted(names) == sorted(node.fields) == sorted(
         name for name in node.get_parameters_by_prefix('') if name != 'use_sim_time'
@@ -155,7 +156,8 @@ def test_every_parameter_is_described_as_the_scene_has_it(graph, kind):
     abouts, types = Client(graph, node).about(names)
     assert len(abouts) == len(types) == len(own)
     for one, about, type_ in zip(own, abouts, types):
-        kind, ends = Parameter.Type[one.field.kind.upper()].value, slider.ends(whole, one)
+        kind, ends = Parameter.Type[one.field.kind.upper()].value, (
+            one.field.high is not None and (one.field.low, one.field.high))
         assert scene.plain(node.get_parameter(one.name).value) == one.value
         assert type_ == kind
         assert about == ParameterDescriptor(
@@ -202,24 +204,25 @@ def test_an_empty_list_of_any_type_is_an_empty_list_of_the_right_one(graph):
 EMPTY = 'leg.loads', 'leg.joint_names', 'leg.crank.sweep'
 
 
-@pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('by_file', [True, False])
 def test_an_empty_list_in_a_parameter_file_or_argument_is_one_of_its_type(
-        graph, tmp_path, kind, by_file):
+        graph, tmp_path, by_file):
     values = {**LEG, **dict.fromkeys(EMPTY, [])}
     path = tmp_path / 'scene.yaml'
     path.write_text(json.dumps({'/**': {'ros__parameters': values}}))
     given = ['--params-file', str(path)] if by_file else [
         word for name, value in values.items() for word in ('-p', f'{name}:={json.dumps(value)}')]
-    node = graph.start(kind, cli_args=['--ros-args', *given])
-    own = [name for name in EMPTY if name in node.fields]
-    assert own
-    for name in own:
+    for kind in (CrankDriver, ServoInverse):
+        follower = graph.start(kind, cli_args=['--ros-args', *given])
+        assert not any(map(follower.has_parameter, EMPTY))
+        assert {p.value for p in follower.scene.parameters if p.name in EMPTY} == {()}
+    node = graph.start(Kinematics, cli_args=['--ros-args', *given])
+    for name in EMPTY:
         parameter = node.get_parameter(name)
         assert parameter.type_ == Parameter.Type[node.fields[name].kind.upper()], name
         assert scene.plain(parameter.value) == ()
     client = Client(graph, node)
-    assert [*client.about(own)[1]] == [node.get_parameter(name).type_.value for name in own]
+    assert [*client.about(EMPTY)[1]] == [node.get_parameter(name).type_.value for name in EMPTY]
     assert client.set(('leg.crank.sweep', [0.0, 1.0]))[0].successful
     assert client.set(('leg.crank.sweep', []))[0].successful
 
@@ -251,20 +254,6 @@ def test_the_parameters_of_another_scene_can_be_loaded_in_one_request(graph):
     results = Client(graph, node).set(*values, ('leg.crank.speed', 1.0), ('leg.scale', 0.01))
     assert [r.successful for r in results] == [True] * 13 + [False, True]
     assert node.scene.machines['leg'].linkage.dimensions['m'] == 1500.0
-
-
-def test_a_slider_moves_along_with_its_value_and_never_refuses(graph):
-    node = graph.start(Kinematics, LEG)
-    client = Client(graph, node)
-
-    def ends():
-        about, = client.call(DescribeParameters, names=['leg.scale']).descriptors
-        return about.floating_point_range[0].from_value, about.floating_point_range[0].to_value
-
-    low, high = ends()
-    assert client.set(('leg.scale', 1e3 * high))[0].successful
-    assert ends()[0] < 1e3 * high < ends()[1]
-    assert client.set(('leg.scale', low))[0].successful
 
 
 class Slow(nodes.SceneNode):
@@ -379,13 +368,61 @@ def test_of_values_of_one_name_in_one_request_the_last_is_validated_and_set(grap
     assert node.get_parameter('leg.dimensions.m').value == wanted[-1][1]
     # One time for the request, and one for what follows from it.
     assert len(validated) <= 2
-    # Where the last cannot be, it is the last of those that can.
-    validated.clear()
-    results = client.set(('leg.scale', 7.0), *wanted[:98], ('leg.dimensions.m', 900.0))
-    assert [result.successful for result in results] == [True] * 99 + [False]
+    # Where the last cannot be, each is set by itself.
+    results = client.set(('leg.scale', 7.0), *wanted[:9], ('leg.dimensions.m', 900.0))
+    assert [result.successful for result in results] == [True] * 10 + [False]
     assert 'leg.dimensions' in results[-1].reason
-    assert node.get_parameter('leg.dimensions.m').value == wanted[97][1]
-    assert node.get_parameter('leg.scale').value == 7.0 and len(validated) < 20
+    assert node.get_parameter('leg.dimensions.m').value == wanted[8][1]
+    assert node.get_parameter('leg.scale').value == 7.0
+
+
+@pytest.mark.parametrize('executor', [SingleThreadedExecutor, nodes.Executor])
+def test_messages_are_handled_between_requests_that_come_at_once(graph, executor):
+    node = Kinematics(context=graph.context, parameter_overrides=[
+        Parameter(name, value=value) for name, value in LEG.items()])
+    handled, asked, over = [], threading.Event(), threading.Event()
+    node.add_post_set_parameters_callback(lambda parameters: handled.append(parameters[0].value))
+    subscription, = (one for one in node.subscriptions if one.topic_name == '/crank_states')
+    crank = graph.node.create_publisher(JointState, 'crank_states', 1)
+
+    def again(_):
+        """Note that a message is handled, and publish the next one."""
+        asked.wait(60.0)
+        handled.append(None)
+        crank.publish(JointState(name=['leg_crank']))
+
+    subscription.callback = again
+    own = executor(context=graph.context)
+    own.add_node(node)
+
+    def spin():
+        while not over.is_set():
+            own.spin_once(timeout_sec=0.1)
+
+    thread = threading.Thread(target=spin)
+    thread.start()
+    try:
+        client = Client(graph, node)
+        graph.until(crank.get_subscription_count)
+        client.about(['leg.scale'])
+        wanted = [1.0 + 0.01 * i for i in range(50)]
+        client.ask(SetParameters, parameters=[_message('leg.scale', 0.5)])
+        graph.until(lambda: handled == [0.5])
+        crank.publish(JointState(name=['leg_crank']))
+        # The last one is refused.
+        for value in [*wanted, -1.0]:
+            client.ask(SetParameters, parameters=[_message('leg.scale', value)])
+        asked.set()
+        graph.until(lambda: wanted[-1] in handled and node.is_settled)
+    finally:
+        asked.set()
+        over.set()
+        thread.join()
+        own.shutdown()
+        node.destroy_node()
+    assert [value for value in handled if value is not None] == [0.5, *wanted]
+    between = handled[handled.index(wanted[0]):handled.index(wanted[-1])]
+    assert between.count(None) > 10
 
 
 def test_a_set_within_the_process_is_at_once_and_is_kept(graph):
@@ -414,6 +451,31 @@ def test_a_mistake_while_a_scene_is_prepared_leaves_the_one_before(graph, monkey
     assert client.set(('leg.scale', 4.0))[0].successful
     settled(graph, node)
     assert node.adopted[-1][1] == 4.0
+
+
+@pytest.mark.parametrize('refused', [
+    ('leg.type', 'klann'), ('leg.crank.source', 'shaft'), ('leg.scale', -1.0),
+    ('leg.dimensions.m', 900.0), ('leg.nobody', 1.0), ('use_sim_time', 3)])
+def test_what_was_refused_keeps_nothing_from_being_accepted(graph, refused):
+    node = graph.start(Kinematics, LEG)
+    client = Client(graph, node)
+    for scale in (2.0, 3.0):
+        bad = client.set(refused)[0]
+        assert not bad.successful and bad.reason
+        # A parameter that somebody declares later is none of the scene's business.
+        node.declare_parameter(f'own{scale:g}', 1.0)
+        assert client.set(('leg.scale', scale))[0].successful
+        assert node.scene.machines['leg'].scale == scale
+    # The same objects once more, though others were set meanwhile.
+    both = [Parameter('use_sim_time', value=False), Parameter('leg.scale', value=5.0)]
+    for scale in (5.0, 3.0):
+        assert node.set_parameters_atomically(both).successful
+        assert node.scene.machines['leg'].scale == 5.0
+        assert client.set(('leg.scale', scale))[0].successful
+    together = client.call(SetParametersAtomically, parameters=[
+        _message('leg.scale', 4.0), _message(*refused)]).result
+    node.declare_parameter('own', 1.0)
+    assert not together.successful and node.scene.machines['leg'].scale == 3.0
 
 
 def test_what_others_have_to_say_about_a_parameter_counts(graph):

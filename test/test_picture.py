@@ -21,6 +21,7 @@ pytest.importorskip('rclpy')
 
 from linkage_ros import palette, scene  # noqa: E402
 from linkage_ros.linkage.walker import Assembly  # noqa: E402
+from linkage_ros.mechanisms import create  # noqa: E402
 from linkage_ros.nodes import messages  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.publishers import LATCHED  # noqa: E402
@@ -109,6 +110,24 @@ def test_whoever_comes_late_sees_the_newest_locus_and_model(graph):
     graph.until(lambda: model and model[-1].data == urdf.describe([wanted], 'world'))
     graph.until(lambda: locus and np.allclose(
         [(p.x, p.y) for p in locus[-1].points], curve, rtol=1e-9))
+
+
+def test_the_locus_has_the_feet_of_both_sides(graph):
+    walker = {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.leg_pairs': 2,
+              'walker.scale': 0.01}
+    node = graph.start(Kinematics, walker)
+    loci = graph.listen(Marker, 'walker/locus', LATCHED)
+    one_side = graph.until(lambda: loci and loci[-1].type == Marker.LINE_LIST and loci[-1])
+    curve, other = np.split(np.array([(p.x, p.y) for p in one_side.points]), 2)
+    # The lines of a curve end where the next begin, and no line joins the two curves.
+    assert (curve[1:-1:2] == curve[2::2]).all() and (other == curve * (-1.0, 1.0)).all()
+    feet = 0.01 * create('jansen').solve(np.linspace(0.0, math.tau, 5000), ('G',))['G']
+    for foot, line in ((feet, curve), (feet * (-1.0, 1.0), other)):
+        away = np.hypot(*np.moveaxis(foot[:, None] - line, -1, 0))
+        assert away.min(axis=1).max() < 0.01 and away.min(axis=0).max() < 5e-4
+    assert graph.set(node, walker__mirrored=False).successful
+    strip = graph.until(lambda: loci[-1].type == Marker.LINE_STRIP and loci[-1])
+    assert np.array_equal([(p.x, p.y) for p in strip.points], [curve[0], *curve[1::2]])
 
 
 def test_nothing_is_left_of_a_node_that_is_destroyed(graph):

@@ -24,7 +24,7 @@ pytest.importorskip('rclpy')
 
 from linkage_ros.nodes import joint_state_reader, message_layout  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.message_layout import SHORTEST, Unreadable  # noqa: E402
+from linkage_ros.nodes.message_layout import MIN_BYTES, Unreadable  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 
@@ -194,7 +194,7 @@ def held(owner):
 
 
 def test_what_is_remembered_is_bounded_whatever_comes(reader, monkeypatch):
-    monkeypatch.setattr(joint_state_reader, 'SENDERS', 32)
+    monkeypatch.setattr(joint_state_reader, 'MAX_SENDERS', 32)
 
     def after(senders):
         for i in senders:
@@ -257,7 +257,7 @@ def outcome(said, *args):
 
 def plainly(text):
     """Return what `read` is to return."""
-    if len(text) < SHORTEST:
+    if len(text) < MIN_BYTES:
         raise Unreadable
     try:
         made = deserialize_message(text, JointState)
@@ -314,11 +314,11 @@ def test_mutated_messages_read_as_they_do_when_they_are_deserialised(reader, see
 def test_no_claim_of_padding_makes_a_short_message_dangerous(reader):
     whole = serialize_message(JointState())
     for options in range(256):
-        for size in range(SHORTEST):
+        for size in range(MIN_BYTES):
             with pytest.raises(Unreadable):
                 reader.sender((b'\0\1\0' + bytes([options]) + whole[4:])[:size])
     for options in range(0, 256, 5):
-        for size in range(SHORTEST, len(whole)):
+        for size in range(MIN_BYTES, len(whole)):
             text = (b'\0\1\0' + bytes([options]) + whole[4:])[:size]
             assert outcome(read, reader, text) == outcome(plainly, text)
 

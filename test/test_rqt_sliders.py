@@ -9,7 +9,7 @@
 # limitations under the License.
 
 """
-The parameters in rqt_reconfigure: each number has a slider, and no stop of it is a trap.
+The parameters in rqt_reconfigure: each limited number has a slider, and no stop is a trap.
 
 Its slider for floats has 100 steps between the ends of the range, counted from zero, so that an
 end that is no whole step is not met. What may refuse a stop is the linkage alone, never the range.
@@ -20,11 +20,9 @@ import re
 import pytest
 
 pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
 
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 
 NUMBERS = (Parameter.Type.INTEGER, Parameter.Type.DOUBLE)
@@ -59,7 +57,7 @@ def numbers(node):
             yield parameter, about, ranges[0] if len(ranges) == 1 else None
 
 
-@pytest.fixture(params=[(kind, i) for kind in (CrankDriver, Kinematics, ServoInverse)
+@pytest.fixture(params=[(kind, i) for kind in (CrankDriver, Kinematics)
                         for i in range(len(SCENES))],
                 ids=lambda param: f'{param[0].__name__}-{param[1]}')
 def node(request, graph):
@@ -69,15 +67,18 @@ def node(request, graph):
 
 
 @pytest.mark.long
-def test_every_number_has_a_meaning_a_unit_and_a_range_with_whole_stops(node):
+def test_every_number_has_a_meaning_a_unit_and_its_limits_with_whole_stops(node):
     found = list(numbers(node))
-    assert len(found) > 20
+    assert sum(range_ is not None for _, _, range_ in found) > 4
     for parameter, about, range_ in found:
         name = parameter.name
-        assert range_ is not None and range_.from_value <= parameter.value <= range_.to_value, name
         assert about.description.endswith('.') and about.additional_constraints, name
         unit = re.search(r'\[(m|rad|rad/s|m/s|Hz|1)\]', about.description)
         assert unit or parameter.type_ == Parameter.Type.INTEGER or name.endswith('.scale'), name
+        assert (range_ is not None) == (' from ' in about.additional_constraints), name
+        if range_ is None:
+            continue
+        assert range_.from_value <= parameter.value <= range_.to_value, name
         assert range_.step == (1 if parameter.type_ == Parameter.Type.INTEGER else 0.0), name
         values = stops(range_.from_value, range_.to_value,
                        parameter.type_ == Parameter.Type.INTEGER)
@@ -89,7 +90,7 @@ def test_every_number_has_a_meaning_a_unit_and_a_range_with_whole_stops(node):
 def test_every_stop_is_accepted_or_the_linkage_forbids_it(node):
     accepted = 0
     for parameter, about, range_ in numbers(node):
-        if about.read_only:
+        if about.read_only or range_ is None:
             continue
         values = stops(range_.from_value, range_.to_value,
                        parameter.type_ == Parameter.Type.INTEGER)
@@ -98,4 +99,4 @@ def test_every_stop_is_accepted_or_the_linkage_forbids_it(node):
             assert result.successful or CANNOT_BE.search(result.reason), (value, result.reason)
             accepted += result.successful
         assert node.set_parameters([parameter])[0].successful
-    assert accepted > 100
+    assert accepted > 15

@@ -118,7 +118,7 @@ def test_a_change_of_the_geometry_reaches_all_three(graph, nodes):
     kinematics, *others = nodes
     assert graph.set(kinematics, lever__dimensions__a=90.0).successful
     graph.until(lambda: all(
-        node.get_parameter('lever.dimensions.a').value == 90.0 for node in others))
+        node.scene.machines['lever'].linkage.dimensions['a'] == 90.0 for node in others))
 
 
 @pytest.mark.slow

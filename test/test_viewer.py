@@ -44,7 +44,7 @@ import browser  # noqa: E402
 from geometry_msgs.msg import Point  # noqa: E402
 from linkage_ros import mechanisms, palette, scene  # noqa: E402
 from linkage_ros.c_code import header  # noqa: E402
-from linkage_ros.nodes import message_layout, messages  # noqa: E402
+from linkage_ros.nodes import message_layout, messages, ownership  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
@@ -58,7 +58,6 @@ from linkage_ros.web import (  # noqa: E402
     poses,
     scene_view,
     server,
-    settings,
 )
 from linkage_ros.web.feed import Feed  # noqa: E402
 from linkage_ros.web.scene_view import LATCHED  # noqa: E402
@@ -66,7 +65,6 @@ from linkage_ros.web.viewer import Viewer  # noqa: E402
 from PIL import Image  # noqa: E402
 from rcl_interfaces.msg import (  # noqa: E402
     Parameter as ParameterMessage,  # noqa: E402
-    ParameterDescriptor,
     ParameterEvent,
     ParameterValue,
 )
@@ -273,7 +271,7 @@ def test_what_is_drawn_is_where_the_catalogue_says(show):
     async def look(url):
         async with Page(url) as page:
             await browser.until(lambda: len(page.drawn('/leg', 'joints')) and len(
-                page.drawn('/leg', 'strip')))
+                page.drawn('/leg', 'locus')))
             return page
 
     page = asyncio.run(look(show(LEG).viewer.url))
@@ -285,12 +283,12 @@ def test_what_is_drawn_is_where_the_catalogue_says(show):
     assert not joints[:, 2].any()
     # Bars, the crank among them, and two plates instead of the bars around them.
     ends = page.drawn('/leg', 'lines').reshape(-1, 2, 3)
-    plates = page.drawn('/leg', 'triangles')[:6].reshape(-1, 3, 3)
+    plates = page.drawn('/leg', 'plates').reshape(-1, 3, 3)
     lengths = np.concatenate([ends[:, 0] - ends[:, 1], *(plates - np.roll(plates, 1, axis=1))])
     np.testing.assert_allclose(np.sort(np.linalg.norm(lengths, axis=1)),
                                sorted(leg.bar_lengths[bar] for bar in leg.bars), rtol=1e-6)
     feet = leg.solve(np.linspace(0.0, math.tau, 721), ('G',))['G']
-    curve = page.drawn('/leg', 'strip')[:, :2]
+    curve = page.drawn('/leg', 'locus')[:, :2]
     away = np.linalg.norm(curve[:, None] - feet, axis=2).min(axis=1)
     assert len(curve) > 100 and away.max() < 0.01 * np.ptp(feet[:, 0])
 
@@ -301,18 +299,74 @@ def test_every_setting_is_described_as_the_scene_has_it(lever):
             return await page.cast('/lever', '/drop')
 
     cast, whole = asyncio.run(look(lever.viewer.url)), scene.read(LEVER)
+    groups = {'crank.speed': 'speeds', 'crank.start': 'starts', 'branches.L': 'branches',
+              **{f'dimensions.{key}': 'dimensions' for key in 'abe'},
+              **dict.fromkeys(('scale', 'crank.ratio', 'crank.offset', 'only_named'), 'more')}
     assert {key: (one['key'], one['name']) for key, one in cast.items()} == {
         '/lever': ('/lever', 'lever'), '/drop': ('/drop', 'drop')}
     shown = {f'{one["name"]}.{setting["name"]}': setting
              for one in cast.values() for setting in one['settings']}
     assert shown == {one.name: {
         'name': one.name.partition('.')[2], 'value': value, 'kind': one.field.kind,
-        'meaning': one.field.meaning, 'allowed': one.field.allowed,
-        'fixed': one.field.read_only, 'low': low, 'high': high, 'step': step}
+        'meaning': one.field.meaning, 'allowed': one.field.allowed, 'unit': one.field.unit,
+        'low': low, 'high': high, 'group': groups.get(one.name.partition('.')[2], '')}
         for one in whole.parameters if '.' in one.name
         for value in [list(one.value) if isinstance(one.value, tuple) else one.value]
-        for ends in [slider.ends(whole, one)]
-        for low, high, step in [(*ends, int(one.field.kind == 'integer')) if ends else [None] * 3]}
+        for low, high in [slider.ends(whole, one) or (None, None)]}
+
+
+EXAMPLES = [*sorted((ROOT / 'config').glob('*.yaml')), *sorted((ROOT / 'examples').glob('*.yaml'))]
+
+
+@pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
+def test_the_page_is_told_what_it_draws_and_moves(path):
+    for name, machine in scene.load(str(path)).machines.items():
+        told = json.loads(json.dumps(poses.drawn(machine), allow_nan=False))
+        legs = machine.assembly().legs
+        assert told['legs'] == len(legs) and told['pairs'] == sum(
+            leg.side > 0 for leg in legs.values())
+        assert told['space'] == (machine.linkage.type == 'rods')
+        assert told['points'] == list(machine.points)
+        assert told['sides'].keys() == machine.linkage.branches.keys()
+        default = scene.read({'mechanisms': [name], **{
+            key: value for key, value in machine.values.items() if not key.endswith('.speed')}})
+        assert told['inputs'].keys() == machine.inputs.keys()
+        for key, drive in default.machines[name].inputs.items():
+            assert told['inputs'][key]['speed'] == drive.speed != 0.0
+            assert told['inputs'][key]['unit'] == ('rad' if drive.input.turns else 'm')
+            turn = told['inputs'][key]['turn']
+            assert (turn is not None) == drive.input.turns
+            start = [one.start for one in machine.inputs.values()]
+            other = [value + (turn or 0.0) * (one == key)
+                     for one, value in zip(machine.inputs, start)]
+            for joint, place in machine.linkage.solve(poses.theta_of(start)).items():
+                np.testing.assert_allclose(
+                    machine.linkage.solve(poses.theta_of(other))[joint], place, atol=1e-9)
+
+
+@pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
+def test_the_unit_of_a_parameter_is_that_of_its_description(path):
+    for one in scene.load(str(path)).parameters:
+        said = re.findall(r'\[(.*?)\]', one.field.meaning)
+        assert '{' not in one.field.meaning + one.field.unit
+        if one.field.kind == 'double':
+            assert one.field.unit == ''.join(said).replace('1', ''), one.name
+
+
+@pytest.mark.slow
+def test_a_page_is_told_of_legs_that_are_added(show):
+    async def use(url):
+        async with Page(url) as page:
+            first = (await page.cast('/leg'))['/leg']
+            assert await page.set('/leg', leg_pairs=3) == ''
+            said = await page.heard('value', name='leg_pairs', value=3)
+            assert await page.set('/leg', mirrored=False) == ''
+            return first, said['drawn'], (await page.heard(
+                'value', name='mirrored', value=False))['drawn']
+
+    first, more, fewer = asyncio.run(use(show(LEG).viewer.url))
+    assert [(one['legs'], one['pairs']) for one in (first, more, fewer)] == [
+        (1, 1), (6, 3), (3, 3)]
 
 
 def test_a_slider_sets_the_node_that_owns_the_parameter(show):
@@ -348,38 +402,54 @@ def test_a_refusal_says_why_and_changes_nothing(lever, values, reason):
             return await page.set('/lever', **values)
 
     assert re.search(reason, asyncio.run(use(lever.viewer.url)))
-    assert lever.values('lever.dimensions.a') == [80.0] * 3
-    assert lever.values('lever.dimensions.b') == [150.0] * 3
+    assert lever.values('lever.dimensions.a') == [80.0]
+    assert lever.values('lever.dimensions.b') == [150.0]
 
 
-def test_what_kinematics_does_not_show_is_set_on_the_node_that_does(graph, show):
-    def other(name, value):
-        def made(**kwargs):
-            node = rclpy.create_node(name, **kwargs)
-            node.declare_parameter('lever.dimensions.b', value)
-            node.declare_parameter('lever.spring', value)
-            return node
-        return made
+def test_what_nobody_announces_is_not_on_the_page(graph, show):
+    def other(**kwargs):
+        node = rclpy.create_node('a_node', **kwargs)
+        node.declare_parameter('lever.dimensions.b', 1.0)
+        node.declare_parameter('lever.spring', 1.0)
+        return node
 
-    def before():
-        # Their names come before that of kinematics.
-        before.first, before.second = (graph.start(other(name, value)) for name, value in (
-            ('a_node', 1.0), ('b_node', 2.0)))
+    running = show(LEVER, before=lambda: graph.start(other))
 
-    running = show(LEVER, before=before)
+    async def use(url):
+        async with Page(url) as page:
+            cast = await page.cast('/lever', '/drop')
+            assert await page.set('/lever', dimensions__b=152.0) == ''
+            return {one['name'] for one in cast['/lever']['settings']}
+
+    assert 'spring' not in asyncio.run(use(running.viewer.url))
+    assert running.value(Kinematics, 'lever.dimensions.b') == 152.0
+
+
+def test_announcements_that_make_no_sense_change_nothing(graph, show):
+    running = show(LEVER)
+    publisher = graph.node.create_publisher(
+        ParameterEvent, ownership.TOPIC, ownership.LATCHED)
+    odd = [ParameterMessage(name='lever.scale', value=ParameterValue(type=200)), *(
+        Parameter(name, value=value).to_parameter_msg() for name, value in (
+            ('lever.scale', 'wide'), ('mechanisms', [b'l']), ('', 1.0), ('lever.crank.speed', 3),
+            ('lever.list', [1.0, math.inf]), ('lever.nan', math.nan), ('lever.bytes', [b'a'])))]
 
     async def use(url):
         async with Page(url) as page:
             await page.cast('/lever', '/drop')
-            await page.shown('/lever', 'dimensions.b', 150.0)
-            await page.shown('/lever', 'spring', 1.0)
+            for node in ('', '/nobody', 'x' * 1000):
+                for part in (odd, *([one] for one in odd)):
+                    publisher.publish(ParameterEvent(node=node, new_parameters=part))
+            publisher.publish(ParameterEvent(node='/crank_driver', changed_parameters=[
+                Parameter('lever.crank.speed', value=3.25).to_parameter_msg()]))
+            await page.heard('value', mechanism='/lever', name='crank.speed', value=3.25)
             assert await page.set('/lever', dimensions__b=152.0) == ''
-            assert await page.set('/lever', spring=3) == ''
+            await page.heard('value', mechanism='/lever', name='dimensions.b', value=152.0)
+            json.dumps(page.said, allow_nan=False)
+            return await page.ask('pose', '/lever')
 
-    asyncio.run(use(running.viewer.url))
-    assert running.value(Kinematics, 'lever.dimensions.b') == 152.0
-    assert [node.get_parameter(f'lever.{name}').value for node in (before.first, before.second)
-            for name in ('dimensions.b', 'spring')] == [1.0, 3.0, 2.0, 2.0]
+    answer = asyncio.run(use(running.viewer.url))
+    assert answer['reason'] == '' and 'crank' in answer['inputs']
 
 
 @pytest.mark.slow
@@ -433,7 +503,7 @@ def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
             return answer
 
     answer = asyncio.run(use(running.viewer.url))
-    servo, lever = answer['inputs']['crank']['value'], answer['outputs']['lever']
+    servo, lever = answer['inputs']['crank'], answer['outputs']['lever']
     assert lever_of(servo) == pytest.approx(0.4, abs=1e-12)
     slope = (lever_of(servo + 1e-6) - lever_of(servo - 1e-6)) / 2e-6
     assert lever['rates'] == [pytest.approx(slope, abs=1e-8)]
@@ -506,7 +576,7 @@ def test_any_joint_of_any_leg_is_brought_where_it_can_be(show):
             return answer
 
     crank = asyncio.run(use(running.viewer.url))['inputs']['crank']
-    assert math.remainder(crank['value'] - theta, math.tau) == pytest.approx(0.0, abs=1e-6)
+    assert math.remainder(crank - theta, math.tau) == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.slow
@@ -540,12 +610,11 @@ def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(lever):
             return await page.ask('tune', '/lever'), await page.ask('tune', '/drop')
 
     whole = scene.read(LEVER)
-    for found, name, fixed, sides, bars in zip(
+    for found, name, fixed, bars in zip(
             asyncio.run(use(lever.viewer.url)), ('lever', 'drop'), ('OQ', 'OC'),
-            ({'L': ['out', 'in']}, {}),
             ({'a': ['OA'], 'b': ['OQ', 'QL'], 'e': []}, {'a': 'OC OA AB AP BP CB'.split()})):
         assert {**found, 'id': 0} == {
-            'op': 'answer', 'id': 0, 'reason': '', 'fixed': list(fixed), 'sides': sides,
+            'op': 'answer', 'id': 0, 'reason': '', 'fixed': list(fixed),
             'bars': {f'dimensions.{key}': [list(pair) for pair in pairs]
                      for key, pairs in bars.items()},
             'travel': {one.name.partition('.')[2]: list(slider.ends(whole, one))
@@ -656,29 +725,23 @@ def test_the_page_is_sent_what_an_output_does_over_a_turn(lever):
         np.testing.assert_allclose(y[known], values[np.isin(x, np.array(said['x'])[known])],
                                    rtol=2e-5, atol=2e-7)
     assert [said['units'][1] for said in about_lever] == ['rad', 'rad/s', 'rad/s²', 'rad', '']
-    assert about_lever[0]['reach'] == [[-math.pi, math.pi]] and about_lever[0]['dead'] == []
+    assert about_lever[0]['ends'] == about_lever[0]['dead'] == []
     # A kite lies flat at 0 and at pi: there it may be assembled in two ways.
     assert about_drop[0]['dead'] == [-math.pi, 0.0] and about_drop[0]['output'] == 'B'
     assert about_drop[0]['y'][180] in (0.0, math.pi)
 
 
-@pytest.mark.slow
-def test_a_node_that_is_silent_at_first_is_waited_for_and_not_guessed(show, monkeypatch):
-    asked, answered = settings.RemoteNode.parameters, asyncio.Event()
-
-    async def late(self, prefixes, known=()):
-        if self.name == '/kinematics' and not answered.is_set():
-            raise scene_view.NoAnswer('busy')
-        return await asked(self, prefixes, known)
-
-    monkeypatch.setattr(settings.RemoteNode, 'parameters', late)
-    running = show({**LEG, 'leg.scale': 0.5})
+def test_a_node_that_is_silent_at_first_is_waited_for_and_not_guessed(graph, show):
+    # Markers that somebody publishes before `kinematics` announces their mechanism.
+    graph.node.create_publisher(MarkerArray, 'leg/markers', 1)
+    graph.node.create_publisher(Marker, 'leg/locus', LATCHED)
+    running = show({}, kinds=())
 
     async def use(url):
         async with Page(url) as page:
             await browser.until(lambda: any(said.get('mechanisms') for said in page.said))
             reasons = [(await page.ask(op, '/leg'))['reason'] for op in ('pose', 'tune', 'curve')]
-            answered.set()
+            running.nodes.extend(graph.start(kind, {**LEG, 'leg.scale': 0.5}) for kind in NODES)
             await page.cast('/leg')
             return reasons, await page.ask('pose', '/leg')
 
@@ -698,7 +761,7 @@ def test_what_a_sensor_cannot_be_at_is_nowhere_on_the_page(show):
         async with Page(url) as page:
             async def carriage(told):
                 crank_states.publish(JointState(name=['lift_cylinder'], position=[told]))
-                value = (await page.ask('pose', '/lift'))['inputs']['carriage']['value']
+                value = (await page.ask('pose', '/lift'))['inputs']['carriage']
                 assert math.isfinite(value)
                 return value
 
@@ -755,6 +818,21 @@ def test_an_input_goes_where_it_is_wanted_or_as_near_as_it_gets(
     if missed:
         assert missed == poses.Reach(input_, tuple(poses.arcs(machine.inputs[input_])),
                                      machine.inputs[input_].input.unit)
+
+
+GEARED = {'mechanisms': ['gear'], 'gear.type': 'custom', 'gear.joints': [
+    'O ground 0 0', 'M crank O 0.01', 'A crank O 1 geared crank 1/5 0']}
+
+
+@pytest.mark.parametrize('value', [4.0, -15.7, 12.6])
+def test_a_geared_input_goes_where_it_is_wanted_in_all_of_its_period(value):
+    gear = scene.read(GEARED).machines['gear']
+    inputs, missed = poses.reached(gear, [0.0], {'output': 'crank', 'value': value})
+    assert (inputs, missed) == ([value], None)
+    # It can be set to start there.
+    assert scene.read({**GEARED, 'gear.crank.start': value}).machines['gear'].first.start == value
+    again, _ = poses.reached(gear, [0.0], {'output': 'crank', 'value': value + 10.0 * math.pi})
+    assert again == pytest.approx([value], abs=1e-12)
 
 
 def test_an_input_goes_to_the_nearest_of_two_arcs_and_not_where_nothing_can_be_assembled():
@@ -855,9 +933,7 @@ def test_a_pose_of_several_inputs_is_described_whole():
                 for name, value in angles.items()}
 
     assert found.keys() == {'inputs', 'outputs'}
-    assert found['inputs'] == {
-        name: {'value': value, 'unit': 'm', 'arcs': [drive.ends]}
-        for (name, drive), value in zip(digger.inputs.items(), present)}
+    assert found['inputs'] == dict(zip(digger.inputs, present))
     assert list(found['outputs']) == [
         *(joint for joint in linkage.joints if joint not in digger.inputs), 'T.x', 'T.y']
     truth, h = at(present), 1e-6
@@ -1444,27 +1520,18 @@ def test_a_viewer_that_ends_says_so_to_its_pages(show):
 
 
 def test_a_node_that_does_not_answer_is_named(graph, show, monkeypatch):
-    def other(**kwargs):
-        node = rclpy.create_node('a_node', **kwargs)
-        node.declare_parameter('leg.spring', 1.0)
-        return node
-
-    def before():
-        before.node = graph.start(other)
-
-    running = show(LEG, before=before)
+    running = show(LEG)
 
     async def use(url):
         async with Page(url) as page:
             await page.cast('/leg')
-            await page.shown('/leg', 'spring', 1.0)
             monkeypatch.setattr(bridge, 'SECONDS_TO_ANSWER', 0.1)
-            graph.executor.remove_node(before.node)
-            return await page.set('/leg', spring=2.0)
+            graph.executor.remove_node(running.nodes[NODES.index(Kinematics)])
+            return await page.set('/leg', scale=2.0)
 
     assert asyncio.run(use(running.viewer.url)) == (
-        '/a_node/set_parameters_atomically does not answer')
-    assert before.node.get_parameter('leg.spring').value == 1.0
+        '/kinematics/set_parameters_atomically does not answer')
+    assert running.values('leg.scale') == [1.0]
 
 
 def test_an_input_that_is_moved_is_there_until_messages_say_otherwise(graph, show, monkeypatch):
@@ -1475,7 +1542,7 @@ def test_an_input_that_is_moved_is_there_until_messages_say_otherwise(graph, sho
         async with Page(url) as page:
             async def crank(value=None):
                 want = {} if value is None else {'want': {'output': 'crank', 'value': value}}
-                return (await page.ask('pose', '/leg', **want))['inputs']['crank']['value']
+                return (await page.ask('pose', '/leg', **want))['inputs']['crank']
 
             async def after(*angles):
                 for angle in angles:
@@ -1580,7 +1647,7 @@ def test_make_view_and_make_demo_end_quietly_when_nobody_reads_what_they_print(a
 
 @pytest.mark.long
 @pytest.mark.parametrize('parameters, named', [
-    ({'port': 'taken'}, 'address already in use'), ({'port': 'taken'}, 'by PORT=8021'),
+    ({'port': 'taken'}, 'address already in use'), ({'port': 'taken'}, 'make view PORT=8021'),
     ({'port': 70000}, 'port'),
     ({'port': 'eighty'}, 'port'), ({'host': '192.0.2.1'}, '192.0.2.1'),
 ])
@@ -1637,7 +1704,7 @@ def look_of(marker):
     """Return how a marker looks, part by part."""
     place, turn, colour = marker.pose.position, marker.pose.orientation, marker.color
     return {'mechanism': '/leg', 'frame': marker.header.frame_id, 'width': marker.scale.x,
-            'kind': {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'strip', Marker.SPHERE_LIST:
+            'kind': {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'locus', Marker.SPHERE_LIST:
                      'joints', Marker.TRIANGLE_LIST: 'triangles'}[marker.type],
             'pose': [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w],
             'colour': [colour.r, colour.g, colour.b, colour.a]}
@@ -1671,7 +1738,7 @@ def test_of_a_message_what_is_deleted_or_no_line_joint_or_triangle_is_not_drawn(
     shown = dict(zip((7, 9, 11, 13), [joints, bars, *message.markers[4:]]))
     looks, records = topic.drawn()
     assert looks == {number: look_of(marker) for number, marker in shown.items()}
-    assert [look['kind'] for look in looks.values()] == ['joints', 'lines', 'triangles', 'strip']
+    assert [look['kind'] for look in looks.values()] == ['joints', 'lines', 'triangles', 'locus']
     assert records == b''.join(recorded(*one) for one in shown.items())
 
 
@@ -1835,43 +1902,13 @@ def test_messages_that_cannot_be_read_are_dropped_and_said_once(show, capfd):
     assert 'Traceback' not in said
 
 
-@pytest.mark.slow
-def test_what_other_nodes_say_of_a_parameter_is_anything(graph, show):
-    def other(**kwargs):
-        node = rclpy.create_node('a_node', **kwargs)
-        for name, value in (('nan', math.nan), ('list', [1.0, math.inf]), ('bytes', [b'a'])):
-            node.declare_parameter(f'leg.{name}', value)
-        node.declare_parameter('leg.none', descriptor=ParameterDescriptor(dynamic_typing=True))
-        return node
-
-    running = show(LEG, before=lambda: graph.start(other))
-    events = running.graph.node.create_publisher(ParameterEvent, '/parameter_events', 10)
-
-    async def use(url):
-        async with Page(url) as page:
-            await page.cast('/leg')
-            await page.shown('/leg', 'nan', None)
-            await page.shown('/leg', 'list', [1.0, None])
-            for kind in (0, 1, 4, 99):
-                said = ParameterEvent(node='/kinematics')
-                said.changed_parameters = [ParameterMessage(
-                    name='leg.dimensions.m', value=ParameterValue(type=kind))]
-                events.publish(said)
-            await page.shown('/leg', 'dimensions.m', 15.0)
-            assert await page.set('/leg', dimensions__m=14.5) == ''
-            await page.heard('value', name='dimensions.m', value=14.5)
-            json.dumps(page.said, allow_nan=False)
-
-    asyncio.run(use(running.viewer.url))
-
-
 @pytest.mark.long
 def test_nodes_that_end_and_come_again_are_drawn_again(graph, show):
     running = show(LEG, kinds=(CrankDriver,))
 
     async def come_and_go(page, scene):
         kinematics = graph.start(Kinematics, scene)
-        await browser.until(lambda: len(page.drawn(f'/{scene["mechanisms"][0]}', 'strip')))
+        await browser.until(lambda: len(page.drawn(f'/{scene["mechanisms"][0]}', 'locus')))
         page.forget()
         graph.end(kinematics)
         await page.heard('scene', mechanisms=[])
@@ -2694,6 +2731,23 @@ def test_a_reload_and_another_viewer_keep_what_is_seen_and_a_lost_connection_is_
 
 @pytest.mark.long
 @needs_browser
+def test_a_phone_may_reload_the_page_as_often_as_it_likes(show, looked_at):
+    given = without_defaults(scene.load(str(ROOT / 'config' / 'all.yaml')))
+    running = show({**given, 'rate': 20.0})
+
+    async def doing(seen):
+        await seen.page.resize(390, 844, 'light')
+        for _ in range(180):
+            await seen.page.open(running.viewer.url)
+            await browser.until(lambda: seen.page.value(
+                'document.querySelectorAll("section").length === 4 && '
+                'document.querySelectorAll("section tbody tr").length > 3'))
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
 def test_mechanisms_of_one_name_in_two_namespaces_are_told_apart(graph, show, looked_at):
     for space in ('left', 'right'):
         for kind in (CrankDriver, Kinematics):
@@ -2881,7 +2935,7 @@ import('/picture.js').then(({ Picture }) => {
       canvas: { clientWidth: 390, clientHeight: 380 } });
     picture.at = (x, y) => [x, y];
     picture.text = (name, x, y) => written.push([x, y, picture.context.measureText(name).width]);
-    picture.names([{ mechanism: { value: () => points }, look: { kind: 'joints', width: 6 },
+    picture.names([{ mechanism: { points }, look: { kind: 'joints', width: 6 },
       places: Float64Array.from(places.flat()) }]);
     return [places, written];
   });
@@ -2993,7 +3047,7 @@ def test_where_an_input_is_that_nobody_has_named_is_not_guessed(graph, show):
                 crank_states.publish(JointState(name=['leg_crank'], position=[2.0]))
                 return (await page.ask('pose', '/leg')).get('inputs')
 
-            return reason, (await browser.until(heard))['crank']['value']
+            return reason, (await browser.until(heard))['crank']
 
     reason, value = asyncio.run(use(running.viewer.url))
     assert reason == 'the crank is not known yet: no message names leg_crank'

@@ -24,7 +24,7 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from . import joint_state_reader
-from .log import NAMES, Once, Throttle
+from .log import MAX_NAMES, Once, Throttle
 from .message_layout import NEVER, pack_time, unpack
 from .messages import joint_states
 from .publishers import PatchedPublisher, TrackedPublisher
@@ -36,10 +36,10 @@ from ..scene.scene_mechanism import SceneMechanism
 from ..words import elided, listed
 
 # Pause after a search for a first command [s]; and at least as many times the search's duration.
-SECONDS_BETWEEN_SEARCHES, PAUSES = 0.5, 9.0
+SEARCH_PAUSE_S, SEARCH_PAUSE_RATIO = 0.5, 9.0
 # Maximum numbers of cached publishers, and of points of a trajectory, which take the worker some
 # seconds.
-PUBLISHERS, MOST_POINTS = 100, 10_000
+MAX_PUBLISHERS, MAX_POINTS = 100, 10_000
 
 
 class Target(NamedTuple):
@@ -47,7 +47,7 @@ class Target(NamedTuple):
 
     # Names of the outputs in the message, for texts.
     named: str
-    machine: SceneMechanism
+    mechanism: SceneMechanism
     request: InverseRequest
     # Index in the message, and published name with sign and offset, of each output.
     indices: tuple[int, ...]
@@ -56,16 +56,16 @@ class Target(NamedTuple):
     @property
     def actuators(self) -> list[str]:
         """Names of the joints to command, per input: its source or, if that measures, itself."""
-        return [f'{self.machine.name}_{drive.input.name}' if drive.measures else drive.source
-                for drive in self.machine.inputs.values()]
+        return [f'{self.mechanism.name}_{settings.input.name}' if settings.measures
+                else settings.source for settings in self.mechanism.inputs.values()]
 
     def command(self, positions: Sequence[float], speeds: Optional[Sequence[float]],
-                near: Sequence[float], jumps: bool) -> Any:
+                seed: Sequence[float], jumps: bool) -> Any:
         """Solve for the positions and speeds in a message; see `InverseRequest.command`."""
         return self.request.command(
             self._values(positions),
             speeds and [name.sign * speeds[i] for name, i in zip(self.names, self.indices)],
-            near, jumps)
+            seed, jumps)
 
     def reason(self, positions: Sequence[float]) -> str:
         """Explain why the positions in a message are out of reach."""
@@ -93,11 +93,11 @@ class Command(NamedTuple):
     @property
     def efforts(self) -> list[float]:
         """Return the static efforts of the actuators that balance the loads [N m or N]."""
-        machine = self.target.machine
-        if not machine.loads:
+        mechanism = self.target.mechanism
+        if not mechanism.loads:
             return [0.0] * len(self.inputs)
-        return [drive.actuator[0] * effort for drive, effort in zip(
-            machine.inputs.values(), machine.efforts(self.inputs))]
+        return [settings.actuator[0] * effort for settings, effort in zip(
+            mechanism.inputs.values(), mechanism.efforts(self.inputs))]
 
 
 class CommandStream:
@@ -118,9 +118,9 @@ class CommandStream:
         self._arrays = {name: TrackedPublisher(node, Float64MultiArray, f'{name}/commands', 10)
                         for name in mechanisms}
         self._trajectories = TrackedPublisher(node, JointTrajectory, 'servo_trajectory', 10)
-        self._throttle, self._unknown = Throttle(self._logger), Once(NAMES)
+        self._throttle, self._unknown = Throttle(self._logger), Once(MAX_NAMES)
         self._searched = Throttle(self._logger)
-        self._machines: Mapping[str, SceneMechanism] = {}
+        self._mechanisms: Mapping[str, SceneMechanism] = {}
         self._last: dict[str, Command] = {}
         # From when on the next search for a mechanism may begin.
         self._searches: dict[str, float] = {}
@@ -129,12 +129,12 @@ class CommandStream:
         node.create_subscription(JointTrajectory, 'wanted_trajectory', node.guarded(
             'wanted_trajectory', self._receive_trajectory), 10)
 
-    def adopt(self, machines: Mapping[str, SceneMechanism]) -> None:
+    def adopt(self, mechanisms: Mapping[str, SceneMechanism]) -> None:
         """Replace the mechanisms."""
-        self._machines, self._publishers = machines, Cache(self._publisher, PUBLISHERS)
+        self._mechanisms, self._publishers = mechanisms, Cache(self._publisher, MAX_PUBLISHERS)
         # With several inputs, the changed geometry may have no pose that continues the last one.
         self._last = {name: last for name, last in self._last.items() if len(last.inputs) == 1
-                      or last.target.machine is machines.get(name)}
+                      or last.target.mechanism is mechanisms.get(name)}
         self._reader = joint_state_reader.Reader(self._interpret)
 
     def end(self) -> None:
@@ -144,12 +144,12 @@ class CommandStream:
 
     def _output(self, named: str) -> Optional[tuple[SceneMechanism, str, JointName]]:
         """Return the mechanism, output and published name for a name in messages, or None."""
-        for machine in self._machines.values():
-            own = {name.name: (joint, name) for joint, name in machine.joints.items()}
-            joint, name = own.get(named) or (
-                named.removeprefix(f'{machine.name}_'), JointName(named))
-            if joint != named and machine.linkage.has_output(joint):
-                return machine, joint, name
+        for mechanism in self._mechanisms.values():
+            joints = {name.name: (joint, name) for joint, name in mechanism.joints.items()}
+            joint, name = joints.get(named) or (
+                named.removeprefix(f'{mechanism.name}_'), JointName(named))
+            if joint != named and mechanism.linkage.has_output(joint):
+                return mechanism, joint, name
         return None
 
     def _targets(self, names: Sequence[str]) -> tuple[list[Target], list[str], list[str]]:
@@ -159,26 +159,27 @@ class CommandStream:
         They are the targets, the names that are no outputs, and the reasons why a mechanism with
         outputs in the message has no target.
         """
-        found: dict[str, list[tuple]] = {}
+        outputs_of: dict[str, list[tuple]] = {}
         targets, unknown, reasons = [], [], []
         for named, index in dict(zip(names, range(len(names)))).items():
             if output := self._output(named):
-                found.setdefault(output[0].name, []).append((index, *output[1:]))
+                outputs_of.setdefault(output[0].name, []).append((index, *output[1:]))
             else:
                 unknown.append(named)
-        for mechanism, outputs in found.items():
-            machine = self._machines[mechanism]
-            n = len(machine.inputs)
+        for name, outputs in outputs_of.items():
+            mechanism = self._mechanisms[name]
+            n = len(mechanism.inputs)
             called = ' and '.join(elided(names[index]) for index, *_ in outputs)
             try:
                 if len(outputs) > n == 1:
                     reasons.append(f'{called} are moved by one input: name one of them')
                 elif len(outputs) != n:
-                    raise ValueError(f'{mechanism} has {n} inputs: name {n} of its outputs, not '
+                    raise ValueError(f'{name} has {n} inputs: name {n} of its outputs, not '
                                      f'{called}')
-                indices, joints, own = zip(*outputs[:n])
-                targets.append(Target(' and '.join(elided(names[index]) for index in indices),
-                                      machine, InverseRequest(machine, joints), indices, own))
+                indices, joints, published = zip(*outputs[:n])
+                targets.append(Target(
+                    ' and '.join(elided(names[index]) for index in indices), mechanism,
+                    InverseRequest(mechanism, joints), indices, published))
             except ValueError as error:
                 reasons.append(str(error))
         return targets, unknown, reasons
@@ -195,7 +196,7 @@ class CommandStream:
 
     def _receive(self, data: bytes) -> None:
         if not self._commands.has_subscribers and not any(
-                one.has_subscribers for one in self._arrays.values()):
+                array.has_subscribers for array in self._arrays.values()):
             return
         sender = self._reader.sender(data)
         (targets, count, known), (stamp, *numbers) = sender.routes, sender.read(data)
@@ -203,24 +204,25 @@ class CommandStream:
             stamp = pack_time(self._clock.now().nanoseconds)
         commands = [self._command(target, stamp, numbers, numbers[count:] if known else None)
                     for target in targets]
-        if found := [command for command in commands if command]:
-            self._send(stamp, found)
+        if answered := [command for command in commands if command]:
+            self._send(stamp, answered)
 
-    def _near(self, target: Target) -> Sequence[float]:
+    def _seed(self, target: Target) -> Sequence[float]:
         """Return the inputs to continue from: of the last command, else present, else starts."""
-        if last := self._last.get(target.machine.name):
+        if last := self._last.get(target.mechanism.name):
             return last.inputs
-        return [position if math.isfinite(position) else drive.start for position, drive in zip(
-            self._present(target.machine), target.machine.inputs.values())]
+        return [position if math.isfinite(position) else settings.start
+                for position, settings in zip(self._present(target.mechanism),
+                                              target.mechanism.inputs.values())]
 
     def _command(self, target: Target, stamp: bytes, positions: Sequence[float],
                  speeds: Optional[Sequence[float]]) -> Optional[Command]:
         """Return the command for a target or, out of reach, the last valid one, if any."""
-        name, near = target.machine.name, self._near(target)
-        last, is_slow = self._last.get(name), len(near) > 1 and not target.request.is_closed
+        name, seed = target.mechanism.name, self._seed(target)
+        last, is_slow = self._last.get(name), len(seed) > 1 and not target.request.is_closed
         # Only the first command, which continues no other, may jump.
         command = Command(target, *target.command(
-            positions, speeds, near, jumps=not last and not is_slow))
+            positions, speeds, seed, jumps=not last and not is_slow))
         if command.is_valid:
             self._last[name] = command
             return command
@@ -229,31 +231,31 @@ class CommandStream:
         elif time.monotonic() > self._searches.get(name, -math.inf):
             self._searches[name] = math.inf
             self._searcher.replace(f'the search for {name}', lambda: self._search(
-                target, stamp, positions, speeds, None if last else near))
+                target, stamp, positions, speeds, None if last else seed))
         return last and last._replace(speeds=[0.0] * len(last.inputs))
 
     def _search(self, target: Target, stamp: bytes, positions: Sequence[float],
-                speeds: Optional[Sequence[float]], near: Optional[Sequence[float]]
+                speeds: Optional[Sequence[float]], seed: Optional[Sequence[float]]
                 ) -> Optional[Callable[[], None]]:
         """Search the first command next to inputs `near`, if given; if there is none, say why."""
         start = time.monotonic()
         try:
-            if near:
-                command = Command(target, *target.command(positions, speeds, near, jumps=True))
+            if seed:
+                command = Command(target, *target.command(positions, speeds, seed, jumps=True))
                 if command.is_valid:
                     return partial(self._begin, command, stamp)
             self._searched.warn(target.named, lambda: f'wanted_states: {target.reason(positions)}')
             return None
         finally:
             end = time.monotonic()
-            self._searches[target.machine.name] = end + max(
-                SECONDS_BETWEEN_SEARCHES, PAUSES * (end - start))
+            self._searches[target.mechanism.name] = end + max(
+                SEARCH_PAUSE_S, SEARCH_PAUSE_RATIO * (end - start))
 
     def _begin(self, command: Command, stamp: bytes) -> None:
         """Publish a first command that has been searched, unless it is out of date."""
-        machine = command.target.machine
-        if machine is self._machines.get(machine.name) and machine.name not in self._last:
-            self._last[machine.name] = command
+        mechanism = command.target.mechanism
+        if mechanism is self._mechanisms.get(mechanism.name) and mechanism.name not in self._last:
+            self._last[mechanism.name] = command
             self._send(stamp, [command])
 
     def _send(self, stamp: bytes, commands: Sequence[Command]) -> None:
@@ -262,7 +264,7 @@ class CommandStream:
         speeds = [speed for command in commands for speed in command.speeds or [math.nan]]
         moving = all(map(math.isfinite, speeds))
         if self._commands.has_subscribers:
-            if any(command.target.machine.loads for command in commands):
+            if any(command.target.mechanism.loads for command in commands):
                 efforts = [effort for command in commands for effort in command.efforts]
                 self._commands.publish(joint_states(
                     unpack(stamp), names, values, speeds if moving else (),
@@ -270,7 +272,7 @@ class CommandStream:
             else:
                 self._publishers[names, moving].publish(stamp, values + speeds * moving)
         for command in commands:
-            publisher = self._arrays[command.target.machine.name]
+            publisher = self._arrays[command.target.mechanism.name]
             if publisher.has_subscribers:
                 publisher.publish(Float64MultiArray(data=command.positions))
 
@@ -285,8 +287,8 @@ class CommandStream:
         if not self._trajectories.has_subscribers:
             return
         try:
-            if len(message.points) > MOST_POINTS:
-                raise ValueError(f'it has {len(message.points)} points; send up to {MOST_POINTS}')
+            if len(message.points) > MAX_POINTS:
+                raise ValueError(f'it has {len(message.points)} points; send up to {MAX_POINTS}')
             if len({*message.joint_names}) < len(message.joint_names):
                 raise ValueError('joint_names has a name twice')
             targets, unknown, reasons = self._targets(message.joint_names)
@@ -297,16 +299,16 @@ class CommandStream:
         except ValueError as error:
             self._refuse(error)
             return
-        near = [self._near(target) for target in targets]
-        jumps = [target.machine.name not in self._last for target in targets]
+        seeds = [self._seed(target) for target in targets]
+        jumps = [target.mechanism.name not in self._last for target in targets]
         self._worker.replace('wanted_trajectory', lambda: self._solve(
-            message, targets, near, jumps))
+            message, targets, seeds, jumps))
 
     def _refuse(self, error: ValueError) -> None:
         self._logger.error(f'wanted_trajectory is refused: {error}')
 
     def _solve(self, message: JointTrajectory, targets: Sequence[Target],
-               near: list[Sequence[float]], jumps: list[bool]) -> Optional[Callable[[], None]]:
+               seeds: list[Sequence[float]], jumps: list[bool]) -> Optional[Callable[[], None]]:
         """Solve a trajectory; return a function to publish it, or None if it is dropped."""
         solved = JointTrajectory(header=message.header, joint_names=[
             name for target in targets for name in target.actuators])
@@ -320,7 +322,7 @@ class CommandStream:
                 if not self._worker.is_newest('wanted_trajectory'):
                     return None
                 solved.points.append(_solved_point(
-                    i, point, len(message.joint_names), targets, near, jumps))
+                    i, point, len(message.joint_names), targets, seeds, jumps))
                 jumps = [False] * len(targets)
         except ValueError as error:
             self._refuse(error)
@@ -329,7 +331,7 @@ class CommandStream:
 
 
 def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence[Target],
-                  near: list[Sequence[float]], jumps: Sequence[bool]) -> JointTrajectoryPoint:
+                  seeds: list[Sequence[float]], jumps: Sequence[bool]) -> JointTrajectoryPoint:
     """Return trajectory point `i` of the actuators, and update `near` to its inputs."""
     if len(point.positions) != n or len(point.velocities) not in (0, n):
         raise ValueError(f'point {i} must have {n} positions, and as many velocities or '
@@ -338,9 +340,9 @@ def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence
         raise ValueError(f'point {i}: a velocity must be finite')
     found = []
     for k, target in enumerate(targets):
-        near[k], *actuator = target.command(
-            point.positions, list(point.velocities) or [0.0] * n, near[k], jumps[k])
-        if not all(map(math.isfinite, near[k])):
+        seeds[k], *actuator = target.command(
+            point.positions, list(point.velocities) or [0.0] * n, seeds[k], jumps[k])
+        if not all(map(math.isfinite, seeds[k])):
             raise ValueError(f'point {i}: {target.reason(point.positions)}')
         if not all(map(math.isfinite, actuator[1])):
             raise ValueError(f'point {i}: the motion of {target.named} reverses there; its speed '

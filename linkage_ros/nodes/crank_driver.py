@@ -28,10 +28,10 @@ from ..scene.motion import Motion
 from ..words import listed
 
 # If system time gains more than this on steady time between two messages [ns], it has jumped.
-JUMP = 10 ** 8
+MIN_JUMP_NS = 10 ** 8
 
 # Longest period of a timer that does not overflow [ns]: thirty years.
-LONGEST_PERIOD = 1e18
+MAX_PERIOD_NS = 1e18
 
 
 class CrankDriver(scene_node.SceneNode):
@@ -47,8 +47,8 @@ class CrankDriver(scene_node.SceneNode):
     def __init__(self, in_process: Sequence[Any] = (), **kwargs: Any):
         super().__init__(scene.DRIVER, **kwargs)
         self._motions: Dict[Tuple[str, str], Motion] = {}
-        self._drives: Dict[Tuple[str, str], scene.InputSettings] = {}
-        self._machines: Mapping[str, scene.SceneMechanism] = {}
+        self._settings: Dict[Tuple[str, str], scene.InputSettings] = {}
+        self._mechanisms: Mapping[str, scene.SceneMechanism] = {}
         self._sent: List[Tuple[Tuple[str, str], scene.InputSettings]] = []
         self._now: Optional[int] = None
         self._steady = 0
@@ -64,17 +64,18 @@ class CrankDriver(scene_node.SceneNode):
     def adopt(self, new: scene.Scene) -> None:
         """Adopt a scene; an input continues from its value, or from its start if that is new."""
         now = 0 if self._now is None else self._follow_clock()
-        drives = {(name, input_): drive for name, machine in new.machines.items()
-                  for input_, drive in machine.inputs.items()}
-        for key, drive in drives.items():
-            old = self._drives.get(key)
-            if old is None or old.start != drive.start:
-                self._motions[key] = Motion.of(drive, now)
-            elif (old.speed, old.sweep) != (drive.speed, drive.sweep):
-                self._motions[key] = self._motions[key].changed(drive.speed, drive.sweep, now)
-        self._drives, self._machines = drives, new.machines
+        all_settings = {(name, input_): settings for name, mechanism in new.machines.items()
+                        for input_, settings in mechanism.inputs.items()}
+        for key, settings in all_settings.items():
+            old = self._settings.get(key)
+            if old is None or old.start != settings.start:
+                self._motions[key] = Motion.of(settings, now)
+            elif (old.speed, old.sweep) != (settings.speed, settings.sweep):
+                self._motions[key] = self._motions[key].changed(
+                    settings.speed, settings.sweep, now)
+        self._settings, self._mechanisms = all_settings, new.machines
         # If several inputs have one source joint, it moves as the last of them.
-        sent = {drive.source: (key, drive) for key, drive in drives.items()}
+        sent = {settings.source: (key, settings) for key, settings in all_settings.items()}
         self._sent = list(sent.values())
         self._set_names(list(sent))
         self._set_rate(new.rate)
@@ -92,7 +93,7 @@ class CrankDriver(scene_node.SceneNode):
         if not rate:
             self._timer.cancel()
             return
-        period = round(min(1e9 / rate, LONGEST_PERIOD))
+        period = round(min(1e9 / rate, MAX_PERIOD_NS))
         if self._timer.timer_period_ns != period or self._timer.is_canceled():
             self._timer.timer_period_ns = period
             self._timer.reset()
@@ -110,7 +111,7 @@ class CrankDriver(scene_node.SceneNode):
         if self._now is not None:
             reached = self._now if simulated else self._now + steady - self._steady
         # Simulated time may advance by any amount.
-        is_ahead = now - reached > JUMP and not simulated
+        is_ahead = now - reached > MIN_JUMP_NS and not simulated
         if self._now is None or now < self._now or is_ahead:
             self._motions = {n: m.moved(reached, now) for n, m in self._motions.items()}
         self._now, self._steady = now, steady
@@ -122,17 +123,17 @@ class CrankDriver(scene_node.SceneNode):
             positions, speeds = zip(*[self._position(*sent, now) for sent in self._sent])
             self._message.publish(pack_time(now), positions + speeds)
 
-    def _position(self, key: Tuple[str, str], drive: scene.InputSettings,
+    def _position(self, key: Tuple[str, str], settings: scene.InputSettings,
                   now: int) -> Tuple[float, float]:
         """Return position [rad or m] and speed [rad/s or m/s] of an input's source joint."""
         value, speed = self._motions[key].at(now)
-        if drive.is_plain:
+        if settings.is_plain:
             return value, speed
-        return self._machines[key[0]].to_source(drive, value, speed)
+        return self._mechanisms[key[0]].to_source(settings, value, speed)
 
     def serves(self) -> str:
         """Return the source joints and their rate, in words."""
-        sources = [drive.source for drive in self._drives.values()]
+        sources = [settings.source for settings in self._settings.values()]
         return f'moves {listed(sources, 200)} on crank_states at {self.scene.rate:g} Hz'
 
     def _restart_timer(self) -> None:

@@ -33,11 +33,11 @@ from .message_layout import deserialized, HEADER, MessageLayout, NoLayout, pack,
 ANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 # Maximum numbers of cached senders, and of masks for one length of messages.
-SENDERS, MASKS = 256, 4
+MAX_SENDERS, MAX_MASKS = 256, 4
 # Messages longer than this [bytes] are always deserialised.
-LONGEST = 1 << 16
-# While a cache is full, the layout of only one in SAMPLED unknown messages is determined.
-SAMPLED = 256
+MAX_LAYOUT_BYTES = 1 << 16
+# While a cache is full, the layout of only one in SAMPLE_INTERVAL unknown messages is determined.
+SAMPLE_INTERVAL = 256
 
 # A packed stamp (bytes), then floats.
 Numbers = Tuple[Any, ...]
@@ -96,11 +96,12 @@ class Reader:
                 return sender
         message = deserialized(data, JointState)
         self._missed += 1
-        is_full = len(self._senders) == SENDERS or len(masks) == MASKS
+        is_full = len(self._senders) == MAX_SENDERS or len(masks) == MAX_MASKS
+        is_skipped = is_full and self._missed % SAMPLE_INTERVAL
         sender = Sender(data, message, self._interpret(message),
-                        size <= LONGEST and not (is_full and self._missed % SAMPLED))
-        if sender.size and (sender.mask in masks or len(masks) < MASKS):
-            if len(self._senders) == SENDERS:
+                        size <= MAX_LAYOUT_BYTES and not is_skipped)
+        if sender.size and (sender.mask in masks or len(masks) < MAX_MASKS):
+            if len(self._senders) == MAX_SENDERS:
                 self._drop_oldest()
             self._masks.setdefault(size, set()).add(sender.mask)
             self._senders[size, sender.mask, sender.same] = sender

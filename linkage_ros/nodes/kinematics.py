@@ -21,7 +21,7 @@ from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node, shutdown
-from .log import NAMES, Once
+from .log import MAX_NAMES, Once
 from .mechanism_model import MechanismModel
 from .mechanism_topics import MechanismTopics
 from .message_layout import NEVER, pack_time
@@ -31,9 +31,9 @@ from ..robot_model import bodies, urdf
 from ..words import listed
 
 # Time from the start, and from the first input received, to a warning about missing ones [s].
-MISSING_AFTER = 5.0
+MISSING_AFTER_S = 5.0
 # Longest wait for subscribers to delete markers when the node ends [s].
-DELETION_TIMEOUT = 0.1
+DELETION_TIMEOUT_S = 0.1
 
 
 class InputSource(NamedTuple):
@@ -53,12 +53,12 @@ class Kinematics(scene_node.SceneNode):
         self._mechanisms: Dict[str, MechanismTopics] = {}
         self._models: Dict[str, MechanismModel] = {}
         super().__init__(scene.KINEMATICS, **kwargs)
-        self._clashing = Once(NAMES)
+        self._clashing = Once(MAX_NAMES)
         # Mechanism and index of the inputs, by their source joint.
         self._inputs: Dict[str, List[Tuple[str, int]]] = {}
-        for name, machine in self.scene.machines.items():
-            for i, drive in enumerate(machine.inputs.values()):
-                self._inputs.setdefault(drive.source, []).append((name, i))
+        for name, mechanism in self.scene.machines.items():
+            for i, settings in enumerate(mechanism.inputs.values()):
+                self._inputs.setdefault(settings.source, []).append((name, i))
         self._scene_joint_states = SceneJointStates(self, self._inputs)
         self._mechanisms.update((name, MechanismTopics(self, mechanism))
                                 for name, mechanism in self.scene.machines.items())
@@ -66,14 +66,14 @@ class Kinematics(scene_node.SceneNode):
         # That of the last message that set an input.
         self._stamp = NEVER
         self._own: frozenset = frozenset()
-        self._missing, self._unknown = set(self._inputs), Once(NAMES)
+        self._missing, self._unknown = set(self._inputs), Once(MAX_NAMES)
         self._missing_timer = self.create_timer(
-            MISSING_AFTER, self.guarded('the check for missing inputs', self._warn_of_missing),
+            MISSING_AFTER_S, self.guarded('the check for missing inputs', self._warn_of_missing),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
-        for machine in self.scene.machines.values():
-            if len(machine.assembly().legs) > 1:
-                self._log_machine_code(machine.linkage)
+        for mechanism in self.scene.machines.values():
+            if len(mechanism.assembly().legs) > 1:
+                self._log_machine_code(mechanism.linkage)
                 break
         joint_state_reader.subscribe(self, 'crank_states', self._receive)
 
@@ -93,24 +93,26 @@ class Kinematics(scene_node.SceneNode):
 
     def check(self, new: scene.Scene) -> None:
         """Raise SceneError if no robot model can be made of a planar mechanism."""
-        for name, machine in new.machines.items():
+        for name, mechanism in new.machines.items():
             before = self.scene.machines[name]
-            if machine.in_space:
+            if mechanism.in_space:
                 continue
-            if machine is not before:
-                bodies.size(machine)
-            # Dimensions and sweeps cannot invalidate a robot model, whose limits take long.
-            alike = replace(machine, linkage=before.linkage, reach=before.reach,
-                            inputs=before.inputs)
-            if alike != before or new.frame_id != self.scene.frame_id:
-                bodies.robot([alike], new.frame_id)
+            if mechanism is not before:
+                bodies.check_range(mechanism)
+            # Nothing else that has changed can invalidate a robot model, whose limits take long.
+            alike = replace(mechanism, linkage=before.linkage, reach=before.reach,
+                            inputs=before.inputs, pose=before.pose, points=before.points,
+                            frame_id=before.frame_id)
+            frame_id = mechanism.frame_id or new.frame_id
+            if alike != before or frame_id.startswith(f'{name}_'):
+                bodies.robot([replace(alike, frame_id=frame_id)], frame_id)
 
     def prepare(self, new: scene.Scene) -> Any:
         """Return a model of each mechanism by name; unchanged mechanisms keep their models."""
         in_scene = self._scene_joint_states.has_subscribers
         return {name: self._mechanisms[name].prepared(
-            machine, machine.frame_id or new.frame_id, new.frame_prefix, in_scene)
-            for name, machine in new.machines.items()}
+            mechanism, mechanism.frame_id or new.frame_id, new.frame_prefix, in_scene)
+            for name, mechanism in new.machines.items()}
 
     def adopt(self, models: Dict[str, MechanismModel]) -> None:
         """Replace the models of the mechanisms, and publish those that have changed."""
@@ -120,17 +122,17 @@ class Kinematics(scene_node.SceneNode):
         self._own = frozenset(joint.name for model in models.values()
                               for joint in model.mechanism.joints.values())
         self._check_clashes()
-        for one in changed:
-            one.adopt(models[one.name])
+        for topics in changed:
+            topics.adopt(models[topics.name])
         if not is_first:
             self._publish(changed)
-        self.later([*(partial(self._latched, one, models[one.name]) for one in changed),
+        self.later([*(partial(self._latched, topics, models[topics.name]) for topics in changed),
                     partial(self._robot, models)])
 
-    def _latched(self, one: MechanismTopics, model: MechanismModel) -> Callable[[], None]:
+    def _latched(self, topics: MechanismTopics, model: MechanismModel) -> Callable[[], None]:
         """Build a mechanism's latched messages; return a function to publish them."""
         latched = model.latched()
-        return lambda: one.publish_latched(latched) if one.model is model else None
+        return lambda: topics.publish_latched(latched) if topics.model is model else None
 
     def _robot(self, models: Dict[str, MechanismModel]) -> Callable[[], None]:
         """Build the scene's robot model; return a function to publish it."""
@@ -146,12 +148,12 @@ class Kinematics(scene_node.SceneNode):
 
     def delete_displayed(self) -> None:
         """Delete all markers and loci."""
-        for one in self._mechanisms.values():
-            one.clear()
+        for topics in self._mechanisms.values():
+            topics.clear()
         # The end of a process would drop messages that are still on their way.
-        deadline = time.monotonic() + DELETION_TIMEOUT
-        for one in self._mechanisms.values():
-            one.wait_for_deletions(deadline)
+        deadline = time.monotonic() + DELETION_TIMEOUT_S
+        for topics in self._mechanisms.values():
+            topics.wait_for_deletions(deadline)
 
     def _receive(self, data: bytes) -> None:
         """Set the inputs by a serialised message, and publish the mechanisms that it moves."""

@@ -26,24 +26,24 @@ InvalidHandle = rclpy_implementation.InvalidHandle
 # Shortest time between two warnings about one subject [s]; most subjects that are throttled; most
 # kinds of errors that are logged; unknown names after which further ones are not logged: a sender
 # that makes up names would fill the log.
-SECONDS, SUBJECTS, ERRORS, NAMES = 5.0, 1000, 100, 20
+THROTTLE_S, MAX_SUBJECTS, MAX_ERRORS, MAX_NAMES = 5.0, 1000, 100, 20
 
 
 class Throttle:
-    """Logs warnings, about each subject at most one in `SECONDS`."""
+    """Logs warnings, about each subject at most one in `THROTTLE_S`."""
 
     def __init__(self, logger: Any):
         self._logger = logger
         self._logged: OrderedDict[Any, float] = OrderedDict()
 
     def warn(self, subject: Any, text: Callable[[], str]) -> None:
-        """Log the result of `text`, unless the subject was logged within the last `SECONDS`."""
+        """Log the result of `text`, unless the subject was logged within the last `THROTTLE_S`."""
         now = time.monotonic()
-        if now < self._logged.get(subject, -math.inf) + SECONDS:
+        if now < self._logged.get(subject, -math.inf) + THROTTLE_S:
             return
         self._logged[subject] = now
         self._logged.move_to_end(subject)
-        if len(self._logged) > SUBJECTS:
+        if len(self._logged) > MAX_SUBJECTS:
             self._logged.popitem(last=False)
         self._logger.warning(text())
 
@@ -74,7 +74,7 @@ class Incidents:
     """Logs unexpected exceptions once each, unless `is_ending` returns true."""
 
     def __init__(self, logger: Any, is_ending: Callable[[], bool]):
-        self._logger, self._is_ending, self._once = logger, is_ending, Once(ERRORS)
+        self._logger, self._is_ending, self._once = logger, is_ending, Once(MAX_ERRORS)
 
     def report(self, what: str, error: Exception) -> None:
         """Log an exception with the place where it was raised; `what` was being handled."""

@@ -31,7 +31,7 @@ from ..linkage.walker import Layout, Solution
 from ..robot_model import bodies, shapes, urdf
 
 # Cached publishers: a walker's legs may leave their reach one by one, each with another message.
-PUBLISHERS = 128
+MAX_PUBLISHERS = 128
 
 
 class AssemblyState(NamedTuple):
@@ -89,7 +89,8 @@ class MechanismModel:
         self._points, shown = _shown(mechanism)
         self._drawn = *drawn, bodies.size(mechanism), shown
         self._conversions, self._logger = Cache(self._conversion), logger
-        self.regular, self.publishers = Cache(self._regular), Cache(self._publisher, PUBLISHERS)
+        self.regular = Cache(self._regular)
+        self.publishers = Cache(self._publisher, MAX_PUBLISHERS)
 
     @cached_property
     def marker_array(self) -> messages.Markers:
@@ -101,7 +102,8 @@ class MechanismModel:
         drawn, size = self._drawn[:3], self._drawn[3]
         curve = self.assembly.locus(self.mechanism.tracer)
         return (urdf.write(self.robot) if self.robot else '',
-                messages.locus(*drawn, curve, size) if len(curve) > 1 else None)
+                messages.locus(*drawn, curve, size, self.mechanism.mirrored)
+                if len(curve) > 1 else None)
 
     def _regular(self, wanted: Tuple[bool, bool, bool]) -> AssemblyState:
         joints, markers, moving = wanted

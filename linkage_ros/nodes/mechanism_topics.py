@@ -65,7 +65,7 @@ class MechanismTopics:
         self.state: Optional[AssemblyState] = None
         # The last position of a source joint, and the last input that one has given.
         self._position = math.nan
-        self._near: Optional[float] = None
+        self._seed: Optional[float] = None
         # Ids of the displayed markers, whether the locus is displayed, and the last robot model.
         self._displayed: AbstractSet[int] = frozenset()
         self._has_locus, self._described = False, ''
@@ -74,10 +74,10 @@ class MechanismTopics:
         """Set input `i` by the position of its source joint and, if known, its speed."""
         model = self.model
         value, self.speeds[i] = model.mechanism.from_source(
-            model.inputs[i], position, speed, self._near)
+            model.inputs[i], position, speed, self._seed)
         self.inputs[i], self._position = value, position
         if math.isfinite(value):
-            self._near = value
+            self._seed = value
 
     def publish(self, in_scene: bool) -> None:
         """Solve for the subscribers, and for the scene's joint states if `in_scene`; publish."""
@@ -170,23 +170,27 @@ class MechanismTopics:
         assembled = [*self.state.legs()] if self.state else []
         missing = {leg: f'{self.name}_{prefix}'.rstrip('_') for leg, prefix in enumerate(
             self.model.assembly.legs) if leg not in assembled}
-        legs, inputs = ', '.join(missing.values()), self.model.inputs
-        if inputs[0].measures and math.isnan(self.inputs[0]):
-            return (f'{legs} cannot be assembled: {inputs[0].source} is at {self._position:.6g}, '
-                    f'out of reach of {inputs[0].measures}')
-        at = ', '.join(f'{one.input.quantity} {value:.6g} {one.input.unit}'
-                       for one, value in zip(inputs, self.inputs))
-        if len(inputs) > 1:
-            return f'{legs} cannot be assembled at {at}: no place for "{self._unplaced()}"'
+        inputs, failure = self.model.inputs, f'{", ".join(missing.values())} cannot be assembled'
+        for settings, value in zip(inputs, self.inputs):
+            if not math.isfinite(value):
+                measured = settings.measures and (
+                    f'{self._position:.6g}, out of reach of {settings.measures}')
+                return f'{failure}: {settings.source} is at {measured or value}'
+        failure += ' at ' + ', '.join(
+            f'{settings.input.quantity} {value:.6g} {settings.input.unit}'
+            for settings, value in zip(inputs, self.inputs))
         first, *others = missing
+        reach, value, input_ = self._reach(inputs[0], first), self.inputs[0], inputs[0].input
+        if len(inputs) > 1 or any(input_.holds(arc, value, value) for arc in reach):
+            return f'{failure}: no place for "{self._unplaced(first)}"'
         of = f' of {missing[first]}' if others else ''
-        return (f'{legs} cannot be assembled at {at}; the reach{of} is '
-                f'{scene.in_words(self._reach(inputs[0], first))} {inputs[0].input.unit}')
+        return f'{failure}; the reach{of} is {scene.in_words(reach)} {input_.unit}'
 
-    def _unplaced(self) -> str:
-        """Return the first joint line that has no place at the present inputs."""
-        mechanism = self.model.mechanism
-        own = [value / mechanism.scale_of(name)
+    def _unplaced(self, leg: int) -> str:
+        """Return the first joint line of a leg that has no place at the present inputs."""
+        mechanism, (lag, start, side, _) = self.model.mechanism, [
+            *self.model.assembly.legs.values()][leg]
+        own = [(start + side * (value - lag)) / mechanism.scale_of(name)
                for name, value in zip(mechanism.inputs, self.inputs)]
         found = {**mechanism.linkage.solve(own), **mechanism.linkage.joint_angles(own)}
         return next((line.text for line in mechanism.linkage.design.lines

@@ -31,7 +31,7 @@ LEAD = bytes(8 - HEADER)
 LITTLE_ENDIAN = b'\0\1'
 # Shorter messages [bytes] are refused: a middleware that trusts the padding length in the header
 # reads beyond their end, and may crash.
-SHORTEST = 8
+MIN_BYTES = 8
 # The packed stamp of a message whose publisher has not set it: time zero.
 NEVER = bytes(8)
 
@@ -64,8 +64,8 @@ class Unreadable(ValueError):
 
 def deserialized(data: bytes, kind: type) -> Any:
     """Deserialise a message of type `kind`; raise Unreadable if `data` is none."""
-    if len(data) < SHORTEST:
-        raise Unreadable(f'it must have at least {SHORTEST} bytes')
+    if len(data) < MIN_BYTES:
+        raise Unreadable(f'it must have at least {MIN_BYTES} bytes')
     try:
         return deserialize_message(data, kind)
     except Exception as error:

@@ -101,10 +101,18 @@ class Markers:
 
 
 def locus(name: str, frame_id: str, pose: Sequence[float], places: np.ndarray,
-          size: float) -> Marker:
-    """Build the marker of the curve through points [m], (n, 2); see Markers."""
+          size: float, mirrored: bool) -> Marker:
+    """
+    Build the marker of the curve through points [m], (n, 2); see Markers.
+
+    With its mirror image, it is a list of lines instead of one strip.
+    """
     # Its stamp is zero: RViz uses the latest pose of the frame.
     marker = _marker(name, LOCUS_ID, frame_id, pose, size)
+    if mirrored:
+        marker.type = Marker.LINE_LIST
+        lines = np.repeat(places, 2, axis=0)[1:-1]
+        places = np.concatenate([lines, lines * (-1.0, 1.0)])
     marker.points = [Point(**dict(zip('xyz', place))) for place in places.tolist()]
     return marker
 

@@ -9,17 +9,17 @@
 # limitations under the License.
 
 """
-Parameters that several nodes use have one owner: types, dimensions, branches, scale, sweep.
+Each parameter of a scene has one owner: `crank_driver` those of motions, `kinematics` all others.
 
-The owner is `kinematics`. It announces its values on `scene_parameters`, and the other nodes adopt
-them while it runs; without it, each node uses its own values. A full announcement has all values,
-among them `mechanisms`; the following ones have only what has changed. A late subscriber receives
-the last full announcement and those after it.
+An owner announces its values on `scene_parameters`. Nodes that use them follow: they adopt them,
+and keep the last ones when the owner ends. Until an announcement they have the values of their own
+file. A full announcement has all values of its owner; the following ones have only what has
+changed. A late subscriber receives the last full announcement and those after it.
 """
 
 from __future__ import annotations
 
-from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Set, Tuple
+from typing import Any, Callable, Dict, Iterable, List, Mapping, Sequence, Set, Tuple
 
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import Parameter, parameter_value_to_python
@@ -35,7 +35,7 @@ LATCHED = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Announcer:
-    """Publishes the owner's values of parameters that several nodes use."""
+    """Publishes the values of the parameters that a node owns."""
 
     def __init__(self, node: Any):
         self._node = node
@@ -45,22 +45,22 @@ class Announcer:
 
     def first(self) -> Callable[[], None]:
         """Return a function that makes the first announcement, with all values."""
-        read, values = self._node.scene, _messages(self._node.scene.parameters)
+        read, values = self._node.scene, self._messages(self._node.scene.parameters)
 
         def publish() -> None:
             if not self._announced:
                 self._announced = 1
-                self._publish(new_parameters=values if read is self._node.scene else _messages(
-                    self._node.scene.parameters))
+                self._publish(new_parameters=values if read is self._node.scene else
+                              self._messages(self._node.scene.parameters))
         return publish
 
     def announce(self, changed: Iterable[scene.Parameter]) -> None:
-        """Publish those changed values that several nodes use; nothing before the first."""
-        values = _messages(changed)
+        """Publish those changed values that the node owns; nothing before the first."""
+        values = self._messages(changed)
         if self._announced and values:
             # A late subscriber receives DEPTH messages, and needs the full one among them.
             self._announced = 1 if self._announced == DEPTH else self._announced + 1
-            self._publish(changed_parameters=values if self._announced > 1 else _messages(
+            self._publish(changed_parameters=values if self._announced > 1 else self._messages(
                 self._node.scene.parameters))
 
     def _publish(self, **values: Any) -> None:
@@ -68,61 +68,81 @@ class Announcer:
             stamp=self._node.get_clock().now().to_msg(),
             node=self._node.get_fully_qualified_name(), **values))
 
+    def _messages(self, parameters: Iterable[scene.Parameter]) -> List:
+        return [Parameter(p.name, Parameter.Type[p.field.kind.upper()], p.value).to_parameter_msg()
+                for p in parameters if p.name in self._node.fields]
+
 
 class Follower:
-    """Sets a node's parameters to the values that their owner announces."""
+    """Adopts the values of the parameters that a node uses and does not own."""
 
     def __init__(self, node: Any, parameters: SceneParameters):
-        self._node, self._parameters = node, parameters
-        self._owner = ''
-        self._owned: Set[str] = set()
+        self._node, self._parameters, self._owner = node, parameters, ''
+        # The mechanisms whose values are adopted, and values that are not adopted yet.
+        self._mechanisms: Set[str] = set()
+        self._waiting: Dict[str, Any] = {}
         self._warned: Dict[str, Sequence[str]] = {}
-        self._refused: Dict[str, Any] = {}
-        self._subscription = node.create_subscription(
+        node.create_subscription(
             ParameterEvent, TOPIC, node.guarded(TOPIC, self._receive), LATCHED)
 
-    def owner_of(self, name: str) -> Optional[str]:
-        """Return the full name of the running node that owns a parameter; None if none does."""
-        owned = name in self._owned and self._node.count_publishers(self._subscription.topic_name)
-        return self._owner if owned else None
-
     def _receive(self, event: ParameterEvent) -> None:
-        fields = self._parameters.fields
-        values, wrong = _read((*event.new_parameters, *event.changed_parameters), fields)
-        if 'mechanisms' in values or event.node != self._owner:
-            self._compare(event, values)
-        # Values that this node has refused may be valid together with the new ones.
-        changed = {name: value for name, value in {**self._refused, **values}.items()
-                   if name in self._owned and not fields[name].read_only
-                   and value != self._present(name)}
-        refused = self._parameters.follow(dict(sorted(changed.items())))
-        self._refused = {name: changed[name] for name in refused}
-        self._warn('refused', wrong + [*refused.values()], 'values that cannot be followed')
+        values, wrong = read((*event.new_parameters, *event.changed_parameters),
+                             self._parameters.followed)
+        mechanisms = values.pop('mechanisms', None)
+        if mechanisms is not None:
+            self._compare(event, mechanisms, values, self._present(values))
+        elif event.node != self._owner:
+            # Those of an owner of other parameters, or one whose full announcement follows.
+            return
+        # Values that were refused may be valid together with the new ones.
+        self._waiting.update((name, value) for name, value in values.items()
+                             if name.partition('.')[0] in self._mechanisms
+                             and not self._parameters.followed[name].read_only)
+        self._warn('refused', wrong + self._follow(), 'values that cannot be followed')
 
-    def _present(self, name: str) -> Any:
-        return scene.plain(self._node.get_parameter_or(name).value)
+    def _follow(self) -> List[str]:
+        """Adopt what waits, together or else by mechanism; return the reasons of refusals."""
+        present = self._present(self._waiting)
+        waiting = {name: value for name, value in self._waiting.items() if value != present[name]}
+        parts: Dict[str, Dict[str, Any]] = {}
+        for name, value in waiting.items():
+            parts.setdefault(name.partition('.')[0], {})[name] = value
+        self._waiting = waiting
+        if not waiting or not self._parameters.follow(waiting):
+            parts = {}
+        refused = {mechanism: reason for mechanism, part in parts.items()
+                   if (reason := self._parameters.follow(part))}
+        self._waiting = {name: value for mechanism in refused
+                         for name, value in parts[mechanism].items()}
+        return [*refused.values()]
 
-    def _compare(self, event: ParameterEvent, values: Mapping[str, Any]) -> None:
+    def _present(self, names: Iterable[str]) -> Dict[str, Any]:
+        """Return this node's values of all parameters of the mechanisms that names begin with."""
+        mechanisms = self._parameters.scene.machines
+        return {parameter.name: parameter.value
+                for mechanism in {name.partition('.')[0] for name in names} & mechanisms.keys()
+                for parameter in mechanisms[mechanism].parameters}
+
+    def _compare(self, event: ParameterEvent, mechanisms: Iterable[str],
+                 there: Mapping[str, Any], here: Mapping[str, Any]) -> None:
         """Compare a full announcement with this node's mechanisms: equal ones are followed."""
-        fields, machines = self._parameters.fields, self._parameters.scene.machines
+        fields, present = self._parameters.followed, self._parameters.scene.machines.keys()
         started = event.node != self._owner or event.new_parameters
-        self._owner, self._refused = event.node, {}
-        here = {name: self._present(name) for name in values}
-        fixed = {name for name in here if fields[name].read_only and name != 'mechanisms'}
-        unlike = {name.partition('.')[0]: name for name in fixed if here[name] != values[name]}
-        missing = set(machines) ^ set(values.get('mechanisms') or ())
-        followed = machines.keys() - missing - unlike.keys()
-        self._owned = {name for name in here if '.' in name and name.partition('.')[0] in followed}
+        self._owner, self._waiting = event.node, {}
+        unlike = {name.partition('.')[0]: name for name in there
+                  if fields[name].read_only and here[name] != there[name]}
+        missing = present ^ set(mechanisms)
+        self._mechanisms = present - missing - unlike.keys()
         self._warn('unlike', [f'{name} is {quoted(here[name])} here and '
-                              f'{quoted(values[name])} there' for name in unlike.values()],
+                              f'{quoted(there[name])} there' for name in unlike.values()],
                    'another mechanism, which is not followed')
         self._warn('missing', sorted(missing), 'other mechanisms; only one of the nodes has')
         if started:
             self._warned.pop('values', None)
             self._warn('values', [
-                f'{name} was {quoted(here[name])} and is now {quoted(values[name])}'
-                for name in sorted(self._owned - fixed) if here[name] != values[name]],
-                'other values, which are followed')
+                f'{name} was {quoted(here[name])} and is now {quoted(there[name])}'
+                for name in sorted(there) if name.partition('.')[0] in self._mechanisms
+                and here[name] != there[name]], 'other values, which are followed')
 
     def _warn(self, kind: str, particulars: Sequence[str], what: str) -> None:
         """Warn that the owner has `what`; repeat it only when the particulars have changed."""
@@ -132,12 +152,7 @@ class Follower:
         self._warned[kind] = particulars
 
 
-def _messages(parameters: Iterable[scene.Parameter]) -> List:
-    return [Parameter(p.name, Parameter.Type[p.field.kind.upper()], p.value).to_parameter_msg()
-            for p in parameters if p.field.shared]
-
-
-def _read(messages: Iterable, fields: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[str]]:
+def read(messages: Iterable, fields: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[str]]:
     """Return the valid values of known parameters by name, and the errors of invalid ones."""
     values: Dict[str, Any] = {}
     wrong: List[str] = []

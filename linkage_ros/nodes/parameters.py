@@ -14,8 +14,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from copy import copy
-from shlex import quote
-from typing import Any, Callable, Mapping, Optional, Sequence
+from typing import Any, Callable, Mapping, Sequence
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -28,8 +27,7 @@ from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter
 
 from .. import scene as scenes
-from ..scene import slider
-from ..words import elided, quoted
+from ..words import elided
 
 
 class Undeclared(ParameterNotDeclaredException):
@@ -40,7 +38,7 @@ class Undeclared(ParameterNotDeclaredException):
 
 class SceneParameters:
     """
-    Declares the parameters that a node uses, and validates every change.
+    Reads a scene from a node's parameters; declares those that it owns, and validates changes.
 
     The `node` is created with `automatically_declare_parameters_from_overrides`. `role`, one of
     scenes.ALL, selects its parameters. `check(scene)` raises SceneError for a scene that the node
@@ -51,8 +49,9 @@ class SceneParameters:
     ----------
     scene : Scene
         The scene of the present values.
-    fields : dict
-        The Field of each declared parameter, by name.
+    fields, followed : dict
+        By name, the Field of each parameter that the node owns, and of each that it uses and
+        another node owns.
     is_given : bool
         Whether the node was started with any parameter of a scene.
 
@@ -60,177 +59,160 @@ class SceneParameters:
 
     def __init__(self, node: Any, role: str, check: Callable[[scenes.Scene], None],
                  changed: Callable[[list[scenes.Parameter]], None]):
-        self._node, self._role, self._check, self._changed = node, role, check, changed
-        # Full name of the node that owns a parameter, or None.
-        self.owner_of: Callable[[str], Optional[str]] = lambda name: None
-        # Whether values from their owner are being set, and whether changed defaults are.
-        self._from_owner = self._is_derived = False
+        self._node, self._check, self._changed = node, check, changed
         # An empty list in a parameter file has neither type nor value.
-        given = {name: () if one.value is None else scenes.plain(one.value)
-                 for name, one in node.get_parameters_by_prefix('').items()}
+        given = {name: () if parameter.value is None else scenes.plain(parameter.value)
+                 for name, parameter in node.get_parameters_by_prefix('').items()}
         self.scene = scenes.read(given)
-        own = [one for one in self.scene.parameters if role in one.field.readers]
-        self.fields = {one.name: one.field for one in own}
-        of_scene = given.keys() & {one.name for one in self.scene.parameters}
+        own = [parameter for parameter in self.scene.parameters if role == parameter.field.owner]
+        self.fields = {parameter.name: parameter.field for parameter in own}
+        self.followed = {parameter.name: parameter.field for parameter in self.scene.parameters
+                         if role in parameter.field.readers and parameter.name not in self.fields}
+        # An input that has left its start is not checked to be in its sweep.
+        self._is_strict = role in scenes.START.readers
+        of_scene = given.keys() & {parameter.name for parameter in self.scene.parameters}
         self.is_given = bool(of_scene)
-        # Parameters of other nodes only are not declared here.
+        # A parameter is declared by its owner alone.
         for name in of_scene:
             node.undeclare_parameter(name)
         self._declare(own)
-        self._candidate = self.scene
-        # Requested slider ranges by name: mechanism, value, and the range computed from them.
-        self._ends: dict[str, tuple[Any, Any, Any]] = {}
-        node.add_pre_set_parameters_callback(self._typed_alike)
-        node.add_on_set_parameters_callback(self._validate)
-        node.add_post_set_parameters_callback(self._adopt)
+        # The scene that a change leads to, what differs in it, why it is refused, and the first
+        # of its parameters: rclpy calls back for other ones, too.
+        self._next, self._refusal = self.scene, ''
+        self._difference: list[scenes.Parameter] = []
+        self._first: Any = None
+        self._follows = False
+        node.add_pre_set_parameters_callback(self._read)
+        node.add_on_set_parameters_callback(self._answer)
+        node.add_post_set_parameters_callback(self._accept)
 
-    def set_valid(self, messages: Sequence[ParameterMessage]) -> dict[int, SetParametersResult]:
-        """Set together those parameters that are valid by themselves; return results by index."""
-        valid = {}
-        for i, one in enumerate(messages):
-            with suppress(scenes.SceneError, KeyError, ValueError):
-                parameter = Parameter.from_parameter_msg(one)
-                if not self.fields[one.name].read_only:
-                    self._value(parameter)
-                    valid[i] = parameter
-        return dict(zip(valid, self._set_together([*valid.values()])))
-
-    def follow(self, values: Mapping[str, Any]) -> dict[str, str]:
-        """Set parameters to their owner's values; return the reasons of refusals by name."""
-        self._from_owner = True
-        try:
-            results = self._set_together([
-                Parameter(name, value=value) for name, value in values.items()])
-        finally:
-            self._from_owner = False
-        return {name: result.reason for name, result in zip(values, results)
-                if not result.successful}
-
-    def _set_together(self, parameters: list[Parameter]) -> list[SetParametersResult]:
+    def set_together(self, messages: Sequence[ParameterMessage]) -> dict[int, SetParametersResult]:
         """
-        Set parameters atomically; if that is refused, each half of them. Return a result for each.
+        Set parameters that are valid by themselves in one change; return their results by index.
 
         One by one would fail: a leg with some old and some new dimensions may not be assembled. If
-        a name is repeated, only its last value is validated and set.
+        the change is refused, there are no results.
         """
-        if not parameters:
-            return []
-        result = self._node.set_parameters_atomically(
-            [*{one.name: one for one in parameters}.values()])
-        if result.successful or len(parameters) == 1:
-            return [result] * len(parameters)
-        half = len(parameters) // 2
-        return self._set_together(parameters[:half]) + self._set_together(parameters[half:])
+        valid = {}
+        for i, message in enumerate(messages):
+            with suppress(scenes.SceneError, KeyError, ValueError):
+                parameter = Parameter.from_parameter_msg(message)
+                self._checked(parameter)
+                valid[i] = parameter
+        # Of a repeated name the last value counts.
+        last = {parameter.name: parameter for parameter in valid.values()}
+        result = self._node.set_parameters_atomically([*last.values()])
+        return dict.fromkeys(valid, result) if result.successful else {}
+
+    def follow(self, values: Mapping[str, Any]) -> str:
+        """Adopt values of parameters of another node; return the reason of a refusal, or ''."""
+        self._refusal = ''
+        try:
+            self._prepare(values, strict=False)
+        except scenes.SceneError as error:
+            return str(error)
+        if derived := self._derived(()):
+            self._first, self._follows = derived[0], True
+            self._node.set_parameters_atomically(derived)
+        else:
+            self._adopt()
+        return ''
 
     def ranged(self, name: str, descriptor: ParameterDescriptor) -> ParameterDescriptor:
-        """Return a parameter's descriptor with a slider range around its value."""
-        if name not in self.fields:
+        """Return a parameter's descriptor with its type and the range of allowed values."""
+        field = self.fields.get(name)
+        if field is None:
             return descriptor
-        descriptor, ends = copy(descriptor), self._slider_ends(name)
+        descriptor = copy(descriptor)
         # rclpy changes the descriptor's type to that of a refused value.
-        descriptor.type = _kind(self.fields[name]).value
-        if ends and self.fields[name].kind == 'integer':
-            descriptor.integer_range = [IntegerRange(from_value=ends[0], to_value=ends[1], step=1)]
-        elif ends:
-            # With a step other than 0, rclpy would refuse rounded values.
-            descriptor.floating_point_range = [
-                FloatingPointRange(from_value=ends[0], to_value=ends[1], step=0.0)]
+        descriptor.type = _kind(field).value
+        if field.high is not None:
+            # rclpy would refuse values that differ from an end by rounding.
+            whole = field.kind == 'integer'
+            ends = {'from_value': field.low, 'to_value': field.high}
+            descriptor.integer_range = [IntegerRange(step=1, **ends)] if whole else []
+            descriptor.floating_point_range = [] if whole else [FloatingPointRange(**ends)]
         return descriptor
 
-    def renew_ranges(self) -> None:
-        """Recompute the requested slider ranges; this may run in another thread."""
-        for name in list(self._ends):
-            self._slider_ends(name)
-
-    def _slider_ends(self, name: str) -> Any:
-        value = scenes.plain(self._node.get_parameter(name).value)
-        machine, made_of, ends = self._ends.get(name, (None, None, None))
-        present = self.scene.machines.get(name.partition('.')[0])
-        if name not in self._ends or machine is not present or made_of != value:
-            ends = slider.ends(self.scene, scenes.Parameter(name, self.fields[name], value))
-            self._ends[name] = present, value, ends
-        return ends
-
     def _declare(self, own: Sequence[scenes.Parameter]) -> None:
-        descriptors = {field: _descriptor(field, field.read_only)
-                       for field in {one.field for one in own}}
+        descriptors = {parameter.field: _descriptor(parameter.field) for parameter in own}
         # The value of an empty list does not imply its type.
-        empty = [one for one in own if one.value == ()]
-        self._node.declare_parameters('', [
-            (one.name, one.value, copy(descriptors[one.field])) if one.value != () else
-            (one.name, None, _descriptor(one.field, read_only=False)) for one in own],
-            ignore_override=True)
-        self._node.set_parameters_atomically([_parameter(one) for one in empty])
-        for one in empty:
-            if one.field.read_only:
-                self._node.set_descriptor(one.name, descriptors[one.field])
+        empty = [_parameter(parameter) for parameter in own if parameter.value == ()]
+        self._node.declare_parameters('', [(
+            parameter.name, None if parameter.value == () else parameter.value,
+            copy(descriptors[parameter.field])) for parameter in own], ignore_override=True)
+        self._node.set_parameters_atomically(empty)
 
-    def _typed_alike(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Convert parameters to their declared types: 3 to 3.0, an empty list to a typed one."""
-        for one in parameters:
-            if not self._node.has_parameter(one.name):
-                raise Undeclared(f'{elided(one.name)} is not a parameter of '
-                                 f'{self._node.get_fully_qualified_name()}')
-        return [self._typed(one) for one in parameters]
-
-    def _typed(self, parameter: Parameter) -> Parameter:
-        field = self.fields.get(parameter.name)
+    def _read(self, parameters: list[Parameter]) -> list[Parameter]:
+        """Read the changed scene; return the parameters in their declared types, and derived."""
+        if self._follows:
+            self._follows = False
+            return parameters
+        # rclpy may have refused what was read before.
+        self._refusal, self._difference = '', []
+        self._first = parameters[0] if parameters else None
+        for parameter in parameters:
+            if not self._node.has_parameter(parameter.name):
+                raise Undeclared(self._unknown(parameter.name))
         try:
-            return parameter if not field or parameter.type_ == Parameter.Type.NOT_SET else (
-                Parameter(parameter.name, _kind(field), field.checked(
-                    parameter.name, parameter.value)))
-        except scenes.SceneError:
-            # `_validate` refuses it with an explanation.
-            return parameter
-
-    def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
-        if self._is_derived:
-            return SetParametersResult(successful=True)
-        try:
-            values = {one.name: self._value(one) for one in parameters
-                      if one.name in self.fields}
-            strict = not self._from_owner and self._role in scenes.START.readers
-            candidate = scenes.changed(self.scene, values, strict) if values else self.scene
-            self._check(candidate)
+            values = {parameter.name: self._checked(parameter) for parameter in parameters
+                      if parameter.name in self.fields}
+            self._prepare(values, self._is_strict)
         except scenes.SceneError as error:
-            return SetParametersResult(successful=False, reason=str(error))
+            self._refusal = str(error)
+            return parameters
         except Exception as error:
             self._node.report('a changed parameter', error)
-            return SetParametersResult(
-                successful=False, reason=elided(f'internal error: {error!r}', 299))
-        self._candidate = candidate
-        return SetParametersResult(successful=True)
+            self._refusal = elided(f'internal error: {error!r}', 299)
+            return parameters
+        typed = [Parameter(
+            parameter.name, _kind(self.fields[parameter.name]), values[parameter.name])
+            if parameter.name in values else parameter for parameter in parameters]
+        self._first = typed[0] if typed else None
+        return typed + self._derived(values)
 
-    def _value(self, parameter: Parameter) -> Any:
+    def _unknown(self, name: str) -> str:
+        owner = f'; set it on {scenes.OWNER}' if name in self.followed else ''
+        node = self._node.get_fully_qualified_name()
+        return f'{elided(name)} is not a parameter of {node}{owner}'
+
+    def _prepare(self, values: Mapping[str, Any], strict: bool) -> None:
+        """Read the scene with changed values; raise SceneError if it is refused."""
+        changed = scenes.changed(self.scene, values, strict) if values else self.scene
+        self._check(changed)
+        self._next, self._difference = changed, changed.changed_from(self.scene)
+
+    def _checked(self, parameter: Parameter) -> Any:
+        """Return the value of a parameter of the scene, valid by itself; raise SceneError."""
         name, field = parameter.name, self.fields[parameter.name]
+        if field.read_only:
+            raise scenes.SceneError(f'{name} can be set only when the node is started')
         if parameter.type_ == Parameter.Type.NOT_SET:
             raise scenes.SceneError(f'{name} cannot be removed; it must be {field.allowed}')
-        value = field.checked(name, parameter.value)
-        owner = None if self._from_owner else self.owner_of(name)
-        if owner:
-            raise scenes.SceneError(
-                f'{name} belongs to {owner} while it runs: ros2 param set {owner} {name} '
-                + quote(quoted(list(value) if isinstance(value, tuple) else value)))
-        return value
+        return field.checked(name, parameter.value)
 
-    def _adopt(self, parameters: list[Parameter]) -> None:
-        if self._is_derived or self._candidate is self.scene:
-            return
-        changed = self._candidate.changed_from(self.scene)
-        if not changed:
-            return
-        self.scene = self._candidate
-        given = {one.name for one in parameters}
-        # The defaults of some parameters depend on the values of others.
-        derived = [_parameter(one) for one in changed if one.name in self.fields
-                   and one.name not in given and not one.field.read_only]
-        if derived:
-            self._is_derived = True
-            try:
-                self._node.set_parameters_atomically(derived)
-            finally:
-                self._is_derived = False
-        self._changed(changed)
+    def _derived(self, given: Any) -> list[Parameter]:
+        """Return those whose defaults depend on others that have changed."""
+        return [_parameter(parameter) for parameter in self._difference
+                if parameter.name in self.fields and parameter.name not in given
+                and not parameter.field.read_only]
+
+    def _is_read(self, parameters: list[Parameter]) -> bool:
+        return any(parameter is self._first for parameter in parameters)
+
+    def _answer(self, parameters: list[Parameter]) -> SetParametersResult:
+        reason = self._refusal if self._is_read(parameters) else ''
+        return SetParametersResult(successful=not reason, reason=reason)
+
+    def _accept(self, parameters: list[Parameter]) -> None:
+        if self._is_read(parameters):
+            self._adopt()
+
+    def _adopt(self) -> None:
+        difference, self._difference = self._difference, []
+        if difference:
+            self.scene = self._next
+            self._changed(difference)
 
 
 def _kind(field: Any) -> Parameter.Type:
@@ -242,9 +224,9 @@ def _parameter(parameter: scenes.Parameter) -> Parameter:
     return Parameter(parameter.name, _kind(parameter.field), parameter.value)
 
 
-def _descriptor(field: Any, read_only: bool) -> ParameterDescriptor:
+def _descriptor(field: Any) -> ParameterDescriptor:
     """Return the descriptor of a field, without its name."""
     # Dynamic typing lets the field refuse a wrong type with its own message.
     return ParameterDescriptor(
-        description=field.meaning, read_only=read_only, type=_kind(field).value,
+        description=field.meaning, read_only=field.read_only, type=_kind(field).value,
         additional_constraints=field.allowed, dynamic_typing=True)

@@ -25,7 +25,7 @@ from .publishers import LATCHED, PatchedPublisher, TrackedPublisher
 from ..cache import Cache
 
 # Cached publishers: the legs of walkers may leave their reach one by one.
-PUBLISHERS = 16
+MAX_PUBLISHERS = 16
 
 # The model and the state of each mechanism in a message.
 Parts = Tuple[Tuple[MechanismModel, AssemblyState], ...]
@@ -52,7 +52,7 @@ class SceneJointStates:
         self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
         self.omitted = frozenset(sources if same else ())
         self._logger = node.get_logger()
-        self._publishers = Cache(self._publisher, PUBLISHERS)
+        self._publishers = Cache(self._publisher, MAX_PUBLISHERS)
         self._description = ''
 
     @property

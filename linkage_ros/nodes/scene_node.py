@@ -16,10 +16,11 @@ from contextlib import contextmanager, suppress
 from functools import partial
 import gc
 import sys
-from typing import Any, Callable, Iterable, Iterator, List, Mapping, Optional
+import types
+from typing import Any, Callable, Generator, Iterable, Iterator, List, Mapping, Optional
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
-from rcl_interfaces.srv import SetParameters
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -45,14 +46,14 @@ except ImportError:
 
 # Longest wait for an event [s]: some builds of the EventsExecutor do not wait without a limit.
 # They loop at full load and ignore signals.
-LONGEST_WAIT = 1.0
+MAX_WAIT_S = 1.0
 
 # Longest time for which the worker thread delays a message [s]. At shorter intervals, it would
 # interrupt the processing of messages, and more of them would be late.
-SWITCH_INTERVAL = 0.0005
+SWITCH_INTERVAL_S = 0.0005
 
 # Time between two checks for another node of the same name [s].
-SECONDS_BETWEEN_CHECKS = 2.0
+NAMESAKE_CHECK_PERIOD_S = 2.0
 
 
 class SceneNode(Node):
@@ -72,6 +73,10 @@ class SceneNode(Node):
         self._worker = Worker(self, incidents.report)
         self._announcer: Optional[Announcer] = None
         self._adopted: Optional[scenes.Scene] = None
+        # Numbers of requests to set parameters: answered, and waiting.
+        self._answered = self._waiting = 0
+        # The scene that was passed to the worker last.
+        self._passed: Optional[scenes.Scene] = None
         with self._or_destroyed():
             self._parameters_of_scene = SceneParameters(self, name, self.check, self._changed)
         self._role = name
@@ -92,7 +97,7 @@ class SceneNode(Node):
 
     @property
     def fields(self) -> Mapping[str, scenes.Field]:
-        """Return the Field of each parameter that the node uses, by name."""
+        """Return the Field of each parameter that the node owns, by name."""
         return self._parameters_of_scene.fields
 
     @property
@@ -101,19 +106,18 @@ class SceneNode(Node):
         return self._adopted is self.scene
 
     def begin(self) -> None:
-        """Adopt the first scene; then announce the parameters of several nodes, or follow them."""
+        """Adopt the first scene; then announce the node's parameters, and follow the others."""
         with self._or_destroyed():
             self.check(self.scene)
             prepared = self.prepare(self.scene)
         self._adopt(self.scene, prepared)
-        if self._role == scenes.OWNER:
+        if self.fields:
             self._announcer = Announcer(self)
             self.later([self._announcer.first])
-        else:
-            follower = Follower(self, self._parameters_of_scene)
-            self._parameters_of_scene.owner_of = follower.owner_of
+        if self._role != scenes.OWNER:
+            Follower(self, self._parameters_of_scene)
         self._namesakes = self.create_timer(
-            SECONDS_BETWEEN_CHECKS, self.guarded('a check of names', self._warn_of_namesake),
+            NAMESAKE_CHECK_PERIOD_S, self.guarded('a check of names', self._warn_of_namesake),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def check(self, new: scenes.Scene) -> None:
@@ -145,16 +149,15 @@ class SceneNode(Node):
         return super().declare_parameters(namespace, parameters, ignore_override)
 
     def describe_parameter(self, name: str) -> ParameterDescriptor:
-        """Return a parameter's descriptor, with a slider range around the present value."""
+        """Return a parameter's descriptor, with the range of allowed values."""
         return self._parameters_of_scene.ranged(name, super().describe_parameter(name))
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Callable, **kwargs: Any
                        ) -> Any:
         """Create a service; if its callback raises, the response is a failure with a reason."""
-        if srv_type is SetParameters:
-            callback = partial(self._set_parameters, callback)
-        return super().create_service(
-            srv_type, srv_name, partial(self._respond, callback), **kwargs)
+        respond = {SetParameters: self._set_parameters, SetParametersAtomically:
+                   self._respond_in_turn}.get(srv_type, self._respond)
+        return super().create_service(srv_type, srv_name, partial(respond, callback), **kwargs)
 
     def delete_displayed(self) -> None:
         """Delete the markers that the node has displayed; a subclass overrides it."""
@@ -173,26 +176,48 @@ class SceneNode(Node):
             self.report('a request', error)
             return _refused(response, elided(f'internal error: {error!r}', 299))
 
-    def _set_parameters(self, callback: Callable, request: Any, response: Any) -> Any:
-        """Set valid parameters together; `callback` of rclpy refuses the others one by one."""
-        if len(request.parameters) < 2:
-            return callback(request, response)
-        results = self._parameters_of_scene.set_valid(request.parameters)
-        response.results = [results.get(i) or self._respond(
-            callback, SetParameters.Request(parameters=[one]),
-            SetParameters.Response()).results[0]
-            for i, one in enumerate(request.parameters)]
+    async def _respond_in_turn(self, callback: Callable, request: Any, response: Any) -> Any:
+        """
+        Respond when no other request was answered since the executor's last turn.
+
+        In a turn the executor runs all that is waiting: messages wait for one request at most.
+        """
+        answered, self._waiting = -1, self._waiting + 1
+        while answered != self._answered:
+            answered = self._answered
+            await _turn()
+        self._answered, self._waiting = self._answered + 1, self._waiting - 1
+        response = self._respond(callback, request, response)
+        self._pass_scene()
+        return response
+
+    async def _set_parameters(self, callback: Callable, request: Any, response: Any) -> Any:
+        """Set valid parameters together or, if that is refused, each by `callback` of rclpy."""
+        results = {}
+        if len(request.parameters) > 1:
+            results = await self._respond_in_turn(
+                lambda *_: self._parameters_of_scene.set_together(request.parameters), None, {})
+        for i, one in enumerate(request.parameters):
+            if i not in results:
+                own = await self._respond_in_turn(
+                    callback, SetParameters.Request(parameters=[one]), SetParameters.Response())
+                results[i], = own.results
+        response.results = [results[i] for i in range(len(results))]
         return response
 
     def _changed(self, changed: List[scenes.Parameter]) -> None:
         """Prepare the newest scene, and announce the changed parameters."""
         if type(self).prepare is SceneNode.prepare:
             self._adopt(self.scene, self.scene)
-        else:
-            self._worker.replace('a changed scene', partial(self._prepared, self.scene))
-        self._worker.replace('the ranges of sliders', self._parameters_of_scene.renew_ranges)
+        self._pass_scene()
         if self._announcer:
             self._announcer.announce(changed)
+
+    def _pass_scene(self) -> None:
+        """Pass a changed scene to the worker, unless waiting requests may change it again."""
+        if not (self._waiting or self.is_settled or self._passed is self.scene):
+            self._passed = self.scene
+            self._worker.replace('a changed scene', partial(self._prepared, self.scene))
 
     def _prepared(self, new: scenes.Scene) -> Callable[[], None]:
         """Prepare a scene; return a function that adopts it."""
@@ -223,6 +248,12 @@ class SceneNode(Node):
             raise
 
 
+@types.coroutine
+def _turn() -> Generator[None, None, None]:
+    """Wait until the executor has run all that is waiting."""
+    yield
+
+
 def _refused(response: Any, reason: str) -> Any:
     """Return a service's response to a request that failed."""
     result = SetParametersResult(successful=False, reason=reason)
@@ -250,7 +281,7 @@ def run_together(make: Callable[[], Iterable[Node]], name: str, args: Any = None
 
 def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_class: Any,
          shutdown: ShutdownHandler) -> int:
-    sys.setswitchinterval(SWITCH_INTERVAL)
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         _refuse_arguments(args)
@@ -299,7 +330,7 @@ def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
             executor.add_node(node)
         while rclpy.ok() and not shutdown.is_over:
             try:
-                executor.spin_once(timeout_sec=LONGEST_WAIT)
+                executor.spin_once(timeout_sec=MAX_WAIT_S)
             except ExternalShutdownException:
                 raise
             except Exception as error:

@@ -33,9 +33,9 @@ from ..words import elided, listed, meant, MESSAGE, quoted
 
 # Other callers and messages wait for an answer: most values at once, most of an output that is
 # searched, and the CPU time after which an answer is given up [s], seen after a block of them.
-MOST_VALUES, MOST_SEARCHED, LONGEST, BLOCK = 1_000_000, 10_000, 1.0, 10_000
+MAX_VALUES, MAX_SEARCHED_VALUES, MAX_CPU_TIME_S, BLOCK_SIZE = 1_000_000, 10_000, 1.0, 10_000
 # Maximum number of values, and of letters of allowed names, in a message.
-MOST_NAMED, MOST = 5, 150
+MAX_NAMED_VALUES, MAX_NAMES_LENGTH = 5, 150
 
 
 class ServoInverse(scene_node.SceneNode):
@@ -55,8 +55,8 @@ class ServoInverse(scene_node.SceneNode):
         joint_state_reader.subscribe(self, 'crank_states', self._receive)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
         self.create_service(InputsFor, 'inputs_for', self.answer_inputs_for)
-        self._stream = CommandStream(self, self.scene.machines, lambda machine: present_inputs(
-            machine, self._positions))
+        self._stream = CommandStream(self, self.scene.machines, lambda mechanism: present_inputs(
+            mechanism, self._positions))
         self.begin()
 
     def serves(self) -> str:
@@ -65,15 +65,15 @@ class ServoInverse(scene_node.SceneNode):
 
     def check(self, new: scene.Scene) -> None:
         """Raise SceneError for a length that `kinematics` could not publish."""
-        for machine in new.machines.values():
-            bodies.size(machine)
+        for mechanism in new.machines.values():
+            bodies.size(mechanism)
 
     def adopt(self, new: scene.Scene) -> None:
         """Replace the scene for which requests are answered."""
         self._requests.clear()
         self._stream.adopt(new.machines)
-        self._sources = frozenset(drive.source for machine in new.machines.values()
-                                  for drive in machine.inputs.values())
+        self._sources = frozenset(settings.source for mechanism in new.machines.values()
+                                  for settings in mechanism.inputs.values())
 
     def destroy_node(self) -> None:
         """End the trajectories, and destroy the node."""
@@ -92,11 +92,11 @@ class ServoInverse(scene_node.SceneNode):
             _machine_with_inputs(self.scene, request.mechanism), request, response), response)
 
     def _request(self, key: Tuple[str, str]) -> InverseRequest:
-        machine = _machine(self.scene, *key)
-        if len(machine.inputs) > 1:
-            raise ValueError(f'{machine.name} has several inputs, which one output does not '
+        mechanism = _machine(self.scene, *key)
+        if len(mechanism.inputs) > 1:
+            raise ValueError(f'{mechanism.name} has several inputs, which one output does not '
                              'determine; call the service inputs_for')
-        return InverseRequest(machine, [key[1]])
+        return InverseRequest(mechanism, [key[1]])
 
     def _filled(self, fill: Callable[[], None], response: Any) -> Any:
         response.success = False
@@ -133,7 +133,7 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     n = len(values)
     if not n:
         raise ValueError('lever_angle is empty; give at least one value')
-    most = MOST_VALUES if inverse.is_closed else MOST_SEARCHED
+    most = MAX_VALUES if inverse.is_closed else MAX_SEARCHED_VALUES
     if n > most:
         searched = '' if inverse.is_closed else f', since {listed(inverse.outputs)} is searched'
         raise ValueError(f'lever_angle has {n} values; give up to {most} at once{searched}')
@@ -168,11 +168,11 @@ def _many(inverse: InverseRequest, values: np.ndarray, near: Any
     """Return positions and rates for many values; raise ValueError if that takes too long."""
     each, start = np.size(near) == len(values), time.thread_time()
     positions, rates = np.empty((2, len(values)))
-    for at in range(0, len(values), BLOCK):
-        if at and time.thread_time() > start + LONGEST:
-            raise ValueError(f'after {LONGEST:g} s only {at} of the {len(values)} values in '
-                             f'lever_angle are solved; give up to {at} at once')
-        some = slice(at, at + BLOCK)
+    for at in range(0, len(values), BLOCK_SIZE):
+        if at and time.thread_time() > start + MAX_CPU_TIME_S:
+            raise ValueError(f'after {MAX_CPU_TIME_S:g} s only {at} of the {len(values)} values '
+                             f'in lever_angle are solved; give up to {at} at once')
+        some = slice(at, at + BLOCK_SIZE)
         beside = near[some] if each else near
         (positions[some],), (rates[some],) = inverse.positions(
             [values[some]], None if beside is None else [beside])
@@ -182,20 +182,20 @@ def _many(inverse: InverseRequest, values: np.ndarray, near: Any
     return positions, rates
 
 
-def solve_inputs_for(machine: scene.SceneMechanism, request: Any, response: Any) -> None:
+def solve_inputs_for(mechanism: scene.SceneMechanism, request: Any, response: Any) -> None:
     """Answer a request for several outputs; raise ValueError if it cannot be answered."""
-    values, near, n = request.values, request.near, len(machine.inputs)
+    values, near, n = request.values, request.near, len(mechanism.inputs)
     if len(request.outputs) != n:
-        raise ValueError(f'{machine.name} has {n} inputs: as many outputs are needed, not '
+        raise ValueError(f'{mechanism.name} has {n} inputs: as many outputs are needed, not '
                          f'{len(request.outputs)}')
-    inverse = InverseRequest(machine, request.outputs)
+    inverse = InverseRequest(mechanism, request.outputs)
     if len(values) != n or len(near) not in (0, n):
         raise ValueError(f'values must have {n} numbers and near as many or none, not '
                          f'{len(values)} and {len(near)}')
     if not all(-scene.FARTHEST <= position <= scene.FARTHEST for position in near):
         raise ValueError(f'near must be finite and within {scene.FARTHEST:g} of zero')
     answers = inverse.answers(values, inverse.inputs_of(near) if near else None)
-    response.names = [drive.source for drive in machine.inputs.values()]
+    response.names = [settings.source for settings in mechanism.inputs.values()]
     response.positions = [position for answer in answers
                           for position in inverse.positions_of(answer.inputs)]
     response.modes = [answer.mode for answer in answers]
@@ -206,22 +206,23 @@ def solve_inputs_for(machine: scene.SceneMechanism, request: Any, response: Any)
 
 def _machine(scene_: scene.Scene, name: str, output: str) -> scene.SceneMechanism:
     """Return a mechanism by its name, or the only one, or for a lever the only slotted lever."""
-    levers = {key: machine for key, machine in scene_.machines.items()
-              if machine.linkage.type == 'slotted_lever'}
-    machines: Mapping[str, scene.SceneMechanism] = scene_.machines if output else levers
-    if name in machines:
-        return machines[name]
+    levers = {key: mechanism for key, mechanism in scene_.machines.items()
+              if mechanism.linkage.type == 'slotted_lever'}
+    mechanisms: Mapping[str, scene.SceneMechanism] = scene_.machines if output else levers
+    if name in mechanisms:
+        return mechanisms[name]
     if not name:
-        for only in (machines, levers if output in ('', LEVER) else {}):
+        for only in (mechanisms, levers if output in ('', LEVER) else {}):
             if len(only) == 1:
                 return next(iter(only.values()))
-    allowed = listed(machines, MOST) if machines else 'none: the scene has no slotted_lever'
+    allowed = (listed(mechanisms, MAX_NAMES_LENGTH) if mechanisms
+               else 'none: the scene has no slotted_lever')
     if name in scene_.machines:
         raise ValueError(f'{name} is a {scene_.machines[name].linkage.type}, not a slotted lever; '
                          f'name an output, or use one of: {allowed}')
     if name:
         raise ValueError(f'there is no mechanism {quoted(name)}; allowed: {allowed}'
-                         f'{meant(name, machines)}')
+                         f'{meant(name, mechanisms)}')
     what = '' if output else ' slotted lever'
     raise ValueError(f'mechanism may be empty only if the scene has a single{what or " one"}; '
                      f'allowed: {allowed}')
@@ -229,20 +230,21 @@ def _machine(scene_: scene.Scene, name: str, output: str) -> scene.SceneMechanis
 
 def _machine_with_inputs(scene_: scene.Scene, name: str) -> scene.SceneMechanism:
     """Return a mechanism by its name, or the only one with several inputs."""
-    able = {key: machine for key, machine in scene_.machines.items() if len(machine.inputs) > 1}
-    found = scene_.machines.get(name) or (
-        next(iter(able.values())) if not name and len(able) == 1 else None)
-    if found is None:
-        raise ValueError(f'mechanism must be one of {listed(scene_.machines, MOST)}, or empty '
-                         f'if a single one has several inputs, not {quoted(name)}'
-                         f'{meant(name, scene_.machines)}')
-    return found
+    mechanisms = scene_.machines
+    several = [mechanism for mechanism in mechanisms.values() if len(mechanism.inputs) > 1]
+    if name in mechanisms:
+        return mechanisms[name]
+    if name or len(several) != 1:
+        raise ValueError(f'mechanism must be one of {listed(mechanisms, MAX_NAMES_LENGTH)}, or '
+                         f'empty if a single one has several inputs, not {quoted(name)}'
+                         f'{meant(name, mechanisms)}')
+    return several[0]
 
 
 def _unreachable(inverse: InverseRequest, values: Sequence[float]) -> str:
     """Return a message with unreachable values, and the reason for the first finite one."""
-    named = ', '.join(f'{value:.6g}' for value in values[:MOST_NAMED])
-    more = f' and {len(values) - MOST_NAMED} more' if len(values) > MOST_NAMED else ''
+    named = ', '.join(f'{value:.6g}' for value in values[:MAX_NAMED_VALUES])
+    more = f' and {len(values) - MAX_NAMED_VALUES} more' if len(values) > MAX_NAMED_VALUES else ''
     first = next(filter(math.isfinite, values), math.nan)
     return f'{inverse.quantity} {named}{more} cannot be reached; {inverse.reason(first)}'
 

@@ -20,7 +20,7 @@ from threading import Event, Thread
 from typing import Any, Callable
 
 # Time from a signal to the forced end of the process [s].
-TIMEOUT = 0.6
+TIMEOUT_S = 0.6
 
 
 def run(main: Callable[[], int]) -> None:
@@ -41,7 +41,7 @@ class ShutdownHandler:
     A context that handles SIGINT and SIGTERM in a thread, so that no callback is interrupted.
 
     The first signal sets `is_over` and calls `wake`, which is to stop rclpy's executor. If the
-    context is not left within TIMEOUT, `before_exit` is called, and the process ends with exit
+    context is not left within TIMEOUT_S, `before_exit` is called, and the process ends with exit
     code 0.
     """
 
@@ -75,7 +75,7 @@ class ShutdownHandler:
                 return
             self.is_over = True
             self.wake()
-            if not self._left.wait(TIMEOUT):
+            if not self._left.wait(TIMEOUT_S):
                 self.before_exit()
                 sys.stdout.flush()
                 sys.stderr.flush()

@@ -20,7 +20,7 @@ from threading import Lock
 from typing import Any, Callable, Deque, Dict, Iterable, Optional
 
 # Longest wait for the worker when a node ends [s].
-TIMEOUT = 0.1
+TIMEOUT_S = 0.1
 
 # Kind of the jobs from `add`, for error messages.
 OTHER = 'a latched message'
@@ -60,13 +60,13 @@ class Worker:
         return kind not in self._newest and not self._has_ended
 
     def end(self) -> None:
-        """Drop the queued jobs, and wait up to TIMEOUT for the running one."""
+        """Drop the queued jobs, and wait up to TIMEOUT_S for the running one."""
         with self._lock:
             is_first, self._has_ended = not self._has_ended, True
         if is_first:
             last = self._thread.submit(lambda: None)
             self._thread.shutdown(wait=False)
-            wait([last], TIMEOUT)
+            wait([last], TIMEOUT_S)
 
     def _run_next(self) -> None:
         with self._lock:

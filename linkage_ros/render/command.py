@@ -43,65 +43,68 @@ def main(args=None) -> int:
 
 
 def _draw(args):
-    asked = parsed(args)
-    draw(asked, chosen(scene.load(asked.scene).machines, asked.mechanisms))
+    arguments = parsed(args)
+    draw(arguments, chosen(scene.load(arguments.scene).machines, arguments.mechanisms))
 
 
 def parsed(args):
     """Return the options of the command line; raise RequestError if they are invalid."""
-    asked = parser().parse_args(args)
-    ending = asked.out.suffix.lower()
+    arguments = parser().parse_args(args)
+    ending = arguments.out.suffix.lower()
     if ending not in STILL + MOVING:
-        raise RequestError(f'--out must end in {", ".join(STILL + MOVING)}, not {asked.out}')
-    asked.moving = ending in MOVING
-    for option in ('angle',) if asked.moving else ('turns', 'fps', 'frames', 'loop', 'colours'):
-        if getattr(asked, option) is not None:
-            allowed = ' and '.join(STILL if asked.moving else MOVING)
+        raise RequestError(f'--out must end in {", ".join(STILL + MOVING)}, not {arguments.out}')
+    arguments.moving = ending in MOVING
+    for option in ('angle',) if arguments.moving else (
+            'turns', 'fps', 'frames', 'loop', 'colours'):
+        if getattr(arguments, option) is not None:
+            allowed = ' and '.join(STILL if arguments.moving else MOVING)
             raise RequestError(f'--{option} is for {allowed} only, not for {ending}')
     if ending == '.mp4':
-        check_mp4(asked)
-    if ending == '.gif' and (asked.fps or FPS) > FASTEST_GIF:
-        raise RequestError(f'--fps must be at most {FASTEST_GIF:g} for .gif, not {asked.fps:g}')
-    for file in filter(None, (asked.out, asked.data)):
+        check_mp4(arguments)
+    if ending == '.gif' and (arguments.fps or FPS) > FASTEST_GIF:
+        raise RequestError(
+            f'--fps must be at most {FASTEST_GIF:g} for .gif, not {arguments.fps:g}')
+    for file in filter(None, (arguments.out, arguments.data)):
         if not file.absolute().parent.is_dir():
             raise RequestError(f'{file} cannot be written: there is no folder {file.parent}')
-    return asked
+    return arguments
 
 
-def check_mp4(asked):
+def check_mp4(arguments):
     """Raise RequestError if MP4 is not available."""
     for option in ('loop', 'colours'):
-        if getattr(asked, option) is not None:
+        if getattr(arguments, option) is not None:
             raise RequestError(f'--{option} is for .gif only, not for .mp4')
-    if any(side % 2 for side in asked.size):
+    if any(side % 2 for side in arguments.size):
         raise RequestError('--size must be two even numbers for .mp4')
     if not shutil.which('ffmpeg'):
         raise RequestError('ffmpeg, which writes .mp4, is not installed: apt install ffmpeg, or '
                            'choose .gif')
 
 
-def draw(asked, machines):
+def draw(arguments, mechanisms):
     """Write the files."""
     with needs('matplotlib'):
         from matplotlib import style
 
         from .picture import Picture, PictureError
 
-    for machine in machines:
-        if machine.in_space:
-            raise RequestError(f'{machine.name} is {IN_SPACE}')
-    default = parts.DEFAULT_IN_MOTION if asked.moving else parts.DEFAULT
+    for mechanism in mechanisms:
+        if mechanism.in_space:
+            raise RequestError(f'{mechanism.name} is {IN_SPACE}')
+    default = parts.DEFAULT_IN_MOTION if arguments.moving else parts.DEFAULT
     with style.context('default', after_reset=True):
-        picture = Picture(machines, asked.size, asked.trace, (default | asked.show) - asked.hide)
-        times = moments(asked, picture)
+        picture = Picture(mechanisms, arguments.size, arguments.trace,
+                          (default | arguments.show) - arguments.hide)
+        times = moments(arguments, picture)
         try:
             picture.arrange(times)
         except PictureError as error:
             raise RequestError(error) from None
-        write(asked, picture, times)
+        write(arguments, picture, times)
 
 
-def write(asked, picture, times):
+def write(arguments, picture, times):
     """Write the picture and, on request, the data."""
     with needs('tqdm'):
         from tqdm import tqdm
@@ -109,35 +112,35 @@ def write(asked, picture, times):
         from . import files
 
     def progress(times):
-        return tqdm(times, asked.out.name, unit='frame', disable=None)
+        return tqdm(times, arguments.out.name, unit='frame', disable=None)
 
-    fps = asked.fps or FPS
-    if asked.out.suffix.lower() == '.gif':
-        colours = asked.colours or MOST_COLOURS
-        files.gif(picture, times, fps, asked.loop or 0, colours, asked.out, progress)
-    elif asked.moving:
-        files.mp4(picture, times, fps, asked.out, progress)
+    fps = arguments.fps or FPS
+    if arguments.out.suffix.lower() == '.gif':
+        colours = arguments.colours or MOST_COLOURS
+        files.gif(picture, times, fps, arguments.loop or 0, colours, arguments.out, progress)
+    elif arguments.moving:
+        files.mp4(picture, times, fps, arguments.out, progress)
     else:
-        files.still(picture, times[0], asked.out)
-    if asked.data:
-        files.data(picture, times, asked.data)
+        files.still(picture, times[0], arguments.out)
+    if arguments.data:
+        files.data(picture, times, arguments.data)
 
 
-def moments(asked, picture):
+def moments(arguments, picture):
     """Return the times to draw [turns of the first input]."""
     first = picture.panels[0]
     wheel = first.cycle.first
-    if not asked.moving:
-        if asked.angle is None:
+    if not arguments.moving:
+        if arguments.angle is None:
             return [0.0]
         if not wheel.input.turns:
-            raise RequestError(f'--angle is for a crank: {first.machine.name} is driven by a '
+            raise RequestError(f'--angle is for a crank: {first.mechanism.name} is driven by a '
                                'length; it is drawn at its start')
-        return [wheel.turns_to(math.radians(asked.angle))]
+        return [wheel.turns_to(math.radians(arguments.angle))]
     if not math.isfinite(picture.period):
-        raise RequestError(f'{first.machine.name}.{wheel.input.name}.speed is 0: nothing moves')
-    turns = asked.turns or 1.0
-    frames = asked.frames or max(round(turns * picture.period * (asked.fps or FPS)), 1)
+        raise RequestError(f'{first.mechanism.name}.{wheel.input.name}.speed is 0: nothing moves')
+    turns = arguments.turns or 1.0
+    frames = arguments.frames or max(round(turns * picture.period * (arguments.fps or FPS)), 1)
     if frames > MOST_FRAMES:
         raise RequestError(f'this would be {frames} frames, more than {MOST_FRAMES}: choose '
                            'fewer with --frames, --turns or --fps')

@@ -97,12 +97,12 @@ class Cycle:
 
     """
 
-    def __init__(self, machine: SceneMechanism):
-        assembly = machine.assembly()
-        sliding = drawn(machine, machine.points)
-        self._solution = assembly.solution((*machine.linkage.points, *(
+    def __init__(self, mechanism: SceneMechanism):
+        assembly = mechanism.assembly()
+        sliding = drawn(mechanism, mechanism.points)
+        self._solution = assembly.solution((*mechanism.linkage.points, *(
             end for shape in sliding for end in (shape.start, shape.end))))
-        self._wheels = [Wheel(drive) for drive in machine.inputs.values()]
+        self._wheels = [Wheel(drive) for drive in mechanism.inputs.values()]
         self.first = self._wheels[0]
         self.period = self.first.period
         self._ratios = [1.0, *(turn_ratio(self.period, wheel.period)
@@ -128,16 +128,16 @@ class Cycle:
         before = self.course[samples % (len(self.course) - 1), :, joint]
         return np.concatenate([before, self.pose(end).places[None, :, joint]])
 
-    def locus(self, machine: SceneMechanism) -> np.ndarray:
+    def locus(self, mechanism: SceneMechanism) -> np.ndarray:
         """
         Return the whole curve of the first leg's tracer [m], shape (n, 2).
 
         It is empty if several inputs never return to their starts together.
         """
-        curve = self._locus(machine.tracer)
+        curve = self._locus(mechanism.tracer)
         if len(curve) or self.turns == MOST_TURNS:
             return curve
-        return self.course[:, 0, machine.linkage.points.index(machine.tracer)]
+        return self.course[:, 0, mechanism.linkage.points.index(mechanism.tracer)]
 
 
 def turn_ratio(period: float, other: float) -> float:

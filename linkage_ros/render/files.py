@@ -12,7 +12,6 @@
 
 from contextlib import contextmanager
 import csv
-import math
 from pathlib import Path
 import subprocess
 import tempfile
@@ -22,13 +21,14 @@ import numpy as np
 from PIL import Image
 
 PALETTE_FRAMES = 8
-FREQUENT = 0.3  # of a GIF's colours: the most frequent ones
+# Pillow looks colours up in a palette by their upper six bits: white would become another grey.
+SIX_BITS = 0b11111100
 FINEST = 100  # the unit of time in a GIF is a hundredth of a second
 
 # Fonts as outlines, and names from a fixed salt: an SVG that is the same everywhere.
 SVG = {'svg.hashsalt': 'linkage_ros', 'svg.fonttype': 'path'}
 
-# Options of ffmpeg for files without time, place and machine.
+# Options of ffmpeg for files without time, place and mechanism.
 REPRODUCIBLE = ('-threads', '1', '-fflags', '+bitexact', '-flags:v', '+bitexact',
                 '-map_metadata', '-1')
 
@@ -64,52 +64,24 @@ def gif(picture, times, fps, loop, colours, file: Path, progress):
         Yields the times one by one.
 
     """
+    def reduced(pixels):
+        return Image.fromarray(pixels & SIX_BITS)
+
     sample = [picture.at(turns) for turns in times[::-(-len(times) // PALETTE_FRAMES)]]
-    palette = Palette(np.stack(sample), colours)
-    frames = [palette.reduced(picture.at(turns)) for turns in progress(times)]
+    palette = reduced(np.concatenate(sample)).quantize(
+        colours, Image.Quantize.MAXCOVERAGE, kmeans=1)
+    # White is 255 again.
+    shown = [255 * value // SIX_BITS for value in palette.getpalette()]
+    frames = []
+    for turns in progress(times):
+        frame = reduced(picture.at(turns)).quantize(palette=palette, dither=Image.Dither.NONE)
+        frame.putpalette(shown)
+        frames.append(frame)
     ends = [round(FINEST * k / fps) for k in range(len(frames) + 1)]
     repeats = {} if loop == 1 else {'loop': max(loop - 1, 0)}
     with replacing(file) as new:
         frames[0].save(new, 'GIF', save_all=True, append_images=frames[1:],
                        duration=[1000 // FINEST * int(d) for d in np.diff(ends)], **repeats)
-
-
-class Palette:
-    """The colours of a GIF: the most frequent, and those farthest from all chosen before."""
-
-    def __init__(self, pixels, count):
-        colours, counts = np.unique(packed(pixels), return_counts=True)
-        colours = unpacked(colours[np.argsort(-counts, kind='stable')]).astype(int)
-        chosen = list(colours[:math.ceil(FREQUENT * count)])
-        apart = np.min([squares(colours - colour) for colour in chosen], axis=0)
-        while len(chosen) < count and apart.any():
-            chosen.append(colours[apart.argmax()])
-            apart = np.minimum(apart, squares(colours - chosen[-1]))
-        self._colours = np.array(chosen)
-
-    def reduced(self, pixels):
-        """Return an image whose pixels have the nearest colours of the palette."""
-        colours, places = np.unique(packed(pixels), return_inverse=True)
-        apart = squares(unpacked(colours)[:, None].astype(int) - self._colours)
-        nearest = np.argmin(apart, axis=1).astype(np.uint8)
-        image = Image.fromarray(nearest[places].reshape(pixels.shape[:2]))
-        image.putpalette(self._colours.ravel().tolist())
-        return image
-
-
-def squares(differences):
-    """Return the squared lengths of vectors (..., 3)."""
-    return (differences * differences).sum(axis=-1)
-
-
-def packed(pixels):
-    """Return colours (..., 3), 8 bits each, as one number each."""
-    return pixels.astype(np.int64) @ (1 << 16, 1 << 8, 1)
-
-
-def unpacked(colours):
-    """Return numbers as colours (..., 3), 8 bits each."""
-    return (colours[..., None] >> np.array([16, 8, 0]) & 255).astype(np.uint8)
 
 
 def mp4(picture, times, fps, file: Path, progress):

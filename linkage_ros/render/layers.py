@@ -48,17 +48,17 @@ def whiter(colour, part: float):
 class Trace:
     """The curve of the tracer: whole, growing, fading, or the part that a foot stands on."""
 
-    def __init__(self, axes, machine, cycle, kind, unit):
+    def __init__(self, axes, mechanism, cycle, kind, unit):
         self._cycle, self._kind = cycle, kind
-        self._tracer = machine.linkage.points.index(machine.tracer)
+        self._tracer = mechanism.linkage.points.index(mechanism.tracer)
         self.artists = []
         if kind in ('growing', 'fading'):
             lines = LineCollection([], lw=3 * unit, color=LOCUS, zorder=2, animated=True)
             axes.add_collection(lines, autolim=False)
             self.artists = [lines]
         elif kind != 'none':
-            curve = cycle.locus(machine)
-            for side in (1.0, -1.0)[:1 + machine.mirrored] if len(curve) else ():
+            curve = cycle.locus(mechanism)
+            for side in (1.0, -1.0)[:1 + mechanism.mirrored] if len(curve) else ():
                 self._add_still(axes, curve * (side, 1.0), unit)
 
     def _add_still(self, axes, curve, unit):
@@ -93,9 +93,9 @@ def standing(curve):
     return np.roll(curve[:-1], -start, axis=0)[:length]
 
 
-def guides(axes, machine, cycle, unit):
+def guides(axes, mechanism, cycle, unit):
     """Draw the crank circle, a straight traced line, and guides on the ground."""
-    linkage = machine.linkage
+    linkage = mechanism.linkage
     first_leg = cycle.course[:, 0]
     dashed = {'color': GREY, 'lw': 1.6 * unit, 'ls': (0, (6, 4)), 'zorder': 1}
     around = np.exp(1j * np.linspace(0.0, math.tau, 361))
@@ -103,20 +103,20 @@ def guides(axes, machine, cycle, unit):
         centre, pin = (first_leg[0, linkage.points.index(name)] for name in bar)
         circle = centre @ (1, 1j) + around * math.dist(centre, pin)
         axes.plot(circle.real, circle.imag, **dashed)
-    line = straight(cycle.locus(machine))
+    line = straight(cycle.locus(mechanism))
     if line is not None:
         axes.axline(*line, **dashed)
-    for shape, ends in sliding(machine):
+    for shape, ends in sliding(mechanism):
         if shape.kind == shapes.GUIDE and shape.is_fixed:
-            for track in cycle.course[0, :1 + machine.mirrored, ends]:
+            for track in cycle.course[0, :1 + mechanism.mirrored, ends]:
                 axes.plot(*track.T, color=TRACK, lw=8 * unit, zorder=1, solid_capstyle='round')
 
 
-def sliding(machine):
+def sliding(mechanism):
     """Return the slides, and the indices of their ends after those of the joints."""
-    first = len(machine.linkage.points)
+    first = len(mechanism.linkage.points)
     return [(shape, slice(first + 2 * k, first + 2 * k + 2))
-            for k, shape in enumerate(shapes.drawn(machine, machine.points))]
+            for k, shape in enumerate(shapes.drawn(mechanism, mechanism.points))]
 
 
 def straight(curve):
@@ -141,9 +141,9 @@ def around(frame):
 class Legs:
     """The links and joints; each pair of legs is paler than the one before."""
 
-    def __init__(self, axes, machine, cycle, parts, unit):
-        linkage = machine.linkage
-        index = {name: linkage.points.index(name) for name in machine.points}
+    def __init__(self, axes, mechanism, cycle, parts, unit):
+        linkage = mechanism.linkage
+        index = {name: linkage.points.index(name) for name in mechanism.points}
         turning = shapes.cranks(linkage)
         bars = [bar for bar in linkage.bars if bar not in turning]
         lines = {'bars': bars, 'rods': linkage.cylinders, 'cranks': turning}
@@ -154,20 +154,20 @@ class Legs:
                         for frame in linkage.frames.values()
                         if len(frame) > 2 and set(frame) <= set(index)]
         self._joints = np.array(list(index.values()))
-        self._tracer = linkage.points.index(machine.tracer)
+        self._tracer = linkage.points.index(mechanism.tracer)
         self._fixed = fixed(cycle.course)[self._joints]
         inputs = {input_.name for input_ in linkage.inputs}
         self._pieces: dict = {'slots': [], 'bodies': [], 'driven': []}
-        for shape, ends in sliding(machine):
+        for shape, ends in sliding(mechanism):
             if shape.kind != shapes.GUIDE:
                 self._pieces['driven' if shape.slide.name in inputs else 'bodies'].append(ends)
             elif not shape.is_fixed:
                 self._pieces['slots'].append(ends)
         self.legs = []
-        sides = 1 + machine.mirrored
+        sides = 1 + mechanism.mirrored
         thin = unit * (1.0 if len(cycle.prefixes) == 1 else 0.7)
         for leg in reversed(range(len(cycle.prefixes))):
-            white = WHITENED * (leg // sides) / machine.leg_pairs
+            white = WHITENED * (leg // sides) / mechanism.leg_pairs
             self.legs.append((leg, self._artists(axes, parts, white, thin)))
         self.artists = sorted((artist for _, artists in self.legs for artist in artists.values()),
                               key=lambda artist: artist.get_zorder())
@@ -237,8 +237,8 @@ class Floor:
 
     MARKS = 9  # per turn
 
-    def __init__(self, axes, machine, cycle, unit):
-        tracer = machine.linkage.points.index(machine.tracer)
+    def __init__(self, axes, mechanism, cycle, unit):
+        tracer = mechanism.linkage.points.index(mechanism.tracer)
         feet = cycle.course[:, :, tracer]
         lowest = np.nan_to_num(feet[:-1, :, 1], nan=np.inf).argmin(axis=1)
         steps = np.diff(feet[:, :, 0], axis=0)[np.arange(len(lowest)), lowest]
@@ -271,18 +271,18 @@ class Floor:
 class Headline:
     """Above the axes: the name, the dimensions, the inputs, and a lever's angle."""
 
-    def __init__(self, axes, machine, parts, unit, single):
-        self._linkage = machine.linkage
+    def __init__(self, axes, mechanism, parts, unit, single):
+        self._linkage = mechanism.linkage
         self._short = not single or unit < 0.6
         size = 5 + 10 * unit if single else 11.5
-        fixed_lines = [] if single else [machine.name.replace('_', ' ')]
+        fixed_lines = [] if single else [mechanism.name.replace('_', ' ')]
         if 'dimensions' in parts:
             sizes = self._linkage.dimensions.items()
             words = ',  '.join(f'{name}\u00a0=\u00a0{value:g}' for name, value in sizes)
             fixed_lines += textwrap.wrap(words, 60 if single else 28)
         self.artists = []
         if 'title' in parts:
-            count = len(readings(self._linkage, [1.0] * len(machine.inputs), self._short))
+            count = len(readings(self._linkage, [1.0] * len(mechanism.inputs), self._short))
             across = min(count, 4 - 2 * self._short)
             rows = math.ceil(count / across)
             fixed_lines += [' '] * rows
@@ -328,10 +328,10 @@ class Names:
 
     DIRECTIONS = np.exp(1j * np.linspace(0.0, math.tau, 24, endpoint=False))
 
-    def __init__(self, axes, machine, cycle, unit):
-        linkage = machine.linkage
+    def __init__(self, axes, mechanism, cycle, unit):
+        linkage = mechanism.linkage
         self._axes = axes
-        self._index = [linkage.points.index(name) for name in machine.points]
+        self._index = [linkage.points.index(name) for name in mechanism.points]
         lines = *linkage.bars, *((link.joint, link.tip) for link in linkage.links)
         self._bars = np.array([[linkage.points.index(name) for name in line] for line in lines])
         self._fixed = np.flatnonzero(fixed(cycle.course))
@@ -339,15 +339,15 @@ class Names:
         in_slots = {link.tip for link in linkage.links if link.kind == 'prismatic'}
         distance = axes.figure.dpi / 72 * (5 + 8 * unit)
         self._distances = [distance * (1.4 if name in in_slots else 1.0)
-                           for name in machine.points]
+                           for name in mechanism.points]
         size = 8 + 6 * unit
         # Half of the difference between the widths of a name and of one letter [pixels].
         self._wider = [0.25 * size * (len(name) - 1) * axes.figure.dpi / 72
-                       for name in machine.points]
+                       for name in mechanism.points]
         self.artists = [axes.annotate(
             name, (0.0, 0.0), (0.0, 0.0), textcoords='offset points', fontsize=size,
             ha='center', va='center', zorder=100, animated=True, path_effects=HALO,
-            annotation_clip=False, in_layout=False) for name in machine.points]
+            annotation_clip=False, in_layout=False) for name in mechanism.points]
 
     def settle(self, poses):
         """Choose each name's place beside its joint, for poses of shape (n, legs, joints, 2)."""

@@ -39,8 +39,8 @@ class Picture:
 
     Parameters
     ----------
-    machines : sequence of SceneMechanism
-        The machines.
+    mechanisms : sequence of SceneMechanism
+        The mechanisms.
     size : (int, int)
         Width and height in pixels.
     trace : str
@@ -48,25 +48,25 @@ class Picture:
     parts : collection of str
         Some of parts.PARTS.
     motions : sequence, optional
-        The motion of each machine, by default its Cycle: objects with a cycle's `period`,
+        The motion of each mechanism, by default its Cycle: objects with a cycle's `period`,
         `prefixes`, `course`, `pose`, `curve` and `locus`.
 
     """
 
-    def __init__(self, machines, size=(720, 720), trace='whole', parts=DEFAULT, motions=None):
+    def __init__(self, mechanisms, size=(720, 720), trace='whole', parts=DEFAULT, motions=None):
         width, height = size
         self.figure = Figure((width / DOTS_PER_INCH, height / DOTS_PER_INCH), DOTS_PER_INCH,
                              layout='constrained', facecolor='white')
         self.figure.get_layout_engine().set(w_pad=PADDING, h_pad=PADDING)
         self._canvas = FigureCanvasAgg(self.figure)
-        count = len(machines)
+        count = len(mechanisms)
         columns = min(max(round(math.sqrt(count * width / height)), 1), count)
         rows = math.ceil(count / columns)
         unit = min(max(min(width / columns, height / rows) / 720, 0.4), 2.0)
         axes = self.figure.subplots(rows, columns, squeeze=False).flat
-        self.panels = [Panel(one, machine, motion, trace, parts, unit, count == 1)
-                       for one, machine, motion in zip(
-                           axes, machines, motions or map(Cycle, machines))]
+        self.panels = [Panel(one, mechanism, motion, trace, parts, unit, count == 1)
+                       for one, mechanism, motion in zip(
+                           axes, mechanisms, motions or map(Cycle, mechanisms))]
         for unused in axes[count:]:
             unused.remove()
         self.period = self.panels[0].cycle.period
@@ -127,30 +127,30 @@ class Picture:
 class Panel:
     """One mechanism on its axes."""
 
-    def __init__(self, axes, machine, cycle, trace, parts, unit, single):
-        self.machine, self.cycle = machine, cycle
+    def __init__(self, axes, mechanism, cycle, trace, parts, unit, single):
+        self.mechanism, self.cycle = mechanism, cycle
         self._axes = axes
         self._margin = 14 + 30 * unit  # pixels, for pivots, slots and names
-        self._joints = [machine.linkage.points.index(name) for name in machine.points]
-        moving: list = [layers.Trace(axes, machine, self.cycle, trace, unit)]
+        self._joints = [mechanism.linkage.points.index(name) for name in mechanism.points]
+        moving: list = [layers.Trace(axes, mechanism, self.cycle, trace, unit)]
         if 'floor' in parts:
-            moving.append(layers.Floor(axes, machine, self.cycle, unit))
+            moving.append(layers.Floor(axes, mechanism, self.cycle, unit))
         if 'guides' in parts:
-            layers.guides(axes, machine, self.cycle, unit)
-        moving.append(layers.Legs(axes, machine, self.cycle, parts, unit))
+            layers.guides(axes, mechanism, self.cycle, unit)
+        moving.append(layers.Legs(axes, mechanism, self.cycle, parts, unit))
         self._names = None
         if 'labels' in parts and len(self.cycle.prefixes) == 1:
-            self._names = layers.Names(axes, machine, self.cycle, unit)
+            self._names = layers.Names(axes, mechanism, self.cycle, unit)
             moving.append(self._names)
         if parts & {'title', 'dimensions'}:
-            moving.append(layers.Headline(axes, machine, parts, unit, single))
+            moving.append(layers.Headline(axes, mechanism, parts, unit, single))
         self.moving = moving
         self._extent = self._drawn()
         self._dress('axes' in parts, unit)
 
     def _drawn(self):
         """Return the lowest and the highest x and y drawn in a turn [m]."""
-        course, joints = self.cycle.course, len(self.machine.linkage.points)
+        course, joints = self.cycle.course, len(self.mechanism.linkage.points)
         places = [course[:, :, self._joints].reshape(-1, 2), course[:, :, joints:].reshape(-1, 2)]
         places += [line.get_xydata() for line in self._axes.lines if len(line.get_xdata()) > 2]
         drawn = np.concatenate(places)
@@ -200,10 +200,10 @@ class Panel:
 
     def columns(self):
         """Return the names of the `values`."""
-        name = self.machine.name
+        name = self.mechanism.name
         joints = [f'{leg}{joint}_{axis}' for leg in self.cycle.prefixes
-                  for joint in self.machine.points for axis in 'xy']
-        return [f'{name}_{part}' for part in (*self.machine.inputs, *joints)]
+                  for joint in self.mechanism.points for axis in 'xy']
+        return [f'{name}_{part}' for part in (*self.mechanism.inputs, *joints)]
 
     def values(self):
         """Return the shown inputs [rad or m] and joints [m]."""

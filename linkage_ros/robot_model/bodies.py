@@ -288,11 +288,7 @@ def _robot(machine: SceneMechanism, frame_id: str, width: Optional[float]) -> Ro
     bodies = list(_Tree(machine, width).bodies(frame_id))
     made = Robot(machine.name, frame_id, [Part(bodies, machine)])
     made.check_names(f'{machine.name}.joints')
-    for value in _numbers(made):
-        if not abs(value) <= LARGEST:
-            raise SceneError(f'{machine.name}.pose, {machine.name}.scale and {machine.name}'
-                             f'.dimensions must keep everything within {LARGEST:g} m, not at '
-                             f'{value:g}')
+    _check_places(machine, _numbers(made))
     return made
 
 
@@ -312,6 +308,20 @@ def size(machine: SceneMechanism) -> float:
             f'{machine.name}.scale and {machine.name}.dimensions must make the longest bar from '
             f'{SMALLEST:g} to {LARGEST:g} m long, not {length:g}')
     return length
+
+
+def check_range(machine: SceneMechanism) -> None:
+    """Raise SceneError if the longest bar or the pose is out of range."""
+    size(machine)
+    _check_places(machine, machine.pose)
+
+
+def _check_places(machine: SceneMechanism, numbers: Iterable[float]) -> None:
+    for value in numbers:
+        if not abs(value) <= LARGEST:
+            raise SceneError(f'{machine.name}.pose, {machine.name}.scale and {machine.name}'
+                             f'.dimensions must keep everything within {LARGEST:g} m, not at '
+                             f'{value:g}')
 
 
 class _Tree:

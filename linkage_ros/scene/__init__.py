@@ -43,9 +43,9 @@ from .scene_mechanism import FRAME, FRAME_NAME, FRAME_RULE, read_machine, SceneM
 from .. import mechanisms
 from ..words import plain_text, quoted
 
-__all__ = ['changed', 'InputSettings', 'DRIVER', 'FARTHEST', 'in_words', 'INVERSE', 'KINEMATICS',
-           'load', 'SceneMechanism', 'OWNER', 'Parameter', 'plain', 'read', 'Scene', 'SceneError',
-           'START']
+__all__ = ['changed', 'InputSettings', 'DRIVER', 'FARTHEST', 'Field', 'in_words', 'INVERSE',
+           'KINEMATICS', 'load', 'SceneMechanism', 'OWNER', 'Parameter', 'plain', 'read', 'Scene',
+           'SceneError', 'START']
 
 _NAME = re.compile(r'(?=.{1,64}$)[A-Za-z](_?[A-Za-z0-9])*')
 
@@ -59,7 +59,8 @@ FRAME_ID = Field('string', 'Frame of the poses.', readers=(KINEMATICS,),
 FRAME_PREFIX = Field(
     'string', 'Prefix of the frames of markers and loci, as in robot_state_publisher.',
     readers=(KINEMATICS,), rule=FRAME_RULE, pattern=FRAME)
-RATE = Field('double', 'Rate of crank messages [Hz]; 0: none.', 0.0, 1000.0, readers=(DRIVER,))
+RATE = Field('double', 'Rate of crank messages [Hz]; 0: none.', 0.0, 1000.0, readers=(DRIVER,),
+             unit='Hz')
 
 
 @dataclass(frozen=True)
@@ -103,10 +104,8 @@ def load(path: str) -> Scene:
     if all(own == merged for own in values.values()):
         return scene
     # Each parameter has the value that the file gives to the parameter's owner.
-    owners = {parameter.name: OWNER if OWNER in parameter.field.readers
-              else parameter.field.readers[0] for parameter in scene.parameters}
-    return read({name: values[owner][name] for name, owner in owners.items()
-                 if name in values[owner]})
+    return read({one.name: values[one.field.owner][one.name] for one in scene.parameters
+                 if one.name in values[one.field.owner]})
 
 
 def read(values: Mapping[str, Any], before: Optional[Scene] = None, strict: bool = True) -> Scene:

@@ -17,7 +17,7 @@ from functools import cached_property
 import math
 from typing import Iterable, Optional, Tuple
 
-from .parameters import ALL, DRIVER, Field, SceneError, Values
+from .parameters import ALL, DRIVER, Field, SceneError, SPEEDS, STARTS, Values
 from ..linkage.inputs import Arc, Input
 from ..linkage.mechanism import Mechanism
 from ..words import quoted
@@ -34,10 +34,12 @@ MOST_ARCS = 8
 FARTHEST = 1e6
 FASTEST = 100.0
 
-SPEED = Field('double', 'Speed of the {0} [{1}/s].', -FASTEST, FASTEST, readers=(DRIVER,))
-TURNS = {'low': -4.0 * math.pi, 'high': 4.0 * math.pi}
-START = Field('double', 'Initial value of the {0} [{1}]; a new value moves it there.',
-              readers=(DRIVER,))
+SPEED = Field('double', 'Speed of the {0} [{unit}].', -FASTEST, FASTEST, readers=(DRIVER,),
+              unit='{1}/s', group=SPEEDS)
+# Farthest start of an angle [rad], if its period is no longer.
+FARTHEST_START = 4.0 * math.pi
+START = Field('double', 'Initial value of the {0} [{unit}]; a new value moves it there.',
+              readers=(DRIVER,), unit='{1}', group=STARTS)
 SOURCE = Field('string', 'Source joint, whose position in messages gives the {0}; empty: '
                '<mechanism>_ and the name of the {0} or of the measured output.', readers=ALL,
                read_only=True)
@@ -45,9 +47,10 @@ MEASURES = Field('string', 'Output that the source joint measures; empty: the {0
                  readers=ALL, read_only=True)
 RATIO = Field('double', 'Motion of the {0} per unit of its source joint [1].', readers=ALL,
               rule='other than zero')
-OFFSET = Field('double', 'Value of the {0} when its source joint is at zero [{1}].', readers=ALL)
-SWEEP = Field('double_array', "Ends of the {0}'s oscillation [{1}]; empty: its reach, or full "
-              'rotation.', readers=ALL,
+OFFSET = Field('double', 'Value of the {0} when its source joint is at zero [{unit}].',
+               readers=ALL, unit='{1}')
+SWEEP = Field('double_array', "Ends of the {0}'s oscillation [{unit}]; empty: its reach, or full "
+              'rotation.', readers=ALL, unit='{1}',
               rule=f'the lower end and the higher end, within {FARTHEST:g} of zero, or none')
 
 
@@ -101,6 +104,11 @@ class InputSettings:
         return (self.ratio, self.offset, self.measures) == (1.0, 0.0, '')
 
     @property
+    def default_speed(self) -> float:
+        """Return the default of the speed [rad/s or m/s]."""
+        return _default_speed(self.input, self.reach)
+
+    @property
     def actuator(self) -> Tuple[float, float]:
         """Ratio and offset from the actuator to the input; (1, 0) if the source is a sensor."""
         return (1.0, 0.0) if self.measures else (self.ratio, self.offset)
@@ -137,8 +145,10 @@ def read_settings(name: str, linkage: Mechanism, input_: Input, reach: Tuple[Arc
 def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values,
           old: Optional[InputSettings], strict: bool) -> InputSettings:
     speed_field, start_field, sweep_field = (
-        field.about(input_.name, input_.unit, **(TURNS if field is START and input_.turns else {}))
-        for field in (SPEED, START, SWEEP))
+        field.about(input_.name, input_.unit) for field in (SPEED, START, SWEEP))
+    if input_.turns:
+        farthest = max(FARTHEST_START, input_.high)
+        start_field = start_field.about(low=-farthest, high=farthest)
     name = f'{name}.{input_.name}'
     speed = values.take(f'{name}.speed', speed_field, _default_speed(input_, reach))
     has_start = values.unused(f'{name}.start')

@@ -22,9 +22,11 @@ from typing import Any, Iterable, List, Optional, Tuple, Type
 from ..cache import cached
 from ..words import elided, listed, meant, MESSAGE, quoted
 
-# The nodes that use parameters; OWNER decides the value of a parameter that several nodes use.
+# The nodes that use parameters; OWNER owns each that it uses.
 DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
 OWNER = KINEMATICS
+
+GROUPS = DIMENSIONS, BRANCHES, SPEEDS, STARTS = 'dimensions', 'branches', 'speeds', 'starts'
 
 # Parameters that rclpy declares.
 _ROS = re.compile(r'(use_sim_time|start_type_description_service)$')
@@ -63,7 +65,7 @@ class Field:
     kind : str
         One of KINDS.
     meaning : str
-        Description, with the unit in brackets.
+        Description, with the unit in brackets, as {unit}.
     low, high : float, optional
         Ends of the allowed range; None: no range.
     positive : bool
@@ -76,6 +78,10 @@ class Field:
         Nodes that use the parameter.
     read_only : bool
         Whether a change needs a restart.
+    unit : str
+        Unit of its numbers; empty: none.
+    group : str
+        Kind of the parameter where there are many of one kind: one of GROUPS, or empty.
 
     """
 
@@ -88,15 +94,19 @@ class Field:
     pattern: re.Pattern = TEXT
     readers: Tuple[str, ...] = ()
     read_only: bool = False
+    unit: str = ''
+    group: str = ''
 
     def about(self, *words: str, **other: Any) -> Field:
-        """Return a copy with `words` for {0}, {1}, ... in the meaning, and `other` attributes."""
-        return _with(self, ('meaning', self.meaning.format(*words)), *other.items())
+        """Return a copy with `words` for {0}, {1}, ... in meaning and unit, `other` attributes."""
+        unit = self.unit.format(*words)
+        return _with(self, ('meaning', self.meaning.format(*words, unit=unit)), ('unit', unit),
+                     *other.items())
 
     @property
-    def shared(self) -> bool:
-        """Whether several nodes use the parameter."""
-        return len(self.readers) > 1
+    def owner(self) -> str:
+        """Return the node that declares the parameter and announces its value to the others."""
+        return OWNER if OWNER in self.readers else self.readers[0]
 
     @property
     def allowed(self) -> str:

@@ -22,6 +22,8 @@ from .joint_names import JointName, read_joint_names
 from .loads import Load, read_loads
 from .parameters import (
     ALL,
+    BRANCHES,
+    DIMENSIONS,
     Field,
     INVERSE,
     KINEMATICS,
@@ -52,8 +54,10 @@ TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
 JOINTS = Field('string_array', 'The linkage, one line per joint.', readers=ALL, read_only=True)
 TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', readers=ALL,
                read_only=True)
-DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [m].', readers=ALL)
-BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1, readers=ALL)
+DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [{unit}].', readers=ALL,
+                  unit='m', group=DIMENSIONS)
+BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1, readers=ALL,
+               group=BRANCHES)
 SCALE = Field('double', 'Factor of every length.', positive=True, readers=ALL)
 LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
                   readers=(KINEMATICS,))

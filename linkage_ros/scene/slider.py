@@ -9,10 +9,10 @@
 # limitations under the License.
 
 """
-Useful ranges for the sliders of parameters; values beyond them are allowed, too.
+Useful ranges for the page's sliders of parameters; values beyond them are allowed, too.
 
-The ends are multiples of a hundredth of the range, because the sliders of rqt_reconfigure have a
-hundred steps and count them from zero. No ROS is needed.
+The ends are multiples of a hundredth of the range, so that they are round numbers. No ROS is
+needed.
 """
 
 from __future__ import annotations

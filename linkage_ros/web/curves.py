@@ -26,8 +26,11 @@ from ..words import listed, meant, quoted
 SAMPLES = 361
 KINDS = POSITION, VELOCITY, ACCELERATION, TRANSMISSION, FORCE = (
     'position', 'velocity', 'acceleration', 'transmission angle', 'force ratio')
-# What has no pole.
+# Quantities without poles, and the power of the speed with which the others grow.
 BOUNDED = POSITION, TRANSMISSION
+POWERS = {VELOCITY: 1, ACCELERATION: 2}
+# An end of the reach this near to a dead point [rad, or of the stroke] is that dead point.
+SAME = 1e-9
 # Units of the force ratio, by the units of output and input.
 FORCES = {('rad', 'm'): 'N·m/N', ('m', 'rad'): 'N/(N·m)'}
 
@@ -40,14 +43,15 @@ class Sweep:
     position bends too much for even samples.
     """
 
-    def __init__(self, machine: SceneMechanism, present: Sequence[float],
+    def __init__(self, mechanism: SceneMechanism, present: Sequence[float],
                  dense_ends: bool = False) -> None:
-        self.linkage, self.input, self._machine = machine.linkage, machine.first.input, machine
-        sizes = [machine.scale_of(name) for name in machine.inputs]
+        self._mechanism, self.linkage = mechanism, mechanism.linkage
+        self.input = mechanism.first.input
+        sizes = [mechanism.scale_of(name) for name in mechanism.inputs]
         others = [value / size for value, size in zip(present, sizes)][1:]
         reach, dead = self.linkage.reach(*others), self.linkage.dead_points(*others)
         if not reach:
-            raise Refused(f'{machine.name} cannot be assembled where its other inputs are')
+            raise Refused(f'{mechanism.name} cannot be assembled where its other inputs are')
         # A NaN separates two arcs.
         own = ascending(np.concatenate([
             *(sampled(low, high, 0, SAMPLES) if dense_ends and not self.input.is_whole(reach)
@@ -56,15 +60,18 @@ class Sweep:
         self._size, still = sizes[0], [0.0] * len(others)
         self._inputs, self._speeds, self._still = (theta_of(values) for values in (
             [own, *others], [1.0 / sizes[0], *still], [0.0, *still]))
-        self.values, self.reach, self.dead = (
-            np.multiply(each, sizes[0]) for each in (own, reach, dead))
+        self.values, self.dead = (np.multiply(each, sizes[0]) for each in (own, dead))
+        # The ends of the reach that are no dead points; a full rotation has none.
+        self.ends = [] if self.input.is_whole(reach) else [
+            end for end in np.multiply(np.ravel(reach), sizes[0]).tolist()
+            if (self.input.apart(end, self.dead) > SAME * self.input.size).all()]
 
     def names(self, kind: str) -> list[str]:
         """Return the joints with a transmission angle, or the outputs."""
         linkage = self.linkage
         if kind == TRANSMISSION:
             return list(linkage.transmission_angles(self._inputs))
-        return [*(name for name in linkage.joints if name not in self._machine.inputs),
+        return [*(name for name in linkage.joints if name not in self._mechanism.inputs),
                 *(f'{joint}.{axis}' for joint in linkage.points if joint not in linkage.grounded
                   for axis in 'xy')]
 
@@ -78,7 +85,7 @@ class Sweep:
     @np.errstate(all='ignore')
     def of(self, kind: str, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return a quantity of each name in the scene's size; not finite where there is none."""
-        linkage, inputs, size = self.linkage, self._inputs, self._machine.scale_of
+        linkage, inputs, size = self.linkage, self._inputs, self._mechanism.scale_of
         if kind == TRANSMISSION:
             return linkage.transmission_angles(inputs, names)
         if kind == FORCE:
@@ -104,12 +111,23 @@ class Sweep:
         return np.sort([*at, *(dead for dead in self.dead if x[0] < dead < x[-1])])
 
 
-def curve(machine: SceneMechanism, present: Sequence[float], kind: str = POSITION,
+def plots(mechanism: SceneMechanism) -> dict[str, str]:
+    """Return of what each of KINDS is plotted: an 'output' or a 'joint'; {} for no plot."""
+    return {} if mechanism.in_space else {
+        kind: 'joint' if kind == TRANSMISSION else 'output' for kind in KINDS}
+
+
+def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSITION,
           output: Optional[str] = None) -> dict[str, Any]:
-    """Return one of KINDS over the first input: x and y in `units`, y None where it has none."""
+    """
+    Return one of KINDS over the first input: x and y in `units`, y None where it has none.
+
+    `dead` are the dead points, `ends` the other ends of the reach; y grows with the `power` of the
+    input's speed.
+    """
     if kind not in KINDS:
         raise ValueError(f'kind must be one of {", ".join(KINDS)}, not {quoted(kind)}')
-    sweep = Sweep(machine, present, dense_ends=kind in BOUNDED)
+    sweep = Sweep(mechanism, present, dense_ends=kind in BOUNDED)
     names = sweep.names(kind)
     output = names[0] if names and output is None else output or ''
     if not (output in names or kind != TRANSMISSION and sweep.linkage.has_output(output)):
@@ -125,20 +143,19 @@ def curve(machine: SceneMechanism, present: Sequence[float], kind: str = POSITIO
         known = np.isfinite(y)
         y[known] = np.unwrap(y[known])
     return {'input': sweep.input.name, 'output': output, 'names': names,
-            'units': [sweep.input.unit, unit], 'x': x.tolist(),
-            'y': list(map(shown, y.tolist())), 'reach': sweep.reach.tolist(),
-            'dead': sweep.dead.tolist()}
+            'units': [sweep.input.unit, unit], 'power': POWERS.get(kind, 0), 'x': x.tolist(),
+            'y': list(map(shown, y.tolist())), 'ends': sweep.ends, 'dead': sweep.dead.tolist()}
 
 
-def exported(machine: SceneMechanism, present: Sequence[float], form: str, frame_id: str) -> str:
+def exported(mechanism: SceneMechanism, present: Sequence[float], form: str, frame_id: str) -> str:
     """Return a text: 'csv', all kinds of all outputs in rad and m; 'urdf'; or 'c'."""
     if form == 'urdf':
-        return urdf.describe([machine], machine.frame_id or frame_id)
+        return urdf.describe([mechanism], mechanism.frame_id or frame_id)
     if form == 'c':
-        return header.written(machine)
+        return header.written(mechanism)
     if form != 'csv':
         raise ValueError(f'form must be csv, urdf or c, not {quoted(form)}')
-    sweep, text = Sweep(machine, present), io.StringIO()
+    sweep, text = Sweep(mechanism, present), io.StringIO()
     columns = {f'{sweep.input.name} [{sweep.input.unit}]': sweep.values, **{
         f'{kind} {name} [{sweep.unit(kind, name) or 1}]': values for kind in KINDS
         for name, values in sweep.of(kind, sweep.names(kind)).items()}}

@@ -17,10 +17,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from visualization_msgs.msg import Marker
 
+from ..nodes import messages
 from ..nodes.message_layout import deserialized, MessageLayout, NoLayout
 
-KINDS = {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'strip', Marker.SPHERE_LIST: 'joints',
+# How the page draws a marker, by its type; for some of kinematics' markers, by type and id.
+KINDS = {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'locus', Marker.SPHERE_LIST: 'joints',
          Marker.TRIANGLE_LIST: 'triangles'}
+OWN_KINDS = {(Marker.LINE_LIST, messages.GUIDES_ID): 'slots',
+             (Marker.LINE_LIST, messages.LOCUS_ID): 'loci',
+             (Marker.TRIANGLE_LIST, messages.PLATES_ID): 'plates'}
 NO_POINTS = np.empty(0)
 
 
@@ -135,6 +140,6 @@ def _look(mechanism: str, marker: Marker) -> dict[str, Any]:
     pose = [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]
     colours = [colour.r, colour.g, colour.b, colour.a]
     _shown([*pose, *colours, marker.scale.x])
-    return {'mechanism': mechanism, 'kind': KINDS[marker.type], 'pose': pose,
-            'frame': marker.header.frame_id,
+    kind = OWN_KINDS.get((marker.type, marker.id), KINDS[marker.type])
+    return {'mechanism': mechanism, 'kind': kind, 'pose': pose, 'frame': marker.header.frame_id,
             'width': marker.scale.x, 'colour': colours}

@@ -26,6 +26,7 @@ from ..words import listed, quoted
 
 ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
 _, ACCELERATION, FORCE = ARROWS
+SIGNS = '+1', '−1'
 # Change of a dimension that detects dependent bars, as a fraction of the longest bar.
 NUDGE = 1e-6
 # Tolerance of an input at its end.
@@ -50,32 +51,51 @@ class Reach:
         return f'{self.name} reaches {in_words(self.arcs)} {self.unit}'
 
 
-def described(machine: SceneMechanism, present: Sequence[float]) -> dict[str, Any]:
+def drawn(mechanism: SceneMechanism) -> dict[str, Any]:
+    """
+    Describe what the page needs to know of a mechanism beside its parameters and markers.
+
+    `points` are the joints of a leg in markers, `legs` the number of legs, `pairs` of those on one
+    side. Each input has its unit, allowed `arcs` [rad or m], `turn` [rad] after which poses repeat
+    (None: never), and default speed. `sides` are the words for a branch of +1 and of -1.
+    """
+    return {
+        'space': mechanism.in_space, 'points': mechanism.points, 'pairs': mechanism.leg_pairs,
+        'legs': mechanism.leg_pairs * (1 + mechanism.mirrored),
+        'sides': {name: mechanism.linkage.line_of(name).sides or SIGNS
+                  for name in mechanism.linkage.branches},
+        'inputs': {name: {
+            'unit': drive.input.unit, 'arcs': arcs(drive), 'speed': drive.default_speed,
+            'turn': drive.input.turn if drive.input.wraps else None}
+            for name, drive in mechanism.inputs.items()}}
+
+
+def described(mechanism: SceneMechanism, present: Sequence[float]) -> dict[str, Any]:
     """
     Describe a mechanism at inputs `present` [rad or m], in the scene's size.
 
-    Each input has value, allowed arcs and unit; each output of the first leg has value, unit, and
-    d output / d input for each input, zero where it is rounding.
+    Each input has its value; each output of the first leg has value, unit, and d output / d input
+    for each input, zero where it is rounding.
     """
-    linkage, names = machine.linkage, [
-        *(name for name in machine.linkage.joints if name not in machine.inputs),
-        *(f'{machine.tracer}.{axis}' for axis in 'xy')]
-    own = [machine.scale_of(name) for name in machine.inputs]
+    linkage, names = mechanism.linkage, [
+        *(name for name in mechanism.linkage.joints if name not in mechanism.inputs),
+        *(f'{mechanism.tracer}.{axis}' for axis in 'xy')]
+    own = [mechanism.scale_of(name) for name in mechanism.inputs]
     theta = theta_of([value / size for value, size in zip(present, own)])
     values = linkage.joint_angles(theta, names)
     rates = [linkage.joint_rates(theta, names, i) for i in range(len(own))]
-    sizes = {name: machine.scale_of(name) * (1.0 if linkage.is_angle(name) else linkage.longest)
+    sizes = {name: mechanism.scale_of(name) * (1.0 if linkage.is_angle(name) else linkage.longest)
              for name in names}
-    units = [machine.scale_of(name) * (1.0 if drive.input.turns else linkage.longest)
-             for name, drive in machine.inputs.items()]
+    units = [mechanism.scale_of(name) * (1.0 if drive.input.turns else linkage.longest)
+             for name, drive in mechanism.inputs.items()]
     return {
-        'inputs': {name: {'value': value, 'unit': drive.input.unit, 'arcs': arcs(drive)}
-                   for (name, drive), value in zip(machine.inputs.items(), present)},
+        'inputs': dict(zip(mechanism.inputs, present)),
         'outputs': {name: {
-            'value': _rounded(float(values[name]) * machine.scale_of(name), sizes[name]),
+            'value': _rounded(float(values[name]) * mechanism.scale_of(name), sizes[name]),
             'unit': 'rad' if linkage.is_angle(name) else 'm',
-            'rates': [_rounded(float(by[name]) * machine.scale_of(name) / size, sizes[name] / unit)
-                      for by, size, unit in zip(rates, own, units)]} for name in names}}
+            'rates': [
+                _rounded(float(by[name]) * mechanism.scale_of(name) / size, sizes[name] / unit)
+                for by, size, unit in zip(rates, own, units)]} for name in names}}
 
 
 def _rounded(value: float, size: float) -> Any:
@@ -83,7 +103,7 @@ def _rounded(value: float, size: float) -> Any:
     return shown(0.0 if abs(value) < ROUNDING * size else value)
 
 
-def arrows(machine: SceneMechanism, present: Sequence[float], kind: str,
+def arrows(mechanism: SceneMechanism, present: Sequence[float], kind: str,
            speeds: Mapping[str, float]) -> dict[str, Any]:
     """
     Return one of ARROWS at each joint of the first leg: `unit`, and x, y in its plane by joint.
@@ -93,18 +113,18 @@ def arrows(machine: SceneMechanism, present: Sequence[float], kind: str,
     """
     if kind not in ARROWS:
         raise ValueError(f'arrows must be one of {", ".join(ARROWS)}, not {quoted(kind)}')
-    by_input = {name: speeds.get(name, 0.0) for name in machine.inputs}
+    by_input = {name: speeds.get(name, 0.0) for name in mechanism.inputs}
     if not all(map(is_number, by_input.values())):
         raise ValueError(f'speeds must be finite numbers, not {quoted(speeds)}')
-    linkage, own = machine.linkage, [machine.scale_of(name) for name in machine.inputs]
+    linkage, own = mechanism.linkage, [mechanism.scale_of(name) for name in mechanism.inputs]
     theta = theta_of([value / size for value, size in zip(present, own)])
     rates = [speed / size for speed, size in zip(by_input.values(), own)]
     if kind == FORCE:
-        efforts = machine.efforts(present) if machine.loads else ()
+        efforts = mechanism.efforts(present) if mechanism.loads else ()
         return {'unit': 'N', 'at': {
-            name: load for name, load in machine.loads.items() if not isinstance(load, float)},
+            name: load for name, load in mechanism.loads.items() if not isinstance(load, float)},
             'efforts': {name: [shown(effort), 'N·m' if drive.input.turns else 'N']
-                        for (name, drive), effort in zip(machine.inputs.items(), efforts)}}
+                        for (name, drive), effort in zip(mechanism.inputs.items(), efforts)}}
     if kind == ACCELERATION:
         found = linkage.acceleration(theta, theta_of(rates), theta_of([0.0] * len(rates)))
     else:
@@ -112,7 +132,7 @@ def arrows(machine: SceneMechanism, present: Sequence[float], kind: str,
         found = {name: sum(rate * one[name] for rate, one in zip(rates, each))
                  for name in linkage.points}
     return {'unit': ARROWS[kind], 'at': {
-        name: [shown(float(part) * machine.scale) for part in vector]
+        name: [shown(float(part) * mechanism.scale) for part in vector]
         for name, vector in found.items() if name not in linkage.grounded}}
 
 
@@ -124,14 +144,14 @@ def number(text: str) -> dict[str, Any]:
     return {'value': float(formula.value({})), 'turns': bool({'pi', 'deg'} & formula.words.keys())}
 
 
-def reached(machine: SceneMechanism, present: Sequence[float],
+def reached(mechanism: SceneMechanism, present: Sequence[float],
             want: Mapping[str, Any]) -> tuple[list[float], Optional[Reach]]:
     """
     Return the inputs [rad or m] for a request, or the nearest possible ones and what is reached.
 
     Parameters
     ----------
-    machine : SceneMechanism
+    mechanism : SceneMechanism
         The mechanism.
     present : sequence of float
         Its inputs.
@@ -148,37 +168,37 @@ def reached(machine: SceneMechanism, present: Sequence[float],
 
     """
     if 'joint' in want:
-        return _joint_at(machine, present, **want), None
+        return _joint_at(mechanism, present, **want), None
     name, value = want['output'], want['value']
     if not is_number(value):
         raise ValueError(f'value must be a finite number, not {quoted(value)}')
-    if name in machine.inputs:
-        return _input_at(machine, present, name, value)
-    if len(machine.inputs) > 1:
+    if name in mechanism.inputs:
+        return _input_at(mechanism, present, name, value)
+    if len(mechanism.inputs) > 1:
         raise Refused(f'only a linkage with one input can be solved for {quoted(name)}')
-    return _output_at(machine, present[0], name, value)
+    return _output_at(mechanism, present[0], name, value)
 
 
-def _input_at(machine: SceneMechanism, present: Sequence[float], name: str,
+def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
               value: float) -> tuple[list[float], Optional[Reach]]:
-    drive, ends = machine.inputs[name], arcs(machine.inputs[name])
+    drive, ends = mechanism.inputs[name], arcs(mechanism.inputs[name])
     near = min((min(max(float(drive.input.beside(value, (low + high) / 2.0)), low), high)
                 for low, high in ends), key=lambda end: drive.input.apart(end, value))
     whole = drive.input.is_whole(ends)
-    new = math.remainder(value, math.tau) if whole else near
-    inputs = [new if key == name else old for key, old in zip(machine.inputs, present)]
-    own = [value / machine.scale_of(key) for key, value in zip(machine.inputs, inputs)]
-    places = machine.linkage.solve(theta_of(own))
+    new = float(drive.input.wrapped(value)) if whole else near
+    inputs = [new if key == name else old for key, old in zip(mechanism.inputs, present)]
+    own = [value / mechanism.scale_of(key) for key, value in zip(mechanism.inputs, inputs)]
+    places = mechanism.linkage.solve(theta_of(own))
     if not all(math.isfinite(part) for place in places.values() for part in place):
-        raise Refused(f'{machine.name} cannot be assembled there')
+        raise Refused(f'{mechanism.name} cannot be assembled there')
     missed = not whole and drive.input.apart(near, value) > CLOSE * drive.input.size
     return inputs, Reach(name, tuple(ends), drive.input.unit) if missed else None
 
 
-def _output_at(machine: SceneMechanism, present: float, name: str,
+def _output_at(mechanism: SceneMechanism, present: float, name: str,
                value: float) -> tuple[list[float], Optional[Reach]]:
-    linkage, drive = machine.linkage, machine.first
-    own, unit = machine.scale_of(drive.input.name), machine.scale_of(name)
+    linkage, drive = mechanism.linkage, mechanism.first
+    own, unit = mechanism.scale_of(drive.input.name), mechanism.scale_of(name)
     ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
     found = float(linkage.servo_for(name, value / unit, present / own, ends)[0])
     if math.isfinite(found):
@@ -191,22 +211,23 @@ def _output_at(machine: SceneMechanism, present: float, name: str,
     return [nearest * own], Reach(name, reach, 'rad' if linkage.is_angle(name) else 'm')
 
 
-def _joint_at(machine: SceneMechanism, present: Sequence[float], joint: str, place: Any,
+def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, place: Any,
               leg: int = 0) -> list[float]:
     if not (isinstance(place, list) and len(place) == 2 and all(map(is_number, place))):
         raise ValueError(f'place must be two finite numbers, not {quoted(place)}')
-    legs = list(machine.assembly().legs.values())
+    legs = list(mechanism.assembly().legs.values())
     if type(leg) is not int or not 0 <= leg < len(legs):
         raise ValueError(f'leg must be a whole number below {len(legs)}, not {quoted(leg)}')
-    if joint not in machine.linkage.points:
-        raise ValueError(f'joint must be one of {listed(machine.linkage.points)}, '
+    if joint not in mechanism.linkage.points:
+        raise ValueError(f'joint must be one of {listed(mechanism.linkage.points)}, '
                          f'not {quoted(joint)}')
-    one, own = legs[leg], [machine.scale_of(name) for name in machine.inputs]
+    one, own = legs[leg], [mechanism.scale_of(name) for name in mechanism.inputs]
     # Conversion to a leg's own input and back: trivial for a single leg.
     ranges = [[sorted(one.start + one.side * (end - one.lag) for end in arc)
-               for arc in arcs(drive)] for drive in machine.inputs.values()]
+               for arc in arcs(drive)] for drive in mechanism.inputs.values()]
     found = nearest_inputs(
-        machine.linkage, joint, [one.side * place[0] / machine.scale, place[1] / machine.scale],
+        mechanism.linkage, joint,
+        [one.side * place[0] / mechanism.scale, place[1] / mechanism.scale],
         [one.start + one.side * (value - one.lag) / size for value, size in zip(present, own)],
         [[(low / size, high / size) for low, high in each] for each, size in zip(ranges, own)])
     return [float(one.lag + one.side * (value - one.start)) * size
@@ -228,16 +249,14 @@ def tunable(scene_: Scene, name: str) -> dict[str, Any]:
     Return the range of each dimension of a mechanism, and its dependent bars.
 
     `travel` holds [low, high] by parameter, `bars` pairs of joints, `fixed` the joints that do not
-    move, `sides` the words for a branch of +1 and of -1.
+    move.
     """
-    machine = scene_.machines[name]
+    mechanism = scene_.machines[name]
     start = f'{name}.dimensions.'
     travel = {parameter.name[len(name) + 1:]: slider.ends(scene_, parameter)
-              for parameter in machine.parameters if parameter.name.startswith(start)}
-    return {'travel': travel, 'fixed': list(ground_frame(machine.linkage)),
-            'sides': {name: machine.linkage.line_of(name).sides
-                      for name in machine.linkage.branches},
-            'bars': {key: _bars(machine.linkage, key.partition('.')[2]) for key in travel}}
+              for parameter in mechanism.parameters if parameter.name.startswith(start)}
+    return {'travel': travel, 'fixed': list(ground_frame(mechanism.linkage)),
+            'bars': {key: _bars(mechanism.linkage, key.partition('.')[2]) for key in travel}}
 
 
 def _bars(linkage: Mechanism, key: str) -> list[tuple[str, str]]:

@@ -22,6 +22,7 @@ from typing import (
     Any,
     Callable,
     Collection,
+    Iterable,
     Mapping,
     Optional,
     Protocol,
@@ -30,13 +31,10 @@ from typing import (
 )
 
 from rcl_interfaces.msg import ParameterEvent
+from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.node import NodeNameNonExistentError
-from rclpy.qos import (
-    DurabilityPolicy,
-    qos_profile_parameter_events,
-    QoSProfile,
-    ReliabilityPolicy,
-)
+from rclpy.parameter import parameter_value_to_python
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -44,28 +42,29 @@ from . import curves, poses
 from .bridge import Bridge, NoAnswer
 from .feed import Feed
 from .poses import Refused
-from .settings import Described, RemoteNode, Setting
+from .settings import Setting
 from .. import scene
-from ..scene import writing
+from ..nodes import ownership
+from ..scene import slider, writing
 from ..words import quoted
 
-MARKERS, LOCUS, LIST = '/markers', '/locus', '/list_parameters'
+MARKERS, LOCUS = '/markers', '/locus'
 MARKERS_TYPE, LOCUS_TYPE = 'visualization_msgs/msg/MarkerArray', 'visualization_msgs/msg/Marker'
-LIST_TYPE = 'rcl_interfaces/srv/ListParameters'
 INPUTS_TYPE = 'sensor_msgs/msg/JointState'
 SECONDS_BETWEEN_LOOKS = 1.0
 SECONDS_TO_LINGER = 1.0
+SECONDS_TO_ANNOUNCE = 1.0
 SECONDS_TO_ARRIVE, ARRIVED = 1.0, 1e-6
 # Parameters that define a scene, which a saved file always has.
 DEFINES = re.compile(r'mechanisms|[^.]+\.(type|scale|dimensions\..+)')
-GENERAL = 'mechanisms', 'frame_id', 'frame_prefix', 'rate'
 SCENE = 'scene'
 
 Answer = dict[str, Any]
 Result = TypeVar('Result')
-# Marker topics with their publishers, nodes with parameters, and each node's input topics.
-Marked = tuple[tuple[str, tuple[tuple[str, bytes], ...]], ...]
-Graph = tuple[Marked, tuple[str, ...], dict[str, list[str]]]
+# Nodes and ids of publishers, by their topic.
+Published = tuple[tuple[str, tuple[tuple[str, bytes], ...]], ...]
+# Marker topics, topics of announced parameters, and the input topics of each node.
+Graph = tuple[Published, Published, dict[str, list[str]]]
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -84,16 +83,16 @@ class OpenPage(Protocol):
 @dataclass
 class ShownMechanism:
     """
-    A mechanism on the page: the prefix of its topics, its settings, and its inputs' sources.
+    A mechanism on the page: the prefix of its topics, its node, settings, and inputs' sources.
 
     An input that was moved is `pending` at its new value `until` a time, or until messages confirm
     it: earlier messages may have the old value.
     """
 
     key: str
-    settings: dict[str, Setting]
+    owner: str
+    settings: dict[str, Setting] = field(default_factory=dict)
     sources: tuple[str, ...] = ()
-    machine: Optional[scene.SceneMechanism] = None
     pending: dict[str, float] = field(default_factory=dict)
     until: float = 0.0
 
@@ -101,16 +100,6 @@ class ShownMechanism:
     def name(self) -> str:
         """Its name in its scene."""
         return self.key.rsplit('/', 1)[1]
-
-    def values(self) -> dict[str, Any]:
-        """Return its parameters by full name."""
-        return {f'{self.name}.{name}': setting.value for name, setting in self.settings.items()}
-
-    def scene(self) -> scene.Scene:
-        """Return the scene of it alone; raise Refused if its parameters are incomplete."""
-        if 'type' not in self.settings:
-            raise Refused(f'the parameters of {self.name} are not known yet')
-        return _read({'mechanisms': [self.name], **self.values()})
 
     def described(self) -> dict[str, Any]:
         """Describe it for the page."""
@@ -142,17 +131,19 @@ class SceneView:
         self._setting = asyncio.Lock()
         self._seen: Optional[Graph] = None
         self._mechanisms: dict[str, ShownMechanism] = {}
-        self._general: dict[str, dict[str, Any]] = {}
-        self._found: dict[str, Optional[Described]] = {}
+        # The values that each node announces, by full name; the scenes that were read from them.
+        self._announced: dict[str, dict[str, Any]] = {}
+        self._scenes: dict[str, scene.Scene] = {}
+        self._news = asyncio.Event()
         self._watching: Optional[asyncio.Task[None]] = None
         self._stopping: Optional[asyncio.TimerHandle] = None
         # The following attributes are changed in the executor's thread alone.
-        self._nodes: dict[str, RemoteNode] = {}
+        self._setters: dict[str, Any] = {}
+        self._announcements: dict[str, Any] = {}
         self._sources: dict[str, Any] = {}
         self._received: dict[str, dict[str, float]] = {}
         self._feeds: dict[str, tuple[Feed, Any]] = {}
         self._numbers: dict[tuple[str, int], int] = {}
-        self._events: Any = None
 
     def add(self, client: OpenPage) -> None:
         """Add a client; the first one starts the observation of the graph."""
@@ -175,7 +166,7 @@ class SceneView:
         if self._watching:
             self._watching.cancel()
         self._watching = self._stopping = None
-        self._seen, self._mechanisms, self._found = None, {}, {}
+        self._seen, self._mechanisms, self._announced, self._scenes = None, {}, {}, {}
         self._bridge.ask(self._close)
 
     def feeds(self) -> list[Feed]:
@@ -200,7 +191,7 @@ class SceneView:
                     raise Refused(f'{mechanism.name} has no parameter {quoted(name)}')
                 setting = mechanism.settings[name]
                 try:
-                    parameter = setting.asked(f'{mechanism.name}.{name}', value)
+                    parameter = setting.asked(value)
                 except ValueError as error:
                     raise Refused(str(error)) from None
                 asked.setdefault(setting.node, []).append(parameter)
@@ -208,14 +199,23 @@ class SceneView:
                 await self._set(node, parameters)
 
     async def _set(self, node: str, parameters: list[Any]) -> None:
-        if node not in self._nodes:
+        if node not in self._announced:
             raise Refused(f'{node} is gone')
         try:
-            reason = await self._nodes[node].set(parameters)
+            response = await self._bridge.call(
+                await self._bridge.ask(self._setter, node),
+                SetParametersAtomically.Request(parameters=parameters))
         except NoAnswer as error:
-            reason = str(error)
-        if reason:
-            raise Refused(reason)
+            raise Refused(str(error)) from None
+        if not response.result.successful:
+            raise Refused(response.result.reason or f'{node} gives no reason')
+
+    def _setter(self, node: str) -> Any:
+        """Return the client that sets parameters of a node."""
+        if node not in self._setters:
+            self._setters[node] = self._bridge.node.create_client(
+                SetParametersAtomically, f'{node}/set_parameters_atomically')
+        return self._setters[node]
 
     async def pose(self, key: str, want: Optional[Mapping[str, Any]] = None, arrows: str = '',
                    speeds: Any = ()) -> Answer:
@@ -259,7 +259,8 @@ class SceneView:
     async def tune(self, key: str) -> Answer:
         """Return the result of `poses.tunable`."""
         mechanism = self._find(key)
-        return await self._aside(lambda: poses.tunable(mechanism.scene(), mechanism.name))
+        whole = self._scene(mechanism)
+        return await self._aside(lambda: poses.tunable(whole, mechanism.name))
 
     async def curve(self, key: str, **about: Any) -> Answer:
         """Return the result of `curves.curve`."""
@@ -269,21 +270,19 @@ class SceneView:
     async def export(self, key: str, form: str) -> Answer:
         """Return the result of `curves.exported`."""
         mechanism = self._find(key)
-        machine, inputs = (_machine(mechanism), []) if form == 'c' else self._state(mechanism)
-        frame_id = self._general.get(_space(key), {}).get('frame_id', 'world')
+        whole = self._scene(mechanism)
+        machine, inputs = (whole.machines[mechanism.name], []) if form == 'c' else self._state(
+            mechanism)
         return {'text': await self._aside(
-            lambda: curves.exported(machine, inputs, form, frame_id))}
+            lambda: curves.exported(machine, inputs, form, whole.frame_id))}
 
     async def save(self, key: str, values: Any = ()) -> Answer:
         """Return a parameter file of a mechanism's scene: its definition and changed values."""
-        mechanism, space = self._find(key), _space(key)
-        whole = dict(self._general.get(space, {}))
-        for other in self._mechanisms.values():
-            if _space(other.key) == space:
-                whole.update(other.values())
-        whole.update((f'{mechanism.name}.{name}', value) for name, value in dict(values).items())
-        return {'text': await self._aside(
-            lambda: writing.in_yaml(writing.without_defaults(_read(whole), DEFINES)))}
+        mechanism = self._find(key)
+        before, changed = self._scene(mechanism), {
+            f'{mechanism.name}.{name}': value for name, value in dict(values).items()}
+        return {'text': await self._aside(lambda: writing.in_yaml(writing.without_defaults(
+            scene.changed(before, changed, strict=False), DEFINES)))}
 
     async def _aside(self, work: Callable[[], Result]) -> Result:
         """Run slow work in another thread; return its result."""
@@ -295,7 +294,7 @@ class SceneView:
 
     def _state(self, mechanism: ShownMechanism) -> tuple[scene.SceneMechanism, list[float]]:
         """Return a mechanism and its last received inputs [rad or m], or their starts."""
-        machine, inputs = _machine(mechanism), []
+        machine, inputs = self._scene(mechanism).machines[mechanism.name], []
         if machine.in_space:
             raise Refused(f'{machine.name} is a linkage in space: the page draws and tunes it, '
                           'and moves, plots and describes linkages in a plane')
@@ -332,12 +331,19 @@ class SceneView:
 
     def _show(self, client: OpenPage) -> None:
         client.tell(SCENE, {'op': 'scene', 'mechanisms': [
-            mechanism.described() for mechanism in self._mechanisms.values()]})
+            {**mechanism.described(), **self._drawn(mechanism)}
+            for mechanism in self._mechanisms.values()]})
         for feed in self.feeds():
             client.offer(feed)
 
+    def _drawn(self, mechanism: ShownMechanism) -> dict[str, Any]:
+        """Describe what the page needs beside the parameters; {} until these are announced."""
+        with suppress(Refused):
+            machine = self._scene(mechanism).machines[mechanism.name]
+            return {**poses.drawn(machine), 'curves': curves.plots(machine)}
+        return {}
+
     async def _watch(self) -> None:
-        await self._bridge.ask(self._listen)
         while True:
             try:
                 await self._look()
@@ -345,32 +351,36 @@ class SceneView:
                 # Other nodes may publish anything; the next look may succeed.
                 self._seen = None
                 self._bridge.warn(f'the scene cannot be read: {error!r}')
-            await asyncio.sleep(SECONDS_BETWEEN_LOOKS)
+            with suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(self._news.wait(), SECONDS_BETWEEN_LOOKS)
 
     async def _look(self) -> None:
+        self._news.clear()
         seen = await self._bridge.ask(self._graph)
         if seen != self._seen:
             self._seen = seen
             await self._change(*seen)
 
     def _graph(self) -> Graph:
-        """Return the graph's marker topics, nodes with parameters, and services."""
-        node = self._bridge.node
-        topics = dict(node.get_topic_names_and_types())
-        services = node.get_service_names_and_types()
+        """Return the graph's topics of markers and parameters, and the owners' input topics."""
+        topics = dict(self._bridge.node.get_topic_names_and_types())
         keys = sorted(name[:-len(MARKERS)] for name, types in topics.items()
                       if name.endswith(MARKERS) and MARKERS_TYPE in types)
-        keys = [key for key in keys if LOCUS_TYPE in topics.get(f'{key}{LOCUS}', ())]
-        marked = tuple((key, tuple(sorted(
+        marked = self._published((f'{key}{MARKERS}' for key in keys
+                                  if LOCUS_TYPE in topics.get(f'{key}{LOCUS}', ())))
+        owners = {owner for _, publishers in marked for owner, _ in publishers}
+        announced = self._published(f'{space}/{ownership.TOPIC}'
+                                    for space in sorted(set(map(_space, owners))))
+        return marked, announced, {owner: self._subscriptions_of(owner) for owner in owners}
+
+    def _published(self, topics: Iterable[str]) -> Published:
+        """Return the topics that are published, with their publishers."""
+        found = ((topic, tuple(sorted(
             (_joined(info.node_namespace, info.node_name), bytes(info.endpoint_gid))
-            for info in node.get_publishers_info_by_topic(f'{key}{MARKERS}')
+            for info in self._bridge.node.get_publishers_info_by_topic(topic)
             # Of a node that starts, the name is unknown at first.
-            if info.node_namespace.startswith('/')))) for key in keys)
-        topics = {owner: self._subscriptions_of(owner)
-                  for _, owners in marked for owner, _ in owners}
-        nodes = tuple(sorted(name[:-len(LIST)] for name, types in services
-                             if name.endswith(LIST) and LIST_TYPE in types))
-        return tuple(shown for shown in marked if shown[1]), nodes, topics
+            if info.node_namespace.startswith('/')))) for topic in topics)
+        return tuple(each for each in found if each[1])
 
     def _subscriptions_of(self, name: str) -> list[str]:
         """Return the topics from which a node receives its inputs."""
@@ -381,81 +391,86 @@ class SceneView:
                     if INPUTS_TYPE in types]
         return []
 
-    async def _change(self, marked: Marked, nodes: Sequence[str],
-                      input_topics: Mapping[str, Sequence[str]]) -> None:
-        owners = {key: [name for name, _ in publishers] for key, publishers in marked}
-        spaces = {_space(node) for names in owners.values() for node in names}
-        nodes = [node for node in nodes if _space(node) in spaces]
-        sources = {topic for topics in input_topics.values() for topic in topics}
-        await self._bridge.ask(self._open, list(owners), nodes, sources)
-        names = sorted({*GENERAL, *(key.rsplit('/', 1)[1] for key in owners)})
-        # Parameters that drawing nodes describe are read from them only. A parameter without a
-        # description is an override of a node that does not use it.
-        found: dict[str, Optional[Described]] = {}
-        for part in ([node for node in nodes if node in input_topics],
-                     [node for node in nodes if node not in input_topics]):
-            known = {space: {name for node, own in found.items() if _space(node) == space
-                             for name, (about, _) in (own or {}).items() if about.description}
-                     for space in spaces}
-            found.update(zip(part, await asyncio.gather(
-                *(self._parameters(node, names, known[_space(node)]) for node in part))))
-        self._found = found
-        self._mechanisms = {key: self._mechanism(key, own_nodes, found, input_topics)
-                            for key, own_nodes in owners.items()}
-        self._general = {}
-        general = [(node, name, *own[name]) for node, described in found.items()
-                   for own in [described or {}] for name in GENERAL if name in own]
-        for node, name, about, value in sorted(general, key=lambda one: not one[2].description):
-            with suppress(ValueError):
-                self._general.setdefault(_space(node), {}).setdefault(
-                    name, Setting(name, node, about, value).value)
+    async def _change(self, marked: Published, announced: Published,
+                      input_topics: dict[str, list[str]]) -> None:
+        nodes = {node for _, publishers in announced for node, _ in publishers}
+        for gone in self._announced.keys() - nodes:
+            del self._announced[gone]
+        owners = {topic[:-len(MARKERS)]: [node for node, _ in own] for topic, own in marked}
+        await self._bridge.ask(
+            self._open, list(owners), nodes, [topic for topic, _ in announced],
+            {topic for topics in input_topics.values() for topic in topics})
+        with suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(self._hear(nodes), SECONDS_TO_ANNOUNCE)
+        self._seen = marked, announced, input_topics
+        mechanisms = {}
+        for key, own in owners.items():
+            # Others may publish on its topics, too.
+            own.sort(key=lambda node: not self._announced.get(node, {}).get('mechanisms'))
+            mechanism = mechanisms[key] = ShownMechanism(key, own[0], {}, tuple(
+                topic for node in own for topic in input_topics[node]))
+            # A node that starts has not announced its parameters.
+            with suppress(Refused):
+                mechanism.settings = await self._aside(partial(
+                    self._settings, mechanism, self._scene(mechanism)))
+        self._mechanisms = mechanisms
         for client in self.clients:
             self._show(client)
 
-    async def _parameters(self, node: str, prefixes: list[str],
-                          known: Collection[str]) -> Optional[Described]:
+    async def _hear(self, nodes: Collection[str]) -> None:
+        """Wait until some nodes have announced their parameters."""
+        while not self._announced.keys() >= set(nodes):
+            self._news.clear()
+            await self._news.wait()
+
+    def _values(self, owner: str) -> dict[str, tuple[str, Any]]:
+        """Return node and value of each parameter of an owner's scene, by full name."""
+        own, whole = self._announced.get(owner, {}), self._scenes.get(owner)
+        values = {name: (owner, value) for name, value in own.items()}
+        others = {parameter.name: parameter.field for parameter in (
+            whole.parameters if whole else ()) if parameter.name not in own}
+        for node in self._announced.keys() - {owner}:
+            for name in self._announced[node].keys() & others.keys():
+                # Any node may announce anything.
+                if _space(node) == _space(owner):
+                    with suppress(scene.SceneError):
+                        values[name] = node, others[name].checked(
+                            name, self._announced[node][name])
+        return values
+
+    def _scene(self, mechanism: ShownMechanism) -> scene.Scene:
+        """Return the scene of a mechanism; raise Refused if its parameters are not announced."""
+        owner = mechanism.owner
+        if mechanism.name not in self._announced.get(owner, {}).get('mechanisms', ()):
+            raise Refused(f'the parameters of {mechanism.name} are not known yet')
         try:
-            return await self._nodes[node].parameters(prefixes, known)
-        except NoAnswer:
-            # It may be starting or ending: look again, and use its last answer until then.
-            self._seen = None
-            return self._found.get(node)
+            # First that of the owner, which knows the names of others' parameters.
+            for _ in range(1 if owner in self._scenes else 2):
+                values = {name: value for name, (_, value) in self._values(owner).items()}
+                self._scenes[owner] = scene.read(values, self._scenes.get(owner), strict=False)
+        except scene.SceneError as error:
+            raise Refused(str(error)) from None
+        return self._scenes[owner]
 
-    def _mechanism(self, key: str, own_nodes: Sequence[str],
-                   found: Mapping[str, Optional[Described]],
-                   input_topics: Mapping[str, Sequence[str]]) -> ShownMechanism:
-        """Return a mechanism with the parameters of its namespace's nodes, its own node first."""
-        mechanism = ShownMechanism(key, {}, tuple(
-            topic for node in own_nodes for topic in input_topics.get(node, ())))
-        spaces = {_space(node) for node in own_nodes}
-        prefix = f'{mechanism.name}.'
-        silent = any(found.get(node, {}) is None for node in own_nodes)
-        near = [] if silent else [node for node in found if _space(node) in spaces]
-        for node in sorted(near, key=lambda node: node not in own_nodes):
-            for full, (descriptor, value) in (found[node] or {}).items():
-                name = full[len(prefix):]
-                before = mechanism.settings.get(name)
-                if full.startswith(prefix) and (not before or not before.descriptor.description
-                                                and descriptor.description):
-                    with suppress(ValueError):
-                        mechanism.settings[name] = Setting(name, node, descriptor, value)
-        return mechanism
+    def _settings(self, mechanism: ShownMechanism, whole: scene.Scene) -> dict[str, Setting]:
+        """Return the announced parameters of a mechanism; the ends of sliders take long."""
+        values = self._values(mechanism.owner)
+        found = [Setting(one.name, one.field, slider.ends(whole, one), node, self._announced[node])
+                 for one in whole.machines[mechanism.name].parameters if one.name in values
+                 for node, _ in [values[one.name]]]
+        return {setting.name: setting for setting in found}
 
-    def _listen(self) -> None:
-        self._events = self._bridge.node.create_subscription(
-            ParameterEvent, '/parameter_events',
-            lambda event: self._bridge.hand_over(self._notice, event),
-            qos_profile_parameter_events)
-
-    def _open(self, keys: Collection[str], nodes: Collection[str],
+    def _open(self, keys: Collection[str], nodes: Collection[str], announced: Collection[str],
               sources: Collection[str]) -> None:
-        """Create missing clients and subscriptions for these, and destroy all others."""
+        """Create missing subscriptions for these, and destroy all others."""
         topics: dict[str, Any] = {
             f'{key}{ending}': (key, type_, qos) for key in keys for ending, type_, qos in (
                 (MARKERS, MarkerArray, NEWEST), (LOCUS, Marker, LATCHED))}
-        self._drop_others(nodes, sources, topics)
-        for name in set(nodes) - set(self._nodes):
-            self._nodes[name] = RemoteNode(self._bridge, name)
+        self._drop_others(nodes, announced, sources, topics)
+        for topic in set(announced) - set(self._announcements):
+            self._announcements[topic] = self._bridge.node.create_subscription(
+                ParameterEvent, topic, partial(self._bridge.hand_over, self._notice),
+                ownership.LATCHED)
         for topic in set(sources) - set(self._sources):
             self._received[topic] = {}
             self._sources[topic] = self._bridge.node.create_subscription(
@@ -471,12 +486,14 @@ class SceneView:
         return feed, self._bridge.node.create_subscription(
             type_, name, lambda raw: self._receive(feed, raw), qos, raw=True)
 
-    def _drop_others(self, nodes: Collection[str], sources: Collection[str],
-                     topics: Collection[str]) -> None:
+    def _drop_others(self, nodes: Collection[str], announced: Collection[str],
+                     sources: Collection[str], topics: Collection[str]) -> None:
         """Destroy all but these."""
         node = self._bridge.node
-        for name in set(self._nodes) - set(nodes):
-            self._nodes.pop(name).close()
+        for name in set(self._setters) - set(nodes):
+            node.destroy_client(self._setters.pop(name))
+        for topic in set(self._announcements) - set(announced):
+            node.destroy_subscription(self._announcements.pop(topic))
         for topic in set(self._sources) - set(sources):
             node.destroy_subscription(self._sources.pop(topic))
             del self._received[topic]
@@ -484,11 +501,8 @@ class SceneView:
             node.destroy_subscription(self._feeds.pop(name)[1])
 
     def _close(self) -> None:
-        self._drop_others((), (), ())
+        self._drop_others((), (), (), ())
         self._numbers = {}
-        if self._events is not None:
-            self._bridge.node.destroy_subscription(self._events)
-            self._events = None
 
     def _receive(self, feed: Feed, raw: bytes) -> None:
         feed.newest = raw
@@ -499,43 +513,30 @@ class SceneView:
             client.offer(feed)
 
     def _notice(self, event: ParameterEvent) -> None:
-        """Forward a change of parameters to the pages."""
+        """Adopt announced values, and forward those that have changed to the pages."""
+        if event.new_parameters:
+            self._announced[event.node] = {}
+            self._scenes.pop(event.node, None)
+        values, changed = self._announced.setdefault(event.node, {}), set()
+        for parameter in (*event.new_parameters, *event.changed_parameters):
+            # Any node may announce values of unknown types.
+            with suppress(RuntimeError):
+                value = scene.plain(parameter_value_to_python(parameter.value))
+                if parameter.name not in values:
+                    self._seen = None
+                    self._news.set()
+                if value != values.get(parameter.name):
+                    changed.add(parameter.name)
+                    values[parameter.name] = value
         for mechanism in self._mechanisms.values():
-            prefix = f'{mechanism.name}.'
-            for parameter in (*event.new_parameters, *event.changed_parameters):
-                name = parameter.name[len(prefix):]
-                if parameter.name.startswith(prefix):
-                    self._notice_one(mechanism, event.node, name, parameter)
-
-    def _notice_one(self, mechanism: ShownMechanism, node: str, name: str,
-                    parameter: Any) -> None:
-        setting = mechanism.settings.get(name)
-        if setting is None or parameter.value.type != setting.message.type:
-            if node in self._nodes:
-                self._seen = None
-            return
-        if node != setting.node:
-            return
-        setting.message = parameter.value
-        mechanism.machine = None
-        for client in self.clients:
-            client.tell((mechanism.key, name), {'op': 'value', 'mechanism': mechanism.key,
-                                                'name': name, 'value': setting.value})
-
-
-def _machine(mechanism: ShownMechanism) -> scene.SceneMechanism:
-    """Return a mechanism as its scene has it, read once."""
-    if mechanism.machine is None:
-        mechanism.machine = mechanism.scene().machines[mechanism.name]
-    return mechanism.machine
-
-
-def _read(given: Mapping[str, Any]) -> scene.Scene:
-    """Read a scene from other nodes' parameters; raise Refused if they are invalid."""
-    try:
-        return scene.read(given, strict=False)
-    except scene.SceneError as error:
-        raise Refused(str(error)) from None
+            settings = [setting for setting in mechanism.settings.values()
+                        if setting.node == event.node and setting.full_name in changed]
+            drawn = self._drawn(mechanism) if settings else {}
+            for setting in settings:
+                message = {'op': 'value', 'mechanism': mechanism.key, 'name': setting.name,
+                           'value': setting.value, 'drawn': drawn}
+                for client in self.clients:
+                    client.tell((mechanism.key, setting.name), message)
 
 
 def _store(positions: dict[str, float], message: JointState) -> None:

@@ -11,18 +11,24 @@ const SETTLED = 500;
 const NUMBER = /^[+-]?(\d+[.,]?\d*|[.,]\d+)(e[+-]?\d+)?$/i;
 
 /** How a slider's place in [0, 1] becomes a value, and back. */
-export const LINEAR = {
+const LINEAR = {
   value: (place, low, high) => low + (high - low) * place,
   place: (value, low, high) => (value - low) / (high - low),
 };
-export const BY_FACTOR = {
+const BY_FACTOR = {
   value: (place, low, high) => low * (high / low) ** place,
   place: (value, low, high) => Math.log(value / low) / Math.log(high / low),
 };
-export const FINE_ABOUT_ZERO = {
+const FINE_ABOUT_ZERO = {
   value: (place, low, high) => high * (2 * place - 1) ** 3,
   place: (value, low, high) => (Math.cbrt(value / high) + 1) / 2,
 };
+
+function law({ kind, group, low, high }) {
+  if (kind === 'integer' || group === 'starts') return LINEAR;
+  if (low > 0) return BY_FACTOR;
+  return low === -high ? FINE_ABOUT_ZERO : LINEAR;
+}
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
@@ -49,6 +55,8 @@ export function element(tag, properties = {}, ...children) {
 export function put(node, properties) {
   for (const [name, value] of Object.entries(properties)) if (node[name] !== value) node[name] = value;
 }
+
+export const button = (textContent, onclick, properties = {}) => element('button', { type: 'button', textContent, onclick, ...properties });
 
 let made = 0;
 const nextId = () => `s${made += 1}`;
@@ -94,13 +102,14 @@ export class Reason {
 
 /** A number with a slider. A gesture lasts from its first change to its release. */
 export class Slider {
-  constructor({ label, title, unit, low, high, kind, value, scale, step, digits = 6, times = () => 1 }, request) {
+  constructor({ label, title, unit, low, high, kind, group, value, digits = 6, times = () => 1 }, request) {
+    const scale = law({ kind, group, low, high });
     Object.assign(this, { unit, low, high, kind, scale, digits, times, accepted: value, held: false, gesture: {} });
     const id = nextId();
     this.range = element('input', { type: 'range', id });
     this.range.min = kind === 'integer' ? low : 0;
     this.range.max = kind === 'integer' ? high : STOPS;
-    this.range.step = kind === 'integer' ? step || 1 : FINE;
+    this.range.step = kind === 'integer' ? 1 : FINE;
     this.number = element('input', { type: 'text', autocomplete: 'off', ariaLabel: label });
     this.reason = new Reason(`${id}r`);
     for (const input of [this.range, this.number]) input.setAttribute('aria-describedby', `${id}r`);
@@ -221,16 +230,14 @@ export class Slider {
   }
 }
 
-/** A button for each of two values; the pressed one has the present value. */
+/** A button for each of the values 1 and -1; the pressed one has the present value. */
 export class Choice {
   constructor({ label, title, value }, words, request) {
     this.reason = new Reason();
-    this.buttons = new Map(Object.entries(words).map(([sign, textContent]) => [Number(sign), element('button', {
-      type: 'button', textContent, onclick: async () => {
-        const { reason } = await request(Number(sign), {}, this.value);
-        this.reason.say(reason && `Refused: ${reason}`);
-        if (!reason) this.update(Number(sign));
-      },
+    this.buttons = new Map([1, -1].map((sign, i) => [sign, button(words[i], async () => {
+      const { reason } = await request(sign, {}, this.value);
+      this.reason.say(reason && `Refused: ${reason}`);
+      if (!reason) this.update(sign);
     })]));
     this.group = element('span', { className: 'choice', ariaLabel: label }, ...this.buttons.values());
     this.group.setAttribute('role', 'group');
@@ -241,12 +248,7 @@ export class Choice {
   update(value) {
     if (value !== this.value) this.reason.fade();
     this.value = value;
-    for (const [sign, button] of this.buttons) button.setAttribute('aria-pressed', sign === value);
-  }
-
-  /** Set the labels of the values. */
-  name(words) {
-    for (const [sign, textContent] of Object.entries(words)) put(this.buttons.get(Number(sign)), { textContent });
+    for (const [sign, one] of this.buttons) one.setAttribute('aria-pressed', sign === value);
   }
 
   render() {}

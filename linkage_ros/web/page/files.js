@@ -3,7 +3,7 @@
 
 // Downloads of a mechanism: its outputs, its picture, its robot model, its C code.
 
-import { element, Reason } from './control.js';
+import { button, element, Reason } from './control.js';
 import { paint } from './picture.js';
 
 const FORMS = {
@@ -33,19 +33,16 @@ function painted() {
 }
 
 export class Files {
-  constructor(mechanism, connection) {
-    Object.assign(this, { mechanism, connection, reason: new Reason() });
+  constructor(mechanism) {
+    Object.assign(this, { mechanism, reason: new Reason() });
     this.element = element('div', { className: 'tools' }, element('span', { className: 'about', textContent: 'Download' }),
-      ...Object.entries(FORMS).map(([form, [ending, title]]) => element('button', {
-        type: 'button', textContent: form, title, onclick: () => this.save(form.toLowerCase(), ending),
-      })), this.reason.line);
+      ...Object.entries(FORMS).map(([form, [ending, title]]) => button(form, () => this.save(form.toLowerCase(), ending), { title })),
+      this.reason.line);
   }
 
   async save(form, ending) {
-    const { name, key } = this.mechanism;
-    const { reason, text } = form === 'png' ? { text: await painted() }
-      : await this.connection.ask({ op: 'export', mechanism: key, form });
+    const { reason, text } = form === 'png' ? { text: await painted() } : await this.mechanism.ask('export', { form });
     this.reason.say(reason && `Not saved: ${reason}`);
-    if (!reason) download(`${name}.${ending}`, text);
+    if (!reason) download(`${this.mechanism.name}.${ending}`, text);
   }
 }

@@ -31,7 +31,7 @@ export class Hand {
   joint([x, y], reach) {
     let best = null;
     for (const leg of this.picture.legsSeen()) {
-      if (leg.mechanism.inSpace) continue;
+      if (leg.mechanism.space) continue;
       for (const [name, at] of leg.seen) {
         const away = Math.hypot(at[0] - x, at[1] - y);
         if (leg.mechanism.tunable.fixed.includes(name) || away > reach || best?.away < away) continue;

@@ -3,21 +3,17 @@
 
 // Changes of a mechanism's parameters, for undo and reset.
 
-const MOVES = /\.(speed|start)$/;
+const TUNED = ['dimensions', 'branches', 'more'];
 
 export class History {
   constructor(mechanism) {
-    this.mechanism = mechanism;
-    this.steps = [];
-    this.first = new Map();
-    this.begin();
+    Object.assign(this, { mechanism, steps: [], first: new Map() });
   }
 
   /** Store the first value of each parameter, except speeds and starts. */
   begin() {
-    for (const { name, kind, value, fixed } of this.mechanism.settings.values()) {
-      const tuned = !fixed && !MOVES.test(name) && ['double', 'integer', 'bool'].includes(kind);
-      if (tuned && !this.first.has(name)) this.first.set(name, value);
+    for (const { name, value } of TUNED.flatMap(group => this.mechanism.group(group))) {
+      if (!this.first.has(name)) this.first.set(name, value);
     }
   }
 

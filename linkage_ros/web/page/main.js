@@ -4,7 +4,7 @@
 // The page: passes the viewer's messages to picture and panel, and requests to the viewer.
 
 import { Connection } from './connection.js';
-import { arithmetic, element, put } from './control.js';
+import { arithmetic, button, put } from './control.js';
 import { Hand } from './hand.js';
 import { Mechanism } from './mechanism.js';
 import { Panel } from './panel.js';
@@ -13,6 +13,7 @@ import { units } from './units.js';
 import { View } from './view.js';
 
 const REFUSED = 4000;
+const LOCUS = ['locus', 'loci'];
 const mechanisms = new Map();
 const at = id => document.getElementById(id);
 const [views, status, names, workshop, arrows, whole, notice] = [
@@ -81,7 +82,7 @@ const connection = new Connection({
     const known = new Map(mechanisms);
     mechanisms.clear();
     for (const one of described) {
-      const mechanism = known.get(one.key) ?? new Mechanism(one);
+      const mechanism = known.get(one.key) ?? new Mechanism(one, connection);
       mechanism.describe(one);
       // Mechanisms of one name in two namespaces have distinct titles.
       mechanism.title = described.some(({ key, name }) => name === one.name && key !== one.key) ? one.key.slice(1) : one.name;
@@ -94,19 +95,21 @@ const connection = new Connection({
   },
 
   look({ number, mechanism, ...look }) {
-    const drawn = mechanisms.get(mechanism) ?? new Mechanism({ key: mechanism, settings: [] });
+    const drawn = mechanisms.get(mechanism) ?? new Mechanism({ key: mechanism }, connection);
     mechanisms.set(mechanism, drawn);
     drawn.markers.set(number, { points: new Float32Array(), ...drawn.markers.get(number), look });
     picture.refit(mechanism);
   },
 
-  value({ mechanism, name, value }) {
-    const setting = mechanisms.get(mechanism)?.settings.get(name);
+  value({ mechanism: key, name, value, drawn }) {
+    const mechanism = mechanisms.get(key);
+    const setting = mechanism?.settings.get(name);
     if (!setting) return;
     setting.value = value;
-    panel.update(mechanism, name, value);
-    if (setting.kind.endsWith('array') || setting.kind === 'bool') show(shown);
-    if (!/\.(speed|start)$/.test(name)) picture.refit(mechanism);
+    Object.assign(mechanism, drawn);
+    panel.update(key, name, value);
+    if (typeof value !== 'number') show(shown);
+    if (setting.group !== 'speeds' && setting.group !== 'starts') picture.refit(key);
   },
 
   frame(buffer) {
@@ -119,7 +122,7 @@ const connection = new Connection({
         const marker = mechanism.markers.get(number);
         if (!marker) continue;
         marker.points = new Float32Array(buffer, from + 8, 3 * count);
-        if (marker.look.kind !== 'strip') mechanism.lastMarkers = now;
+        if (!LOCUS.includes(marker.look.kind)) mechanism.lastMarkers = now;
       }
       from += 8 + 12 * count;
     }
@@ -130,7 +133,7 @@ const connection = new Connection({
 });
 arithmetic.ask = text => connection.ask({ op: 'read', text });
 
-const panel = new Panel(at('panel'), connection, light, refuse);
+const panel = new Panel(at('panel'), light, refuse);
 
 /** Draw once before the next refresh of the screen, then call `after`. */
 function draw(after) {
@@ -151,14 +154,10 @@ function show(key) {
   shown = key;
   const several = mechanisms.size > 1;
   const labels = several ? [['', 'all'], ...[...mechanisms.values()].map(one => [one.key, one.title])] : [];
-  views.replaceChildren(...labels.map(([value, textContent]) => {
-    const button = element('button', { type: 'button', textContent, ariaPressed: value === key });
-    button.onclick = () => {
-      store({ shown: value });
-      show(value);
-    };
-    return button;
-  }));
+  views.replaceChildren(...labels.map(([value, title]) => button(title, () => {
+    store({ shown: value });
+    show(value);
+  }, { ariaPressed: value === key })));
   const selected = [...mechanisms.values()].filter(mechanism => !key || mechanism.key === key);
   for (const mechanism of selected) mechanism.arrows.kind = stored.arrows;
   picture.show(selected);

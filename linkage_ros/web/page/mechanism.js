@@ -1,56 +1,48 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// A mechanism on the page: its markers by number, its settings by name, and its changes.
+// A mechanism on the page: its description, its markers by number, and its changes.
 
 import { History } from './history.js';
 
+/** What is drawn of a mechanism whose parameters are not announced yet. */
+const UNKNOWN = { settings: [], points: [], legs: 1, pairs: 1, inputs: {}, sides: {}, curves: {} };
+
 export class Mechanism {
-  constructor(described) {
+  constructor(described, connection) {
+    this.connection = connection;
     this.markers = new Map();
     this.lastMarkers = performance.now();
     /** Ranges and bars of dimensions, and fixed joints; empty until the viewer has answered. */
     this.tunable = { travel: {}, bars: {}, fixed: [] };
     /** The requested kind of arrows, and the received arrows by joint. */
     this.arrows = { kind: '', at: {} };
-    this.describe(described);
     this.history = new History(this);
+    this.describe(described);
   }
 
   describe(described) {
-    Object.assign(this, described);
-    this.settings = new Map(described.settings.map(setting => [setting.name, setting]));
-    this.history?.begin();
+    Object.assign(this, UNKNOWN, described);
+    this.settings = new Map(this.settings.map(setting => [setting.name, setting]));
+    this.history.begin();
   }
 
-  /** Store the arrows that were requested, by joint. */
-  show(arrows) {
-    Object.assign(this.arrows, arrows);
+  /** Request something of the mechanism; return the answer. */
+  ask(op, fields) {
+    return this.connection.ask({ op, mechanism: this.key, ...fields });
   }
 
   value(name) {
     return this.settings.get(name)?.value;
   }
 
-  /** Its markers; with mirrored legs, the curve of their feet, too. */
-  *drawn() {
-    for (const { look, points } of this.markers.values()) {
-      yield { look, points };
-      if (look.kind === 'strip' && this.value('mirrored')) yield { look, points: points.map((value, i) => i % 3 ? value : -value) };
-    }
+  /** The settings of a group: dimensions, branches, speeds, starts or more. */
+  group(name) {
+    return [...this.settings.values()].filter(({ group }) => group === name);
   }
 
-  /** Whether it is no linkage in a plane. */
-  get inSpace() {
-    return this.value('type') === 'rods';
-  }
-
-  /** How many pairs of legs there are, and how many legs. */
-  get pairs() {
-    return this.value('leg_pairs') ?? 1;
-  }
-
-  get legs() {
-    return this.pairs * (this.value('mirrored') ? 2 : 1);
+  /** The width of a bar [m], which is half of a joint's. */
+  get width() {
+    return [...this.markers.values()].find(({ look }) => look.kind === 'joints')?.look.width / 2;
   }
 }

@@ -3,18 +3,13 @@
 
 // The motion of a mechanism: a slider for each input, play and step, and its present outputs.
 
-import { element, LINEAR, Newest, noNumber, put, Reason, Slider, typed } from './control.js';
+import { button, element, Newest, noNumber, put, Reason, Slider, typed } from './control.js';
 import { figures, units } from './units.js';
 
 const STEP = Math.PI / 180;
 const STEPS_A_STROKE = 100;
-const SECONDS_A_STROKE = 3;
 const FIGURES = 5;
 const FIGURES_OF_MANY = 3;
-
-function button(textContent, ariaLabel, onclick) {
-  return element('button', { type: 'button', textContent, ariaLabel, title: ariaLabel, onclick });
-}
 
 function shown(value, unit, digits = FIGURES) {
   if (value === null) return '—';
@@ -27,49 +22,52 @@ function inWords({ name, arcs, unit }) {
   return `${name} reaches ${ends.join(' or ')} ${units.of(unit).name}`;
 }
 
+/** An angle plus the whole turns that bring it nearest to another. */
+export const beside = (value, other, turn) => turn ? value + turn * Math.round((other - value) / turn) : value;
+
+const ends = ({ arcs }) => [Math.min(...arcs.map(([low]) => low)), Math.max(...arcs.map(([, high]) => high))];
+
 /** An input: its slider, which follows it, and buttons for a step back and on. */
 class InputRow {
-  constructor(name, input, want) {
-    this.turns = input.unit === 'rad';
+  constructor(name, input, value, want) {
+    const { unit } = this.input = input;
+    const [low, high] = ends(input);
     this.slider = new Slider({
-      label: name, unit: input.unit, kind: 'double', value: input.value, digits: FIGURES, scale: LINEAR, ...this.ends(input),
-      title: `The ${name} [${input.unit}]. Moved by hand it stops there.`,
-    }, async value => {
-      const answer = await want({ output: name, value });
-      return answer.inputs ? { ...answer, value: this.beside(answer.inputs[name].value) } : answer;
+      label: name, unit, kind: 'double', group: 'starts', value, digits: FIGURES, low, high,
+      title: `The ${name} [${unit}]. Moved by hand it stops there.`,
+    }, async requested => {
+      const answer = await want({ output: name, value: requested });
+      return answer.inputs ? { ...answer, value: this.beside(answer.inputs[name]) } : answer;
     });
-    this.slider.range.before(button('−', `Step the ${name} back`, () => this.step(-1)));
-    this.slider.range.after(button('+', `Step the ${name} on`, () => this.step(1)));
+    this.slider.range.before(this.button('−', `Step the ${name} back`, -1));
+    this.slider.range.after(this.button('+', `Step the ${name} on`, 1));
     this.slider.row.classList.add('input');
   }
 
-  ends({ arcs }) {
-    return { low: Math.min(...arcs.map(arc => arc[0])), high: Math.max(...arcs.map(arc => arc[1])) };
+  button(sign, title, way) {
+    return button(sign, () => {
+      const { low, high, expected } = this.slider;
+      const step = this.input.unit === 'rad' ? STEP : (high - low) / STEPS_A_STROKE;
+      this.slider.offer(this.beside(expected + way * step));
+    }, { title, ariaLabel: title });
   }
 
   /** An angle plus the whole turns that put it on the slider. */
   beside(value) {
-    const { low, high } = this.slider;
-    return this.turns ? value - 2 * Math.PI * Math.round((value - (low + high) / 2) / (2 * Math.PI)) : value;
+    return beside(value, (this.slider.low + this.slider.high) / 2, this.input.turn);
   }
 
-  step(way) {
-    const { low, high, expected } = this.slider;
-    const requested = expected + way * (this.turns ? STEP : (high - low) / STEPS_A_STROKE);
-    this.slider.offer(this.turns ? this.beside(requested) : requested);
-  }
-
-  show(input) {
-    const { low, high } = this.ends(input);
+  show(input, value) {
+    const [low, high] = ends(this.input = input);
     if (low !== this.slider.low || high !== this.slider.high) this.slider.bound(low, high);
-    this.slider.follow(this.beside(input.value));
+    this.slider.follow(this.beside(value));
   }
 }
 
 /** An output: its value, which is editable with a single input, and d output / d input. */
 class OutputRow {
-  constructor(name, editable, count, want, say) {
-    this.editable = editable;
+  constructor(name, count, want, say) {
+    const editable = this.editable = count === 1;
     this.value = editable
       ? element('input', { type: 'text', autocomplete: 'off', ariaLabel: name })
       : element('span');
@@ -102,75 +100,55 @@ class OutputRow {
     this.inputs.forEach((input, i) => {
       const ratio = `${unit}/${input.unit}`;
       const { name } = units.of(ratio);
-      const alone = this.inputs.length === 1;
-      const textContent = shown(rates[i], ratio, alone ? FIGURES : FIGURES_OF_MANY);
-      put(this.rates[i], { title: name, textContent: textContent + (alone && unit !== input.unit ? ` ${name}` : '') });
+      const textContent = shown(rates[i], ratio, this.editable ? FIGURES : FIGURES_OF_MANY);
+      put(this.rates[i], { title: name, textContent: textContent + (this.editable && unit !== input.unit ? ` ${name}` : '') });
     });
   }
 }
 
 /** The part of the panel that moves one mechanism; calls `onshow` when its pose has been received. */
 export class Motion {
-  constructor(mechanism, connection, open, refuse) {
-    this.mechanism = mechanism;
-    this.connection = connection;
-    this.speeds = new Map([...mechanism.settings.keys()].filter(name => name.endsWith('.speed')).map(name => [name, 0]));
-    this.play = button('', '', () => this.stopOrPlay());
-    this.play.hidden = !this.speeds.size;
-    this.inputs = new Map();
-    this.outputs = new Map();
+  constructor(mechanism, open, refuse) {
+    Object.assign(this, { mechanism, inputs: new Map(), outputs: new Map(), reason: new Reason() });
+    /** The last speeds other than zero, by parameter. */
+    this.playing = {};
+    this.play = button('', () => this.stopOrPlay(), { hidden: !mechanism.group('speeds').length });
     this.place = element('div', { className: 'inputs' });
     this.table = element('table');
-    this.reason = new Reason();
     this.folding = element('details', { open, hidden: true }, element('summary', { textContent: 'Outputs', title: 'Coordinates count from the origin of its own plane' }), this.table);
     this.element = element('div', {}, this.place, this.reason.line, this.folding);
     this.dragged = new Newest(async want => {
       const answer = await this.want(want);
       this.say(answer);
-      if (this.connection.opened) refuse(answer.reason);
+      if (mechanism.connection.opened) refuse(answer.reason);
     });
     this.renderPlay();
   }
 
-  get moves() {
-    return [...this.speeds.keys()].some(name => this.mechanism.value(name));
-  }
-
   stopOrPlay() {
-    const values = Object.fromEntries([...this.speeds].map(([name, speed]) => [name, this.moves ? 0 : speed || this.usual(name)]));
-    this.connection.ask({ op: 'set', mechanism: this.mechanism.key, values }).then(answer => this.say(answer));
-  }
-
-  /** The default speed of an input that has not moved yet. */
-  usual(name) {
-    const row = this.inputs.get(name.split('.')[0]);
-    return !row || row.turns ? 1 : (row.slider.high - row.slider.low) / SECONDS_A_STROKE;
-  }
-
-  /** The speeds of the inputs when it plays. */
-  get playing() {
-    return Object.fromEntries([...this.speeds].filter(([, speed]) => speed));
+    const values = Object.fromEntries(Object.entries(this.speeds).map(([name, speed]) => [`${name}.speed`, this.moves ? 0 : speed]));
+    this.mechanism.ask('set', { values }).then(answer => this.say(answer));
   }
 
   /** The speed of the first input when it plays. */
   get speed() {
-    const name = `${this.inputs.keys().next().value}.speed`;
-    return this.playing[name] ?? this.usual(name);
+    return Object.values(this.speeds)[0];
   }
 
-  /** The present inputs, and whether the first is an angle. */
+  /** The speeds of the inputs when it plays, by input. */
+  get speeds() {
+    return Object.fromEntries(Object.entries(this.mechanism.inputs).map(([name, { speed }]) => [name, this.playing[`${name}.speed`] ?? speed]));
+  }
+
+  /** The present inputs. */
   get present() {
     return [...this.inputs.values()].map(({ slider }) => slider.accepted);
   }
 
-  get turns() {
-    return this.inputs.values().next().value?.turns;
-  }
-
   renderPlay() {
-    for (const name of this.speeds.keys()) {
-      this.speeds.set(name, this.mechanism.value(name) || this.speeds.get(name));
-    }
+    const speeds = this.mechanism.group('speeds');
+    this.moves = speeds.some(({ value }) => value);
+    for (const { name, value } of speeds) if (value) this.playing[name] = value;
     this.play.textContent = this.moves ? 'Stop' : 'Play';
   }
 
@@ -180,7 +158,7 @@ export class Motion {
 
   /** Request a value of an output, or a place of a joint. */
   async want(want) {
-    const answer = await this.connection.ask({ op: 'pose', mechanism: this.mechanism.key, want });
+    const answer = await this.mechanism.ask('pose', { want });
     if (answer.inputs) this.show(answer);
     if (answer.reach) answer.reason = inWords(answer.reach);
     return answer;
@@ -190,31 +168,25 @@ export class Motion {
     this.dragged.offer(want);
   }
 
-  /** The request for arrows, at the inputs' speeds when it plays. */
-  get arrows() {
-    if (!this.mechanism.arrows.kind) return {};
-    const speeds = Object.fromEntries([...this.inputs.keys()].map(name => [name, this.playing[`${name}.speed`] ?? this.usual(`${name}.speed`)]));
-    return { arrows: this.mechanism.arrows.kind, speeds };
-  }
-
-  /** Request the present pose. */
+  /** Request the present pose, with the chosen arrows at the inputs' speeds when it plays. */
   async look() {
-    if (this.looking || !this.connection.opened) return;
+    const { connection, inputs, arrows: { kind } } = this.mechanism;
+    if (this.looking || !connection.opened || !Object.keys(inputs).length) return;
     this.looking = true;
-    const answer = await this.connection.ask({ op: 'pose', mechanism: this.mechanism.key, ...this.arrows });
+    const answer = await this.mechanism.ask('pose', kind && { arrows: kind, speeds: this.speeds });
     this.looking = false;
     if (answer.inputs) this.show(answer);
     else if (!this.inputs.size) this.say(answer);
   }
 
   show({ inputs, outputs, arrows }) {
-    if (arrows) this.mechanism.show(arrows);
+    Object.assign(this.mechanism.arrows, arrows);
     const names = [...Object.keys(inputs), ...Object.keys(outputs)].join();
     if (names !== this.built) this.build(names, inputs, outputs);
-    for (const [name, input] of Object.entries(inputs)) this.inputs.get(name).show(input);
+    for (const [name, value] of Object.entries(inputs)) this.inputs.get(name).show(this.mechanism.inputs[name], value);
     this.onshow();
     if (!this.folding.open) return;
-    for (const [name, output] of Object.entries(outputs)) this.outputs.get(name).show(output, Object.values(inputs));
+    for (const [name, output] of Object.entries(outputs)) this.outputs.get(name).show(output, Object.values(this.mechanism.inputs));
   }
 
   build(names, inputs, outputs) {
@@ -222,17 +194,16 @@ export class Motion {
     this.say({});
     const want = async what => {
       const answer = await this.want(what);
-      if (!inputs[what.output]) this.say(answer);
+      if (!(what.output in inputs)) this.say(answer);
       return answer;
     };
-    const [all, one] = [Object.keys(inputs), Object.keys(inputs).length === 1];
-    this.inputs = new Map(Object.entries(inputs).map(([name, input]) => [name, new InputRow(name, input, want)]));
-    this.outputs = new Map(Object.keys(outputs).map(name => [name, new OutputRow(name, one, all.length, want, answer => this.say(answer))]));
+    const all = Object.keys(inputs);
+    this.inputs = new Map(all.map(name => [name, new InputRow(name, this.mechanism.inputs[name], inputs[name], want)]));
+    this.outputs = new Map(Object.keys(outputs).map(name => [name, new OutputRow(name, all.length, want, answer => this.say(answer))]));
     this.place.replaceChildren(...[...this.inputs.values()].map(({ slider }) => slider.row));
+    const head = (...children) => element('th', { scope: 'col' }, ...children);
     this.table.replaceChildren(
-      element('thead', {}, element('tr', {}, element('th', { scope: 'col', textContent: 'output' }),
-        element('th', { scope: 'col', textContent: 'value' }),
-        ...all.map(name => element('th', { scope: 'col' }, 'd / d ', element('span', { textContent: name }))))),
+      element('thead', {}, element('tr', {}, head('output'), head('value'), ...all.map(name => head('d / d ', element('span', { textContent: name }))))),
       element('tbody', {}, ...[...this.outputs.values()].map(({ row }) => row)));
     this.folding.hidden = !this.outputs.size;
   }

@@ -15,16 +15,15 @@ const LOOKS = 120;
 
 /** The section of one mechanism. Its `parts` have a method render(). */
 class Section {
-  constructor(mechanism, { connection, light, refuse }, folded) {
+  constructor(mechanism, { light, refuse }, folded) {
     const { key, name, title } = mechanism;
     const type = mechanism.value('type') ?? '';
     this.mechanism = mechanism;
-    this.motion = new Motion(mechanism, connection, !folded, refuse);
-    this.plot = new Plot(mechanism, connection, this.motion);
-    this.plot.element.hidden = mechanism.inSpace;
+    this.motion = new Motion(mechanism, !folded, refuse);
+    this.plot = new Plot(mechanism, this.motion);
     this.motion.place.after(this.plot.element);
     this.motion.onshow = () => this.plot.look();
-    this.tuning = new Tuning(mechanism, connection, !folded, own => light(mechanism, own));
+    this.tuning = new Tuning(mechanism, !folded, own => light(mechanism, own));
     this.parts = [this.motion, this.plot, this.tuning];
     this.still = element('p', { className: 'still', hidden: true });
     this.loading = element('p', { className: 'about', textContent: 'Waiting for its parameters …', hidden: mechanism.settings.size > 0 });
@@ -32,7 +31,7 @@ class Section {
       element('header', {}, element('h2', { textContent: title }),
         element('span', { className: 'about', textContent: type === name ? '' : type }), this.motion.play),
       this.still, this.loading, this.motion.element, ...this.tuning.speeds, this.tuning.element,
-      new Files(mechanism, connection).element);
+      new Files(mechanism).element);
     this.element.dataset.key = key;
   }
 
@@ -61,8 +60,8 @@ class Section {
 /** All displayed sections. */
 export class Panel {
   /** Calls `light`, and `refuse` with the reason why a joint is not dragged. */
-  constructor(place, connection, light, refuse) {
-    Object.assign(this, { place, connection, light, refuse });
+  constructor(place, light, refuse) {
+    Object.assign(this, { place, light, refuse });
     this.sections = new Map();
     units.onchange(() => this.render());
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.render());
@@ -74,7 +73,7 @@ export class Panel {
   show(mechanisms, folded) {
     const before = this.sections;
     this.sections = new Map(mechanisms.map(one => {
-      const built = JSON.stringify([folded, one.title, [...one.settings.values()].map(({ value, ...rest }) => rest)]);
+      const built = JSON.stringify([folded, one.title, one.curves, Object.keys(one.inputs), [...one.settings.values()].map(({ value, ...rest }) => rest)]);
       const old = before.get(one.key);
       return [one.key, old?.built === built ? old : new Section(one, this, folded).after(old, built)];
     }));

@@ -20,8 +20,8 @@ const HEAD = 9;
 /** Where a name is tried: beside its joint from the side away from the middle on, then farther out. */
 const TURNS = [1, 1.9].flatMap(ring => [0, 1, -1, 2, -2, 3, -3, 4].map(eighth => [ring, eighth * Math.PI / 4]));
 const MOST_LINES = 100;
-/** The number of coordinates of a line, a triangle, a joint. */
-const PIECE = { lines: 4, triangles: 6, joints: 2 };
+/** The number of coordinates of a line, a triangle, a joint, by the kind of their marker. */
+const PIECE = { lines: 4, slots: 4, plates: 6, triangles: 6, joints: 2 };
 /** A linkage in space is seen from the front, from the right and above. */
 const OBLIQUE = { right: [0.8, 0.6, 0], up: [-0.168, 0.224, 0.96], out: [0.576, -0.768, 0.28] };
 const FONT = "13px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
@@ -151,12 +151,13 @@ export class Picture {
     if (!shapes.length) return;
     // The picture is not refitted while a joint is dragged.
     if (!this.scale || !this.pull()) this.fit(shapes, width, height);
-    if (!this.view.turned && !this.mechanisms[0].inSpace) this.grid(width, height);
+    if (!this.view.turned && !this.mechanisms[0].space) this.grid(width, height);
     this.planes();
     // Slots are drawn first, so that they do not hide bars.
-    shapes.sort((a, b) => this.isSlot(b) - this.isSlot(a) || a.depth - b.depth);
-    const joints = shapes.filter(({ look }) => look.kind === 'joints');
-    for (const shape of shapes) if (!joints.includes(shape)) this[shape.look.kind](shape);
+    const drawn = kind => shapes.filter(({ look }) => look.kind === kind);
+    shapes.sort((a, b) => a.depth - b.depth);
+    const [slots, joints] = ['slots', 'joints'].map(drawn);
+    for (const shape of [...slots, ...shapes.filter(one => !slots.includes(one) && !joints.includes(one))]) this[shape.look.kind](shape);
     this.light();
     for (const shape of joints) this.joints(shape);
     this.arrows();
@@ -170,9 +171,9 @@ export class Picture {
     const shapes = [];
     this.seen = null;
     for (const mechanism of this.mechanisms) {
-      for (const { look, points } of mechanism.drawn()) {
+      for (const { look, points } of mechanism.markers.values()) {
         const [x, y, z] = axes(look.pose);
-        this.seen ??= this.view.axes(mechanism.inSpace ? OBLIQUE : { right: x, up: y, out: z });
+        this.seen ??= this.view.axes(mechanism.space ? OBLIQUE : { right: x, up: y, out: z });
         const depth = dot(this.seen.out, look.pose.slice(0, 3));
         const map = [this.seen.right, this.seen.up].map(way => [
           dot(way, x), dot(way, y), dot(way, z), dot(way, look.pose.slice(0, 3))]);
@@ -193,8 +194,8 @@ export class Picture {
   fit(shapes, width, height) {
     const now = new Map();
     this.maps = new Map();
-    for (const { mechanism: { key, inSpace }, points, map } of shapes) {
-      if (!now.has(key)) now.set(key, new Box(inSpace ? 3 : 2));
+    for (const { mechanism: { key, space }, points, map } of shapes) {
+      if (!now.has(key)) now.set(key, new Box(space ? 3 : 2));
       for (let i = 0; i < points.length; i += 3) now.get(key).add(points[i], points[i + 1], points[i + 2]);
       this.maps.set(key, map);
     }
@@ -312,14 +313,25 @@ export class Picture {
     this.context.stroke();
   }
 
-  strip({ look, places }) {
+  locus({ look, places }) {
+    this.stroke(look, places, places.length, colour(look.colour), 1.5);
+  }
+
+  /** Curves as a list of lines. */
+  loci({ look, places }) {
+    this.stroke(look, places, PIECE.lines, colour(look.colour), 1.5);
+  }
+
+  /** Draw lines through places, so many coordinates each; return their width. */
+  stroke({ width }, places, size, style, least = 2) {
     const { context } = this;
-    context.lineWidth = Math.max(1.5, look.width * this.scale);
-    context.strokeStyle = colour(look.colour);
+    context.lineWidth = Math.max(least, width * this.scale);
+    context.strokeStyle = style;
     context.lineJoin = context.lineCap = 'round';
     context.beginPath();
-    for (let i = 0; i < places.length; i += 2) context.lineTo(...this.at(places[i], places[i + 1]));
+    for (let i = 0; i < places.length; i += 2) context[i % size ? 'lineTo' : 'moveTo'](...this.at(places[i], places[i + 1]));
     context.stroke();
+    return context.lineWidth;
   }
 
   /** Call back with each leg's part of a shape, the last pair first, and its closeness to the front. */
@@ -333,58 +345,52 @@ export class Picture {
     }
   }
 
-  /** Whether lines are a slot: they are wider than a joint. */
-  isSlot({ mechanism, look }) {
-    const joints = [...mechanism.markers.values()].find(marker => marker.look.kind === 'joints');
-    return look.kind === 'lines' && look.width > joints?.look.width;
-  }
-
   lines(shape) {
-    const { context } = this;
-    const wide = context.lineWidth = Math.max(2, shape.look.width * this.scale);
-    const slot = wide > 4 && this.isSlot(shape);
-    context.lineCap = 'round';
+    this.legs(shape, (places, front) => this.stroke(shape.look, places, PIECE.lines, colour(shape.look.colour, front)));
+  }
+
+  /** Draw slots hollow. */
+  slots(shape) {
     this.legs(shape, (places, front) => {
-      context.strokeStyle = colour(shape.look.colour, front);
-      context.beginPath();
-      for (let i = 0; i < places.length; i += 4) {
-        context.moveTo(...this.at(places[i], places[i + 1]));
-        context.lineTo(...this.at(places[i + 2], places[i + 3]));
-      }
-      context.stroke();
-      if (!slot) return;
-      context.strokeStyle = paint('--paper');
-      context.lineWidth = wide - 4;
-      context.stroke();
-      context.lineWidth = wide;
+      const inner = this.stroke(shape.look, places, PIECE.slots, colour(shape.look.colour, front)) - 4;
+      if (inner <= 0) return;
+      this.context.strokeStyle = paint('--paper');
+      this.context.lineWidth = inner;
+      this.context.stroke();
     });
   }
 
-  /** Draw plates pale between their bars; triangles without bars of their colour are filled. */
-  triangles(shape) {
+  /** Draw plates pale between their bars. */
+  plates(shape) {
     const { context } = this;
-    const same = [...shape.mechanism.markers.values()].map(({ look }) => look)
-      .filter(({ kind, colour: other }) => kind === 'lines' && `${other}` === `${shape.look.colour}`);
-    const width = Math.min(...same.map(look => look.width));
-    context.lineWidth = Math.max(2, width * this.scale);
-    context.lineJoin = 'round';
+    context.fillStyle = mixed(shape.look.colour, 0.8, 'paper');
     this.legs(shape, (places, front) => {
-      context.beginPath();
-      for (let i = 0; i < places.length; i += 6) {
-        const [first, ...others] = [0, 2, 4].map(k => this.at(places[i + k], places[i + k + 1]));
-        // The mark of a ground joint stays visible below it at any scale.
-        const size = Math.max(...others.map(([x, y]) => Math.hypot(x - first[0], y - first[1])));
-        const larger = same.length ? 1 : Math.max(1, MARK / size);
-        context.moveTo(...first);
-        for (const [x, y] of others) context.lineTo(first[0] + larger * (x - first[0]), first[1] + larger * (y - first[1]));
-        context.closePath();
-      }
-      context.fillStyle = same.length ? mixed(shape.look.colour, 0.8, 'paper') : colour(shape.look.colour);
-      context.fill();
-      if (!same.length) return;
+      this.fill(places, () => 1);
+      context.lineWidth = Math.max(2, shape.mechanism.width * this.scale);
+      context.lineJoin = 'round';
       context.strokeStyle = colour(shape.look.colour, front);
       context.stroke();
     });
+  }
+
+  /** Draw the marks of ground joints, which stay visible below them at any scale. */
+  triangles(shape) {
+    this.context.fillStyle = colour(shape.look.colour);
+    this.legs(shape, places => this.fill(places, size => Math.max(1, MARK / size)));
+  }
+
+  /** Fill triangles, magnified about their first corner by a function of their size. */
+  fill(places, magnified) {
+    const { context } = this;
+    context.beginPath();
+    for (let i = 0; i < places.length; i += PIECE.triangles) {
+      const [[x, y], ...others] = [0, 2, 4].map(k => this.at(places[i + k], places[i + k + 1]));
+      const factor = magnified(Math.max(...others.map(([a, b]) => Math.hypot(a - x, b - y))));
+      context.moveTo(x, y);
+      for (const [a, b] of others) context.lineTo(x + factor * (a - x), y + factor * (b - y));
+      context.closePath();
+    }
+    context.fill();
   }
 
   joints(shape) {
@@ -420,7 +426,7 @@ export class Picture {
     context.textAlign = 'center';
     context.textBaseline = 'middle';
     for (const { mechanism, look, places } of shapes) {
-      const names = mechanism.value('points') ?? [];
+      const names = mechanism.points;
       if (look.kind !== 'joints' || places.length !== 2 * names.length) continue;
       const seen = names.map((name, i) => this.at(places[2 * i], places[2 * i + 1]));
       const middle = [0, 1].map(i => seen.reduce((sum, at) => sum + at[i], 0) / seen.length);
@@ -488,7 +494,7 @@ export class Picture {
   /** Return the joints of each leg by name, in pixels of the view. */
   legsSeen() {
     return this.shapes().filter(({ look }) => look.kind === 'joints').flatMap(({ mechanism, places, map }) => {
-      const names = mechanism.value('points') ?? [];
+      const names = mechanism.points;
       if (!this.scale || places.length !== 2 * names.length * mechanism.legs) return [];
       return Array.from({ length: mechanism.legs }, (_, leg) => ({
         mechanism, leg, map, seen: new Map(names.map((name, i) => {

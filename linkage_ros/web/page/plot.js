@@ -3,13 +3,11 @@
 
 // A plot of an output over a turn or a stroke of the first input; the other inputs are fixed.
 
-import { element, Newest, put, Reason } from './control.js';
+import { button, element, Newest, put, Reason } from './control.js';
+import { beside } from './motion.js';
 import { multiples, paint } from './picture.js';
 import { figures, units } from './units.js';
 
-const KINDS = ['position', 'velocity', 'acceleration', 'transmission angle', 'force ratio'];
-// Quantities that grow with the input's speed: the power of the speed.
-const POWERS = { velocity: 1, acceleration: 2 };
 const FONT = "12px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 const DIGIT = 7.5;
 const DEGREES = [1, 2, 5, 10, 15, 30, 45, 90, 180, 360];
@@ -65,22 +63,22 @@ function path(plot) {
 }
 
 export class Plot {
-  constructor(mechanism, connection, motion) {
-    Object.assign(this, { mechanism, connection, motion, chosen: {}, sight: '' });
-    this.kind = this.choice('Quantity', KINDS);
+  constructor(mechanism, motion) {
+    Object.assign(this, { mechanism, motion, chosen: {}, sight: '' });
+    this.kind = this.choice('Quantity', Object.keys(mechanism.curves));
     this.output = this.choice('Output', []);
     this.other = element('input', { type: 'text', placeholder: 'distance(A,C)', ariaLabel: 'Another output', onchange: () => {
       this.chosen[this.about] = this.other.value.trim() || undefined;
       this.refresh();
     } });
-    this.enlarging = element('button', { type: 'button', textContent: 'Enlarge', onclick: () => this.enlarge() });
+    this.enlarging = button('Enlarge', () => this.enlarge());
     this.now = element('div', { className: 'now' });
     this.place = element('div', { className: 'plot', tabIndex: 0, ariaLabel: 'No curve yet' });
     this.place.setAttribute('role', 'img');
     this.read = element('p', { className: 'answer' });
     this.marks = element('p', { className: 'answer' });
     this.reason = new Reason();
-    this.element = element('details', {}, element('summary', { textContent: 'Plot' }),
+    this.element = element('details', { hidden: !this.kind.options.length }, element('summary', { textContent: 'Plot' }),
       element('div', { className: 'tools' }, this.kind, this.output, this.other, this.enlarging), this.reason.line, this.place, this.read, this.marks);
     this.element.ontoggle = () => {
       if (!this.element.open) this.enlarge(false);
@@ -111,7 +109,7 @@ export class Plot {
 
   /** Whether a joint or an output is plotted; each of them keeps its own selection. */
   get about() {
-    return this.kind.value === 'transmission angle' ? 'joint' : 'output';
+    return this.mechanism.curves[this.kind.value];
   }
 
   choose() {
@@ -121,20 +119,19 @@ export class Plot {
 
   /** Request the curve again. */
   refresh() {
-    if (this.element.open) this.asked.offer();
+    if (this.element.open && this.about) this.asked.offer();
   }
 
   /** Update the plot after a change of a parameter. */
   update(name) {
-    if (name.endsWith('.speed')) this.render();
-    else if (!name.endsWith('.start')) this.refresh();
+    const { group } = this.mechanism.settings.get(name);
+    if (group === 'speeds') this.render();
+    else if (group !== 'starts') this.refresh();
   }
 
   async ask() {
     const { kind: { value: kind }, about } = this;
-    const [answer] = await Promise.all([this.connection.ask({
-      op: 'curve', mechanism: this.mechanism.key, kind, output: this.chosen[about],
-    }), library()]);
+    const [answer] = await Promise.all([this.mechanism.ask('curve', { kind, output: this.chosen[about] }), library()]);
     this.reason.say(answer.reason);
     if (answer.reason) this.chosen[about] = this.curve?.about === about ? this.curve.output : undefined;
     if (answer.reason || about !== this.about || !this.element.open) return;
@@ -150,18 +147,14 @@ export class Plot {
 
   /** Draw the curve in the displayed units. */
   draw() {
-    const { kind, input, output, units: [across, up], x, y, reach, dead } = this.curve;
+    const { kind, input, output, units: [across, up], power, x, y, ends, dead } = this.curve;
     this.units = [units.of(across), units.of(up)];
     const [{ name: acrossName, factor: wide }, { name: upName, factor: high }] = this.units;
-    const [{ speed }, power] = [this.motion, POWERS[kind] ?? 0];
+    const { speed } = this.motion;
     const title = `${kind} of ${output}${power ? ` with the ${input} at ${shown(speed * wide)} ${acrossName}/s` : ''}`;
     this.data = [x.map(value => value * wide), y.map(value => value === null ? null : value * high * speed ** power)];
     this.bounds = bounds(this.data[1]);
-    this.dead = dead.map(value => value * wide);
-    // A whole turn has no ends.
-    const whole = across === 'rad' && reach[0][1] - reach[0][0] > 2 * Math.PI - NOTHING;
-    this.ends = whole ? [] : reach.flat().map(value => value * wide)
-      .filter(end => !this.dead.some(other => Math.abs(other - end) < NOTHING * Math.abs(end)));
+    [this.dead, this.ends] = [dead, ends].map(values => values.map(value => value * wide));
     const labels = [`${input} [${acrossName}]`, upName];
     if (this.built !== labels.join() || !this.plot) {
       this.built = labels.join();
@@ -232,10 +225,8 @@ export class Plot {
 
   /** A value of the input plus the whole turns that bring it into the plot. */
   inside(value) {
-    if (!this.motion.turns) return value;
-    const [low, high] = [this.data[0][0], this.data[0].at(-1)];
-    const turn = 2 * Math.PI * this.units[0].factor;
-    return value - turn * Math.round((value - (low + high) / 2) / turn);
+    const { turn } = this.mechanism.inputs[this.curve.input];
+    return beside(value, (this.data[0][0] + this.data[0].at(-1)) / 2, turn * this.units[0].factor);
   }
 
   /** Move the input to the place where the pointer is pressed or dragged. */
@@ -260,17 +251,13 @@ export class Plot {
     this.sight = sight;
     const here = this.inside(present * this.units[0].factor);
     const left = this.plot.valToPos(here, 'x');
-    // At the start of a new turn the mark jumps without an animation.
-    this.now.classList.toggle('jumps', Math.abs(left - this.left) > this.plot.over.clientWidth / 2);
-    this.left = left;
     this.now.style.transform = `translateX(${left}px)`;
     const { idx } = this.plot.cursor;
     const [x, y] = idx === null || idx === undefined
       ? [here, between(...this.data, here)] : this.data.map(values => values[idx]);
     const { kind, input, output, units: [, unit] } = this.curve;
     // An angle is drawn without jumps, but printed within half a turn.
-    const turn = 2 * Math.PI * this.units[1].factor;
-    const value = kind === 'position' && unit === 'rad' && y ? y - turn * Math.round(y / turn) : y;
+    const value = kind === 'position' && unit === 'rad' && y ? beside(y, 0, 2 * Math.PI * this.units[1].factor) : y;
     put(this.read, { textContent: `${input} ${shown(x)} ${this.units[0].name}: ${output} ${shown(value)} ${this.units[1].name}` });
   }
 

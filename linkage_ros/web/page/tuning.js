@@ -3,79 +3,59 @@
 
 // The parameters of a mechanism: a control for each, undo and reset, and its scene as a file.
 
-import { BY_FACTOR, Choice, element, FINE_ABOUT_ZERO, LINEAR, Reason, Slider, Switch } from './control.js';
+import { button, Choice, element, Reason, Slider, Switch } from './control.js';
 import { download } from './files.js';
 
-const DIMENSION = 'dimensions.';
-const BRANCH = 'branches.';
-const SIGNS = { 1: '+1', '-1': '−1' };
-const MOVES = /\.(speed|start)$/;
 const RESTED = 300;
 
 /** A parameter's name without the part that its group in the panel implies. */
-function labelled(name, inputs) {
-  const [input, what] = name.split('.');
-  if (MOVES.test(name)) return inputs > 1 ? `${what} of ${input}` : what;
-  return name.replace(/^(dimensions|branches)\./, '');
-}
-
-function law({ name, kind, low, high }) {
-  if (kind === 'integer' || name.endsWith('.start')) return LINEAR;
-  if (low > 0) return BY_FACTOR;
-  return low === -high ? FINE_ABOUT_ZERO : LINEAR;
-}
-
-function folding(title, children, open) {
-  return element('details', { open, hidden: !children.length }, element('summary', { textContent: title }), ...children);
+function labelled({ name, group }, inputs) {
+  const [first, second] = name.split('.');
+  // A long name is broken behind a point or an underscore, before it is anywhere else.
+  if (group === 'more') return name.replace(/[._]/g, '$&\u200b');
+  return inputs > 1 && (group === 'speeds' || group === 'starts') ? `${second} of ${first}` : second;
 }
 
 export class Tuning {
   /** Calls `light` with the dimension whose bars light up, or an empty text. */
-  constructor(mechanism, connection, open, light) {
-    Object.assign(this, { mechanism, connection, light });
-    this.controls = new Map();
-    this.reason = new Reason();
-    this.inputs = [...mechanism.settings.keys()].filter(name => name.endsWith('.speed')).length;
-    const groups = { speeds: [], dimensions: [], branches: [], more: [] };
-    for (const setting of mechanism.settings.values()) {
-      const control = this.control(setting);
-      if (!control) continue;
-      this.controls.set(setting.name, control);
-      const group = setting.name.startsWith(DIMENSION) ? 'dimensions' : setting.name.startsWith(BRANCH) ? 'branches'
-        : setting.name.endsWith('.speed') ? 'speeds' : 'more';
-      groups[group].push(control.row);
-    }
-    this.speeds = groups.speeds;
-    this.undoing = this.button('Undo', () => this.undo());
-    this.resetting = this.button('Reset', () => this.reset());
-    const tools = element('div', { className: 'tools' }, this.undoing, this.resetting,
-      this.button('Save as scene file', () => this.save()), this.reason.line);
-    this.element = element('div', {}, tools, folding('Dimensions', groups.dimensions, open),
-      folding('Branches', groups.branches, open), folding('More', groups.more, false));
+  constructor(mechanism, open, light) {
+    Object.assign(this, { mechanism, light, controls: new Map(), reason: new Reason() });
+    this.undoing = button('Undo', () => this.undo());
+    this.resetting = button('Reset', () => this.reset());
+    this.speeds = this.rows('speeds');
+    const folding = (title, groups, unfolded) => {
+      const rows = groups.flatMap(group => this.rows(group));
+      return element('details', { open: unfolded, hidden: !rows.length }, element('summary', { textContent: title }), ...rows);
+    };
+    this.element = element('div', {},
+      element('div', { className: 'tools' }, this.undoing, this.resetting, button('Save as scene file', () => this.save()), this.reason.line),
+      folding('Dimensions', ['dimensions'], open), folding('Branches', ['branches'], open), folding('More', ['starts', 'more'], false));
     this.renderTools();
     this.refresh();
   }
 
-  button(textContent, onclick) {
-    return element('button', { type: 'button', textContent, onclick });
+  /** Make the controls of a group; return their rows. */
+  rows(group) {
+    return this.mechanism.group(group).map(setting => {
+      const control = this.control(setting);
+      this.controls.set(setting.name, control);
+      return control.row;
+    });
   }
 
   control(setting) {
-    const { name, kind, meaning, allowed, fixed, low, high } = setting;
-    if (fixed) return null;
+    const { name, kind, group, meaning, allowed } = setting;
+    const [, second] = name.split('.');
     const described = {
-      ...setting, label: labelled(name, this.inputs), title: `${meaning}\nAllowed: ${allowed}.`,
-      unit: /\[([^\]]+)\]/.exec(meaning)?.[1] ?? '', scale: law(setting),
+      ...setting, label: labelled(setting, Object.keys(this.mechanism.inputs).length), title: `${meaning}\nAllowed: ${allowed}.`,
       // A dimension is displayed with its length in the picture.
-      times: () => name.startsWith(DIMENSION) ? this.mechanism.value('scale') ?? 1 : 1,
+      times: () => group === 'dimensions' ? this.mechanism.value('scale') ?? 1 : 1,
     };
     const request = (...about) => this.set(name, ...about);
-    if (name.startsWith(BRANCH)) return new Choice(described, SIGNS, request);
+    if (group === 'branches') return new Choice(described, this.mechanism.sides[second], request);
     if (kind === 'bool') return new Switch(described, request);
-    const ranged = low !== null && high !== null && low < high;
-    if (!ranged || kind !== 'double' && kind !== 'integer') return null;
     const slider = new Slider(described, request);
-    if (name.startsWith(DIMENSION)) this.lights(name, slider);
+    if (group === 'dimensions') this.lights(name, slider);
     return slider;
   }
 
@@ -86,7 +66,7 @@ export class Tuning {
   }
 
   async set(name, value, gesture, before) {
-    const answer = await this.connection.ask({ op: 'set', mechanism: this.mechanism.key, values: { [name]: value } });
+    const answer = await this.mechanism.ask('set', { values: { [name]: value } });
     if (!answer.reason && before !== value) this.mechanism.history.remember(name, before, gesture);
     this.renderTools();
     return answer;
@@ -108,15 +88,15 @@ export class Tuning {
 
   /** Set several values at once; return whether they were accepted. */
   async put(values) {
-    const { reason } = await this.connection.ask({ op: 'set', mechanism: this.mechanism.key, values });
+    const { reason } = await this.mechanism.ask('set', { values });
     this.reason.say(reason && `Refused: ${reason}`);
     for (const name of Object.keys(values)) this.controls.get(name)?.reason.say('');
     return !reason;
   }
 
   async save() {
-    const { name, key, playing } = this.mechanism;
-    const { reason, text } = await this.connection.ask({ op: 'save', mechanism: key, values: playing });
+    const { name, playing } = this.mechanism;
+    const { reason, text } = await this.mechanism.ask('save', { values: playing });
     this.reason.say(reason && `Not saved: ${reason}`);
     if (text) download(`${name}.yaml`, text);
   }
@@ -125,13 +105,10 @@ export class Tuning {
   refresh() {
     clearTimeout(this.resting);
     this.resting = setTimeout(async () => {
-      const tunable = await this.connection.ask({ op: 'tune', mechanism: this.mechanism.key });
+      const tunable = await this.mechanism.ask('tune');
       if ([...this.controls.values()].some(({ held }) => held)) return this.refresh();
       if (tunable.reason) return;
       this.mechanism.tunable = tunable;
-      for (const [joint, [plus = SIGNS[1], minus = SIGNS[-1]]] of Object.entries(tunable.sides)) {
-        this.controls.get(BRANCH + joint)?.name({ 1: plus, '-1': minus });
-      }
       for (const [name, ends] of Object.entries(tunable.travel)) {
         if (ends && ends[0] < ends[1]) this.controls.get(name)?.bound(...ends);
       }
@@ -141,15 +118,15 @@ export class Tuning {
   update(name, value) {
     this.controls.get(name)?.update(value);
     if (name === 'scale') this.render();
-    if (this.mechanism.history.first.has(name)) this.refresh();
-    if (MOVES.test(name)) return;
+    if (!this.mechanism.history.first.has(name)) return;
+    this.refresh();
     this.renderTools();
   }
 
   renderTools() {
-    const { steps, first } = this.mechanism.history;
+    const { steps } = this.mechanism.history;
     this.undoing.disabled = !steps.length;
-    this.resetting.disabled = [...first].every(([name, value]) => this.mechanism.value(name) === value);
+    this.resetting.disabled = !Object.keys(this.mechanism.history.changes()[0]).length;
   }
 
   /** Light up the slider of a dimension. */
