@@ -295,7 +295,6 @@ LEG = """<link name="coupler{0}"/><link name="rocker{0}"/>
 MOTOR = """<robot name="r"><link name="base"/><link name="crank"/><joint name="motor"
   type="{}"><parent link="base"/><child link="crank"/><axis xyz="0 1 0"/></joint>{}
   <transmission name="t"><joint name="motor"/></transmission></robot>"""
-BENT = '<limit lower="0.2" upper="3"/>'
 
 
 def legs(count, ends=''):
@@ -327,9 +326,11 @@ def test_all_legs_that_are_undecided_are_asked_in_one_run(capsys, tmp_path, coun
     assert found[0] != found[1]
 
 
-def test_of_two_poses_the_one_inside_the_limits_is_no_question(capsys, tmp_path):
+@pytest.mark.parametrize('low', [-0.1, 0.2])
+def test_of_two_poses_the_one_inside_the_limits_is_no_question(capsys, tmp_path, low):
+    # The file's pose is inside of the first, and outside of the second.
     file = tmp_path / 'legs.urdf'
-    file.write_text(legs(2, BENT))
+    file.write_text(legs(2, f'<limit lower="{low}" upper="3"/>'))
     assert command.main([str(file)]) == 0
     assert '--pose' not in capsys.readouterr().err
 
@@ -356,11 +357,14 @@ def test_a_fold_is_left_by_a_line_that_is_printed(capsys, tmp_path):
 
 def test_a_pose_next_to_a_fold_leaves_bars_free(capsys, tmp_path):
     file = tmp_path / 'folded.urdf'
-    file.write_text(FOLDED.format('continuous'))
+    file.write_text(FOLDED.format('revolute').replace(
+        '</joint>', '<limit lower="-0.1" upper="0.7"/></joint>', 1))
     robot = posed(readers.read(str(file)), {'motor': 1e-4, 'shoulder': 1e-4, 'elbow': -1e-4})
     why = closing.closed(robot).faults['motor']
     assert 'bars lie in line where the file has them, which leaves ' in why
     (side,) = choices(why)
+    (motor,) = (float(each.partition('=')[2]) for each in side if each.startswith('motor='))
+    assert -0.1 < motor < 0.7
     assert command.main([str(file), *side]) == 0
     assert 'Left out' not in capsys.readouterr().err
 
