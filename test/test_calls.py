@@ -14,7 +14,7 @@ import math
 
 from effort import calls
 from linkage_ros import mechanisms
-from linkage_ros.linkage.inverse import Answer
+from linkage_ros.linkage.inverse import Answer, Solution
 import numpy as np
 import pytest
 
@@ -177,9 +177,10 @@ def test_an_answer_prints_its_inputs_its_mode_and_its_margin(arm):
     inverse = arm.inverse(('P.x', 'P.y'))
     answer = inverse.all((0.05, 0.15))[0]
     assert repr(answer) == (
-        f'Answer(inputs={answer.inputs}, mode={answer.mode!r}, margin={answer.margin:.3g})')
+        f'Solution(inputs={answer.inputs}, mode={answer.mode!r}, margin={answer.margin:.3g})')
     assert repr(inverse) == '<inverse of five_bar for P.x, P.y>'
-    assert isinstance(answer, Answer) and ' at 0x' not in str([answer])
+    assert isinstance(answer, Solution) and ' at 0x' not in str([answer])
+    assert Answer is Solution  # as it was called
 
 
 # --- what they cost beside the inverse below them ---

@@ -35,6 +35,7 @@ from linkage_ros.render import (  # noqa: E402
 from linkage_ros.render.cycle import Cycle  # noqa: E402
 from linkage_ros.render.parts import DEFAULT, PARTS, TRACES  # noqa: E402
 from linkage_ros.render.picture import Picture  # noqa: E402
+from matplotlib.collections import LineCollection  # noqa: E402
 from matplotlib.colors import to_rgb  # noqa: E402
 from PIL import Image  # noqa: E402
 
@@ -606,3 +607,14 @@ def test_names_see_how_far_they_are_from_the_nearest_line(rows):
     along = starts[..., None] + np.linspace(0.0, 1.0, 2001) * (ends - starts)[..., None]
     nearest = np.abs(points[:, :, None] - along.reshape(rows, 1, -1)).min(axis=2)
     np.testing.assert_allclose(layers.clearance(points, starts, ends), nearest, atol=2e-3)
+
+
+def test_a_larger_picture_has_wider_lines_and_all_have_equal_margins():
+    machine, = scene.read({'mechanisms': ['jansen']}).machines.values()
+    small, large = (Picture([machine], (size, size), 'whole', frozenset(PARTS)).figure
+                    for size in (720, 1440))
+    widths = [[float(line.get_linewidth()[0]) for line in figure.findobj(LineCollection)]
+              for figure in (small, large)]
+    assert widths[1] == [2.0 * width for width in widths[0]] and len(widths[0]) > 9
+    margins = small.get_layout_engine().get()
+    assert margins['h_pad'] == margins['w_pad'] > 0.0

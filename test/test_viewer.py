@@ -1472,7 +1472,9 @@ def test_where_a_port_is_taken_another_is_used_or_the_viewer_says_how(graph):
         taken.listen()
         port = taken.getsockname()[1]
         other = graph.start(Viewer, {'port': port, 'or_any_port': True})
-        assert asyncio.run(status(other.url)) == 200 and f':{port}/' not in other.url
+        assert asyncio.run(status(other.url)) == 200
+        # Ports below are for the administrator.
+        assert port != int(re.search(r':(\d+)/', other.url)[1]) >= 1024
         with pytest.raises(scene.SceneError, match=(
                 '^the viewer cannot be started: .*in use; for another port use -p port:=8021, '
                 'with ros2 launch port:=8021, with make view PORT=8021; port 0 is any free one$')):

@@ -8,51 +8,49 @@
 # express or implied. See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""
-Outputs over the first input: extremes, dead points, monotone branches.
-
-They are computed from the linkage's closures and outputs with their exact rates.
-"""
+"""The motion of the first input: its reach and dead points, and outputs with exact rates."""
 
 from __future__ import annotations
 
-import math
-from typing import Callable, List, Optional, Sequence, TYPE_CHECKING
+from typing import Callable, Iterable, List, Optional, Sequence, TYPE_CHECKING
 
 import numpy as np
 
-from .curves import extremes
-from .dead_points import NEAR, near_zeros, NearZero
-from .inputs import Arc
-from .monotone import distinct, MonotoneBranches
-from .planar import TOLERANCE
+from .curves import LEAST
+from .dead_points import near_zeros, NearZero
+from .inputs import Arc, Input
 
 if TYPE_CHECKING:
     from .mechanism import Mechanism
 
 # Dead points nearer to an end of the reach than this [rad] are that end.
 ONE = 1e-9
+# Inputs no farther apart than this [rad] are one.
+SAME = 1e-13
+
+
+def distinct(values: Iterable[float], input_: Input) -> List[float]:
+    """Return values of an input in order, wrapped, one of those that differ by rounding."""
+    found: List[float] = []
+    for x in sorted(float(input_.wrapped(0.0 if abs(x) < LEAST else x)) for x in values):
+        if not found or x - found[-1] > SAME:
+            found.append(x)
+    if input_.wraps and len(found) > 1 and found[0] + input_.turn - found[-1] <= SAME:
+        found.pop()
+    return found
 
 
 class Analysis:
-    """Motion of a linkage with its first input; the other inputs are fixed."""
+    """
+    Motion of a linkage with its first input; the other inputs are fixed.
 
-    def __init__(self, linkage: Mechanism, others: Sequence[float] = ()):
+    `first` is the first input over a part of its period, by default over all of it.
+    """
+
+    def __init__(self, linkage: Mechanism, others: Sequence[float] = (),
+                 first: Optional[Input] = None):
         self._linkage, self._others = linkage, tuple(others)
-        self._first = linkage.inputs[0]
-
-    def extremes(self, output: str, arcs: Optional[Sequence[Arc]] = None) -> list:
-        """Implement `Mechanism.extremes`."""
-        linkage = self._linkage
-        linkage.check_output(output)
-        pose, angular = linkage.bound('output', output), np.array([linkage.is_angle(output)])
-        size = self._first.step
-        parts = linkage.reach(*self._others) if arcs is None else arcs
-        if arcs is None and (branches := self.branches(output)).jumps:
-            parts = [(low * size, high * size) for low, high in branches.arcs]
-        found = [extremes(lambda value: pose.searched(value, *self._others)[:1], low, high,
-                          angular)[0].tolist() for low, high in parts]
-        return [(tuple(least), tuple(greatest)) for least, greatest in found]
+        self._first = first or linkage.inputs[0]
 
     # From here on the first input is in units of its step.
 
@@ -60,31 +58,22 @@ class Analysis:
         """Return the values of the input at which a dyad stretches or folds."""
         first = self._first.counted()
         # Where a reach may only be cut off, a dead point is found as a touch.
-        ends = [end for arc in self._reach() for end in arc if not first.is_cut(end)]
-        touched = [near.value for near in self._near_zeros()
+        ends = [end for arc in self.reach() for end in arc if not first.is_cut(end)]
+        touched = [near.value for near in self.near_zeros()
                    if near.gap <= near.rounding
                    and all(first.apart(near.value, end) > ONE for end in ends)]
         return distinct([*ends, *touched], first)
 
-    def branches(self, output: str) -> MonotoneBranches:
-        """Return the branches on which an output is monotone."""
-        return self._linkage.cache.get_or_make(
-            ('branches', output, *self._others), lambda: self._branches(output))
-
-    def _branches(self, output: str) -> MonotoneBranches:
-        angular = self._linkage.is_angle(output)
-        marks = distinct((near.value for near in self._near_zeros()
-                          if near.gap <= NEAR * near.size), self._first.counted())
-        return MonotoneBranches(self._curve('output', output), self._reach(), marks, angular,
-                                TOLERANCE * (math.pi if angular else 2.0 * self._linkage.longest))
-
-    def _reach(self) -> List[Arc]:
+    def reach(self) -> List[Arc]:
         """Return the reach in arcs, none of them on both sides of an end of a turn."""
-        size = self._first.step
-        return [part for lo, hi in self._linkage.reach(*self._others)
-                for part in self._first.counted().within(lo / size, hi / size)]
+        size, first = self._first.step, self._first.counted()
+        arcs = [(lo / size, hi / size) for lo, hi in self._linkage.reach(*self._others)]
+        if self._first.turn < self._linkage.inputs[0].turn:
+            arcs = [(max(lo, first.low), min(hi, first.high)) for lo, hi in arcs
+                    if lo < first.high and hi > first.low]
+        return [part for arc in arcs for part in first.within(*arc)]
 
-    def _curve(self, kind: str, name: object) -> Callable:
+    def curve(self, kind: str, name: object) -> Callable:
         """Return the function from the first input to numbers, and each one's rate by it."""
         pose, size, others = self._linkage.bound(kind, name), self._first.step, self._others
 
@@ -94,16 +83,17 @@ class Analysis:
             return rows
         return curve
 
-    def _near_zeros(self) -> List[NearZero]:
+    def near_zeros(self) -> List[NearZero]:
         """Return the inputs at which a dyad stretches or folds, or nearly does."""
         structure = self._linkage.structure
         closures, folds = structure.closures, structure.built.folds
 
         def find() -> List[NearZero]:
-            reach = self._reach() if closures else []
+            reach = self.reach() if closures else []
             rounding = np.array([2.0 * float(self._linkage.value(x.tolerance)) for x in closures])
             return [near for arc in reach for near in near_zeros(
-                self._curve('closures', ()), arc, self._first.counted(), rounding,
+                self.curve('closures', ()), arc, self._first.counted(), rounding,
                 np.array([x in folds for x in closures]))]
 
-        return self._linkage.cache.get_or_make(('near zeros', *self._others), find)
+        return self._linkage.cache.get_or_make(
+            ('near zeros', self._first.period, *self._others), find)

@@ -29,7 +29,7 @@ from .builder import in_metres, UNIT
 from .design import Design
 from .input_range import arcs, is_periodic
 from .inputs import Arc, FASTEST, Input, MOST_COUNTED, MOST_TURNS, spread, WINDOW
-from .inverse import Answer, Inverse
+from .inverse import extremes_of, Inverse, segments_of, Solution
 from .quantities import LinkPoint, Points, structure_of
 from ..cache import Cache
 from ..formula.expression import derivative, Real, real
@@ -600,7 +600,7 @@ class Mechanism:
         return found, rate
 
     def inputs_for(self, outputs: Sequence[str], values: ArrayLike,
-                   near: Optional[ArrayLike] = None) -> List[Answer]:
+                   near: Optional[ArrayLike] = None) -> List[Solution]:
         """Return all values of the inputs for values of the outputs; see `Inverse.all`."""
         return self.inverse(outputs).all(values, near)
 
@@ -654,7 +654,7 @@ class Mechanism:
         past -pi and pi. By default an arc in which the output jumps, as an angle may where its
         ends meet, counts as several.
         """
-        return Analysis(self, self._fixed(others)).extremes(output, arcs)
+        return extremes_of(self, output, arcs, self._fixed(others))
 
     def monotone(self, output: str, most: float, others: Sequence[float] = ()
                  ) -> Tuple[List[Tuple[float, ...]], Pose]:
@@ -667,8 +667,8 @@ class Mechanism:
         size = self.inputs[0].step
         self.check_output(output)
         return [(low * size, high * size, *values) for low, high, *values
-                in Analysis(self, self._fixed(others)).branches(output).pieces(most)
-                ], self.bound('output', output)
+                in segments_of(self, output, self._fixed(others)).pieces(most)], self.bound(
+                    'output', output)
 
     # --- its code ---
 

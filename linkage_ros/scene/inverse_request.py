@@ -22,9 +22,8 @@ import numpy as np
 from .input_settings import in_words, InputSettings
 from .scene_mechanism import SceneMechanism
 from ..formula.program import compile_in_background
-from ..linkage.choice import CLOSE
 from ..linkage.inputs import Arc, Input
-from ..linkage.inverse import Answer
+from ..linkage.inverse import CLOSE, Solution
 from ..words import listed
 
 LEVER = 'lever'
@@ -53,7 +52,7 @@ class Command(NamedTuple):
 
 
 class SceneAnswer(NamedTuple):
-    """Inputs [rad or m] that give outputs their values, and the working mode; see `Answer`."""
+    """Inputs [rad or m] that give outputs their values, and the working mode; see `Solution`."""
 
     inputs: Tuple[float, ...]
     mode: str
@@ -114,7 +113,7 @@ class InverseRequest:
     @property
     def is_closed(self) -> bool:
         """Whether the answers are closed forms, so that none is searched."""
-        return self._inverse.closed is not None
+        return self._inverse.is_quick
 
     def inputs_of(self, positions: Sequence[Any]) -> List[Any]:
         """Return the inputs [rad or m] at their actuators' positions."""
@@ -225,7 +224,7 @@ class InverseRequest:
         return sorted(found, key=lambda answer: math.dist(
             np.divide(answer.inputs, sizes), np.divide(near, sizes)))
 
-    def _inside(self, answers: Sequence[Answer]) -> List[SceneAnswer]:
+    def _inside(self, answers: Sequence[Solution]) -> List[SceneAnswer]:
         """Return those of the linkage's answers that lie inside the sweeps."""
         found = []
         for answer in answers:

@@ -18,15 +18,15 @@ is an assembly mode; the first is the one that is drawn.
 from __future__ import annotations
 
 from itertools import product
-from typing import Dict, List, Optional, Sequence, Tuple, TYPE_CHECKING
+from typing import Optional, TYPE_CHECKING
 
-from .inverse_linkage import InverseLinkage, Mode, MOST_SIDES
-from .quantities import Names, Structure
-from .rod_lines import turning_rods
-from ..formula.expression import argument, derivative, Real, real, substituted
+from .linkage import InverseLinkage, Mode, MOST_SIDES
+from ..quantities import Names, Structure
+from ..rod_lines import turning_rods
+from ...formula.expression import argument, real, substituted
 
 if TYPE_CHECKING:
-    from .mechanism import Mechanism
+    from ..mechanism import Mechanism
 
 
 def taken_apart(linkage: Mechanism, outputs: Names) -> Optional[InverseLinkage]:
@@ -40,19 +40,10 @@ def taken_apart(linkage: Mechanism, outputs: Names) -> Optional[InverseLinkage]:
         structure = Structure(design, {**linkage.branches, **{
             rod: argument(n + i) for i, rod in enumerate(rods)}})
         values = [structure.output(input_.name) for input_ in linkage.inputs]
-        known: List[Dict[Real, Real]] = [{} for _ in outputs]
-        rates = [derivative(value, {by: 1.0}, each)
-                 for value in values for by, each in enumerate(known)]
-        modes = tuple(_mode(structure, values + rates, n, sides)
-                      for sides in product((1.0, -1.0), repeat=len(rods)))
+        modes = tuple(Mode(structure, tuple(substituted(
+            values, [*map(argument, range(n)), *map(real, sides)])))
+            for sides in product((1.0, -1.0), repeat=len(rods)))
         return InverseLinkage(design.joints, {name: (name, 1.0, 0.0) for name in outputs}, rods,
-                              modes, ((0.0,),) * n, {}, not turning_rods(linkage.design.lines, ()))
+                              modes, ((0.0,),) * n, {})
     except ValueError:
         return None
-
-
-def _mode(structure: Structure, row: List[Real], n: int, sides: Sequence[float]) -> Mode:
-    row = substituted(row, [*map(argument, range(n)), *map(real, sides)])
-    rates: Tuple[Tuple[Real, ...], ...] = tuple(
-        tuple(row[at:at + n]) for at in range(n, n + n * n, n))
-    return Mode(structure, tuple(row[:n]), rates)

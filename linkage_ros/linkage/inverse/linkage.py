@@ -27,26 +27,23 @@ from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, TYPE_
 
 import numpy as np
 
-from . import joint_lines
-from .builder import GROUND, Link, UNIT
-from .design import Design
-from .dyads import Dyads, Hinge, Motor, Slide
-from .inputs import Input, spread
-from .quantities import Names, PAIR, Structure
-from ..formula.expression import (
+from .. import joint_lines
+from ..builder import GROUND, Link, UNIT
+from ..design import Design
+from ..dyads import Dyads, Hinge, Motor, Slide
+from ..inputs import Input, spread
+from ..quantities import Names, PAIR, Structure
+from ...formula.expression import (
     arctangent,
     argument,
     Complex,
-    derivative,
     dot,
     Real,
-    real,
-    spin,
     square_root,
 )
 
 if TYPE_CHECKING:
-    from .mechanism import Mechanism
+    from ..mechanism import Mechanism
 
 # Two to the power of this many assembly modes at most.
 MOST_SIDES = 5
@@ -69,14 +66,11 @@ class Mode(NamedTuple):
     inputs : tuple of Real
         The values [rad or m] of the original linkage's inputs in this mode. An input that is also
         an output is that argument of the program.
-    rates : tuple of tuple of Real
-        For each input, its rate by each output.
 
     """
 
     linkage: Structure
     inputs: Tuple[Real, ...]
-    rates: Tuple[Tuple[Real, ...], ...]
 
 
 class InverseLinkage(NamedTuple):
@@ -99,8 +93,6 @@ class InverseLinkage(NamedTuple):
         turns of the link that it is read from, up to the input's period.
     arguments : dict
         The inputs of the modes, as expressions of the outputs, which are arguments of a program.
-    is_own : bool
-        Whether the original linkage has no branches; all modes are then its own.
 
     """
 
@@ -110,7 +102,6 @@ class InverseLinkage(NamedTuple):
     modes: Tuple[Mode, ...]
     turns: Tuple[Tuple[float, ...], ...]
     arguments: Dict[Real, Real]
-    is_own: bool = False
 
     def __str__(self) -> str:
         comments = {}
@@ -137,8 +128,8 @@ def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
     if 2 ** len(branches) * math.prod(map(len, turns)) > MOST_MODES:
         raise ValueError('too many turns')
     design = Design('inverse', {}, tuple(line.text for line in lines), lines[-1].names[0])
-    modes = tuple(_mode(Structure(design, dict(zip(branches, signs))), outputs, sketch.reads, [
-        *drives.values()]) for signs in product((1, -1), repeat=len(branches)))
+    modes = tuple(_mode(Structure(design, dict(zip(branches, signs))), outputs, sketch.reads)
+                  for signs in product((1, -1), repeat=len(branches)))
     given = [ratio * argument(outputs.index(name)) + offset
              for name, ratio, offset in drives.values()]
     # Each mode has arguments of its own.
@@ -146,21 +137,11 @@ def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
         leaf: value for mode in modes for leaf, value in zip(mode.linkage.built.arguments, given)})
 
 
-def _mode(structure: Structure, outputs: Names, reads: Sequence[_Read],
-          driving: Sequence[Tuple[str, float, float]]) -> Mode:
-    inputs, rates = [], []
-    for read in reads:
-        if read.name in outputs:
-            value, row = argument(outputs.index(read.name)), [
-                real(float(read.name == name)) for name in outputs]
-        else:
-            value, turning = _input_of(structure.built, *read.ends)
-            found = {name: _rate(value, turning, {i: ratio})
-                     for i, (name, ratio, _) in enumerate(driving)}
-            row = [found[name] for name in outputs]
-        inputs.append((value - read.offset) / read.ratio)
-        rates.append(tuple(rate / read.ratio for rate in row))
-    return Mode(structure, tuple(inputs), tuple(rates))
+def _mode(structure: Structure, outputs: Names, reads: Sequence[_Read]) -> Mode:
+    values = (argument(outputs.index(read.name)) if read.name in outputs else
+              _input_of(structure.built, *read.ends) for read in reads)
+    return Mode(structure, tuple(
+        (value - read.offset) / read.ratio for value, read in zip(values, reads)))
 
 
 class _End(NamedTuple):
@@ -460,29 +441,27 @@ class _Sketch(Dyads):
         return _End((one, two), ((end - start) / along,))
 
 
-def _input_of(built: Any, one: _End, other: _End, line: Optional[_End] = None) -> Tuple[
-        Real, Sequence[Tuple[float, Complex]]]:
-    """Return the value of an input, and the signed vectors whose angles add up to it."""
+def _input_of(built: Any, one: _End, other: _End, line: Optional[_End] = None) -> Real:
+    """Return the value of an input."""
     if one.places:
-        relative, turning = Complex(1.0, 0.0), []
+        relative = Complex(1.0, 0.0)
         for end, sign in ((one, 1.0), (other, -1.0)):
             seen = end.places[0] / abs(end.places[0])
             if end.joints:
                 bar = built.arm(*end.joints).vector
-                turning.append((sign, bar))
                 relative = relative * (bar if sign > 0.0 else bar.conjugate())
                 seen = seen.conjugate()
             relative = relative * _constant(seen if sign > 0.0 else seen.conjugate())
-        return arctangent(relative.y, relative.x), turning
+        return arctangent(relative.y, relative.x)
     (tip,), (origin,) = one.joints, other.joints
     arm = built.arm(origin, tip)
     if line is None:
-        return square_root(arm.square), ()
+        return square_root(arm.square)
     along = _constant(line.places[0] / abs(line.places[0]))
     if line.joints:
         along = built.arm(*line.joints).vector * along.conjugate()
         along = along / along.length()
-    return dot(arm.vector, along), ()
+    return dot(arm.vector, along)
 
 
 def _constant(value: complex) -> Complex:
@@ -490,15 +469,3 @@ def _constant(value: complex) -> Complex:
     exact = [0.0 if abs(part) < 1e-16 else math.copysign(1.0, part)
              if abs(abs(part) - 1.0) < 1e-16 else part for part in (value.real, value.imag)]
     return Complex(*exact)
-
-
-def _rate(value: Real, turning: Sequence[Tuple[float, Complex]],
-          speeds: Dict[int, Any]) -> Real:
-    known: Dict[Real, Real] = {}
-    if not turning:
-        return derivative(value, speeds, known)
-    total = real(0.0)
-    for sign, bar in turning:
-        turned = spin(bar)
-        total = total + sign * turned.formula(*(derivative(x, speeds, known) for x in turned.of))
-    return total

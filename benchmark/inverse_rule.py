@@ -1,0 +1,112 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How many solutions inverses lose and invent, judged by sampled and bisected poses.
+
+    python -m benchmark.inverse_rule [--linkages 2000] [--minutes 60] [--document]
+
+The judge is `test/truth/inverse_judge.py`. All of the catalogue are asked, and random linkages:
+three outputs of each at ordinary poses, next to and at ends of the reach, at extremes and at dead
+points. With --document the table goes into docs/accuracy.md.
+"""
+
+import argparse
+from collections import Counter
+from itertools import chain
+from pathlib import Path
+import sys
+import time
+
+from linkage_ros import mechanisms
+import numpy as np
+
+from . import document
+from .nodes.report import table
+
+sys.path.append(str(Path(__file__).parents[1] / 'test'))
+from truth import inverse_judge, random_linkages  # noqa: E402
+
+COLUMNS = 'questions', 'lost', 'invented', 'duplicates'
+
+
+def linkages(count):
+    """Yield linkages of the catalogue, then random ones, each with its own generator."""
+    for kind in mechanisms.TYPES:
+        yield mechanisms.create(kind), np.random.default_rng(0)
+    for seed in range(count):
+        rng = np.random.default_rng(seed)
+        drawn = random_linkages.design(rng)
+        try:
+            yield mechanisms.create('custom', joints=drawn.joints, branches=drawn.branches,
+                                    **drawn.dimensions), rng
+        except ValueError:
+            continue
+
+
+def judged(linkage, rng):
+    """Yield what is asked, its counts and the worst error, for some outputs of a linkage."""
+    names = [name for name in (*linkage.joints, *(
+        f'{point}.{axis}' for point in linkage.points for axis in 'xy')) if linkage.moves(name)]
+    others = [float(rng.uniform(each.low, each.high)) for each in linkage.inputs[1:]]
+    kind = 'held' if others else 'geared' if linkage.geared else 'one output'
+    for name in map(str, rng.choice(names, min(3, len(names)), replace=False) if names else ()):
+        if name != linkage.inputs[0].name:
+            yield kind, inverse_judge.judge(linkage, name, rng, 4, tuple(others))
+    if others and len(names) > len(others):
+        chosen = tuple(map(str, rng.choice(names, len(others) + 1, replace=False)))
+        yield 'several', inverse_judge.judge_several(linkage, chosen, rng, 3)
+
+
+def measure(count, minutes):
+    """Return counts by what is asked and where, the worst error, and how many linkages."""
+    total, worst, used, start = Counter(), 0.0, 0, time.monotonic()
+    for linkage, rng in linkages(count):
+        if time.monotonic() - start > 60.0 * minutes:
+            break
+        used += 1
+        asked = judged(linkage, rng)
+        while True:
+            try:
+                kind, (found, error) = next(asked)
+            except StopIteration:
+                break
+            except ValueError as refused:
+                assert 'do not determine' in str(refused) or 'does not move' in str(refused)
+                break
+            worst = max(worst, error)
+            for key, number in found.items():
+                if len(key) == 2:
+                    total[(kind, *key)] += number
+    return total, worst, used
+
+
+def main():
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
+    parser.add_argument('--linkages', type=int, default=2000, help='random linkages')
+    parser.add_argument('--minutes', type=float, default=60.0, help='stop after these')
+    parser.add_argument('--document', action='store_true', help='write it to docs/accuracy.md')
+    options = parser.parse_args()
+    total, worst, used = measure(options.linkages, options.minutes)
+    places = dict.fromkeys(chain.from_iterable([key[:2]] for key in sorted(total)))
+    text = table(('asked', *COLUMNS), [
+        (f'{kind}, {where}', *(total[kind, where, what] for what in COLUMNS))
+        for kind, where in places])
+    text += (f'\n\n{used} linkages. The largest error of a solution at an ordinary value is '
+             f"{worst:.2g} in units of the rule: half an ulp of the output's size, and half an "
+             'ulp of the input times the rate.')
+    print(text)
+    if options.document:
+        document.write('accuracy.md', text, 'measured: inverse')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,85 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The solution that is continuous from given inputs.
+
+The outputs go straight from their present values to others. Of one input, the solution is on the
+segment of the present input, or on one that continues it. Of several, Newton's method follows the
+motion in steps, which get shorter where it fails.
+
+Source: Gosselin and Angeles, "Singularity analysis of closed-loop kinematic chains", IEEE Trans.
+Robotics and Automation 6 (1990).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Optional, Sequence, Tuple
+
+import numpy as np
+
+from .problem import Found, InverseProblem
+from .refine import refine
+from .segments import Segments
+
+# Steps of a motion at most, the shortest of them [part of the motion], and the longest of an input
+# [rad, sizes].
+STEPS, SHORTEST, LONGEST = 200, 1e-10, 0.7
+
+
+def follow(problem: InverseProblem, values: Sequence[float], near: Sequence[float],
+           source: object) -> Optional[Found]:
+    """Return the solution, with the whole turns of `near`, and its rates; None if none."""
+    start = problem.forward.at(*near)[:problem.n]
+    if not all(map(math.isfinite, start)):
+        return None
+    found: Optional[Found]
+    if isinstance(source, Segments):
+        input_ = problem.inputs[0]
+        turns = input_.turns_of(near[0])
+        way = source.follow(values[0], start[0], (near[0] - turns) / input_.step,
+                            problem.turns[0])
+        if not way:
+            return None
+        bracket, passed = way
+        found = refine(problem, values, bracket)
+        near = (turns + passed + bracket[2],)
+    else:
+        found, near = _followed(problem, values, near, start)
+    return found and (problem.beside(found[0], near), found[1])
+
+
+def _followed(problem: InverseProblem, values: Sequence[float], near: Sequence[float],
+              start: Sequence[float]) -> Tuple[Optional[Found], Sequence[float]]:
+    """Return the end of the motion, None if there is none, and inputs in its turn."""
+    gaps = [math.remainder(now - value, turn) for now, value, turn in zip(
+        start, values, problem.periods)]
+    side, left, part = _side(problem, problem.forward.at(*near)[problem.n:]), 1.0, 1.0
+    for _ in range(STEPS if side else 0):
+        rest = max(left - part, 0.0)
+        found = refine(problem, [x + rest * gap for x, gap in zip(values, gaps)], tuple(near))
+        # A fold is not passed, nor is the motion left for another one.
+        if found and _side(problem, found[1]) == side and all(
+                abs(x - y) <= LONGEST * size for x, y, size in zip(
+                    problem.beside(found[0], near), near, problem.sizes)):
+            near, left = problem.beside(found[0], near), rest
+            if not left:
+                return found, near
+            part = min(4.0 * part, left)
+        elif (part := 0.25 * part) < SHORTEST:
+            break
+    return None, near
+
+
+def _side(problem: InverseProblem, rates: Sequence[float]) -> float:
+    """Return the sign of the determinant, 0 where there is none."""
+    jacobian = problem.jacobian(rates)
+    return float(np.sign(np.linalg.det(jacobian))) if np.isfinite(jacobian).all() else 0.0

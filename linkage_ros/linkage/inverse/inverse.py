@@ -1,0 +1,514 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The inverse: values of the inputs at which as many outputs have given values.
+
+One algorithm: candidates are refined to solutions by the forward formula, those that are one are
+merged, and one is chosen. Only the candidates differ: brackets on `segments` for one input, the
+assembly `modes` of the inverse linkage for several, or a `grid` if it has no closed form.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+import math
+from typing import (
+    Any,
+    cast,
+    Iterator,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+    TYPE_CHECKING,
+    Union,
+)
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import rods
+from .choice import choose, choose_arrays
+from .follow import follow
+from .grid import blocks, Grid
+from .linkage import InverseLinkage, taken_apart
+from .modes import Modes
+from .problem import Found, InverseProblem
+from .refine import distinct, distinct_arrays, refine, refine_arrays
+from .segments import Segments, segments_of
+from ..arguments import numbers
+from ...words import listed, quoted
+
+if TYPE_CHECKING:
+    from ..mechanism import Mechanism
+
+# Arrays are solved in blocks that stay in a processor's cache, and few values as floats.
+BLOCK, FEW = 8192, 32
+# Below this margin a pose is singular, and signs are 0.
+SINGULAR = 1e-6
+
+Ends = Optional[Sequence[Optional[Tuple[float, float]]]]
+
+
+class Solution(NamedTuple):
+    """
+    Values of all inputs at which the outputs have the given values.
+
+    Attributes
+    ----------
+    inputs : tuple of float
+        In the order of `Mechanism.inputs` [rad or m].
+    inverse : Inverse
+        The inverse that it solves.
+
+    """
+
+    inputs: Tuple[float, ...]
+    inverse: Inverse
+
+    def __repr__(self) -> str:
+        return f'Solution(inputs={self.inputs}, mode={self.mode!r}, margin={self.margin:.3g})'
+
+    @property
+    def signs(self) -> Mapping[str, int]:
+        """
+        Return the working mode.
+
+        For each link at the tip of an input crank, by its name, the side to which it turns off
+        from the line between the crank's joints, +1 left; and 'det', the sign of the determinant
+        of d outputs / d inputs. 0 where rounding hides the sign.
+        """
+        return self.inverse.signs(self.inputs)
+
+    @property
+    def margin(self) -> float:
+        """
+        Return the least singular value of d outputs / d inputs, divided by the greatest or 1.
+
+        It is 0 where the inputs cannot move the outputs in some direction, or cannot resist a load
+        in some direction. Units are rad, the longest bar for outputs, about the stroke for inputs.
+        """
+        return self.inverse.margin(self.inputs)
+
+    @property
+    def jacobian(self) -> np.ndarray:
+        """Return d outputs / d inputs [rad or m, per rad or m], shape (outputs, inputs)."""
+        return self.inverse.jacobian(self.inputs)
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether the pose is singular, so that at most half of the digits are right."""
+        return self.margin < SINGULAR
+
+    @property
+    def mode(self) -> str:
+        """Return the signs as text: 'AP+ CP- det-'."""
+        return ' '.join(f'{name}{"0+-"[sign]}' for name, sign in self.signs.items())
+
+
+class Inverse:
+    """
+    The inverse of as many outputs as a linkage has inputs; make one with `Mechanism.inverse`.
+
+    `print` shows the joint lines of the inverse linkage.
+
+    Attributes
+    ----------
+    outputs : tuple of str
+        Names of the outputs; see `Mechanism.has_output`.
+    inputs : tuple of Input
+        The inputs of the linkage; see `InverseProblem`. One that `is_part` has the solutions of
+        the turns around zero, or around given inputs.
+
+    """
+
+    def __init__(self, linkage: Mechanism, outputs: Tuple[str, ...]):
+        self.linkage, self.outputs, self._n = linkage, outputs, len(outputs)
+        blocks(linkage, outputs)
+        self._problem = InverseProblem(linkage, outputs)
+        self.inputs = self._problem.inputs
+        self._is_part = any(each.is_part for each in self.inputs)
+        if self._n > 1 and not self.closed:
+            self._source = Grid(self._problem)  # raises ValueError for dependent outputs
+
+    @cached_property
+    def closed(self) -> Optional[InverseLinkage]:
+        """Joint lines and assembly modes of the inverse linkage; None if there is none."""
+        # An inverse linkage has each input in one period, or else in one turn.
+        make = taken_apart if self.linkage.axes == 'xy' else rods.taken_apart
+        return None if self._is_part else make(self.linkage, self.outputs)
+
+    @property
+    def is_quick(self) -> bool:
+        """Whether arrays of values cost little more than poses: no grid is searched."""
+        return self._n == 1 or self.closed is not None
+
+    @cached_property
+    def _source(self) -> Union[Segments, Modes, Grid]:
+        """Return what yields candidates."""
+        if self._n == 1:
+            return segments_of(self.linkage, self.outputs[0], (), self.inputs[0])
+        return Modes(self._problem, self.closed) if self.closed else Grid(self._problem)
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        """Pickle the linkage and the outputs only."""
+        return self.linkage.inverse, (self.outputs,)
+
+    def __repr__(self) -> str:
+        return f'<inverse of {self.linkage.type} for {listed(self.outputs)}>'
+
+    def __str__(self) -> str:
+        what = listed(self.outputs)
+        if not self.closed:
+            return f'the inverse of {self.linkage.type} for {what} is searched'
+        return f'# {self.linkage.type} driven by {what}\n{self.closed}'
+
+    # --- all solutions ---
+
+    def all(self, values: ArrayLike, near: Optional[ArrayLike] = None) -> List[Solution]:
+        """
+        Return all solutions for one value of each output.
+
+        Parameters
+        ----------
+        values : array-like (outputs,)
+            Values of the outputs [rad or m]; angles are equal up to whole turns, and an output
+            that is an input up to whole periods of it.
+        near : array-like (inputs,), optional
+            Values of the inputs [rad or m]. Whole turns are added to the solutions to bring them
+            nearest to it, and the nearest comes first; the unit of a length is about its stroke.
+
+        Returns
+        -------
+        list of Solution
+            The solutions of the linkage's own assembly, its `branches`, inside its reach; [] if
+            there are none. Without `near` crank angles are in [-pi, pi), and the first input
+            ascends. Solutions that differ by rounding only are one.
+
+        Raises
+        ------
+        ValueError
+            If there is not one value for each output, and one finite `near` for each input.
+
+        """
+        if near is not None and (there := self._elsewhere(self._one_each(near, 'near'))):
+            inverse, start, own = there
+            return [Solution(tuple(np.add(each, start).tolist()), self) for each, _ in inverse.all(
+                np.subtract(self._one_each(values), own), np.subtract(
+                    self._one_each(near), start))]
+        found = [inputs for inputs, _ in self._all(self._one_each(values))]
+        if near is not None:
+            beside = self._finite(near, 'near')
+            found = sorted((self._problem.beside(inputs, beside) for inputs in found),
+                           key=lambda x: sum(((a - b) / size) ** 2 for a, b, size in zip(
+                               x, beside, self._problem.sizes)))
+        return [Solution(inputs, self) for inputs in found]
+
+    def _elsewhere(self, near: Sequence[float]
+                   ) -> Optional[Tuple[Inverse, Sequence[float], Sequence[float]]]:
+        """
+        Return the inverse in the turns of some inputs, if it is not this one, and these turns.
+
+        These are the angles [rad] of each input, and of each output that is an input.
+        """
+        turns = [float(input_.whole_turns(x)) if math.isfinite(x) else 0.0
+                 for input_, x in zip(self.inputs, near)]
+        if not any(turns):
+            return None
+        start = {input_.name: math.tau * count for input_, count in zip(self.inputs, turns)}
+        return (self.linkage.turned(*turns).inverse(self.outputs), list(start.values()),
+                [start.get(name, 0.0) for name in self.outputs])
+
+    def _in_turns(self, method: str, values: Sequence[Any], near: Sequence[float],
+                  *limits: Sequence[Sequence[float]]) -> Optional[Tuple[Any, Any]]:
+        """Return what a method does in the turns of some inputs; None if those are these."""
+        there = self._is_part and self._elsewhere(near)
+        if not there:
+            return None
+        inverse, start, own = there
+        ends = [[tuple(end - turn for end in pair) or None for pair, turn in zip(each, start)]
+                for each in limits]
+        inputs, rates = getattr(inverse, method)(
+            [x - turn for x, turn in zip(values, own)],
+            [x - turn for x, turn in zip(near, start)], *ends)
+        return tuple(x + turn for x, turn in zip(inputs, start)), rates
+
+    def over(self, *values: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
+        """
+        Return all solutions for arrays of values [rad or m], one array for each output.
+
+        Returns
+        -------
+        (array (inputs, *shape, answers), array (outputs * inputs, *shape, answers))
+            The inputs [rad or m], the first ascending, padded with NaN; and the rate of each
+            output by the first input, by the second and so on.
+
+        """
+        rows = _broadcast(self._each(values))
+        found = self._all_arrays(rows)
+        found = np.moveaxis(found, 0, -1).reshape(len(found[0]), *rows[0].shape, len(found))
+        return found[:self._n], found[self._n:]
+
+    def _all(self, values: Sequence[float]) -> List[Found]:
+        """Return all solutions in order, none for values that are not finite."""
+        if not all(map(math.isfinite, values)):
+            return []
+        problem = self._problem
+        values = problem.reduced(values)
+        found = [solution for candidate in self._source.candidates(values)
+                 if (solution := refine(problem, values, candidate))]
+        return distinct(problem, found) if len(found) > 1 else found
+
+    def _all_arrays(self, rows: Sequence[np.ndarray]) -> np.ndarray:
+        """Return all solutions in order (solutions, inputs and rates, m), padded with NaN."""
+        blocks = [*self._blocks(rows)]
+        most = max(map(len, blocks))
+        return np.concatenate([np.pad(block, ((0, most - len(block)), (0, 0), (0, 0)),
+                                      constant_values=math.nan) for block in blocks], axis=2)
+
+    def _blocks(self, rows: Sequence[np.ndarray]) -> Iterator[np.ndarray]:
+        """Yield what `_all_arrays` returns in blocks, at least one."""
+        values = self._problem.reduced_arrays(np.stack([row.ravel() for row in rows]))
+        for k in range(0, max(values.shape[1], 1), BLOCK):
+            yield self._block(values[:, k:k + BLOCK])
+
+    def _block(self, values: np.ndarray) -> np.ndarray:
+        """Return all solutions for values (outputs, m), as `_all_arrays` does."""
+        problem, n, count = self._problem, self._n, values.shape[1]
+        if count <= FEW or isinstance(self._source, Grid):
+            each = [self._all(column) for column in values.T.tolist()]
+            found = np.full((max(map(len, each), default=0) or 1, n + n * n, count), math.nan)
+            for k, solutions in enumerate(each):
+                for i, (inputs, rates) in enumerate(solutions):
+                    found[i, :, k] = *inputs, *rates
+            return found
+        parts = self._source.candidate_arrays(values)
+        found = np.full((len(parts) or 1, n + n * n, count), math.nan)
+        if parts:
+            places, candidates = zip(*parts)
+            solved = refine_arrays(problem, values[:, np.concatenate(places)], np.concatenate(
+                candidates, axis=1))
+            filled = np.zeros(count, int)
+            for place in places:
+                found[filled[place], :, place] = solved[:, :len(place)].T
+                filled[place] += 1
+                solved = solved[:, len(place):]
+            found = found[:max(filled.max(initial=0), 1)]
+        return distinct_arrays(problem, found)
+
+    # --- arguments ---
+
+    def _one_each(self, values: Any, name: str = 'values') -> Tuple[float, ...]:
+        """Return one number for each output; raise ValueError if there are not as many."""
+        found = self._each(values, name)
+        if any(type(each) is not float and each.size != 1 for each in found):
+            raise self._miscounted(values, name)
+        return tuple([each if type(each) is float else each.item() for each in found])
+
+    def _finite(self, values: Any, name: str) -> Tuple[float, ...]:
+        """Return what `_one_each` does; raise ValueError also if one is not finite."""
+        found = self._one_each(values, name)
+        if not all(map(math.isfinite, found)):
+            raise ValueError(f'{name} must be finite, got {quoted(list(found))}')
+        return found
+
+    def _each(self, values: Any, name: str = 'values') -> Tuple[Any, ...]:
+        """Return a float or an array for each output; raise ValueError if they are not that."""
+        if not isinstance(values, (list, tuple)):
+            values = np.atleast_1d(numbers(name, values))
+        if len(values) != self._n:
+            raise self._miscounted(values, name)
+        if set(map(type, values)) == {float}:
+            return tuple(values)
+        found = [numbers(name, each) for each in values]
+        return tuple(each if each.ndim else float(each) for each in found)
+
+    def _miscounted(self, values: Any, name: str) -> ValueError:
+        return ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
+                          f'numbers, got {quoted(values)}')
+
+    def _limits(self, ends: Ends) -> Tuple[Tuple[float, ...], ...]:
+        """Return the ends of each input as floats, () if it has none."""
+        if ends is None:
+            return ((),) * self._n
+        try:
+            limits = tuple(
+                () if pair is None else tuple(map(float, pair)) for pair in ends)
+            if len(limits) == self._n and all(
+                    len(pair) == 2 and -math.inf < pair[0] <= pair[1] < math.inf
+                    for pair in limits if pair):
+                return limits
+        except (TypeError, ValueError):
+            pass
+        raise ValueError('ends must be two finite numbers in order, or None, for each input, got '
+                         + quoted(ends))
+
+    # --- one of the solutions ---
+
+    def nearest(self, values: Sequence[Any], near: Optional[Sequence[Any]] = None,
+                ends: Ends = None) -> Tuple[Any, Any]:
+        """
+        Return one solution.
+
+        Parameters
+        ----------
+        values : sequence of float or array
+            The value of each output [rad or m].
+        near : sequence of float or array, optional
+            Values of the inputs [rad or m]: the solution is the nearest to them, whole turns
+            included; the unit of a length is about its stroke. Default: with one input, the least
+            at which the output increases, else the least (on this working branch of a lever, lever
+            and crank turn the same way); with several, the one with the least first input; where
+            that is equal up to 1e-9 [rad, strokes], the least next one.
+        ends : sequence of (float, float) or None, optional
+            For each input the range [rad or m] that the solution has to lie in, or None.
+
+        Returns
+        -------
+        (tuple of float or array, tuple of float or array)
+            The inputs [rad or m], and the rate of each output by the first input, by the second
+            and so on; NaN where there is no solution.
+
+        Raises
+        ------
+        ValueError
+            If there is not one value for each output, or ends are not finite and in order.
+
+        """
+        limits, values = self._limits(ends), self._each(values)
+        near = None if near is None else self._each(near, 'near')
+        given = (*values, *(near or ()))
+        if set(map(type, given)) == {float}:
+            return near and self._in_turns('nearest', values, near, limits) or choose(
+                self._problem, self._all(values), near, limits)
+        rows = _broadcast(given)
+        shape, rows = rows[0].shape, [row.ravel() for row in rows]
+        if near and self._is_part:
+            alone = [self.nearest(column[:self._n], column[self._n:], ends)
+                     for column in np.stack(rows).T.tolist()]
+            return cast(Tuple[Any, Any], tuple(
+                tuple(np.reshape(part, (len(alone), -1)).T.reshape(-1, *shape))
+                for part in (zip(*alone) if alone else ([], []))))
+        chosen = np.concatenate([choose_arrays(self._problem, block, [
+            row[k * BLOCK:(k + 1) * BLOCK] for row in rows[self._n:]] or None, limits)
+            for k, block in enumerate(self._blocks(rows[:self._n]))], axis=1)
+        found = [row.reshape(shape) for row in chosen]
+        return tuple(found[:self._n]), tuple(found[self._n:])
+
+    def path(self, values: Sequence[ArrayLike], near: Optional[ArrayLike] = None,
+             ends: Ends = None) -> Tuple[Any, Any]:
+        """
+        Return solutions for successive values: each is the nearest to the one before.
+
+        Parameters
+        ----------
+        values : sequence of array (n,)
+            The successive values of each output [rad or m].
+        near, ends
+            As for `nearest`, for the first value. Values without a solution are left out, and the
+            next one continues from the solution before them.
+
+        Returns
+        -------
+        (tuple of array (n,), tuple of array (n,))
+            As `nearest` does.
+
+        """
+        problem, limits = self._problem, self._limits(ends)
+        beside = None if near is None else self._finite(near, 'near')
+        rows = [np.atleast_1d(row) for row in _broadcast(self._each(values))]
+        if rows[0].ndim > 1:
+            raise self._miscounted(values, 'values')
+        if beside and (there := self._in_turns('path', rows, beside, limits)):
+            return there
+        found, n = [], self._n
+        for each in self._all_arrays(rows).transpose(2, 0, 1).tolist():
+            solution = choose(problem, [(x[:n], x[n:]) for x in each if x[0] == x[0]], beside,
+                              limits)
+            found.append([*solution[0], *solution[1]])
+            if solution[0][0] == solution[0][0]:
+                beside = solution[0]
+        columns = np.array(found).reshape(-1, n + n * n).T
+        return tuple(columns[:n]), tuple(columns[n:])
+
+    def follow(self, values: ArrayLike, near: ArrayLike) -> Found:
+        """
+        Return the solution that is continuous from given inputs.
+
+        Parameters
+        ----------
+        values : array-like (outputs,)
+            The values of the outputs [rad or m].
+        near : array-like (inputs,)
+            The present inputs [rad or m]; whole turns of a crank are preserved.
+
+        Returns
+        -------
+        (tuple of float, tuple of float)
+            The inputs [rad or m] at the end of a motion in which the outputs go straight from
+            their present values to `values`, angles the shorter way; and the rate of each output
+            by the first input, by the second and so on. NaN if the motion passes a dead point or
+            leaves the reach.
+
+        """
+        values, near = self._one_each(values), self._one_each(near, 'near')
+        known = all(map(math.isfinite, (*values, *near)))
+        if known and (there := self._in_turns('follow', values, near)):
+            return there
+        return known and follow(self._problem, self._problem.reduced(values), near,
+                                self._source) or (
+            (math.nan,) * self._n, (math.nan,) * self._n ** 2)
+
+    # --- the working mode ---
+
+    def jacobian(self, inputs: ArrayLike) -> np.ndarray:
+        """Return d outputs / d inputs at a pose (inputs,), shape (outputs, inputs)."""
+        rates = self._problem.rated.at(*self._one_each(inputs, 'inputs'))[self._n:]
+        return np.reshape(rates, (self._n, self._n)).T
+
+    def margin(self, inputs: ArrayLike) -> float:
+        """Return the distance of a pose from a singular one; see `Solution.margin`."""
+        jacobian = self._problem.scaled(self.jacobian(inputs))
+        if not np.isfinite(jacobian).all():
+            return 0.0
+        values = np.linalg.svd(jacobian, compute_uv=False)
+        return float(values[-1] / max(1.0, values[0]))
+
+    def signs(self, inputs: Sequence[float]) -> Mapping[str, int]:
+        """Return the working mode of a pose; see `Solution.signs`."""
+        linkage, inputs = self.linkage, self._one_each(inputs, 'inputs')
+        cranks = {link.name: link for link in linkage.links
+                  if any(input_.turns and link.name == input_.name for input_ in linkage.inputs)}
+        places, signs = linkage.solve(inputs if self._n > 1 else inputs[0]), {}
+        for link in linkage.links if linkage.axes == 'xy' else ():
+            crank = cranks.get(link.parent)
+            if crank and link.kind == 'revolute' and link.joint != crank.joint:
+                (a, b), (c, d) = (places[end] - places[start] for start, end in (
+                    (crank.joint, link.joint), (link.joint, link.tip)))
+                signs[link.name] = _sign(a * d - b * c, math.hypot(a, b) * math.hypot(c, d))
+        signs['det'] = 0 if self.margin(inputs) < SINGULAR else _sign(float(np.linalg.det(
+            self._problem.scaled(self.jacobian(inputs)))), 0.0)
+        return signs
+
+
+def _broadcast(values: Sequence[Any]) -> Sequence[np.ndarray]:
+    """Return arrays of one shape; raise ValueError with their shapes if they have none."""
+    try:
+        return np.broadcast_arrays(*values)
+    except ValueError:
+        shapes = ', '.join(str(np.shape(each)) for each in values)
+        raise ValueError(f'arrays must have shapes that broadcast, got {shapes}') from None
+
+
+def _sign(value: float, size: float) -> int:
+    return int(np.sign(value)) if abs(value) > SINGULAR * size else 0

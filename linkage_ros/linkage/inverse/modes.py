@@ -1,0 +1,49 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The assembly modes of the inverse linkage: candidates in closed form, for floats and arrays."""
+
+from __future__ import annotations
+
+from itertools import product
+import math
+from typing import Iterator, List, Sequence, Tuple
+
+import numpy as np
+
+from .linkage import InverseLinkage
+from .problem import InverseProblem
+from ...formula.program import Program
+
+
+class Modes:
+    """The inputs in each assembly mode of an inverse linkage, and in each of its turns."""
+
+    def __init__(self, problem: InverseProblem, closed: InverseLinkage):
+        self._problem = problem
+        rows = [value + turn for mode in closed.modes for turns in product(*closed.turns)
+                for value, turn in zip(mode.inputs, turns)]
+        self._pose = problem.linkage.bind(Program(rows, problem.n, closed.arguments))
+
+    def candidates(self, values: Sequence[float]) -> Iterator[Tuple[float, ...]]:
+        """Yield the inputs of each mode that can be assembled."""
+        flat, n = self._pose.at(*values), self._problem.n
+        for start in range(0, len(flat), n):
+            inputs = flat[start:start + n]
+            if math.isfinite(sum(inputs)):
+                yield inputs
+
+    def candidate_arrays(self, values: np.ndarray) -> List[Tuple[np.ndarray, np.ndarray]]:
+        """Return for each mode the places of values (outputs, m) that it has, with inputs."""
+        pose, m = self._pose, values.shape[1]
+        over = pose.over if self._problem.linkage.is_accelerated else pose.searched
+        modes = over(*values).reshape(-1, self._problem.n, m)
+        places = [np.flatnonzero(np.isfinite(inputs).all(axis=0)) for inputs in modes]
+        return [(place, inputs[:, place]) for place, inputs in zip(places, modes)]

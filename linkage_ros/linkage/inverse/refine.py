@@ -1,0 +1,266 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+From candidates to solutions: Newton's method on the forward formula, and one judgement.
+
+A candidate is a solution if the outputs there have their values up to rounding: that of the
+outputs, and that of the inputs times their rates. `refine` works on floats, `refine_arrays` does
+the same on arrays. Where a bracket is known, Newton's method stays inside it.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+import math
+from typing import Any, Callable, List, Optional, Sequence, Tuple
+
+import numpy as np
+
+from .problem import Found, InverseProblem
+from .segments import Bracket, SPECIAL, STEEPEST
+
+# Errors in units of rounding (half an ulp of the output's size and of the inputs times the rates):
+# where refinement stops; and the largest of a solution, which rounding of all joints may explain.
+ROUNDED, ACCEPTED = 2.0, 64.0
+# A larger error [sizes], or a longer step [rad, sizes], leads to another solution.
+FAR = 0.1
+# Steps at most: bisection alone needs one per bit of a float.
+MAX_STEPS = 64
+# Two solutions are one if they are no farther apart than SPECIAL [rad, sizes], or than this and
+# the rates say that the outputs differ by no more than SPECIAL [sizes].
+NEIGHBOURS = 1e-4
+
+_UNIT = 2.0 ** -53
+
+
+def refine(problem: InverseProblem, values: Sequence[float], candidate: Sequence[Any]
+           ) -> Optional[Found]:
+    """
+    Return the solution at a candidate, with its rates; None if there is none.
+
+    A candidate is a `Bracket` of one input, values of several inputs, or a solution.
+    """
+    if isinstance(candidate[0], tuple):
+        return problem.wrapped(candidate[0]), candidate[1]
+    if problem.n == 1:
+        inside = refine_inside(problem.forward.at, values[0], problem.periods[0],
+                               problem.scales[0], problem.sizes[0], candidate)
+        return inside and (problem.wrapped(inside[:1]), inside[1:])
+    inputs, at, n, least, found = tuple(candidate), problem.forward.at, problem.n, math.inf, None
+    if not math.isfinite(sum(at(*inputs)[:n])):
+        # Rounding may have led out of the reach.
+        near = ((*inputs[:by], inputs[by] + ulps * math.ulp(inputs[by]), *inputs[by + 1:])
+                for ulps in (2.0, -2.0, 16.0, -16.0) for by in range(n))
+        inputs = next((x for x in near if math.isfinite(sum(at(*x)[:n]))), inputs)
+    for _ in range(MAX_STEPS):
+        row = at(*inputs)
+        gaps = [math.remainder(y - x, turn) if -math.inf < y < math.inf else math.nan
+                for y, x, turn in zip(row, values, problem.periods)]
+        missed = max([abs(gap) / scale for gap, scale in zip(gaps, problem.scales)])
+        if not missed < least:
+            break
+        least, found = missed, (inputs, row, gaps)
+        if not ROUNDED * _UNIT < missed <= FAR:
+            break
+        step = _step(problem, gaps, row)
+        if not sum([abs(x) / size for x, size in zip(step, problem.sizes)]) <= FAR:
+            break
+        inputs = tuple([x - by for x, by in zip(inputs, step)])
+    if not found or least > FAR:
+        return None
+    inputs, row, gaps = found
+    # Where rates are low, rounding is that of the outputs alone.
+    if least > ACCEPTED * _UNIT and not (least <= STEEPEST and _errors(
+            problem, *(np.reshape(part, (-1, 1)) for part in (gaps, row, inputs)))[0] <= ACCEPTED):
+        return None
+    return problem.wrapped(inputs), row[n:]
+
+
+def refine_inside(at: Callable, value: float, period: float, scale: float, size: float,
+                  bracket: Bracket) -> Optional[Tuple[float, float]]:
+    """
+    Return the input in a bracket at which an output has a value, and the rate; None if none.
+
+    `at` returns the output and its rate. Newton's method stays inside the bracket.
+    """
+    low, high, x, sign = bracket
+    x, best, least = x if low <= x <= high else 0.5 * (low + high), (math.nan, math.nan), math.inf
+    most = STEEPEST / ACCEPTED * scale
+    for _ in range(MAX_STEPS):
+        output, rate = at(x)
+        gap = output - value
+        if not -period <= 2.0 * gap <= period:
+            gap = math.remainder(gap, period) if -math.inf < gap < math.inf else math.nan
+        rounding = min(_UNIT * (scale + abs(rate) * max(abs(x), size)), most)
+        if abs(gap) < least:
+            least, best = abs(gap), (x, rate)
+            if least <= ROUNDED * rounding:
+                break
+        elif least <= ACCEPTED * rounding:
+            break
+        low, high = (x, high) if gap * sign < 0.0 else (low, x)
+        x = x - gap / rate if rate else math.nan
+        if not low < x < high:
+            x = 0.5 * (low + high)
+            if x in (low, high):
+                break
+    # At a jump or in noise both sides enclose values that the output never has.
+    if not least <= STEEPEST * scale:
+        return None
+    x, rate = best
+    if not -math.inf < rate < math.inf:
+        # At an end of a segment, those of the nearest float that has rates.
+        near = (x + side * 2.0 ** k * math.ulp(x) for k in range(MAX_STEPS // 2)
+                for side in (1, -1))
+        rate = next(filter(math.isfinite, (at(y)[1] for y in near)), rate)
+    return x, rate
+
+
+def _step(problem: InverseProblem, gaps: Sequence[float], row: Sequence[float]) -> Sequence[float]:
+    """Return the step of Newton's method; NaN where the Jacobian is singular."""
+    n = problem.n
+    if n == 2:
+        a, b, c, d = row[2:]
+        det = a * d - b * c
+        return ((gaps[0] * d - gaps[1] * c) / det, (gaps[1] * a - gaps[0] * b) / det) if det else (
+            math.nan,)
+    return _step_arrays(problem, np.reshape(gaps, (n, 1)), np.reshape(row, (-1, 1)))[:, 0].tolist()
+
+
+def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.ndarray
+                  ) -> np.ndarray:
+    """
+    Return what `refine` does for columns of values (outputs, m) and of candidates.
+
+    The solutions have the shape (inputs and rates, m), NaN where there is none.
+    """
+    n, inputs = problem.n, candidates
+    with np.errstate(all='ignore'):
+        if n == 1:
+            # Estimates need a step; closed forms may be right.
+            low, high, seed, _ = candidates
+            inputs = np.where((low <= seed) & (seed <= high), seed, 0.5 * (low + high))[None]
+            rows = problem.over(*inputs)
+            inputs = np.fmin(np.fmax(
+                inputs - _step_arrays(problem, _gaps(problem, rows, values), rows), low), high)
+        rows = problem.over(*inputs)
+        gaps = _gaps(problem, rows, values)
+        error = _errors(problem, gaps, rows, inputs)
+        again = np.flatnonzero((error > ROUNDED) & (error <= FAR / _UNIT))
+        x = inputs[:, again] - _step_arrays(problem, gaps[:, again], rows[:, again])
+        new = problem.over(*x)
+        less = _errors(problem, _gaps(problem, new, values[:, again]), new, x)
+        better = less < error[again]
+        if n == 1:
+            better &= (low[again] <= x[0]) & (x[0] <= high[again])
+        again = again[better]
+        inputs[:, again], rows[:, again], error[again] = x[:, better], new[:, better], less[better]
+        # A part needs more steps, or rates from beside it.
+        left = ~(error <= ACCEPTED) | ~np.isfinite(rows[1]) if n == 1 else ~(
+            (error <= ACCEPTED) | (error > FAR / _UNIT))
+    solutions = np.concatenate([problem.wrapped_arrays(inputs), rows[n:]])
+    solutions[:, ~(error <= ACCEPTED)] = np.nan
+    for k in np.flatnonzero(left).tolist():
+        found = refine(problem, values[:, k].tolist(), candidates[:, k].tolist())
+        solutions[:, k] = (*found[0], *found[1]) if found else math.nan
+    return solutions
+
+
+def _gaps(problem: InverseProblem, rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+    gaps = rows[:problem.n] - values
+    for gap, turn in zip(gaps, problem.periods):
+        if turn < math.inf:
+            gap -= turn * np.rint(gap / turn)
+    return gaps
+
+
+def _errors(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray,
+            inputs: np.ndarray) -> np.ndarray:
+    """Return the largest of the outputs' errors in units of their rounding, for columns."""
+    n, errors = problem.n, []
+    weights = [np.maximum(np.abs(x), size) for x, size in zip(inputs, problem.sizes)]
+    for i, (gap, scale) in enumerate(zip(gaps, problem.scales)):
+        rounding = scale + sum(np.abs(rate) * weight for rate, weight in zip(
+            rows[n + i::n], weights))
+        # Where a pose has no rates, they explain nothing.
+        most = scale * (STEEPEST / (ACCEPTED * _UNIT))
+        errors.append(np.abs(gap) / (_UNIT * np.where(np.isnan(rounding), scale, np.minimum(
+            rounding, most))))
+    return np.max(errors, axis=0) if n > 1 else errors[0]
+
+
+def _step_arrays(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Return what `_step` does for columns."""
+    n = problem.n
+    if n == 1:
+        return gaps / rows[1]
+    if n == 2:
+        a, b, c, d = rows[2:]
+        return np.stack([gaps[0] * d - gaps[1] * c, gaps[1] * a - gaps[0] * b]) / (a * d - b * c)
+    jacobian = rows[n:].reshape(n, n, rows.shape[1]).T
+    with np.errstate(all='ignore'):
+        jacobian[~(np.abs(np.linalg.det(jacobian)) > 0.0)] = np.nan
+    return np.linalg.solve(jacobian, gaps.T[..., None])[..., 0].T
+
+
+def same(problem: InverseProblem, one: Found, other: Found) -> bool:
+    """Return whether two solutions are one."""
+    for x, y, turn, size in zip(one[0], other[0], problem.turns, problem.sizes):
+        if NEIGHBOURS * size < abs(x - y) < turn - NEIGHBOURS * size:
+            return False
+    steps = [math.remainder(x - y, turn) for x, y, turn in zip(one[0], other[0], problem.turns)]
+    apart = max([abs(step) / size for step, size in zip(steps, problem.sizes)])
+    if not SPECIAL < apart <= NEIGHBOURS:
+        return apart <= SPECIAL
+    n = problem.n
+    return any(all(abs(sum(rate * step for rate, step in zip(rates[i::n], steps)))
+                   <= SPECIAL * scale for i, scale in enumerate(problem.scales))
+               for _, rates in (one, other))
+
+
+def distinct(problem: InverseProblem, solutions: Sequence[Found]) -> List[Found]:
+    """Return solutions in order, one of those that are one."""
+    found: List[Found] = []
+    for solution in sorted(solutions):
+        # Of one input only neighbours can be one, a turn apart too.
+        beside = found if problem.n > 1 else found[-1:] + found[:1]
+        if not any(same(problem, solution, other) for other in beside):
+            found.append(solution)
+    return found
+
+
+def distinct_arrays(problem: InverseProblem, solutions: np.ndarray) -> np.ndarray:
+    """Return solutions (solutions, inputs and rates, m) in order, one of those that are one."""
+    n, solutions = problem.n, _ordered(problem, solutions)
+    count, places = len(solutions), np.arange(solutions.shape[2])
+    last = np.isfinite(solutions[:, 0]).sum(axis=0).clip(1) - 1
+    # Of one input only neighbours can be one, a turn apart too.
+    pairs = [(k, np.full_like(last, i)) for k, i in combinations(range(count), 2)
+             if n > 1 or k + 1 == i] + [(0, last)] * (count > 1)
+    again = False
+    for k, i in pairs:
+        apart = np.max([problem.apart(by, solutions[k, by], solutions[i, by, places])
+                        for by in range(n)], axis=0)
+        for place in np.flatnonzero((apart <= NEIGHBOURS) & (i > k)):
+            one, other = ((tuple(x[:n]), tuple(x[n:])) for x in solutions[
+                [k, i[place]], :, place].tolist())
+            if same(problem, one, other):
+                solutions[i[place], :, place], again = math.nan, True
+    solutions = _ordered(problem, solutions) if again else solutions
+    return solutions[:max(int(np.isfinite(solutions[:, 0]).any(axis=1).sum()), 1)]
+
+
+def _ordered(problem: InverseProblem, solutions: np.ndarray) -> np.ndarray:
+    first = np.where(np.isnan(solutions[:, 0]), np.inf, solutions[:, 0])
+    if problem.n == 1 and (first[1:] >= first[:-1]).all():
+        return solutions
+    order = np.lexsort(solutions[:, :problem.n].swapaxes(0, 1)[::-1], axis=0)
+    return np.take_along_axis(solutions, order[:, None], 0)

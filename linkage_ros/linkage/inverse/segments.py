@@ -1,0 +1,438 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The segments of the reach on which an output is monotone: candidates of one unknown input.
+
+Special inputs cut the reach: ends, dead points, extremes of the output and its jumps. Between two
+of them the output has each value of its range once; docs/accuracy.md has the rule for its ends.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import (
+    Any,
+    Callable,
+    Iterator,
+    List,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+    TYPE_CHECKING,
+)
+
+import numpy as np
+
+from ..analysis import Analysis, distinct
+from ..curves import ascending, extremes, LEAST, refined, sampled, turns
+from ..dead_points import NEAR, NearZero
+from ..inputs import Arc, Input
+
+if TYPE_CHECKING:
+    from ..mechanism import Mechanism
+
+# A value this near to a special input's is that input's; and this near, if no other input has it
+# [parts of the output's size].
+SPECIAL, BEYOND = 1e-13, 1e-9
+# Next to an end at which its rate is infinite, a value is the end's if so many ulps of the input
+# change the output as much, up to the second [part of the output's size].
+ULPS, STEEPEST = 64.0, 1e-6
+# An end of the reach is answered by an input so many ulps inside.
+INSIDE = 2.0
+# The output's error between samples [part of its range]; cells narrower than the second [rad] are
+# only divided where it jumps, by more than the third [part of its range].
+EXPLAINED, NARROW, JUMP = 1e-4, 1e-6, 0.05
+# Jumps that are no farther apart than this [rad] are noise, of an arm that nearly vanishes.
+NARROWEST = 1e-12
+# Parts of a divided cell, and rounds: a turn is divided down to neighbouring floats.
+PARTS, ROUNDS = 8, 20
+# The output has rounding of this part of its size; changes up to STILL times that are none.
+ROUNDING, STILL = 2.0 ** -50, 64.0
+# Samples at an end with more noise than this multiple of rounding are left out.
+NOISY = 1e9
+# More additional samples of an arc, and more jumps and dead points a turn, are those of a linkage
+# that is singular nearly everywhere.
+MAX_SAMPLES, MAX_RUNS = 10000, 100
+
+
+# Two inputs [rad or m] between which an output has a value once, a first estimate, and the sign of
+# the rate. A special input has no width.
+Bracket = Sequence[float]
+
+
+class Segment(NamedTuple):
+    """
+    Samples of a part of the reach on which an output is monotone.
+
+    Attributes
+    ----------
+    theta, value : float array (samples,)
+        The input in its size, and the output times the sign of its rate; both ascend.
+    cells : float array (8, samples - 1)
+        For an estimate between two samples: see `_estimate`.
+    sign : float
+        1.0 where the output rises, -1.0 where it falls.
+
+    """
+
+    theta: np.ndarray
+    value: np.ndarray
+    cells: np.ndarray
+    sign: float
+
+
+class Segments:
+    """
+    An output over the reach, in segments on which it is monotone.
+
+    Parameters
+    ----------
+    curve : callable
+        From values of the input, shape (n,), to the output and its rate, shape (2, n).
+    arcs : sequence of (float, float)
+        The reach; no arc extends to both sides of -pi or pi.
+    near_zeros : sequence of NearZero
+        Where a dyad is or nearly is at a dead point.
+    input_ : Input
+        The input; in all samples it is in its size.
+    period : float
+        After how much the output is the same, or inf.
+    size : float
+        The unit of the output.
+
+    """
+
+    def __init__(self, curve: Callable, arcs: Sequence[Arc], near_zeros: Sequence[NearZero],
+                 input_: Input, period: float, size: float):
+        self._curve, self._period, self._size, self._unit = curve, period, size, input_.step
+        self._rounding, counted = ROUNDING * size, input_.counted()
+        special = distinct((near.value for near in near_zeros if near.gap <= near.rounding),
+                           counted)
+        marks = distinct((near.value for near in near_zeros if near.gap <= NEAR * near.size),
+                         counted)
+        self.jumps: List[float] = []
+        self._ends = {end for arc in arcs for end in arc if not counted.is_cut(end)}
+        runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
+        if not 0 < len(runs) <= MAX_RUNS * max(1.0, sum(hi - lo for lo, hi in arcs) / math.tau) \
+                or not self._moves(runs):
+            runs, self.jumps = [], []
+        self.all = [segment for run in runs for segment in self._monotone(*run)]
+        self.all.sort(key=lambda segment: float(segment.theta[0]))
+        turn = counted.turn if counted.wraps else math.inf
+        # The segment, if any, on which the output goes on after the last input of each.
+        following = [self._continues(*pair, turn) for pair in zip(
+            self.all, self.all[1:] + self.all[:1])]
+        self._preceding = following[-1:] + following[:-1]
+        self._following = following
+        self._rows = [self._row(*each) for each in zip(self.all, *self._slack())]
+
+    def _row(self, segment: Segment, below: float, above: float) -> Tuple:
+        """
+        Return what values need.
+
+        This is the range in which the segment has answers, its sign, and samples and cells. The
+        outer cells have no width: those of values that are answered by the end of the segment.
+        """
+        theta, value, cells, sign = segment
+        rounded, ends = SPECIAL * self._size, [0, -1]
+        # At an end of the reach there is a pose also when whole turns are added.
+        start, end = (x + side * INSIDE * math.ulp(max(abs(x), math.pi)) * (x in self._ends)
+                      for x, side in zip(theta[ends].tolist(), (1.0, -1.0)))
+        none, one = np.zeros(2), np.ones(2)
+        special = np.stack([(start, end), none, value[ends], one, one, none, none, none])
+        cells = np.column_stack([special[:, 0], cells, special[:, 1]])
+        cells[:2] *= self._unit
+        return (float(value[0] - below), float(value[-1] + above), sign,
+                np.array([start, *theta.clip(start, end), end]) * self._unit,
+                value.clip(value[0] + rounded, value[-1] - rounded), cells)
+
+    # --- candidates ---
+
+    def candidates(self, values: Sequence[float]) -> List[Bracket]:
+        """Return a bracket for each input that has the value."""
+        (value,), found, period = values, [], self._period
+        for row in self._rows:
+            low, high, sign = row[:3]
+            target = sign * value
+            if period < math.inf and not low <= target < low + period:
+                target += period * math.ceil((low - target) / period)
+            while low <= target <= high:
+                found.append(_bracket(target, row))
+                target += period
+        return found
+
+    def candidate_arrays(self, values: np.ndarray) -> List[Tuple[np.ndarray, np.ndarray]]:
+        """Return for each segment the places of values (1, n) that it has, and brackets."""
+        found, period = [], self._period
+        # They are searched faster in order.
+        order = values[0].argsort()
+        for low, high, sign, theta, samples, cells in self._rows:
+            target = sign * values[0, order]
+            if period < math.inf:
+                target = target + period * np.ceil((low - target) / period)
+            while len(inside := np.flatnonzero((low <= target) & (target <= high))):
+                goal = target[inside]
+                i = samples.searchsorted(goal, 'right')
+                found.append((order[inside], np.stack([
+                    theta[i], theta[i + 1], _estimate(goal, *cells.take(i, axis=1)),
+                    np.full(len(i), sign)])))
+                target = target + period
+        return found
+
+    def follow(self, value: float, now: float, near: float, turn: float
+               ) -> Optional[Tuple[Bracket, float]]:
+        """
+        Return the bracket of a value on the segment of `near` or those that continue it.
+
+        The output goes straight there from its present value `now`, an angle the shorter way;
+        also returned are the whole turns that the input passes.
+        """
+        gap, passed = math.remainder(value - now, self._period), 0.0
+        number = next((i for i, (theta, *_) in enumerate(self.all)
+                       if theta[0] <= near <= theta[-1]), None)
+        if number is None:
+            return None
+        theta, values, _, sign = self.all[number]
+        target = float(np.interp(near, theta, values))
+        target += math.remainder(sign * now - target, self._period) + sign * gap
+        for _ in range(2 * len(self.all)):
+            low, high, *_ = row = self._rows[number]
+            if low <= target <= high:
+                return _bracket(target, row), passed
+            if not (self._following if target > high else self._preceding)[number]:
+                break
+            one, two, other = (-1, 0, number + 1) if target > high else (0, -1, number - 1)
+            other %= len(self.all)
+            there = self.all[other]
+            # The same value, or whole periods from it.
+            target += float(there.value[two] - self.all[number].value[one])
+            gap = float(self.all[number].theta[one] - there.theta[two]) * self._unit
+            passed += turn * round(gap / turn) if turn < math.inf else 0.0
+            number = other
+        return None
+
+    # --- for other uses ---
+
+    @property
+    def arcs(self) -> List[Arc]:
+        """Return the reach without jumps, cut at them."""
+        joined: List[Arc] = []
+        for theta, *_ in self.all:
+            low, high = float(theta[0]), float(theta[-1])
+            joined.append((joined.pop()[0], high) if joined and low == joined[-1][1] else (
+                low, high))
+        return joined
+
+    def pieces(self, most: float) -> List[Tuple[float, float, float, float]]:
+        """Return pieces of the segments, each two inputs and outputs at most `most` apart."""
+        cut = []
+        for theta, value, _, sign in self.all:
+            places = [0]
+            for i in range(1, len(theta)):
+                if i + 1 == len(theta) or value[i + 1] - value[places[-1]] > most:
+                    places.append(i)
+            cut += [(float(theta[i]), float(theta[k]), float(sign * value[i]),
+                     float(sign * value[k])) for i, k in zip(places, places[1:])]
+        return cut
+
+    # --- how they are found ---
+
+    def _difference(self, gap: Any) -> Any:
+        return gap if self._period == math.inf else gap - self._period * np.round(
+            gap / self._period)
+
+    def _runs(self, lo: float, hi: float, marks: Sequence[float]) -> Iterator[Tuple]:
+        """Yield samples as inputs, values, rates and noise, cut where the output jumps."""
+        theta = np.concatenate([sampled(*arc) for arc in _cut([(lo, hi)], marks)])
+        theta = ascending(theta)
+        if len(theta) < 2:
+            return
+        known = np.isfinite(self._curve(theta[[0, -1]])[0])
+        if not known.all():
+            # The last input inside: an end may be rounded, or an arm without length at it.
+            inside, _ = refined(lambda x: np.isfinite(self._curve(x.ravel())[0]).reshape(
+                x.shape), theta[[1, -2]], theta[[0, -1]])
+            theta[[0, -1]] = np.where(known, theta[[0, -1]], inside)
+            self._ends.update(inside)
+        most = MAX_SAMPLES + 4 * len(theta)
+        theta, jumped = self._divided(theta, most)
+        if len(theta) > most:
+            return
+        self.jumps += theta[jumped].tolist()
+        digit = 4.0 * np.spacing(np.abs(theta).clip(1e-3))
+        around = (theta + digit * np.array([[0.0], [1.0], [-1.0]])).clip(lo, hi)
+        value, rate = self._curve(around.ravel()).reshape(2, *around.shape)
+        with np.errstate(all='ignore'):
+            # The change over an ulp of the input that the rate does not explain is rounding.
+            noise = np.abs(self._difference(value[1:] - value[0])
+                           - rate[0] * (around[1:] - theta)).max(axis=0)
+        noise[~np.isfinite(noise)] = 0.0
+        known = np.isfinite(value[0])
+        cuts = np.unique(np.concatenate([np.flatnonzero(~known), jumped + 1]))
+        for run in np.split(np.arange(len(theta)), cuts):
+            clear = np.flatnonzero((known & (noise <= NOISY * self._rounding))[run])
+            if len(clear) > 1 and theta[run[-1]] - theta[run[0]] > NARROWEST:
+                run = run[clear[0]:clear[-1] + 1]
+                steps = self._difference(np.diff(value[0, run]))
+                yield (theta[run], value[0, run[0]] + np.append(0.0, np.cumsum(steps))
+                       if self._period < math.inf else value[0, run], rate[0, run], noise[run])
+
+    def _divided(self, theta: np.ndarray, most: int) -> Tuple[np.ndarray, np.ndarray]:
+        """Return samples that explain the output, and after which of them it jumps."""
+        inner, jumped = np.arange(1, PARTS) / PARTS, np.empty(0, int)
+        value, rate = self._curve(theta)
+        for _ in range(ROUNDS):
+            width, change = np.diff(theta), self._difference(np.diff(value))
+            with np.errstate(all='ignore'):
+                size = 0.5 * self._period if self._period < math.inf else max(
+                    float(np.nanmax(value) - np.nanmin(value)), BEYOND * self._size)
+                slopes = np.stack([rate[1:], rate[:-1]])
+                # At an end a rate may be infinite.
+                slopes = np.where(np.isfinite(slopes), slopes, slopes[::-1])
+                mean = 0.5 * width * slopes.sum(axis=0)
+                missed = np.abs(change - np.where(np.isfinite(mean), mean, 0.0))
+                wide = (width > NARROW) & (missed > STILL * self._rounding)
+                # Two extremes may hide where the change is less than half of what rates say.
+                hidden = (slopes[0] * slopes[1] > 0.0) & (missed > 0.5 * np.abs(mean))
+                place = np.flatnonzero((missed > JUMP * size) | wide & (
+                    hidden | (missed > EXPLAINED * size)))
+            neighbours = np.nextafter(theta[place], theta[place + 1]) == theta[place + 1]
+            jumped = place[neighbours & (np.abs(change[place]) > JUMP * size)]
+            place = place[~neighbours]
+            if not len(place) or len(theta) > most:
+                break
+            new = (theta[place, None] + width[place, None] * inner).ravel()
+            found = self._curve(new)
+            order = np.argsort(np.concatenate([theta, new]))
+            theta, value, rate = (np.concatenate(parts)[order] for parts in (
+                (theta, new), (value, found[0]), (rate, found[1])))
+        return theta, jumped
+
+    def _moves(self, runs: Sequence[Tuple]) -> bool:
+        """Return whether the output changes by more than rounding."""
+        _, values, _, noise = (np.concatenate(part) for part in zip(*runs))
+        noise = STILL * (noise + np.median(noise)) + self._rounding
+        return bool(np.any(np.abs(self._difference(values - np.median(values))) > noise))
+
+    def _monotone(self, theta: np.ndarray, value: np.ndarray, rate: np.ndarray,
+                  noise: np.ndarray) -> Iterator[Segment]:
+        """Yield the segments of a run, cut at its extremes."""
+        with np.errstate(invalid='ignore'):
+            places = turns(value, rate, 4.0 * (noise + self._rounding))
+            rising = rate[places] >= 0.0
+            at, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
+                x.shape) == rising[:, None], theta[places], theta[places + 1])
+        at = np.where(np.abs(at) < LEAST, 0.0, at)
+        found = self._curve(at)[0] if len(at) else at
+        # An extreme may be the one input at which an arm has no length and no direction.
+        at = np.where(np.isfinite(found), at, theta[places])
+        found = value[places] + self._difference(
+            np.where(np.isfinite(found), found, value[places]) - value[places])
+        theta, value = np.insert(theta, places + 1, at), np.insert(value, places + 1, found)
+        rate = np.insert(rate, places + 1, 0.0)
+        cuts = [0, *(places + 1 + np.arange(len(places))).tolist(), len(theta) - 1]
+        for first, last in zip(cuts, cuts[1:]):
+            part = slice(first, last + 1)
+            sign = 1.0 if value[last] >= value[first] else -1.0
+            values = np.maximum.accumulate(sign * value[part])
+            yield Segment(theta[part], values, _cells(theta[part], values, sign * rate[part]),
+                          sign)
+
+    def _slack(self) -> List[np.ndarray]:
+        """Return how far below and above each segment values are those of its ends."""
+        found: List[np.ndarray] = []
+        for end, goes_on, side in ((0, self._preceding, -1), (-1, self._following, 1)):
+            x, other, value, sign, there = np.array([
+                (segment.theta[end], segment.theta[-1 - end], segment.value[end], segment.sign,
+                 self.all[(i + side) % len(self.all)].value[-1 - end])
+                for i, segment in enumerate(self.all)]).reshape(-1, 5).T
+            # An end is a float, too: next to it the output may change quickly.
+            beside = x + np.copysign(ULPS * np.spacing(np.maximum(abs(x), 1.0)), other - x)
+            change = np.abs(self._difference(self._curve(beside)[0] - sign * value))
+            found.append(np.where(
+                goes_on, SPECIAL * self._size + np.abs(self._difference(there - value)),
+                np.fmin(np.fmax(change, BEYOND * self._size), STEEPEST * self._size)))
+        return found
+
+    def _continues(self, segment: Segment, other: Segment, turn: float) -> bool:
+        """Return whether the output goes on from a segment to the next one."""
+        apart = float(other.theta[0] - segment.theta[-1])
+        return other.sign == segment.sign and abs(
+            math.remainder(apart, turn)) <= SPECIAL and bool(abs(self._difference(
+                other.value[0] - segment.value[-1])) <= BEYOND * self._size)
+
+
+def segments_of(linkage: Mechanism, output: str, others: Sequence[float] = (),
+                first: Optional[Input] = None) -> Segments:
+    """Return the segments of an output over the first input; see `Analysis`."""
+    first = first or linkage.inputs[0]
+
+    def make() -> Segments:
+        analysis = Analysis(linkage, others, first)
+        period = math.inf if not linkage.is_angle(output) else (
+            math.tau if output != first.name else first.turn if first.wraps else math.inf)
+        return Segments(analysis.curve('output', output), analysis.reach(), analysis.near_zeros(),
+                        first, period, 1.0 if linkage.is_angle(output) else linkage.longest)
+
+    return linkage.cache.get_or_make(('segments', output, first.period, *others), make)
+
+
+def extremes_of(linkage: Mechanism, output: str, arcs: Optional[Sequence[Arc]],
+                others: Sequence[float]) -> list:
+    """Implement `Mechanism.extremes`."""
+    linkage.check_output(output)
+    pose, angular = linkage.bound('output', output), np.array([linkage.is_angle(output)])
+    size = linkage.inputs[0].step
+    parts = linkage.reach(*others) if arcs is None else arcs
+    if arcs is None and (segments := segments_of(linkage, output, others)).jumps:
+        parts = [(low * size, high * size) for low, high in segments.arcs]
+    found = [extremes(lambda value: pose.searched(value, *others)[:1], low, high,
+                      angular)[0].tolist() for low, high in parts]
+    return [(tuple(least), tuple(greatest)) for least, greatest in found]
+
+
+def _cut(arcs: Sequence[Arc], marks: Any) -> Iterator[Arc]:
+    """Yield arcs, cut at marks."""
+    for start, end in arcs:
+        inside = sorted(mark for mark in marks if start < mark < end)
+        yield from zip([start, *inside], [*inside, end])
+
+
+def _cells(theta: np.ndarray, value: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Return what `_estimate` needs between samples: a cubic from the end with the lower rate."""
+    width, change = np.diff(theta), np.diff(value)
+    slow, fast = rate[:-1], rate[1:]
+    start = ~(slow > fast)
+    with np.errstate(invalid='ignore'):
+        slow, fast = np.where(start, slow, fast) * width, np.where(start, fast, slow) * width
+    slow = np.where(slow < change, slow.clip(1e-300), change.clip(1e-300))
+    known = np.isfinite(fast)
+    bend = np.where(known, 3.0 * change - 2.0 * slow - np.where(known, fast, 0.0), change - slow)
+    return np.stack([
+        np.where(start, theta[:-1], theta[1:]), np.where(start, width, -width),
+        np.where(start, value[:-1], value[1:]), np.where(start, 1.0, -1.0), slow, change - slow,
+        bend, change - slow - bend])
+
+
+def _estimate(target: Any, start: Any, width: Any, value: Any, side: Any, slow: Any, curve: Any,
+              square: Any, cube: Any) -> Any:
+    """Return the input at a value: a parabola's, after one step of Newton's on the cubic."""
+    rest = side * (target - value)
+    part = 2.0 * rest / (slow + (slow * slow + 4.0 * curve * rest) ** 0.5)
+    error = part * (slow + part * (square + part * cube)) - rest
+    return start + width * (part - error / (slow + part * (2.0 * square + 3.0 * part * cube)))
+
+
+def _bracket(target: float, row: Tuple) -> Bracket:
+    _, _, sign, theta, samples, cells = row
+    i = samples.searchsorted(target, 'right')
+    return (*theta[i:i + 2].tolist(), _estimate(target, *cells[:, i].tolist()), sign)

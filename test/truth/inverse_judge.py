@@ -1,0 +1,222 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A judge of inverses: poses alone decide, sampled and bisected, without the code of the inverse.
+
+A question is a pose, and an output's value there. It is lost if no answer is at that pose; an
+answer is invented if its own pose has another value, and a duplicate if it is next to another.
+"""
+
+from collections import Counter
+import math
+
+import numpy as np
+
+# Distances of questions from ends, extremes and dead points [rad, sizes].
+AWAY = 1e-12, 1e-9, 1e-6, 1e-3
+# An answer at a pose is no farther from it; ends and extremes have a larger one, since a value
+# within 1e-13 of theirs is theirs.
+AT, NEXT = 1e-7, 3e-5
+# Error of an answer in units of the rule: half an ulp of the output's size, and of the input
+# times the rate; what is beyond MOST is invented. Next to a special input 1e-9 of the size is
+# allowed, and what 64 ulps of the input change.
+MOST, ALLOWED = 64.0, 1e-9
+# Samples of the range of an input, and steps of a bisection.
+SAMPLES, STEPS = 721, 60
+KINDS = 'ordinary', 'next to ends', 'ends', 'extremes', 'dead points'
+
+
+class Output:
+    """An output over the first input, by poses; the other inputs are fixed."""
+
+    def __init__(self, linkage, name, others=()):
+        self.linkage, self.name, self.others = linkage, name, others
+        self.first = linkage.inputs[0]
+        self.size = 1.0 if linkage.is_angle(name) else linkage.longest
+        own = name == self.first.name
+        self.period = math.inf if not linkage.is_angle(name) else (
+            math.tau if not own else self.first.turn if self.first.wraps else math.inf)
+        low, high = self.first.low, self.first.high
+        # Few of many turns: the judge is slow.
+        turns = min(round((high - low) / math.tau), 3) if self.first.turns else 1
+        if turns > 1:
+            low, high = -math.pi * turns, math.pi * turns
+        self.theta = np.linspace(low, high, SAMPLES * max(turns, 1))
+        self.values = self.at(self.theta)
+
+    def at(self, theta):
+        """Return the output at inputs, NaN where any joint cannot be assembled."""
+        theta = np.asarray(theta, float)
+        inputs = [theta, *(np.full_like(theta, other) for other in self.others)]
+        value = self.linkage.joint_angles(inputs if self.others else theta, (self.name,))[
+            self.name]
+        margins = self.linkage.margins(*(each.ravel() for each in inputs))
+        return np.where((margins >= 0.0).all(axis=0).reshape(theta.shape), value, np.nan)
+
+    def away(self, value, other):
+        """Return the distance of two values, without whole turns."""
+        gap = np.asarray(value) - other
+        return np.abs(gap if math.isinf(self.period) else gap - self.period * np.round(
+            gap / self.period))
+
+    def ends(self):
+        """Return the last inputs at which there is a pose, with the direction inside."""
+        known = np.isfinite(self.values)
+        for i in np.flatnonzero(known[1:] != known[:-1]).tolist():
+            inside, out = (self.theta[i], self.theta[i + 1])[::1 if known[i] else -1]
+            for _ in range(STEPS):
+                middle = 0.5 * (inside + out)
+                inside, out = (middle, out) if np.isfinite(self.at(middle)) else (inside, middle)
+            yield inside, -1.0 if known[i] else 1.0
+        if not self.first.turns:  # a whole turn, or a few of many, have no ends
+            yield from ((end, side) for end, side, there in (
+                (self.theta[0], 1.0, known[0]), (self.theta[-1], -1.0, known[-1])) if there)
+
+    def extremes(self):
+        """Return inputs at which the output turns back, to half of all digits."""
+        before, now, after = self.values[:-2], self.values[1:-1], self.values[2:]
+        with np.errstate(invalid='ignore'):
+            places = np.flatnonzero((now - before) * (now - after) > 0.0) + 1
+        for i in places.tolist():
+            if max(self.away(self.values[i], self.values[i - 1]),
+                   self.away(self.values[i], self.values[i + 1])) > 0.3 * self.size:
+                continue
+            sign = 1.0 if self.values[i] > self.values[i - 1] else -1.0
+            low, high = self.theta[i - 1], self.theta[i + 1]
+            for _ in range(40):
+                inner = np.linspace(low, high, 9)
+                best = int(np.clip(np.argmax(sign * self.at(inner)), 1, 7))
+                low, high = inner[best - 1], inner[best + 1]
+            yield 0.5 * (low + high)
+
+    def roots(self, value):
+        """Return the inputs between samples at which the output passes a value."""
+        gap = self.values - value
+        if self.period < math.inf:
+            gap = gap - self.period * np.round(gap / self.period)
+        with np.errstate(invalid='ignore'):
+            places = np.flatnonzero((gap[1:] * gap[:-1] < 0.0) & (
+                np.abs(gap[1:] - gap[:-1]) < 0.3 * self.size))
+        for i in places.tolist():
+            low, high, rising = self.theta[i], self.theta[i + 1], gap[i] < 0.0
+            for _ in range(STEPS):
+                middle = 0.5 * (low + high)
+                now = float(self.at(middle)) - value
+                now = math.remainder(now, self.period) if now == now else now
+                low, high = (middle, high) if (now < 0.0) == rising else (low, middle)
+            if self.away(self.at(low), value) < 1e-9 * self.size:
+                yield low
+
+    def questions(self, rng, count):
+        """Yield kinds and inputs of questions."""
+        known = self.theta[np.isfinite(self.values)]
+        for at in rng.choice(known, min(count, len(known))) if len(known) else ():
+            yield 'ordinary', float(at + 0.3 * (self.theta[1] - self.theta[0]))
+        special = [('ends', at, side) for at, side in self.ends()]
+        special += [('extremes', at, 1.0) for at in self.extremes()]
+        special += [('dead points', at, side) for at in self.linkage.dead_points(*self.others)
+                    for side in (1.0, -1.0)]
+        for kind, at, side in special:
+            yield kind, at
+            for away in AWAY:
+                yield 'next to ends', at + side * away * self.first.size
+
+
+def judge(linkage, name, rng, count=6, others=()):
+    """Return counts by (kind, what), and the worst error of an answer in units of the rule."""
+    output, found, worst = Output(linkage, name, others), Counter(), 0.0
+    values = output.values[np.isfinite(output.values)]
+    # An output that stands still, except where an arm nearly vanishes, tells no input.
+    if len(values) < 20 or np.ptp(np.quantile(values, (0.05, 0.95))) < 1e-6 * output.size:
+        return found, worst
+    names = (name, *(input_.name for input_ in linkage.inputs[1:]))
+    inverse = linkage.inverse(names)
+    first = inverse.inputs[0]
+    for kind, at in output.questions(rng, count):
+        value = float(output.at(at))
+        if value != value:
+            continue
+        answers = [answer.inputs[0] for answer in inverse.all([value, *others], [at, *others])]
+        found[kind, 'questions'] += 1
+        expected = [at] if kind != 'ordinary' else [at, *output.roots(value)]
+        close = (AT if kind == 'ordinary' else NEXT) * first.size
+        for root in expected:
+            gaps = [first.apart(root, x) for x in answers]
+            if not min(gaps, default=9.0) <= close and not any(
+                    # Where the output hardly changes, its value does not tell the input.
+                    gap < 1e-2 and output.away(output.at(np.linspace(root, x, 9)), value).max()
+                    < 1e-11 * output.size for gap, x in zip(gaps, answers)):
+                found[kind, 'lost'] += 1
+                found[kind, 'lost at', linkage, name, at, others] += 1
+                break
+        for k, x in enumerate(answers):
+            error, reached, beside = _error(output, x, value)
+            beyond = 0.0 if kind == 'ordinary' else max(2.0 * ALLOWED * output.size, beside)
+            if not error <= MOST and not output.away(reached, value) <= beyond:
+                found[kind, 'invented'] += 1
+                found[kind, 'invented at', linkage, name, at, others] += 1
+            elif kind == 'ordinary':
+                worst = max(worst, error)
+            if any(first.apart(x, y) <= 1e-9 * first.size for y in answers[:k]):
+                found[kind, 'duplicates'] += 1
+    return found, worst
+
+
+def _error(output, x, value):
+    """Return the error of an answer in units of the rule, and the output there."""
+    first = output.first
+    step = 2.0 * np.spacing(max(abs(x), 1e-3 * first.size))
+    reached, *beside = output.at(np.array([x, x + step, x - step])).tolist()
+    # What an ulp of the input changes, on the side where there is a pose; and what 64 do.
+    change = np.nanmax([0.0, *output.away(beside, reached)]) / 4.0
+    far = 64.0 * np.spacing(max(abs(x), first.size))
+    far = output.at(np.array([x + far, x - far]))
+    return float(output.away(reached, value)) / (2.0 ** -53 * output.size + change), reached, min(
+        1e-6 * output.size, 2.0 * np.nanmax([0.0, *output.away(far, reached)]))
+
+
+def judge_several(linkage, names, rng, count=6):
+    """Return what `judge` does for as many outputs as there are inputs, at ordinary poses."""
+    found, worst = Counter(), 0.0
+    inverse = linkage.inverse(names)
+    sizes = [input_.size for input_ in linkage.inputs]
+    scales = [1.0 if linkage.is_angle(name) else linkage.longest for name in names]
+    for _ in range(count):
+        pose = [float(rng.uniform(input_.low, input_.high)) for input_ in linkage.inputs]
+        row = np.array(linkage.checked(names).at(*pose)[:len(names)])
+        if not np.isfinite(row).all() or not inverse.margin(pose) > 1e-6:
+            continue
+        answers = inverse.all(row.tolist())
+        found['ordinary', 'questions'] += 1
+        margin = inverse.margin(pose)
+        if not any(max(input_.apart(x, y) / size for input_, x, y, size in zip(
+                linkage.inputs, answer.inputs, pose, sizes)) < 1e-9 / margin
+                for answer in answers):
+            found['ordinary', 'lost'] += 1
+            found['ordinary', 'lost at', linkage, names, tuple(pose), ()] += 1
+        for answer in answers:
+            there = np.array(linkage.checked(names).at(*answer.inputs)[:len(names)])
+            gaps = [abs(math.remainder(gap, math.tau)) / scale if linkage.is_angle(name)
+                    and name not in [input_.name for input_ in linkage.inputs]
+                    else abs(gap) / scale for gap, name, scale in zip(there - row, names, scales)]
+            if not max(gaps) < 1e-9 and _differ(linkage, names, there - row, scales):
+                found['ordinary', 'invented'] += 1
+                found['ordinary', 'invented at', linkage, names, tuple(pose), ()] += 1
+    return found, worst
+
+
+def _differ(linkage, names, gaps, scales):
+    """Return whether outputs differ, those that are inputs not only by whole periods."""
+    inputs = {input_.name: input_ for input_ in linkage.inputs}
+    return not all(
+        (inputs[name].apart(gap, 0.0) if name in inputs else
+         abs(math.remainder(gap, math.tau)) if linkage.is_angle(name) else abs(gap)) < 1e-7 * scale
+        for name, gap, scale in zip(names, gaps, scales))
