@@ -10,10 +10,15 @@
 
 """Facts of a robot's file, each as it is read, printed or refused."""
 
+import ast
+import math
+from pathlib import Path
 import re
+import shlex
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import check, closing, command, model, readers
+from linkage_ros.robot_files.spatial import posed
 import numpy as np
 import pytest
 from test_robot_files import (
@@ -278,6 +283,167 @@ def test_joints_that_no_mechanism_publishes_are_one_of_cranks(tmp_path):
                     ('speed', 0.0))}}
     assert model.others(readers.read(str(ROBOTS / 'four_bar.sdf')), scene.read(command.described(
         readers.read(str(ROBOTS / 'four_bar.sdf')))[0]).machines, {}) == ({}, [])
+
+
+LEG = """<link name="coupler{0}"/><link name="rocker{0}"/>
+  <joint name="elbow{0}" type="revolute"><parent link="crank"/><child link="coupler{0}"/>
+    <origin xyz="{1} 0 0.2" rpy="0 {4} 0"/><axis xyz="0 1 0"/>{2}</joint>
+  <joint name="shoulder{0}" type="continuous"><parent link="base"/><child link="rocker{0}"/>
+    <origin xyz="{3} 0 0" rpy="0 {5} 0"/><axis xyz="0 1 0"/></joint>
+  <loop_joint name="wrist{0}" type="revolute"><link1 link="coupler{0}" xyz="0.25 0 0"/>
+    <link2 link="rocker{0}" xyz="0.22 0 0"/><axis xyz="0 1 0"/></loop_joint>"""
+MOTOR = """<robot name="r"><link name="base"/><link name="crank"/><joint name="motor"
+  type="{}"><parent link="base"/><child link="crank"/><axis xyz="0 1 0"/></joint>{}
+  <transmission name="t"><joint name="motor"/></transmission></robot>"""
+
+
+def legs(count, ends=''):
+    """Return legs on one crank, each on the line of its pivots, so that both sides are as near."""
+    return MOTOR.format('continuous', ''.join(LEG.format(
+        i, x, ends, far, math.atan2(0.2, far - x), math.atan2(-0.2, x - far))
+        for i in range(count) for x, far in [(0.01 * i, 0.3 - 0.01 * i)]))
+
+
+def choices(line):
+    """Return the options that a refusal offers to be pasted."""
+    return [shlex.split(each) for each in re.findall(
+        r'(--(?:pose|driven|hold) [^.].*?)(?:, or by |\.?\n| or (?=--)|; |$)', line)]
+
+
+@pytest.mark.parametrize('count', [1, pytest.param(12, marks=pytest.mark.slow)])
+def test_all_legs_that_are_undecided_are_asked_in_one_run(capsys, tmp_path, count):
+    file = tmp_path / 'legs.urdf'
+    file.write_text(legs(count))
+    line = refused(capsys, file)
+    sides = choices(line)
+    assert line.count(' as with ') == count and len(sides) == 2
+    found = []
+    for side in sides:
+        assert command.main([str(file), *side]) == 0
+        out, err = capsys.readouterr()
+        assert 'loops stand open by' in err and 'Left out' not in err
+        found.append(out)
+    assert found[0] != found[1]
+
+
+@pytest.mark.parametrize('low', [-0.1, 0.2])
+def test_of_two_poses_the_one_inside_the_limits_is_no_question(capsys, tmp_path, low):
+    # The file's pose is inside of the first, and outside of the second.
+    file = tmp_path / 'legs.urdf'
+    file.write_text(legs(2, f'<limit lower="{low}" upper="3"/>'))
+    assert command.main([str(file)]) == 0
+    assert '--pose' not in capsys.readouterr().err
+
+
+# A parallelogram that lies on its base where the file has it.
+FOLDED = MOTOR.format('{}', """<link name="coupler"/><link name="rocker"/>
+  <joint name="elbow" type="continuous"><parent link="crank"/><child link="coupler"/>
+    <origin xyz="0.2 0 0"/><axis xyz="0 1 0"/></joint>
+  <joint name="shoulder" type="continuous"><parent link="base"/><child link="rocker"/>
+    <origin xyz="0.3 0 0"/><axis xyz="0 1 0"/></joint>
+  <loop_joint name="wrist" type="revolute"><link1 link="coupler" xyz="0.3 0 0"/>
+    <link2 link="rocker" xyz="0.2 0 0"/><axis xyz="0 1 0"/></loop_joint>""")
+
+
+def test_a_fold_is_left_by_a_line_that_is_printed(capsys, tmp_path):
+    file = tmp_path / 'folded.urdf'
+    file.write_text(FOLDED.format('continuous'))
+    sides, found = choices(refused(capsys, file)), set()
+    for side in sides:
+        assert command.main([str(file), *side]) == 0
+        found |= {*re.findall('parallelogram|dyad', capsys.readouterr().out)}
+    assert len(sides) == 2 and 'parallelogram' in found
+
+
+def test_a_pose_next_to_a_fold_leaves_bars_free(capsys, tmp_path):
+    file = tmp_path / 'folded.urdf'
+    file.write_text(FOLDED.format('revolute').replace(
+        '</joint>', '<limit lower="-0.1" upper="0.7"/></joint>', 1))
+    robot = posed(readers.read(str(file)), {'motor': 1e-4, 'shoulder': 1e-4, 'elbow': -1e-4})
+    why = closing.closed(robot).faults['motor']
+    assert 'bars lie in line where the file has them, which leaves ' in why
+    (side,) = choices(why)
+    (motor,) = (float(each.partition('=')[2]) for each in side if each.startswith('motor='))
+    assert -0.1 < motor < 0.7
+    assert command.main([str(file), *side]) == 0
+    assert 'Left out' not in capsys.readouterr().err
+
+
+def test_a_loop_that_closes_in_one_pose_alone_is_named(capsys, tmp_path):
+    # Its three bars are just as long as the ground.
+    file = tmp_path / 'line.urdf'
+    file.write_text(FOLDED.format('continuous').replace(
+        '<origin xyz="0.3 0 0"/>', '<origin xyz="0.7 0 0"/>').replace(
+        'link="rocker" xyz="0.2', 'link="rocker" xyz="-0.2'))
+    assert ('its loops end where the file has motor, and no other pose is found: lengths or '
+            'places in the file are wrong.\n') in refused(capsys, file)
+
+
+def test_a_joint_without_a_range_is_the_one_to_hold(capsys, tmp_path):
+    file, loops = tmp_path / 'five_bar.urdf', tmp_path / 'loops.yaml'
+    knee = '"front_knee" type="continuous">'
+    text = (ROBOTS / 'five_bar.urdf').read_text()
+    assert knee in text
+    file.write_text(text.replace(
+        knee, '"front_knee" type="revolute"><limit lower="0" upper="0"/>'))
+    loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [3d], name_mot: [mot_front]}')
+    line = refused(capsys, file, '--loops', loops)
+    assert re.search('or --hold front_knee=.*; the limits of front_knee leave no range', line)
+
+
+def test_a_fold_outside_the_limits_starts_inside_them(capsys, tmp_path):
+    file = tmp_path / 'folded.urdf'
+    file.write_text(FOLDED.format('revolute').replace(
+        '</joint>', '<limit lower="0.5" upper="2"/></joint>', 1))
+    assert command.main([str(file)]) == 0
+    assert 'Started inside the limits of the file: motor at 0.6' in capsys.readouterr().err
+
+
+def test_what_is_not_driven_is_imported_with_the_line_that_is_printed(capsys, tmp_path):
+    file = tmp_path / 'five_bar.urdf'
+    loops = tmp_path / 'loops.yaml'
+    file.write_text((ROBOTS / 'five_bar.urdf').read_text())
+    loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [3d], name_mot: [mot_front]}')
+    line = refused(capsys, file, '--loops', loops)
+    assert 'not driven: 1 of ' in line
+    for more in choices(line):
+        assert command.main([str(file), '--loops', str(loops), *more]) == 0
+        assert 'Checked: mot_front' in capsys.readouterr().err
+    assert len(choices(line)) == 2
+
+
+def test_what_has_no_one_position_is_named(capsys):
+    pytest.importorskip('mujoco')
+    assert command.main([str(ROBOTS / 'toe_rod.xml')]) == 0
+    assert re.search('Not published: .*: a ball or a free joint has no one position',
+                     capsys.readouterr().err)
+
+
+def refusals():
+    """Return the texts of all errors and reasons for which a loop is left out."""
+    for name in ('closing', 'planar', 'loops', 'rods', 'check'):
+        tree = ast.parse(Path(command.__file__).with_name(f'{name}.py').read_text())
+        for node in ast.walk(tree):
+            is_reason = isinstance(node, ast.FunctionDef) and node.name in (
+                '_fault', '_why', '_elsewhere')
+            for part in ast.walk(node) if is_reason else [node]:
+                if isinstance(part, (ast.Raise, ast.Return) if is_reason else ast.Raise):
+                    yield from (each.value.strip(' :;,') for each in ast.walk(part)
+                                if isinstance(each, ast.Constant) and isinstance(each.value, str)
+                                and len(each.value) > 12)
+
+
+def test_the_table_of_messages_has_all_refusals_and_no_others():
+    text = (ROBOTS.parents[1] / 'docs' / 'robot-files.md').read_text()
+    section = text.partition('## When it refuses')[2].partition('\n## ')[0]
+    rows = [row.split('|')[1] for row in section.splitlines() if row.startswith('| ')][1:]
+    said, known = ' '.join(refusals()), '\n'.join(rows)
+    assert len(rows) > 20
+    assert not [each for each in refusals() if each not in known]
+    quotes = [quote.strip(' :') for row in rows for quote in re.findall('`(.*?)`', row)]
+    others = {'choose by', 'not driven', 'free: choose another pose by'}
+    assert not [quote for quote in quotes if quote not in said and quote not in others
+                and not quote.startswith('m, more')]
 
 
 def test_a_mechanism_that_cannot_move_is_not_checked():

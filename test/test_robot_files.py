@@ -576,14 +576,14 @@ def test_what_is_missing_is_said_in_one_sentence(capsys, tmp_path):
         capsys, ROBOTS / 'five_bar.urdf', '--loops', loops)
 
 
-PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], actuated_joints: [motor]}'
+PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], independent: [motor]}'
 
 
 @pytest.mark.parametrize('text, why', [
     (PIN % 'parent_xzy', "pin_loops[0] has no key 'parent_xzy'; allowed: name, parent, child, "
      'parent_xyz, child_xyz, axis; did you mean parent_xyz?'),
-    (PIN.replace('actuated', 'actated') % 'parent_xyz', "the file has no key 'actated_joints'; "
-     'allowed: closures, .*; did you mean actuated_joints?'),
+    (PIN.replace('independent', 'indepndent') % 'parent_xyz', "the file has no key 'indepndent'; "
+     'allowed: closures, .*; did you mean independent?'),
     ('{closures: [{link_a: coupler, link_b: rocker, 7: 8}]}', 'closures[0] has no key 7; '
      'allowed: link_a, link_b, point, axis\n')])
 def test_an_unknown_key_of_a_file_of_loops_is_refused(capsys, tmp_path, text, why):
@@ -672,8 +672,12 @@ def test_a_pose_at_the_end_of_its_loops_is_no_side(capsys, tmp_path):
         'xyz="0 0 0.2"/><axis', f'xyz="0 0 0.2" rpy="0 {math.atan2(2.0, 3.0)!r} 0"/><axis'), (
         'xyz="0.3 0 0"/><axis', f'xyz="0.3 0 0" rpy="0 {-math.atan2(3.0, 2.0)!r} 0"/><axis'), (
         '<parent_origin xyz="0.3 0 0"/>', f'<parent_origin xyz="{13 ** 0.5 / 10 - 0.2!r} 0 0"/>'))
-    assert ('its loops end where the file has motor: choose another pose by --pose motor='
-            in refused(capsys, file, '--driven', 'motor'))
+    line = refused(capsys, file, '--driven', 'motor')
+    assert 'its loops end where the file has motor: choose another pose by --pose motor=' in line
+    # What is printed leads on: the loops do not let the motor inside its limits.
+    more = line.rstrip('.\n').partition('--pose ')[2].split()
+    assert command.main([str(file), '--driven', 'motor', '--pose', *more]) == 0
+    assert 'motor, from -2 to -1: its loops do not reach them' in capsys.readouterr().err
 
 
 def test_a_joint_that_follows_another_is_geared_to_it(imported, tmp_path):
@@ -871,7 +875,7 @@ def test_the_axis_of_a_joint_of_gazebo_is_seen_as_the_file_says(tmp_path, seed, 
 
 
 BALLS = '{pin_loops: [], ball_loops: [{parent: coupler, child: rocker, parent_xyz: [0.3, 0, 0], ' \
-    'child_xyz: [0, 0, 0.2]}], ball_upgrades: [elbow], actuated_joints: [motor]}'
+    'child_xyz: [0, 0, 0.2]}], joint_name: [elbow], joint_type: [SPHERICAL], independent: [motor]}'
 PAIRS = '{closed_loop: [[wrist_a, wrist_b]], type: [3d], name_mot: [motor], ' \
     'joint_name: [elbow], joint_type: [%s]}'
 
@@ -1033,7 +1037,8 @@ def test_a_loop_of_the_whole_robot_that_stands_open_is_named(monkeypatch, capsys
     made = [check.Imported('hip', {}, [], {'hip': (-0.2, 0.3), 'crank_motor': (-0.3, 0.3)})]
     assert len(whole(robot, machines, made)) == 1
     _, line = whole(robot, wrong, made)
-    assert re.match('Open: the loops of bell_joint, .*, by 0.0[0-9]* m', line)
+    assert re.match('Open: the loops of bell_joint, .*: with hip at -0.0.*, bell_joint at 0 its '
+                    'loops stand open by 9.2e-05 m', line)
     monkeypatch.setattr(check, 'whole', lambda robot, _, made: whole(robot, wrong, made))
     assert command.main([str(file)]) == 1
     out, err = capsys.readouterr()

@@ -16,7 +16,7 @@ from pathlib import Path
 from linkage_ros import scene
 from linkage_ros.robot_files import command as from_robot, readers
 from linkage_ros.robot_model import bodies, mjcf, sdf
-from linkage_ros.robot_model.assembled import assembled
+from linkage_ros.robot_model.assembled import assembled, weight
 import numpy as np
 import pytest
 from test_urdf import drives, in_space, MACHINES, OWN, posed
@@ -192,9 +192,9 @@ def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
     assert not any(line.startswith('Left out') for line in said)
     # An SDF has its zeros where it starts.
     zeros = {solid.joint.name: solid.position if form is sdf else 0.0
-             for solid in built.solids if solid.joint}
+             for solid in built.bodies if solid.joint}
     turns = {solid.joint.name: solid.joint.kind == 'revolute'
-             for solid in built.solids if solid.joint}
+             for solid in built.bodies if solid.joint}
     machines = scene.read(given).machines.values()
     for thetas in drives(one, 7):
         wanted = {name: value - zeros[name] for name, value in posed(one, thetas)[0].items()}
@@ -211,11 +211,12 @@ def test_bodies_weigh_what_mujoco_finds_their_shapes_to_weigh():
     text = mjcf.write(built)
     given, shapes = (MuJoCo(text.replace('angle="radian"', f'angle="radian" {by}')).model
                      for by in ('', 'inertiafromgeom="true"'))
-    moving = [given.body(solid.name).id for solid in built.solids if solid.joint]
+    moving = [given.body(solid.name).id for solid in built.bodies if solid.joint]
     for what in 'body_mass', 'body_ipos', 'body_inertia':
         assert getattr(given, what)[moving] == pytest.approx(getattr(shapes, what)[moving])
     wide = model([simulated('engine')], density=2000.0)
-    assert wide.solids[1].weight.mass == pytest.approx(2.0 * built.solids[1].weight.mass)
+    assert weight(wide.bodies[1].solid, wide.density).mass == pytest.approx(
+        2.0 * weight(built.bodies[1].solid, built.density).mass)
 
 
 def test_a_start_out_of_reach_is_refused():

@@ -14,7 +14,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
-from typing import Dict, List, Mapping, NamedTuple, Tuple
+import shlex
+from typing import Any, Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -32,6 +33,8 @@ STARTS = 24
 ALIKE, ALIKE_LENGTH, DISTINCT = 1.2, 1e-3, 1e-3
 # A step of motors away from a dead point [rad, or of the size].
 ASIDE = 0.1
+# How far inside its limits a joint starts, as a part of its range.
+INSIDE = 0.1
 
 
 def held(robot: Robot, values: Mapping[str, float]) -> Robot:
@@ -79,12 +82,38 @@ class Closed(NamedTuple):
     faults: Dict[str, str]
 
 
-def closed(robot: Robot) -> Closed:
-    """Close the loops of a robot; its motors keep their positions if possible."""
+class Question(NamedTuple):
+    """Two closed poses of which one has to be chosen: a joint in both, and what to type."""
+
+    text: str
+    choices: Sequence[Mapping[str, str]]
+
+
+def closed(robot: Robot, given: Collection[str] = ()) -> Closed:
+    """
+    Close the loops of a robot; its motors keep their positions if possible.
+
+    If that does not determine a pose, joints outside their limits start inside them, but for those
+    whose positions are given.
+    """
+    made, outside = _closed(robot)
+    outside = {name: value for name, value in outside.items() if name not in given}
+    if outside:
+        other, _ = _closed(posed(robot, outside))
+        if len(other.open_loops) + len(other.faults) < len(made.open_loops) + len(made.faults):
+            where = ', '.join(f'{name} at {value:.4g}' for name, value in outside.items())
+            return other._replace(report=[
+                f'Started inside the limits of the file: {where}.', *other.report])
+    return made
+
+
+def _closed(robot: Robot) -> Tuple[Closed, Dict[str, float]]:
+    """Return a robot with its loops closed, and starts inside limits where that failed."""
     robot = _with_followers(robot)
     made = Closed(robot, [], {}, [], {})
     moves: Dict[str, np.ndarray] = {}
     positions: Dict[str, float] = {}
+    outside: Dict[str, float] = {}
     for component in components(robot):
         names, followers = ([name for name in component.positions if name in several]
                             for several in (robot.driven, robot.follows))
@@ -92,30 +121,74 @@ def closed(robot: Robot) -> Closed:
             poses, report = nearest(component, names, followers)
         except ValueError as error:
             made.open_loops.update((joint.name, str(error)) for joint in component.joints)
+            outside.update(component.outside(INSIDE))
             continue
         if component.gap(poses)[0] < CLOSED:
             made.immobile.extend(component.immobile(poses))
             if fault := _fault(component, poses, names, followers, made.immobile):
                 made.faults.update((joint.name, fault) for joint in component.joints)
+                outside.update(component.outside(INSIDE))
         moves.update(component.moves(poses))
         positions.update((name, float(value[0])) for name, value in component.read(poses).items())
         made.report.extend([report] * bool(report))
-    return made._replace(robot=displaced(robot, moves, positions))
+    return made._replace(robot=displaced(robot, moves, positions)), outside
+
+
+def option(word: str, values: Mapping[str, str]) -> str:
+    """Return an option of a command line, to be pasted."""
+    return f'--{word} ' + ' '.join(shlex.quote(f'{name}={value}')
+                                   for name, value in values.items())
 
 
 def _fault(component: Component, poses: Poses, motors: List[str], followers: List[str],
            immobile: List[str]) -> str:
     """Return why motors and their followers do not determine a pose; empty if they do."""
     if {*component.positions} <= {*immobile}:
-        return 'it cannot move, as its joints hold each other'
+        rigid = [joint.name for joint in component.joints if joint.kind == FIXED and joint.is_cut]
+        return 'it cannot move, as its joints hold each other' + (
+            f': {listed(rigid)} makes one body of two, where a pin has the type 3d'
+            if rigid else '')
     ways = component.free_ways(poses, component.columns_of([]))[:, component.columns_of(motors)]
     count = int(np.linalg.matrix_rank(ways, 1e-6)) if ways.size else 0
     if count < len(motors):
         return (f'{listed(motors)} drive it, and hold each other, as {count} of them tell where '
-                'all is: name these by --driven')
-    loose, count = component.loose(poses, motors + followers) if motors else ([], 0)
-    return f'not driven: {count} of {listed(loose)} must be moved, named by --driven, or held, ' \
-        'named by --hold' if count else ''
+                f'all is: name these by --driven, as in --driven '
+                f'{shlex.join(component.chosen(ways, motors))}')
+    fixed = component.columns_of(motors + followers)
+    loose, count = component.loose(poses, motors + followers)
+    if not count:
+        return ''
+    if len(component.free_ways(poses, fixed)) > component.nullity(fixed):
+        return (f'bars lie in line where the file has them, which leaves {listed(loose)} free'
+                + _elsewhere(component, motors))
+    found = component.free_ways(poses, fixed)[:, component.columns_of(loose)]
+    stiff = [joint.name for joint in component.joints if joint.name in loose
+             and joint.no_limits.endswith('no range')]
+    more = component.chosen(found, loose, stiff)
+    why = f'; the limits of {listed(stiff)} leave no range' if stiff else ''
+    at = component.read(poses)
+    return (f'not driven: {count} of {listed(loose)} must be moved, named by --driven, or held, '
+            f'named by --hold, as in --driven {shlex.join([*motors, *more])} or '
+            + option('hold', {name: f'{at[name][0]:.6g}' for name in more}) + why)
+
+
+def _elsewhere(component: Component, motors: List[str]) -> str:
+    """Return the option of the stiffest of other closed poses, inside limits if there are any."""
+    poses = _searched(component, component.columns_of([]), 0.0)
+    other = np.max(np.abs(component.away(poses.positions)), axis=1) > DISTINCT
+    stiff = component.stiffness(poses, component.columns_of(motors)) * other * (
+        component.gap(poses) < CLOSED) * np.where(component.within(poses, True), 1.0, 1e-6)
+    best = poses.some(np.array([int(np.argmax(stiff))]))
+    return f': choose another pose by {option("pose", component.written(best, True))}' \
+        if stiff.any() else ', and no other pose is found: lengths or places in the file are wrong'
+
+
+def _choice(questions: Sequence[Question], why: str) -> ValueError:
+    """Return the error of all that has to be chosen, with what to type."""
+    sides = [{name: value for each in questions for name, value in each.choices[side].items()}
+             for side in (0, 1)]
+    return ValueError(f'{why} {", and ".join(each.text for each in questions)}: choose by ' + (
+        ', or by '.join(option('pose', side) for side in sides)))
 
 
 def _check_unfolded(component: Component, poses: Poses, motors: List[str], least: float) -> None:
@@ -127,41 +200,49 @@ def _check_unfolded(component: Component, poses: Poses, motors: List[str], least
             return
         motors = component.most_moved(ways)
     fixed = component.columns_of(motors)
-    ways = component.free_ways(poses, fixed, least)
-    for way in ways if len(ways) > component.nullity(fixed) else ():
-        aside = ASIDE * component.unit * way[None]
-        back = component.closed(component.stepped(poses, aside), fixed, 40)
-        if np.max(np.abs(component.away(back.positions - poses.positions))) < 0.3 * ASIDE:
-            _refuse_fold(component, poses, motors, 3.0 * aside)
+    questions = []
+    for columns, rows in component.lots(fixed):
+        ways = component.free_ways(poses, fixed | ~columns, least)
+        for way in ways if len(ways) > component.nullity(fixed | ~columns) else ():
+            aside = ASIDE * component.unit * way[None]
+            back = component.closed(component.stepped(poses, aside), fixed, 40)
+            if np.max(np.abs(component.away(back.positions - poses.positions))) < 0.3 * ASIDE:
+                questions += _folded(component, poses, motors, 3.0 * aside, rows)
+    if questions:
+        raise _choice(questions, 'bars lie in line where the file has them, and')
 
 
-def _refuse_fold(component: Component, poses: Poses, motors: List[str], aside: np.ndarray) -> None:
-    """Raise ValueError with both neighbouring poses of a dead point, if there are two."""
+def _folded(component: Component, poses: Poses, motors: List[str], aside: np.ndarray, rows: Any
+            ) -> List[Question]:
+    """Return the choice of neighbouring poses of a dead point, if there are two."""
     fixed, ends = component.columns_of(motors), True
     for ahead in (ASIDE, -ASIDE):
         step = component.towards_limits(motors, ahead)
         both = Poses(*map(np.concatenate, zip(*(component.closed(
             component.stepped(poses, step + side), fixed, 40) for side in (aside, -aside)))))
-        name, first, second = component.farthest_apart(both, 1.0)
-        is_closed = np.max(component.gap(both)) < CLOSED
+        mask = component.elements_of(np.any(aside, axis=0) | fixed)
+        name, first, second = component.farthest_apart(both, mask)
+        is_closed = np.max(component.gap(both, rows)) < CLOSED
         ends = ends and not is_closed
         if is_closed and abs(first - second) > DISTINCT:
             where = ' '.join(f'{motor}={float(component.read(both)[motor][0]):.3g}'
                              for motor in motors)
-            raise ValueError(f'bars lie in line where the file has them, and with {where} {name} '
-                             f'is at {first:.3g} as well as at {second:.3g}: choose by --pose '
-                             f'{where} {name}=...')
+            return [Question(
+                f'with {where} {name} is at {first:.3g} as well as at {second:.3g}',
+                [component.written(both.some([k]), mask) for k in (0, 1)])]
     if ends:
-        raise ValueError(f'its loops end where the file has {listed(motors)}: choose another '
-                         f'pose by --pose {motors[0]}=...')
+        raise ValueError(f'its loops end where the file has {listed(motors)}'
+                         + _elsewhere(component, motors))
+    return []
 
 
 def nearest(component: Component, names: List[str], followers: List[str]) -> Tuple[Poses, str]:
     """
     Return the closed pose that is nearest to the file's, and a report if motors had to move.
 
-    Motors and followers keep their positions if the loops can be closed so. Raises ValueError if
-    two poses are equally near.
+    Motors and followers keep their positions if the loops can be closed so. Loops that share no
+    joint but these are closed on their own. Raises ValueError with all loops of which two poses
+    are equally near.
     """
     start, fixed = component.at_start(), component.columns_of(names)
     gap = float(component.gap(start)[0])
@@ -174,39 +255,47 @@ def nearest(component: Component, names: List[str], followers: List[str]) -> Tup
     # If the loops cannot be closed otherwise, followers move, and then motors.
     found, held_ones, open_by = start, names, math.inf
     for tried in [names + followers] * bool(followers) + [names] + [[]] * bool(names):
-        others, smallest = _closed_ones(component, component.columns_of(tried))
+        others = _searched(component, component.columns_of(tried))
+        smallest = max(component.gap(others, rows).min()
+                       for _, rows in component.lots(component.columns_of(tried)))
         if smallest < 0.9 * open_by:
             found, held_ones, open_by = others, tried, smallest
         if open_by < CLOSED:
             break
     report = '' if held_ones or not names else \
         f'{", ".join(names)} moved: their loops cannot be closed where the file has them.'
-    determined = ~component.free(component.free_ways(found, component.columns_of(held_ones))) \
-        if held_ones else 1.0
-    away = np.linalg.norm(component.away(found.positions) * determined, axis=1)
-    nearest_one = int(np.argmin(away))
-    for i in np.flatnonzero(away < ALIKE * away[nearest_one] + ALIKE_LENGTH):
-        two = found.some(np.array([nearest_one, i]))
-        name, first, second = component.farthest_apart(two, determined)
-        if abs(first - second) > DISTINCT:
-            # Motors that had to move are part of the choice.
-            chosen = [name, *(motor for motor in names if not held_ones and motor != name)]
-            ends = [' '.join(f'{each}={component.read(two)[each][k]:.3g}' for each in chosen)
-                    for k in (0, 1)]
-            raise ValueError(f'the file has them open, and they close as well with {ends[0]} as '
-                             f'with {ends[1]}: choose by --pose {name}=...')
-    return found.some(np.array([nearest_one])), report
+    fixed, poses, questions = component.columns_of(held_ones), found.some(np.arange(1)), []
+    for columns, rows in component.lots(fixed):
+        # Those with the smallest gap, inside limits if there are any; the nearest first.
+        gaps, mask = component.gap(found, rows), component.elements_of(columns)
+        some = found.some(np.flatnonzero(gaps <= 1.001 * gaps.min() + CLOSED))
+        inside = component.within(some, mask)
+        some = some.some(inside) if inside.any() else some
+        determined = mask * (~component.free(component.free_ways(some, fixed | ~columns))
+                             if held_ones else 1.0)
+        away = np.linalg.norm(component.away(some.positions) * determined, axis=1)
+        first, *more = np.argsort(away, kind='stable')
+        for each, other in zip(poses, some):
+            each[0, mask] = other[first, mask]
+        for i in more:
+            two = some.some([first, i])
+            name, *ends = component.farthest_apart(two, determined)
+            if away[i] < ALIKE * away[first] + ALIKE_LENGTH and abs(ends[0] - ends[1]) > DISTINCT:
+                questions.append(Question(
+                    f'with {name}={ends[0]:.3g} as with {name}={ends[1]:.3g}',
+                    [component.written(two.some([k]), mask) for k in (0, 1)]))
+                break
+    if questions:
+        raise _choice(questions, 'the file has them open, and they close as well')
+    return poses, report
 
 
-def _closed_ones(component: Component, fixed: np.ndarray) -> Tuple[Poses, float]:
-    """Return the poses with the smallest gap, and this gap as a part of the size."""
+def _searched(component: Component, fixed: np.ndarray, pull: float = 1e-2) -> Poses:
+    """Return poses of random starts, the first that of the file, closed as far as they can be."""
     columns = len(fixed)
     count = max(2, min(STARTS, 400_000 // max(columns, 1) ** 2))
     rng = np.random.default_rng(0)
     spread = np.linspace(0.0, 2.0, count)[:, None] * ~fixed
     poses = component.stepped(component.at_start(count), component.unit * spread * rng.uniform(
         -1.0, 1.0, (count, columns)))
-    poses = component.closed(poses, fixed, 40, 1e-2)
-    poses = component.closed(poses, fixed, 12)
-    gaps = component.gap(poses)
-    return poses.some(np.flatnonzero(gaps <= 1.001 * gaps.min() + CLOSED)), float(gaps.min())
+    return component.closed(component.closed(poses, fixed, 40, pull), fixed, 12)

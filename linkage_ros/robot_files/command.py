@@ -15,16 +15,16 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Collection, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
 from . import check, closing, loops, model, planar, readers, rods, spatial
-from .robot import FARTHEST, Joint, Robot
+from .robot import FARTHEST, FIXED, HINGE, Joint, NotDriven, Robot, SLIDE
 from .. import command, scene
 from ..linkage.dyads import short
 from ..scene.writing import in_yaml
-from ..words import elided, sentence
+from ..words import elided, listed, sentence
 
 NAME = 'from_robot'
 # The report on a mechanism that differs from its robot, or could not be compared.
@@ -55,7 +55,7 @@ def show(args: Optional[List[str]]) -> None:
         robot.check_names(asked.driven or ())
         robot = spatial.posed(robot, _values(asked.pose))
         robot = closing.held(robot, {**robot.held, **_values(asked.hold)})
-        given, reports, still = described(robot)
+        given, reports, still = described(robot, [*_values(asked.pose)])
     # Unprintable characters in names of the file could end a comment.
     head = [*(elided(line, 10 ** 6) for line in (
         f'From {asked.file}. Its joints on /joint_states, and its model:',
@@ -78,14 +78,16 @@ def _launch(asked: Any, still: Mapping[str, float]) -> str:
         f'{name}:={shlex.quote(text)}' for name, text in arguments.items() if text)
 
 
-def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
+def described(robot: Robot, given_pose: Collection[str] = ()
+              ) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
     """
     Return the parameters of a robot's scene, and the report on omissions and checks.
 
-    Also return the positions of joints in loops that stay.
+    Also return the positions of joints in loops that stay. Joints of a given pose do not move to
+    start inside their limits.
     """
     given: Dict[str, Any] = {'mechanisms': []}
-    closed = closing.closed(robot)
+    closed = closing.closed(robot, given_pose)
     robot, reports = closed.robot, closed.report
     imported: List[check.Imported] = []
 
@@ -106,9 +108,9 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]
                 if group.why:
                     continue
                 reason = f'{WRONG}: {error}' if isinstance(error, check.Difference) else (
-                    fault or error)
+                    _why(error, fault, part.joints, robot))
                 bodies = error.bodies if isinstance(error, planar.NotPlaced) else _bodies(left)
-                reports.append(f'Left out: {", ".join(bodies)}: {reason}.')
+                reports.append(f'Left out: {listed(bodies, 200)}: {reason}.')
             done = {joint.name for joint in part.joints}
             left = [joint for joint in left if joint.name not in done]
         if not left:
@@ -118,8 +120,9 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]
                 raise ValueError(open_one)
             add(rods.described(robot, group._replace(joints=left), given['mechanisms']))
         except (ArithmeticError, ValueError) as error:
-            why = fault or (f'as rods in space: {error}' if group.why else error)
-            reports.append(f'Left out: {", ".join(_bodies(left))}: '
+            why = _why(error, fault, left, robot)
+            why = f'as rods in space: {why}' if group.why and why is error else why
+            reports.append(f'Left out: {listed(_bodies(left), 200)}: '
                            + f'{group.why}; ' * bool(group.why) + f'{why}.')
     if not given['mechanisms']:
         raise command.RequestError(' '.join(reports) or 'no joint of this robot closes a loop')
@@ -133,6 +136,10 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]
         machines = scene.read({**given, **rest, 'mechanisms': [*machines, model.OTHERS]}).machines
     if lost:
         reports.append(model.not_published(lost))
+    if free := [joint.name for _, joint in spatial.trees(robot)[0].values()
+                if joint.name and joint.kind not in (HINGE, SLIDE, FIXED)]:
+        reports.append(f'Not published: {", ".join(free)}: a ball or a free joint has no one '
+                       'position. The model of the robot has them fixed where the file has them.')
     return given, [*reports, *check.whole(robot, machines, imported)], still
 
 
@@ -152,6 +159,12 @@ def _values(texts: Sequence[str]) -> Dict[str, float]:
 
 def _first(reasons: Mapping[str, str], joints: Sequence[Joint]) -> str:
     return next((reasons[joint.name] for joint in joints if joint.name in reasons), '')
+
+
+def _why(error: Exception, fault: str, joints: Sequence[Joint], robot: Robot) -> object:
+    """Return an error, or the fault of motors that do not determine the pose, if that is why."""
+    is_driven = any(joint.name in robot.driven for joint in joints)
+    return fault if fault and (is_driven or isinstance(error, NotDriven)) else error
 
 
 def _bodies(joints: Sequence[Joint]) -> List[str]:

@@ -23,8 +23,9 @@ from .elements import at, parse
 from .robot import FARTHEST, HINGE, Robot, SLIDE
 from .spatial import components, posed, trees
 from .. import scene
+from ..robot_model import bodies
 from ..robot_model.bodies import coordinates
-from ..robot_model.urdf import link, tree_joint
+from ..robot_model.urdf import write
 from ..scene.joint_names import quoted_name
 
 OTHERS = 'others'
@@ -38,25 +39,29 @@ def description(path: str, loops: Optional[str] = None) -> str:
 
 def urdf(robot: Robot) -> str:
     """Return the tree of a robot, all joints at zero where its URDF has them at zero."""
+    return write(drawn(robot))
+
+
+def drawn(robot: Robot) -> bodies.Robot:
+    """Return the tree of a robot as what all formats are written from, its joints at zero."""
     names = {joint.name for _, joint in trees(robot)[0].values()}
     robot = posed(robot, {name: 0.0 for name in robot.positions if name in names})
-    text = link(robot.root)
+    found = []
     for body, (base, joint) in trees(robot)[0].items():
         frame, seen = robot.frames[body], np.linalg.inv(robot.frames[base])
         if joint.kind in (HINGE, SLIDE) and joint.position is not None:
-            # In URDF the frame of a joint is that of its child.
+            # The frame of a joint is that of its child.
             home = at(joint.place(base), frame[:3, :3])
             child = body if np.array_equal(home, frame) else f'{body}/joint'
             kind = 'prismatic' if joint.kind == SLIDE else 'revolute'
             ends = joint.limits or ((-FARTHEST, FARTHEST) if joint.kind == SLIDE else ())
             axis = home[:3, :3].T @ joint.motion(body)
-            text += tree_joint(joint.name, kind, base, child, coordinates(seen @ home),
-                               axis.tolist(), np.clip(ends, -1e3, 1e3).tolist()) + link(child)
+            found.append(bodies.Body(child, base, coordinates(seen @ home), bodies.Joint(
+                joint.name, kind, axis.tolist(), tuple(np.clip(ends, -1e3, 1e3).tolist()))))
             base, seen = child, np.linalg.inv(home)
         if base != body:
-            text += tree_joint(f'{body}_fixed', 'fixed', base, body,
-                               coordinates(seen @ frame)) + link(body)
-    return f'<robot name="robot">\n{text}</robot>'
+            found.append(bodies.Body(body, base, coordinates(seen @ frame)))
+    return bodies.Robot('robot', robot.root, [bodies.Part(found)])
 
 
 def not_published(names: Sequence[str]) -> str:

@@ -24,7 +24,7 @@ from typing import Any, Dict, Iterator, List, Optional, Sequence, Set, Tuple
 import numpy as np
 
 from . import check, loops, sweeps
-from .robot import Joint, Limits, plain, Robot, SLIDE
+from .robot import Joint, Limits, NotDriven, plain, Robot, SLIDE
 from .sweeps import Source
 from .. import mechanisms, scene
 from ..linkage.dyads import bar_name, Dyads, Hinge, Motor, Pin, ROUNDING, short, Slide
@@ -224,7 +224,7 @@ class Drawing(Dyads):
         return None
 
 
-class NotPlaced(ValueError):
+class NotPlaced(NotDriven):
     """Why bodies are not placed."""
 
     def __init__(self, drawing: Drawing):
@@ -295,7 +295,7 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
                                           if each.name == motors[0])
                     return other
     if not best.drives:
-        raise NotPlaced(best) if best.left else ValueError('no motor moves it')
+        raise NotPlaced(best) if best.left else NotDriven('no motor moves it')
     for i, line in enumerate(best.lines):
         # At a change point the side in this pose may be the wrong one.
         name, *_, side = line.split()
@@ -312,9 +312,9 @@ def _why(drawing: Drawing) -> str:
                and {*joint.bodies} <= {*drawing.left}]
     if between and free <= 0:
         return f'not of dyads, as {", ".join(between)} drives between two of them'
-    return f'not driven: {free} more of {names} must be, named by --driven' if free > 0 else (
-        'not of dyads: all of them hold each other, as on a platform on three bars'
-        if free == 0 else f'held more than once by {names}')
+    return f'held more than once by {names}' if free < 0 else (
+        'not of dyads: all of them hold each other, as on a platform on three bars (an Assur '
+        'group of class III or higher)')
 
 
 def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:

@@ -31,6 +31,10 @@ KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical'
 FARTHEST = 1e9
 
 
+class NotDriven(ValueError):
+    """The motors do not determine the poses of a loop."""
+
+
 class Limits(NamedTuple):
     """Between which positions a joint moves [rad or m], by the limits of some joints."""
 
@@ -101,6 +105,11 @@ class Joint:
     def start(self) -> float:
         """Return the position in the file [rad or m], 0 for a joint without one."""
         return self.position or 0.0
+
+    @property
+    def range(self) -> Tuple[float, float]:
+        """Return its limits [rad or m], infinite ones without any."""
+        return self.limits or (-math.inf, math.inf)
 
     @property
     def chain(self) -> List[Tuple['Joint', float]]:

@@ -27,7 +27,7 @@ import numpy as np
 
 from . import check, sweeps
 from .loops import Group
-from .robot import BALL, HINGE, Joint, plain, Robot, SLIDE
+from .robot import BALL, HINGE, Joint, NotDriven, plain, Robot, SLIDE
 from .. import mechanisms, scene
 from ..linkage.dyads import short
 from ..linkage.rod_lines import FORMS, WindowError
@@ -230,7 +230,7 @@ def described(robot: Robot, group: Group, others: Sequence[str]) -> check.Import
     """
     found = Rods(robot, group)
     if not found.inputs:
-        raise ValueError('not driven: its motors must be named by --driven')
+        raise NotDriven('not driven: its motors must be named by --driven')
     lines, reports = _lines(found)
     name = f'{next(iter(found.inputs))}_rods'
     name = f'{name}_{len(others)}' if name in others else name

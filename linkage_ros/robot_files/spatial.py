@@ -290,7 +290,7 @@ class Component:
         """Return a step of joints by some part [rad, or of the size], within their limits."""
         step = np.zeros(len(self._column))
         for i in map(self._names.index, names):
-            low, high = self._elements[i].joint.limits or (-math.inf, math.inf)
+            low, high = self._elements[i].joint.range
             column, start = self._first[i], self._starts[i]
             change = part * self.unit[column]
             if not low <= start + change <= high:
@@ -384,9 +384,56 @@ class Component:
                 break
         return poses
 
-    def gap(self, poses: Poses) -> np.ndarray:
-        """Return the largest residual in each pose, as a part of the size."""
-        return np.max(np.abs(self.errors(poses)[0]), axis=1, initial=0.0) / self.size
+    def gap(self, poses: Poses, rows: Any = slice(None)) -> np.ndarray:
+        """Return the largest residual in each pose, of all or of some rows, as a part of size."""
+        return np.max(np.abs(self.errors(poses)[0][:, rows]), axis=1, initial=0.0) / self.size
+
+    def lots(self, fixed: np.ndarray) -> List[Tuple[np.ndarray, np.ndarray]]:
+        """Return columns and residuals of loops that share no joint but those that are fixed."""
+        moved = np.any(self._signed.sum(axis=1, keepdims=True), axis=1) & ~fixed
+        near = (moved @ moved.T) | np.all(self._ends[:, None] == self._ends, axis=2)
+        while np.any((more := near @ near) != near):
+            near = more
+        return [(np.any(moved[rows], axis=0), np.repeat(rows, 3))
+                for rows in np.unique(near, axis=0)]
+
+    def elements_of(self, columns: np.ndarray) -> np.ndarray:
+        """Return which elements have some of the columns."""
+        return np.logical_or.reduceat(columns, self._first)
+
+    def outside(self, part: float) -> Dict[str, float]:
+        """Return positions inside their limits, by a part of the range, of joints outside."""
+        found = {}
+        for each in (each.joint for each in self._elements if each.joint.position is not None):
+            low, high = each.range
+            if not low <= each.start <= high:
+                aside = part * min(high - low, 1.0)
+                found[each.name] = low + aside if each.start < low else high - aside
+        return found
+
+    def within(self, poses: Poses, elements: Any) -> np.ndarray:
+        """Return in which poses elements with names are inside the limits of their joints."""
+        found, at = np.ones(len(poses.positions), bool), self.read(poses)
+        for i in np.flatnonzero(self._named & elements):
+            low, high = self._elements[i].joint.range
+            found &= (low <= at[self._names[i]]) & (at[self._names[i]] <= high)
+        return found
+
+    def chosen(self, ways: np.ndarray, names: Sequence[str], first: Sequence[str] = ()
+               ) -> List[str]:
+        """Return joints that tell where all is, by their columns of the ways to move."""
+        own = [self._names[i] for i in self._column[self.columns_of(names)]]
+        found: List[int] = []
+        for i in sorted(range(len(own)), key=lambda i: own[i] not in first):
+            if np.linalg.matrix_rank(ways[:, [*found, i]], 1e-6) > len(found):
+                found.append(i)
+        return [own[i] for i in found]
+
+    def written(self, poses: Poses, elements: Any) -> Dict[str, str]:
+        """Return the positions of elements with names in the first pose."""
+        found = self.read(poses.some(np.arange(1)))
+        return {self._names[i]: f'{found[self._names[i]][0]:.6g}'
+                for i in np.flatnonzero(self._named & elements)}
 
     def moves(self, poses: Poses) -> Dict[str, np.ndarray]:
         """Return the displacement of each body on its parent in the first pose."""

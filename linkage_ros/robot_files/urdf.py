@@ -34,8 +34,8 @@ _ENDS = ('name', 'parent', 'child', 'parent_xyz', 'child_xyz', 'axis')
 LOOPS = {'closures': ('link_a', 'link_b', 'point', 'axis'), 'closed_loop': (),
          'pin_loops': _ENDS, 'ball_loops': _ENDS}
 # All its keys; the last two have no effect.
-_KEYS = (*LOOPS, 'type', 'joint_name', 'joint_type', 'ball_upgrades', 'independent', 'name_mot',
-         'actuated_joints', 'dependent', 'ball_limit_deg')
+_KEYS = (*LOOPS, 'type', 'joint_name', 'joint_type', 'independent', 'name_mot', 'dependent',
+         'ball_limit_deg')
 _CLOSING = re.compile(r'(?P<name>.*closing_.+)_1')
 _NOWHERE = np.eye(4)
 
@@ -197,13 +197,11 @@ class Reader:
                     str(cut.get('name', f'{key}[{i}]')), kind, (cut['parent'], cut['child']),
                     [at(numbers(cut.get(f'{end}_xyz', '0 0 0'))) for end in ('parent', 'child')],
                     numbers(cut.get('axis', '0 0 1')))
-        changes = [*zip(loops.get('joint_name', ()), loops.get('joint_type', ())),
-                   *((name, 'SPHERICAL') for name in loops.get('ball_upgrades', ()))]
-        for name, kind in changes:
+        for name, kind in zip(loops.get('joint_name', ()), loops.get('joint_type', ())):
             self._change(name, str(kind).upper())
         # Its motors are those of the closed robot, transmissions those of the open tree.
-        self.robot.driven = [name for key in ('independent', 'name_mot', 'actuated_joints')
-                             for name in loops.get(key, ())] or self.robot.driven
+        self.robot.driven = [*loops.get('independent', ()), *loops.get('name_mot', ())] \
+            or self.robot.driven
 
     def _change(self, name: str, kind: str) -> None:
         """Change the type of a joint of the tree; the axes of `UJOINT_XY` are in its frame."""

@@ -16,12 +16,13 @@ All inputs are at their starts, so that every loop is closed at the beginning of
 
 from __future__ import annotations
 
+from dataclasses import replace
 import math
-from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, Iterator, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .bodies import BALL, Body, BOX, Joint, Piece, Point, pose, Robot, ROD, size
+from .bodies import BALL, Body, BOX, Joint, Motor, Part, Piece, Point, pose, Robot, ROD, size
 from ..scene import SceneError, SceneMechanism
 from ..scene.motion import Motion
 
@@ -37,77 +38,33 @@ class Weight(NamedTuple):
     moments: Sequence[float]
 
 
-class Solid(NamedTuple):
-    """A body in its initial pose; without a name, its parent is the world."""
-
-    name: str
-    parent: str
-    pose: Tuple[float, ...]
-    joint: Optional[Joint]
-    position: float
-    pieces: Sequence[Piece]
-    points: Sequence[Point]
-    weight: Weight
-
-
-class Motor(NamedTuple):
-    """The motor of an input: start, sweep if any, moved mass [kg] and arm [m]."""
-
-    joint: str
-    turns: bool
-    start: float
-    sweep: Sequence[float]
-    mass: float
-    arm: float
-
-
-class Gear(NamedTuple):
-    """A joint whose motion is `ratio` times that of another."""
-
-    joint: str
-    input: str
-    ratio: float
-
-
-class Assembled(NamedTuple):
-    """A robot model with closed loops, and its density [kg/m^3]."""
-
-    name: str
-    density: float
-    solids: List[Solid]
-    motors: List[Motor]
-    gears: List[Gear]
-
-
-def assembled(robot: Robot, density: float = DENSITY) -> Assembled:
+def assembled(robot: Robot, density: float = DENSITY) -> Robot:
     """Return a robot model at the start of its inputs; raise SceneError if there is no pose."""
     homes = {point.name: (body.name, point.place) for body in robot.bodies
              for point in body.points}
-    made = Assembled(robot.name, density, [], [], [])
+    made = replace(robot, parts=[], motors=[], gears={}, density=density)
     for part in robot.parts:
-        machine = part.machine
+        if not (machine := part.machine):
+            made.parts.append(part)
+            continue
         starts = {name: Motion.of(drive).at(0)[0] for name, drive in machine.inputs.items()}
         positions, rates = _solved(machine, starts)
-        bodies = [*part.bodies, *_slots(machine, part.bodies, positions)]
-        solids = []
-        for body in bodies:
-            position = positions.get(body.joint.name, 0.0) if body.joint else 0.0
-            pieces = [*body.pieces, *(point.ball(point.place) for point in body.points)]
+        bodies = []
+        for body in (*part.bodies, *_slots(machine, part.bodies, positions)):
             home, (x, y) = homes.get(body.parent, (body.parent, (0.0, 0.0)))
-            u, v, *turned = body.posed(position)
-            solids.append(Solid(
-                body.name, '' if home == robot.root else home, (u + x, v + y, *turned),
-                body.joint, position, pieces, body.points, weight(pieces, density)))
-        made.solids.extend(solids)
+            u, v, *turned = body.pose
+            bodies.append(replace(body, parent=home, pose=(u + x, v + y, *turned), position=(
+                positions.get(body.joint.name, 0.0) if body.joint else 0.0)))
+        made.parts.append(Part(bodies, machine))
         tips = {link.name: link.tip for link in machine.linkage.links}
-        mass = sum(solid.weight.mass for solid in solids[1:])
+        mass = sum(weight(body.solid, density).mass for body in bodies[1:])
         for name, drive in machine.inputs.items():
             joint = machine.joints[name]
             arm = math.hypot(*machine.linkage.frames[name][tips[name]])
             ends = sorted(map(joint.of, drive.sweep or ()))
             made.motors.append(Motor(joint.name, drive.input.turns, joint.of(starts[name]), ends,
                                      mass, machine.scale * arm if arm else size(machine)))
-        made.gears.extend(Gear(name, *max(rates[name].items(), key=lambda item: abs(item[1])))
+        made.gears.update((name, max(rates[name].items(), key=lambda item: abs(item[1])))
                           for name in rates)
     return made
 
@@ -141,7 +98,8 @@ def _slots(machine: SceneMechanism, bodies: Sequence[Body], positions: Dict[str,
     """Yield the bodies in slots of yokes, which have no joint in the tree."""
     at: Dict[str, np.ndarray] = {}
     for body in bodies:
-        own = pose(*body.posed(positions[body.joint.name] if body.joint else 0.0))
+        own = pose(*replace(
+            body, position=positions[body.joint.name] if body.joint else 0.0).start)
         at[body.name] = at[body.parent] @ own if at else np.eye(4)
     points = {point.name: (at[body.name] @ (*point.place, 0.0, 1.0), point)
               for body in bodies for point in body.points}
@@ -150,7 +108,7 @@ def _slots(machine: SceneMechanism, bodies: Sequence[Body], positions: Dict[str,
             name = f'{machine.name}_{prefix}{link}'
             place, point = points[f'{machine.name}_{prefix}{pin}']
             x, y = np.linalg.solve(at[f'{name}_link'], place)[:2].tolist()
-            joint = Joint(f'{name}_slot', 'prismatic', 1.0, None)
+            joint = Joint(f'{name}_slot', 'prismatic', (1.0, 0.0, 0.0))
             met = Point(f'{name}_pin', (0.0, 0.0), point.name, point.radius)
             yield Body(f'{name}_slot_link', f'{name}_link', (x, y, 0.0, 0.0, 0.0, 0.5 * math.pi),
                        joint, [], [met])

@@ -104,22 +104,50 @@ class Point(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """The joint of a body: rotation about z or slide along x, with a sign and optional limits."""
+    """The joint of a body: rotation about an axis or slide along it, with optional limits."""
 
     name: str
     kind: str
-    sign: float
-    travel: Optional[Travel]
+    axis: Sequence[float]
+    travel: Optional[Travel] = None
 
-    @property
-    def axis(self) -> Tuple[float, float, float]:
-        """Return its axis."""
-        return (self.sign, 0.0, 0.0) if self.kind == 'prismatic' else (0.0, 0.0, self.sign)
+    def motion(self, position: float) -> np.ndarray:
+        """Return the displacement by a position [rad or m] as a matrix (4, 4)."""
+        made, axis = np.eye(4), np.asarray(self.axis, float)
+        if self.kind == 'prismatic':
+            made[:3, 3] = position * axis
+        else:
+            skew = np.cross(np.eye(3), axis)
+            made[:3, :3] += math.sin(position) * skew + (1.0 - math.cos(position)) * skew @ skew
+        return made
+
+
+class Motor(NamedTuple):
+    """The motor of an input: start, sweep if any, moved mass [kg] and arm [m]."""
+
+    joint: str
+    turns: bool
+    start: float
+    sweep: Sequence[float]
+    mass: float
+    arm: float
 
 
 @dataclass
 class Body:
-    """A body; pose: x, y, z [m], roll, pitch, yaw [rad] on its parent with its joint at zero."""
+    """
+    A body.
+
+    Attributes
+    ----------
+    parent : str
+        The body, or the point of one, that it hangs on.
+    pose : sequence of float
+        x, y, z [m], roll, pitch, yaw [rad] on its parent with its joint at zero.
+    position : float
+        The position of its joint where a simulation starts [rad or m].
+
+    """
 
     name: str
     parent: str
@@ -127,24 +155,26 @@ class Body:
     joint: Optional[Joint] = None
     pieces: List[Piece] = field(default_factory=list)
     points: List[Point] = field(default_factory=list)
+    position: float = 0.0
 
-    def posed(self, position: float) -> Tuple[float, ...]:
-        """Return its pose on its parent at a position of its joint."""
-        if not self.joint:
-            return tuple(self.pose)
-        x, y, *middle, yaw = self.pose
-        moved = self.joint.sign * position
-        if self.joint.kind == 'prismatic':
-            return x + moved * math.cos(yaw), y + moved * math.sin(yaw), *middle, yaw
-        return x, y, *middle, yaw + moved
+    @property
+    def start(self) -> Sequence[float]:
+        """Return its pose on its parent where a simulation starts."""
+        return coordinates(pose(*self.pose) @ self.joint.motion(self.position)) \
+            if self.joint else self.pose
+
+    @property
+    def solid(self) -> List[Piece]:
+        """Return what is seen of it and of its points."""
+        return [*self.pieces, *(point.ball(point.place) for point in self.points)]
 
 
 @dataclass(eq=False)
 class Part:
-    """The bodies of one mechanism, parents first."""
+    """The bodies of one mechanism, or of a robot's file; parents first."""
 
-    machine: SceneMechanism
     bodies: List[Body]
+    machine: Optional[SceneMechanism] = None
 
     @cached_property
     def joints(self) -> List[str]:
@@ -162,11 +192,28 @@ class Part:
 
 @dataclass
 class Robot:
-    """Mechanisms below a root link without a body."""
+    """
+    Bodies below a root link without a body: what all formats are written from.
+
+    Attributes
+    ----------
+    parts : list of Part
+        The bodies of each mechanism.
+    motors : list of Motor
+        The motors, for a simulation.
+    gears : dict
+        For each joint that follows another one its name and the ratio.
+    density : float
+        Of all bodies [kg/m^3], for a simulation.
+
+    """
 
     name: str
     root: str
     parts: List[Part]
+    motors: List[Motor] = field(default_factory=list)
+    gears: Dict[str, Tuple[str, float]] = field(default_factory=dict)
+    density: float = 0.0
 
     @property
     def bodies(self) -> List[Body]:
@@ -239,7 +286,7 @@ def together(robots: Sequence[Robot]) -> Robot:
 
 def _robot(machine: SceneMechanism, frame_id: str, width: Optional[float]) -> Robot:
     bodies = list(_Tree(machine, width).bodies(frame_id))
-    made = Robot(machine.name, frame_id, [Part(machine, bodies)])
+    made = Robot(machine.name, frame_id, [Part(bodies, machine)])
     made.check_names(f'{machine.name}.joints')
     _check_places(machine, _numbers(made))
     return made
@@ -335,7 +382,8 @@ class _Tree:
             zero += back
         if travel:
             travel = called.travel(travel)
-        joint = Joint(called.name, link.kind, called.sign * (side if prismatic else 1.0), travel)
+        axis = (called.sign * side, 0.0, 0.0) if prismatic else (0.0, 0.0, called.sign)
+        joint = Joint(called.name, link.kind, axis, travel)
         return Body(self._name(prefix, link.name), self._name(prefix, link.parent),
                     (x, y, 0.0, 0.0, 0.0, zero), joint)
 

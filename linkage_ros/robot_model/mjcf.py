@@ -20,13 +20,13 @@ Format: MuJoCo's XML reference (mujoco.readthedocs.io).
 from __future__ import annotations
 
 import math
-from typing import Dict
+from typing import Mapping, Sequence
 from xml.etree import ElementTree
 
 import numpy as np
 
-from .assembled import Assembled, Motor, Solid
-from .bodies import add, BALL, BOX, COLOURS, numbers, Piece, ROD
+from .assembled import weight
+from .bodies import add, BALL, Body, BOX, COLOURS, Motor, numbers, Piece, Robot, ROD
 from .. import palette
 from ..scene import SceneError
 
@@ -39,7 +39,7 @@ GRAVITY = 9.81
 LEAST = 1e-14
 
 
-def write(model: Assembled) -> str:
+def write(model: Robot) -> str:
     """Return a robot model, its loops closed, as MJCF."""
     root = ElementTree.Element('mujoco', model=model.name)
     add(root, 'compiler', angle='radian', eulerseq='XYZ')
@@ -49,21 +49,20 @@ def write(model: Assembled) -> str:
     usual = add(root, 'default')
     add(usual, 'geom', contype='0', conaffinity='0')
     add(usual, 'equality', solref=numbers(2.0 * step, 1.0), solimp='0.9999 0.9999 1')
-    bodies: Dict[str, ElementTree.Element] = {'': add(root, 'worldbody')}
+    elements = {model.root: add(root, 'worldbody')}
+    sweeps = {motor.joint: motor.sweep for motor in model.motors if motor.sweep}
     moving = set()
-    for solid in model.solids:
-        body = bodies[solid.name] = _add_solid(bodies[solid.parent], solid)
-        if solid.joint or solid.parent in moving:
-            moving.add(solid.name)
-            _add_weight(body, solid)
+    for body in model.bodies:
+        element = elements[body.name] = _add_body(elements[body.parent], body, sweeps)
+        if body.joint or body.parent in moving:
+            moving.add(body.name)
+            _add_weight(element, body, model.density)
     equality, actuator = add(root, 'equality'), add(root, 'actuator')
-    for solid in model.solids:
-        for point in solid.points:
-            if point.meets:
-                add(equality, 'connect', name=point.name, site1=point.meets, site2=point.name)
-    for gear in model.gears:
-        add(equality, 'joint', joint1=gear.joint, joint2=gear.input,
-            polycoef=numbers(0.0, gear.ratio, 0.0, 0.0, 0.0))
+    for point in (point for body in model.bodies for point in body.points if point.meets):
+        add(equality, 'connect', name=point.name, site1=point.meets, site2=point.name)
+    for name, (other, ratio) in model.gears.items():
+        add(equality, 'joint', joint1=name, joint2=other,
+            polycoef=numbers(0.0, ratio, 0.0, 0.0, 0.0))
     for motor in model.motors:
         _add_motor(actuator, motor)
     add(add(root, 'keyframe'), 'key', name='start',
@@ -72,26 +71,29 @@ def write(model: Assembled) -> str:
     return ElementTree.tostring(root, encoding='unicode')
 
 
-def _add_solid(parent: ElementTree.Element, solid: Solid) -> ElementTree.Element:
-    body = add(parent, 'body', name=solid.name, pos=numbers(*solid.pose[:3]),
-               euler=numbers(*solid.pose[3:]))
-    if joint := solid.joint:
+def _add_body(parent: ElementTree.Element, body: Body, sweeps: Mapping[str, Sequence[float]]
+              ) -> ElementTree.Element:
+    made = add(parent, 'body', name=body.name, pos=numbers(*body.start[:3]),
+               euler=numbers(*body.start[3:]))
+    if joint := body.joint:
         kind = 'slide' if joint.kind == 'prismatic' else 'hinge'
-        add(body, 'joint', name=joint.name, type=kind, axis=numbers(*joint.axis),
-            ref=numbers(solid.position))
-    for piece in solid.pieces:
-        _add_piece(body, piece)
-    for point in solid.points:
-        add(body, 'site', name=point.name, pos=numbers(*point.place, 0.0), group='4')
-    return body
+        moved = add(made, 'joint', name=joint.name, type=kind, axis=numbers(*joint.axis),
+                    ref=numbers(body.position))
+        if joint.name in sweeps:
+            moved.set('range', numbers(*sweeps[joint.name]))
+    for piece in body.solid:
+        _add_piece(made, piece)
+    for point in body.points:
+        add(made, 'site', name=point.name, pos=numbers(*point.place, 0.0), group='4')
+    return made
 
 
-def _add_weight(body: ElementTree.Element, solid: Solid) -> None:
-    mass, centre, (xx, yy, zz, xy) = solid.weight
+def _add_weight(element: ElementTree.Element, body: Body, density: float) -> None:
+    mass, centre, (xx, yy, zz, xy) = weight(body.solid, density)
     if np.linalg.eigvalsh([[xx, xy], [xy, yy]])[0] < LEAST:
-        raise SceneError(f'{solid.name} is too light for MuJoCo: give a larger scale, --width or '
+        raise SceneError(f'{body.name} is too light for MuJoCo: give a larger scale, --width or '
                          '--density')
-    add(body, 'inertial', pos=numbers(*centre, 0.0), mass=numbers(mass),
+    add(element, 'inertial', pos=numbers(*centre, 0.0), mass=numbers(mass),
         fullinertia=numbers(xx, yy, zz, xy, 0.0, 0.0))
 
 

@@ -20,38 +20,38 @@ Format: the SDFormat specification (sdformat.org/spec).
 
 from __future__ import annotations
 
-from typing import Optional
+from typing import Optional, Tuple
 from xml.etree import ElementTree
 
-from .assembled import Assembled, Gear, Motor, Solid, weight
-from .bodies import add, COLOURS, Joint, Piece
+from .assembled import weight
+from .bodies import add, Body, COLOURS, Joint, Motor, Piece, Robot
 from .. import palette
 
 
-def write(model: Assembled) -> str:
+def write(model: Robot) -> str:
     """Return a robot model, its loops closed, as SDF."""
     # Gazebo Classic reads versions up to 1.7, which have no mimic.
     root = ElementTree.Element('sdf', version='1.11' if model.gears else '1.7')
     robot = add(root, 'model', name=model.name)
-    gears = {gear.joint: gear for gear in model.gears}
     motors = {motor.joint: motor for motor in model.motors}
-    homes = {point.name: solid.name for solid in model.solids for point in solid.points}
-    for solid in model.solids:
-        _add_link(robot, solid)
-        name = solid.joint.name if solid.joint else f'{solid.name}_fixed'
-        joint = _add_joint(robot, name, solid.joint, solid.parent or 'world', solid.name)
-        if solid.joint:
-            _add_ends(joint, gears.get(name), motors.get(name), solid.position)
-        for point in solid.points:
-            frame = add(robot, 'frame', name=point.name, attached_to=solid.name)
+    homes = {point.name: body.name for body in model.bodies for point in body.points}
+    for body in model.bodies:
+        is_top = body.parent == model.root
+        _add_link(robot, body, '__model__' if is_top else body.parent, model.density)
+        name = body.joint.name if body.joint else f'{body.name}_fixed'
+        joint = _add_joint(robot, name, body.joint, 'world' if is_top else body.parent, body.name)
+        if body.joint:
+            _add_ends(joint, model.gears.get(name), motors.get(name), body.position)
+        for point in body.points:
+            frame = add(robot, 'frame', name=point.name, attached_to=body.name)
             add(frame, 'pose', *point.place, *[0.0] * 4)
-    cuts = [(solid, point) for solid in model.solids for point in solid.points if point.meets]
-    for solid, point in cuts:
-        hinge = Joint(f'{point.name}_hinge', 'revolute', 1.0, None)
-        pin = Solid(f'{point.name}_pin', solid.name, (*point.place, *[0.0] * 4), hinge, 0.0,
-                    [point.ball()], [], weight([point.ball()], model.density))
-        _add_link(robot, pin)
-        _add_joint(robot, hinge.name, hinge, solid.name, pin.name)
+    cuts = [(body, point) for body in model.bodies for point in body.points if point.meets]
+    for body, point in cuts:
+        hinge = Joint(f'{point.name}_hinge', 'revolute', (0.0, 0.0, 1.0))
+        pin = Body(f'{point.name}_pin', body.name, (*point.place, *[0.0] * 4), hinge,
+                   [point.ball()])
+        _add_link(robot, pin, body.name, model.density)
+        _add_joint(robot, hinge.name, hinge, body.name, pin.name)
     for _, point in cuts:
         ends = homes[point.meets], f'{point.name}_pin'
         _add_joint(robot, f'{point.name}_closed', None, *ends)
@@ -83,13 +83,13 @@ def _add_joint(robot: ElementTree.Element, name: str, joint: Optional[Joint], pa
     return element
 
 
-def _add_ends(joint: ElementTree.Element, gear: Optional[Gear], motor: Optional[Motor],
-              start: float) -> None:
+def _add_ends(joint: ElementTree.Element, gear: Optional[Tuple[str, float]],
+              motor: Optional[Motor], start: float) -> None:
     """Add the gear of a joint, or the limits of its motor."""
     axis, = joint.iter('axis')
     if gear:
-        mimic = add(axis, 'mimic', joint=gear.input)
-        for tag, value in ('multiplier', gear.ratio), ('offset', 0.0), ('reference', 0.0):
+        mimic = add(axis, 'mimic', joint=gear[0])
+        for tag, value in ('multiplier', gear[1]), ('offset', 0.0), ('reference', 0.0):
             add(mimic, tag, value)
     if motor and motor.sweep:
         limit = add(axis, 'limit')
@@ -97,18 +97,18 @@ def _add_ends(joint: ElementTree.Element, gear: Optional[Gear], motor: Optional[
             add(limit, tag, end - start)
 
 
-def _add_link(robot: ElementTree.Element, solid: Solid) -> None:
-    link = add(robot, 'link', name=solid.name)
-    add(link, 'pose', *solid.pose, relative_to=solid.parent or '__model__')
-    mass, centre, moments = solid.weight
+def _add_link(robot: ElementTree.Element, body: Body, parent: str, density: float) -> None:
+    link = add(robot, 'link', name=body.name)
+    add(link, 'pose', *body.start, relative_to=parent)
+    mass, centre, moments = weight(body.solid, density)
     inertial = add(link, 'inertial')
     add(inertial, 'pose', *centre, *[0.0] * 4)
     add(inertial, 'mass', mass)
     inertia = add(inertial, 'inertia')
     for tag, moment in zip(('ixx', 'iyy', 'izz', 'ixy'), moments):
         add(inertia, tag, moment)
-    for i, piece in enumerate(solid.pieces):
-        _add_visual(link, f'{solid.name}_{i}', piece)
+    for i, piece in enumerate(body.solid):
+        _add_visual(link, f'{body.name}_{i}', piece)
 
 
 def _add_visual(link: ElementTree.Element, name: str, piece: Piece) -> None:

@@ -44,7 +44,7 @@ def write(robot: Robot) -> str:
     <color rgba="{numbers(*palette.rgb(code), 1.0)}" />
   </material>
 """ for colour, code in COLOURS.items()]
-    return ''.join([f'<robot name="{_escaped(robot.name)}">\n', *materials, link(robot.root),
+    return ''.join([f'<robot name="{_escaped(robot.name)}">\n', *materials, _link(robot.root),
                     *map(_part, robot.parts), '</robot>'])
 
 
@@ -55,31 +55,23 @@ def _escaped(text: str) -> str:
 def _part(part: Part) -> str:
     if part not in _written:
         _written[part] = ''.join(
-            _joint(body) + link(body.name, body.pieces) + ''.join(
+            _joint(body) + _link(body.name, body.pieces) + ''.join(
                 _joint(Body(point.name, body.name, (*point.place, 0.0, 0.0, 0.0, 0.0)))
-                + link(point.name, [point.ball()]) for point in body.points)
+                + _link(point.name, [point.ball()]) for point in body.points)
             for body in part.bodies)
     return _written[part]
 
 
 def _joint(body: Body) -> str:
-    """Return the joint that a body hangs on."""
-    joint = body.joint
-    return tree_joint(joint.name, joint.kind, body.parent, body.name, body.pose, joint.axis,
-                      joint.travel or ()) if joint else tree_joint(
-        f'{body.name}_fixed', 'fixed', body.parent, body.name, body.pose)
-
-
-def tree_joint(name: str, kind: str, parent: str, child: str, pose: Sequence[float],
-               axis: Sequence[float] = (), limits: Sequence[float] = ()) -> str:
-    """Return a joint; a revolute one without limits is continuous."""
+    """Return the joint that a body hangs on; a revolute one without limits is continuous."""
+    name, kind, axis, limits = body.joint or (f'{body.name}_fixed', 'fixed', (), None)
     kind = 'continuous' if kind == 'revolute' and not limits else kind
     text = f"""\
   <joint name="{_escaped(name)}" type="{kind}">
-    <parent link="{_escaped(parent)}" />
-    <child link="{_escaped(child)}" />
-{_origin('    ', pose)}"""
-    if axis:
+    <parent link="{_escaped(body.parent)}" />
+    <child link="{_escaped(body.name)}" />
+{_origin('    ', body.pose)}"""
+    if body.joint:
         text += f'    <axis xyz="{numbers(*axis)}" />\n'
     if limits:
         lower, upper = map(numbers, limits)
@@ -87,7 +79,7 @@ def tree_joint(name: str, kind: str, parent: str, child: str, pose: Sequence[flo
     return text + '  </joint>\n'
 
 
-def link(name: str, pieces: Iterable[Piece] = ()) -> str:
+def _link(name: str, pieces: Iterable[Piece] = ()) -> str:
     """Return a link, and what is seen of it."""
     name = _escaped(name)
     seen = ''.join([f"""\
