@@ -65,6 +65,12 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Sequence
         gaps = [math.remainder(y - x, turn) if -math.inf < y < math.inf else math.nan
                 for y, x, turn in zip(row, values, problem.periods)]
         missed = max([abs(gap) / scale for gap, scale in zip(gaps, problem.scales)])
+        missed += 0.0 * sum(gaps)  # NaN if one is
+        if found and missed != missed:
+            # The step leads out of the reach.
+            step = [0.5 * by for by in step]
+            inputs = tuple([x - by for x, by in zip(found[0], step)])
+            continue
         if not missed < least:
             break
         least, found = missed, (inputs, row, gaps)
