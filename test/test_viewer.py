@@ -353,7 +353,6 @@ def test_the_unit_of_a_parameter_is_that_of_its_description(path):
             assert one.field.unit == ''.join(said).replace('1', ''), one.name
 
 
-@pytest.mark.slow
 def test_a_page_is_told_of_legs_that_are_added(show):
     async def use(url):
         async with Page(url) as page:
