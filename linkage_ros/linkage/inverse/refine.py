@@ -55,6 +55,7 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Sequence
                                problem.scales[0], problem.sizes[0], candidate)
         return inside and (problem.wrapped(inside[:1]), inside[1:])
     inputs, at, n, least, found = tuple(candidate), problem.forward.at, problem.n, math.inf, None
+    step: Sequence[float] = ()
     if not math.isfinite(sum(at(*inputs)[:n])):
         # Rounding may have led out of the reach.
         near = ((*inputs[:by], inputs[by] + ulps * math.ulp(inputs[by]), *inputs[by + 1:])
