@@ -500,3 +500,11 @@ def test_a_node_ends_while_its_worker_is_busy(graph):
     node.destroy_node()
     assert len(node.prepared) == prepared
     node.free.set()
+
+
+def test_what_no_robot_model_can_have_is_refused(graph):
+    node = graph.start(Kinematics, {'mechanisms': ['leg'], 'leg.type': 'jansen'})
+    before = node.scene
+    refused = graph.set(node, leg__frame_id='leg_crank_link')
+    assert not refused.successful and 'leg' in refused.reason and node.scene is before
+    assert graph.set(node, leg__frame_id='torso').successful
