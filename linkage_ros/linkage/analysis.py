@@ -12,16 +12,15 @@
 
 from __future__ import annotations
 
-from typing import Callable, Iterable, List, Optional, Sequence, TYPE_CHECKING
+from typing import Callable, Iterable, List, Optional, Sequence
 
 import numpy as np
 
 from .curves import LEAST
 from .dead_points import near_zeros, NearZero
+from .input_range import reach_of
 from .inputs import Arc, Input
-
-if TYPE_CHECKING:
-    from .mechanism import Mechanism
+from .kinematics import Kinematics
 
 # Dead points nearer to an end of the reach than this [rad] are that end.
 ONE = 1e-9
@@ -47,7 +46,7 @@ class Analysis:
     `first` is the first input over a part of its period, by default over all of it.
     """
 
-    def __init__(self, linkage: Mechanism, others: Sequence[float] = (),
+    def __init__(self, linkage: Kinematics, others: Sequence[float] = (),
                  first: Optional[Input] = None):
         self._linkage, self._others = linkage, tuple(others)
         self._first = first or linkage.inputs[0]
@@ -67,7 +66,7 @@ class Analysis:
     def reach(self) -> List[Arc]:
         """Return the reach in arcs, none of them on both sides of an end of a turn."""
         size, first = self._first.step, self._first.counted()
-        arcs = [(lo / size, hi / size) for lo, hi in self._linkage.reach(*self._others)]
+        arcs = [(lo / size, hi / size) for lo, hi in reach_of(self._linkage, self._others)]
         if self._first.turn < self._linkage.inputs[0].turn:
             arcs = [(max(lo, first.low), min(hi, first.high)) for lo, hi in arcs
                     if lo < first.high and hi > first.low]

@@ -19,7 +19,8 @@ import numpy as np
 from ..cache import cached
 from ..linkage import joint_lines, rod_lines
 from ..linkage.design import Design
-from ..linkage.mechanism import check_bars, Mechanism
+from ..linkage.kinematics import check_bars
+from ..linkage.mechanism import Mechanism
 from ..words import listed, meant, plain_text, quoted
 
 MOST_LINES = 2000
