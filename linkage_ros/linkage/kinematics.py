@@ -22,12 +22,12 @@ from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple, Type
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import joint_lines
-from .arguments import checked_dimensions, numbers
-from .builder import in_metres, UNIT
-from .design import Design
+from .formulas import LinkPoint, Points, structure_of
+from .geometry.builder import in_metres, UNIT
 from .inputs import FASTEST, Input, is_periodic, MOST_COUNTED, MOST_TURNS, spread, WINDOW
-from .quantities import LinkPoint, Points, structure_of
+from .text import joint_lines
+from .text.arguments import checked_dimensions, numbers
+from .text.design import Design
 from ..cache import Cache
 from ..formula.expression import derivative, Real, real
 from ..formula.program import evaluate, Pose, Program

@@ -19,12 +19,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import statics
-from .analysis import Analysis
-from .arguments import numbers
-from .input_range import reach_of
 from .inputs import Arc
 from .inverse import extremes_of, Inverse, inverse_of, segments_of, Solution
 from .kinematics import Inputs, Kinematics
+from .motion.reach import reach_of
+from .motion.singularities import Analysis
+from .text.arguments import numbers
 from ..formula.program import Pose
 from ..words import quoted
 

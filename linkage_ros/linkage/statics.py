@@ -23,8 +23,8 @@ from typing import Any, Iterator, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import numbers
 from .kinematics import Inputs, Kinematics
+from .text.arguments import numbers
 from ..words import listed, plain_text, quoted
 
 

@@ -29,8 +29,8 @@ import numpy as np
 from .problem import Found, InverseProblem
 from .refine import refine_inside
 from .segments import segments_of
+from ..formulas import Names
 from ..kinematics import Kinematics
-from ..quantities import Names
 from ...words import listed
 
 # Grid points at first and at most, and the least number of them that can be assembled.

@@ -45,8 +45,8 @@ from .modes import Modes
 from .problem import Found, InverseProblem
 from .refine import distinct, distinct_arrays, refine, refine_arrays
 from .segments import Segments, segments_of
-from ..arguments import numbers
 from ..kinematics import Kinematics
+from ..text.arguments import numbers
 from ...words import listed, plain_text, quoted
 
 # Arrays are solved in blocks that stay in a processor's cache, and few values as floats.

@@ -27,14 +27,14 @@ from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .. import joint_lines
-from ..builder import GROUND, Link, UNIT
-from ..design import Design
 from ..dyads import Dyads, Hinge, Motor, Slide
-from ..input_range import reach_of
+from ..formulas import Names, PAIR, Structure
+from ..geometry.builder import GROUND, Link, UNIT
 from ..inputs import Input, spread
 from ..kinematics import Kinematics
-from ..quantities import Names, PAIR, Structure
+from ..motion.reach import reach_of
+from ..text import joint_lines
+from ..text.design import Design
 from ...formula.expression import (
     arctangent,
     argument,

@@ -23,9 +23,9 @@ from typing import Any, Sequence, Tuple
 
 import numpy as np
 
-from ..curves import LEAST
 from ..inputs import Input, is_periodic, spread
 from ..kinematics import Kinematics
+from ..motion.curves import LEAST
 from ...formula.program import Pose
 
 # Inputs and rates of a solution.

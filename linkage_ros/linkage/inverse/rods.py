@@ -21,9 +21,9 @@ from itertools import product
 from typing import Optional
 
 from .linkage import InverseLinkage, Mode, MOST_SIDES
+from ..formulas import Names, Structure
 from ..kinematics import Kinematics
-from ..quantities import Names, Structure
-from ..rod_lines import turning_rods
+from ..text.rod_lines import turning_rods
 from ...formula.expression import argument, real, substituted
 
 

@@ -31,12 +31,11 @@ from typing import (
 
 import numpy as np
 
-from ..analysis import Analysis, distinct
-from ..curves import ascending, extremes, LEAST, refined, sampled, turns
-from ..dead_points import NEAR, NearZero
-from ..input_range import reach_of
 from ..inputs import Arc, Input
 from ..kinematics import Kinematics
+from ..motion.curves import ascending, extremes, LEAST, refined, sampled, turns
+from ..motion.reach import reach_of
+from ..motion.singularities import Analysis, distinct, NEAR, NearZero
 
 # A value this near to a special input's is that input's; and this near, if no other input has it
 # [parts of the output's size].

@@ -24,9 +24,9 @@ from typing import Any, Callable, Iterable, List, Sequence, Tuple
 import numpy as np
 
 from .curves import ascending, lowest, near_misses, refined, sampled
-from .inputs import Arc, CRANK, Input, is_periodic, NARROWEST
-from .kinematics import Kinematics
-from .planar import Limit
+from ..geometry.planar import Limit
+from ..inputs import Arc, CRANK, Input, is_periodic, NARROWEST
+from ..kinematics import Kinematics
 
 # In the search for ends without a closed form: samples of a whole turn, least samples of an arc,
 # and rounds of search inside the arcs that were found.
