@@ -340,10 +340,13 @@ class Model:
         return pose and Drawing(state.stamp, self.solvers[name].points(pose, state.values))
 
     def locus(self, name):
-        """Return the points of a mechanism's curve."""
+        """Return the points of a mechanism's curve; with its mirror image, the ends of lines."""
         machine = self.scene.machines[name]
-        curve = machine.assembly().locus(machine.tracer)
-        return curve.tolist() if len(curve) > 1 else []
+        curve = machine.assembly().locus(machine.tracer).tolist()
+        if machine.mirrored:
+            lines = [end for line in zip(curve, curve[1:]) for end in line]
+            curve = [*lines, *([-x, y] for x, y in lines)]
+        return curve if len(curve) > 1 else []
 
     def seen(self, before, stamp):
         """Take note of the time [ns] that a node took for that of a message without a stamp."""
@@ -661,7 +664,9 @@ class Bench:
         curve = self.model.locus(name)
         if message is None or message.action == Marker.DELETE:
             return not curve
+        mirrored = self.model.scene.machines[name].mirrored
         return ([[p.x, p.y] for p in message.points] == curve
+                and message.type == (Marker.LINE_LIST if mirrored else Marker.LINE_STRIP)
                 and message.header.frame_id == self.model.frames[name])
 
 

@@ -166,7 +166,7 @@ def test_a_new_dimension_keeps_the_crank_in_its_new_reach(graph):
     ('drop.crank.speed', True, 'drop.crank.speed must be'),
     ('drop.crank.speed', math.nan, 'drop.crank.speed .*100'),
     ('drop.crank.speed', 'fast', 'drop.crank.speed must be'),
-    ('drop.crank.sweep', [2.0, 1.0], 'drop.crank.sweep must be .* lower end'),
+    ('drop.crank.sweep', [2.0, 1.0], 'drop.crank.sweep is not a parameter .*set it on kinematics'),
     ('drop.dimensions.a', 2.0, 'drop.dimensions.a is not a parameter .*set it on kinematics'),
     ('rate', -1.0, 'rate .*1000'),
     ('rate', 1e9, 'rate .*1000'),

@@ -353,7 +353,6 @@ def test_the_unit_of_a_parameter_is_that_of_its_description(path):
             assert one.field.unit == ''.join(said).replace('1', ''), one.name
 
 
-@pytest.mark.slow
 def test_a_page_is_told_of_legs_that_are_added(show):
     async def use(url):
         async with Page(url) as page:
@@ -1081,21 +1080,20 @@ def test_a_browser_that_has_not_drawn_is_sent_no_more(show):
     asyncio.run(use(running.viewer.url))
 
 
-@pytest.mark.long
 def test_nodes_that_come_later_or_in_a_namespace_are_found(graph, show):
     running = show(LEG, kinds=())
 
     async def use(url):
         async with Page(url) as page:
             assert (await page.heard('scene'))['mechanisms'] == []
-            running.nodes.extend(graph.start(kind, LEG, namespace='left')
+            running.nodes.extend(graph.start(kind, LEG, namespace='robots/left')
                                  for kind in (CrankDriver, Kinematics))
-            await page.cast('/left/leg')
-            await browser.until(lambda: len(page.drawn('/left/leg', 'joints')))
+            await page.cast('/robots/left/leg')
+            await browser.until(lambda: len(page.drawn('/robots/left/leg', 'joints')))
             await browser.until(lambda: 'crank.speed' in {
                 one['name'] for m in page.said if m['op'] == 'scene'
                 for cast in m['mechanisms'] for one in cast['settings']})
-            assert await page.set('/left/leg', crank__speed=2.0) == ''
+            assert await page.set('/robots/left/leg', crank__speed=2.0) == ''
 
     asyncio.run(use(running.viewer.url))
     assert running.values('leg.crank.speed') == [2.0]

@@ -91,8 +91,8 @@ class ShownMechanism:
 
     key: str
     owner: str
-    settings: dict[str, Setting] = field(default_factory=dict)
-    sources: tuple[str, ...] = ()
+    settings: dict[str, Setting]
+    sources: tuple[str, ...]
     pending: dict[str, float] = field(default_factory=dict)
     until: float = 0.0
 

@@ -55,6 +55,7 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Sequence
                                problem.scales[0], problem.sizes[0], candidate)
         return inside and (problem.wrapped(inside[:1]), inside[1:])
     inputs, at, n, least, found = tuple(candidate), problem.forward.at, problem.n, math.inf, None
+    step: Sequence[float] = ()
     if not math.isfinite(sum(at(*inputs)[:n])):
         # Rounding may have led out of the reach.
         near = ((*inputs[:by], inputs[by] + ulps * math.ulp(inputs[by]), *inputs[by + 1:])
@@ -65,6 +66,12 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Sequence
         gaps = [math.remainder(y - x, turn) if -math.inf < y < math.inf else math.nan
                 for y, x, turn in zip(row, values, problem.periods)]
         missed = max([abs(gap) / scale for gap, scale in zip(gaps, problem.scales)])
+        missed += 0.0 * sum(gaps)  # NaN if one is
+        if found and missed != missed:
+            # The step leads out of the reach.
+            step = [0.5 * by for by in step]
+            inputs = tuple([x - by for x, by in zip(found[0], step)])
+            continue
         if not missed < least:
             break
         least, found = missed, (inputs, row, gaps)
