@@ -99,7 +99,8 @@ def test_an_mp4_has_the_same_bytes_each_time(tmp_path):
 def test_without_ffmpeg_there_is_no_mp4_but_a_reason(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv('PATH', str(tmp_path))
     assert main([str(CONFIG / 'jansen.yaml'), '--out', str(tmp_path / 'leg.mp4')]) == 1
-    assert 'ffmpeg' in capsys.readouterr().err
+    assert capsys.readouterr().err == ('render: ffmpeg, which writes .mp4, is not installed: apt '
+                                       'install ffmpeg, or choose .gif\n')
     assert not list(tmp_path.iterdir())
 
 
@@ -275,6 +276,8 @@ def test_a_cylinder_is_drawn_from_base_to_rod_and_a_scribble_is_not():
     assert len(Cycle(arm).locus(arm)) > 1
     five_bar = machine('five_bar', crank2__speed=math.pi)
     assert not len(Cycle(five_bar).locus(five_bar)) and picture_of(five_bar, trace='stance')
+    five_bar = machine('five_bar', crank2__speed=2.0)
+    assert len(Cycle(five_bar).locus(five_bar)) > 1
 
 
 def test_any_motion_is_drawn_in_place_of_the_solved_one():
@@ -298,6 +301,8 @@ def test_the_floor_moves_as_the_foot_that_stands_on_it():
         lowest = int(feet[:, 1].argmin())
         marks = np.array([path.vertices[0] for path in floor.artists[1].get_paths()])
         assert marks[:, 1] == pytest.approx(feet[lowest, 1])
+        low, high = floor.artists[1].axes.get_xlim()
+        assert marks[0, 0] <= low and marks[-1, 0] >= high - floor.spacing
         return lowest, feet[lowest, 0], marks[3, 0]
 
     moved = 0
@@ -618,3 +623,11 @@ def test_a_larger_picture_has_wider_lines_and_all_have_equal_margins():
     assert widths[1] == [2.0 * width for width in widths[0]] and len(widths[0]) > 9
     margins = small.get_layout_engine().get()
     assert margins['h_pad'] == margins['w_pad'] > 0.0
+
+
+def test_the_joints_of_a_plate_are_in_their_order_around_it():
+    corners = [(3.0, 2.0), (5.0, 2.2), (5.3, 4.0), (4.1, 5.0), (2.7, 3.6)]
+    for order in itertools.permutations(range(5)):
+        found = layers.around({k: corners[k] for k in order})
+        first = found.index(0)
+        assert found[first:] + found[:first] == [0, 1, 2, 3, 4]

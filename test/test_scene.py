@@ -362,7 +362,11 @@ def test_the_mechanisms_of_the_scene_of_all_stand_apart():
     ('ros__parameters: {rate: 5.0}', 'ros__parameters must be below the name of a node'),
     ('/**:\n  ros__parameters: {rate: }', 'a value is missing in line 2'),
     ('/**: {', 'not a valid ROS parameter file: did not find expected .*, line [12]$'),
-    ('[1]', 'ros__parameters below the name of a node, .* is expected in line 1')])
+    ('[1]', 'ros__parameters below the name of a node, .* is expected in line 1'),
+    ('/**:\n  ros__parameters:\n    rate: 1.0\n    rate: fast',
+     "'?rate'? is given twice, with different types in line 4"),
+    ('/**:\n  ros__parameters:\n    rate: 1.0\n    rate: {of: 1}',
+     "'?rate'? is given twice, with different types in line 4")])
 def test_a_file_that_is_no_scene_says_so(tmp_path, text, reason):
     pytest.importorskip('yaml')
     path = tmp_path / 'scene.yaml'
