@@ -26,7 +26,7 @@ import re
 import tempfile
 import time
 
-from linkage_ros.linkage.mechanism import Mechanism
+from linkage_ros.linkage import Mechanism
 import numpy as np
 
 from . import document

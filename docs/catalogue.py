@@ -22,7 +22,8 @@ import sys
 import textwrap
 
 from linkage_ros import mechanisms, palette, scene
-from linkage_ros.linkage import joint_lines, planar
+from linkage_ros.linkage import joint_lines
+from linkage_ros.linkage.geometry import planar
 from linkage_ros.render import files
 from linkage_ros.render.command import parser
 from linkage_ros.render.cycle import Cycle

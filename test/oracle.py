@@ -41,7 +41,7 @@ import time
 from typing import NamedTuple
 
 from linkage_ros import scene
-from linkage_ros.linkage.quantities import LinkPoint
+from linkage_ros.linkage import LinkPoint
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.robot_model import bodies, shapes, urdf
 import numpy as np

@@ -14,7 +14,7 @@ import math
 
 from effort import calls
 from linkage_ros import mechanisms
-from linkage_ros.linkage.inverse import Answer, Solution
+from linkage_ros.linkage import Answer, Solution
 import numpy as np
 import pytest
 

@@ -18,8 +18,8 @@ from pathlib import Path
 import sys
 
 from linkage_ros import mechanisms
-from linkage_ros.linkage.walker import Assembly
 from linkage_ros.mechanisms.four_bar import grashof
+from linkage_ros.scene.legs import Assembly
 import numpy as np
 import pytest
 from truth import exact_poses, hard_cases, linkage_checks as checks

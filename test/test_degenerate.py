@@ -15,8 +15,8 @@ import tracemalloc
 
 from effort import few_calls
 from linkage_ros import mechanisms
-from linkage_ros.linkage.analysis import distinct
 from linkage_ros.linkage.inputs import CRANK
+from linkage_ros.linkage.motion.singularities import distinct
 import numpy as np
 import pytest
 from truth import linkage_checks

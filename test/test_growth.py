@@ -16,7 +16,8 @@ import weakref
 
 from hypothesis import given, settings, strategies as st
 from linkage_ros import scene
-from linkage_ros.linkage import mechanism, output_range
+from linkage_ros.linkage.motion import reach
+from linkage_ros.robot_model import output_range
 import pytest
 
 COUNT = 60
@@ -34,7 +35,7 @@ def linkages(a):
 
 def test_equal_linkages_are_one_and_their_reach_and_travels_are_found_once(monkeypatch):
     found = []
-    for module, name in ((mechanism, 'arcs'), (output_range, 'extremes')):
+    for module, name in ((reach, 'arcs'), (output_range, 'extremes')):
         find = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *args, name=name, find=find: (
             found.append(name) or find(*args)))

@@ -19,7 +19,7 @@ import traceback
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
-from linkage_ros.linkage.walker import Assembly
+from linkage_ros.scene.legs import Assembly
 import numpy as np
 import pytest
 

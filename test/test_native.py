@@ -18,7 +18,7 @@ import threading
 
 from linkage_ros import mechanisms
 from linkage_ros.formula import expression, program
-from linkage_ros.linkage.walker import Assembly
+from linkage_ros.scene.legs import Assembly
 import numpy as np
 import pytest
 from truth import hard_cases
@@ -179,7 +179,7 @@ def test_a_single_leg_is_solved_without_llvmlite_in_memory(legs):
     done = subprocess.run([sys.executable, '-c', f"""
 import sys, threading
 from linkage_ros import mechanisms
-from linkage_ros.linkage.walker import Assembly
+from linkage_ros.scene.legs import Assembly
 Assembly(mechanisms.create('jansen'), {legs}).solution(('G',), ('BC',)).solve([0.3])
 for thread in threading.enumerate():
     if thread is not threading.main_thread():

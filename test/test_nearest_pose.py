@@ -14,7 +14,7 @@ import math
 from pathlib import Path
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.linkage.nearest_pose import nearest_inputs
+from linkage_ros.web.nearest_pose import nearest_inputs
 import numpy as np
 import pytest
 

@@ -19,7 +19,7 @@ import subprocess
 import sys
 
 from linkage_ros import mechanisms, optional
-from linkage_ros.linkage.walker import Assembly
+from linkage_ros.scene.legs import Assembly
 import numpy as np
 import pytest
 

@@ -20,12 +20,12 @@ import pytest
 pytest.importorskip('rclpy')
 
 from linkage_ros import palette, scene  # noqa: E402
-from linkage_ros.linkage.walker import Assembly  # noqa: E402
 from linkage_ros.mechanisms import create  # noqa: E402
 from linkage_ros.nodes import messages  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.publishers import LATCHED  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
+from linkage_ros.scene.legs import Assembly  # noqa: E402
 from ros_harness import Graph, Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402

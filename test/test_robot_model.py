@@ -19,10 +19,10 @@ from xml.etree import ElementTree
 
 from hypothesis import given, settings, strategies as st
 from linkage_ros import command, scene
-from linkage_ros.linkage.output_range import ground_frame
 from linkage_ros.robot_model import bodies, mjcf, rviz, sdf, urdf
 from linkage_ros.robot_model.assembled import assembled
 from linkage_ros.robot_model.command import main, show
+from linkage_ros.robot_model.output_range import ground_frame
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
 import numpy as np
 import pytest

@@ -19,7 +19,7 @@ from c_libraries import loaded
 import gmpy2
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
-from linkage_ros.linkage.rod_lines import FORMS, WindowError
+from linkage_ros.linkage import FORMS, WindowError
 import numpy as np
 import pytest
 from sweeps import few_and_many

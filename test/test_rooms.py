@@ -25,6 +25,10 @@ PACKAGE = ROOT / 'linkage_ros'
 ROOMS = ('words', 'optional', 'palette', 'cache', 'formula', 'linkage', 'mechanisms', 'scene',
          'command', 'c_code', 'robot_model', 'robot_files', 'render', 'nodes', 'web',
          'executables')
+# The floors of the core, in the same order.
+FLOORS = ('inputs', 'geometry', 'text', 'formulas', 'kinematics', 'statics', 'motion', 'dyads',
+          'inverse', 'mechanism', '__init__')
+CORE = PACKAGE / 'linkage'
 WITH_ROS = ('nodes', 'web')
 ROS = ('rclpy', 'builtin_interfaces', 'geometry_msgs', 'rcl_interfaces', 'sensor_msgs', 'std_msgs',
        'trajectory_msgs', 'visualization_msgs', 'linkage_interfaces')
@@ -82,6 +86,37 @@ def test_a_module_imports_nothing_from_above():
             if top == 'linkage_ros' and own:
                 assert ROOMS.index(below[0]) <= ROOMS.index(own), f'{module.name} imports {name}'
             assert own in WITH_ROS or top not in ROS, f'{module.name} needs ROS: {name}'
+
+
+def test_other_rooms_import_the_core_by_its_public_names():
+    public = ast.literal_eval(next(node.value for node in parsed(CORE / '__init__.py').body
+                                   if ast.unparse(node).startswith('__all__')))
+    for module in MODULES:
+        for name in imported(module) if room(module) != 'linkage' else ():
+            core, _, below = name.partition('linkage_ros.linkage.')
+            assert core or below in public, f'{module.name} imports {name}'
+
+
+def test_the_floors_of_the_core_stand_on_each_other():
+    modules = [module for module in MODULES if CORE in module.parents]
+    used = {module: {next(filter(modules.__contains__, map(file_of, (
+        name, name.rpartition('.')[0]))), None) for name in imported(module)} - {None}
+        for module in modules}
+    floor = {module: FLOORS.index(module.relative_to(CORE).with_suffix('').parts[0])
+             for module in modules}
+    for module, others in used.items():
+        for other in others:
+            assert floor[other] <= floor[module], f'{module} imports {other}'
+    # Take away those that import no other, until none is left: imports for types count too.
+    while ground := [module for module, others in used.items() if not others & {*used}]:
+        used = {module: used[module] for module in used if module not in ground}
+    assert not used, f'in a circle, or above one: {[module.name for module in used]}'
+
+
+def file_of(name):
+    """Return the file of a module of a full name, whether it exists or not."""
+    path = ROOT.joinpath(*name.split('.'))
+    return path / '__init__.py' if path.is_dir() else path.with_suffix('.py')
 
 
 def unguarded(module):

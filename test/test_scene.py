@@ -20,11 +20,11 @@ import re
 from xml.etree import ElementTree
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.linkage.walker import Assembly
 from linkage_ros.render.cycle import Cycle
 from linkage_ros.robot_model import urdf
 from linkage_ros.scene import slider, writing
 from linkage_ros.scene.joint_names import quoted_name
+from linkage_ros.scene.legs import Assembly
 from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest

@@ -15,7 +15,7 @@ from itertools import combinations
 import math
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.linkage.quantities import LinkPoint
+from linkage_ros.linkage import LinkPoint
 from linkage_ros.robot_model import shapes
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD
 import numpy as np

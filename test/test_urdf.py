@@ -18,9 +18,9 @@ import sys
 from xml.etree import ElementTree
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.linkage.output_range import common_reach, travels
-from linkage_ros.linkage.walker import Assembly
 from linkage_ros.robot_model import urdf
+from linkage_ros.robot_model.output_range import common_reach, travels
+from linkage_ros.scene.legs import Assembly
 import numpy as np
 import pytest
 from robots import LIBRARIES, Pinocchio, Yourdfpy

@@ -16,10 +16,10 @@ import math
 
 from builtin_interfaces.msg import Time
 from linkage_ros import mechanisms, scene
-from linkage_ros.linkage.walker import Assembly
 from linkage_ros.nodes import mechanism_model, message_layout, messages
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.publishers import LATCHED
+from linkage_ros.scene.legs import Assembly
 import numpy as np
 import pytest
 from rclpy.publisher import Publisher

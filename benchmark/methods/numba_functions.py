@@ -16,7 +16,7 @@ numba on the very operations of `linkage_ros.formula`, with the dimensions as co
 
 from linkage_ros import mechanisms
 from linkage_ros.formula import program
-from linkage_ros.linkage import quantities
+from linkage_ros.linkage import formulas
 import numba
 import numpy as np
 
@@ -32,7 +32,7 @@ class Plain(Ours):
 
     def prepare(self, kind, dimensions):
         """Read the joint lines and make the code, nothing of which is kept from before."""
-        quantities.structure_of.cache.clear()
+        formulas.structure_of.cache.clear()
         vars(mechanisms.design(kind)).pop('lines', None)
         super().prepare(kind, dimensions)
         self.points = problems.POINTS[kind]
@@ -56,7 +56,7 @@ class OnOurs(Plain):
         """Make the function of the other engine."""
         super().prepare(kind, dimensions)
         design, made = mechanisms.design(kind), self._mechanism
-        structure = quantities.structure_of(design, tuple(made.branches.items()))
+        structure = formulas.structure_of(design, tuple(made.branches.items()))
         pose = structure.program('points', self.points).bind({**made.dimensions, '[m]': 1.0}, {})
         self.make(pose.variant.listing, pose.constants)
 

@@ -15,8 +15,7 @@ from typing import Any, List, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from ..linkage.builder import GROUND, Link
-from ..linkage.inputs import spread
+from ..linkage import GROUND, Link, spread
 from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion

@@ -22,9 +22,7 @@ from .names import literal as text_literal
 from ..formula.expression import Real, real, unknown
 from ..formula.operations import OPERATIONS
 from ..formula.program import Dialect, evaluate, Pose
-from ..linkage.mechanism import Mechanism
-from ..linkage.planar import LEAST_SQUARE, TINY, TOLERANCE
-from ..linkage.spatial import EDGE, LAST_STEP
+from ..linkage import EDGE, LAST_STEP, LEAST_SQUARE, Mechanism, TINY, TOLERANCE
 
 # Expressions that are true or false.
 _CONDITIONS = ('less', 'less_equal')

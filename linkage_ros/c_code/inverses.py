@@ -20,8 +20,7 @@ from .axes import Axis
 from .code import Code
 from .names import filled, template
 from ..formula.program import Program
-from ..linkage.inverse import InverseLinkage, Mode
-from ..linkage.mechanism import Mechanism
+from ..linkage import InverseLinkage, Mechanism, Mode
 
 # Newton steps, the first pose included, from a closed form and of a search.
 CLOSED, SEARCHED = 4, 64

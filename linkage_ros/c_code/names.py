@@ -14,7 +14,7 @@ from importlib.resources import files
 import re
 from typing import Iterable, List, Mapping
 
-from ..linkage.mechanism import Mechanism
+from ..linkage import Mechanism
 
 _PLACE = re.compile(r'@(\w+)@')
 # Names of inputs that a user has not chosen.

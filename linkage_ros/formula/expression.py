@@ -11,10 +11,10 @@
 """
 Symbolic expressions of real and complex numbers.
 
-A construction of `linkage.planar` is written once, with ordinary operators on `Real` and `Complex`
-values. Its result is an expression graph: `program` generates code from it for single poses,
-arrays and machine code, and `derivative` differentiates it. The order of operations is exactly as
-written, because numerical stability depends on it.
+A construction of `linkage.geometry` is written once, with ordinary operators on `Real` and
+`Complex` values. Its result is an expression graph: `program` generates code from it for single
+poses, arrays and machine code, and `derivative` differentiates it. The order of operations is
+exactly as written, because numerical stability depends on it.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ This module alone handles the periodicity of angles.
 from __future__ import annotations
 
 import math
-from typing import Any, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
+from typing import Any, Callable, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -34,6 +34,9 @@ MOST_TURNS, FASTEST = 10 ** 6, 1000
 ROUNDED_END = 1e-12
 # Arcs below this width [rad] are the rounding of one angle.
 NARROWEST = 2e-15
+# Poses that are compared with those a period later. Their places are equal if they differ by at
+# most this fraction of their size.
+PERIODIC, ALIKE = 64, 1e-6
 
 
 class Input(NamedTuple):
@@ -196,3 +199,16 @@ def wrapped(theta: Any, turn: float = math.tau) -> Any:
     turned = theta - turn * np.floor((theta + half) / turn)
     turned = np.where((turned < -half) | (turned >= half), -half, turned)
     return np.where((theta >= -half) & (theta < half), theta, turned)
+
+
+def is_periodic(places: Callable, input_: Input) -> bool:
+    """
+    Return whether poses are the same a period of an input later.
+
+    `places` takes values of the input, shape (n,), and returns coordinates (any, n).
+    """
+    theta = np.linspace(input_.low, input_.high, PERIODIC + 2)[1:-1]
+    now, later = (places(theta + turn) for turn in (0.0, input_.turn))
+    with np.errstate(invalid='ignore'):
+        alike = np.abs(now - later) <= ALIKE * np.fmax.reduce(np.abs(now), axis=None, initial=0.0)
+    return bool(np.all(alike | (np.isnan(now) & np.isnan(later))))

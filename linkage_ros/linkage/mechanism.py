@@ -8,76 +8,28 @@
 # express or implied. See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A linkage with its dimensions: poses, rates, forces, outputs, inverse and reach."""
+"""A linkage as its users have it: its kinematics, forces, inverse and reach."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from fractions import Fraction
-from functools import cached_property
 import math
-from types import MappingProxyType
-from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple, TypeVar, Union
+from typing import Any, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import joint_lines, statics
-from .analysis import Analysis
-from .arguments import checked_dimensions, numbers
-from .builder import in_metres, UNIT
-from .design import Design
-from .input_range import arcs, is_periodic
-from .inputs import Arc, FASTEST, Input, MOST_COUNTED, MOST_TURNS, spread, WINDOW
-from .inverse import extremes_of, Inverse, segments_of, Solution
-from .quantities import LinkPoint, Points, structure_of
-from ..cache import Cache
-from ..formula.expression import derivative, Real, real
-from ..formula.program import evaluate, Pose, Program
-from ..optional import needs
-from ..words import listed, meant, plain_text, quoted
-
-# Lengths beyond these have a unit of their own, a power of two. It changes no bit of a result and
-# keeps squares and products of lengths inside the range of float64.
-SMALL_LENGTH, LARGE_LENGTH = 1e-30, 1e30
-# Cached values of expressions of dimensions: some twenty times those of Jansen's leg.
-MOST_VALUES = 10000
-# Quantities of joints; all others are of links.
-OF_POINTS = 'points', 'velocities', 'point accelerations'
-
-Own = TypeVar('Own', bound='Mechanism')
-# One input, or a sequence of several; each a number or an array [rad or m].
-Inputs = Union[ArrayLike, Sequence[ArrayLike]]
-Names = Optional[Sequence[str]]
+from . import statics
+from .inputs import Arc
+from .inverse import extremes_of, Inverse, inverse_of, segments_of, Solution
+from .kinematics import Inputs, Kinematics
+from .motion.reach import reach_of
+from .motion.singularities import Analysis
+from .text.arguments import numbers
+from ..formula.program import Pose
+from ..words import quoted
 
 
-def check_bars(linkage: Mechanism) -> None:
-    """Raise ValueError, with the joint line, for a bar of zero length."""
-    for (first, second), length in linkage.bar_lengths.items():
-        size = np.asarray(length)
-        if not np.all((size > 0.0) & np.isfinite(size)):
-            raise linkage.line_of(first, second).error(
-                f'the bar {first}-{second} must be longer than zero, got {length:g}'
-                if not size.ndim else f'the bar {first}-{second} must be longer than zero')
-
-
-def _hashable(names: Any) -> Any:
-    """Return names as a tuple, but None or one name unchanged; raise ValueError if invalid."""
-    try:
-        names = names if names is None or isinstance(names, (str, tuple)) else tuple(names)
-        hash(names)
-        return names
-    except TypeError:
-        raise ValueError('points and joints must be a name or a list of names, '
-                         f'got {quoted(names)}') from None
-
-
-def _plain(names: Any) -> Any:
-    """Return hashable names as plain text, since a subclass of str may change."""
-    return tuple(map(plain_text, names)) if isinstance(names, tuple) else plain_text(names)
-
-
-class Mechanism:
+class Mechanism(Kinematics):
     """
     A linkage with given dimensions; create one with `linkage_ros.mechanisms.create`.
 
@@ -123,325 +75,6 @@ class Mechanism:
 
     """
 
-    def __init__(self, design: Design, dimensions: Mapping, branches: Mapping[str, int],
-                 accelerate: bool = False):
-        self.type, self.design, self.tracer = design.name, design, design.tracer
-        self.dimensions, self.branches = dict(dimensions), dict(branches)
-        self.is_accelerated = accelerate
-        # Equal linkages share it, including unpickled ones.
-        self.structure = structure_of(design, tuple(self.branches.items()))
-        built = self.structure.built
-        self.points, self.joints = tuple(built.points), tuple(built.joint_values)
-        self.grounded, self.axes = built.grounded, built.axes
-        self.bars = tuple((bar.first, bar.second) for bar in built.bars)
-        self.cylinders, self.yokes = tuple(built.cylinders), dict(built.yokes)
-        self.lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
-        self._evaluated: dict = {}
-        self._poses, self._placers, self.cache = Cache(), Cache(), Cache()
-        self.inputs = tuple(map(self._counted_input, range(len(built.inputs)), built.inputs))
-        own = {input_.name for input_ in self.inputs}
-        self.geared = tuple(name for name in built.driven if name not in own)
-        self.links = tuple(link._replace(zero=np.asarray(self.value(link.zero)).tolist())
-                           for link in built.links)
-
-    def __reduce__(self) -> tuple:
-        return type(self), (self.design, self.dimensions, self.branches, self.is_accelerated)
-
-    def __repr__(self) -> str:
-        lengths = ', '.join(f'{k}={v}' for k, v in self.dimensions.items())
-        return f'<{self.type} {lengths}>'
-
-    # --- its dimensions ---
-
-    @cached_property
-    def bar_lengths(self) -> Mapping:
-        """Return the length [m] of each bar."""
-        return MappingProxyType({(bar.first, bar.second): self._metres(bar.length)
-                                 for bar in self.structure.built.bars})
-
-    @cached_property
-    def frames(self) -> Mapping:
-        """Coordinates of each link's joints [m] in the link's frame, x along its bar."""
-        return MappingProxyType({
-            link: {name: tuple(map(self._metres, (place.x, place.y)))
-                   for name, place in frame.items()}
-            for link, frame in self.structure.built.frames.items()})
-
-    @property
-    def longest(self) -> float:
-        """Return the longest bar [m], or without bars the longest stroke of an input."""
-        return max(self.bar_lengths.values(),
-                   default=max(input_.high - input_.low for input_ in self.inputs))
-
-    def line_of(self, *joints: str) -> joint_lines.Line:
-        """Return the last line that places one of some joints."""
-        return [line for line in self.design.lines if set(joints) & set(line.names)][-1]
-
-    def triangles(self) -> dict:
-        """Return for each line of a rigid triangle whether the dimensions allow it."""
-        return {self.line_of(name): np.isfinite(self.value(height))
-                for name, height in self.structure.built.triangles.items()}
-
-    def constants(self, expressions: Any) -> Any:
-        """Return tuples of expressions of dimensions as tuples of their values."""
-        if isinstance(expressions, Real):
-            return self.value(expressions)
-        if not isinstance(expressions, tuple):
-            return expressions
-        return getattr(expressions, '_make', tuple)(map(self.constants, expressions))
-
-    def demands(self) -> list:
-        """Return quantities that dimensions must make positive: line, value, and the problem."""
-        return [self.constants(tuple(demand)) for demand in self.structure.built.demands]
-
-    def windows(self) -> list:
-        """Return the links on two hinges in a row with two rods, and their limits."""
-        return [self.constants(window) for window in self.structure.built.windows]
-
-    def value(self, length: Real) -> Any:
-        """Return the value of an expression of dimensions alone, lengths in its own unit."""
-        with np.errstate(all='ignore'):
-            return evaluate(length, self.lengths, self._evaluated)
-
-    def _metres(self, length: Real) -> Any:
-        """Return the value [m] of a length of dimensions alone: a float, or an array."""
-        with np.errstate(all='ignore'):
-            value = self.value(real(length)) * self.lengths[UNIT.args[0]]
-        return value if np.ndim(value) else float(value)
-
-    def check(self) -> None:
-        """Raise ValueError, with the joint line, if its dimensions are not allowed."""
-        if check := self.design.check:
-            check(self.design.lines, self)
-        else:
-            check_bars(self)
-        for by, input_ in enumerate(self.inputs):
-            for name in self.geared if input_.speed > FASTEST else ():
-                if abs(ratio := self.gear(name, by)[0]) > FASTEST:
-                    raise ValueError(f'{self.type}: {name} turns {abs(ratio):g} times as fast as '
-                                     f'the {input_.name}; allowed: {FASTEST} times')
-
-    def with_dimensions(self, /, **changed: ArrayLike) -> Mechanism:
-        """Return a copy with other dimensions [m]; raises ValueError as `create` does."""
-        made = type(self)(
-            self.design, checked_dimensions(self.design, {**self.dimensions, **changed}),
-            self.branches, self.is_accelerated)
-        made.check()
-        return made
-
-    def driven_by(self: Own, *outputs: str, branches: Optional[Mapping[str, int]] = None) -> Own:
-        """
-        Return a linkage in space with other joints as its inputs.
-
-        `outputs` are as many joints as it has inputs, which they replace; `branches` is the side
-        of the crank for each rod, 1 as drawn or -1, by default its own. Raises ValueError if a
-        joint does not exist, or the linkage cannot be solved from these.
-        """
-        unknown = [name for name in outputs if name not in self.joints]
-        if self.axes != 'xyz' or unknown or len({*outputs}) != len(self.inputs):
-            raise ValueError(f'{self.type} can be driven by {len(self.inputs)} of '
-                             f'{listed(self.joints if self.axes == "xyz" else ())}, '
-                             f'not by {listed(outputs)}')
-        sides = {**self.branches, **(branches or {})}
-        made = self.cache.get_or_make(('driven by', outputs, *sides.values()), lambda: type(self)(
-            replace(self.design, inputs=outputs), self.dimensions, sides, self.is_accelerated))
-        made.check()
-        return made
-
-    def turned(self: Own, *turns: float) -> Own:
-        """
-        Return the same linkage, each input counted from so many whole turns on.
-
-        Gears make it another one. Of an input whose period is very long, reach, dead points and
-        inverse are those of the turns around zero, and so of any others.
-        """
-        counts = tuple((input_.name, float(count)) for input_, count in zip(self.inputs, turns))
-        return self.cache.get_or_make(('turned', counts), lambda: type(self)(
-            replace(self.design, turned=counts), self.dimensions, self.branches,
-            self.is_accelerated))
-
-    def accelerated(self) -> Mechanism:
-        """
-        Return a copy that solves arrays by compiled code, large ones on all cores.
-
-        The first call for a set of points compiles for about 0.1 s. Sine, cosine and arctangent
-        are its own and satisfy the rule for errors. A pose is the same in any array, on any number
-        of cores, but its last digits may differ from those of a single pose. Raises ImportError
-        without an llvmlite that works.
-        """
-        with needs('llvmlite'):
-            from ..formula import llvm_arrays  # noqa: F401
-        return self.cache.get_or_make('accelerated', lambda: type(self)(
-            self.design, self.dimensions, self.branches, True))
-
-    def period(self, by: int = 0) -> float:
-        """
-        Return the number of turns of an input after which the pose repeats: `inputs[by].period`.
-
-        It is above one if the input drives cranks by fractional gears, or if it passes one change
-        point per turn, and infinite if a gear ratio is no fraction with a denominator up to
-        MOST_TURNS. With arrays of dimensions, change points are ignored.
-        """
-        return self.inputs[self._checked_by(by)].period
-
-    def _ratios(self, by: int) -> List[float]:
-        """Return the turns of each driven link per turn of an input."""
-        each = [np.ravel(self.value(derivative(value, {by: 1.0}, {})))
-                for _, value in self.structure.built.driven.values()]
-        return [float(ratio) for ratios in each for ratio in ratios if math.isfinite(ratio)]
-
-    def _period(self, by: int, ratios: Sequence[float], most: float) -> float:
-        fractions = [Fraction(ratio).limit_denominator(MOST_TURNS) for ratio in ratios]
-        if any(abs(float(fraction) - ratio) > 4.0 * math.ulp(ratio)
-               for fraction, ratio in zip(fractions, ratios)):
-            return math.inf
-        turns = math.lcm(*(fraction.denominator for fraction in fractions))
-        if turns > most or not self._passes_change_point(by):
-            return turns
-        return turns if is_periodic(lambda theta: self._points_over(by, theta), Input(
-            '', low=-math.pi * turns, high=math.pi * turns, period=turns)) else 2 * turns
-
-    def _passes_change_point(self, by: int) -> bool:
-        """Return whether a dyad of a crank has a gap of nothing but rounding."""
-        gaps = [(limit.tolerance, *limit.ends[:2]) for limit in self.structure.built.limits
-                if limit.ends and limit.ends.theta.args[0] == by]
-        values = [tuple(map(self.value, each)) for each in gaps]
-        return any(np.ndim(tolerance + start + end) == 0 and min(abs(start), abs(end)) <= tolerance
-                   for tolerance, start, end in values)
-
-    def _points_over(self, by: int, values: np.ndarray) -> np.ndarray:
-        """Return the coordinates of all joints over one input; the others are spread."""
-        inputs = spread([self._with_stroke(x) for x in self.structure.built.inputs], len(values))
-        inputs[by] = values
-        return self.bound('points', self.points).searched(*inputs)
-
-    def _counted_input(self, by: int, input_: Input) -> Input:
-        """Return an input with the limits [rad or m] of all poses."""
-        if not input_.turns:
-            return self._with_stroke(input_)
-        ratios = self._ratios(by)
-        input_ = input_._replace(speed=max(1.0, *map(abs, ratios)))
-        most, window = (input_.step * count ** (1.0 / len(self.structure.built.inputs))
-                        for count in (MOST_COUNTED, WINDOW))
-        period = self._period(by, ratios, most)
-        turns = period if period <= max(most, 1.0) else max(2.0, 2.0 * round(0.5 * window))
-        return input_._replace(low=-math.pi * turns, high=math.pi * turns, period=period)
-
-    def _with_stroke(self, input_: Input) -> Input:
-        """Return an input with its stroke [m]; an angle is unchanged."""
-        return input_ if input_.turns else input_._replace(
-            low=self._metres(input_.low), high=self._metres(input_.high))
-
-    # --- poses and how they change ---
-
-    def solve(self, theta: Inputs, points: Names = None) -> dict:
-        """Return the coordinates of each joint [m]: theta's shape and a last axis for x and y."""
-        if isinstance(theta, float) and len(self.inputs) == 1:
-            names = _hashable(points)
-            place = self._placers.get(names) or self._placer(names)
-            return place(theta)
-        return self._vectors('points', theta, points)
-
-    def _placer(self, points: Any) -> Callable:
-        """Return a function from one value of the input, a float, to joints."""
-        names, pose = self._ready('points', points)
-        if pose.shape:
-            return lambda theta: self._vectors('points', theta, points)
-        return self._placers.get_or_make(_plain(points), lambda: pose.placer(names))
-
-    def velocity(self, theta: Inputs, points: Names = None, by: int = 0) -> dict:
-        """Differentiate `solve` by an input [m/rad, m/m]; infinite or NaN at a dead point."""
-        return self._vectors('velocities', theta, points, self._checked_by(by))
-
-    def acceleration(self, theta: Inputs, rate: Inputs, rate_rate: Inputs,
-                     points: Names = None) -> dict:
-        """
-        Return the acceleration of each joint [m/s^2], in the form of `solve`.
-
-        `rate` and `rate_rate` are the first and second time derivatives of each input, with shapes
-        that broadcast with theta's. Infinite or NaN at a dead point.
-        """
-        names, pose = self._ready('point accelerations', points)
-        return self._by_point(names, pose.over(*self._motion(theta, rate, rate_rate)))
-
-    def joint_angles(self, theta: Inputs, joints: Names = None) -> dict:
-        """
-        Return the angle of each moving link to its parent, or other outputs; see `has_output`.
-
-        Angles [rad] are in (-pi, pi], relative to the link's `zero`; inputs are unchanged, slides
-        in m.
-        """
-        return self._scalars('angles', theta, joints)
-
-    def joint_rates(self, theta: Inputs, joints: Names = None, by: int = 0) -> dict:
-        """Differentiate the joint angles by one of the inputs; see `joint_angles`."""
-        return self._scalars('rates', theta, joints, self._checked_by(by))
-
-    def joint_accelerations(self, theta: Inputs, rate: Inputs, rate_rate: Inputs,
-                            joints: Names = None) -> dict:
-        """Return the joints' accelerations [rad/s^2 or m/s^2]; see `acceleration`."""
-        names, pose = self._ready('joint accelerations', joints)
-        return dict(zip(names, pose.over(*self._motion(theta, rate, rate_rate))))
-
-    def _motion(self, *each: Inputs) -> Sequence[np.ndarray]:
-        return [values for name, inputs in zip(('theta', 'rate', 'rate_rate'), each)
-                for values in self.each_input(inputs, name)]
-
-    def transmission_angles(self, theta: Inputs, joints: Names = None) -> dict:
-        """
-        Return the transmission angle of each joint [rad] in [0, pi]; the best is pi/2.
-
-        The joints are the first ones of dyad, cylinder, mirror, inversor, slot and slider lines;
-        0 and pi are dead points. For a dyad it is the angle between its bars (a cylinder is a
-        bar); for a slider between its rod and the normal of its line; for a slot between its
-        line and the normal of the radius from pivot to pin. Sources: Norton, "Design of
-        Machinery", sec. 3.3; Balli and Chand, "Transmission angle in mechanisms", Mechanism and
-        Machine Theory 37 (2002).
-        """
-        return self._scalars('transmissions', theta, joints)
-
-    def function(self, points: Names = None, joints: Sequence[str] = (),
-                 rates: Sequence[str] = ()) -> Callable:
-        """
-        Return the fastest function for single poses.
-
-        Its arguments are the inputs, floats. It returns a tuple of floats: x, y of each point,
-        then the joint angles, then the joint rates by each input.
-        """
-        return self.posed(points, joints, rates).at
-
-    def posed(self, points: Names = None, joints: Sequence[str] = (),
-              rates: Sequence[str] = ()) -> Pose:
-        """Return the code behind `function`."""
-        requested = tuple(self._names(kind, _plain(_hashable(names)))
-                          for kind, names in (('points', points), ('angles', joints),
-                                              ('rates', rates)))
-        return self.bound('parts', requested)
-
-    def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]) -> Pose:
-        """
-        Return the function that solves a leg like this one.
-
-        Its arguments are floats: the value of each input [rad or m], its speed [rad/s or m/s], and
-        the numbers of the `Leg`. It returns x, y of each point (a joint, or a `LinkPoint` on a
-        link), the angles of `joints` [rad; a slide: m], and the velocities of the links in
-        `moving`.
-        """
-        return self.cache.get_or_make(('legs', points, joints, moving), lambda: self._legs(
-            points, joints, moving))
-
-    def _legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]) -> Pose:
-        lengths, unit = dict(self.lengths), self.lengths[UNIT.args[0]]
-        named: List[Union[str, LinkPoint]] = []
-        for i, point in enumerate(points):
-            if isinstance(point, LinkPoint):
-                names = f'[x{i}]', f'[y{i}]'
-                lengths.update(zip(names, (point.x / unit, point.y / unit)))
-                point = LinkPoint(point.link, *names)
-            named.append(point)
-        program = self.structure.legs(tuple(named), joints, moving)
-        return program.bind(lengths, dict(self._evaluated), self.is_accelerated)
-
     # --- forces ---
 
     def effort(self, theta: Inputs, loads: Mapping[str, ArrayLike]) -> np.ndarray:
@@ -464,55 +97,6 @@ class Mechanism:
         """
         return statics.output_effort(self, output, theta, effort)
 
-    # --- outputs ---
-
-    def has_output(self, name: Any) -> bool:
-        """
-        Return whether there is an output of this name.
-
-        Outputs are a link's name, for its joint angle [rad] or slide [m]; a joint's coordinate
-        such as 'C.x' [m]; 'distance(A,C)' [m] of two joints; 'angle(A,C)' [rad] from +x to A -> C.
-        """
-        return isinstance(name, str) and self.structure.has(name)
-
-    def is_angle(self, output: str) -> bool:
-        """Return whether an output is an angle [rad], not a length [m]."""
-        return self.structure.turns(output)
-
-    def moves(self, output: str, by: int = 0) -> bool:
-        """Return whether an output depends on one of the inputs."""
-        return self.structure.moves(output, by)
-
-    def check_output(self, output: str) -> None:
-        """Raise ValueError if an output does not exist or does not move."""
-        if not isinstance(output, str) or not self.moves(output):
-            self.check_there(output)
-            raise ValueError(f'{plain_text(output)} of {self.type} does not move with the '
-                             f'{self.inputs[0].name}')
-
-    def check_there(self, output: str) -> None:
-        """Raise ValueError if an output does not exist."""
-        if not self.has_output(output):
-            named = (*self.joints, *(f'{name}.{axis}' for name in self.points
-                                     for axis in self.axes))
-            own = listed([name for name in named if output == name[:-2]])
-            raise ValueError(
-                f'{self.type} has no output {quoted(output)}; allowed: distance(A,B) and '
-                f'angle(A,B) of two joints, {listed(named)}'
-                + (f'; did you mean {own}?' if output in self.points else meant(output, named)))
-
-    def gear(self, name: str, by: int = 0) -> Tuple[float, float]:
-        """Return ratio and offset [rad or m] by which an input drives a link, anywhere."""
-        input_, value = self.structure.built.driven[name]
-        value = value if input_.turns else in_metres(value)
-        program = Program([derivative(value, {by: 1.0}, {}), value], len(self.inputs))
-        ratio, offset = self.bind(program).at(*[0.0] * len(self.inputs))
-        return ratio, offset
-
-    def geared_to(self, by: int) -> List[str]:
-        """Return the links that one of the inputs drives by gears."""
-        return [name for name in self.geared if self.moves(name, by)]
-
     # --- the inverse ---
 
     def inverse(self, outputs: Union[str, Sequence[str]]) -> Inverse:
@@ -523,27 +107,7 @@ class Mechanism:
         joint lines of its linkage. Raises ValueError if an output does not exist, their number is
         not that of the inputs, they do not determine all inputs, or a dimension is an array.
         """
-        try:
-            found: Inverse = self.cache['inverse', outputs]
-            return found
-        except (KeyError, TypeError):  # the first time, and for a list
-            names = (outputs,) if isinstance(outputs, str) else outputs
-        if not isinstance(names, (list, tuple)):
-            raise ValueError(f'outputs must be a list of names, got {quoted(outputs)}')
-        for name in names:
-            self.check_there(name)
-        plain = tuple(map(plain_text, names))
-        made = self.cache.get_or_make(('inverse', plain), lambda: self._inverse(plain))
-        return self.cache.get_or_make(
-            ('inverse', plain[0] if isinstance(outputs, str) else plain), lambda: made)
-
-    def _inverse(self, names: Tuple[str, ...]) -> Inverse:
-        if len(names) != len(self.inputs):
-            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: as many outputs are '
-                             f'needed, got {listed(names)}')
-        if names[1:] == tuple(input_.name for input_ in self.inputs[1:]):
-            self.check_output(names[0])
-        return Inverse(self, names)
+        return inverse_of(self, outputs)
 
     def input_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
                   others: Sequence[float] = ()) -> Any:
@@ -614,19 +178,7 @@ class Mechanism:
         [(-pi, pi)]; strokes (lo, hi) of a cylinder are in m; the list may be empty. Raises
         ValueError if not every other input is given, or a dimension is an array.
         """
-        fixed = self._fixed(others)
-        return list(self.cache.get_or_make(('reach', *fixed), lambda: self._arcs(fixed)))
-
-    def _arcs(self, others: Tuple[float, ...]) -> List[Arc]:
-        margins = self.bound('margins', ())
-        if margins.shape:
-            raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
-                             'not for arrays')
-        step = self.inputs[0].step
-        return [(lo * step, hi * step) for lo, hi in arcs(
-            lambda value: margins.searched(value * step, *others), self.inputs[0].counted(),
-            self.structure.built.limits, self.value,
-            lambda theta: self._ready('points', None)[1].searched(theta * step, *others), step)]
+        return list(reach_of(self, self._fixed(others)))
 
     def dead_points(self, *others: float) -> list:
         """
@@ -669,86 +221,3 @@ class Mechanism:
         return [(low * size, high * size, *values) for low, high, *values
                 in segments_of(self, output, self._fixed(others)).pieces(most)], self.bound(
                     'output', output)
-
-    # --- its code ---
-
-    def bind(self, program: Program) -> Pose:
-        """Return a program of its formulas as a function of its arguments."""
-        if len(self._evaluated) > MOST_VALUES:
-            # A new dictionary, since a thread may be reading the old one.
-            self._evaluated = {}
-        return program.bind(self.lengths, self._evaluated, self.is_accelerated)
-
-    def bound(self, kind: str, names: Any, *by: int) -> Pose:
-        """Return the code for quantities of one kind; see `Structure.program`."""
-        return self.bind(self.structure.program(kind, names, *by))
-
-    def checked(self, outputs: Tuple[str, ...]) -> Pose:
-        """Return the code for outputs and their rates, NaN unless all joints are assembled."""
-        return self.bound('checked', outputs)
-
-    def margins(self, *inputs: np.ndarray) -> np.ndarray:
-        """Return each limit's margin (limits, n), nonnegative where the limit is satisfied."""
-        return self.bound('margins', ()).searched(*inputs)
-
-    def _vectors(self, kind: str, theta: Inputs, points: Any, *by: int) -> dict:
-        names, pose = self._ready(kind, points, *by)
-        return self._by_point(names, pose.over(*self.each_input(theta)))
-
-    def _by_point(self, names: Sequence[str], values: np.ndarray) -> dict:
-        """Return coordinates (coordinates of all names, *shape) as {name: (*shape, axes)}."""
-        places = values.reshape(len(names), len(self.axes), *values.shape[1:])
-        return dict(zip(names, np.moveaxis(places, 1, -1)))
-
-    def _scalars(self, kind: str, theta: Inputs, joints: Any, *by: int) -> dict:
-        names, pose = self._ready(kind, joints, *by)
-        return dict(zip(names, pose.over(*self.each_input(theta))))
-
-    def each_input(self, theta: Any, name: str = 'theta') -> Sequence[np.ndarray]:
-        """Return each input's values as an array; raise ValueError if they are not numbers."""
-        if len(self.inputs) == 1:
-            return (numbers(name, theta),)
-        if not hasattr(theta, '__len__') or len(theta) != len(self.inputs):
-            raise ValueError(f'{self.type} has {len(self.inputs)} inputs: '
-                             f'{name} must be a sequence of as many values')
-        return [numbers(name, each) for each in theta]
-
-    def _checked_by(self, by: Any) -> int:
-        """Return the index of an input; raise ValueError if it is invalid."""
-        if isinstance(by, (bool, np.bool_)) or not hasattr(by, '__index__') \
-                or not 0 <= by.__index__() < len(self.inputs):
-            raise ValueError(f'by must be the number of an input, from 0 to '
-                             f'{len(self.inputs) - 1}, got {quoted(by)}')
-        return int(by)
-
-    def _ready(self, kind: str, requested: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
-        """Return the requested names and the function that computes them."""
-        key = kind, _hashable(requested), *by
-        return self._poses.get(key) or self._pose(kind, _plain(key[1]), *by)
-
-    def _pose(self, kind: str, requested: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
-        names = self._names(kind, requested)
-        return self._poses.get_or_make(
-            (kind, requested, *by), lambda: (names, self.bound(kind, names, *by)))
-
-    def _names(self, kind: str, requested: Any) -> Tuple[str, ...]:
-        what, allowed = ('point', self.points) if kind in OF_POINTS else ('joint', self.joints)
-        if kind == 'transmissions':
-            what, allowed = 'transmission angle at', tuple(self.structure.built.transmissions)
-        if requested is None:
-            return allowed
-        names = (requested,) if isinstance(requested, str) else requested
-        for name in names:
-            if name not in allowed and not (what == 'joint' and self.has_output(name)):
-                raise ValueError(f'{self.type} has no {what} {quoted(name)}; '
-                                 f'allowed: {listed(allowed)}{meant(name, allowed)}')
-        return names
-
-
-def _in_own_unit(dimensions: Mapping, fixed: bool) -> dict:
-    """Return dimensions in a unit that is a power of two, and that unit [m]."""
-    longest = max((np.max(np.abs(length)) for length in dimensions.values()), default=1.0)
-    if fixed or SMALL_LENGTH < longest < LARGE_LENGTH:
-        return {**dimensions, UNIT.args[0]: 1.0}
-    unit = 2.0 ** np.frexp(longest)[1]
-    return {UNIT.args[0]: unit, **{name: length / unit for name, length in dimensions.items()}}

@@ -18,19 +18,17 @@ in every motion of the linkage.
 from __future__ import annotations
 
 from collections import abc
-from typing import Any, Iterator, Mapping, TYPE_CHECKING
+from typing import Any, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import numbers
+from .kinematics import Inputs, Kinematics
+from .text.arguments import numbers
 from ..words import listed, plain_text, quoted
 
-if TYPE_CHECKING:
-    from .mechanism import Inputs, Mechanism
 
-
-def effort(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike]) -> np.ndarray:
+def effort(linkage: Kinematics, theta: Inputs, loads: Mapping[str, ArrayLike]) -> np.ndarray:
     """Implement `Mechanism.effort`."""
     if not isinstance(loads, abc.Mapping):
         raise ValueError('loads must be a mapping from joints to forces and from links to '
@@ -44,7 +42,7 @@ def effort(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike]) ->
     return np.stack(efforts, -1)
 
 
-def _powers(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike],
+def _powers(linkage: Kinematics, theta: Inputs, loads: Mapping[str, ArrayLike],
             by: int) -> Iterator[np.ndarray]:
     """Yield each load's work per unit of an input."""
     for name, load in loads.items():
@@ -67,7 +65,7 @@ def _powers(linkage: Mechanism, theta: Inputs, loads: Mapping[str, ArrayLike],
                              f'allowed: {listed((*linkage.points, *linkage.joints))}')
 
 
-def _chain(linkage: Mechanism, name: str) -> Iterator[str]:
+def _chain(linkage: Kinematics, name: str) -> Iterator[str]:
     """Yield a link and its parents, down to the ground."""
     links = {link.name: link for link in linkage.links}
     if linkage.axes != 'xy':  # each turns about its own axis, and is loaded about that
@@ -79,7 +77,7 @@ def _chain(linkage: Mechanism, name: str) -> Iterator[str]:
         name = links[name].parent
 
 
-def output_effort(linkage: Mechanism, output: str, theta: Inputs, effort: ArrayLike) -> Any:
+def output_effort(linkage: Kinematics, output: str, theta: Inputs, effort: ArrayLike) -> Any:
     """Implement `Mechanism.output_effort`."""
     if len(linkage.inputs) > 1:
         raise ValueError(f'{linkage.type} has several inputs; the effort of an output needs '

@@ -29,9 +29,7 @@ from typing import Dict, Iterable, Mapping, Optional, Sequence
 from numpy.typing import ArrayLike
 
 from . import custom
-from ..linkage.arguments import checked_branches, checked_dimensions
-from ..linkage.design import Design
-from ..linkage.mechanism import Mechanism
+from ..linkage import checked_branches, checked_dimensions, Design, Mechanism
 from ..words import meant, plain_text, quoted
 
 # The mechanisms of a scene without names, and their scales: they are 0.5 m to 1.5 m in size.

@@ -18,7 +18,7 @@ its height has seven extremes, equally high and low in turn.
 Source: Chebyshev, "Les plus simples systemes de tiges articulees", 1878.
 """
 
-from ..linkage.design import Design
+from ..linkage import Design
 
 DESIGN = Design('chebyshev_lambda', {'a': 1.0}, tracer='P', joints=(
     'O ground 0 0',

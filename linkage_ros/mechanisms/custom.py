@@ -17,9 +17,7 @@ from typing import Any, Iterable, List, Optional, Tuple
 import numpy as np
 
 from ..cache import cached
-from ..linkage import joint_lines, rod_lines
-from ..linkage.design import Design
-from ..linkage.mechanism import check_bars, Mechanism
+from ..linkage import check_bars, Design, joint_lines, Mechanism, rod_lines
 from ..words import listed, meant, plain_text, quoted
 
 MOST_LINES = 2000

@@ -18,7 +18,7 @@ The defaults are those of a double SCARA robot with four equal arms.
 Source: Norton, "Design of Machinery", sec. 4.9 (the geared five-bar, whose letters these are).
 """
 
-from ..linkage.design import Design
+from ..linkage import Design
 
 DESIGN = Design('five_bar', {'a': 0.09, 'b': 0.09, 'c': 0.09, 'd': 0.09, 'f': 0.118}, tracer='P',
                 joints=(

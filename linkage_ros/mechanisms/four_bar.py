@@ -20,8 +20,8 @@ Source: Norton, "Design of Machinery", sec. 2.13 (Grashof's condition) and 4.5 (
 
 from math import fsum
 
-from ..linkage import mechanism
-from ..linkage.design import Design
+from .. import linkage
+from ..linkage import Design
 
 DESIGN = Design('four_bar', {'a': 40.0, 'b': 120.0, 'c': 80.0, 'd': 100.0, 'p': 60.0},
                 tracer='P', signed=frozenset('p'), joints=(
@@ -53,7 +53,7 @@ def grashof(crank: float, coupler: float, rocker: float, ground: float) -> str:
     return names[lengths.index(shortest)]
 
 
-class Mechanism(mechanism.Mechanism):
+class Mechanism(linkage.Mechanism):
     """A four-bar: also classified."""
 
     def grashof(self) -> str:

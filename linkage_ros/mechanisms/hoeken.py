@@ -19,7 +19,7 @@ Source: Norton, "Design of Machinery", sec. 3.8, whose table 3-1 lists the propo
 that are straightest over 20 to 180 degrees of the crank.
 """
 
-from ..linkage.design import Design
+from ..linkage import Design
 
 DESIGN = Design('hoeken', {'a': 1.0, 'b': 2.5, 'd': 2.0}, tracer='P', joints=(
     'O ground 0 0',

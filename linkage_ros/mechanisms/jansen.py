@@ -15,7 +15,7 @@ The defaults are Jansen's holy numbers. Source: Jansen, "The Great Pretender"; l
 Wikipedia, "Jansen's linkage".
 """
 
-from ..linkage.design import Design
+from ..linkage import Design
 
 HOLY_NUMBERS = {
     'a': 38.0, 'b': 41.5, 'c': 39.3, 'd': 40.1, 'e': 55.8, 'f': 39.4, 'g': 36.7,

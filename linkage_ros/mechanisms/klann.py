@@ -18,7 +18,7 @@ the distances between the joints of the patent's example, in its unit.
 Source: Klann, "Walking device", US patent 6,260,862, 2001.
 """
 
-from ..linkage.design import Design
+from ..linkage import Design
 
 DESIGN = Design('klann', {
     'm': 0.268, 'a': 0.590, 'b': 0.3206, 'c': 0.5221, 'd': 1.1051, 'e': 0.5177, 'f': 0.8966,

@@ -18,7 +18,7 @@ distance g to the right of the pole; d > b.
 Source: Scheiner, "Pantographice", 1631; Hartenberg and Denavit, "Kinematic Synthesis of Linkages".
 """
 
-from ..linkage.design import Design
+from ..linkage import Design
 
 DESIGN = Design('pantograph', {'a': 1.0, 'b': 2.5, 'c': 2.5, 'd': 5.0, 'g': 3.0}, tracer='T',
                 joints=(

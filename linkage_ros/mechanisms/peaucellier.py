@@ -18,7 +18,7 @@ reaches |a - b| <= 2 r |cos(theta/2)| <= a + b.
 Source: Hartenberg and Denavit, "Kinematic Synthesis of Linkages", ch. 5.
 """
 
-from ..linkage.design import Design
+from ..linkage import Design
 
 DESIGN = Design('peaucellier', {'r': 3.0, 'a': 9.0, 'b': 4.0}, tracer='C', joints=(
     'O ground 0 0',

@@ -18,7 +18,7 @@ points where the crank stands upright.
 Source: Norton, "Design of Machinery", sec. 4.6.
 """
 
-from ..linkage.design import Design
+from ..linkage import Design
 
 DESIGN = Design('slider_crank', {'a': 40.0, 'b': 120.0, 'c': -20.0}, tracer='B',
                 signed=frozenset('c'), joints=(

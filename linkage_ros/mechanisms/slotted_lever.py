@@ -26,9 +26,8 @@ from typing import Any, Optional, Sequence
 
 from numpy.typing import ArrayLike
 
-from ..linkage import mechanism
-from ..linkage.design import Design
-from ..linkage.input_range import reachable_arcs
+from .. import linkage
+from ..linkage import Design, reachable_arcs
 
 DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',
                 signed=frozenset('e'), joints=(
@@ -38,7 +37,7 @@ DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',
     'L slot Q A e out max(1.8*b,a+b)'))
 
 
-class Mechanism(mechanism.Mechanism):
+class Mechanism(linkage.Mechanism):
     """A slotted lever: also solved from the lever angle."""
 
     def servo_angle(self, lever_angle: ArrayLike, near: Optional[ArrayLike] = None) -> Any:

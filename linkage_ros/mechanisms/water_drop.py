@@ -16,7 +16,7 @@ of O in line AC at every angle, so there is no root and no branch. P's curve has
 since AP/AB = (2a + a)/(2a - a), and the area 8 pi a^2. Idea of the linkage: Keishiro Ueki.
 """
 
-from ..linkage.design import Design
+from ..linkage import Design
 
 DESIGN = Design('water_drop', {'a': 1.0}, tracer='P', joints=(
     'O ground 0 0',

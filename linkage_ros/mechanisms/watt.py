@@ -17,7 +17,7 @@ Q = (2a, -c). Its middle P writes a lemniscate that is flat about the middle of 
 Sources: Watt's letter to Boulton of 1784; Weisstein, "Watt's Curve", MathWorld.
 """
 
-from ..linkage.design import Design
+from ..linkage import Design
 
 DESIGN = Design('watt', {'a': 3.0, 'c': 2.0}, tracer='P', joints=(
     'O ground 0 0',

@@ -21,7 +21,7 @@ Source: Norton, "Design of Machinery", sec. 3.7; the defaults a, b from an exerc
 Gupta, "Theory of Machines", ch. 5.
 """
 
-from ..linkage.design import Design
+from ..linkage import Design
 
 DESIGN = Design('whitworth', {'a': 150.0, 'b': 100.0, 'c': 120.0, 'd': 400.0}, tracer='R',
                 joints=(

@@ -25,10 +25,9 @@ from . import messages
 from .publishers import PatchedPublisher
 from .. import scene
 from ..cache import Cache
-from ..linkage.mechanism import Mechanism
-from ..linkage.quantities import LinkPoint
-from ..linkage.walker import Layout, Solution
+from ..linkage import LinkPoint, Mechanism
 from ..robot_model import bodies, shapes, urdf
+from ..scene.legs import Layout, Solution
 
 # Cached publishers: a walker's legs may leave their reach one by one, each with another message.
 MAX_PUBLISHERS = 128

@@ -18,7 +18,7 @@ import shutil
 from . import parts
 from .. import scene
 from ..command import chosen, Parser, RequestError, run
-from ..linkage.arithmetic import Formula
+from ..linkage import Formula
 from ..optional import needs
 from ..scene.scene_mechanism import IN_SPACE
 from ..words import meant

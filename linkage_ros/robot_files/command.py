@@ -22,7 +22,7 @@ import numpy as np
 from . import check, closing, loops, model, planar, readers, rods, spatial
 from .robot import FARTHEST, FIXED, HINGE, Joint, NotDriven, Robot, SLIDE
 from .. import command, scene
-from ..linkage.dyads import short
+from ..linkage import short
 from ..scene.writing import in_yaml
 from ..words import elided, listed, sentence
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from .robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE
 from .spatial import blocks, EXACT, TOGETHER, top, trees
-from ..linkage.dyads import ROUNDING
+from ..linkage import ROUNDING
 
 # Kinds of joints in planar loops.
 FLAT = (HINGE, SLIDE, BALL)

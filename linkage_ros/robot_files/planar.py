@@ -27,8 +27,7 @@ from . import check, loops, sweeps
 from .robot import Joint, Limits, NotDriven, plain, Robot, SLIDE
 from .sweeps import Source
 from .. import mechanisms, scene
-from ..linkage.dyads import bar_name, Dyads, Hinge, Motor, Pin, ROUNDING, short, Slide
-from ..linkage.mechanism import Mechanism
+from ..linkage import bar_name, Dyads, Hinge, Mechanism, Motor, Pin, ROUNDING, short, Slide
 from ..robot_model.bodies import coordinates
 from ..scene.joint_names import quoted_name
 

@@ -29,8 +29,7 @@ from . import check, sweeps
 from .loops import Group
 from .robot import BALL, HINGE, Joint, NotDriven, plain, Robot, SLIDE
 from .. import mechanisms, scene
-from ..linkage.dyads import short
-from ..linkage.rod_lines import FORMS, WindowError
+from ..linkage import FORMS, short, WindowError
 from ..scene.joint_names import quoted_name
 from ..words import listed
 

@@ -17,7 +17,7 @@ from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tup
 
 from .robot import Limits
 from .. import scene
-from ..linkage.dyads import ROUNDING, short
+from ..linkage import ROUNDING, short
 from ..scene import FARTHEST
 
 # Why no motion is within limits.

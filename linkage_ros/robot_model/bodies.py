@@ -37,11 +37,11 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from . import shapes
+from .output_range import common_reach, ground_frame, Travel, travels
 from .. import palette
-from ..linkage.builder import GROUND, Link
-from ..linkage.output_range import common_reach, ground_frame, Travel, travels
-from ..linkage.walker import Assembly
+from ..linkage import GROUND, Link
 from ..scene import SceneError, SceneMechanism
+from ..scene.legs import Assembly
 from ..scene.scene_mechanism import IN_SPACE
 from ..words import listed
 

@@ -23,10 +23,8 @@ from typing import Any, Collection, Dict, Iterable, List, NamedTuple, Optional, 
 
 import numpy as np
 
-from ..linkage.builder import GROUND, Link
-from ..linkage.mechanism import Mechanism
-from ..linkage.output_range import ground_frame
-from ..linkage.quantities import LinkPoint
+from .output_range import ground_frame
+from ..linkage import GROUND, Link, LinkPoint, Mechanism
 from ..scene import SceneMechanism
 
 GUIDE, BLOCK, BARREL, ROD = 'guide', 'block', 'barrel', 'rod'

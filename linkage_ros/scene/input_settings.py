@@ -18,8 +18,7 @@ import math
 from typing import Iterable, Optional, Tuple
 
 from .parameters import ALL, DRIVER, Field, SceneError, SPEEDS, STARTS, Values
-from ..linkage.inputs import Arc, Input
-from ..linkage.mechanism import Mechanism
+from ..linkage import Arc, Input, Mechanism
 from ..words import quoted
 
 # Distance of a default sweep from each end of the reach, as a fraction of the reach.

@@ -22,8 +22,7 @@ import numpy as np
 from .input_settings import in_words, InputSettings
 from .scene_mechanism import SceneMechanism
 from ..formula.program import compile_in_background
-from ..linkage.inputs import Arc, Input
-from ..linkage.inverse import CLOSE, Solution
+from ..linkage import Arc, CLOSE, Input, Solution
 from ..words import listed
 
 LEVER = 'lever'

@@ -16,7 +16,7 @@ import re
 from typing import Dict, Iterable, Tuple, Union
 
 from .parameters import SceneError
-from ..linkage.mechanism import Mechanism
+from ..linkage import Mechanism
 from ..words import elided, listed, meant
 
 # A moment [N m], or a force [N]: x, y and, in a spatial linkage, z.

@@ -20,7 +20,7 @@ from __future__ import annotations
 from typing import Optional, Tuple
 
 from . import InputSettings
-from ..linkage.inputs import Arc
+from ..linkage import Arc
 
 STEPS, STEP = 1 << 160, 2.0 ** -160
 TURN = 62831853071795864769252867665590057683943387987502116 * STEPS // 10 ** 52

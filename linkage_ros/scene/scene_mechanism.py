@@ -19,6 +19,7 @@ from typing import Any, Dict, Mapping, Optional, Sequence, Tuple
 
 from .input_settings import InputSettings, read_settings
 from .joint_names import JointName, read_joint_names
+from .legs import Assembly
 from .loads import Load, read_loads
 from .parameters import (
     ALL,
@@ -34,10 +35,7 @@ from .parameters import (
 )
 from .. import mechanisms
 from ..cache import cached
-from ..linkage.design import Design
-from ..linkage.inputs import Arc
-from ..linkage.mechanism import Mechanism
-from ..linkage.walker import Assembly
+from ..linkage import Arc, Design, Mechanism
 from ..words import listed, meant, quoted
 
 IN_SPACE = 'a linkage in space: pictures and robot models are of linkages in a plane'

@@ -25,8 +25,7 @@ import numpy as np
 from . import Scene, SceneMechanism
 from .parameters import Parameter
 from ..cache import cached
-from ..linkage.inputs import Arc
-from ..linkage.mechanism import Mechanism
+from ..linkage import Arc, Mechanism
 
 # Steps of a slider, and the smallest step as a fraction of the value.
 STEPS, FINEST = 100, 1e-5

@@ -18,7 +18,7 @@ import numpy as np
 from .poses import Refused, theta_of
 from .settings import shown
 from ..c_code import header
-from ..linkage.curves import ascending, sampled
+from ..linkage import ascending, sampled
 from ..robot_model import urdf
 from ..scene import SceneMechanism
 from ..words import listed, meant, quoted

@@ -15,12 +15,10 @@ from itertools import combinations
 import math
 from typing import Any, Mapping, Optional, Sequence
 
+from .nearest_pose import nearest_inputs
 from .settings import is_number, shown
-from ..linkage.arithmetic import Formula
-from ..linkage.inputs import Arc
-from ..linkage.mechanism import Mechanism
-from ..linkage.nearest_pose import nearest_inputs
-from ..linkage.output_range import ground_frame
+from ..linkage import Arc, Formula, Mechanism
+from ..robot_model.output_range import ground_frame
 from ..scene import in_words, InputSettings, Scene, SceneMechanism, slider
 from ..words import listed, quoted
 

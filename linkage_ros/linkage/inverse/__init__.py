@@ -11,12 +11,12 @@
 """The inverse of a linkage: candidates, refined, distinct, and one chosen or followed."""
 
 from .choice import CLOSE
-from .inverse import Inverse, Solution
+from .inverse import Inverse, inverse_of, Solution
 from .linkage import InverseLinkage, Mode
 from .segments import extremes_of, Segments, segments_of
 
 # The former name of a solution; deprecated.
 Answer = Solution
 
-__all__ = ['Answer', 'CLOSE', 'extremes_of', 'Inverse', 'InverseLinkage', 'Mode', 'Segments',
-           'segments_of', 'Solution']
+__all__ = ['Answer', 'CLOSE', 'extremes_of', 'Inverse', 'inverse_of', 'InverseLinkage', 'Mode',
+           'Segments', 'segments_of', 'Solution']

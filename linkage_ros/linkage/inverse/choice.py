@@ -18,7 +18,7 @@ from typing import Any, List, Optional, Sequence
 import numpy as np
 
 from .problem import Found, InverseProblem
-from ..planar import TOLERANCE
+from ..geometry.planar import TOLERANCE
 
 # Distance to an end of a sweep that counts as that end, in sizes and as a part of the end.
 CLOSE, ULPS = 1e-7, 4 * 2.0 ** -52

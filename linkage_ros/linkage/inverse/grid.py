@@ -22,18 +22,16 @@ from __future__ import annotations
 
 from itertools import chain, combinations
 import math
-from typing import Callable, Iterator, List, Sequence, Set, Tuple, TYPE_CHECKING, Union
+from typing import Callable, Iterator, List, Sequence, Set, Tuple, Union
 
 import numpy as np
 
 from .problem import Found, InverseProblem
 from .refine import refine_inside
 from .segments import segments_of
-from ..quantities import Names
+from ..formulas import Names
+from ..kinematics import Kinematics
 from ...words import listed
-
-if TYPE_CHECKING:
-    from ..mechanism import Mechanism
 
 # Grid points at first and at most, and the least number of them that can be assembled.
 STARTS, MAX_STARTS, ASSEMBLED = 1024, 1 << 16, 250
@@ -48,7 +46,7 @@ DEPENDENT = 1e-10
 TWINS = 24
 
 
-def blocks(linkage: Mechanism, outputs: Names) -> List[Tuple[List[int], List[int]]]:
+def blocks(linkage: Kinematics, outputs: Names) -> List[Tuple[List[int], List[int]]]:
     """
     Return groups of outputs that are solved in turn, and the inputs that each group determines.
 

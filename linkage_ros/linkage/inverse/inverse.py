@@ -30,7 +30,6 @@ from typing import (
     Optional,
     Sequence,
     Tuple,
-    TYPE_CHECKING,
     Union,
 )
 
@@ -46,11 +45,9 @@ from .modes import Modes
 from .problem import Found, InverseProblem
 from .refine import distinct, distinct_arrays, refine, refine_arrays
 from .segments import Segments, segments_of
-from ..arguments import numbers
-from ...words import listed, quoted
-
-if TYPE_CHECKING:
-    from ..mechanism import Mechanism
+from ..kinematics import Kinematics
+from ..text.arguments import numbers
+from ...words import listed, plain_text, quoted
 
 # Arrays are solved in blocks that stay in a processor's cache, and few values as floats.
 BLOCK, FEW = 8192, 32
@@ -132,7 +129,7 @@ class Inverse:
 
     """
 
-    def __init__(self, linkage: Mechanism, outputs: Tuple[str, ...]):
+    def __init__(self, linkage: Kinematics, outputs: Tuple[str, ...]):
         self.linkage, self.outputs, self._n = linkage, outputs, len(outputs)
         blocks(linkage, outputs)
         self._problem = InverseProblem(linkage, outputs)
@@ -162,7 +159,7 @@ class Inverse:
 
     def __reduce__(self) -> Tuple[Any, ...]:
         """Pickle the linkage and the outputs only."""
-        return self.linkage.inverse, (self.outputs,)
+        return inverse_of, (self.linkage, self.outputs)
 
     def __repr__(self) -> str:
         return f'<inverse of {self.linkage.type} for {listed(self.outputs)}>'
@@ -226,7 +223,7 @@ class Inverse:
         if not any(turns):
             return None
         start = {input_.name: math.tau * count for input_, count in zip(self.inputs, turns)}
-        return (self.linkage.turned(*turns).inverse(self.outputs), list(start.values()),
+        return (inverse_of(self.linkage.turned(*turns), self.outputs), list(start.values()),
                 [start.get(name, 0.0) for name in self.outputs])
 
     def _in_turns(self, method: str, values: Sequence[Any], near: Sequence[float],
@@ -512,3 +509,29 @@ def _broadcast(values: Sequence[Any]) -> Sequence[np.ndarray]:
 
 def _sign(value: float, size: float) -> int:
     return int(np.sign(value)) if abs(value) > SINGULAR * size else 0
+
+
+def inverse_of(linkage: Kinematics, outputs: Union[str, Sequence[str]]) -> Inverse:
+    """Implement `Mechanism.inverse`."""
+    try:
+        found: Inverse = linkage.cache['inverse', outputs]
+        return found
+    except (KeyError, TypeError):  # the first time, and for a list
+        names = (outputs,) if isinstance(outputs, str) else outputs
+    if not isinstance(names, (list, tuple)):
+        raise ValueError(f'outputs must be a list of names, got {quoted(outputs)}')
+    for name in names:
+        linkage.check_there(name)
+    plain = tuple(map(plain_text, names))
+    made = linkage.cache.get_or_make(('inverse', plain), lambda: _made(linkage, plain))
+    return linkage.cache.get_or_make(
+        ('inverse', plain[0] if isinstance(outputs, str) else plain), lambda: made)
+
+
+def _made(linkage: Kinematics, names: Tuple[str, ...]) -> Inverse:
+    if len(names) != len(linkage.inputs):
+        raise ValueError(f'{linkage.type} has {len(linkage.inputs)} inputs: as many outputs are '
+                         f'needed, got {listed(names)}')
+    if names[1:] == tuple(input_.name for input_ in linkage.inputs[1:]):
+        linkage.check_output(names[0])
+    return Inverse(linkage, names)

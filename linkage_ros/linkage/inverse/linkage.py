@@ -23,16 +23,18 @@ from __future__ import annotations
 import cmath
 from itertools import product
 import math
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, TYPE_CHECKING
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .. import joint_lines
-from ..builder import GROUND, Link, UNIT
-from ..design import Design
 from ..dyads import Dyads, Hinge, Motor, Slide
+from ..formulas import Names, PAIR, Structure
+from ..geometry.builder import GROUND, Link, UNIT
 from ..inputs import Input, spread
-from ..quantities import Names, PAIR, Structure
+from ..kinematics import Kinematics
+from ..motion.reach import reach_of
+from ..text import joint_lines
+from ..text.design import Design
 from ...formula.expression import (
     arctangent,
     argument,
@@ -41,9 +43,6 @@ from ...formula.expression import (
     Real,
     square_root,
 )
-
-if TYPE_CHECKING:
-    from ..mechanism import Mechanism
 
 # Two to the power of this many assembly modes at most.
 MOST_SIDES = 5
@@ -165,7 +164,7 @@ class _Read(NamedTuple):
     turns: Tuple[float, ...]
 
 
-def taken_apart(linkage: Mechanism, outputs: Names) -> Optional[InverseLinkage]:
+def taken_apart(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
     """Return the inverse linkage for outputs, None where no closed form is known."""
     # Lengths in joint lines are in metres.
     if linkage.value(UNIT) != 1.0 or len(set(outputs)) < len(outputs):
@@ -188,14 +187,14 @@ def _pair(output: str) -> Optional[Tuple[str, ...]]:
     return found and found.groups()
 
 
-def _pose(linkage: Mechanism) -> Optional[Dict[str, float]]:
+def _pose(linkage: Kinematics) -> Optional[Dict[str, float]]:
     """Return all joint angles and coordinates in a generic pose, away from dead points."""
     names = (*linkage.joints, *(f'{point}.{axis}' for point in linkage.points for axis in 'xy'))
     pose = linkage.posed((), names)
     if len(linkage.inputs) > 1:
         values = spread(linkage.inputs, TRIES)
     else:
-        arcs = linkage.reach()
+        arcs = reach_of(linkage)
         values = [np.array([lo + part * (hi - lo) for part in (0.382, 0.7, 0.13)
                             for lo, hi in arcs])]
     if not len(values[0]):
@@ -218,7 +217,7 @@ class _Sketch(Dyads):
 
     """
 
-    def __init__(self, linkage: Mechanism, outputs: Names, ground: str, pose: Dict[str, float]):
+    def __init__(self, linkage: Kinematics, outputs: Names, ground: str, pose: Dict[str, float]):
         self._linkage, self._outputs, self._pose = linkage, outputs, pose
         self._links = {link.name: link for link in linkage.links}
         self.driving: Dict[str, Tuple[str, float, float]] = {}

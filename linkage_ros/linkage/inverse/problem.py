@@ -19,17 +19,14 @@ from __future__ import annotations
 
 from functools import cached_property, partial
 import math
-from typing import Any, Sequence, Tuple, TYPE_CHECKING
+from typing import Any, Sequence, Tuple
 
 import numpy as np
 
-from ..curves import LEAST
-from ..input_range import is_periodic
-from ..inputs import Input, spread
+from ..inputs import Input, is_periodic, spread
+from ..kinematics import Kinematics
+from ..motion.curves import LEAST
 from ...formula.program import Pose
-
-if TYPE_CHECKING:
-    from ..mechanism import Mechanism
 
 # Inputs and rates of a solution.
 Found = Tuple[Tuple[float, ...], Tuple[float, ...]]
@@ -57,7 +54,7 @@ class InverseProblem:
 
     """
 
-    def __init__(self, linkage: Mechanism, outputs: Tuple[str, ...]):
+    def __init__(self, linkage: Kinematics, outputs: Tuple[str, ...]):
         self.linkage, self.outputs, self.n = linkage, outputs, len(outputs)
         # Of one input, candidates are inside the reach.
         self.forward: Pose = linkage.checked(outputs) if self.n > 1 else self.rated

@@ -18,18 +18,16 @@ is an assembly mode; the first is the one that is drawn.
 from __future__ import annotations
 
 from itertools import product
-from typing import Optional, TYPE_CHECKING
+from typing import Optional
 
 from .linkage import InverseLinkage, Mode, MOST_SIDES
-from ..quantities import Names, Structure
-from ..rod_lines import turning_rods
+from ..formulas import Names, Structure
+from ..kinematics import Kinematics
+from ..text.rod_lines import turning_rods
 from ...formula.expression import argument, real, substituted
 
-if TYPE_CHECKING:
-    from ..mechanism import Mechanism
 
-
-def taken_apart(linkage: Mechanism, outputs: Names) -> Optional[InverseLinkage]:
+def taken_apart(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
     """Return the inverse of rods for outputs, None where no closed form is known."""
     try:
         design, n = linkage.driven_by(*outputs).design, len(outputs)

@@ -27,18 +27,15 @@ from typing import (
     Optional,
     Sequence,
     Tuple,
-    TYPE_CHECKING,
 )
 
 import numpy as np
 
-from ..analysis import Analysis, distinct
-from ..curves import ascending, extremes, LEAST, refined, sampled, turns
-from ..dead_points import NEAR, NearZero
 from ..inputs import Arc, Input
-
-if TYPE_CHECKING:
-    from ..mechanism import Mechanism
+from ..kinematics import Kinematics
+from ..motion.curves import ascending, extremes, LEAST, refined, sampled, turns
+from ..motion.reach import reach_of
+from ..motion.singularities import Analysis, distinct, NEAR, NearZero
 
 # A value this near to a special input's is that input's; and this near, if no other input has it
 # [parts of the output's size].
@@ -371,7 +368,7 @@ class Segments:
                 other.value[0] - segment.value[-1])) <= BEYOND * self._size)
 
 
-def segments_of(linkage: Mechanism, output: str, others: Sequence[float] = (),
+def segments_of(linkage: Kinematics, output: str, others: Sequence[float] = (),
                 first: Optional[Input] = None) -> Segments:
     """Return the segments of an output over the first input; see `Analysis`."""
     first = first or linkage.inputs[0]
@@ -386,13 +383,13 @@ def segments_of(linkage: Mechanism, output: str, others: Sequence[float] = (),
     return linkage.cache.get_or_make(('segments', output, first.period, *others), make)
 
 
-def extremes_of(linkage: Mechanism, output: str, arcs: Optional[Sequence[Arc]],
+def extremes_of(linkage: Kinematics, output: str, arcs: Optional[Sequence[Arc]],
                 others: Sequence[float]) -> list:
     """Implement `Mechanism.extremes`."""
     linkage.check_output(output)
     pose, angular = linkage.bound('output', output), np.array([linkage.is_angle(output)])
     size = linkage.inputs[0].step
-    parts = linkage.reach(*others) if arcs is None else arcs
+    parts = reach_of(linkage, tuple(others)) if arcs is None else arcs
     if arcs is None and (segments := segments_of(linkage, output, others)).jumps:
         parts = [(low * size, high * size) for low, high in segments.arcs]
     found = [extremes(lambda value: pose.searched(value, *others)[:1], low, high,

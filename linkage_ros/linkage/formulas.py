@@ -20,11 +20,11 @@ from itertools import chain, cycle
 import re
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
 
-from . import joint_lines
-from .builder import Builder, in_metres
-from .design import Design
-from .planar import Arm, Limit
-from .spatial import Vector
+from .geometry.builder import Builder, in_metres
+from .geometry.planar import Arm, Limit
+from .geometry.spatial import Vector
+from .text import joint_lines
+from .text.design import Design
 from ..cache import Cache, cached
 from ..formula.expression import (
     arctangent,

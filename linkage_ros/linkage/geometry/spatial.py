@@ -31,7 +31,7 @@ from __future__ import annotations
 from typing import Any, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 from .planar import Limit, TOLERANCE
-from ..formula.expression import (
+from ...formula.expression import (
     arctangent,
     cosine,
     gated,

@@ -64,11 +64,11 @@ from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tup
 import numpy as np
 
 from .arithmetic import ARITHMETIC_WORDS, Formula, IN_RANGE, in_range
-from .builder import Builder, ConstructionError, Gear
-from .planar import LEFT, RIGHT
-from ..cache import cached
-from ..formula.expression import dimension, Real
-from ..words import elided, listed, meant, quoted
+from ..geometry.builder import Builder, ConstructionError, Gear
+from ..geometry.planar import LEFT, RIGHT
+from ...cache import cached
+from ...formula.expression import dimension, Real
+from ...words import elided, listed, meant, quoted
 
 _WORDS = {'left': LEFT, 'right': RIGHT, 'out': 1.0, 'in': -1.0}
 _JOINTS = ('CENTRE', 'BASE', 'FIRST', 'SECOND', 'POINT', 'CORNER', 'POLE', 'PIN', 'PIVOT',

@@ -19,13 +19,14 @@ for the whole arc. At each end the linkage can still be assembled.
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Iterable, List, Sequence
+from typing import Any, Callable, Iterable, List, Sequence, Tuple
 
 import numpy as np
 
 from .curves import ascending, lowest, near_misses, refined, sampled
-from .inputs import Arc, CRANK, Input, NARROWEST
-from .planar import Limit
+from ..geometry.planar import Limit
+from ..inputs import Arc, CRANK, Input, is_periodic, NARROWEST
+from ..kinematics import Kinematics
 
 # In the search for ends without a closed form: samples of a whole turn, least samples of an arc,
 # and rounds of search inside the arcs that were found.
@@ -35,12 +36,27 @@ HALVINGS = 12
 # Fraction at which an arc is tested: in the exact middle, an arm of a symmetric linkage may have
 # no length.
 INSIDE = 0.49
-# Poses that are compared with those a period later. Their places are equal if they differ by at
-# most this fraction of their size.
-PERIODIC, ALIKE = 64, 1e-6
 # The search stops at more ends than these: they are rounding, of the direction of an arm without
 # length.
 MOST = 100
+
+
+def reach_of(linkage: Kinematics, others: Tuple[float, ...] = ()) -> List[Arc]:
+    """Implement `Mechanism.reach`."""
+    return linkage.cache.get_or_make(('reach', *others), lambda: _reach(linkage, others))
+
+
+def _reach(linkage: Kinematics, others: Tuple[float, ...]) -> List[Arc]:
+    margins = linkage.bound('margins', ())
+    if margins.shape:
+        raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
+                         'not for arrays')
+    step = linkage.inputs[0].step
+    return [(lo * step, hi * step) for lo, hi in arcs(
+        lambda value: margins.searched(value * step, *others), linkage.inputs[0].counted(),
+        linkage.structure.built.limits, linkage.value,
+        lambda theta: linkage.bound('points', linkage.points).searched(theta * step, *others),
+        step)]
 
 
 def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Callable,
@@ -154,19 +170,6 @@ def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:
     ends[beyond] = refined(assembled, middle, ends[beyond])[0]
     low, high = ends.tolist()
     return low, high
-
-
-def is_periodic(places: Callable, input_: Input) -> bool:
-    """
-    Return whether poses are the same a period of an input later.
-
-    `places` takes values of the input, shape (n,), and returns coordinates (any, n).
-    """
-    theta = np.linspace(input_.low, input_.high, PERIODIC + 2)[1:-1]
-    now, later = (places(theta + turn) for turn in (0.0, input_.turn))
-    with np.errstate(invalid='ignore'):
-        alike = np.abs(now - later) <= ALIKE * np.fmax.reduce(np.abs(now), axis=None, initial=0.0)
-    return bool(np.all(alike | (np.isnan(now) & np.isnan(later))))
 
 
 def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],

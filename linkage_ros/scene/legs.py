@@ -22,10 +22,8 @@ from typing import Any, List, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 
-from .curves import drawn
-from .mechanism import Mechanism
-from .quantities import Leg, LinkPoint
 from ..formula.program import Batch, Pose
+from ..linkage import drawn, Leg, LinkPoint, Mechanism
 
 
 class Layout(NamedTuple):

@@ -17,7 +17,7 @@ from typing import Any, Optional
 import numpy as np
 
 from .design import Design
-from ..words import listed, meant, quoted
+from ...words import listed, meant, quoted
 
 SHORTEST_LENGTH, LONGEST_LENGTH = 1e-300, 1e300
 

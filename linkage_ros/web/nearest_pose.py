@@ -16,8 +16,7 @@ from typing import Sequence
 
 import numpy as np
 
-from .inputs import Arc
-from .mechanism import Mechanism
+from ..linkage import Arc, Mechanism
 
 DRAG_SAMPLES = 721
 # Penalty for moving the input through its whole arc, as a fraction of the path's width: where a
@@ -65,7 +64,8 @@ def _descended(linkage: Mechanism, joint: str, goal: np.ndarray, value: np.ndarr
     sizes = np.array([input_.size for input_ in linkage.inputs])
 
     def gap_at(inputs: np.ndarray) -> np.ndarray:
-        return goal - linkage.solve(inputs[0] if single else inputs, (joint,))[joint]
+        error: np.ndarray = goal - linkage.solve(inputs[0] if single else inputs, (joint,))[joint]
+        return error
 
     gap = gap_at(value)
     for _ in range(GAUSS_NEWTON_STEPS):

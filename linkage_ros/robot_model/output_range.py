@@ -17,11 +17,8 @@ from typing import Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .curves import extremes
-from .input_range import reachable_arcs
-from .inputs import Arc
-from .mechanism import Mechanism
-from .walker import Assembly
+from ..linkage import Arc, extremes, Mechanism, reachable_arcs
+from ..scene.legs import Assembly
 
 # Margin at each end of a travel: [rad], for a slide as a fraction of the longest bar.
 SLACK = 1e-6

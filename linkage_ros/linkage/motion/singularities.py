@@ -9,26 +9,33 @@
 # limitations under the License.
 
 """
-Dead points: the values of an input at which a closure is zero or nearly zero.
+Motion of the first input: its dead points, and outputs with exact rates.
 
-A closure vanishes where a linkage stretches or folds. It is the margin of a limit, or the area of
-a kite or parallelogram.
+Dead points are the values at which a closure is zero, nearby ones those at which it is nearly
+zero. A closure vanishes where a linkage stretches or folds. It is the margin of a limit, or the
+area of a kite or parallelogram.
 """
 
 from __future__ import annotations
 
-from typing import Callable, Iterator, NamedTuple, Tuple
+from typing import Callable, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .curves import refined, sampled
-from .inputs import Arc, Input
-from .planar import TOLERANCE
+from .curves import LEAST, refined, sampled
+from .reach import reach_of
+from ..geometry.planar import TOLERANCE
+from ..inputs import Arc, Input
+from ..kinematics import Kinematics
 
 # Outputs change quickly where a closure is below this fraction of its size.
 NEAR = 1e-2
 # A closure whose size is below this multiple of its rounding is zero everywhere.
 FLAT = 256.0
+# Dead points nearer to an end of the reach than this [rad] are that end.
+ONE = 1e-9
+# Inputs no farther apart than this [rad] are one.
+SAME = 1e-13
 
 Places = Tuple[np.ndarray, ...]
 
@@ -117,3 +124,73 @@ def _approaches(theta: np.ndarray, values: np.ndarray, rates: np.ndarray,
             before - after)
         bound = sign * values[:, :-1] + before * ahead
         return np.nonzero((before < 0.0) & (after >= 0.0) & ~(bound > near))
+
+
+def distinct(values: Iterable[float], input_: Input) -> List[float]:
+    """Return values of an input in order, wrapped, one of those that differ by rounding."""
+    found: List[float] = []
+    for x in sorted(float(input_.wrapped(0.0 if abs(x) < LEAST else x)) for x in values):
+        if not found or x - found[-1] > SAME:
+            found.append(x)
+    if input_.wraps and len(found) > 1 and found[0] + input_.turn - found[-1] <= SAME:
+        found.pop()
+    return found
+
+
+class Analysis:
+    """
+    Motion of a linkage with its first input; the other inputs are fixed.
+
+    `first` is the first input over a part of its period, by default over all of it.
+    """
+
+    def __init__(self, linkage: Kinematics, others: Sequence[float] = (),
+                 first: Optional[Input] = None):
+        self._linkage, self._others = linkage, tuple(others)
+        self._first = first or linkage.inputs[0]
+
+    # From here on the first input is in units of its step.
+
+    def dead_points(self) -> List[float]:
+        """Return the values of the input at which a dyad stretches or folds."""
+        first = self._first.counted()
+        # Where a reach may only be cut off, a dead point is found as a touch.
+        ends = [end for arc in self.reach() for end in arc if not first.is_cut(end)]
+        touched = [near.value for near in self.near_zeros()
+                   if near.gap <= near.rounding
+                   and all(first.apart(near.value, end) > ONE for end in ends)]
+        return distinct([*ends, *touched], first)
+
+    def reach(self) -> List[Arc]:
+        """Return the reach in arcs, none of them on both sides of an end of a turn."""
+        size, first = self._first.step, self._first.counted()
+        arcs = [(lo / size, hi / size) for lo, hi in reach_of(self._linkage, self._others)]
+        if self._first.turn < self._linkage.inputs[0].turn:
+            arcs = [(max(lo, first.low), min(hi, first.high)) for lo, hi in arcs
+                    if lo < first.high and hi > first.low]
+        return [part for arc in arcs for part in first.within(*arc)]
+
+    def curve(self, kind: str, name: object) -> Callable:
+        """Return the function from the first input to numbers, and each one's rate by it."""
+        pose, size, others = self._linkage.bound(kind, name), self._first.step, self._others
+
+        def curve(value: np.ndarray) -> np.ndarray:
+            rows = pose.searched(value * size, *others)
+            rows[1::2] *= size
+            return rows
+        return curve
+
+    def near_zeros(self) -> List[NearZero]:
+        """Return the inputs at which a dyad stretches or folds, or nearly does."""
+        structure = self._linkage.structure
+        closures, folds = structure.closures, structure.built.folds
+
+        def find() -> List[NearZero]:
+            reach = self.reach() if closures else []
+            rounding = np.array([2.0 * float(self._linkage.value(x.tolerance)) for x in closures])
+            return [near for arc in reach for near in near_zeros(
+                self.curve('closures', ()), arc, self._first.counted(), rounding,
+                np.array([x in folds for x in closures]))]
+
+        return self._linkage.cache.get_or_make(
+            ('near zeros', self._first.period, *self._others), find)

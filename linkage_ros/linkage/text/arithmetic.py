@@ -24,8 +24,8 @@ from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Tuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..formula.expression import Real, real, square_root, where
-from ..words import quoted
+from ...formula.expression import Real, real, square_root, where
+from ...words import quoted
 
 # A number, or the name of a dimension or an operation.
 Step = Union[float, str]

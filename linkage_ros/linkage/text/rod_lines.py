@@ -37,11 +37,10 @@ from typing import Any, Collection, Dict, Iterable, List, Mapping, NamedTuple, O
 
 import numpy as np
 
-from .builder import Bar, Builder, GROUND, Link, Point
-from .inputs import ANGLE, Input, LENGTH
 from .joint_lines import check_numbers, formula, Line, parsed
-from .planar import Limit, TOLERANCE
-from .spatial import (
+from ..geometry.builder import Bar, Builder, GROUND, Link, Point
+from ..geometry.planar import Limit, TOLERANCE
+from ..geometry.spatial import (
     Circle,
     drawn_ahead,
     drawn_side,
@@ -58,9 +57,10 @@ from .spatial import (
     Vector,
     ZERO,
 )
-from .window import Window, WindowRod
-from ..formula.expression import Real, real
-from ..words import listed, meant, quoted
+from ..geometry.window import Window, WindowRod
+from ..inputs import ANGLE, Input, LENGTH
+from ...formula.expression import Real, real
+from ...words import listed, meant, quoted
 
 FORMS = {
     'hinge': ('hinge LINK at X Y Z axis U V W [within ANGLE ANGLE]',),

@@ -32,7 +32,7 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import NamedTuple, Optional, Sequence, Tuple
 
-from ..formula.expression import (
+from ...formula.expression import (
     arctangent,
     Complex,
     cosine,

@@ -22,8 +22,8 @@ from math import pi
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 from . import planar
-from .inputs import ANGLE, Input, LENGTH
-from ..formula.expression import (
+from ..inputs import ANGLE, Input, LENGTH
+from ...formula.expression import (
     arctangent,
     argument,
     Complex,
