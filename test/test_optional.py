@@ -10,6 +10,7 @@
 
 """Optional packages that are missing, or broken in any way: a sentence, or the plain way."""
 
+from contextlib import suppress
 from importlib import import_module
 import os
 from pathlib import Path
@@ -62,8 +63,14 @@ def write(folder, package, way):
 @pytest.fixture
 def broken(tmp_path, monkeypatch):
     """Return a function that breaks a package in this process, as if nothing had imported it."""
+    packages = []
+
     def breaks(package, way):
         write(tmp_path, package, way)
+        packages.append(package)
+        # What is imported comes back; machine code can be imported only once.
+        with suppress(ImportError):
+            import_module(package)
         for name in [*sys.modules]:
             if name.partition('.')[0] == package or name in MODULES:
                 monkeypatch.delitem(sys.modules, name)
@@ -76,7 +83,7 @@ def broken(tmp_path, monkeypatch):
     before = {*sys.modules}
     yield breaks
     for name in {*sys.modules} - before:
-        if name in MODULES or name.partition('.')[0] in optional.INSTALL:
+        if name in MODULES or name.partition('.')[0] in packages:
             del sys.modules[name]
 
 
