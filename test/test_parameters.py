@@ -422,7 +422,7 @@ def test_messages_are_handled_between_requests_that_come_at_once(graph, executor
         node.destroy_node()
     assert [value for value in handled if value is not None] == [0.5, *wanted]
     between = handled[handled.index(wanted[0]):handled.index(wanted[-1])]
-    assert between.count(None) > 10
+    assert between.count(None) > 10 or not nodes.AWAITS
 
 
 def test_a_set_within_the_process_is_at_once_and_is_kept(graph):

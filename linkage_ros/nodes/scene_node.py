@@ -44,6 +44,9 @@ try:
 except ImportError:
     Executor = SingleThreadedExecutor
 
+# Jazzy's EventsExecutor awaits no callback of a service; it has no `create_future` either.
+AWAITS = hasattr(Executor, 'create_future') or Executor is SingleThreadedExecutor
+
 # Longest wait for an event [s]: some builds of the EventsExecutor do not wait without a limit.
 # They loop at full load and ignore signals.
 MAX_WAIT_S = 1.0
@@ -155,9 +158,12 @@ class SceneNode(Node):
     def create_service(self, srv_type: Any, srv_name: str, callback: Callable, **kwargs: Any
                        ) -> Any:
         """Create a service; if its callback raises, the response is a failure with a reason."""
-        respond = {SetParameters: self._set_parameters, SetParametersAtomically:
-                   self._respond_in_turn}.get(srv_type, self._respond)
-        return super().create_service(srv_type, srv_name, partial(respond, callback), **kwargs)
+        in_turn = {SetParameters: self._set_parameters, SetParametersAtomically:
+                   self._respond_in_turn}.get(srv_type)
+        respond = partial(in_turn or self._respond, callback)
+        if in_turn and not AWAITS:
+            respond = partial(_at_once, respond)
+        return super().create_service(srv_type, srv_name, respond, **kwargs)
 
     def delete_displayed(self) -> None:
         """Delete the markers that the node has displayed; a subclass overrides it."""
@@ -252,6 +258,16 @@ class SceneNode(Node):
 def _turn() -> Generator[None, None, None]:
     """Wait until the executor has run all that is waiting."""
     yield
+
+
+def _at_once(respond: Callable, *arguments: Any) -> Any:
+    """Return what a coroutine returns that waits for turns of the executor only."""
+    coroutine = respond(*arguments)
+    while True:
+        try:
+            coroutine.send(None)
+        except StopIteration as end:
+            return end.value
 
 
 def _refused(response: Any, reason: str) -> Any:
