@@ -145,6 +145,7 @@ def test_an_input_that_is_held_is_held_in_its_own_turn(hung, seed):
 def test_two_dyads_beyond_the_ends_of_their_rockers_are_not_taken_for_the_other_sides():
     # A rocker turns back where its dyad stretches: next to that the other side is an answer, too.
     rng, beyond, found = np.random.default_rng(1), 3e-8, 0
+    outputs = 'Oq_Ob', 'Rq_Rb'
     for _ in range(12):
         lines, ends = [], []
         for name, at in ('O', 0), ('R', 7):
@@ -156,12 +157,16 @@ def test_two_dyads_beyond_the_ends_of_their_rockers_are_not_taken_for_the_other_
         linkage = mechanisms.create('custom', joints=lines)
         for sides in product((1.0, -1.0), repeat=4 * bool(np.isfinite(ends).all())):
             values = np.multiply(sides[:2], ends) + beyond * np.array(sides[2:])
-            for answer in linkage.inputs_for(('Oq_Ob', 'Rq_Rb'), values):
-                there = [*linkage.joint_angles(answer.inputs, ('Oq_Ob', 'Rq_Rb')).values()]
-                away = np.angle(np.exp(1j * (np.array(there) - values)))
-                assert np.abs(away).max() < 1.5 * beyond, (lines, values)
-                found += 1
-    assert found > 30
+            answers = [answer.inputs for answer in linkage.inputs_for(outputs, values)]
+            # As many values as are solved as arrays.
+            inputs, _ = linkage.inverse(outputs).over(*np.repeat(values, 40).reshape(2, -1))
+            for solved in answers, inputs[:, 0, np.isfinite(inputs[0, 0])].T.tolist():
+                for there in solved:
+                    away = np.angle(np.exp(1j * (np.array(
+                        [*linkage.joint_angles(there, outputs).values()]) - values)))
+                    assert np.abs(away).max() < 1.5 * beyond, (lines, values)
+                    found += 1
+    assert found > 60
 
 
 @pytest.mark.slow

@@ -165,14 +165,15 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
         x = inputs[:, again] - _step_arrays(problem, gaps[:, again], rows[:, again])
         new = problem.over(*x)
         less = _errors(problem, _gaps(problem, new, values[:, again]), new, x)
-        better = less < error[again]
+        better, beyond = less < error[again], again[np.isnan(less)]
         if n == 1:
             better &= (low[again] <= x[0]) & (x[0] <= high[again])
         again = again[better]
         inputs[:, again], rows[:, again], error[again] = x[:, better], new[:, better], less[better]
-        # A part needs more steps, or rates from beside it.
+        # A part needs more steps, shorter ones at an end of the reach, or rates from beside it.
         left = ~(error <= ACCEPTED) | ~np.isfinite(rows[1]) if n == 1 else ~(
             (error <= ACCEPTED) | (error > FAR / _UNIT))
+        left[beyond] = True
     solutions = np.concatenate([problem.wrapped_arrays(inputs), rows[n:]])
     solutions[:, ~(error <= ACCEPTED)] = np.nan
     for k in np.flatnonzero(left).tolist():
