@@ -22,10 +22,10 @@ from __future__ import annotations
 from typing import Any, Callable, Dict, Iterable, List, Mapping, Sequence, Set, Tuple
 
 from rcl_interfaces.msg import ParameterEvent
-from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from .parameters import SceneParameters
+from .parameters import SceneParameters, typed
 from .. import scene
 from ..words import elided, listed, quoted
 
@@ -69,8 +69,8 @@ class Announcer:
             node=self._node.get_fully_qualified_name(), **values))
 
     def _messages(self, parameters: Iterable[scene.Parameter]) -> List:
-        return [Parameter(p.name, Parameter.Type[p.field.kind.upper()], p.value).to_parameter_msg()
-                for p in parameters if p.name in self._node.fields]
+        return [typed(parameter).to_parameter_msg() for parameter in parameters
+                if parameter.name in self._node.fields]
 
 
 class Follower:

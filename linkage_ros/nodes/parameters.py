@@ -137,7 +137,7 @@ class SceneParameters:
     def _declare(self, own: Sequence[scenes.Parameter]) -> None:
         descriptors = {parameter.field: _descriptor(parameter.field) for parameter in own}
         # The value of an empty list does not imply its type.
-        empty = [_parameter(parameter) for parameter in own if parameter.value == ()]
+        empty = [typed(parameter) for parameter in own if parameter.value == ()]
         self._node.declare_parameters('', [(
             parameter.name, None if parameter.value == () else parameter.value,
             copy(descriptors[parameter.field])) for parameter in own], ignore_override=True)
@@ -165,14 +165,15 @@ class SceneParameters:
             self._node.report('a changed parameter', error)
             self._refusal = elided(f'internal error: {error!r}', 299)
             return parameters
-        typed = [Parameter(
-            parameter.name, _kind(self.fields[parameter.name]), values[parameter.name])
+        read = [typed(scenes.Parameter(
+            parameter.name, self.fields[parameter.name], values[parameter.name]))
             if parameter.name in values else parameter for parameter in parameters]
-        self._first = typed[0] if typed else None
-        return typed + self._derived(values)
+        self._first = read[0] if read else None
+        return read + self._derived(values)
 
     def _unknown(self, name: str) -> str:
-        owner = f'; set it on {scenes.OWNER}' if name in self.followed else ''
+        field = self.followed.get(name)
+        owner = f'; set it on {field.owner}' if field else ''
         node = self._node.get_fully_qualified_name()
         return f'{elided(name)} is not a parameter of {node}{owner}'
 
@@ -193,7 +194,7 @@ class SceneParameters:
 
     def _derived(self, given: Any) -> list[Parameter]:
         """Return those whose defaults depend on others that have changed."""
-        return [_parameter(parameter) for parameter in self._difference
+        return [typed(parameter) for parameter in self._difference
                 if parameter.name in self.fields and parameter.name not in given
                 and not parameter.field.read_only]
 
@@ -219,8 +220,8 @@ def _kind(field: Any) -> Parameter.Type:
     return Parameter.Type[field.kind.upper()]
 
 
-def _parameter(parameter: scenes.Parameter) -> Parameter:
-    """Return a ROS parameter with the type of its field."""
+def typed(parameter: scenes.Parameter) -> Parameter:
+    """Return a scene's parameter as one of ROS, with the type of its field."""
     return Parameter(parameter.name, _kind(parameter.field), parameter.value)
 
 

@@ -15,9 +15,8 @@ import math
 import sys
 from typing import Any, Callable, Mapping, Optional, Union
 
-from rclpy.parameter import Parameter
-
 from .. import scene
+from ..nodes.parameters import typed
 from ..words import quoted
 
 Ends = Optional[tuple[Union[int, float], Union[int, float]]]
@@ -67,8 +66,8 @@ class Setting:
                              f'param set {self.node} {name}')
         if not ALLOWS[kind](value):
             raise ValueError(f'{name} must be {self.field.allowed}, not {quoted(value)}')
-        return Parameter(name, Parameter.Type[kind.upper()],
-                         float(value) if kind == 'double' else value).to_parameter_msg()
+        return typed(scene.Parameter(name, self.field, float(value) if kind == 'double' else value)
+                     ).to_parameter_msg()
 
 
 def is_number(value: Any) -> bool:
