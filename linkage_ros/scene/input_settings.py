@@ -12,7 +12,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 import math
 from typing import Iterable, Optional, Tuple
@@ -80,8 +80,6 @@ class InputSettings:
         [rad or m].
     measures : str
         Output that the source joint, a sensor, measures; empty: it is the input itself.
-    period : int
-        Turns of a crank after which poses repeat: above one with fractional gears.
 
     """
 
@@ -95,12 +93,16 @@ class InputSettings:
     ratio: float
     offset: float
     measures: str
-    period: int = 1
 
     @cached_property
     def is_plain(self) -> bool:
         """Whether the position of the source joint is the input, without conversion."""
         return (self.ratio, self.offset, self.measures) == (1.0, 0.0, '')
+
+    @property
+    def period(self) -> int:
+        """Return the turns of a crank after which poses repeat; above one with gears."""
+        return int(min(self.input.period, NEVER))
 
     @property
     def default_speed(self) -> float:
@@ -136,9 +138,9 @@ def read_settings(name: str, linkage: Mechanism, input_: Input, reach: Tuple[Arc
                   scale: float, values: Values, old: Optional[InputSettings],
                   strict: bool) -> InputSettings:
     """Read the settings of an input; its lengths are those of the linkage times `scale`."""
-    drive = _read(name, *_scaled(input_, linkage, reach, scale), values, old, strict)
-    _check_measures(name, linkage, drive)
-    return replace(drive, period=int(min(input_.period, NEVER)))
+    settings = _read(name, *_scaled(input_, linkage, reach, scale), values, old, strict)
+    _check_measures(name, linkage, settings)
+    return settings
 
 
 def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values,
