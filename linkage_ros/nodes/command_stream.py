@@ -237,7 +237,7 @@ class CommandStream:
     def _search(self, target: Target, stamp: bytes, positions: Sequence[float],
                 speeds: Optional[Sequence[float]], seed: Optional[Sequence[float]]
                 ) -> Optional[Callable[[], None]]:
-        """Search the first command next to inputs `near`, if given; if there is none, say why."""
+        """Search the first command, next to `seed` if given; if there is none, say why."""
         start = time.monotonic()
         try:
             if seed:
@@ -332,7 +332,7 @@ class CommandStream:
 
 def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence[Target],
                   seeds: list[Sequence[float]], jumps: Sequence[bool]) -> JointTrajectoryPoint:
-    """Return trajectory point `i` of the actuators, and update `near` to its inputs."""
+    """Return trajectory point `i` of the actuators, and update `seeds` to its inputs."""
     if len(point.positions) != n or len(point.velocities) not in (0, n):
         raise ValueError(f'point {i} must have {n} positions, and as many velocities or '
                          f'none, not {len(point.positions)} and {len(point.velocities)}')

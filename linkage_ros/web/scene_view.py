@@ -401,7 +401,7 @@ class SceneView:
             self._open, list(owners), nodes, [topic for topic, _ in announced],
             {topic for topics in input_topics.values() for topic in topics})
         with suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(self._hear(nodes), SECONDS_TO_ANNOUNCE)
+            await asyncio.wait_for(self._wait_for_announcements(nodes), SECONDS_TO_ANNOUNCE)
         self._seen = marked, announced, input_topics
         mechanisms = {}
         for key, own in owners.items():
@@ -417,7 +417,7 @@ class SceneView:
         for client in self.clients:
             self._show(client)
 
-    async def _hear(self, nodes: Collection[str]) -> None:
+    async def _wait_for_announcements(self, nodes: Collection[str]) -> None:
         """Wait until some nodes have announced their parameters."""
         while not self._announced.keys() >= set(nodes):
             self._news.clear()
