@@ -425,6 +425,18 @@ def test_messages_are_handled_between_requests_that_come_at_once(graph, executor
     assert between.count(None) > 10 or not nodes.AWAITS
 
 
+def test_an_executor_that_awaits_no_service_answers_at_once(graph, monkeypatch):
+    monkeypatch.setattr(nodes, 'AWAITS', False)
+    client = Client(graph, graph.start(Kinematics, LEG))
+    assert [result.successful for result in client.set(
+        ('leg.scale', 2.0), ('leg.scale', -1.0), ('leg.pose', [1.0] * 6))] == [True, False, True]
+    result = client.call(SetParametersAtomically, parameters=[
+        _message('leg.scale', 3.0), _message('leg.frame_id', 'base')]).result
+    assert result.successful
+    leg = client.node.scene.machines['leg']
+    assert (leg.scale, leg.pose, leg.frame_id) == (3.0, (1.0,) * 6, 'base')
+
+
 def test_a_set_within_the_process_is_at_once_and_is_kept(graph):
     node = graph.start(Slow, LEG)
     held_up(graph, Client(graph, node))
