@@ -32,7 +32,7 @@ from . import document
 from .nodes.report import table
 
 sys.path.append(str(Path(__file__).parents[1] / 'test'))
-from truth import inverse_judge, random_linkages  # noqa: E402
+from truth import inverse_judge, linkage_checks  # noqa: E402
 
 COLUMNS = 'questions', 'lost', 'invented', 'duplicates'
 
@@ -41,14 +41,8 @@ def linkages(count):
     """Yield linkages of the catalogue, then random ones, each with its own generator."""
     for kind in mechanisms.TYPES:
         yield mechanisms.create(kind), np.random.default_rng(0)
-    for seed in range(count):
-        rng = np.random.default_rng(seed)
-        drawn = random_linkages.design(rng)
-        try:
-            yield mechanisms.create('custom', joints=drawn.joints, branches=drawn.branches,
-                                    **drawn.dimensions), rng
-        except ValueError:
-            continue
+    for _, linkage, rng in linkage_checks.assembled(range(count)):
+        yield linkage, rng
 
 
 def judged(linkage, rng):

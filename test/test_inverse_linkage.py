@@ -19,7 +19,7 @@ from linkage_ros import mechanisms
 import numpy as np
 import pytest
 from sweeps import EXHAUSTIVE
-from truth import random_linkages
+from truth import linkage_checks, random_linkages
 
 FIVE_BAR = """\
 # five_bar driven by P.x, P.y
@@ -126,14 +126,7 @@ def checked(linkage, inverse, poses, sure=1e-4):
     pytest.param(range(12, 400), marks=EXHAUSTIVE)])
 def test_of_random_linkages_no_answer_is_missed_and_none_invented(seeds):
     closed = count = 0
-    for seed in seeds:
-        rng = np.random.default_rng(seed)
-        drawn = random_linkages.design(rng)
-        try:
-            linkage = mechanisms.create('custom', joints=drawn.joints, branches=drawn.branches,
-                                        **drawn.dimensions)
-        except ValueError:
-            continue
+    for _, linkage, rng in linkage_checks.assembled(seeds):
         names = outputs_of(linkage)
         outputs = [str(name) for name in rng.choice(names, min(3, len(names)), replace=False)]
         for output in outputs:

@@ -16,7 +16,7 @@ from linkage_ros import mechanisms, scene
 import mpmath
 import numpy as np
 import pytest
-from truth import random_linkages
+from truth import linkage_checks
 
 LIFT = {'mechanisms': ['lift'], 'lift.type': 'custom', 'lift.scale': 2.0, 'lift.joints': [
     'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C line O B 1.6']}
@@ -179,14 +179,7 @@ def outputs_of(linkage, rng):
 def followed(seeds):
     """Follow outputs of random linkages all through their reach; return how many values."""
     count = 0
-    for seed in seeds:
-        rng = np.random.default_rng(seed)
-        drawn = random_linkages.design(rng)
-        try:
-            linkage = mechanisms.create('custom', joints=drawn.joints, branches=drawn.branches,
-                                        **drawn.dimensions)
-        except ValueError:
-            continue
+    for seed, linkage, rng in linkage_checks.assembled(seeds):
         if len(linkage.inputs) > 1 or not linkage.reach():
             continue
         for output, size, theta, values in outputs_of(linkage, rng):

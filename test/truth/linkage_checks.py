@@ -15,6 +15,7 @@ Each check yields `Problem`s. What float64 finds by brute force is believed only
 in many digits says the same, so that nothing here is a false alarm next to a limit.
 """
 
+from contextlib import suppress
 import math
 import time
 from typing import NamedTuple
@@ -162,6 +163,17 @@ class Subject:
         for gap in drawing.gaps.values():
             held &= gap * np.ones(self.values.shape) >= 0.0
         return held
+
+
+def assembled(seeds):
+    """Yield the seed, the linkage and the generator of those random designs that assemble."""
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        drawn = random_linkages.design(rng)
+        with suppress(ValueError):
+            linkage = mechanisms.create(
+                'custom', joints=drawn.joints, branches=drawn.branches, **drawn.dimensions)
+            yield seed, linkage, rng
 
 
 def checked(kind):
