@@ -8,138 +8,89 @@
 # express or implied. See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Markers for the page: conversion of messages to looks, which rarely change, and points."""
+"""Markers for the page: the newest message of a topic, as a frame that the page reads."""
 
-import struct
-from typing import Any, Callable, Mapping, Optional, Sequence
+import json
+from typing import Any, Callable, Optional
 
 import numpy as np
-from numpy.typing import ArrayLike
 from visualization_msgs.msg import Marker
 
 from ..nodes import messages
-from ..nodes.message_layout import deserialized, MessageLayout, NoLayout
+from ..nodes.message_layout import deserialized
 
 # How the page draws a marker, by its type; for some of kinematics' markers, by type and id.
 KINDS = {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'locus', Marker.SPHERE_LIST: 'joints',
          Marker.TRIANGLE_LIST: 'triangles'}
-OWN_KINDS = {(Marker.LINE_LIST, messages.GUIDES_ID): 'slots',
-             (Marker.LINE_LIST, messages.LOCUS_ID): 'loci',
-             (Marker.TRIANGLE_LIST, messages.PLATES_ID): 'plates'}
-NO_POINTS = np.empty(0)
+KINDS_BY_ID = {(Marker.LINE_LIST, messages.GUIDES_ID): 'slots',
+               (Marker.LINE_LIST, messages.LOCUS_ID): 'loci',
+               (Marker.TRIANGLE_LIST, messages.PLATES_ID): 'plates'}
 
 
 class Feed:
     """
-    The newest message of a marker topic, converted for the page on request.
+    The newest message of a marker topic.
 
-    Messages arrive serialised; a message is deserialised only to be drawn. Invalid messages are
-    dropped, and the last valid one stays.
+    Messages arrive serialised, and are converted only to be drawn. Invalid ones are dropped, and
+    the last valid one stays.
 
     Parameters
     ----------
-    topic : str
-        Topic of the messages.
     mechanism : str
         Mechanism of the markers.
+    topic : str
+        Topic of the messages, which begins with the mechanism.
     type_ : type
         Marker or MarkerArray.
-    number : callable
-        Returns a constant number for each index of a marker in a message.
     warn : callable
         Logs a text, a dropped message, about a subject, its topic.
 
     """
 
-    def __init__(self, topic: str, mechanism: str, type_: type, number: Callable[[int], int],
+    def __init__(self, mechanism: str, topic: str, type_: type,
                  warn: Callable[[str, str], None]) -> None:
         self.newest: Optional[bytes] = None
-        self.topic = topic
-        self._mechanism = mechanism
-        self._type = type_
-        self._number = number
+        self._mechanism, self._topic, self._type = mechanism, topic, type_
         self._warn = warn
-        self._drawn: Optional[bytes] = None
-        self._layout: Optional[MessageLayout] = None
-        # By the markers' numbers; places are indices of markers in the message.
-        self._looks: dict[int, dict[str, Any]] = {}
-        self._places: dict[int, Optional[int]] = {}
-        self._records = b''
+        self._converted: Optional[bytes] = None
+        self._frame = b''
 
-    def drawn(self) -> tuple[dict[int, dict[str, Any]], bytes]:
+    def frame(self) -> bytes:
         """
-        Return the looks and points of the newest message.
+        Return the markers of the newest message for the page.
 
-        Returns
-        -------
-        looks : dict
-            By number: mechanism, kind, frame, pose (x, y, z, qx, qy, qz, qw), width [m], colour.
-        records : bytes
-            For each marker its number and its points' count, uint32, and the points, float32
-            x, y, z; all little-endian.
-
+        A frame has the length of a header [bytes], uint32; the header, JSON: mechanism, topic and,
+        for each of its `markers`, kind, frame, pose (x, y, z, qx, qy, qz, qw), width [m], colour
+        and number of points; then all points, float32 x, y, z. Numbers are little-endian.
         """
-        if self.newest is not None and self.newest is not self._drawn:
-            self._drawn = self.newest
+        if self.newest is not None and self.newest is not self._converted:
+            self._converted = self.newest
             try:
-                self._draw(self.newest)
+                self._frame = self._framed(deserialized(self.newest, self._type))
             except Exception as error:
                 # Bytes of any publisher, and any exception of the middleware.
-                self._warn(f'a message on {self.topic} is dropped: {error}', self.topic)
-        return self._looks, self._records
+                self._warn(f'a message on {self._topic} is dropped: {error}', self._topic)
+        return self._frame
 
     @np.errstate(over='ignore')
-    def _draw(self, text: bytes) -> None:
-        if self._layout and self._layout.fits(text):
-            self._records = _records(self._places, self._layout.read(text))
-            return
-        message = deserialized(text, self._type)
-        markers = getattr(message, 'markers', [message])
-        shown = [place for place, marker in enumerate(markers)
-                 if marker.type in KINDS and marker.action == Marker.ADD]
-        numbers = {self._number(i): place for i, place in enumerate(shown)}
-        looks = {number: _look(self._mechanism, markers[place])
-                 for number, place in numbers.items()}
-        # Markers that are missing now are drawn without points.
-        places = {**dict.fromkeys(self._places), **numbers}
-        records = _records(places, [np.array([(point.x, point.y, point.z)
-                                              for point in marker.points]) for marker in markers])
-        self._layout = _layout(text, message, places, records)
-        self._looks, self._places, self._records = looks, places, records
+    def _framed(self, message: Any) -> bytes:
+        markers = [marker for marker in getattr(message, 'markers', [message])
+                   if marker.type in KINDS and marker.action == Marker.ADD]
+        points = np.array([(point.x, point.y, point.z) for marker in markers
+                           for point in marker.points]).astype('<f4')
+        if not np.isfinite(points).all():
+            raise ValueError('a number in it is not finite, or too large to be drawn')
+        header = json.dumps({
+            'mechanism': self._mechanism, 'topic': self._topic[len(self._mechanism) + 1:],
+            'markers': list(map(_described, markers))}, allow_nan=False).encode()
+        # The points are aligned.
+        header += b' ' * (-len(header) % points.itemsize)
+        return np.array(len(header), '<u4').tobytes() + header + points.tobytes()
 
 
-def _layout(text: bytes, message: Any, places: Mapping[int, Optional[int]],
-            records: bytes) -> Optional[MessageLayout]:
-    """Return the layout of a message that was drawn, or None if it has none."""
-    try:
-        layout = MessageLayout(text, message)
-    except NoLayout:
-        return None
-    return layout if _records(places, layout.read(text)) == records else None
-
-
-def _records(places: Mapping[int, Optional[int]], points: Sequence[np.ndarray]) -> bytes:
-    """Return the page's records of markers' points, by the markers' numbers and places."""
-    records = []
-    for number, place in places.items():
-        shown = _shown(NO_POINTS if place is None else points[place])
-        records += [struct.pack('<II', number, shown.size // 3), shown.tobytes()]
-    return b''.join(records)
-
-
-def _shown(numbers: ArrayLike) -> np.ndarray:
-    """Return numbers as float32; raise ValueError if one is not finite or too large."""
-    shown = np.asarray(numbers).astype('<f4')
-    if not np.isfinite(shown).all():
-        raise ValueError('a number in it is not finite, or too large to be drawn')
-    return shown
-
-
-def _look(mechanism: str, marker: Marker) -> dict[str, Any]:
+def _described(marker: Marker) -> dict[str, Any]:
     place, turn, colour = marker.pose.position, marker.pose.orientation, marker.color
-    pose = [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]
-    colours = [colour.r, colour.g, colour.b, colour.a]
-    _shown([*pose, *colours, marker.scale.x])
-    kind = OWN_KINDS.get((marker.type, marker.id), KINDS[marker.type])
-    return {'mechanism': mechanism, 'kind': kind, 'pose': pose, 'frame': marker.header.frame_id,
-            'width': marker.scale.x, 'colour': colours}
+    return {'kind': KINDS_BY_ID.get((marker.type, marker.id), KINDS[marker.type]),
+            'frame': marker.header.frame_id, 'width': marker.scale.x, 'points': len(marker.points),
+            'pose': [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w],
+            'colour': [colour.r, colour.g, colour.b, colour.a]}

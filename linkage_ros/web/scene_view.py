@@ -8,7 +8,7 @@
 # express or implied. See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The running scene for the page: discovery in the ROS graph, drawing, and changes by services."""
+"""The running scene for the page: what nodes announce, its markers, and changes by services."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ from typing import (
     Any,
     Callable,
     Collection,
-    Iterable,
     Mapping,
     Optional,
     Protocol,
@@ -48,10 +47,8 @@ from ..nodes import ownership
 from ..scene import slider, writing
 from ..words import quoted
 
-MARKERS, LOCUS = '/markers', '/locus'
-MARKERS_TYPE, LOCUS_TYPE = 'visualization_msgs/msg/MarkerArray', 'visualization_msgs/msg/Marker'
-INPUTS_TYPE = 'sensor_msgs/msg/JointState'
-SECONDS_BETWEEN_LOOKS = 1.0
+EVENTS_TYPE, INPUTS_TYPE = 'rcl_interfaces/msg/ParameterEvent', 'sensor_msgs/msg/JointState'
+SECONDS_BETWEEN_POLLS = 1.0
 SECONDS_TO_LINGER = 1.0
 SECONDS_TO_ANNOUNCE = 1.0
 SECONDS_TO_ARRIVE, ARRIVED = 1.0, 1e-6
@@ -61,10 +58,6 @@ SCENE = 'scene'
 
 Answer = dict[str, Any]
 Result = TypeVar('Result')
-# Nodes and ids of publishers, by their topic.
-Published = tuple[tuple[str, tuple[tuple[str, bytes], ...]], ...]
-# Marker topics, topics of announced parameters, and the input topics of each node.
-Graph = tuple[Published, Published, dict[str, list[str]]]
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -92,7 +85,7 @@ class ShownMechanism:
     key: str
     owner: str
     settings: dict[str, Setting]
-    sources: tuple[str, ...]
+    sources: Sequence[str]
     pending: dict[str, float] = field(default_factory=dict)
     until: float = 0.0
 
@@ -101,15 +94,10 @@ class ShownMechanism:
         """Its name in its scene."""
         return self.key.rsplit('/', 1)[1]
 
-    def described(self) -> dict[str, Any]:
-        """Describe it for the page."""
-        return {'key': self.key, 'name': self.name,
-                'settings': [setting.described() for setting in self.settings.values()]}
-
 
 class SceneView:
     """
-    All mechanisms of the graph, while a page is open; otherwise there are no subscriptions.
+    All mechanisms that nodes announce, while a page is open; otherwise it subscribes to nothing.
 
     All methods run in the web's thread, except functions passed to the bridge.
 
@@ -129,21 +117,23 @@ class SceneView:
         self.clients: list[OpenPage] = []
         self._bridge = bridge
         self._setting = asyncio.Lock()
-        self._seen: Optional[Graph] = None
+        # The nodes that announce parameters, by topic, and the topics of owners' inputs.
+        self._graph: tuple[dict[str, list[str]], dict[str, list[str]]] = {}, {}
+        self._is_stale = True
         self._mechanisms: dict[str, ShownMechanism] = {}
         # The values that each node announces, by full name; the scenes that were read from them.
         self._announced: dict[str, dict[str, Any]] = {}
         self._scenes: dict[str, scene.Scene] = {}
+        # The last speeds other than zero, by mechanism and input.
+        self._speeds: dict[tuple[str, str], float] = {}
         self._news = asyncio.Event()
         self._watching: Optional[asyncio.Task[None]] = None
         self._stopping: Optional[asyncio.TimerHandle] = None
         # The following attributes are changed in the executor's thread alone.
         self._setters: dict[str, Any] = {}
-        self._announcements: dict[str, Any] = {}
-        self._sources: dict[str, Any] = {}
-        self._received: dict[str, dict[str, float]] = {}
-        self._feeds: dict[str, tuple[Feed, Any]] = {}
-        self._numbers: dict[tuple[str, int], int] = {}
+        self._subscriptions: dict[str, Any] = {}
+        self._positions: dict[str, dict[str, float]] = {}
+        self._feeds: dict[str, Feed] = {}
 
     def add(self, client: OpenPage) -> None:
         """Add a client; the first one starts the observation of the graph."""
@@ -166,12 +156,9 @@ class SceneView:
         if self._watching:
             self._watching.cancel()
         self._watching = self._stopping = None
-        self._seen, self._mechanisms, self._announced, self._scenes = None, {}, {}, {}
-        self._bridge.ask(self._close)
-
-    def feeds(self) -> list[Feed]:
-        """Return the feeds with messages to draw."""
-        return [feed for feed, _ in list(self._feeds.values()) if feed.newest is not None]
+        self._graph, self._is_stale = ({}, {}), True
+        self._mechanisms, self._announced, self._scenes = {}, {}, {}
+        self._bridge.ask(self._drop_others, (), ())
 
     async def set(self, key: str, values: Mapping[str, Any]) -> None:
         """
@@ -185,17 +172,17 @@ class SceneView:
         """
         async with self._setting:
             mechanism = self._find(key)
-            asked: dict[str, list[Any]] = {}
+            requests: dict[str, list[Any]] = {}
             for name, value in values.items():
                 if name not in mechanism.settings:
                     raise Refused(f'{mechanism.name} has no parameter {quoted(name)}')
                 setting = mechanism.settings[name]
                 try:
-                    parameter = setting.asked(value)
+                    parameter = setting.parameter(value)
                 except ValueError as error:
                     raise Refused(str(error)) from None
-                asked.setdefault(setting.node, []).append(parameter)
-            for node, parameters in asked.items():
+                requests.setdefault(setting.node, []).append(parameter)
+            for node, parameters in requests.items():
                 await self._set(node, parameters)
 
     async def _set(self, node: str, parameters: list[Any]) -> None:
@@ -233,12 +220,12 @@ class SceneView:
         else:
             inputs, reach = poses.reached(machine, inputs, dict(want))
             await self._hold(mechanism, machine, inputs)
-        found = {**poses.described(machine, inputs), 'reason': str(reach or '')}
+        answer = {**poses.described(machine, inputs), 'reason': str(reach or '')}
         if reach:
-            found['reach'] = asdict(reach)
+            answer['reach'] = asdict(reach)
         if arrows:
-            found['arrows'] = poses.arrows(machine, inputs, arrows, dict(speeds))
-        return found
+            answer['arrows'] = poses.arrows(machine, inputs, arrows, dict(speeds))
+        return answer
 
     async def _hold(self, mechanism: ShownMechanism, machine: scene.SceneMechanism,
                     inputs: Sequence[float]) -> None:
@@ -259,7 +246,7 @@ class SceneView:
     async def tune(self, key: str) -> Answer:
         """Return the result of `poses.tunable`."""
         mechanism = self._find(key)
-        whole = self._scene(mechanism)
+        whole = self._scene(mechanism.owner)
         return await self._aside(lambda: poses.tunable(whole, mechanism.name))
 
     async def curve(self, key: str, **about: Any) -> Answer:
@@ -270,31 +257,34 @@ class SceneView:
     async def export(self, key: str, form: str) -> Answer:
         """Return the result of `curves.exported`."""
         mechanism = self._find(key)
-        whole = self._scene(mechanism)
+        whole = self._scene(mechanism.owner)
         machine, inputs = (whole.machines[mechanism.name], []) if form == 'c' else self._state(
             mechanism)
         return {'text': await self._aside(
             lambda: curves.exported(machine, inputs, form, whole.frame_id))}
 
-    async def save(self, key: str, values: Any = ()) -> Answer:
+    async def save(self, key: str) -> Answer:
         """Return a parameter file of a mechanism's scene: its definition and changed values."""
-        mechanism = self._find(key)
-        before, changed = self._scene(mechanism), {
-            f'{mechanism.name}.{name}': value for name, value in dict(values).items()}
+        owner = self._find(key).owner
+        whole = self._scene(owner)
+        # An input that was stopped is saved with the speed that it had.
+        speeds = {f'{name}.{input_}.speed': self._speeds[f'{_space(owner)}/{name}', input_]
+                  for name, machine in whole.machines.items() for input_ in machine.inputs
+                  if (f'{_space(owner)}/{name}', input_) in self._speeds}
         return {'text': await self._aside(lambda: writing.in_yaml(writing.without_defaults(
-            scene.changed(before, changed, strict=False), DEFINES)))}
+            scene.changed(whole, speeds, strict=False), DEFINES)))}
 
     async def _aside(self, work: Callable[[], Result]) -> Result:
         """Run slow work in another thread; return its result."""
         try:
-            found: Result = await self._bridge.loop.run_in_executor(None, work)
-            return found
+            result: Result = await self._bridge.loop.run_in_executor(None, work)
+            return result
         except scene.SceneError as error:
             raise Refused(str(error)) from None
 
     def _state(self, mechanism: ShownMechanism) -> tuple[scene.SceneMechanism, list[float]]:
         """Return a mechanism and its last received inputs [rad or m], or their starts."""
-        machine, inputs = self._scene(mechanism).machines[mechanism.name], []
+        machine, inputs = self._scene(mechanism.owner).machines[mechanism.name], []
         if machine.in_space:
             raise Refused(f'{machine.name} is a linkage in space: the page draws and tunes it, '
                           'and moves, plots and describes linkages in a plane')
@@ -313,8 +303,8 @@ class SceneView:
 
     def _position_of(self, mechanism: ShownMechanism, source: str) -> Optional[float]:
         """Return the last position of an input's source, or None."""
-        return next((self._received[topic][source] for topic in mechanism.sources
-                     if source in self._received.get(topic, ())), None)
+        return next((self._positions[topic][source] for topic in mechanism.sources
+                     if source in self._positions.get(topic, ())), None)
 
     def _check_known(self, mechanism: ShownMechanism, machine: scene.SceneMechanism) -> None:
         """Raise Refused if an input has neither been received nor a start."""
@@ -330,59 +320,62 @@ class SceneView:
         return self._mechanisms[key]
 
     def _show(self, client: OpenPage) -> None:
-        client.tell(SCENE, {'op': 'scene', 'mechanisms': [
-            {**mechanism.described(), **self._drawn(mechanism)}
-            for mechanism in self._mechanisms.values()]})
-        for feed in self.feeds():
+        mechanisms = []
+        for mechanism in self._mechanisms.values():
+            # What a node announces may be no scene any more.
+            with suppress(Refused):
+                mechanisms.append({
+                    'key': mechanism.key, 'name': mechanism.name, **self._described(mechanism),
+                    'settings': [setting.described() for setting in mechanism.settings.values()]})
+        client.tell(SCENE, {'op': 'scene', 'mechanisms': mechanisms})
+        for feed in [*self._feeds.values()]:
             client.offer(feed)
 
-    def _drawn(self, mechanism: ShownMechanism) -> dict[str, Any]:
-        """Describe what the page needs beside the parameters; {} until these are announced."""
-        with suppress(Refused):
-            machine = self._scene(mechanism).machines[mechanism.name]
-            return {**poses.drawn(machine), 'curves': curves.plots(machine)}
-        return {}
+    def _described(self, mechanism: ShownMechanism) -> dict[str, Any]:
+        """Describe what the page needs of a mechanism beside its parameters and markers."""
+        machine = self._scene(mechanism.owner).machines[mechanism.name]
+        description = {**poses.drawn(machine), 'curves': curves.plots(machine)}
+        for name, drive in machine.inputs.items():
+            if drive.speed:
+                self._speeds[mechanism.key, name] = drive.speed
+            # Its speed when it plays.
+            description['inputs'][name]['speed'] = self._speeds.get(
+                (mechanism.key, name), drive.default_speed)
+        return description
 
     async def _watch(self) -> None:
         while True:
             try:
-                await self._look()
+                await self._poll()
             except Exception as error:
-                # Other nodes may publish anything; the next look may succeed.
-                self._seen = None
+                # Other nodes may publish anything; the next poll may succeed.
+                self._is_stale = True
                 self._bridge.warn(f'the scene cannot be read: {error!r}')
             with suppress(asyncio.TimeoutError):
-                await asyncio.wait_for(self._news.wait(), SECONDS_BETWEEN_LOOKS)
+                await asyncio.wait_for(self._news.wait(), SECONDS_BETWEEN_POLLS)
 
-    async def _look(self) -> None:
+    async def _poll(self) -> None:
         self._news.clear()
-        seen = await self._bridge.ask(self._graph)
-        if seen != self._seen:
-            self._seen = seen
-            await self._change(*seen)
+        graph = await self._bridge.ask(self._find_announcers)
+        if graph != self._graph or self._is_stale:
+            gone = self._graph[1].keys() - graph[1].keys()
+            self._graph, self._is_stale = graph, False
+            await self._change(*graph, gone)
 
-    def _graph(self) -> Graph:
-        """Return the graph's topics of markers and parameters, and the owners' input topics."""
-        topics = dict(self._bridge.node.get_topic_names_and_types())
-        keys = sorted(name[:-len(MARKERS)] for name, types in topics.items()
-                      if name.endswith(MARKERS) and MARKERS_TYPE in types)
-        marked = self._published((f'{key}{MARKERS}' for key in keys
-                                  if LOCUS_TYPE in topics.get(f'{key}{LOCUS}', ())))
-        owners = {owner for _, publishers in marked for owner, _ in publishers}
-        announced = self._published(f'{space}/{ownership.TOPIC}'
-                                    for space in sorted(set(map(_space, owners))))
-        return marked, announced, {owner: self._subscriptions_of(owner) for owner in owners}
-
-    def _published(self, topics: Iterable[str]) -> Published:
-        """Return the topics that are published, with their publishers."""
-        found = ((topic, tuple(sorted(
-            (_joined(info.node_namespace, info.node_name), bytes(info.endpoint_gid))
-            for info in self._bridge.node.get_publishers_info_by_topic(topic)
+    def _find_announcers(self) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
+        """Return the nodes that announce parameters, by topic, and the topics of their inputs."""
+        node = self._bridge.node
+        announcers = {topic: sorted({
+            _joined(info.node_namespace, info.node_name)
+            for info in node.get_publishers_info_by_topic(topic)
             # Of a node that starts, the name is unknown at first.
-            if info.node_namespace.startswith('/')))) for topic in topics)
-        return tuple(each for each in found if each[1])
+            if info.node_namespace.startswith('/')})
+            for topic, types in node.get_topic_names_and_types()
+            if topic.endswith(f'/{ownership.TOPIC}') and EVENTS_TYPE in types}
+        return announcers, {name: self._input_topics(name)
+                            for names in announcers.values() for name in names}
 
-    def _subscriptions_of(self, name: str) -> list[str]:
+    def _input_topics(self, name: str) -> list[str]:
         """Return the topics from which a node receives its inputs."""
         space, own = name.rsplit('/', 1)
         with suppress(NodeNameNonExistentError):
@@ -391,29 +384,27 @@ class SceneView:
                     if INPUTS_TYPE in types]
         return []
 
-    async def _change(self, marked: Published, announced: Published,
-                      input_topics: dict[str, list[str]]) -> None:
-        nodes = {node for _, publishers in announced for node, _ in publishers}
-        for gone in self._announced.keys() - nodes:
-            del self._announced[gone]
-        owners = {topic[:-len(MARKERS)]: [node for node, _ in own] for topic, own in marked}
-        await self._bridge.ask(
-            self._open, list(owners), nodes, [topic for topic, _ in announced],
-            {topic for topics in input_topics.values() for topic in topics})
+    async def _change(self, announcers: Collection[str], inputs: Mapping[str, list[str]],
+                      gone: Collection[str]) -> None:
+        """Follow what the nodes with these topics of inputs announce, and forget others."""
+        topics: dict[str, Callable[[str], Any]] = dict.fromkeys(announcers, self._listen)
+        await self._bridge.ask(self._subscribe, topics)
         with suppress(asyncio.TimeoutError):
-            await asyncio.wait_for(self._wait_for_announcements(nodes), SECONDS_TO_ANNOUNCE)
-        self._seen = marked, announced, input_topics
-        mechanisms = {}
-        for key, own in owners.items():
-            # Others may publish on its topics, too.
-            own.sort(key=lambda node: not self._announced.get(node, {}).get('mechanisms'))
-            mechanism = mechanisms[key] = ShownMechanism(key, own[0], {}, tuple(
-                topic for node in own for topic in input_topics[node]))
-            # A node that starts has not announced its parameters.
-            with suppress(Refused):
-                mechanism.settings = await self._aside(partial(
-                    self._settings, mechanism, self._scene(mechanism)))
+            await asyncio.wait_for(self._wait_for_announcements(inputs), SECONDS_TO_ANNOUNCE)
+        owners = {f'{_space(owner)}/{name}': owner for owner in sorted(inputs)
+                  for name in self._names(owner)}
+        mechanisms = {key: ShownMechanism(
+            key, owner, await self._aside(partial(self._settings, key, owner)), inputs[owner])
+            for key, owner in sorted(owners.items())}
+        for key, owner in owners.items():
+            topics.update(dict.fromkeys(inputs[owner], self._follow))
+            topics[f'{key}/markers'] = partial(self._draw, key, MarkerArray, NEWEST)
+            topics[f'{key}/locus'] = partial(self._draw, key, Marker, LATCHED)
+        await self._bridge.ask(self._drop_others, inputs, topics)
+        await self._bridge.ask(self._subscribe, topics)
         self._mechanisms = mechanisms
+        for node in gone:
+            self._announced.pop(node, None)
         for client in self.clients:
             self._show(client)
 
@@ -423,12 +414,32 @@ class SceneView:
             self._news.clear()
             await self._news.wait()
 
+    def _names(self, owner: str) -> Collection[str]:
+        """Return the mechanisms that a node announces."""
+        with suppress(Refused):
+            return self._scene(owner).machines.keys()
+        return ()
+
+    def _scene(self, owner: str) -> scene.Scene:
+        """Return the scene of a node that announces one; raise Refused if it does not."""
+        values = self._announced.get(owner, {})
+        if 'mechanisms' not in values:
+            raise Refused(f'{owner} announces no mechanisms')
+        try:
+            if owner not in self._scenes:
+                self._scenes[owner] = scene.read(values, strict=False)
+            self._scenes[owner] = scene.read({
+                name: value for name, (_, value) in self._values(owner).items()},
+                self._scenes[owner], strict=False)
+        except scene.SceneError as error:
+            raise Refused(str(error)) from None
+        return self._scenes[owner]
+
     def _values(self, owner: str) -> dict[str, tuple[str, Any]]:
-        """Return node and value of each parameter of an owner's scene, by full name."""
-        own, whole = self._announced.get(owner, {}), self._scenes.get(owner)
-        values = {name: (owner, value) for name, value in own.items()}
-        others = {parameter.name: parameter.field for parameter in (
-            whole.parameters if whole else ()) if parameter.name not in own}
+        """Return node and value of each announced parameter of an owner's scene, by full name."""
+        values = {name: (owner, value) for name, value in self._announced[owner].items()}
+        others = {parameter.name: parameter.field for parameter in self._scenes[owner].parameters
+                  if parameter.name not in values}
         for node in self._announced.keys() - {owner}:
             for name in self._announced[node].keys() & others.keys():
                 # Any node may announce anything.
@@ -438,75 +449,52 @@ class SceneView:
                             name, self._announced[node][name])
         return values
 
-    def _scene(self, mechanism: ShownMechanism) -> scene.Scene:
-        """Return the scene of a mechanism; raise Refused if its parameters are not announced."""
-        owner = mechanism.owner
-        if mechanism.name not in self._announced.get(owner, {}).get('mechanisms', ()):
-            raise Refused(f'the parameters of {mechanism.name} are not known yet')
-        try:
-            # First that of the owner, which knows the names of others' parameters.
-            for _ in range(1 if owner in self._scenes else 2):
-                values = {name: value for name, (_, value) in self._values(owner).items()}
-                self._scenes[owner] = scene.read(values, self._scenes.get(owner), strict=False)
-        except scene.SceneError as error:
-            raise Refused(str(error)) from None
-        return self._scenes[owner]
-
-    def _settings(self, mechanism: ShownMechanism, whole: scene.Scene) -> dict[str, Setting]:
+    def _settings(self, key: str, owner: str) -> dict[str, Setting]:
         """Return the announced parameters of a mechanism; the ends of sliders take long."""
-        values = self._values(mechanism.owner)
-        found = [Setting(one.name, one.field, slider.ends(whole, one), node, self._announced[node])
-                 for one in whole.machines[mechanism.name].parameters if one.name in values
-                 for node, _ in [values[one.name]]]
-        return {setting.name: setting for setting in found}
+        whole, values = self._scene(owner), self._values(owner)
+        settings = [
+            Setting(parameter.name, parameter.field, slider.ends(whole, parameter), node,
+                    self._announced[node])
+            for parameter in whole.machines[key.rsplit('/', 1)[1]].parameters
+            if parameter.name in values for node, _ in [values[parameter.name]]]
+        return {setting.name: setting for setting in settings}
 
-    def _open(self, keys: Collection[str], nodes: Collection[str], announced: Collection[str],
-              sources: Collection[str]) -> None:
-        """Create missing subscriptions for these, and destroy all others."""
-        topics: dict[str, Any] = {
-            f'{key}{ending}': (key, type_, qos) for key in keys for ending, type_, qos in (
-                (MARKERS, MarkerArray, NEWEST), (LOCUS, Marker, LATCHED))}
-        self._drop_others(nodes, announced, sources, topics)
-        for topic in set(announced) - set(self._announcements):
-            self._announcements[topic] = self._bridge.node.create_subscription(
-                ParameterEvent, topic, partial(self._bridge.hand_over, self._notice),
-                ownership.LATCHED)
-        for topic in set(sources) - set(self._sources):
-            self._received[topic] = {}
-            self._sources[topic] = self._bridge.node.create_subscription(
-                JointState, topic, partial(_store, self._received[topic]), NEWEST)
-        for name in set(topics) - set(self._feeds):
-            self._feeds[name] = self._feed(name, *topics[name])
-
-    def _feed(self, name: str, key: str, type_: type, qos: QoSProfile) -> tuple[Feed, Any]:
-        def number(i: int) -> int:
-            return self._numbers.setdefault((name, i), len(self._numbers))
-
-        feed = Feed(name, key, type_, number, self._bridge.warn)
-        return feed, self._bridge.node.create_subscription(
-            type_, name, lambda raw: self._receive(feed, raw), qos, raw=True)
-
-    def _drop_others(self, nodes: Collection[str], announced: Collection[str],
-                     sources: Collection[str], topics: Collection[str]) -> None:
-        """Destroy all but these."""
-        node = self._bridge.node
+    def _drop_others(self, nodes: Collection[str], topics: Collection[str]) -> None:
+        """Destroy the clients and subscriptions of all other nodes and topics."""
         for name in set(self._setters) - set(nodes):
-            node.destroy_client(self._setters.pop(name))
-        for topic in set(self._announcements) - set(announced):
-            node.destroy_subscription(self._announcements.pop(topic))
-        for topic in set(self._sources) - set(sources):
-            node.destroy_subscription(self._sources.pop(topic))
-            del self._received[topic]
-        for name in set(self._feeds) - set(topics):
-            node.destroy_subscription(self._feeds.pop(name)[1])
+            self._bridge.node.destroy_client(self._setters.pop(name))
+        for topic in set(self._subscriptions) - set(topics):
+            self._bridge.node.destroy_subscription(self._subscriptions.pop(topic))
+            self._feeds.pop(topic, None)
+            self._positions.pop(topic, None)
 
-    def _close(self) -> None:
-        self._drop_others((), (), (), ())
-        self._numbers = {}
+    def _subscribe(self, topics: Mapping[str, Callable[[str], Any]]) -> None:
+        """Subscribe to topics, each by a function of its name, unless it is done."""
+        for topic in set(topics) - set(self._subscriptions):
+            self._subscriptions[topic] = topics[topic](topic)
 
-    def _receive(self, feed: Feed, raw: bytes) -> None:
-        feed.newest = raw
-        self._bridge.hand_over(self._offer, feed)
+    def _listen(self, topic: str) -> Any:
+        return self._bridge.node.create_subscription(
+            ParameterEvent, topic, partial(self._bridge.hand_over, self._notice),
+            ownership.LATCHED)
+
+    def _follow(self, topic: str) -> Any:
+        positions = self._positions[topic] = {}
+
+        def store(message: JointState) -> None:
+            positions.update((name, position) for name, position in zip(
+                message.name, message.position) if math.isfinite(position))
+
+        return self._bridge.node.create_subscription(JointState, topic, store, NEWEST)
+
+    def _draw(self, key: str, type_: type, qos: QoSProfile, topic: str) -> Any:
+        feed = self._feeds[topic] = Feed(key, topic, type_, self._bridge.warn)
+
+        def receive(raw: bytes) -> None:
+            feed.newest = raw
+            self._bridge.hand_over(self._offer, feed)
+
+        return self._bridge.node.create_subscription(type_, topic, receive, qos, raw=True)
 
     def _offer(self, feed: Feed) -> None:
         for client in self.clients:
@@ -523,7 +511,7 @@ class SceneView:
             with suppress(RuntimeError):
                 value = scene.plain(parameter_value_to_python(parameter.value))
                 if parameter.name not in values:
-                    self._seen = None
+                    self._is_stale = True
                     self._news.set()
                 if value != values.get(parameter.name):
                     changed.add(parameter.name)
@@ -531,18 +519,13 @@ class SceneView:
         for mechanism in self._mechanisms.values():
             settings = [setting for setting in mechanism.settings.values()
                         if setting.node == event.node and setting.full_name in changed]
-            drawn = self._drawn(mechanism) if settings else {}
-            for setting in settings:
-                message = {'op': 'value', 'mechanism': mechanism.key, 'name': setting.name,
-                           'value': setting.value, 'drawn': drawn}
-                for client in self.clients:
-                    client.tell((mechanism.key, setting.name), message)
-
-
-def _store(positions: dict[str, float], message: JointState) -> None:
-    """Store the finite positions of a message by name."""
-    positions.update((name, position) for name, position in zip(message.name, message.position)
-                     if math.isfinite(position))
+            with suppress(Refused):
+                description = self._described(mechanism) if settings else {}
+                for setting in settings:
+                    message = {'op': 'value', 'mechanism': mechanism.key, 'name': setting.name,
+                               'value': setting.value, 'drawn': description}
+                    for client in self.clients:
+                        client.tell((mechanism.key, setting.name), message)
 
 
 def _joined(space: str, name: str) -> str:

@@ -30,7 +30,7 @@ from aiohttp import web, WSCloseCode
 from .bridge import Bridge
 from .feed import Feed
 from .poses import number, Refused
-from .scene_view import SCENE, SceneView
+from .scene_view import SceneView
 from .. import palette
 from ..words import quoted
 
@@ -238,8 +238,7 @@ class Client:
         self._socket = socket_
         self._warn = warn
         self._texts: dict[Any, Message] = {}
-        self._offered: set[str] = set()
-        self._looks: dict[int, Message] = {}
+        self._offered: set[Feed] = set()
         self._ready = True
         self._news = asyncio.Event()
         self._requests: asyncio.Queue[Message] = asyncio.Queue(MOST_WAITING)
@@ -251,7 +250,7 @@ class Client:
 
     def offer(self, feed: Feed) -> None:
         """Send a feed's newest message when the browser is ready to draw it."""
-        self._offered.add(feed.topic)
+        self._offered.add(feed)
         self._news.set()
 
     async def serve(self) -> None:
@@ -343,22 +342,14 @@ class Client:
 
     async def _send_texts(self) -> None:
         while self._texts:
-            key = next(iter(self._texts))
-            if key == SCENE:
-                # The page drops the looks of mechanisms that are not in the scene.
-                self._looks = {}
-            await self._send_message(self._texts.pop(key))
+            await self._send_message(self._texts.pop(next(iter(self._texts))))
 
     async def _send_picture(self) -> None:
         offered, self._offered = self._offered, set()
-        drawn = [feed.drawn() for feed in self._view.feeds() if feed.topic in offered]
-        for looks, _ in drawn:
-            for id_, look in looks.items():
-                if self._looks.get(id_) != look:
-                    self._looks[id_] = look
-                    await self._send_message({'op': 'look', 'number': id_, **look})
-        self._ready = False
-        await self._within(self._socket.send_bytes(b''.join(records for _, records in drawn)))
+        picture = b''.join(feed.frame() for feed in offered)
+        if picture:
+            self._ready = False
+            await self._within(self._socket.send_bytes(picture))
 
     async def _send_message(self, message: Message) -> None:
         await self._within(self._socket.send_json(message))

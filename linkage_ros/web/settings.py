@@ -58,7 +58,7 @@ class Setting:
                 'unit': self.field.unit, 'low': low, 'high': high,
                 'group': (self.field.group or 'more') if has_control else ''}
 
-    def asked(self, value: Any) -> Any:
+    def parameter(self, value: Any) -> Any:
         """Return a parameter message with a value from JSON; ValueError if it is not allowed."""
         name, kind = self.full_name, self.field.kind
         if kind not in ALLOWS:
