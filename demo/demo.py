@@ -18,38 +18,36 @@ end well when it is terminated.
 
 import math
 from pathlib import Path
-import signal
 import sys
 import time
-
-HERE = Path(__file__).parent
 
 try:
     from domains import Domain
     from linkage_interfaces.srv import ServoInverse
-    from linkage_ros import command, scene
+    from linkage_ros import scene
+    from linkage_ros.nodes.messages import BODIES_ID, GUIDES_ID, JOINTS_ID
     from linkage_ros.render import files
+    from linkage_ros.render.cycle import Configuration, Cycle
     from linkage_ros.render.parts import DEFAULT, DEFAULT_IN_MOTION
     from linkage_ros.render.picture import Picture
-    from nodes import DemoError, Nodes
     import numpy as np
-    from received import Received
+    from rclpy.qos import DurabilityPolicy, QoSProfile
     from ros_harness import Graph
+    from sensor_msgs.msg import JointState
+    from view import DemoError, Nodes, run
+    from visualization_msgs.msg import Marker, MarkerArray
 except ImportError as error:
     sys.exit(f'demo: {error}; `make demo` installs and builds what is needed')
 
-SCENE = HERE.parent / 'config' / 'all.yaml'
-OUT = HERE / 'out'
+SCENE = Path(__file__).parents[1] / 'config' / 'all.yaml'
+OUT = Path(__file__).parent / 'out'
 SECONDS = 10.0
-
-PORTRAIT_SIZE, PORTRAIT_TURNS = (720, 720), 1 / 6
-ANIMATION_SIZE, ANIMATED_SECONDS, FRAMES_PER_SECOND, COLOURS = (1040, 300), 2.0 * math.pi, 12.0, 24
-
+STILL, MOVING, FRAMES_PER_SECOND, COLOURS = (720, 720), (1040, 300), 12.0, 24
 # Lever angles [degrees] for the service; the last is out of reach.
 LEVER_ANGLES = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)
 # Largest errors: of a length as a part of the longest bar, and of an angle [rad].
 TOLERANCE = 1e-12
-
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 NEXT = """
 Try next:
   make view                               the same scene in the browser, to be moved and tuned
@@ -57,68 +55,115 @@ Try next:
   docs/tutorial.md                        a gripper of your own, from paper to a servo"""
 
 
-def main() -> int:
-    """Run the demo; return the exit code of the process."""
-    # However it ends, no node is left behind.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    return command.run('demo', lambda _: show(), None)
+class Received(Cycle):
+    """The motion of a mechanism as a Cycle whose poses are its messages."""
+
+    def __init__(self, mechanism, graph):
+        self.mechanism = mechanism
+        self.states, self.markers, self.loci = (
+            graph.listen(type_, f'{mechanism.name}/{topic}', qos) for type_, topic, qos in (
+                (JointState, 'joint_states', 10), (MarkerArray, 'markers', 10),
+                (Marker, 'locus', LATCHED)))
+
+    def read(self):
+        """Read the messages, of which each joint state has its markers."""
+        states = {seconds(state): dict(zip(state.name, state.position)) for state in self.states}
+        arrays = {seconds(array.markers[0]): [
+            marker for marker in array.markers
+            if marker.id in (JOINTS_ID, GUIDES_ID, BODIES_ID)] for array in self.markers}
+        self.times = np.array(sorted(states.keys() & arrays.keys()))
+        legs = len(self.mechanism.assembly().legs)
+        self._poses = [
+            ([states[time][f'{self.mechanism.name}_{name}'] for name in self.mechanism.inputs],
+             np.concatenate([points(marker).reshape(legs, -1, 2) for marker in arrays[time]], 1))
+            for time in self.times]
+        super().__init__(self.mechanism)
+
+    def pose(self, turns):
+        """Return the configuration at a time [turns]: that of the latest message."""
+        # A time may be rounded.
+        time = self.times[0] + turns * self.period + 1e-6
+        return Configuration(turns, *self._poses[int(np.searchsorted(self.times, time)) - 1])
+
+    def locus(self, mechanism):
+        """Return the received curve [m], shape (n, 2)."""
+        return points(self.loci[-1])
+
+    def length_error(self):
+        """Return the largest error of a bar's length, as a part of the longest bar."""
+        linkage, scale = self.mechanism.linkage, self.mechanism.scale
+        places = np.array([places for _, places in self._poses])
+        first, last = (places[:, :, [self.mechanism.points.index(name) for name in names]]
+                       for names in zip(*linkage.bars))
+        lengths = scale * np.array([linkage.bar_lengths[bar] for bar in linkage.bars])
+        errors = np.hypot(*np.moveaxis(last - first, -1, 0)) - lengths
+        return float(np.abs(errors).max() / (scale * linkage.longest))
 
 
-def show():
+def points(marker):
+    """Return the points of a marker in its plane [m], shape (n, 2)."""
+    return np.array([(point.x, point.y) for point in marker.points])
+
+
+def seconds(message):
+    """Return the stamp of a message [s]."""
+    return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+
+
+def demo():
     """Observe the nodes, report and draw; raise DemoError if something is wrong."""
     mechanisms = scene.load(SCENE).machines
     try:
-        received, answer = observe(mechanisms)
+        motions, answer = observe(mechanisms.values())
     except (AssertionError, RuntimeError) as error:
         raise DemoError(error) from None
-    report_motions(received)
-    report_answer(next(one for one in mechanisms.values() if one.linkage.type == 'slotted_lever'),
-                  answer)
-    draw(received)
+    report_motions(motions)
+    report_answer(next(mechanism.linkage.dimensions for mechanism in mechanisms.values()
+                       if mechanism.linkage.type == 'slotted_lever'), answer)
+    draw(motions)
     print(NEXT)
 
 
 def observe(mechanisms):
-    """Return the messages of the mechanisms, and the response of the service."""
+    """Return the motions of the mechanisms, and the response of the service."""
     with Domain() as domain, Nodes(SCENE, domain.id) as nodes, Graph(domain.id) as graph:
         print(f'Running three nodes on {SCENE.name}, ROS_DOMAIN_ID {domain.id} ...', flush=True)
-        received = [Received(mechanism, graph) for mechanism in mechanisms.values()]
+        motions = [Received(mechanism, graph) for mechanism in mechanisms]
         inverse = graph.node.create_client(ServoInverse, 'servo_inverse')
+        start = time.monotonic()
 
-        def wait(held):
+        def is_complete():
             nodes.check()
-            return held()
+            return time.monotonic() > start + SECONDS and all(
+                motion.states and motion.markers and motion.loci for motion in motions)
 
-        graph.until(lambda: wait(lambda: all(one.is_complete for one in received)))
-        print(f'Listening for {SECONDS:g} s ...', flush=True)
-        end = time.monotonic() + SECONDS
-        graph.until(lambda: wait(lambda: time.monotonic() > end), 2.0 * SECONDS)
+        graph.until(is_complete)
         answer = graph.call(inverse, ServoInverse.Request(
             lever_angle=list(map(math.radians, LEVER_ANGLES))))
         for name, code in nodes.stop().items():
             if code != 0:
                 raise DemoError(f'{name} ended with exit code {code} when it was terminated')
-    start = max(one.read() for one in received)
-    for one in received:
-        one.start = start
-    return received, answer
+    for motion in motions:
+        motion.read()
+    return motions, answer
 
 
-def report_motions(received):
+def report_motions(motions):
     """Print a line for each mechanism; raise DemoError if the length of a bar is wrong."""
     print('\nmechanism        messages  rate [Hz]  length error  traced curve [m]')
-    for one in received:
-        print(f'{one.mechanism.name:14} {len(one.times):10} {one.rate:10.1f}  '
-              f'{one.length_error():12.1e}  {" x ".join(f"{side:.3g}" for side in one.extent)}')
+    for motion in motions:
+        count, error = len(motion.times), motion.length_error()
+        size = ' x '.join(f'{side:.3g}' for side in np.ptp(points(motion.loci[-1]), axis=0))
+        print(f'{motion.mechanism.name:14} {count:10} {(count - 1) / np.ptp(motion.times):10.1f}  '
+              f'{error:12.1e}  {size}')
+        if not error <= TOLERANCE:
+            raise DemoError(f'the length of a bar is wrong by {error:.1e} of the longest bar')
     print('(length error: largest of all bars and messages, as a part of the longest bar)')
-    worst = max(one.length_error() for one in received)
-    if not worst <= TOLERANCE:
-        raise DemoError(f'the length of a bar is wrong by {worst:.1e} of the longest bar')
 
 
-def report_answer(mechanism, answer):
+def report_answer(dimensions, answer):
     """Print a line for each lever angle; raise DemoError if a response is wrong."""
-    a, b, e = (mechanism.linkage.dimensions[key] for key in 'abe')
+    a, b, e = (dimensions[key] for key in 'abe')
     print('\nlever [deg]  servo [deg]  d lever / d servo  error [rad]')
     for lever, servo, reduction, reachable in zip(
             LEVER_ANGLES, answer.servo_angle, answer.reduction, answer.reachable):
@@ -135,21 +180,21 @@ def report_answer(mechanism, answer):
         raise DemoError('servo_inverse did not reach all lever angles but the last')
 
 
-def draw(received):
+def draw(motions):
     """Draw a picture of each mechanism, and an animation of all, from their messages."""
     OUT.mkdir(exist_ok=True)
     print(f'\nDrawing the messages to {OUT} ...', flush=True)
-    for one in received:
-        picture = Picture([one.mechanism], PORTRAIT_SIZE, 'whole', DEFAULT, [one])
-        picture.arrange([PORTRAIT_TURNS])
-        files.still(picture, PORTRAIT_TURNS, OUT / f'{one.mechanism.name}.png')
-    picture = Picture([one.mechanism for one in received], ANIMATION_SIZE, 'whole',
-                      DEFAULT_IN_MOTION - {'axes'}, received)
-    times = np.arange(0.0, ANIMATED_SECONDS, 1.0 / FRAMES_PER_SECOND) / picture.period
+    for motion in motions:
+        picture = Picture([motion.mechanism], STILL, 'whole', DEFAULT, [motion])
+        picture.arrange([1 / 6])
+        files.still(picture, 1 / 6, OUT / f'{motion.mechanism.name}.png')
+    picture = Picture([motion.mechanism for motion in motions], MOVING, 'whole',
+                      DEFAULT_IN_MOTION - {'axes'}, motions)
+    times = np.arange(0.0, 1.0, 1.0 / (FRAMES_PER_SECOND * picture.period))
     picture.arrange(times)
     files.gif(picture, times, FRAMES_PER_SECOND, 0, COLOURS, OUT / 'all.gif', iter)
     print(*(f'  {file.name}' for file in sorted(OUT.iterdir())), sep='\n')
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(run('demo', demo))

@@ -136,10 +136,15 @@ def arrows(mechanism: SceneMechanism, present: Sequence[float], kind: str,
 
 def number(text: str) -> dict[str, Any]:
     """Return the `value` of arithmetic such as pi/2, and whether it is in rad (`turns`)."""
-    formula = Formula(text)
-    if formula.names:
-        raise Refused(f'{quoted(text)} is not a number: {listed(formula.names)} is unknown')
-    return {'value': float(formula.value({})), 'turns': bool({'pi', 'deg'} & formula.words.keys())}
+    try:
+        # A number may have a decimal comma; arithmetic has commas in parentheses only.
+        formula = Formula(text if '(' in text else text.replace(',', '.'))
+        if formula.names:
+            raise Refused(f'{quoted(text)} is not a number: {listed(formula.names)} is unknown')
+        value = float(formula.value({}))
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    return {'value': value, 'turns': bool({'pi', 'deg'} & formula.words.keys())}
 
 
 def reached(mechanism: SceneMechanism, present: Sequence[float],

@@ -360,7 +360,7 @@ class SceneView:
         if graph != self._graph or self._is_stale:
             gone = self._graph[1].keys() - graph[1].keys()
             self._graph, self._is_stale = graph, False
-            await self._change(*graph, gone)
+            await self._change(graph[0], graph[1], gone)
 
     def _find_announcers(self) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
         """Return the nodes that announce parameters, by topic, and the topics of their inputs."""

@@ -5,59 +5,56 @@
 
 const RETRY = 1000;
 const GONE = { reason: 'the viewer is gone' };
+const requests = new Map();
+let handlers = null;
+let socket = null;
+let id = 0;
 
-export class Connection {
-  constructor(handlers) {
-    this.handlers = handlers;
-    this.asked = new Map();
-    this.next = 1;
-    document.addEventListener('visibilitychange', () => document.hidden ? this.close() : this.open());
-    this.open();
-  }
+function close() {
+  const old = socket;
+  socket = null;
+  old?.close();
+  for (const answer of requests.values()) answer(GONE);
+  requests.clear();
+}
 
-  get opened() {
-    return this.socket?.readyState === WebSocket.OPEN;
-  }
+function open() {
+  if (document.hidden || socket) return;
+  const opened = socket = new WebSocket(`ws${location.protocol.slice(4)}//${location.host}/socket`);
+  opened.binaryType = 'arraybuffer';
+  opened.onmessage = ({ data }) => {
+    if (data instanceof ArrayBuffer) return handlers.picture(data);
+    const message = JSON.parse(data);
+    if (message.op !== 'answer') return handlers[message.op](message);
+    requests.get(message.id)?.(message);
+    requests.delete(message.id);
+  };
+  opened.onopen = () => handlers.opened();
+  opened.onclose = () => {
+    if (socket !== opened) return;
+    close();
+    handlers.closed();
+    setTimeout(open, RETRY);
+  };
+}
 
-  open() {
-    if (document.hidden || this.socket) return;
-    const socket = this.socket = new WebSocket(`ws${location.protocol.slice(4)}//${location.host}/socket`);
-    socket.binaryType = 'arraybuffer';
-    socket.onmessage = ({ data }) => {
-      if (data instanceof ArrayBuffer) return this.handlers.frame(data);
-      const message = JSON.parse(data);
-      if (message.op !== 'answer') return this.handlers[message.op](message);
-      this.asked.get(message.id)?.(message);
-      this.asked.delete(message.id);
-    };
-    socket.onopen = () => this.handlers.opened();
-    socket.onclose = () => {
-      if (this.socket !== socket) return;
-      this.close();
-      this.handlers.closed();
-      setTimeout(() => this.open(), RETRY);
-    };
-  }
+/** Connect, whenever the page is visible; handlers are named as the messages, `picture` for a binary one. */
+export function connect(receivers) {
+  handlers = receivers;
+  document.addEventListener('visibilitychange', () => document.hidden ? close() : open());
+  open();
+}
 
-  close() {
-    const socket = this.socket;
-    this.socket = null;
-    socket?.close();
-    for (const answer of this.asked.values()) answer(GONE);
-    this.asked.clear();
-  }
+export const isOpen = () => socket?.readyState === WebSocket.OPEN;
 
-  tell(message) {
-    if (this.opened) this.socket.send(JSON.stringify(message));
-  }
+export function tell(message) {
+  if (isOpen()) socket.send(JSON.stringify(message));
+}
 
-  /** Send a request and return its answer, whose reason is empty if the request was granted. */
-  ask(message) {
-    if (!this.opened) return Promise.resolve(GONE);
-    const id = this.next++;
-    return new Promise(resolve => {
-      this.asked.set(id, resolve);
-      this.tell({ ...message, id });
-    });
-  }
+/** Send a request and return its answer, whose reason is empty if the request was granted. */
+export function ask(message) {
+  if (!isOpen()) return Promise.resolve(GONE);
+  id += 1;
+  tell({ ...message, id });
+  return new Promise(resolve => { requests.set(id, resolve); });
 }

@@ -13,6 +13,9 @@ const FORMS = {
   C: ['h', 'A C99 header for a microcontroller'],
 };
 
+/** What there is of a linkage in space. */
+const IN_SPACE = ['PNG', 'C'];
+
 /** Let the browser save blobs or texts as a file. */
 export function download(name, ...parts) {
   const href = URL.createObjectURL(new Blob(parts));
@@ -32,17 +35,14 @@ function painted() {
   return new Promise(done => { canvas.toBlob(done); });
 }
 
-export class Files {
-  constructor(mechanism) {
-    Object.assign(this, { mechanism, reason: new Reason() });
-    this.element = element('div', { className: 'tools' }, element('span', { className: 'about', textContent: 'Download' }),
-      ...Object.entries(FORMS).map(([form, [ending, title]]) => button(form, () => this.save(form.toLowerCase(), ending), { title })),
-      this.reason.line);
-  }
-
-  async save(form, ending) {
-    const { reason, text } = form === 'png' ? { text: await painted() } : await this.mechanism.ask('export', { form });
-    this.reason.say(reason && `Not saved: ${reason}`);
-    if (!reason) download(`${this.mechanism.name}.${ending}`, text);
-  }
+/** The buttons that download. */
+export function files(mechanism) {
+  const reason = new Reason();
+  const save = async (form, ending) => {
+    const { reason: why, text } = form === 'PNG' ? { text: await painted() } : await mechanism.ask('export', { form: form.toLowerCase() });
+    reason.say(why && `Not saved: ${why}`);
+    if (text) download(`${mechanism.name}.${ending}`, text);
+  };
+  return element('div', { className: 'tools' }, element('span', { className: 'about', textContent: 'Download' }),
+    ...Object.entries(FORMS).filter(([form]) => !mechanism.space || IN_SPACE.includes(form)).map(([form, [ending, title]]) => button(form, () => save(form, ending), { title })), reason.line);
 }

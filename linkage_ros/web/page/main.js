@@ -3,33 +3,32 @@
 
 // The page: passes the viewer's messages to picture and panel, and requests to the viewer.
 
-import { Connection } from './connection.js';
-import { arithmetic, button, put } from './control.js';
-import { Hand } from './hand.js';
+import { connect, isOpen, tell } from './connection.js';
+import { button, put } from './control.js';
 import { Mechanism } from './mechanism.js';
 import { Panel } from './panel.js';
 import { Picture } from './picture.js';
+import { PointerDrag } from './pointer_drag.js';
 import { units } from './units.js';
 import { View } from './view.js';
 
 const REFUSED = 4000;
-const LOCUS = ['locus', 'loci'];
 const mechanisms = new Map();
+const text = new TextDecoder();
 const at = id => document.getElementById(id);
 const [views, status, names, workshop, arrows, whole, notice] = [
   'views', 'status', 'names', 'workshop', 'arrows', 'whole', 'notice'].map(at);
-const naming = names.closest('label');
 /** What a reload keeps. */
 const stored = { shown: '', from: {}, names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
 let { shown } = stored;
 let fading = 0;
 let scheduled = false;
-let frames = 0;
 
 const store = values => sessionStorage.setItem('kept', JSON.stringify(Object.assign(stored, values)));
 
 const picture = new Picture(at('picture'));
-const hand = new Hand(picture, {
+const panel = new Panel(at('panel'), light, refuse);
+picture.drag = new PointerDrag(picture, {
   drag(mechanism, want) {
     panel.drag(mechanism.key, want);
     draw();
@@ -37,8 +36,7 @@ const hand = new Hand(picture, {
   light,
   choose: (mechanism, dimension) => panel.goTo(mechanism.key, dimension),
 });
-picture.pull = () => hand.pull;
-picture.view = new View(picture.canvas, () => hand.grabbed !== null, stored.from, () => {
+picture.view = new View(picture.canvas, stored.from, () => {
   whole.hidden = picture.view.whole;
   store({ from: picture.view.from });
   draw();
@@ -66,9 +64,8 @@ function refuse(words) {
   fading = setTimeout(say, REFUSED, '');
 }
 
-const connection = new Connection({
+connect({
   opened() {
-    for (const mechanism of mechanisms.values()) mechanism.markers.clear();
     say(mechanisms.size ? '' : 'Loading …');
     status.textContent = 'connected';
   },
@@ -78,27 +75,21 @@ const connection = new Connection({
     status.textContent = 'not connected';
   },
 
-  scene({ mechanisms: described }) {
+  scene({ mechanisms: descriptions }) {
     const known = new Map(mechanisms);
     mechanisms.clear();
-    for (const one of described) {
-      const mechanism = known.get(one.key) ?? new Mechanism(one, connection);
-      mechanism.describe(one);
+    for (const description of descriptions) {
+      const { key, name } = description;
+      const mechanism = known.get(key) ?? new Mechanism();
+      mechanism.describe(description);
       // Mechanisms of one name in two namespaces have distinct titles.
-      mechanism.title = described.some(({ key, name }) => name === one.name && key !== one.key) ? one.key.slice(1) : one.name;
-      mechanisms.set(one.key, mechanism);
+      mechanism.title = descriptions.some(other => other.name === name && other.key !== key) ? key.slice(1) : name;
+      mechanisms.set(key, mechanism);
     }
     at('empty').hidden = mechanisms.size > 0;
     say('');
     // What was shown before a reload, or before the viewer ended, may be found later.
     show(mechanisms.has(stored.shown) || !mechanisms.size ? stored.shown : '');
-  },
-
-  look({ number, mechanism, ...look }) {
-    const drawn = mechanisms.get(mechanism) ?? new Mechanism({ key: mechanism }, connection);
-    mechanisms.set(mechanism, drawn);
-    drawn.markers.set(number, { points: new Float32Array(), ...drawn.markers.get(number), look });
-    picture.refit(mechanism);
   },
 
   value({ mechanism: key, name, value, drawn }) {
@@ -112,28 +103,24 @@ const connection = new Connection({
     if (setting.group !== 'speeds' && setting.group !== 'starts') picture.refit(key);
   },
 
-  frame(buffer) {
-    const numbers = new DataView(buffer);
-    const now = performance.now();
+  /** Frames, each the length of a header, the header, and the points of its markers. */
+  picture(buffer) {
     for (let from = 0; from < buffer.byteLength;) {
-      const number = numbers.getUint32(from, true);
-      const count = numbers.getUint32(from + 4, true);
-      for (const mechanism of mechanisms.values()) {
-        const marker = mechanism.markers.get(number);
-        if (!marker) continue;
-        marker.points = new Float32Array(buffer, from + 8, 3 * count);
-        if (!LOCUS.includes(marker.look.kind)) mechanism.lastMarkers = now;
+      const length = new DataView(buffer).getUint32(from, true);
+      const { mechanism: key, topic, markers } = JSON.parse(text.decode(new Uint8Array(buffer, from + 4, length)));
+      from += 4 + length;
+      for (const marker of markers) {
+        const count = 3 * marker.points;
+        marker.points = new Float32Array(buffer, from, count);
+        from += 4 * count;
       }
-      from += 8 + 12 * count;
+      mechanisms.get(key)?.markers.set(topic, markers);
+      if (topic === 'markers' && mechanisms.has(key)) mechanisms.get(key).lastMarkers = performance.now();
     }
     panel.follow();
-    draw(() => connection.tell({ op: 'drawn' }));
-    frames += 1;
+    draw(() => tell({ op: 'drawn' }));
   },
 });
-arithmetic.ask = text => connection.ask({ op: 'read', text });
-
-const panel = new Panel(at('panel'), light, refuse);
 
 /** Draw once before the next refresh of the screen, then call `after`. */
 function draw(after) {
@@ -159,19 +146,20 @@ function show(key) {
     show(value);
   }, { ariaPressed: value === key })));
   const selected = [...mechanisms.values()].filter(mechanism => !key || mechanism.key === key);
-  for (const mechanism of selected) mechanism.arrows.kind = stored.arrows;
   picture.show(selected);
   panel.show(selected, several && !key);
-  naming.hidden = selected.length !== 1 || selected[0].legs > 1;
+  names.parentElement.hidden = selected.length !== 1 || selected[0].legs > 1;
   draw();
 }
 
 /** Apply the options above the picture, and save them for a reload. */
 function choose() {
   store({ names: names.checked, workshop: workshop.checked, arrows: arrows.value });
-  picture.named = stored.names;
-  if (units.workshop !== stored.workshop) units.choose(stored.workshop);
-  for (const mechanism of mechanisms.values()) mechanism.arrows = { kind: stored.arrows, at: {} };
+  Object.assign(picture, { named: names.checked, kind: arrows.value });
+  Object.assign(panel, { arrows: arrows.value });
+  units.workshop = workshop.checked;
+  for (const mechanism of mechanisms.values()) mechanism.arrows = { at: {} };
+  panel.render();
   draw();
 }
 
@@ -182,7 +170,5 @@ choose();
 new ResizeObserver(() => draw()).observe(picture.canvas);
 
 setInterval(() => {
-  if (connection.opened) status.textContent = `${frames} pictures/s`;
-  frames = 0;
-  panel.check(performance.now());
+  if (isOpen()) panel.check(performance.now());
 }, 1000);

@@ -1,35 +1,36 @@
 // Copyright 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// A mechanism on the page: its description, its markers by number, and its changes.
+// A mechanism on the page: its description, its markers by topic, and its changes.
 
-import { History } from './history.js';
+import { ask } from './connection.js';
 
-/** What is drawn of a mechanism whose parameters are not announced yet. */
-const UNKNOWN = { settings: [], points: [], legs: 1, pairs: 1, inputs: {}, sides: {}, curves: {} };
+const TUNED = ['dimensions', 'branches', 'more'];
 
 export class Mechanism {
-  constructor(described, connection) {
-    this.connection = connection;
+  constructor() {
     this.markers = new Map();
     this.lastMarkers = performance.now();
     /** Ranges and bars of dimensions, and fixed joints; empty until the viewer has answered. */
     this.tunable = { travel: {}, bars: {}, fixed: [] };
-    /** The requested kind of arrows, and the received arrows by joint. */
-    this.arrows = { kind: '', at: {} };
-    this.history = new History(this);
-    this.describe(described);
+    /** The received arrows by joint. */
+    this.arrows = { at: {} };
+    /** Values to set for undo, one step a gesture, and the first value of each tuned parameter. */
+    this.steps = [];
+    this.first = new Map();
   }
 
-  describe(described) {
-    Object.assign(this, UNKNOWN, described);
+  describe(description) {
+    Object.assign(this, description);
     this.settings = new Map(this.settings.map(setting => [setting.name, setting]));
-    this.history.begin();
+    for (const { name, value } of TUNED.flatMap(group => this.group(group))) {
+      if (!this.first.has(name)) this.first.set(name, value);
+    }
   }
 
   /** Request something of the mechanism; return the answer. */
   ask(op, fields) {
-    return this.connection.ask({ op, mechanism: this.key, ...fields });
+    return ask({ op, mechanism: this.key, ...fields });
   }
 
   value(name) {
@@ -41,8 +42,20 @@ export class Mechanism {
     return [...this.settings.values()].filter(({ group }) => group === name);
   }
 
+  /** Store a value before a change; all changes of one gesture are one step. */
+  remember(name, value, gesture) {
+    const last = this.steps.at(-1);
+    if (!this.first.has(name) || last?.gesture === gesture) return;
+    this.steps.push({ gesture, values: { [name]: value } });
+  }
+
+  /** The names of the parameters that are not as they were at first. */
+  get changed() {
+    return [...this.first.keys()].filter(name => this.value(name) !== this.first.get(name));
+  }
+
   /** The width of a bar [m], which is half of a joint's. */
   get width() {
-    return [...this.markers.values()].find(({ look }) => look.kind === 'joints')?.look.width / 2;
+    return [...this.markers.values()].flat().find(({ kind }) => kind === 'joints')?.width / 2;
   }
 }

@@ -3,18 +3,16 @@
 
 // The motion of a mechanism: a slider for each input, play and step, and its present outputs.
 
-import { button, element, Newest, noNumber, put, Reason, Slider, typed } from './control.js';
-import { figures, units } from './units.js';
+import { isOpen } from './connection.js';
+import { button, element, Newest, put, Reason, Slider } from './control.js';
+import { figures, read, units } from './units.js';
 
 const STEP = Math.PI / 180;
 const STEPS_A_STROKE = 100;
 const FIGURES = 5;
 const FIGURES_OF_MANY = 3;
 
-function shown(value, unit, digits = FIGURES) {
-  if (value === null) return '—';
-  return figures(value * units.of(unit).factor, digits);
-}
+const shown = (value, unit, digits = FIGURES) => value === null ? '—' : figures(value * units.of(unit).factor, digits);
 
 /** What is reached, in the units that are shown. */
 function inWords({ name, arcs, unit }) {
@@ -68,9 +66,7 @@ class InputRow {
 class OutputRow {
   constructor(name, count, want, say) {
     const editable = this.editable = count === 1;
-    this.value = editable
-      ? element('input', { type: 'text', autocomplete: 'off', ariaLabel: name })
-      : element('span');
+    this.value = editable ? element('input', { type: 'text', autocomplete: 'off', ariaLabel: name }) : element('span');
     this.unit = element('span', { className: 'unit' });
     this.rates = Array.from({ length: count }, () => element('td'));
     this.row = element('tr', {}, element('th', { scope: 'row' }, element('span', { textContent: name })),
@@ -78,18 +74,17 @@ class OutputRow {
     this.value.onchange = async () => {
       const { unit } = this.output;
       const text = this.value.value.trim();
-      const value = text ? await typed(text, unit, units.of(unit).factor) : NaN;
+      const { value, reason } = text ? await read(text, unit, units.of(unit).factor) : {};
       this.value.blur();
-      if (Number.isFinite(value)) want({ output: name, value });
-      else say({ reason: text && noNumber(text) });
+      if (value !== undefined) want({ output: name, value });
+      else say({ reason: reason && `Refused: ${reason}` });
       this.render();
     };
     this.value.onblur = () => this.render();
   }
 
   show(output, inputs) {
-    this.output = output;
-    this.inputs = inputs;
+    Object.assign(this, { output, inputs });
     this.render();
   }
 
@@ -110,19 +105,21 @@ class OutputRow {
 export class Motion {
   constructor(mechanism, open, refuse) {
     Object.assign(this, { mechanism, inputs: new Map(), outputs: new Map(), reason: new Reason() });
-    /** The last speeds other than zero, by parameter. */
-    this.playing = {};
     this.play = button('', () => this.stopOrPlay(), { hidden: !mechanism.group('speeds').length });
     this.place = element('div', { className: 'inputs' });
     this.table = element('table');
     this.folding = element('details', { open, hidden: true }, element('summary', { textContent: 'Outputs', title: 'Coordinates count from the origin of its own plane' }), this.table);
     this.element = element('div', {}, this.place, this.reason.line, this.folding);
-    this.dragged = new Newest(async want => {
+    this.target = new Newest(async want => {
       const answer = await this.want(want);
       this.say(answer);
-      if (mechanism.connection.opened) refuse(answer.reason);
+      if (isOpen()) refuse(answer.reason);
     });
     this.renderPlay();
+  }
+
+  get moves() {
+    return this.mechanism.group('speeds').some(({ value }) => value);
   }
 
   stopOrPlay() {
@@ -130,14 +127,9 @@ export class Motion {
     this.mechanism.ask('set', { values }).then(answer => this.say(answer));
   }
 
-  /** The speed of the first input when it plays. */
-  get speed() {
-    return Object.values(this.speeds)[0];
-  }
-
-  /** The speeds of the inputs when it plays, by input. */
+  /** The speeds of the inputs when it plays. */
   get speeds() {
-    return Object.fromEntries(Object.entries(this.mechanism.inputs).map(([name, { speed }]) => [name, this.playing[`${name}.speed`] ?? speed]));
+    return Object.fromEntries(Object.entries(this.mechanism.inputs).map(([name, { speed }]) => [name, speed]));
   }
 
   /** The present inputs. */
@@ -146,14 +138,11 @@ export class Motion {
   }
 
   renderPlay() {
-    const speeds = this.mechanism.group('speeds');
-    this.moves = speeds.some(({ value }) => value);
-    for (const { name, value } of speeds) if (value) this.playing[name] = value;
-    this.play.textContent = this.moves ? 'Stop' : 'Play';
+    put(this.play, { textContent: this.moves ? 'Stop' : 'Play' });
   }
 
   say({ reason }) {
-    this.reason.say(reason ?? '');
+    this.reason.say(reason);
   }
 
   /** Request a value of an output, or a place of a joint. */
@@ -164,23 +153,18 @@ export class Motion {
     return answer;
   }
 
-  drag(want) {
-    this.dragged.offer(want);
-  }
-
-  /** Request the present pose, with the chosen arrows at the inputs' speeds when it plays. */
-  async look() {
-    const { connection, inputs, arrows: { kind } } = this.mechanism;
-    if (this.looking || !connection.opened || !Object.keys(inputs).length) return;
-    this.looking = true;
-    const answer = await this.mechanism.ask('pose', kind && { arrows: kind, speeds: this.speeds });
-    this.looking = false;
+  /** Request the present pose, with a kind of arrows at the inputs' speeds when it plays. */
+  async poll(arrows) {
+    if (this.polling || !isOpen()) return;
+    this.polling = true;
+    const answer = await this.mechanism.ask('pose', arrows && { arrows, speeds: this.speeds });
+    this.polling = false;
     if (answer.inputs) this.show(answer);
     else if (!this.inputs.size) this.say(answer);
   }
 
   show({ inputs, outputs, arrows }) {
-    Object.assign(this.mechanism.arrows, arrows);
+    if (arrows) this.mechanism.arrows = arrows;
     const names = [...Object.keys(inputs), ...Object.keys(outputs)].join();
     if (names !== this.built) this.build(names, inputs, outputs);
     for (const [name, value] of Object.entries(inputs)) this.inputs.get(name).show(this.mechanism.inputs[name], value);

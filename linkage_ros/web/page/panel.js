@@ -4,44 +4,41 @@
 // The panel: motion, plot and parameters of each displayed mechanism.
 
 import { element } from './control.js';
-import { Files } from './files.js';
+import { files } from './files.js';
 import { Motion } from './motion.js';
 import { Plot } from './plot.js';
 import { Tuning } from './tuning.js';
-import { units } from './units.js';
 
 const STILL = 2000;
-const LOOKS = 120;
+const POLL = 120;
+
+/** What a section is built from: with other values of the settings it stays the same. */
+const formOf = ({ title, curves, inputs, settings }, folded) => JSON.stringify(
+  [folded, title, curves, Object.keys(inputs), [...settings.values()].map(({ value, ...rest }) => rest)]);
 
 /** The section of one mechanism. Its `parts` have a method render(). */
 class Section {
-  constructor(mechanism, { light, refuse }, folded) {
+  constructor(mechanism, { light, refuse }, folded, old) {
     const { key, name, title } = mechanism;
-    const type = mechanism.value('type') ?? '';
+    const type = mechanism.value('type');
     this.mechanism = mechanism;
+    this.form = formOf(mechanism, folded);
     this.motion = new Motion(mechanism, !folded, refuse);
     this.plot = new Plot(mechanism, this.motion);
     this.motion.place.after(this.plot.element);
-    this.motion.onshow = () => this.plot.look();
-    this.tuning = new Tuning(mechanism, !folded, own => light(mechanism, own));
+    this.motion.onshow = () => this.plot.follow();
+    this.tuning = new Tuning(mechanism, !folded, dimension => light(mechanism, dimension));
     this.parts = [this.motion, this.plot, this.tuning];
     this.still = element('p', { className: 'still', hidden: true });
-    this.loading = element('p', { className: 'about', textContent: 'Waiting for its parameters …', hidden: mechanism.settings.size > 0 });
+    const about = element('p', { className: 'about', hidden: !mechanism.space, textContent: `${title} is a linkage in space: here it is drawn, played, tuned and saved. Dragging, outputs and plots are for linkages in a plane.` });
     this.element = element('section', { ariaLabel: title },
       element('header', {}, element('h2', { textContent: title }),
         element('span', { className: 'about', textContent: type === name ? '' : type }), this.motion.play),
-      this.still, this.loading, this.motion.element, ...this.tuning.speeds, this.tuning.element,
-      new Files(mechanism).element);
+      about, this.still, this.motion.element, ...this.tuning.speeds, this.tuning.element, files(mechanism));
     this.element.dataset.key = key;
-  }
-
-  /** Open the foldings that are open in the section that this one replaces. */
-  after(old, built) {
-    this.built = built;
-    const title = folding => folding.firstElementChild.textContent;
-    const open = new Set([...old?.element.querySelectorAll('details[open]') ?? []].map(title));
-    for (const folding of this.element.querySelectorAll('details')) folding.open ||= open.has(title(folding));
-    return this;
+    // Foldings that are open in the section that this one replaces are open here.
+    const openTitles = [...old?.element.querySelectorAll('details[open] > summary') ?? []].map(one => one.textContent);
+    for (const summary of this.element.querySelectorAll('summary')) summary.parentElement.open ||= openTitles.includes(summary.textContent);
   }
 
   get inSight() {
@@ -52,7 +49,6 @@ class Section {
   update(name, value) {
     this.tuning.update(name, value);
     this.motion.renderPlay();
-    this.mechanism.playing = this.motion.playing;
     this.plot.update(name);
   }
 }
@@ -61,29 +57,27 @@ class Section {
 export class Panel {
   /** Calls `light`, and `refuse` with the reason why a joint is not dragged. */
   constructor(place, light, refuse) {
-    Object.assign(this, { place, light, refuse });
-    this.sections = new Map();
-    units.onchange(() => this.render());
+    Object.assign(this, { place, light, refuse, arrows: '', sections: new Map() });
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.render());
-    setInterval(() => this.look(), LOOKS);
+    setInterval(() => this.poll(), POLL);
     document.addEventListener('keydown', event => this.key(event));
   }
 
-  /** Show mechanisms; a section with unchanged settings is reused. */
+  /** Show mechanisms; a section that would be built alike is reused. */
   show(mechanisms, folded) {
     const before = this.sections;
-    this.sections = new Map(mechanisms.map(one => {
-      const built = JSON.stringify([folded, one.title, one.curves, Object.keys(one.inputs), [...one.settings.values()].map(({ value, ...rest }) => rest)]);
-      const old = before.get(one.key);
-      return [one.key, old?.built === built ? old : new Section(one, this, folded).after(old, built)];
+    this.sections = new Map(mechanisms.map(mechanism => {
+      const old = before.get(mechanism.key);
+      return [mechanism.key, old?.form === formOf(mechanism, folded) ? old : new Section(mechanism, this, folded, old)];
     }));
-    for (const [key, section] of before) if (this.sections.get(key) !== section) section.plot.end();
-    const parts = [...this.sections.values()].map(section => section.element);
-    if (parts.length !== this.place.children.length || parts.some((one, i) => one !== this.place.children[i])) {
-      this.place.replaceChildren(...parts);
+    const sections = [...this.sections.values()];
+    for (const section of before.values()) if (!sections.includes(section)) section.plot.end();
+    // What is moved in the document loses its focus.
+    if (sections.length !== before.size || sections.some(({ element: part }, i) => part !== this.place.children[i])) {
+      this.place.replaceChildren(...sections.map(section => section.element));
     }
-    for (const { key, settings } of mechanisms) {
-      for (const { name, value } of settings.values()) this.sections.get(key).update(name, value);
+    for (const section of sections) {
+      for (const { name, value } of section.mechanism.settings.values()) section.update(name, value);
     }
   }
 
@@ -91,16 +85,16 @@ export class Panel {
     this.sections.get(key)?.update(name, value);
   }
 
-  look() {
-    for (const { motion, mechanism, inSight } of this.sections.values()) {
-      if (inSight || mechanism.arrows.kind || !motion.inputs.size) motion.look();
+  poll() {
+    for (const { mechanism, motion, inSight } of this.sections.values()) {
+      if (mechanism.space) continue;
+      if (inSight || this.arrows || !motion.inputs.size) motion.poll(this.arrows);
     }
   }
 
   /** Keep arrows in step with the picture; those of many mechanisms come as often as all else. */
   follow() {
-    if (this.sections.size > 1) return;
-    for (const { motion, mechanism } of this.sections.values()) if (mechanism.arrows.kind) motion.look();
+    if (this.sections.size === 1 && this.arrows) this.poll();
   }
 
   /** Undo by Ctrl-Z, except in a text field. */
@@ -111,8 +105,9 @@ export class Panel {
     this.sections.get(section.dataset.key).tuning.undoing.click();
   }
 
+  /** Request a place of a joint. */
   drag(key, want) {
-    this.sections.get(key)?.motion.drag(want);
+    this.sections.get(key)?.motion.target.offer(want);
   }
 
   lit(key, name) {

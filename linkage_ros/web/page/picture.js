@@ -3,23 +3,23 @@
 
 // The picture: markers to scale, seen at a right angle to the plane of the linkage.
 
+import { put } from './control.js';
 import { figures, units } from './units.js';
 
 const MARGIN = 44;
 /** What is seen is not smaller [m]. */
-const LEAST = 1e-33;
-const LEGEND = 64;
+const MIN_SIZE = 1e-33;
 const SLACK = 0.06;
 const SHRUNK = 10;
 const LINE = 18;
 /** How long a number at the grid may be, and its figures where it would be longer. */
-const [LONGEST, FIGURES] = [10, 6];
+const [MAX_LENGTH, FIGURES] = [10, 6];
 const MARK = 13;
 const ARROW = 90;
 const HEAD = 9;
 /** Where a name is tried: beside its joint from the side away from the middle on, then farther out. */
 const TURNS = [1, 1.9].flatMap(ring => [0, 1, -1, 2, -2, 3, -3, 4].map(eighth => [ring, eighth * Math.PI / 4]));
-const MOST_LINES = 100;
+const MAX_LINES = 100;
 /** The number of coordinates of a line, a triangle, a joint, by the kind of their marker. */
 const PIECE = { lines: 4, slots: 4, plates: 6, triangles: 6, joints: 2 };
 /** A linkage in space is seen from the front, from the right and above. */
@@ -52,13 +52,11 @@ function round(value) {
 export function multiples(step, low, high) {
   const first = Math.ceil(low / step);
   const count = Math.max(0, Math.floor(high / step) - first + 1) || 0;
-  return Array.from({ length: Math.min(count, MOST_LINES) }, (_, i) => (first + i) * step);
+  return Array.from({ length: Math.min(count, MAX_LINES) }, (_, i) => (first + i) * step);
 }
 
-/** A height for a line of text at or below `y` that is clear of the lines at other heights. */
-function below(y, others) {
-  return others.sort((a, b) => a - b).reduce((free, other) => Math.abs(other - free) < LINE ? other + LINE : free, y);
-}
+/** Whether a text or a box is clear of others; `half` and `high` are half of its width and height. */
+const isClear = (one, others) => others.every(other => Math.abs(other.x - one.x) >= other.half + one.half || Math.abs(other.y - one.y) >= other.high + one.high);
 
 /** How far a text is from a place. */
 const apart = ({ x, y, half, high }, [left, top]) => Math.hypot(
@@ -115,15 +113,18 @@ export class Picture {
     this.canvas = canvas;
     this.context = canvas.getContext('2d');
     this.named = true;
+    /** The kind of arrows, or none. */
+    this.kind = '';
     /** The view; see view.js. */
     this.view = null;
     this.mechanisms = [];
     this.boxes = new Map();
     /** The shift of each frame: mechanisms in different frames are drawn side by side. */
     this.asides = new Map();
-    /** The mechanism and the dimension whose bars are lit, and the line of a joint that is pulled. */
+    /** The mechanism and the dimension whose bars are lit, and the pointer that drags a joint. */
     this.lit = { mechanism: null, dimension: '' };
-    this.pull = () => null;
+    this.drag = null;
+    this.legend = document.getElementById('legend');
   }
 
   show(mechanisms) {
@@ -150,18 +151,17 @@ export class Picture {
     const shapes = this.shapes();
     if (!shapes.length) return;
     // The picture is not refitted while a joint is dragged.
-    if (!this.scale || !this.pull()) this.fit(shapes, width, height);
+    if (!this.scale || !this.drag.line) this.fit(shapes, width, height);
     if (!this.view.turned && !this.mechanisms[0].space) this.grid(width, height);
     this.planes();
     // Slots are drawn first, so that they do not hide bars.
-    const drawn = kind => shapes.filter(({ look }) => look.kind === kind);
-    shapes.sort((a, b) => a.depth - b.depth);
-    const [slots, joints] = ['slots', 'joints'].map(drawn);
-    for (const shape of [...slots, ...shapes.filter(one => !slots.includes(one) && !joints.includes(one))]) this[shape.look.kind](shape);
+    const rank = ({ kind }) => kind === 'slots' ? 0 : kind === 'joints' ? 2 : 1;
+    shapes.sort((a, b) => rank(a) - rank(b) || a.depth - b.depth);
+    for (const shape of shapes.filter(one => rank(one) < 2)) this[shape.kind](shape);
     this.light();
-    for (const shape of joints) this.joints(shape);
+    for (const shape of shapes.filter(one => rank(one) === 2)) this.joints(shape);
     this.arrows();
-    this.ghost();
+    this.dragLine();
     if (this.named && this.mechanisms.length === 1) this.names(shapes);
     if (this.mechanisms.length > 1) this.titles();
   }
@@ -171,20 +171,21 @@ export class Picture {
     const shapes = [];
     this.seen = null;
     for (const mechanism of this.mechanisms) {
-      for (const { look, points } of mechanism.markers.values()) {
-        const [x, y, z] = axes(look.pose);
+      for (const marker of [...mechanism.markers.values()].flat()) {
+        const { points, pose, frame } = marker;
+        const [x, y, z] = axes(pose);
         this.seen ??= this.view.axes(mechanism.space ? OBLIQUE : { right: x, up: y, out: z });
-        const depth = dot(this.seen.out, look.pose.slice(0, 3));
+        const depth = dot(this.seen.out, pose.slice(0, 3));
         const map = [this.seen.right, this.seen.up].map(way => [
-          dot(way, x), dot(way, y), dot(way, z), dot(way, look.pose.slice(0, 3))]);
-        map[0][3] += this.asides.get(look.frame) ?? 0;
+          dot(way, x), dot(way, y), dot(way, z), dot(way, pose.slice(0, 3))]);
+        map[0][3] += this.asides.get(frame) ?? 0;
         const places = new Float64Array(points.length / 3 * 2);
         for (let from = 0, to = 0; from < points.length; from += 3) {
           for (const [a, b, c, d] of map) {
             places[to++] = a * points[from] + b * points[from + 1] + c * points[from + 2] + d;
           }
         }
-        shapes.push({ mechanism, look, points, places, map, depth });
+        shapes.push({ mechanism, ...marker, places, map, depth });
       }
     }
     return shapes;
@@ -193,14 +194,15 @@ export class Picture {
   /** Choose scale and place so that everything is visible, and steady during the motion. */
   fit(shapes, width, height) {
     const now = new Map();
+    const frames = new Map();
     this.maps = new Map();
-    for (const { mechanism: { key, space }, points, map } of shapes) {
+    for (const { mechanism: { key, space }, frame, points, map } of shapes) {
+      frames.set(key, frame);
       if (!now.has(key)) now.set(key, new Box(space ? 3 : 2));
       for (let i = 0; i < points.length; i += 3) now.get(key).add(points[i], points[i + 1], points[i + 2]);
       this.maps.set(key, map);
     }
     const all = new Box();
-    const frames = new Map(shapes.map(({ mechanism: { key }, look }) => [key, look.frame]));
     const inFrames = new Map();
     for (const [key, box] of now) {
       const empty = new Box(box.low.length);
@@ -216,7 +218,7 @@ export class Picture {
       }
     }
     this.setAside(inFrames);
-    const span = [0, 1].map(i => Math.max(all.high[i] - all.low[i], LEAST));
+    const span = [0, 1].map(i => Math.max(all.high[i] - all.low[i], MIN_SIZE));
     this.scale = Math.min((width - 2 * MARGIN) / span[0], (height - 2 * MARGIN) / span[1]);
     this.middle = [0, 1].map(i => (all.high[i] + all.low[i]) / 2);
     this.scale *= this.view.zoom;
@@ -275,7 +277,7 @@ export class Picture {
     const digits = Math.max(0, -Math.floor(Math.log10(step * factor) + 1e-9));
     const said = value => {
       const text = (value * factor).toFixed(digits);
-      return text.length < LONGEST ? text : figures(value * factor, FIGURES);
+      return text.length < MAX_LENGTH ? text : figures(value * factor, FIGURES);
     };
     // One mechanism is seen in its own plane, in which its outputs count; several in the scene's frame.
     const [one, ...others] = this.maps.values();
@@ -313,17 +315,17 @@ export class Picture {
     this.context.stroke();
   }
 
-  locus({ look, places }) {
-    this.stroke(look, places, places.length, colour(look.colour), 1.5);
+  locus({ width, places, colour: rgba }) {
+    this.stroke(width, places, places.length, colour(rgba), 1.5);
   }
 
   /** Curves as a list of lines. */
-  loci({ look, places }) {
-    this.stroke(look, places, PIECE.lines, colour(look.colour), 1.5);
+  loci({ width, places, colour: rgba }) {
+    this.stroke(width, places, PIECE.lines, colour(rgba), 1.5);
   }
 
   /** Draw lines through places, so many coordinates each; return their width. */
-  stroke({ width }, places, size, style, least = 2) {
+  stroke(width, places, size, style, least = 2) {
     const { context } = this;
     context.lineWidth = Math.max(least, width * this.scale);
     context.strokeStyle = style;
@@ -335,10 +337,10 @@ export class Picture {
   }
 
   /** Call back with each leg's part of a shape, the last pair first, and its closeness to the front. */
-  legs({ mechanism, look, places }, draw) {
+  legs({ mechanism, kind, places }, draw) {
     const { pairs, legs } = mechanism;
     const size = places.length / legs;
-    if (size % PIECE[look.kind]) return draw(places, 0);
+    if (size % PIECE[kind]) return draw(places, 0);
     for (let leg = legs - 1; leg >= 0; leg--) {
       const pair = Math.floor(leg * pairs / legs);
       draw(places.subarray(leg * size, (leg + 1) * size), pairs > 1 ? 1 - pair / (pairs - 1) : 0);
@@ -346,13 +348,13 @@ export class Picture {
   }
 
   lines(shape) {
-    this.legs(shape, (places, front) => this.stroke(shape.look, places, PIECE.lines, colour(shape.look.colour, front)));
+    this.legs(shape, (places, front) => this.stroke(shape.width, places, PIECE.lines, colour(shape.colour, front)));
   }
 
   /** Draw slots hollow. */
   slots(shape) {
     this.legs(shape, (places, front) => {
-      const inner = this.stroke(shape.look, places, PIECE.slots, colour(shape.look.colour, front)) - 4;
+      const inner = this.stroke(shape.width, places, PIECE.slots, colour(shape.colour, front)) - 4;
       if (inner <= 0) return;
       this.context.strokeStyle = paint('--paper');
       this.context.lineWidth = inner;
@@ -363,19 +365,19 @@ export class Picture {
   /** Draw plates pale between their bars. */
   plates(shape) {
     const { context } = this;
-    context.fillStyle = mixed(shape.look.colour, 0.8, 'paper');
+    context.fillStyle = mixed(shape.colour, 0.8, 'paper');
     this.legs(shape, (places, front) => {
       this.fill(places, () => 1);
       context.lineWidth = Math.max(2, shape.mechanism.width * this.scale);
       context.lineJoin = 'round';
-      context.strokeStyle = colour(shape.look.colour, front);
+      context.strokeStyle = colour(shape.colour, front);
       context.stroke();
     });
   }
 
   /** Draw the marks of ground joints, which stay visible below them at any scale. */
   triangles(shape) {
-    this.context.fillStyle = colour(shape.look.colour);
+    this.context.fillStyle = colour(shape.colour);
     this.legs(shape, places => this.fill(places, size => Math.max(1, MARK / size)));
   }
 
@@ -395,11 +397,11 @@ export class Picture {
 
   joints(shape) {
     const { context } = this;
-    const radius = Math.max(3, shape.look.width * this.scale / 2);
+    const radius = Math.max(3, shape.width * this.scale / 2);
     context.lineWidth = Math.max(1.5, radius / 2.5);
     context.fillStyle = paint('--paper');
     this.legs(shape, (places, front) => {
-      context.strokeStyle = colour(shape.look.colour, front);
+      context.strokeStyle = colour(shape.colour, front);
       for (let i = 0; i < places.length; i += 2) {
         context.beginPath();
         context.arc(...this.at(places[i], places[i + 1]), radius - context.lineWidth / 2, 0, 2 * Math.PI);
@@ -425,12 +427,12 @@ export class Picture {
     context.font = `600 ${FONT}`;
     context.textAlign = 'center';
     context.textBaseline = 'middle';
-    for (const { mechanism, look, places } of shapes) {
+    for (const { mechanism, kind, width, places } of shapes) {
       const names = mechanism.points;
-      if (look.kind !== 'joints' || places.length !== 2 * names.length) continue;
+      if (kind !== 'joints' || places.length !== 2 * names.length) continue;
       const seen = names.map((name, i) => this.at(places[2 * i], places[2 * i + 1]));
       const middle = [0, 1].map(i => seen.reduce((sum, at) => sum + at[i], 0) / seen.length);
-      const away = look.width * this.scale / 2 + 12;
+      const away = width * this.scale / 2 + 12;
       const written = seen.map(([x, y]) => ({ x, y, half: 5, high: 5 }));
       names.forEach((whole, i) => {
         if (!this.isSeen(...seen[i])) return;
@@ -440,7 +442,7 @@ export class Picture {
         const tried = TURNS.map(([ring, turn]) => this.inside({
           x: seen[i][0] + Math.cos(start + turn) * (ring * away + half - 5), y: seen[i][1] + Math.sin(start + turn) * ring * away, half, high: 8,
         }));
-        const free = tried.filter(at => written.every(other => Math.abs(other.x - at.x) > other.half + half || Math.abs(other.y - at.y) > other.high + 8));
+        const free = tried.filter(place => isClear(place, written));
         // A name beside another's joint would be taken for that one's.
         const own = free.find(at => seen.every(joint => apart(at, joint) >= apart(at, seen[i])));
         const place = own ?? free[0] ?? tried[0];
@@ -475,25 +477,32 @@ export class Picture {
     context.font = `600 ${FONT}`;
     context.textAlign = 'center';
     context.textBaseline = 'top';
+    const boxes = new Map(this.mechanisms.filter(({ key }) => this.boxes.has(key)).map(({ key }) => {
+      const corners = this.corners(key, this.boxes.get(key)).map(corner => this.at(...corner));
+      const [[left, right], [top, bottom]] = [0, 1].map(i => corners.map(corner => corner[i])).map(all => [Math.min(...all), Math.max(...all)]);
+      return [key, { x: (left + right) / 2, y: (top + bottom) / 2, half: (right - left) / 2, high: (bottom - top) / 2 }];
+    }));
     const written = [];
     for (const { key, title } of this.mechanisms) {
-      const box = this.boxes.get(key);
-      if (!box) continue;
+      if (!boxes.has(key)) continue;
+      const { x, y, high } = boxes.get(key);
       const name = this.shortened(title);
       const half = context.measureText(name).width / 2 + 4;
-      const corners = this.corners(key, box).map(corner => this.at(...corner));
-      const middle = corners.reduce((sum, [one]) => sum + one / corners.length, 0);
-      const { x } = this.isSeen(middle, 0) ? this.inside({ x: middle, y: 0, half, high: 0 }) : { x: middle };
-      const beside = written.filter(other => Math.abs(other.x - x) < other.half + half);
-      const y = below(Math.max(...corners.map(([, one]) => one)), beside.map(other => other.y));
-      written.push({ x, y, half });
-      if (y + LINE < this.canvas.clientHeight) this.text(name, x, y);
+      const at = middle => ({ x: this.isSeen(x, 0) ? this.inside({ x, y: 0, half, high: 0 }).x : x, y: middle, half, high: LINE / 2 });
+      const below = Array.from({ length: 2 * this.mechanisms.length }, (_, line) => at(y + high + (line + 0.5) * LINE));
+      const free = [below[0], at(y - high - LINE / 2), ...below.slice(1)].filter(place => (
+        isClear(place, written) && place.y > LINE / 2 && place.y + LINE / 2 < this.canvas.clientHeight));
+      // A title on another mechanism would be taken for that one's.
+      const place = free.find(one => isClear(one, [...boxes.values()])) ?? free[0];
+      if (!place) continue;
+      written.push(place);
+      this.text(name, place.x, place.y - LINE / 2);
     }
   }
 
   /** Return the joints of each leg by name, in pixels of the view. */
   legsSeen() {
-    return this.shapes().filter(({ look }) => look.kind === 'joints').flatMap(({ mechanism, places, map }) => {
+    return this.shapes().filter(({ kind }) => kind === 'joints').flatMap(({ mechanism, places, map }) => {
       const names = mechanism.points;
       if (!this.scale || places.length !== 2 * names.length * mechanism.legs) return [];
       return Array.from({ length: mechanism.legs }, (_, leg) => ({
@@ -534,16 +543,19 @@ export class Picture {
     const length = Math.min(ARROW, canvas.clientHeight / 6);
     context.strokeStyle = context.fillStyle = paint('--ink');
     context.lineWidth = 2;
+    let legend = '';
     for (const { mechanism: { arrows }, leg, map, seen } of this.legsSeen()) {
-      const at = Object.entries(arrows.at).filter(([joint, [x]]) => arrows.kind && !leg && x !== null && seen.has(joint));
+      if (!this.kind || leg) continue;
+      const at = Object.entries(arrows.at).filter(([joint, [x]]) => x !== null && seen.has(joint));
       const most = Math.max(0, ...at.map(([, way]) => Math.hypot(...way)));
       const [longest] = at.find(([, way]) => Math.hypot(...way) === most) ?? [];
       for (const [joint, [x, y]] of most ? at : []) {
         const [right, up] = map.map(([a, b]) => (a * x + b * y) * length / most);
         this.arrow(seen.get(joint), [right, -up]);
       }
-      if (this.mechanisms.length === 1 && arrows.kind && !leg) this.legend(arrows, longest, most);
+      if (this.mechanisms.length === 1) legend = this.explained(arrows, longest, most);
     }
+    put(this.legend, { textContent: legend });
   }
 
   arrow([x, y], way) {
@@ -559,41 +571,24 @@ export class Picture {
     context.fill();
   }
 
-  /** Write the value of the longest arrow, and the efforts that balance the loads. */
-  legend({ kind, unit, efforts = {} }, joint, most) {
+  /** The value of the longest arrow, and the efforts that balance the loads, in words. */
+  explained({ unit, efforts = {} }, joint, most) {
     const { name, factor } = units.of(unit);
     const figure = value => value === null ? 'without bound' : figures(value, 3);
     const holds = Object.entries(efforts).map(([input, [value, of]]) => `, the ${input} holds ${figure(value)} ${of}`);
-    this.context.font = FONT;
-    this.context.textAlign = 'left';
-    this.context.textBaseline = 'top';
-    const words = joint ? `longest ${kind}: ${figure(most * factor)} ${name} at ${joint}${holds.join('')}`
-      : kind === 'force' ? `no loads on its joints${holds.join('')}` : `no ${kind}`;
-    this.broken(words, this.canvas.clientWidth - LEGEND).forEach((line, i) => this.text(line, LEGEND, 12 + i * LINE));
-  }
-
-  /** Break a text into lines of a width, at spaces or, in a word that is too long, anywhere. */
-  broken(words, width) {
-    const lines = [''];
-    const has = text => this.context.measureText(text).width < width;
-    for (const word of words.split(/(?<= )/)) {
-      for (const part of has(word) ? [word] : word) {
-        if (has(lines.at(-1) + part)) lines.push(lines.pop() + part);
-        else lines.push(part);
-      }
-    }
-    return lines;
+    return joint ? `longest ${this.kind}: ${figure(most * factor)} ${name} at ${joint}${holds.join('')}`
+      : this.kind === 'force' ? `no loads on its joints${holds.join('')}` : `no ${this.kind}`;
   }
 
   /** Draw a line from the dragged joint to the pointer. */
-  ghost() {
-    const pull = this.pull();
-    if (!pull) return;
+  dragLine() {
+    const { line } = this.drag;
+    if (!line) return;
     const { context } = this;
     context.setLineDash([6, 6]);
     context.lineWidth = 2;
     context.strokeStyle = paint('--faint');
-    this.line(...pull.flat());
+    this.line(...line.flat());
     context.setLineDash([]);
   }
 }

@@ -64,14 +64,14 @@ function path(plot) {
 
 export class Plot {
   constructor(mechanism, motion) {
-    Object.assign(this, { mechanism, motion, chosen: {}, sight: '' });
+    Object.assign(this, { mechanism, motion, chosen: {}, fixed: '' });
     this.kind = this.choice('Quantity', Object.keys(mechanism.curves));
     this.output = this.choice('Output', []);
     this.other = element('input', { type: 'text', placeholder: 'distance(A,C)', ariaLabel: 'Another output', onchange: () => {
       this.chosen[this.about] = this.other.value.trim() || undefined;
       this.refresh();
     } });
-    this.enlarging = button('Enlarge', () => this.enlarge());
+    const enlarging = button('Enlarge', () => this.element.requestFullscreen(), { hidden: !document.fullscreenEnabled });
     this.now = element('div', { className: 'now' });
     this.place = element('div', { className: 'plot', tabIndex: 0, ariaLabel: 'No curve yet' });
     this.place.setAttribute('role', 'img');
@@ -79,13 +79,9 @@ export class Plot {
     this.marks = element('p', { className: 'answer' });
     this.reason = new Reason();
     this.element = element('details', { hidden: !this.kind.options.length }, element('summary', { textContent: 'Plot' }),
-      element('div', { className: 'tools' }, this.kind, this.output, this.other, this.enlarging), this.reason.line, this.place, this.read, this.marks);
-    this.element.ontoggle = () => {
-      if (!this.element.open) this.enlarge(false);
-      this.refresh();
-    };
-    this.element.onkeydown = ({ key }) => { if (key === 'Escape') this.enlarge(false); };
-    this.asked = new Newest(() => this.ask());
+      element('div', { className: 'tools' }, this.kind, this.output, this.other, enlarging), this.reason.line, this.place, this.read, this.marks);
+    this.element.ontoggle = () => this.refresh();
+    this.requests = new Newest(() => this.request());
     new ResizeObserver(() => {
       if (this.element.open) this.plot?.setSize(this.size);
     }).observe(this.place);
@@ -93,12 +89,6 @@ export class Plot {
 
   get size() {
     return { width: this.place.clientWidth, height: this.place.clientHeight };
-  }
-
-  /** Enlarge the plot to the window, or shrink it again. */
-  enlarge(large = !this.element.classList.contains('large')) {
-    this.element.classList.toggle('large', large);
-    this.enlarging.textContent = large ? 'Back' : 'Enlarge';
   }
 
   choice(ariaLabel, names) {
@@ -119,7 +109,7 @@ export class Plot {
 
   /** Request the curve again. */
   refresh() {
-    if (this.element.open && this.about) this.asked.offer();
+    if (this.element.open && this.about) this.requests.offer();
   }
 
   /** Update the plot after a change of a parameter. */
@@ -129,7 +119,7 @@ export class Plot {
     else if (group !== 'starts') this.refresh();
   }
 
-  async ask() {
+  async request() {
     const { kind: { value: kind }, about } = this;
     const [answer] = await Promise.all([this.mechanism.ask('curve', { kind, output: this.chosen[about] }), library()]);
     this.reason.say(answer.reason);
@@ -150,7 +140,7 @@ export class Plot {
     const { kind, input, output, units: [across, up], power, x, y, ends, dead } = this.curve;
     this.units = [units.of(across), units.of(up)];
     const [{ name: acrossName, factor: wide }, { name: upName, factor: high }] = this.units;
-    const { speed } = this.motion;
+    const { speed } = this.mechanism.inputs[input];
     const title = `${kind} of ${output}${power ? ` with the ${input} at ${shown(speed * wide)} ${acrossName}/s` : ''}`;
     this.data = [x.map(value => value * wide), y.map(value => value === null ? null : value * high * speed ** power)];
     this.bounds = bounds(this.data[1]);
@@ -166,7 +156,7 @@ export class Plot {
       this.plot.setData(this.data);
     }
     this.describe(title, upName, labels[0]);
-    this.look();
+    this.follow();
   }
 
   /** Describe the plot in words. */
@@ -199,7 +189,7 @@ export class Plot {
         { ...axis(across), size: 24, ...(this.units[0].name === '°' && { incrs: DEGREES }) },
         { ...axis(up), size: (_, values) => 10 + DIGIT * Math.max(2, ...(values ?? []).map(text => text.length)) },
       ],
-      hooks: { drawAxes: [plot => this.mark(plot)], setCursor: [() => this.look()] },
+      hooks: { drawAxes: [plot => this.mark(plot)], setCursor: [() => this.follow()] },
     };
   }
 
@@ -231,7 +221,7 @@ export class Plot {
 
   /** Move the input to the place where the pointer is pressed or dragged. */
   hold(over) {
-    const move = ({ offsetX }) => this.motion.drag({
+    const move = ({ offsetX }) => this.motion.target.offer({
       output: this.curve.input, value: this.plot.posToVal(offsetX, 'x') / this.units[0].factor,
     });
     over.onpointerdown = event => {
@@ -242,13 +232,14 @@ export class Plot {
   }
 
   /** Mark the present input, and print the value there or at the pointer. */
-  look() {
+  follow() {
     if (!this.element.open || !this.curve) return;
     const [present, ...others] = this.motion.present;
     if (present === undefined) return;
-    const sight = others.map(value => value.toPrecision(6)).join();
-    if (sight !== this.sight) this.refresh();
-    this.sight = sight;
+    // The curve is that of the other inputs' values.
+    const fixed = others.map(value => value.toPrecision(6)).join();
+    if (fixed !== this.fixed) this.refresh();
+    this.fixed = fixed;
     const here = this.inside(present * this.units[0].factor);
     const left = this.plot.valToPos(here, 'x');
     this.now.style.transform = `translateX(${left}px)`;

@@ -3,10 +3,11 @@
 
 // The parameters of a mechanism: a control for each, undo and reset, and its scene as a file.
 
-import { button, Choice, element, Reason, Slider, Switch } from './control.js';
+import { button, Choice, element, Reason, Slider } from './control.js';
 import { download } from './files.js';
 
 const RESTED = 300;
+const SWITCH = [[true, 'yes'], [false, 'no']];
 
 /** A parameter's name without the part that its group in the panel implies. */
 function labelled({ name, group }, inputs) {
@@ -45,16 +46,16 @@ export class Tuning {
 
   control(setting) {
     const { name, kind, group, meaning, allowed } = setting;
-    const [, second] = name.split('.');
-    const described = {
+    const description = {
       ...setting, label: labelled(setting, Object.keys(this.mechanism.inputs).length), title: `${meaning}\nAllowed: ${allowed}.`,
       // A dimension is displayed with its length in the picture.
-      times: () => group === 'dimensions' ? this.mechanism.value('scale') ?? 1 : 1,
+      times: () => group === 'dimensions' ? this.mechanism.value('scale') : 1,
     };
-    const request = (...about) => this.set(name, ...about);
-    if (group === 'branches') return new Choice(described, this.mechanism.sides[second], request);
-    if (kind === 'bool') return new Switch(described, request);
-    const slider = new Slider(described, request);
+    const request = (value, gesture, before) => this.set(name, value, gesture, before);
+    const sides = this.mechanism.sides[name.split('.')[1]];
+    if (group === 'branches') return new Choice(description, [[1, sides[0]], [-1, sides[1]]], request);
+    if (kind === 'bool') return new Choice(description, SWITCH, request);
+    const slider = new Slider(description, request);
     if (group === 'dimensions') this.lights(name, slider);
     return slider;
   }
@@ -67,38 +68,38 @@ export class Tuning {
 
   async set(name, value, gesture, before) {
     const answer = await this.mechanism.ask('set', { values: { [name]: value } });
-    if (!answer.reason && before !== value) this.mechanism.history.remember(name, before, gesture);
+    if (!answer.reason && before !== value) this.mechanism.remember(name, before, gesture);
     this.renderTools();
     return answer;
   }
 
   async undo() {
-    const { steps } = this.mechanism.history;
+    const { steps } = this.mechanism;
     const step = steps.pop();
     if (step && !await this.put(step.values)) steps.push(step);
     this.renderTools();
   }
 
   async reset() {
-    const { history } = this.mechanism;
-    const [values, before] = history.changes();
-    if (await this.put(values)) history.steps.push({ values: before });
+    const { changed, first, steps } = this.mechanism;
+    const values = from => Object.fromEntries(changed.map(name => [name, from(name)]));
+    const before = values(name => this.mechanism.value(name));
+    if (await this.put(values(name => first.get(name)))) steps.push({ values: before });
     this.renderTools();
   }
 
   /** Set several values at once; return whether they were accepted. */
   async put(values) {
     const { reason } = await this.mechanism.ask('set', { values });
-    this.reason.say(reason && `Refused: ${reason}`);
-    for (const name of Object.keys(values)) this.controls.get(name)?.reason.say('');
+    this.reason.refuse(reason);
+    for (const name of Object.keys(values)) this.controls.get(name)?.reason.say();
     return !reason;
   }
 
   async save() {
-    const { name, playing } = this.mechanism;
-    const { reason, text } = await this.mechanism.ask('save', { values: playing });
+    const { reason, text } = await this.mechanism.ask('save');
     this.reason.say(reason && `Not saved: ${reason}`);
-    if (text) download(`${name}.yaml`, text);
+    if (text) download(`${this.mechanism.name}.yaml`, text);
   }
 
   /** Update the ranges of dimensions, once no slider is held. */
@@ -118,15 +119,14 @@ export class Tuning {
   update(name, value) {
     this.controls.get(name)?.update(value);
     if (name === 'scale') this.render();
-    if (!this.mechanism.history.first.has(name)) return;
+    if (!this.mechanism.first.has(name)) return;
     this.refresh();
     this.renderTools();
   }
 
   renderTools() {
-    const { steps } = this.mechanism.history;
-    this.undoing.disabled = !steps.length;
-    this.resetting.disabled = !Object.keys(this.mechanism.history.changes()[0]).length;
+    this.undoing.disabled = !this.mechanism.steps.length;
+    this.resetting.disabled = !this.mechanism.changed.length;
   }
 
   /** Light up the slider of a dimension. */

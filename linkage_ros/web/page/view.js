@@ -6,16 +6,16 @@
 const PIXELS_A_RADIAN = 200;
 const STEP = 40;
 const ZOOM = 1.2;
-const [LEAST, MOST] = [0.05, 200];
+const [MIN_ZOOM, MAX_ZOOM] = [0.05, 200];
 const WHOLE = { zoom: 1, shift: [0, 0], yaw: 0, pitch: 0 };
 const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 const middle = points => [0, 1].map(i => points.reduce((sum, at) => sum + at[i], 0) / points.length);
 
 export class View {
-  /** Calls `changed()`; leaves alone what `busy()` says that somebody else drags; begins as `from`. */
-  constructor(canvas, busy, from, changed) {
-    Object.assign(this, { canvas, busy, changed, pointers: new Map(), ...WHOLE, ...from });
+  /** Begins as `from`, and calls `changed()`. */
+  constructor(canvas, from, changed) {
+    Object.assign(this, { canvas, changed, pointers: new Map(), ...WHOLE, ...from });
     canvas.addEventListener('pointerdown', event => this.press(event));
     canvas.addEventListener('pointermove', event => this.move(event));
     for (const end of ['pointerup', 'pointercancel']) {
@@ -57,12 +57,12 @@ export class View {
     return { right: mix(right, c, out, -s), up: mix(up, e, towards, -f), out: mix(towards, e, up, f) };
   }
 
-  /** Zoom by a factor about a place in the canvas. */
+  /** Zoom by a factor about a place in the canvas, by default its middle. */
   magnify(factor, at) {
-    const zoom = Math.min(Math.max(this.zoom * factor, LEAST), MOST);
+    const zoom = Math.min(Math.max(this.zoom * factor, MIN_ZOOM), MAX_ZOOM);
     const real = zoom / this.zoom;
     const centre = [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2];
-    this.shift = this.shift.map((shift, i) => (at[i] - centre[i]) * (1 - real) + shift * real);
+    this.shift = this.shift.map((shift, i) => ((at ?? centre)[i] - centre[i]) * (1 - real) + shift * real);
     this.zoom = zoom;
     this.changed();
   }
@@ -79,7 +79,7 @@ export class View {
   }
 
   press(event) {
-    if (this.busy()) return;
+    if (event.isTaken) return;
     this.pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
     this.canvas.setPointerCapture(event.pointerId);
   }
@@ -107,7 +107,7 @@ export class View {
     const zoom = { '+': ZOOM, '=': ZOOM, '-': 1 / ZOOM }[event.key];
     if (way && event.shiftKey) this.turn(...way);
     else if (way) this.pan(...way);
-    else if (zoom) this.magnify(zoom, [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2]);
+    else if (zoom) this.magnify(zoom);
     else if (event.key === '0') this.reset();
     else return;
     event.preventDefault();

@@ -6,19 +6,22 @@
 const GRAB = { mouse: 16, touch: 28 };
 const BAR = 9;
 
-/** How far a point is from a line between two others. */
+/** The distance of a point from a line between two others. */
 function distance([x, y], [ax, ay], [bx, by]) {
   const along = [bx - ax, by - ay];
   const part = ((x - ax) * along[0] + (y - ay) * along[1]) / (along[0] ** 2 + along[1] ** 2 || 1);
-  const near = Math.min(Math.max(part, 0), 1);
-  return Math.hypot(x - ax - near * along[0], y - ay - near * along[1]);
+  const nearest = Math.min(Math.max(part, 0), 1);
+  return Math.hypot(x - ax - nearest * along[0], y - ay - nearest * along[1]);
 }
 
-export class Hand {
+/** The first candidate with the least distance, if that is in reach. */
+const closest = (candidates, reach) => candidates.filter(({ away }) => away <= reach).sort((a, b) => a.away - b.away)[0] ?? null;
+
+export class PointerDrag {
   /** Calls `drag(mechanism, want)`, `light(mechanism, dimension)` and `choose(mechanism, dimension)`. */
   constructor(picture, calls) {
     Object.assign(this, calls, { picture, canvas: picture.canvas, grabbed: null });
-    this.canvas.addEventListener('pointerdown', event => this.grab(event));
+    this.canvas.addEventListener('pointerdown', event => this.press(event));
     this.canvas.addEventListener('pointermove', event => this.move(event));
     this.canvas.addEventListener('pointerleave', () => this.light(null, ''));
     this.canvas.addEventListener('click', event => this.click(event));
@@ -29,40 +32,31 @@ export class Hand {
 
   /** The joint that is nearest to a pointer, of those that can be moved. */
   joint([x, y], reach) {
-    let best = null;
-    for (const leg of this.picture.legsSeen()) {
-      if (leg.mechanism.space) continue;
-      for (const [name, at] of leg.seen) {
-        const away = Math.hypot(at[0] - x, at[1] - y);
-        if (leg.mechanism.tunable.fixed.includes(name) || away > reach || best?.away < away) continue;
-        best = { ...leg, joint: name, away };
-      }
-    }
-    return best;
+    return closest(this.picture.legsSeen().filter(({ mechanism }) => !mechanism.space).flatMap(
+      leg => [...leg.seen].filter(([joint]) => !leg.mechanism.tunable.fixed.includes(joint)).map(
+        ([joint, at]) => ({ ...leg, joint, away: Math.hypot(at[0] - x, at[1] - y) }))), reach);
   }
 
   /** The bar that is nearest to a pointer, with the dimension that determines it. */
   bar(pointer) {
-    let best = null;
-    for (const { mechanism, seen } of this.picture.legsSeen()) {
-      for (const [dimension, pairs] of Object.entries(mechanism.tunable.bars)) {
-        for (const [a, b] of pairs) {
-          if (!seen.has(a) || !seen.has(b)) continue;
-          const away = distance(pointer, seen.get(a), seen.get(b)) + pairs.length / 100;
-          if (away <= BAR && !(best?.away <= away)) best = { mechanism, dimension, away };
-        }
-      }
-    }
-    return best;
+    // Of dimensions that determine the same bar, the one that determines the fewest others.
+    return closest(this.picture.legsSeen().flatMap(
+      ({ mechanism, seen }) => Object.entries(mechanism.tunable.bars).flatMap(
+        ([dimension, pairs]) => pairs.filter(pair => pair.every(joint => seen.has(joint))).map(([a, b]) => (
+          { mechanism, dimension, away: distance(pointer, seen.get(a), seen.get(b)) + pairs.length / 100 })))), BAR);
   }
 
-  grab({ offsetX, offsetY, button, pointerId, pointerType }) {
-    const pointer = this.pressed = [offsetX, offsetY];
+  press(event) {
+    const { offsetX, offsetY, button, pointerId, pointerType } = event;
+    this.pressed = [offsetX, offsetY];
     // Another finger zooms, or holds a joint; another button turns.
-    if (button || this.grabbed || this.picture.view.pointers.size) return;
-    const found = this.joint(pointer, GRAB[pointerType] ?? GRAB.mouse);
-    if (!found) return;
-    this.grabbed = { key: found.mechanism.key, leg: found.leg, joint: found.joint, pointer, pointerId };
+    if (!button && !this.grabbed && !this.picture.view.pointers.size) {
+      const joint = this.joint(this.pressed, GRAB[pointerType] ?? GRAB.mouse);
+      if (joint) this.grabbed = { key: joint.mechanism.key, leg: joint.leg, joint: joint.joint, pointer: this.pressed, pointerId };
+    }
+    if (!this.grabbed) return;
+    // The view leaves it alone.
+    event.isTaken = true;
     this.canvas.setPointerCapture(pointerId);
   }
 
@@ -86,22 +80,22 @@ export class Hand {
     }
     if (event.pointerId !== this.grabbed.pointerId) return;
     this.grabbed.pointer = pointer;
-    const held = this.held();
-    if (!held) return;
-    const place = this.picture.inPlane(held.map, ...this.picture.from(...pointer));
+    const dragged = this.dragged;
+    if (!dragged) return;
+    const place = this.picture.inPlane(dragged.map, ...this.picture.from(...pointer));
     const { joint, leg } = this.grabbed;
-    if (place.every(Number.isFinite)) this.drag(held.mechanism, { joint, leg, place });
+    if (place.every(Number.isFinite)) this.drag(dragged.mechanism, { joint, leg, place });
   }
 
   /** The leg whose joint is dragged. */
-  held() {
+  get dragged() {
     return this.grabbed && this.picture.legsSeen().find(
       ({ mechanism, leg }) => mechanism.key === this.grabbed.key && leg === this.grabbed.leg);
   }
 
   /** The ends of the line from the dragged joint to the pointer. */
-  get pull() {
-    const from = this.held()?.seen.get(this.grabbed.joint);
+  get line() {
+    const from = this.dragged?.seen.get(this.grabbed.joint);
     return from ? [from, this.grabbed.pointer] : null;
   }
 }
