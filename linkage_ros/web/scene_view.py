@@ -502,20 +502,19 @@ class SceneView:
 
     def _notice(self, event: ParameterEvent) -> None:
         """Adopt announced values, and forward those that have changed to the pages."""
+        values = self._announced.setdefault(event.node, {})
+        before = dict(values)
         if event.new_parameters:
-            self._announced[event.node] = {}
-            self._scenes.pop(event.node, None)
-        values, changed = self._announced.setdefault(event.node, {}), set()
+            values.clear()
         for parameter in (*event.new_parameters, *event.changed_parameters):
             # Any node may announce values of unknown types.
             with suppress(RuntimeError):
-                value = scene.plain(parameter_value_to_python(parameter.value))
-                if parameter.name not in values:
-                    self._is_stale = True
-                    self._news.set()
-                if value != values.get(parameter.name):
-                    changed.add(parameter.name)
-                    values[parameter.name] = value
+                values[parameter.name] = scene.plain(parameter_value_to_python(parameter.value))
+        changed = {name for name, value in values.items() if value != before.get(name)}
+        if values.keys() != before.keys():
+            self._scenes.pop(event.node, None)
+            self._is_stale = True
+            self._news.set()
         for mechanism in self._mechanisms.values():
             settings = [setting for setting in mechanism.settings.values()
                         if setting.node == event.node and setting.full_name in changed]

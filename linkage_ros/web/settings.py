@@ -13,11 +13,10 @@
 from dataclasses import dataclass
 import math
 import sys
-from typing import Any, Callable, Mapping, Optional, Union
+from typing import Any, Mapping, Optional, Union
 
 from .. import scene
 from ..nodes.parameters import typed
-from ..words import quoted
 
 Ends = Optional[tuple[Union[int, float], Union[int, float]]]
 
@@ -60,26 +59,17 @@ class Setting:
 
     def parameter(self, value: Any) -> Any:
         """Return a parameter message with a value from JSON; ValueError if it is not allowed."""
-        name, kind = self.full_name, self.field.kind
-        if kind not in ALLOWS:
+        name = self.full_name
+        if self.field.kind not in ('double', 'integer', 'bool'):
             raise ValueError(f'{name} is no number, and the page sets numbers only: use ros2 '
                              f'param set {self.node} {name}')
-        if not ALLOWS[kind](value):
-            raise ValueError(f'{name} must be {self.field.allowed}, not {quoted(value)}')
-        return typed(scene.Parameter(name, self.field, float(value) if kind == 'double' else value)
-                     ).to_parameter_msg()
+        return typed(scene.Parameter(
+            name, self.field, self.field.checked(name, value))).to_parameter_msg()
 
 
 def is_number(value: Any) -> bool:
     """Return whether a value from JSON is a finite number in the range of a double."""
     return type(value) in (int, float) and abs(value) <= sys.float_info.max
-
-
-ALLOWS: dict[str, Callable[[Any], bool]] = {
-    'double': is_number,
-    'integer': lambda value: type(value) is int and -1 << 63 <= value < 1 << 63,
-    'bool': lambda value: type(value) is bool,
-}
 
 
 def shown(value: Any) -> Any:

@@ -16,8 +16,8 @@ const REFUSED = 4000;
 const mechanisms = new Map();
 const text = new TextDecoder();
 const at = id => document.getElementById(id);
-const [views, status, names, workshop, arrows, whole, notice] = [
-  'views', 'status', 'names', 'workshop', 'arrows', 'whole', 'notice'].map(at);
+const [views, names, workshop, arrows, whole, notice] = [
+  'views', 'names', 'workshop', 'arrows', 'whole', 'notice'].map(at);
 /** What a reload keeps. */
 const stored = { shown: '', from: {}, names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
 let { shown } = stored;
@@ -30,11 +30,11 @@ const picture = new Picture(at('picture'));
 const panel = new Panel(at('panel'), light, refuse);
 picture.drag = new PointerDrag(picture, {
   drag(mechanism, want) {
-    panel.drag(mechanism.key, want);
+    panel.sections.get(mechanism.key)?.motion.target.offer(want);
     draw();
   },
   light,
-  choose: (mechanism, dimension) => panel.goTo(mechanism.key, dimension),
+  choose: (mechanism, dimension) => panel.sections.get(mechanism.key)?.tuning.goTo(dimension),
 });
 picture.view = new View(picture.canvas, stored.from, () => {
   whole.hidden = picture.view.whole;
@@ -65,20 +65,14 @@ function refuse(words) {
 }
 
 connect({
-  opened() {
-    say(mechanisms.size ? '' : 'Loading …');
-    status.textContent = 'connected';
-  },
+  opened: () => say(mechanisms.size ? '' : 'Loading …'),
 
-  closed() {
-    say('Connection lost: the viewer is gone. Trying again …');
-    status.textContent = 'not connected';
-  },
+  closed: () => say('Connection lost: the viewer is gone. Trying again …'),
 
   scene({ mechanisms: descriptions }) {
     const known = new Map(mechanisms);
     mechanisms.clear();
-    for (const description of descriptions) {
+    for (const description of descriptions.sort((one, other) => one.key.localeCompare(other.key, 'en', { numeric: true }))) {
       const { key, name } = description;
       const mechanism = known.get(key) ?? new Mechanism();
       mechanism.describe(description);
@@ -98,7 +92,7 @@ connect({
     if (!setting) return;
     setting.value = value;
     Object.assign(mechanism, drawn);
-    panel.update(key, name, value);
+    panel.sections.get(key)?.update(name, value);
     if (typeof value !== 'number') show(shown);
     if (setting.group !== 'speeds' && setting.group !== 'starts') picture.refit(key);
   },

@@ -53,7 +53,7 @@ class Section {
   }
 }
 
-/** All displayed sections. */
+/** All displayed sections, by their mechanisms' keys. */
 export class Panel {
   /** Calls `light`, and `refuse` with the reason why a joint is not dragged. */
   constructor(place, light, refuse) {
@@ -81,10 +81,6 @@ export class Panel {
     }
   }
 
-  update(key, name, value) {
-    this.sections.get(key)?.update(name, value);
-  }
-
   poll() {
     for (const { mechanism, motion, inSight } of this.sections.values()) {
       if (mechanism.space) continue;
@@ -105,17 +101,8 @@ export class Panel {
     this.sections.get(section.dataset.key).tuning.undoing.click();
   }
 
-  /** Request a place of a joint. */
-  drag(key, want) {
-    this.sections.get(key)?.motion.target.offer(want);
-  }
-
   lit(key, name) {
     for (const [own, { tuning }] of this.sections) tuning.lit(own === key ? name : '');
-  }
-
-  goTo(key, name) {
-    this.sections.get(key)?.tuning.goTo(name);
   }
 
   render() {

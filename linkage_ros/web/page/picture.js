@@ -82,8 +82,8 @@ class Box {
 
   add(...at) {
     for (let i = 0; i < this.low.length; i++) {
-      if (at[i] < this.low[i]) this.low[i] = at[i];
-      if (at[i] > this.high[i]) this.high[i] = at[i];
+      this.low[i] = Math.min(this.low[i], at[i]);
+      this.high[i] = Math.max(this.high[i], at[i]);
     }
   }
 
@@ -91,20 +91,14 @@ class Box {
     return Math.max(...this.high.map((high, i) => high - this.low[i]));
   }
 
-  holds(other) {
-    return this.low.every((low, i) => low <= other.low[i] && other.high[i] <= this.high[i]);
-  }
-
-  /** Return the box around both, with a margin. */
-  grown(other) {
-    const box = new Box(this.low.length);
-    box.add(...this.low.map((low, i) => Math.min(low, other.low[i])));
-    box.add(...this.high.map((high, i) => Math.max(high, other.high[i])));
-    const slack = SLACK * box.size;
-    if (!Number.isFinite(slack)) return box;
-    box.low = box.low.map(low => low - slack);
-    box.high = box.high.map(high => high + slack);
-    return box;
+  /** Grow around another box, with a margin, unless that is inside. */
+  hold({ low, high }) {
+    if (this.low.every((end, i) => end <= low[i] && high[i] <= this.high[i])) return;
+    this.add(...low);
+    this.add(...high);
+    const slack = SLACK * this.size;
+    this.add(...this.low.map(end => end - slack));
+    this.add(...this.high.map(end => end + slack));
   }
 }
 
@@ -153,7 +147,6 @@ export class Picture {
     // The picture is not refitted while a joint is dragged.
     if (!this.scale || !this.drag.line) this.fit(shapes, width, height);
     if (!this.view.turned && !this.mechanisms[0].space) this.grid(width, height);
-    this.planes();
     // Slots are drawn first, so that they do not hide bars.
     const rank = ({ kind }) => kind === 'slots' ? 0 : kind === 'joints' ? 2 : 1;
     shapes.sort((a, b) => rank(a) - rank(b) || a.depth - b.depth);
@@ -205,14 +198,13 @@ export class Picture {
     const all = new Box();
     const inFrames = new Map();
     for (const [key, box] of now) {
-      const empty = new Box(box.low.length);
-      let known = this.boxes.get(key) ?? empty;
-      // It was never so large: something far off was drawn that is gone.
-      if (box.size > 0 && known.size > SHRUNK * box.size) known = empty;
-      if (!known.holds(box)) this.boxes.set(key, known.grown(box));
+      // It was never so large if something far off was drawn that is gone.
+      const isKnown = this.boxes.has(key) && !(box.size > 0 && this.boxes.get(key).size > SHRUNK * box.size);
+      if (!isKnown) this.boxes.set(key, new Box(box.low.length));
+      this.boxes.get(key).hold(box);
       const frame = frames.get(key);
       if (!inFrames.has(frame)) inFrames.set(frame, new Box());
-      for (const corner of this.corners(key, this.boxes.get(key) ?? box)) {
+      for (const corner of this.corners(key, this.boxes.get(key))) {
         all.add(...corner);
         inFrames.get(frame).add(...corner);
       }
@@ -241,25 +233,6 @@ export class Picture {
     return [back, front].slice(0, front > back ? 2 : 1).flatMap(
       z => [[left, bottom], [right, bottom], [right, top], [left, top]].map(
         ([x, y]) => this.maps.get(key).map(([a, b, c, d]) => a * x + b * y + c * z + d)));
-  }
-
-  /** Draw the planes of mechanisms that are oblique to the view. */
-  planes() {
-    const { context } = this;
-    context.lineWidth = 1;
-    context.strokeStyle = paint('--faint');
-    context.fillStyle = paint('--shade');
-    for (const [key, box] of this.boxes) {
-      const [[a, b], [c, d]] = this.maps.get(key) ?? [[1, 0], [0, 1]];
-      if (box.low.length > 2 || Math.abs(a * d - b * c) > 0.9999) continue;
-      context.beginPath();
-      for (const corner of this.corners(key, box)) context.lineTo(...this.at(...corner));
-      context.closePath();
-      context.globalAlpha = 0.6;
-      context.fill();
-      context.globalAlpha = 1;
-      context.stroke();
-    }
   }
 
   at(x, y) {
@@ -417,8 +390,8 @@ export class Picture {
     context.lineWidth = 4;
     context.strokeStyle = paint('--paper');
     context.fillStyle = paint('--ink');
-    context.strokeText(words, x, y);
-    context.fillText(words, x, y);
+    context.strokeText(words, x, y, this.width(words));
+    context.fillText(words, x, y, this.width(words));
   }
 
   /** Write the names of the joints beside them, on the side away from the middle. */
@@ -434,10 +407,9 @@ export class Picture {
       const middle = [0, 1].map(i => seen.reduce((sum, at) => sum + at[i], 0) / seen.length);
       const away = width * this.scale / 2 + 12;
       const written = seen.map(([x, y]) => ({ x, y, half: 5, high: 5 }));
-      names.forEach((whole, i) => {
+      names.forEach((name, i) => {
         if (!this.isSeen(...seen[i])) return;
-        const name = this.shortened(whole);
-        const half = context.measureText(name).width / 2;
+        const half = this.width(name) / 2;
         const start = Math.atan2(seen[i][1] - middle[1], seen[i][0] - middle[0]);
         const tried = TURNS.map(([ring, turn]) => this.inside({
           x: seen[i][0] + Math.cos(start + turn) * (ring * away + half - 5), y: seen[i][1] + Math.sin(start + turn) * ring * away, half, high: 8,
@@ -463,12 +435,9 @@ export class Picture {
     return { x: clamp(x, half + 2, width - half - 2), y: clamp(y, high + 2, height - high - 2), half, high };
   }
 
-  /** A name as far as the picture is wide enough for it. */
-  shortened(name) {
-    const room = this.canvas.clientWidth - 8;
-    let end = name.length;
-    while (end > 1 && this.context.measureText(name.slice(0, end)).width > room) end -= 1;
-    return end < name.length ? `${name.slice(0, end - 2)}…` : name;
+  /** The width of a text, which is drawn as wide as the picture at most. */
+  width(words) {
+    return Math.min(this.context.measureText(words).width, this.canvas.clientWidth - 8);
   }
 
   /** Write the mechanisms' names below them, none over another, where the picture has room. */
@@ -486,17 +455,16 @@ export class Picture {
     for (const { key, title } of this.mechanisms) {
       if (!boxes.has(key)) continue;
       const { x, y, high } = boxes.get(key);
-      const name = this.shortened(title);
-      const half = context.measureText(name).width / 2 + 4;
+      const half = this.width(title) / 2 + 4;
       const at = middle => ({ x: this.isSeen(x, 0) ? this.inside({ x, y: 0, half, high: 0 }).x : x, y: middle, half, high: LINE / 2 });
       const below = Array.from({ length: 2 * this.mechanisms.length }, (_, line) => at(y + high + (line + 0.5) * LINE));
-      const free = [below[0], at(y - high - LINE / 2), ...below.slice(1)].filter(place => (
-        isClear(place, written) && place.y > LINE / 2 && place.y + LINE / 2 < this.canvas.clientHeight));
+      const isFree = place => isClear(place, written) && place.y > LINE / 2 && place.y + LINE / 2 < this.canvas.clientHeight;
       // A title on another mechanism would be taken for that one's.
-      const place = free.find(one => isClear(one, [...boxes.values()])) ?? free[0];
+      const others = [...boxes].filter(([other]) => other !== key).map(([, box]) => box);
+      const place = [below[0], at(y - high - LINE / 2), below[1]].find(one => isFree(one) && isClear(one, others)) ?? below.find(isFree);
       if (!place) continue;
       written.push(place);
-      this.text(name, place.x, place.y - LINE / 2);
+      this.text(title, place.x, place.y - LINE / 2);
     }
   }
 
@@ -553,7 +521,7 @@ export class Picture {
         const [right, up] = map.map(([a, b]) => (a * x + b * y) * length / most);
         this.arrow(seen.get(joint), [right, -up]);
       }
-      if (this.mechanisms.length === 1) legend = this.explained(arrows, longest, most);
+      if (this.mechanisms.length === 1 && arrows.unit) legend = this.explained(arrows, longest, most);
     }
     put(this.legend, { textContent: legend });
   }
