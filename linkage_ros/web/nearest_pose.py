@@ -49,7 +49,7 @@ def _nearest_sample(linkage: Mechanism, joint: str, goal: np.ndarray, present: f
     samples = np.array([np.linspace(*arc, DRAG_SAMPLES) for arc in arcs])
     path = linkage.solve(samples, (joint,))[joint]
     if not np.isfinite(path).any():
-        raise ValueError(f'{linkage.type} cannot be assembled here')
+        raise ValueError('the linkage cannot be assembled here')
     width = np.nanmax(np.nanmax(path, axis=(0, 1)) - np.nanmin(path, axis=(0, 1)))
     away = np.hypot(*np.moveaxis(path - goal, -1, 0)) + LEASH * width * linkage.inputs[0].apart(
         samples, present) / np.ptp(samples)

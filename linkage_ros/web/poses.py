@@ -15,6 +15,8 @@ from itertools import combinations
 import math
 from typing import Any, Mapping, Optional, Sequence
 
+import numpy as np
+
 from .nearest_pose import nearest_inputs
 from .settings import is_number, shown
 from ..linkage import Arc, Formula, Mechanism
@@ -78,22 +80,22 @@ def described(mechanism: SceneMechanism, present: Sequence[float]) -> dict[str, 
     linkage, names = mechanism.linkage, [
         *(name for name in mechanism.linkage.joints if name not in mechanism.inputs),
         *(f'{mechanism.tracer}.{axis}' for axis in 'xy')]
-    own = [mechanism.scale_of(name) for name in mechanism.inputs]
-    theta = theta_of([value / size for value, size in zip(present, own)])
+    theta = linkage_inputs(mechanism, present)
     values = linkage.joint_angles(theta, names)
-    rates = [linkage.joint_rates(theta, names, i) for i in range(len(own))]
-    sizes = {name: mechanism.scale_of(name) * (1.0 if linkage.is_angle(name) else linkage.longest)
-             for name in names}
-    units = [mechanism.scale_of(name) * (1.0 if drive.input.turns else linkage.longest)
-             for name, drive in mechanism.inputs.items()]
+    rates = {input_: linkage.joint_rates(theta, names, i)
+             for i, input_ in enumerate(mechanism.inputs)}
+    # Sizes of quantities beside which rounding is seen.
+    size = {name: mechanism.scale_of(name) * (1.0 if linkage.is_angle(name) else linkage.longest)
+            for name in (*names, *mechanism.inputs)}
     return {
         'inputs': dict(zip(mechanism.inputs, present)),
         'outputs': {name: {
-            'value': _rounded(float(values[name]) * mechanism.scale_of(name), sizes[name]),
+            'value': _rounded(float(values[name]) * mechanism.scale_of(name), size[name]),
             'unit': 'rad' if linkage.is_angle(name) else 'm',
             'rates': [
-                _rounded(float(by[name]) * mechanism.scale_of(name) / size, sizes[name] / unit)
-                for by, size, unit in zip(rates, own, units)]} for name in names}}
+                _rounded(float(by[name]) * mechanism.scale_of(name) / mechanism.scale_of(input_),
+                         size[name] / size[input_]) for input_, by in rates.items()]}
+            for name in names}}
 
 
 def _rounded(value: float, size: float) -> Any:
@@ -114,24 +116,23 @@ def arrows(mechanism: SceneMechanism, present: Sequence[float], kind: str,
     by_input = {name: speeds.get(name, 0.0) for name in mechanism.inputs}
     if not all(map(is_number, by_input.values())):
         raise ValueError(f'speeds must be finite numbers, not {quoted(speeds)}')
-    linkage, own = mechanism.linkage, [mechanism.scale_of(name) for name in mechanism.inputs]
-    theta = theta_of([value / size for value, size in zip(present, own)])
-    rates = [speed / size for speed, size in zip(by_input.values(), own)]
     if kind == FORCE:
         efforts = mechanism.efforts(present) if mechanism.loads else ()
         return {'unit': 'N', 'at': {
             name: load for name, load in mechanism.loads.items() if not isinstance(load, float)},
             'efforts': {name: [shown(effort), 'N·m' if drive.input.turns else 'N']
                         for (name, drive), effort in zip(mechanism.inputs.items(), efforts)}}
+    linkage, theta = mechanism.linkage, linkage_inputs(mechanism, present)
+    rates = linkage_inputs(mechanism, [*by_input.values()])
     if kind == ACCELERATION:
-        found = linkage.acceleration(theta, theta_of(rates), theta_of([0.0] * len(rates)))
+        vectors = linkage.acceleration(theta, rates, theta_of([0.0] * len(by_input)))
     else:
-        each = [linkage.velocity(theta, None, by) for by in range(len(rates))]
-        found = {name: sum(rate * one[name] for rate, one in zip(rates, each))
-                 for name in linkage.points}
+        velocities = [linkage.velocity(theta, None, by) for by in range(len(by_input))]
+        vectors = {name: sum(rate * velocity[name] for rate, velocity in zip(
+            np.atleast_1d(rates), velocities)) for name in linkage.points}
     return {'unit': ARROWS[kind], 'at': {
         name: [shown(float(part) * mechanism.scale) for part in vector]
-        for name, vector in found.items() if name not in linkage.grounded}}
+        for name, vector in vectors.items() if name not in linkage.grounded}}
 
 
 def number(text: str) -> dict[str, Any]:
@@ -177,6 +178,8 @@ def reached(mechanism: SceneMechanism, present: Sequence[float],
         raise ValueError(f'value must be a finite number, not {quoted(value)}')
     if name in mechanism.inputs:
         return _input_at(mechanism, present, name, value)
+    if not mechanism.linkage.has_output(name):
+        raise Refused(f'{mechanism.name} has no output {quoted(name)}')
     if len(mechanism.inputs) > 1:
         raise Refused(f'only a linkage with one input can be solved for {quoted(name)}')
     return _output_at(mechanism, present[0], name, value)
@@ -190,8 +193,7 @@ def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
     whole = drive.input.is_whole(ends)
     new = float(drive.input.wrapped(value)) if whole else near
     inputs = [new if key == name else old for key, old in zip(mechanism.inputs, present)]
-    own = [value / mechanism.scale_of(key) for key, value in zip(mechanism.inputs, inputs)]
-    places = mechanism.linkage.solve(theta_of(own))
+    places = mechanism.linkage.solve(linkage_inputs(mechanism, inputs))
     if not all(math.isfinite(part) for place in places.values() for part in place):
         raise Refused(f'{mechanism.name} cannot be assembled there')
     missed = not whole and drive.input.apart(near, value) > CLOSE * drive.input.size
@@ -240,6 +242,12 @@ def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, p
 def arcs(drive: InputSettings) -> list[Arc]:
     """Return the allowed intervals of an input [rad or m]."""
     return [drive.ends] if drive.ends else list(drive.reach)
+
+
+def linkage_inputs(mechanism: SceneMechanism, values: Sequence[float]) -> Any:
+    """Return inputs [rad or m], or their speeds, as an argument of the unscaled linkage."""
+    return theta_of([value / mechanism.scale_of(name)
+                     for name, value in zip(mechanism.inputs, values)])
 
 
 def theta_of(values: Sequence[Any]) -> Any:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import asyncio
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import partial
 import math
 import re
@@ -24,7 +24,6 @@ from typing import (
     Collection,
     Mapping,
     Optional,
-    Protocol,
     Sequence,
     TypeVar,
 )
@@ -63,31 +62,14 @@ NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-class OpenPage(Protocol):
-    """A page that displays the scene."""
-
-    def tell(self, key: Any, message: dict[str, Any]) -> None:
-        """Send a message; it replaces waiting ones with the same key."""
-
-    def offer(self, feed: Feed) -> None:
-        """Send a feed's newest message, when the page is ready to draw it."""
-
-
 @dataclass
 class ShownMechanism:
-    """
-    A mechanism on the page: the prefix of its topics, its node, settings, and inputs' sources.
-
-    An input that was moved is `pending` at its new value `until` a time, or until messages confirm
-    it: earlier messages may have the old value.
-    """
+    """A mechanism on the page: prefix of its topics, node, settings, and topics of its inputs."""
 
     key: str
     owner: str
     settings: dict[str, Setting]
     sources: Sequence[str]
-    pending: dict[str, float] = field(default_factory=dict)
-    until: float = 0.0
 
     @property
     def name(self) -> str:
@@ -109,12 +91,12 @@ class SceneView:
     Attributes
     ----------
     clients : list
-        Open pages, which receive messages by `tell(key, message)`, markers by `offer(feed)`.
+        Open pages, of class Client: they receive messages by `tell`, markers by `offer`.
 
     """
 
     def __init__(self, bridge: Bridge) -> None:
-        self.clients: list[OpenPage] = []
+        self.clients: list[Any] = []
         self._bridge = bridge
         self._setting = asyncio.Lock()
         # The nodes that announce parameters, by topic, and the topics of owners' inputs.
@@ -124,8 +106,10 @@ class SceneView:
         # The values that each node announces, by full name; the scenes that were read from them.
         self._announced: dict[str, dict[str, Any]] = {}
         self._scenes: dict[str, scene.Scene] = {}
-        # The last speeds other than zero, by mechanism and input.
+        # By mechanism and input: the last speed other than zero, and where it was moved to. It is
+        # there until a time, or until messages confirm it: earlier ones may have the old value.
         self._speeds: dict[tuple[str, str], float] = {}
+        self._moved: dict[tuple[str, str], tuple[float, float]] = {}
         self._news = asyncio.Event()
         self._watching: Optional[asyncio.Task[None]] = None
         self._stopping: Optional[asyncio.TimerHandle] = None
@@ -135,7 +119,7 @@ class SceneView:
         self._positions: dict[str, dict[str, float]] = {}
         self._feeds: dict[str, Feed] = {}
 
-    def add(self, client: OpenPage) -> None:
+    def add(self, client: Any) -> None:
         """Add a client; the first one starts the observation of the graph."""
         self.clients.append(client)
         if self._stopping:
@@ -145,7 +129,7 @@ class SceneView:
             return
         self._show(client)
 
-    def remove(self, client: OpenPage) -> None:
+    def remove(self, client: Any) -> None:
         """Remove a client; after the last one the observation ends, unless it was a reload."""
         self.clients.remove(client)
         if not self.clients:
@@ -240,8 +224,9 @@ class SceneView:
                 value = math.nextafter(value, sum(poses.arcs(drive)[0]) / 2.0)
             values.update({f'{name}.start': value, f'{name}.speed': 0.0})
         await self.set(mechanism.key, values)
-        mechanism.pending = dict(zip(machine.inputs, inputs))
-        mechanism.until = self._bridge.loop.time() + SECONDS_TO_ARRIVE
+        until = self._bridge.loop.time() + SECONDS_TO_ARRIVE
+        for name, value in zip(machine.inputs, inputs):
+            self._moved[mechanism.key, name] = value, until
 
     async def tune(self, key: str) -> Answer:
         """Return the result of `poses.tunable`."""
@@ -288,17 +273,17 @@ class SceneView:
         if machine.in_space:
             raise Refused(f'{machine.name} is a linkage in space: the page draws and tunes it, '
                           'and moves, plots and describes linkages in a plane')
-        if self._bridge.loop.time() > mechanism.until:
-            mechanism.pending = {}
         for name, drive in machine.inputs.items():
             position = self._position_of(mechanism, drive.source)
             now = drive.start if position is None else machine.from_source(
                 drive, position, None, None)[0]
             now = now if math.isfinite(now) else drive.start
-            pending = mechanism.pending.get(name, now)
-            if drive.input.apart(pending, now) < ARRIVED * drive.input.size:
-                mechanism.pending.pop(name, None)
-            inputs.append(mechanism.pending.get(name, now))
+            value, until = self._moved.get((mechanism.key, name), (now, math.inf))
+            if self._bridge.loop.time() > until or (
+                    drive.input.apart(value, now) < ARRIVED * drive.input.size):
+                self._moved.pop((mechanism.key, name), None)
+                value = now
+            inputs.append(value)
         return machine, inputs
 
     def _position_of(self, mechanism: ShownMechanism, source: str) -> Optional[float]:
@@ -319,7 +304,7 @@ class SceneView:
                           f'there are: {", ".join(self._mechanisms)}')
         return self._mechanisms[key]
 
-    def _show(self, client: OpenPage) -> None:
+    def _show(self, client: Any) -> None:
         mechanisms = []
         for mechanism in self._mechanisms.values():
             # What a node announces may be no scene any more.
