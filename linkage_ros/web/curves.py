@@ -15,7 +15,7 @@ from typing import Any, Optional, Sequence
 
 import numpy as np
 
-from .poses import Refused, theta_of
+from .poses import linkage_inputs, Refused, theta_of
 from .settings import shown
 from ..c_code import header
 from ..linkage import ascending, sampled
@@ -47,23 +47,23 @@ class Sweep:
                  dense_ends: bool = False) -> None:
         self._mechanism, self.linkage = mechanism, mechanism.linkage
         self.input = mechanism.first.input
-        sizes = [mechanism.scale_of(name) for name in mechanism.inputs]
-        others = [value / size for value, size in zip(present, sizes)][1:]
+        self._size = mechanism.scale_of(self.input.name)
+        _, *others = np.atleast_1d(linkage_inputs(mechanism, present))
         reach, dead = self.linkage.reach(*others), self.linkage.dead_points(*others)
         if not reach:
             raise Refused(f'{mechanism.name} cannot be assembled where its other inputs are')
         # A NaN separates two arcs.
-        own = ascending(np.concatenate([
+        values = ascending(np.concatenate([
             *(sampled(low, high, 0, SAMPLES) if dense_ends and not self.input.is_whole(reach)
               else np.linspace(low, high, SAMPLES) for low, high in reach),
             [0.5 * (before + after) for (_, before), (after, _) in zip(reach, reach[1:])]]))
-        self._size, still = sizes[0], [0.0] * len(others)
-        self._inputs, self._speeds, self._still = (theta_of(values) for values in (
-            [own, *others], [1.0 / sizes[0], *still], [0.0, *still]))
-        self.values, self.dead = (np.multiply(each, sizes[0]) for each in (own, dead))
+        still = [0.0] * len(others)
+        self._inputs, self._speeds, self._still = map(theta_of, (
+            [values, *others], [1.0 / self._size, *still], [0.0, *still]))
+        self.values, self.dead = values * self._size, np.multiply(dead, self._size)
         # The ends of the reach that are no dead points; a full rotation has none.
         self.ends = [] if self.input.is_whole(reach) else [
-            end for end in np.multiply(np.ravel(reach), sizes[0]).tolist()
+            end for end in np.multiply(np.ravel(reach), self._size).tolist()
             if (self.input.apart(end, self.dead) > SAME * self.input.size).all()]
 
     def names(self, kind: str) -> list[str]:
@@ -77,10 +77,10 @@ class Sweep:
 
     def unit(self, kind: str, name: str) -> str:
         """Return the unit of a quantity; empty for a plain number."""
-        own = 'rad' if kind == TRANSMISSION or self.linkage.is_angle(name) else 'm'
+        unit = 'rad' if kind == TRANSMISSION or self.linkage.is_angle(name) else 'm'
         if kind == FORCE:
-            return FORCES.get((own, self.input.unit), '')
-        return own + {VELOCITY: '/s', ACCELERATION: '/s²'}.get(kind, '')
+            return FORCES.get((unit, self.input.unit), '')
+        return unit + {VELOCITY: '/s', ACCELERATION: '/s²'}.get(kind, '')
 
     @np.errstate(all='ignore')
     def of(self, kind: str, names: Sequence[str]) -> dict[str, np.ndarray]:
@@ -91,12 +91,13 @@ class Sweep:
         if kind == FORCE:
             return {name: 1.0 / value for name, value in self.of(VELOCITY, names).items()}
         if kind == ACCELERATION:
-            found = linkage.joint_accelerations(inputs, self._speeds, self._still, names)
+            values = linkage.joint_accelerations(inputs, self._speeds, self._still, names)
+        elif kind == VELOCITY:
+            values = linkage.joint_rates(inputs, names)
         else:
-            find = linkage.joint_angles if kind == POSITION else linkage.joint_rates
-            found = find(inputs, names)
+            values = linkage.joint_angles(inputs, names)
         factor = 1.0 / self._size if kind == VELOCITY else 1.0
-        return {name: value * factor * size(name) for name, value in found.items()}
+        return {name: value * factor * size(name) for name, value in values.items()}
 
     def poles(self, kind: str, name: str) -> np.ndarray:
         """Return inputs [rad or m] at which a quantity may be infinite."""

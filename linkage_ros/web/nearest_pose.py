@@ -16,7 +16,7 @@ from typing import Sequence
 
 import numpy as np
 
-from ..linkage import Arc, Mechanism
+from ..linkage import Mechanism
 
 DRAG_SAMPLES = 721
 # Penalty for moving the input through its whole arc, as a fraction of the path's width: where a
@@ -26,7 +26,7 @@ GAUSS_NEWTON_STEPS, STEP_HALVINGS = 60, 12
 
 
 def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
-                   present: Sequence[float], arcs: Sequence[Sequence[Arc]]) -> np.ndarray:
+                   present: Sequence[float], arcs: Sequence[Sequence[Sequence[float]]]) -> np.ndarray:
     """
     Return the inputs (inputs,) [rad or m] that bring a joint nearest to a place (x, y) [m].
 
@@ -36,7 +36,7 @@ def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
     """
     goal = np.asarray(place, float)
     if len(linkage.inputs) > 1:
-        low, high = np.array([own[0] for own in arcs]).T
+        low, high = np.array([input_arcs[0] for input_arcs in arcs]).T
         start = np.clip(present, low, high)
     else:
         start, low, high = _nearest_sample(linkage, joint, goal, present[0], arcs[0])
@@ -44,7 +44,7 @@ def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
 
 
 def _nearest_sample(linkage: Mechanism, joint: str, goal: np.ndarray, present: float,
-                    arcs: Sequence[Arc]) -> Sequence[np.ndarray]:
+                    arcs: Sequence[Sequence[float]]) -> Sequence[np.ndarray]:
     """Return the best of many samples of the only input, and the ends of its arc."""
     samples = np.array([np.linspace(*arc, DRAG_SAMPLES) for arc in arcs])
     path = linkage.solve(samples, (joint,))[joint]

@@ -203,17 +203,17 @@ def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
 def _output_at(mechanism: SceneMechanism, present: float, name: str,
                value: float) -> tuple[list[float], Optional[Reach]]:
     linkage, drive = mechanism.linkage, mechanism.first
-    own, unit = mechanism.scale_of(drive.input.name), mechanism.scale_of(name)
-    ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
-    found = float(linkage.servo_for(name, value / unit, present / own, ends)[0])
-    if math.isfinite(found):
-        return [found * own], None
-    spans = linkage.extremes(name, [(low / own, high / own) for low, high in arcs(drive)])
+    size, output_size = mechanism.scale_of(drive.input.name), mechanism.scale_of(name)
+    ends = drive.ends and (drive.ends[0] / size, drive.ends[1] / size)
+    solution = float(linkage.servo_for(name, value / output_size, present / size, ends)[0])
+    if math.isfinite(solution):
+        return [solution * size], None
+    spans = linkage.extremes(name, [(low / size, high / size) for low, high in arcs(drive)])
     turn = math.tau if linkage.is_angle(name) else math.inf
-    _, nearest = min((abs(math.remainder(reached - value / unit, turn)), at)
-                     for span in spans for reached, at in span)
-    reach = tuple((low * unit, high * unit) for (low, _), (high, _) in spans)
-    return [nearest * own], Reach(name, reach, 'rad' if linkage.is_angle(name) else 'm')
+    _, nearest = min((abs(math.remainder(extreme - value / output_size, turn)), at)
+                     for span in spans for extreme, at in span)
+    reach = tuple((low * output_size, high * output_size) for (low, _), (high, _) in spans)
+    return [nearest * size], Reach(name, reach, 'rad' if linkage.is_angle(name) else 'm')
 
 
 def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, place: Any,
@@ -226,17 +226,16 @@ def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, p
     if joint not in mechanism.linkage.points:
         raise ValueError(f'joint must be one of {listed(mechanism.linkage.points)}, '
                          f'not {quoted(joint)}')
-    one, own = legs[leg], [mechanism.scale_of(name) for name in mechanism.inputs]
-    # Conversion to a leg's own input and back: trivial for a single leg.
-    ranges = [[sorted(one.start + one.side * (end - one.lag) for end in arc)
-               for arc in arcs(drive)] for drive in mechanism.inputs.values()]
-    found = nearest_inputs(
+    # The inputs of this leg and back: for a single leg, those of the linkage in the scene's size.
+    lag, start, side, _ = legs[leg]
+    sizes = [mechanism.scale_of(name) for name in mechanism.inputs]
+    inputs = nearest_inputs(
         mechanism.linkage, joint,
-        [one.side * place[0] / mechanism.scale, place[1] / mechanism.scale],
-        [one.start + one.side * (value - one.lag) / size for value, size in zip(present, own)],
-        [[(low / size, high / size) for low, high in each] for each, size in zip(ranges, own)])
-    return [float(one.lag + one.side * (value - one.start)) * size
-            for value, size in zip(found, own)]
+        [side * place[0] / mechanism.scale, place[1] / mechanism.scale],
+        [start + side * (value / size - lag) for value, size in zip(present, sizes)],
+        [[sorted(start + side * (end / size - lag) for end in arc) for arc in arcs(drive)]
+         for drive, size in zip(mechanism.inputs.values(), sizes)])
+    return [float(lag + side * (value - start)) * size for value, size in zip(inputs, sizes)]
 
 
 def arcs(drive: InputSettings) -> list[Arc]:

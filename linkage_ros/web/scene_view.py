@@ -362,10 +362,10 @@ class SceneView:
 
     def _input_topics(self, name: str) -> list[str]:
         """Return the topics from which a node receives its inputs."""
-        space, own = name.rsplit('/', 1)
+        space, node = name.rsplit('/', 1)
         with suppress(NodeNameNonExistentError):
             return [topic for topic, types in
-                    self._bridge.node.get_subscriber_names_and_types_by_node(own, space or '/')
+                    self._bridge.node.get_subscriber_names_and_types_by_node(node, space or '/')
                     if INPUTS_TYPE in types]
         return []
 
