@@ -26,7 +26,8 @@ GAUSS_NEWTON_STEPS, STEP_HALVINGS = 60, 12
 
 
 def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
-                   present: Sequence[float], arcs: Sequence[Sequence[Sequence[float]]]) -> np.ndarray:
+                   present: Sequence[float], arcs: Sequence[Sequence[Sequence[float]]]
+                   ) -> np.ndarray:
     """
     Return the inputs (inputs,) [rad or m] that bring a joint nearest to a place (x, y) [m].
 
@@ -46,7 +47,7 @@ def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
 def _nearest_sample(linkage: Mechanism, joint: str, goal: np.ndarray, present: float,
                     arcs: Sequence[Sequence[float]]) -> Sequence[np.ndarray]:
     """Return the best of many samples of the only input, and the ends of its arc."""
-    samples = np.array([np.linspace(*arc, DRAG_SAMPLES) for arc in arcs])
+    samples = np.array([np.linspace(low, high, DRAG_SAMPLES) for low, high in arcs])
     path = linkage.solve(samples, (joint,))[joint]
     if not np.isfinite(path).any():
         raise ValueError('the linkage cannot be assembled here')

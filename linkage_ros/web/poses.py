@@ -92,10 +92,9 @@ def described(mechanism: SceneMechanism, present: Sequence[float]) -> dict[str, 
         'outputs': {name: {
             'value': _rounded(float(values[name]) * mechanism.scale_of(name), size[name]),
             'unit': 'rad' if linkage.is_angle(name) else 'm',
-            'rates': [
-                _rounded(float(by[name]) * mechanism.scale_of(name) / mechanism.scale_of(input_),
-                         size[name] / size[input_]) for input_, by in rates.items()]}
-            for name in names}}
+            'rates': [_rounded(
+                float(by[name]) * mechanism.scale_of(name) / mechanism.scale_of(input_),
+                size[name] / size[input_]) for input_, by in rates.items()]} for name in names}}
 
 
 def _rounded(value: float, size: float) -> Any:
@@ -108,14 +107,11 @@ def arrows(mechanism: SceneMechanism, present: Sequence[float], kind: str,
     """
     Return one of ARROWS at each joint of the first leg: `unit`, and x, y in its plane by joint.
 
-    Speeds [rad/s or m/s] are by input, 0 if missing. Forces are the loads; `efforts` by input
-    [N m or N] balance them.
+    Speeds [rad/s or m/s] are by input. Forces are the loads; `efforts` by input [N m or N] balance
+    them.
     """
     if kind not in ARROWS:
         raise ValueError(f'arrows must be one of {", ".join(ARROWS)}, not {quoted(kind)}')
-    by_input = {name: speeds.get(name, 0.0) for name in mechanism.inputs}
-    if not all(map(is_number, by_input.values())):
-        raise ValueError(f'speeds must be finite numbers, not {quoted(speeds)}')
     if kind == FORCE:
         efforts = mechanism.efforts(present) if mechanism.loads else ()
         return {'unit': 'N', 'at': {
@@ -123,11 +119,11 @@ def arrows(mechanism: SceneMechanism, present: Sequence[float], kind: str,
             'efforts': {name: [shown(effort), 'N·m' if drive.input.turns else 'N']
                         for (name, drive), effort in zip(mechanism.inputs.items(), efforts)}}
     linkage, theta = mechanism.linkage, linkage_inputs(mechanism, present)
-    rates = linkage_inputs(mechanism, [*by_input.values()])
+    rates = linkage_inputs(mechanism, [speeds[name] for name in mechanism.inputs])
     if kind == ACCELERATION:
-        vectors = linkage.acceleration(theta, rates, theta_of([0.0] * len(by_input)))
+        vectors = linkage.acceleration(theta, rates, theta_of([0.0] * len(speeds)))
     else:
-        velocities = [linkage.velocity(theta, None, by) for by in range(len(by_input))]
+        velocities = [linkage.velocity(theta, None, by) for by in range(len(speeds))]
         vectors = {name: sum(rate * velocity[name] for rate, velocity in zip(
             np.atleast_1d(rates), velocities)) for name in linkage.points}
     return {'unit': ARROWS[kind], 'at': {

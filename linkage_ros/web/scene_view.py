@@ -188,14 +188,14 @@ class SceneView:
                 SetParametersAtomically, f'{node}/set_parameters_atomically')
         return self._setters[node]
 
-    async def pose(self, key: str, want: Optional[Mapping[str, Any]] = None, arrows: str = '',
-                   speeds: Any = ()) -> Answer:
+    async def pose(self, key: str, want: Optional[Mapping[str, Any]] = None, arrows: str = ''
+                   ) -> Answer:
         """
         Describe a mechanism's pose; with a request, move it there first and hold it.
 
-        Arguments are those of `poses.reached` and `poses.arrows`. The result is that of
-        `poses.described`, with requested arrows, and the reason, and what is reached, if the
-        request is not met exactly.
+        Arguments are those of `poses.reached`, and a kind of arrows, at the speeds when it plays.
+        The result is that of `poses.described`, with requested arrows, and the reason, and what is
+        reached, if the request is not met exactly.
         """
         mechanism = self._find(key)
         (machine, inputs), reach = self._state(mechanism), None
@@ -208,7 +208,9 @@ class SceneView:
         if reach:
             answer['reach'] = asdict(reach)
         if arrows:
-            answer['arrows'] = poses.arrows(machine, inputs, arrows, dict(speeds))
+            answer['arrows'] = poses.arrows(machine, inputs, arrows, {
+                name: self._playing(mechanism, name, drive)
+                for name, drive in machine.inputs.items()})
         return answer
 
     async def _hold(self, mechanism: ShownMechanism, machine: scene.SceneMechanism,
@@ -323,10 +325,12 @@ class SceneView:
         for name, drive in machine.inputs.items():
             if drive.speed:
                 self._speeds[mechanism.key, name] = drive.speed
-            # Its speed when it plays.
-            description['inputs'][name]['speed'] = self._speeds.get(
-                (mechanism.key, name), drive.default_speed)
+            description['inputs'][name]['speed'] = self._playing(mechanism, name, drive)
         return description
+
+    def _playing(self, mechanism: ShownMechanism, name: str, drive: scene.InputSettings) -> float:
+        """Return the speed of an input when it plays: the last one that was not zero."""
+        return self._speeds.get((mechanism.key, name), drive.default_speed)
 
     async def _watch(self) -> None:
         while True:

@@ -123,13 +123,8 @@ export class Motion {
   }
 
   stopOrPlay() {
-    const values = Object.fromEntries(Object.entries(this.speeds).map(([name, speed]) => [`${name}.speed`, this.moves ? 0 : speed]));
+    const values = Object.fromEntries(Object.entries(this.mechanism.inputs).map(([name, { speed }]) => [`${name}.speed`, this.moves ? 0 : speed]));
     this.mechanism.ask('set', { values }).then(answer => this.say(answer));
-  }
-
-  /** The speeds of the inputs when it plays. */
-  get speeds() {
-    return Object.fromEntries(Object.entries(this.mechanism.inputs).map(([name, { speed }]) => [name, speed]));
   }
 
   /** The present inputs. */
@@ -153,11 +148,11 @@ export class Motion {
     return answer;
   }
 
-  /** Request the present pose, with a kind of arrows at the inputs' speeds when it plays. */
+  /** Request the present pose, with a kind of arrows or none. */
   async poll(arrows) {
     if (this.polling || !isOpen()) return;
     this.polling = true;
-    const answer = await this.mechanism.ask('pose', arrows && { arrows, speeds: this.speeds });
+    const answer = await this.mechanism.ask('pose', { arrows });
     this.polling = false;
     if (answer.inputs) this.show(answer);
     else if (!this.inputs.size) this.say(answer);

@@ -26,6 +26,8 @@ function library() {
   return loading;
 }
 
+const options = names => names.map(textContent => element('option', { textContent }));
+
 const shown = value => value === null || value === undefined ? '—' : figures(value, FIGURES);
 
 /** The range of the drawn values: all, except those that grow without bound. */
@@ -64,13 +66,16 @@ function path(plot) {
 
 export class Plot {
   constructor(mechanism, motion) {
-    Object.assign(this, { mechanism, motion, chosen: {}, fixed: '' });
-    this.kind = this.choice('Quantity', Object.keys(mechanism.curves));
-    this.output = this.choice('Output', []);
-    this.other = element('input', { type: 'text', placeholder: 'distance(A,C)', ariaLabel: 'Another output', onchange: () => {
-      this.chosen[this.about] = this.other.value.trim() || undefined;
+    /** The output of each kind that is plotted about outputs or about joints. */
+    this.chosen = {};
+    Object.assign(this, { mechanism, motion, fixed: '' });
+    const choose = output => {
+      this.chosen[this.about] = output;
       this.refresh();
-    } });
+    };
+    this.kind = element('select', { ariaLabel: 'Quantity', onchange: () => this.refresh() }, ...options(Object.keys(mechanism.curves)));
+    this.output = element('select', { ariaLabel: 'Output', onchange: () => choose(this.output.value) });
+    this.other = element('input', { type: 'text', placeholder: 'distance(A,C)', ariaLabel: 'Another output', onchange: () => choose(this.other.value.trim() || undefined) });
     const enlarging = button('Enlarge', () => this.element.requestFullscreen(), { hidden: !document.fullscreenEnabled });
     this.now = element('div', { className: 'now' });
     this.place = element('div', { className: 'plot', tabIndex: 0, ariaLabel: 'No curve yet' });
@@ -91,20 +96,9 @@ export class Plot {
     return { width: this.place.clientWidth, height: this.place.clientHeight };
   }
 
-  choice(ariaLabel, names) {
-    const select = element('select', { ariaLabel, onchange: () => this.choose() });
-    select.append(...names.map(textContent => element('option', { textContent })));
-    return select;
-  }
-
   /** Whether a joint or an output is plotted; each of them keeps its own selection. */
   get about() {
     return this.mechanism.curves[this.kind.value];
-  }
-
-  choose() {
-    if (this.curve?.about === this.about) this.chosen[this.about] = this.output.value;
-    this.refresh();
   }
 
   /** Request the curve again. */
@@ -128,7 +122,7 @@ export class Plot {
     this.curve = { ...answer, about, kind };
     const names = [...new Set([...answer.names, answer.output])];
     if (names.join() !== [...this.output.options].map(({ value }) => value).join()) {
-      this.output.replaceChildren(...names.map(textContent => element('option', { textContent })));
+      this.output.replaceChildren(...options(names));
     }
     this.output.value = answer.output;
     this.other.hidden = about === 'joint';
