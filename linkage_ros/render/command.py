@@ -24,6 +24,9 @@ from ..scene.scene_mechanism import IN_SPACE
 from ..words import meant
 
 STILL, MOVING = ('.png', '.svg'), ('.gif', '.mp4')
+# Options that are for some endings only.
+OPTIONS = {'angle': STILL, 'turns': MOVING, 'fps': MOVING, 'frames': MOVING,
+           'loop': ('.gif',), 'colours': ('.gif',)}
 FPS, FASTEST_GIF, FASTEST = 25.0, 50.0, 240.0
 SMALLEST, LARGEST = 64, 8192
 MOST_FRAMES, MOST_COLOURS = 10000, 255
@@ -54,13 +57,15 @@ def parsed(args):
     if ending not in STILL + MOVING:
         raise RequestError(f'--out must end in {", ".join(STILL + MOVING)}, not {arguments.out}')
     arguments.moving = ending in MOVING
-    for option in ('angle',) if arguments.moving else (
-            'turns', 'fps', 'frames', 'loop', 'colours'):
-        if getattr(arguments, option) is not None:
-            allowed = ' and '.join(STILL if arguments.moving else MOVING)
-            raise RequestError(f'--{option} is for {allowed} only, not for {ending}')
-    if ending == '.mp4':
-        check_mp4(arguments)
+    for option, endings in OPTIONS.items():
+        if getattr(arguments, option) is not None and ending not in endings:
+            raise RequestError(
+                f'--{option} is for {" and ".join(endings)} only, not for {ending}')
+    if ending == '.mp4' and any(side % 2 for side in arguments.size):
+        raise RequestError('--size must be two even numbers for .mp4')
+    if ending == '.mp4' and not shutil.which('ffmpeg'):
+        raise RequestError('ffmpeg, which writes .mp4, is not installed: apt install ffmpeg, or '
+                           'choose .gif')
     if ending == '.gif' and (arguments.fps or FPS) > FASTEST_GIF:
         raise RequestError(
             f'--fps must be at most {FASTEST_GIF:g} for .gif, not {arguments.fps:g}')
@@ -68,18 +73,6 @@ def parsed(args):
         if not file.absolute().parent.is_dir():
             raise RequestError(f'{file} cannot be written: there is no folder {file.parent}')
     return arguments
-
-
-def check_mp4(arguments):
-    """Raise RequestError if MP4 is not available."""
-    for option in ('loop', 'colours'):
-        if getattr(arguments, option) is not None:
-            raise RequestError(f'--{option} is for .gif only, not for .mp4')
-    if any(side % 2 for side in arguments.size):
-        raise RequestError('--size must be two even numbers for .mp4')
-    if not shutil.which('ffmpeg'):
-        raise RequestError('ffmpeg, which writes .mp4, is not installed: apt install ffmpeg, or '
-                           'choose .gif')
 
 
 def draw(arguments, mechanisms):

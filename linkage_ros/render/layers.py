@@ -115,7 +115,7 @@ def guides(axes, mechanism, cycle, unit):
 def sliding(mechanism):
     """Return the slides, and the indices of their ends after those of the joints."""
     first = len(mechanism.linkage.points)
-    return [(shape, slice(first + 2 * k, first + 2 * k + 2))
+    return [(shape, [first + 2 * k, first + 2 * k + 1])
             for k, shape in enumerate(shapes.drawn(mechanism, mechanism.points))]
 
 
@@ -146,23 +146,24 @@ class Legs:
         index = {name: linkage.points.index(name) for name in mechanism.points}
         turning = shapes.cranks(linkage)
         bars = [bar for bar in linkage.bars if bar not in turning]
-        lines = {'bars': bars, 'rods': linkage.cylinders, 'cranks': turning}
-        self._lines = {kind: np.array([[index[p], index[q]] for p, q in ends
-                                       if {p, q} <= set(index)], int).reshape(-1, 2)
-                       for kind, ends in lines.items()}
+        lines = {kind: [[index[p], index[q]] for p, q in ends if {p, q} <= set(index)]
+                 for kind, ends in (
+                     ('bars', bars), ('rods', linkage.cylinders), ('cranks', turning))}
+        inputs = {input_.name for input_ in linkage.inputs}
+        lines.update(slots=[], bodies=[], driven=[])
+        for shape, ends in sliding(mechanism):
+            if shape.kind != shapes.GUIDE:
+                lines['driven' if shape.slide.name in inputs else 'bodies'].append(ends)
+            elif not shape.is_fixed:
+                lines['slots'].append(ends)
+        # The indices of their ends.
+        self._lines = {kind: np.array(ends, int).reshape(-1, 2) for kind, ends in lines.items()}
         self._plates = [[index[name] for name in around(frame)]
                         for frame in linkage.frames.values()
                         if len(frame) > 2 and set(frame) <= set(index)]
         self._joints = np.array(list(index.values()))
         self._tracer = linkage.points.index(mechanism.tracer)
         self._fixed = fixed(cycle.course)[self._joints]
-        inputs = {input_.name for input_ in linkage.inputs}
-        self._pieces: dict = {'slots': [], 'bodies': [], 'driven': []}
-        for shape, ends in sliding(mechanism):
-            if shape.kind != shapes.GUIDE:
-                self._pieces['driven' if shape.slide.name in inputs else 'bodies'].append(ends)
-            elif not shape.is_fixed:
-                self._pieces['slots'].append(ends)
         self.legs = []
         sides = 1 + mechanism.mirrored
         thin = unit * (1.0 if len(cycle.prefixes) == 1 else 0.7)
@@ -216,10 +217,8 @@ class Legs:
         if 'bars' in artists:
             artists['plates'].set_verts([places[plate] for plate in self._plates])
             for name, ends in self._lines.items():
-                artists[name].set_segments(places[ends])
-            for name, pieces in self._pieces.items():
-                for part in (f'{name}_rims', name):
-                    artists[part].set_segments([places[ends] for ends in pieces])
+                for part in artists.keys() & {name, f'{name}_rims'}:
+                    artists[part].set_segments(places[ends])
         if 'joints' in artists:
             joints = places[self._joints]
             artists['pivots'].set_data(*joints[self._fixed].T)
