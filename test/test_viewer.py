@@ -2515,10 +2515,9 @@ import('/picture.js').then(({ Picture }) => {
     picture.mechanisms = Array.from({ length: 16 }, (_, i) => (
       { key: i, title: 'linkage'.slice(i % 5) }));
     Object.assign(picture, {
-      scale: 1, middle: [0, 0], centre: [0, 0], maps: new Map(), canvas: CANVAS });
+      scale: 1, middle: [0, 0], centre: [0, 0], canvas: CANVAS });
     const y = 4 ** (5 * random()), x = 4 ** (5 * random());
     for (const { key } of picture.mechanisms) {
-      picture.maps.set(key, [[1, 0, 0, 0], [0, 1, 0, 0]]);
       const [left, top] = [x * random(), -y * (random() < 0.5 || random())];
       picture.boxes.set(key, { low: [left, top], high: [left, top] });
     }

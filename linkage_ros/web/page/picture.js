@@ -73,15 +73,15 @@ function mixed([r, g, b, a], part, towards) {
 /** A colour, stronger for the legs in front; all are visible against the paper. */
 const colour = (rgba, front = 0) => mixed(rgba, 0.55 * front, 'ink');
 
-/** A box along the axes, of two dimensions or three. */
+/** A box along the axes. */
 class Box {
-  constructor(dimension = 2) {
-    this.low = Array(dimension).fill(Infinity);
-    this.high = Array(dimension).fill(-Infinity);
+  constructor() {
+    this.low = [Infinity, Infinity];
+    this.high = [-Infinity, -Infinity];
   }
 
   add(...at) {
-    for (let i = 0; i < this.low.length; i++) {
+    for (let i = 0; i < 2; i++) {
       this.low[i] = Math.min(this.low[i], at[i]);
       this.high[i] = Math.max(this.high[i], at[i]);
     }
@@ -91,14 +91,15 @@ class Box {
     return Math.max(...this.high.map((high, i) => high - this.low[i]));
   }
 
-  /** Grow around another box, with a margin, unless that is inside. */
+  /** Grow around another box, with a margin, unless that is inside; return this one. */
   hold({ low, high }) {
-    if (this.low.every((end, i) => end <= low[i] && high[i] <= this.high[i])) return;
+    if (this.low.every((end, i) => end <= low[i] && high[i] <= this.high[i])) return this;
     this.add(...low);
     this.add(...high);
     const slack = SLACK * this.size;
     this.add(...this.low.map(end => end - slack));
     this.add(...this.high.map(end => end + slack));
+    return this;
   }
 }
 
@@ -112,8 +113,9 @@ export class Picture {
     /** The view; see view.js. */
     this.view = null;
     this.mechanisms = [];
+    /** The boxes of mechanisms, seen from a direction, their frames, and how far each frame is drawn aside. */
     this.boxes = new Map();
-    /** The shift of each frame: mechanisms in different frames are drawn side by side. */
+    this.frames = new Map();
     this.asides = new Map();
     /** The mechanism and the dimension whose bars are lit, and the pointer that drags a joint. */
     this.lit = { mechanism: null, dimension: '' };
@@ -146,7 +148,7 @@ export class Picture {
     if (!shapes.length) return;
     // The picture is not refitted while a joint is dragged.
     if (!this.scale || !this.drag.line) this.fit(shapes, width, height);
-    if (!this.view.turned && !this.mechanisms[0].space) this.grid(width, height);
+    if (!this.view.turned && !this.mechanisms[0].space) this.grid(width, height, shapes[0].map);
     // Slots are drawn first, so that they do not hide bars.
     const rank = ({ kind }) => kind === 'slots' ? 0 : kind === 'joints' ? 2 : 1;
     shapes.sort((a, b) => rank(a) - rank(b) || a.depth - b.depth);
@@ -168,6 +170,8 @@ export class Picture {
         const { points, pose, frame } = marker;
         const [x, y, z] = axes(pose);
         this.seen ??= this.view.axes(mechanism.space ? OBLIQUE : { right: x, up: y, out: z });
+        if (this.direction !== String(this.seen.out)) this.boxes.clear();
+        this.direction = String(this.seen.out);
         const depth = dot(this.seen.out, pose.slice(0, 3));
         const map = [this.seen.right, this.seen.up].map(way => [
           dot(way, x), dot(way, y), dot(way, z), dot(way, pose.slice(0, 3))]);
@@ -187,52 +191,38 @@ export class Picture {
   /** Choose scale and place so that everything is visible, and steady during the motion. */
   fit(shapes, width, height) {
     const now = new Map();
-    const frames = new Map();
-    this.maps = new Map();
-    for (const { mechanism: { key, space }, frame, points, map } of shapes) {
-      frames.set(key, frame);
-      if (!now.has(key)) now.set(key, new Box(space ? 3 : 2));
-      for (let i = 0; i < points.length; i += 3) now.get(key).add(points[i], points[i + 1], points[i + 2]);
-      this.maps.set(key, map);
+    for (const { mechanism: { key }, frame, places } of shapes) {
+      this.frames.set(key, frame);
+      if (!now.has(key)) now.set(key, new Box());
+      for (let i = 0; i < places.length; i += 2) now.get(key).add(places[i] - this.aside(key), places[i + 1]);
     }
-    const all = new Box();
-    const inFrames = new Map();
+    const boxes = new Map();
     for (const [key, box] of now) {
       // It was never so large if something far off was drawn that is gone.
       const isKnown = this.boxes.has(key) && !(box.size > 0 && this.boxes.get(key).size > SHRUNK * box.size);
-      if (!isKnown) this.boxes.set(key, new Box(box.low.length));
-      this.boxes.get(key).hold(box);
-      const frame = frames.get(key);
-      if (!inFrames.has(frame)) inFrames.set(frame, new Box());
-      for (const corner of this.corners(key, this.boxes.get(key))) {
-        all.add(...corner);
-        inFrames.get(frame).add(...corner);
-      }
+      if (!isKnown) this.boxes.set(key, new Box());
+      const { low, high } = this.boxes.get(key).hold(box);
+      const frame = this.frames.get(key);
+      if (!boxes.has(frame)) boxes.set(frame, new Box());
+      boxes.get(frame).add(...low);
+      boxes.get(frame).add(...high);
     }
-    this.setAside(inFrames);
+    const all = new Box();
+    for (const [frame, { low, high, size }] of boxes) {
+      // To the right of the frames before it, from the next picture on.
+      const aside = all.high[0] + SLACK * size - low[0];
+      this.asides.set(frame, Number.isFinite(aside) ? aside : 0);
+      for (const [x, y] of [low, high]) all.add(x + this.asides.get(frame), y);
+    }
     const span = [0, 1].map(i => Math.max(all.high[i] - all.low[i], MIN_SIZE));
-    this.scale = Math.min((width - 2 * MARGIN) / span[0], (height - 2 * MARGIN) / span[1]);
+    this.scale = this.view.zoom * Math.min((width - 2 * MARGIN) / span[0], (height - 2 * MARGIN) / span[1]);
     this.middle = [0, 1].map(i => (all.high[i] + all.low[i]) / 2);
-    this.scale *= this.view.zoom;
     this.centre = [width / 2 + this.view.shift[0], height / 2 + this.view.shift[1]];
   }
 
-  /** Draw each frame to the right of those before it, from the next picture on. */
-  setAside(boxes) {
-    let edge = null;
-    for (const [frame, box] of boxes) {
-      const before = this.asides.get(frame) ?? 0;
-      const aside = edge === null ? 0 : edge + SLACK * box.size - (box.low[0] - before);
-      this.asides.set(frame, Number.isFinite(aside) ? aside : 0);
-      edge = box.high[0] - before + this.asides.get(frame);
-    }
-  }
-
-  /** Return the corners of a mechanism's box as they are seen, one after the other in its plane. */
-  corners(key, { low: [left, bottom, back = 0], high: [right, top, front = back] }) {
-    return [back, front].slice(0, front > back ? 2 : 1).flatMap(
-      z => [[left, bottom], [right, bottom], [right, top], [left, top]].map(
-        ([x, y]) => this.maps.get(key).map(([a, b, c, d]) => a * x + b * y + c * z + d)));
+  /** How far a mechanism is drawn aside. */
+  aside(key) {
+    return this.asides.get(this.frames.get(key)) ?? 0;
   }
 
   at(x, y) {
@@ -243,7 +233,7 @@ export class Picture {
     return [(x - this.centre[0]) / this.scale + this.middle[0], (this.centre[1] - y) / this.scale + this.middle[1]];
   }
 
-  grid(width, height) {
+  grid(width, height, map) {
     const { context } = this;
     const { name, factor } = units.of('m');
     const step = round(90 / this.scale * factor) / factor;
@@ -253,11 +243,11 @@ export class Picture {
       return text.length < MAX_LENGTH ? text : figures(value * factor, FIGURES);
     };
     // One mechanism is seen in its own plane, in which its outputs count; several in the scene's frame.
-    const [one, ...others] = this.maps.values();
-    const [across, up] = others.length ? [0, 0] : one.map(([, , , from]) => from);
+    const isOne = this.mechanisms.length === 1;
+    const [across, up] = isOne ? map.map(([, , , from]) => from) : [0, 0];
     const [left, bottom] = this.from(0, height);
     const [right, top] = this.from(width, 0);
-    const unit = `${name} ${others.length ? 'in the scene' : 'from its origin'}`;
+    const unit = `${name} ${isOne ? 'from its origin' : 'in the scene'}`;
     context.font = FONT;
     context.lineWidth = 1;
     context.strokeStyle = paint('--grid');
@@ -447,8 +437,8 @@ export class Picture {
     context.textAlign = 'center';
     context.textBaseline = 'top';
     const boxes = new Map(this.mechanisms.filter(({ key }) => this.boxes.has(key)).map(({ key }) => {
-      const corners = this.corners(key, this.boxes.get(key)).map(corner => this.at(...corner));
-      const [[left, right], [top, bottom]] = [0, 1].map(i => corners.map(corner => corner[i])).map(all => [Math.min(...all), Math.max(...all)]);
+      const { low, high } = this.boxes.get(key);
+      const [[left, bottom], [right, top]] = [low, high].map(([x, y]) => this.at(x + this.aside(key), y));
       return [key, { x: (left + right) / 2, y: (top + bottom) / 2, half: (right - left) / 2, high: (bottom - top) / 2 }];
     }));
     const written = [];
