@@ -2086,7 +2086,9 @@ def test_a_dragged_slider_sets_the_nodes_and_a_refused_one_springs_back(show, lo
             return abs(await seen.number('lever', 'e') - kept) < 1e-5 * abs(kept) + 1e-9
 
         await browser.until(sprung)
-        assert re.match('Refused: .*lever.dimensions', await seen.reason('lever', 'e'))
+        # The number as it was typed, in its unit, and the range.
+        assert re.match(r'Refused: 7000 m; the slider goes from \S+ to \S+ m\. lever.dimensions',
+                        await seen.reason('lever', 'e'))
         assert abs(kept) < 1500.0
 
     looked_at(running, doing)
@@ -2668,6 +2670,12 @@ def test_a_reload_and_another_viewer_keep_what_is_seen_and_a_lost_connection_is_
         # A bar of 1, scale 0.1, is 100 mm long in the picture.
         await browser.until(lambda: seen.number('drop', 'a'))
         assert await seen.number('drop', 'a') == 100.0
+        await seen.write('drop', 'speed', '100')
+        await browser.until(lambda: running.values('drop.crank.speed')[0] == pytest.approx(
+            math.radians(100.0)))
+        play = f'{seen.section("drop")}.querySelector("button")'
+        await page.value(f'{play}.click()')
+        await browser.until(lambda: running.values('drop.crank.speed') == [0.0])
         await page.value('document.getElementById("picture").focus()')
         for _ in range(3):
             await page.press('+')
@@ -2678,6 +2686,9 @@ def test_a_reload_and_another_viewer_keep_what_is_seen_and_a_lost_connection_is_
         assert await page.value('document.getElementById("workshop").checked')
         assert await page.value('document.getElementById("arrows").value') == 'velocity'
         assert await page.value('document.getElementById("notice").hidden')
+        await page.value(f'{play}.click()')
+        await browser.until(lambda: running.values('drop.crank.speed')[0] == pytest.approx(
+            math.radians(100.0)))
         url = running.viewer.url
         running.graph.end(running.viewer)
         await browser.until(lambda: page.value(
@@ -2732,6 +2743,20 @@ def test_mechanisms_of_one_name_in_two_namespaces_are_told_apart(graph, show, lo
             return len(columns) and (np.diff(columns) > 30).sum() == 1
 
         await browser.until(beside)
+
+    looked_at(running, doing)
+
+
+@pytest.mark.long
+@needs_browser
+def test_mechanisms_are_in_their_natural_order(show, looked_at):
+    running = show({**RATE, 'mechanisms': ['m10', 'm1', 'm2'], **{
+        f'm{number}.type': 'four_bar' for number in (1, 2, 10)}})
+
+    async def doing(seen):
+        await browser.until(lambda: seen.page.value(
+            '[...document.querySelectorAll("#views button, section h2")].map('
+            'one => one.textContent).join() === "all,m1,m2,m10,m1,m2,m10"'))
 
     looked_at(running, doing)
 

@@ -406,8 +406,8 @@ export class Picture {
         }));
         const free = tried.filter(place => isClear(place, written));
         // A name beside another's joint would be taken for that one's.
-        const own = free.find(at => seen.every(joint => apart(at, joint) >= apart(at, seen[i])));
-        const place = own ?? free[0] ?? tried[0];
+        const place = free.find(at => seen.every(joint => apart(at, joint) >= apart(at, seen[i]))) ?? free[0];
+        if (!place) return;
         written.push(place);
         this.text(name, place.x, place.y);
       });
