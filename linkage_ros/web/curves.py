@@ -54,8 +54,9 @@ class Sweep:
             raise Refused(f'{mechanism.name} cannot be assembled where its other inputs are')
         # A NaN separates two arcs.
         values = ascending(np.concatenate([
-            *(sampled(low, high, 0, SAMPLES) if dense_ends and not self.input.is_whole(reach)
-              else np.linspace(low, high, SAMPLES) for low, high in reach),
+            *(np.linspace(low, high, SAMPLES) for low, high in reach),
+            *(sampled(low, high) for low, high in reach
+              if dense_ends and not self.input.is_whole(reach)),
             [0.5 * (before + after) for (_, before), (after, _) in zip(reach, reach[1:])]]))
         still = [0.0] * len(others)
         self._inputs, self._speeds, self._still = map(theta_of, (
