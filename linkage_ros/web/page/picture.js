@@ -436,25 +436,24 @@ export class Picture {
     context.font = `600 ${FONT}`;
     context.textAlign = 'center';
     context.textBaseline = 'top';
-    const boxes = new Map(this.mechanisms.filter(({ key }) => this.boxes.has(key)).map(({ key }) => {
+    const boxes = this.mechanisms.filter(({ key }) => this.boxes.has(key)).map(({ key, title }) => {
       const { low, high } = this.boxes.get(key);
       const [[left, bottom], [right, top]] = [low, high].map(([x, y]) => this.at(x + this.aside(key), y));
-      return [key, { x: (left + right) / 2, y: (top + bottom) / 2, half: (right - left) / 2, high: (bottom - top) / 2 }];
-    }));
+      return { title, x: (left + right) / 2, y: (top + bottom) / 2, half: (right - left) / 2, high: (bottom - top) / 2 };
+    });
     const written = [];
-    for (const { key, title } of this.mechanisms) {
-      if (!boxes.has(key)) continue;
-      const { x, y, high } = boxes.get(key);
-      const half = this.width(title) / 2 + 4;
-      const at = middle => ({ x: this.isSeen(x, 0) ? this.inside({ x, y: 0, half, high: 0 }).x : x, y: middle, half, high: LINE / 2 });
-      const below = Array.from({ length: 2 * this.mechanisms.length }, (_, line) => at(y + high + (line + 0.5) * LINE));
-      const isFree = place => isClear(place, written) && place.y > LINE / 2 && place.y + LINE / 2 < this.canvas.clientHeight;
+    const isFree = place => isClear(place, written) && place.y > LINE / 2 && place.y + LINE / 2 < this.canvas.clientHeight;
+    for (const box of boxes) {
+      const half = this.width(box.title) / 2 + 4;
+      const x = this.isSeen(box.x, 0) ? this.inside({ x: box.x, y: 0, half, high: 0 }).x : box.x;
+      const at = lines => ({ x, y: box.y + Math.sign(lines) * box.high + (lines - Math.sign(lines) / 2) * LINE, half, high: LINE / 2 });
+      const below = Array.from({ length: 2 * boxes.length }, (_, line) => at(line + 1));
       // A title on another mechanism would be taken for that one's.
-      const others = [...boxes].filter(([other]) => other !== key).map(([, box]) => box);
-      const place = [below[0], at(y - high - LINE / 2), below[1]].find(one => isFree(one) && isClear(one, others)) ?? below.find(isFree);
+      const others = boxes.filter(other => other !== box);
+      const place = [below[0], at(-1), below[1]].find(one => isFree(one) && isClear(one, others)) ?? below.find(isFree);
       if (!place) continue;
       written.push(place);
-      this.text(title, place.x, place.y - LINE / 2);
+      this.text(box.title, place.x, place.y - LINE / 2);
     }
   }
 
