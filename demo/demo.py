@@ -130,14 +130,14 @@ def observe(mechanisms):
         print(f'Running three nodes on {SCENE.name}, ROS_DOMAIN_ID {domain.id} ...', flush=True)
         motions = [Received(mechanism, graph) for mechanism in mechanisms]
         inverse = graph.node.create_client(ServoInverse, 'servo_inverse')
-        start = time.monotonic()
 
-        def is_complete():
+        def has_all():
             nodes.check()
-            return time.monotonic() > start + SECONDS and all(
-                motion.states and motion.markers and motion.loci for motion in motions)
+            return all(motion.states and motion.markers and motion.loci for motion in motions)
 
-        graph.until(is_complete)
+        graph.until(has_all)
+        end = time.monotonic() + SECONDS
+        graph.until(lambda: has_all() and time.monotonic() > end, 2.0 * SECONDS)
         answer = graph.call(inverse, ServoInverse.Request(
             lever_angle=list(map(math.radians, LEVER_ANGLES))))
         for name, code in nodes.stop().items():
