@@ -83,15 +83,16 @@ VALUE = st.sampled_from(sorted(CHANGES)).flatmap(
 @settings(max_examples=40)
 @given(st.lists(st.lists(VALUE, min_size=1, max_size=3).map(dict), max_size=6))
 def test_a_scene_with_any_history_is_what_its_values_read_anew_make(history):
-    values = {'mechanisms': ['m3', 'm4'], 'm3.type': 'four_bar', 'm4.type': 'slider_crank'}
-    made = scene.read(values)
+    made = scene.read({
+        'mechanisms': ['m3', 'm4'], 'm3.type': 'four_bar', 'm4.type': 'slider_crank'})
     for change in history:
         before = made.parameters
         found, new = outcome(scene.changed, made, change)
+        # All that was not changed keeps its value, defaults, too.
+        values = {parameter.name: parameter.value for parameter in before}
         assert found == outcome(scene.read, {**values, **change})[0]
         assert made.parameters == before
-        if new:
-            values, made = {**values, **change}, new
+        made = new or made
 
 
 @pytest.mark.slow

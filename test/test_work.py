@@ -12,7 +12,6 @@
 
 from collections import Counter
 import dis
-import math
 
 from builtin_interfaces.msg import Time
 from linkage_ros import mechanisms, scene
@@ -206,21 +205,3 @@ def test_a_patched_message_reads_like_one_that_is_built(count):
             patched, = template.patched(message_layout.pack(stamp), values)
             assert deserialize_message(patched, kind) == deserialize_message(
                 serialize_message(build(stamp, values)), kind)
-
-
-def test_what_cannot_be_patched_is_published_as_an_ordinary_message(graph, monkeypatch):
-    def refuse(*_):
-        raise message_layout.NoLayout('not on this middleware')
-
-    monkeypatch.setattr(message_layout.Template, '__init__', refuse)
-    graph.start(Kinematics, WALKER)
-    turn = graph.crank(['walker_crank'])
-    plain = turn([0.4], graph.listen(JointState, 'walker/joint_states'), [2.0])
-    assert plain.position[0] == 0.4 and plain.velocity[0] == 2.0
-    monkeypatch.undo()
-    patched = message_layout.Template(
-        [lambda stamp, values: JointState(name=plain.name, position=values)], len(plain.name))
-    text, = patched.patched(message_layout.pack(Time()), np.array(plain.position))
-    read = deserialize_message(text, JointState)
-    assert read.position == plain.position
-    assert all(math.isfinite(x) for x in plain.position)

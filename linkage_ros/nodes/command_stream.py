@@ -281,7 +281,7 @@ class CommandStream:
         n = len(names)
         return PatchedPublisher(
             [(self._commands.publisher, lambda stamp, values: joint_states(
-                stamp, names, values[:n], values[n:]))], (1 + moving) * n, self._logger)
+                stamp, names, values[:n], values[n:]))], (1 + moving) * n)
 
     def _receive_trajectory(self, message: JointTrajectory) -> None:
         if not self._trajectories.has_subscribers:

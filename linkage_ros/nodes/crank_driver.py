@@ -87,7 +87,7 @@ class CrankDriver(scene_node.SceneNode):
         self._names, self._message = sources, PatchedPublisher(
             [(self._publisher,
               lambda stamp, values: joint_states(stamp, sources, values[:n], values[n:]))],
-            2 * n, self.get_logger())
+            2 * n)
 
     def _set_rate(self, rate: float) -> None:
         if not rate:

@@ -53,7 +53,6 @@ class Kinematics(scene_node.SceneNode):
         self._mechanisms: Dict[str, MechanismTopics] = {}
         self._models: Dict[str, MechanismModel] = {}
         super().__init__(scene.KINEMATICS, **kwargs)
-        self._clashing = Once(MAX_NAMES)
         # Mechanism and index of the inputs, by their source joint.
         self._inputs: Dict[str, List[Tuple[str, int]]] = {}
         for name, mechanism in self.scene.machines.items():
@@ -121,7 +120,6 @@ class Kinematics(scene_node.SceneNode):
         is_first, self._models = not self._models, models
         self._own = frozenset(joint.name for model in models.values()
                               for joint in model.mechanism.joints.values())
-        self._check_clashes()
         for topics in changed:
             topics.adopt(models[topics.name])
         if not is_first:
@@ -203,20 +201,6 @@ class Kinematics(scene_node.SceneNode):
             self.get_logger().warning(
                 f'crank_states: no input is called {listed(unknown, 150)}; the inputs are '
                 f'{listed(self._inputs, 150)}{self._unknown.ending}')
-
-    def _check_clashes(self) -> None:
-        """Warn once of each joint that has the name of another mechanism's source on its topic."""
-        clashes = self._clashing.new(
-            joint.name for name, model in self._models.items()
-            for key, joint in model.mechanism.joints.items()
-            if joint.published and joint.name in self._scene_joint_states.omitted
-            and key not in model.mechanism.inputs
-            and name not in dict(self._inputs[joint.name]))
-        if clashes:
-            self.get_logger().warning(
-                f'joint_states: {listed(clashes, 150)} is the name of a joint and of a source of '
-                'another mechanism on the same topic, so that the joint is not published; rename '
-                f'one of them{self._clashing.ending}')
 
     def _warn_of_missing(self) -> None:
         """Warn of source joints that have not been received."""

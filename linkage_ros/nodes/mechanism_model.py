@@ -76,7 +76,7 @@ class MechanismModel:
 
     """
 
-    def __init__(self, mechanism: scene.SceneMechanism, frame_id: str, prefix: str, logger: Any):
+    def __init__(self, mechanism: scene.SceneMechanism, frame_id: str, prefix: str):
         self.mechanism, self.made_of = mechanism, (mechanism, frame_id, prefix)
         self.inputs = list(mechanism.inputs.values())
         self.robot = None if mechanism.in_space else bodies.robot([mechanism], frame_id)
@@ -87,7 +87,7 @@ class MechanismModel:
         drawn = mechanism.name, prefix + frame_id, mechanism.pose
         self._points, shown = _shown(mechanism)
         self._drawn = *drawn, bodies.size(mechanism), shown
-        self._conversions, self._logger = Cache(self._conversion), logger
+        self._conversions = Cache(self._conversion)
         self.regular = Cache(self._regular)
         self.publishers = Cache(self._publisher, MAX_PUBLISHERS)
 
@@ -167,7 +167,7 @@ class MechanismModel:
         builders = self.joint_message, self.marker_message
         return PatchedPublisher(
             [(topic, partial(build, state)) for topic, build in zip(topics, builders) if topic],
-            state.solution.layout.size, self._logger)
+            state.solution.layout.size)
 
     def joint_message(self, state: AssemblyState, stamp: Any, values: np.ndarray) -> JointState:
         """Build the joint states of the assembled legs from a solution's values."""

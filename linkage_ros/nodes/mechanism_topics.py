@@ -57,8 +57,7 @@ class MechanismTopics:
         self._markers = TrackedPublisher(node, MarkerArray, f'{name}/markers', 1)
         self._locus = node.create_publisher(Marker, f'{name}/locus', LATCHED)
         self._description = node.create_publisher(String, f'{name}/robot_description', LATCHED)
-        self._logger = node.get_logger().get_child(name)
-        self._throttle = Throttle(self._logger)
+        self._throttle = Throttle(node.get_logger().get_child(name))
         self.inputs: List[Any] = [None] * len(mechanism.inputs)
         self.speeds: List[Optional[float]] = [None] * len(mechanism.inputs)
         self.stamp = NEVER
@@ -121,7 +120,7 @@ class MechanismTopics:
         before, inputs = getattr(self, 'model', None), [*self.inputs]
         if before and before.made_of == (mechanism, frame_id, prefix):
             return before
-        model = MechanismModel(mechanism, frame_id, prefix, self._logger)
+        model = MechanismModel(mechanism, frame_id, prefix)
         # This runs in the worker's thread, while subscribers may change.
         topics = self._joint_states.subscribed, self._markers.subscribed
         if before and None not in inputs and (in_scene or any(topics)):

@@ -98,23 +98,11 @@ class Follower:
         self._waiting.update((name, value) for name, value in values.items()
                              if name.partition('.')[0] in self._mechanisms
                              and not self._parameters.followed[name].read_only)
-        self._warn('refused', wrong + self._follow(), 'values that cannot be followed')
-
-    def _follow(self) -> List[str]:
-        """Adopt what waits, together or else by mechanism; return the reasons of refusals."""
-        present = self._present(self._waiting)
-        waiting = {name: value for name, value in self._waiting.items() if value != present[name]}
-        parts: Dict[str, Dict[str, Any]] = {}
-        for name, value in waiting.items():
-            parts.setdefault(name.partition('.')[0], {})[name] = value
-        self._waiting = waiting
-        if not waiting or not self._parameters.follow(waiting):
-            parts = {}
-        refused = {mechanism: reason for mechanism, part in parts.items()
-                   if (reason := self._parameters.follow(part))}
-        self._waiting = {name: value for mechanism in refused
-                         for name, value in parts[mechanism].items()}
-        return [*refused.values()]
+        if refused := self._parameters.follow(self._waiting):
+            wrong.append(refused)
+        else:
+            self._waiting = {}
+        self._warn('refused', wrong, 'values that cannot be followed')
 
     def _present(self, names: Iterable[str]) -> Dict[str, Any]:
         """Return this node's values of all parameters of the mechanisms that names begin with."""

@@ -18,7 +18,7 @@ from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from .message_layout import NoLayout, Template, unpack
+from .message_layout import Template
 
 # Later subscribers receive the last message, too.
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -55,25 +55,15 @@ class PatchedPublisher:
     Publishes messages again and again with new values.
 
     `parts` are, for each message, its publisher and its builder; builders and `count` are as for
-    Template. If a message cannot be patched, a warning is logged, `template` is None, and every
-    message is built.
+    Template.
     """
 
-    def __init__(self, parts: Sequence[Tuple[Any, Callable]], count: int, logger: Any):
-        self._parts, self.template = parts, None
-        self._publish = [publisher.publish for publisher, _ in parts]
-        try:
-            self.template = Template([build for _, build in parts], count)
-        except NoLayout as reason:
-            topics = ', '.join(publisher.topic_name for publisher, _ in parts)
-            logger.warning(f'{topics}: {reason}; each message is built anew, which takes longer',
-                           once=True)
+    def __init__(self, parts: Sequence[Tuple[Any, Callable]], count: int):
+        publishers, builders = zip(*parts)
+        self._publish = [publisher.publish for publisher in publishers]
+        self._template = Template(builders, count)
 
     def publish(self, stamp: bytes, values: Any) -> None:
         """Publish the messages with a packed stamp and values (count,)."""
-        if self.template:
-            for publish, data in zip(self._publish, self.template.patched(stamp, values)):
-                publish(data)
-        else:
-            for publish, (_, build) in zip(self._publish, self._parts):
-                publish(build(unpack(stamp), values))
+        for publish, data in zip(self._publish, self._template.patched(stamp, values)):
+            publish(data)

@@ -83,9 +83,8 @@ class SceneNode(Node):
         with self._or_destroyed():
             self._parameters_of_scene = SceneParameters(self, name, self.check, self._changed)
         self._role = name
-        self._later: List[Job] = []
         self._first_spin = self.create_timer(
-            0.0, self.guarded('the start of the worker', self._start_later),
+            0.0, self.guarded('the start of the worker', self._start_worker),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
@@ -135,10 +134,7 @@ class SceneNode(Node):
 
     def later(self, jobs: Iterable[Job]) -> None:
         """Run jobs in the worker's thread, after the node has begun to spin."""
-        if self._first_spin.is_canceled():
-            self._worker.add(jobs)
-        else:
-            self._later.extend(jobs)
+        self._worker.add(jobs)
 
     def serves(self) -> str:
         """Return what the node does, in words, for its first log message."""
@@ -233,9 +229,9 @@ class SceneNode(Node):
         self._adopted = new
         self.adopt(prepared)
 
-    def _start_later(self) -> None:
+    def _start_worker(self) -> None:
         self._first_spin.cancel()
-        self._worker.add(self._later)
+        self._worker.run_next()
 
     def _warn_of_namesake(self) -> None:
         me = self.get_name(), self.get_namespace()

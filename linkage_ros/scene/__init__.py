@@ -19,9 +19,9 @@ raises an error that names the wrong parameter and its allowed values. Nodes dec
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field as some
+from dataclasses import dataclass
 import re
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any, Dict, Iterable, List, Optional, Tuple
 
 from .input_settings import FARTHEST, in_words, InputSettings, START
 from .joint_names import check_distinct
@@ -73,8 +73,6 @@ class Scene:
     rate: float
     # Parameters that belong to no mechanism.
     general: Tuple[Parameter, ...]
-    # What it was read from, by mechanism ('' for general parameters) and full parameter name.
-    values: Mapping[str, Mapping[str, Any]] = some(compare=False, repr=False)
 
     @property
     def parameters(self) -> Tuple[Parameter, ...]:
@@ -134,11 +132,16 @@ def changed(before: Scene, values: Mapping[str, Any], strict: bool = True) -> Sc
     """
     Return the scene `before` with some other values, by full parameter name.
 
-    Mechanisms without a changed value are reused. `strict` and SceneError are those of `read`.
+    All other parameters keep their values, defaults, too. Mechanisms without a changed value are
+    reused. `strict` and SceneError are those of `read`.
     """
-    parts = dict(before.values)
+    parts = {'': _values(before.general),
+             **{name: machine.values for name, machine in before.machines.items()}}
     for name, part in _by_mechanism(values).items():
-        parts[name] = {**parts.get(name, {}), **part}
+        machine = before.machines.get(name)
+        present = _values(machine.parameters) if machine else parts.get(name, {})
+        if not part.items() <= present.items():
+            parts[name] = {**present, **part}
     return _read(parts, before, strict)
 
 
@@ -160,7 +163,11 @@ def _read(parts: Mapping[str, Mapping[str, Any]], before: Optional[Scene], stric
     for unused in (values.unused(), *(part for name, part in parts.items()
                                       if name and name not in machines)):
         refuse_unknown(unused, allowed)
-    return Scene(machines, frame_id, frame_prefix, rate, tuple(values.parameters), parts)
+    return Scene(machines, frame_id, frame_prefix, rate, tuple(values.parameters))
+
+
+def _values(parameters: Iterable[Parameter]) -> Dict[str, Any]:
+    return {parameter.name: parameter.value for parameter in parameters}
 
 
 def _by_mechanism(values: Any) -> Dict[str, Dict[str, Any]]:
