@@ -108,7 +108,7 @@ def test_an_owner_announces_all_its_values_and_then_each_change(graph, monkeypat
     double = Parameter.Type.DOUBLE
     assert [(said(event.new_parameters), said(event.changed_parameters)) for event in heard] == [
         (own(), {}), ({}, {A: (double, 90.0), 'lever.scale': (double, 2.0)}),
-        ({}, {A: (double, 91.0)}), ({}, own(**{A: 92.0, 'lever.scale': 2.0})),
+        ({}, {A: (double, 91.0)}), (own(**{A: 92.0, 'lever.scale': 2.0}), {}),
         ({}, {A: (double, 93.0)})]
     times = [event.stamp.sec * 10 ** 9 + event.stamp.nanosec for event in heard]
     assert before < times[0] and times == sorted(times)

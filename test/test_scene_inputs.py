@@ -143,7 +143,7 @@ def test_a_command_continues_from_the_last_inputs_at_the_speed_of_the_outputs(po
         near(command.positions, case.positions(inputs))
         moved = case.jacobian(inputs) @ np.multiply(command.speeds, case.ratios)
         np.testing.assert_allclose(moved, speeds, 1e-6, 1e-6)
-        assert request.command(values, None, inputs, jumps).speeds is None
+        assert request.command(values, None, inputs, jumps).speeds == ()
 
 
 def test_all_answers_are_in_their_sweeps_the_nearest_first(posed):

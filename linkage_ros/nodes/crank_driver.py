@@ -52,9 +52,13 @@ class CrankDriver(scene_node.SceneNode):
         self._sent: List[Tuple[Tuple[str, str], scene.InputSettings]] = []
         self._now: Optional[int] = None
         self._steady = 0
-        self._names: List[str] = []
-        self._message: PatchedPublisher
         self._publisher = InProcessPublisher(self, 'crank_states', in_process)
+        sources = list(dict.fromkeys(
+            settings.source for mechanism in self.scene.machines.values()
+            for settings in mechanism.inputs.values()))
+        n = len(sources)
+        self._message = PatchedPublisher([(self._publisher, lambda stamp, values: joint_states(
+            stamp, sources, values[:n], values[n:]))], 2 * n)
         self._timer = self.create_timer(1.0, self.guarded('a crank message', self._tick))
         # After system time is set back, a timer would sleep until the old time returns.
         self.create_timer(1.0, self.guarded('the check of the clock', self._restart_timer),
@@ -77,17 +81,7 @@ class CrankDriver(scene_node.SceneNode):
         # If several inputs have one source joint, it moves as the last of them.
         sent = {settings.source: (key, settings) for key, settings in all_settings.items()}
         self._sent = list(sent.values())
-        self._set_names(list(sent))
         self._set_rate(new.rate)
-
-    def _set_names(self, sources: List[str]) -> None:
-        if sources == self._names:
-            return
-        n = len(sources)
-        self._names, self._message = sources, PatchedPublisher(
-            [(self._publisher,
-              lambda stamp, values: joint_states(stamp, sources, values[:n], values[n:]))],
-            2 * n)
 
     def _set_rate(self, rate: float) -> None:
         if not rate:

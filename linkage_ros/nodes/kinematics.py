@@ -124,8 +124,8 @@ class Kinematics(scene_node.SceneNode):
             topics.adopt(models[topics.name])
         if not is_first:
             self._publish(changed)
-        self.later([*(partial(self._latched, topics, models[topics.name]) for topics in changed),
-                    partial(self._robot, models)])
+        self.worker.add(partial(self._latched, topics, models[topics.name]) for topics in changed)
+        self.worker.add([partial(self._robot, models)])
 
     def _latched(self, topics: MechanismTopics, model: MechanismModel) -> Callable[[], None]:
         """Build a mechanism's latched messages; return a function to publish them."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import AbstractSet, Any, List, Optional, Sequence, Tuple
+from typing import AbstractSet, Any, List, Optional, Tuple
 
 import numpy as np
 from rclpy.duration import Duration
@@ -178,12 +178,12 @@ class MechanismTopics:
         failure += ' at ' + ', '.join(
             f'{settings.input.quantity} {value:.6g} {settings.input.unit}'
             for settings, value in zip(inputs, self.inputs))
-        first, *others = missing
-        reach, value, input_ = self._reach(inputs[0], first), self.inputs[0], inputs[0].input
-        if len(inputs) > 1 or any(input_.holds(arc, value, value) for arc in reach):
+        first, input_ = next(iter(missing)), inputs[0].input
+        is_inside = any(input_.holds(arc, self.inputs[0], self.inputs[0])
+                        for arc in inputs[0].reach)
+        if len(inputs) > 1 or len(self.model.assembly.legs) > 1 or is_inside:
             return f'{failure}: no place for "{self._unplaced(first)}"'
-        of = f' of {missing[first]}' if others else ''
-        return f'{failure}; the reach{of} is {scene.in_words(reach)} {input_.unit}'
+        return f'{failure}; the reach is {scene.in_words(inputs[0].reach)} {input_.unit}'
 
     def _unplaced(self, leg: int) -> str:
         """Return the first joint line of a leg that has no place at the present inputs."""
@@ -194,12 +194,3 @@ class MechanismTopics:
         found = {**mechanism.linkage.solve(own), **mechanism.linkage.joint_angles(own)}
         return next((line.text for line in mechanism.linkage.design.lines
                      if any(np.isnan(found.get(name, 0.0)).any() for name in line.names)), '')
-
-    def _reach(self, settings: scene.InputSettings, leg: int) -> Sequence[Tuple[float, float]]:
-        """Return the reach of a leg, by the crank that all legs have in common."""
-        if len(self.model.assembly.legs) == 1:
-            return settings.reach
-        lag, start, side, _ = [*self.model.assembly.legs.values()][leg]
-        arcs = [sorted(lag + side * (end - start) for end in arc) for arc in settings.reach]
-        turns = [settings.input.turns_of(low) for low, _ in arcs]
-        return sorted((low - turn, high - turn) for (low, high), turn in zip(arcs, turns))

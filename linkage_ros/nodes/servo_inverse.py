@@ -89,14 +89,25 @@ class ServoInverse(scene_node.SceneNode):
     def answer_inputs_for(self, request: Any, response: Any) -> Any:
         """Answer a request of `inputs_for`; the response names an error, if any."""
         return self._filled(lambda: solve_inputs_for(
-            _machine_with_inputs(self.scene, request.mechanism), request, response), response)
+            self._with_several_inputs(request.mechanism), request, response), response)
 
     def _request(self, key: Tuple[str, str]) -> InverseRequest:
-        mechanism = _machine(self.scene, *key)
+        (name, output), mechanisms = key, self.scene.machines
+        levers = {} if output not in ('', LEVER) else {
+            name: mechanism for name, mechanism in mechanisms.items()
+            if mechanism.linkage.type == 'slotted_lever'}
+        mechanism = _chosen(mechanisms, name, levers or mechanisms,
+                            'slotted lever' if levers else 'mechanism')
         if len(mechanism.inputs) > 1:
             raise ValueError(f'{mechanism.name} has several inputs, which one output does not '
                              'determine; call the service inputs_for')
-        return InverseRequest(mechanism, [key[1]])
+        return InverseRequest(mechanism, [output])
+
+    def _with_several_inputs(self, name: str) -> scene.SceneMechanism:
+        mechanisms = self.scene.machines
+        return _chosen(mechanisms, name, {
+            name: mechanism for name, mechanism in mechanisms.items()
+            if len(mechanism.inputs) > 1}, 'mechanism with several inputs')
 
     def _filled(self, fill: Callable[[], None], response: Any) -> Any:
         response.success = False
@@ -202,41 +213,17 @@ def solve_inputs_for(mechanism: scene.SceneMechanism, request: Any, response: An
     response.message = '' if answers else elided(inverse.reason(*values), MESSAGE)
 
 
-def _machine(scene_: scene.Scene, name: str, output: str) -> scene.SceneMechanism:
-    """Return a mechanism by its name, or the only one, or for a lever the only slotted lever."""
-    levers = {key: mechanism for key, mechanism in scene_.machines.items()
-              if mechanism.linkage.type == 'slotted_lever'}
-    mechanisms: Mapping[str, scene.SceneMechanism] = scene_.machines if output else levers
+def _chosen(mechanisms: Mapping[str, scene.SceneMechanism], name: str,
+            default: Mapping[str, scene.SceneMechanism], what: str) -> scene.SceneMechanism:
+    """Return a mechanism by its name or, if that is empty, the only one in `default`."""
     if name in mechanisms:
         return mechanisms[name]
-    if not name:
-        for only in (mechanisms, levers if output in ('', LEVER) else {}):
-            if len(only) == 1:
-                return next(iter(only.values()))
-    allowed = (listed(mechanisms, MAX_NAMES_LENGTH) if mechanisms
-               else 'none: the scene has no slotted_lever')
-    if name in scene_.machines:
-        raise ValueError(f'{name} is a {scene_.machines[name].linkage.type}, not a slotted lever; '
-                         f'name an output, or use one of: {allowed}')
-    if name:
-        raise ValueError(f'there is no mechanism {quoted(name)}; allowed: {allowed}'
-                         f'{meant(name, mechanisms)}')
-    what = '' if output else ' slotted lever'
-    raise ValueError(f'mechanism may be empty only if the scene has a single{what or " one"}; '
-                     f'allowed: {allowed}')
-
-
-def _machine_with_inputs(scene_: scene.Scene, name: str) -> scene.SceneMechanism:
-    """Return a mechanism by its name, or the only one with several inputs."""
-    mechanisms = scene_.machines
-    several = [mechanism for mechanism in mechanisms.values() if len(mechanism.inputs) > 1]
-    if name in mechanisms:
-        return mechanisms[name]
-    if name or len(several) != 1:
-        raise ValueError(f'mechanism must be one of {listed(mechanisms, MAX_NAMES_LENGTH)}, or '
-                         f'empty if a single one has several inputs, not {quoted(name)}'
-                         f'{meant(name, mechanisms)}')
-    return several[0]
+    if not name and len(default) == 1:
+        return next(iter(default.values()))
+    problem = (f'there is no mechanism {quoted(name)}' if name else
+               f'mechanism may be empty only if the scene has a single {what}')
+    raise ValueError(f'{problem}; allowed: {listed(mechanisms, MAX_NAMES_LENGTH)}'
+                     f'{meant(name, mechanisms)}')
 
 
 def _unreachable(inverse: InverseRequest, values: Sequence[float]) -> str:

@@ -40,14 +40,19 @@ class Command(NamedTuple):
         The inputs [rad or m]; NaN if the reach and sweeps have none for the outputs' values.
     positions : sequence of float
         The actuators' positions.
-    speeds : sequence of float, optional
+    speeds : sequence of float
         The actuators' speeds, if known; infinite where an output that moves would turn back.
 
     """
 
     inputs: Sequence[float]
     positions: Sequence[float]
-    speeds: Optional[Sequence[float]]
+    speeds: Sequence[float]
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether there is an answer."""
+        return all(map(math.isfinite, self.inputs))
 
 
 class SceneAnswer(NamedTuple):
@@ -189,7 +194,8 @@ class InverseRequest:
             found, rates = self._inverse.nearest(own, start, self._ends) \
                 if jumps or len(start) == 1 else ((math.nan,) * len(start), rates)
         inputs = [x * scale for x, scale in zip(found, self._scales)]
-        return Command(inputs, self.positions_of(inputs), speeds and self._speeds(speeds, rates))
+        return Command(inputs, self.positions_of(inputs),
+                       self._speeds(speeds, rates) if speeds else ())
 
     def _are_inside(self, inputs: Sequence[float]) -> bool:
         return all(end[0] <= value <= end[1] if end else value == value
