@@ -187,7 +187,7 @@ def test_a_sensor_gives_the_input_and_an_input_the_sensor(name, output):
     key, = case.machine.inputs
     case = Case(name, **{f'{key}.measures': output, f'{key}.ratio': 2.0, f'{key}.offset': 0.125})
     drive, = case.drives
-    assert drive.source == f'm_{output}' and drive.actuator == (1.0, 0.0) and not drive.is_plain
+    assert drive.source == f'm_{output}' and drive.actuator == (1.0, 0.0)
     for (value,), speed in itertools.product(case.inputs, (0.0, -0.6)):
         (read,), (slope,) = case.at([value], [output]), case.jacobian([value], [output])[0]
         position, rate = case.machine.to_source(drive, value, speed)

@@ -13,7 +13,7 @@
 from __future__ import annotations
 
 from time import monotonic_ns, time_ns
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from rclpy.clock import Clock, ClockType
 from rclpy.serialization import serialize_message
@@ -48,7 +48,6 @@ class CrankDriver(scene_node.SceneNode):
         super().__init__(scene.DRIVER, **kwargs)
         self._motions: Dict[Tuple[str, str], Motion] = {}
         self._settings: Dict[Tuple[str, str], scene.InputSettings] = {}
-        self._mechanisms: Mapping[str, scene.SceneMechanism] = {}
         self._sent: List[Tuple[Tuple[str, str], scene.InputSettings]] = []
         self._now: Optional[int] = None
         self._steady = 0
@@ -77,7 +76,7 @@ class CrankDriver(scene_node.SceneNode):
             elif (old.speed, old.sweep) != (settings.speed, settings.sweep):
                 self._motions[key] = self._motions[key].changed(
                     settings.speed, settings.sweep, now)
-        self._settings, self._mechanisms = all_settings, new.machines
+        self._settings = all_settings
         # If several inputs have one source joint, it moves as the last of them.
         sent = {settings.source: (key, settings) for key, settings in all_settings.items()}
         self._sent = list(sent.values())
@@ -120,10 +119,7 @@ class CrankDriver(scene_node.SceneNode):
     def _position(self, key: Tuple[str, str], settings: scene.InputSettings,
                   now: int) -> Tuple[float, float]:
         """Return position [rad or m] and speed [rad/s or m/s] of an input's source joint."""
-        value, speed = self._motions[key].at(now)
-        if settings.is_plain:
-            return value, speed
-        return self._mechanisms[key[0]].to_source(settings, value, speed)
+        return self.scene.machines[key[0]].to_source(settings, *self._motions[key].at(now))
 
     def serves(self) -> str:
         """Return the source joints and their rate, in words."""

@@ -19,14 +19,14 @@ from __future__ import annotations
 
 from array import array
 from contextlib import suppress
-from struct import Struct
+from struct import error as StructError, Struct
 from typing import Any, Callable, Dict, List, Optional, Tuple
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from .log import Throttle
-from .message_layout import deserialized, HEADER, MessageLayout, NoLayout, pack, Unreadable
+from .message_layout import deserialized, HEADER, LITTLE_ENDIAN, pack, Unreadable
 
 # Best effort matches publishers of any reliability. At 1000 Hz, the queue holds 100 ms.
 ANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -35,6 +35,8 @@ ANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 MAX_SENDERS = 256
 # Messages longer than this [bytes] are always deserialised.
 MAX_LAYOUT_BYTES = 1 << 16
+
+COUNT = Struct('<I')
 
 # A packed stamp (bytes), then floats.
 Numbers = Tuple[Any, ...]
@@ -114,16 +116,16 @@ class Sender:
         self._numbers: Optional[Numbers] = (
             pack(message.header.stamp), *message.position, *message.velocity)
         if len(data) <= MAX_LAYOUT_BYTES:
-            with suppress(NoLayout):
-                self._set_layout(data, MessageLayout(data, message))
+            with suppress(StructError):
+                self._set_layout(data)
 
-    def _set_layout(self, data: bytes, layout: MessageLayout) -> None:
-        (positions, count), (velocities, others) = layout.numbers[:2]
+    def _set_layout(self, data: bytes) -> None:
+        mask, ((positions, count), (velocities, others), _) = _layout(data)
         unpack = Struct(f'<{HEADER}x8s{positions - HEADER - 8}x{count}d'
                         f'{velocities - positions - 8 * count}x{others}d').unpack_from
         if _bits(unpack(data)) == _bits(self._numbers):
-            # Integers are the fastest to compare and look up for messages this short.
-            self.size, self.mask = len(data), int.from_bytes(layout.fixed, 'little')
+            # Integers are the fastest to compare for messages this short.
+            self.size, self.mask = len(data), int.from_bytes(mask, 'little')
             self.same = int.from_bytes(data, 'little') & self.mask
             self._numbers, self._unpack = None, unpack
 
@@ -145,3 +147,36 @@ class Sender:
 def _bits(numbers: Any) -> tuple:
     """Return the numbers as bytes, because as a float, NaN is unequal to itself."""
     return numbers[0], array('d', numbers[1:]).tobytes()
+
+
+def _layout(data: bytes) -> Tuple[bytearray, List[Tuple[int, int]]]:
+    """
+    Return where the constant bytes and the numbers of a serialised JointState are.
+
+    That is a mask, 0 at stamp, numbers and padding, and place and count of positions, velocities
+    and efforts. Raises StructError if the message is not in little-endian CDR.
+    """
+    mask, place = bytearray(len(data)), HEADER + 8
+    mask[:HEADER] = HEADER * b'\xff'
+
+    def skip(size: int, alignment: int, bits: bytes) -> int:
+        nonlocal place
+        start = place + (HEADER - place) % alignment
+        place = start + size
+        if data[:len(LITTLE_ENDIAN)] != LITTLE_ENDIAN or place > len(data):
+            raise StructError
+        mask[start:place] = size * bits
+        return start
+
+    def count() -> int:
+        return int(COUNT.unpack_from(data, skip(COUNT.size, COUNT.size, b'\xff'))[0])
+
+    # The frame, and the names.
+    skip(count(), 1, b'\xff')
+    for _ in range(count()):
+        skip(count(), 1, b'\xff')
+    numbers = []
+    for _ in range(3):
+        size = count()
+        numbers.append((skip(8 * size, 8 if size else 1, b'\0'), size))
+    return mask, numbers

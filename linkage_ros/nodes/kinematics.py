@@ -30,7 +30,7 @@ from .. import scene
 from ..robot_model import bodies, urdf
 from ..words import listed
 
-# Time from the start, and from the first input received, to a warning about missing ones [s].
+# Time from the start to a warning about inputs that were not received [s].
 MISSING_AFTER_S = 5.0
 # Longest wait for subscribers to delete markers when the node ends [s].
 DELETION_TIMEOUT_S = 0.1
@@ -65,7 +65,7 @@ class Kinematics(scene_node.SceneNode):
         # That of the last message that set an input.
         self._stamp = NEVER
         self._own: frozenset = frozenset()
-        self._missing, self._unknown = set(self._inputs), Once(MAX_NAMES)
+        self._unknown = Once(MAX_NAMES)
         self._missing_timer = self.create_timer(
             MISSING_AFTER_S, self.guarded('the check for missing inputs', self._warn_of_missing),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -187,14 +187,11 @@ class Kinematics(scene_node.SceneNode):
         sources = [InputSource(self._mechanisms[mechanism], i, index, moving and count + index)
                    for name, index in indices.items()
                    for mechanism, i in self._inputs.get(name, ())]
-        self._check_names(message.name, indices)
+        self._check_names(message.name)
         return sources, [*dict.fromkeys(source.mechanism for source in sources)]
 
-    def _check_names(self, names: Iterable[str], received: Iterable[str]) -> None:
-        """Warn once of each unknown name; record source joints whose position is received."""
-        if len(self._missing) == len(self._inputs) and not self._missing.isdisjoint(received):
-            self._missing_timer.reset()
-        self._missing.difference_update(received)
+    def _check_names(self, names: Iterable[str]) -> None:
+        """Warn once of each unknown name."""
         unknown = self._unknown.new(name for name in names if name not in self._inputs
                                     and name not in self._own)
         if unknown:
@@ -205,13 +202,12 @@ class Kinematics(scene_node.SceneNode):
     def _warn_of_missing(self) -> None:
         """Warn of source joints that have not been received."""
         self._missing_timer.cancel()
-        if self._missing:
-            waiting = [name for name in self._inputs if name in self._missing]
-            stuck = dict.fromkeys(mechanism for name in waiting
-                                  for mechanism, _ in self._inputs[name])
+        waiting = {name: mechanism for name, inputs in self._inputs.items()
+                   for mechanism, i in inputs if self._mechanisms[mechanism].inputs[i] is None}
+        if waiting:
             self.get_logger().warning(
                 f'crank_states: no position of {listed(waiting, 150)} was received, without which '
-                f'{listed(stuck, 150)} cannot move')
+                f'{listed(dict.fromkeys(waiting.values()), 150)} cannot move')
 
 
 def main(args: Any = None) -> int:

@@ -31,9 +31,9 @@ from ..robot_model import bodies
 from ..scene.inverse_request import InverseRequest, LEVER, present_inputs
 from ..words import elided, listed, meant, MESSAGE, quoted
 
-# Other callers and messages wait for an answer: most values at once, and the CPU time after
-# which an answer is given up [s], seen after a block of them.
-MAX_VALUES, MAX_CPU_TIME_S, BLOCK_SIZE = 1_000_000, 1.0, 10_000
+# Other callers and messages wait for an answer: the CPU time after which it is given up [s], seen
+# after a block of values.
+MAX_CPU_TIME_S, BLOCK_SIZE = 1.0, 10_000
 # Maximum number of values, and of letters of allowed names, in a message.
 MAX_NAMED_VALUES, MAX_NAMES_LENGTH = 5, 150
 
@@ -144,8 +144,6 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     n = len(values)
     if not n:
         raise ValueError('lever_angle is empty; give at least one value')
-    if n > MAX_VALUES:
-        raise ValueError(f'lever_angle has {n} values; give up to {MAX_VALUES} at once')
     if len(near) not in (0, 1, n):
         raise ValueError(f'servo_near must be empty, have one angle, or one for each of the '
                          f'{n} in lever_angle, not {len(near)}')

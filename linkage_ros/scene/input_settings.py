@@ -13,7 +13,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 import math
 from typing import Iterable, Optional, Tuple
 
@@ -93,11 +92,6 @@ class InputSettings:
     ratio: float
     offset: float
     measures: str
-
-    @cached_property
-    def is_plain(self) -> bool:
-        """Whether the position of the source joint is the input, without conversion."""
-        return (self.ratio, self.offset, self.measures) == (1.0, 0.0, '')
 
     @property
     def period(self) -> int:
