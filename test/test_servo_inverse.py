@@ -147,10 +147,9 @@ def test_a_request_that_cannot_be_answered_gets_the_reason_alone(graph, paramete
 
 @pytest.mark.parametrize('fields, message', [
     ({'lever_angle': [0.1] + [1.0] * 9}, 'lever angles 1, 1, 1, 1, 1 and 4 more cannot be reached'
-     '; the lever reaches [-0.562536, 0.562536] rad, its maximum at the crank angle 2.13333 rad'),
+     '; the lever reaches [-0.562536, 0.562536] rad'),
     ({'lever_angle': [1e308], 'output': 'G.x', 'mechanism': 'jansen'},
-     'values of G.x 1e+308 cannot be reached; G.x reaches [-0.357608, -0.0180657] m, its maximum '
-     'at the crank angle 2.04479 rad'),
+     'values of G.x 1e+308 cannot be reached; G.x reaches [-0.357608, -0.0180657] m'),
     ({'lever_angle': [-math.inf], 'output': 'BC', 'mechanism': 'jansen'},
      'values of BC -inf cannot be reached; a value must be finite')])
 def test_a_value_that_cannot_be_had_is_nan_with_the_reason(graph, fields, message):
@@ -171,8 +170,7 @@ def test_any_output_of_any_mechanism_is_put_where_it_is_wanted(call):
         assert 0.1 * 65.0 / 6.0 * math.tan(servo / 2.0) == pytest.approx(y, abs=1e-15)
         assert slope == pytest.approx(0.1 * 65.0 / 12.0 / math.cos(servo / 2.0) ** 2)
     assert response.message == (
-        'values of C.y 5 cannot be reached; C.y reaches [-0.718602, 0.718602] m, its '
-        'maximum at the crank angle 1.17137 rad, the upper end of the reach')
+        'values of C.y 5 cannot be reached; C.y reaches [-0.718602, 0.718602] m')
 
 
 def test_a_link_is_turned_to_an_angle_by_the_answer_nearest_to_a_servo(call):
@@ -297,12 +295,11 @@ def test_an_answer_lies_in_the_sweep_or_the_reason_says_which_end_forbids(graph)
     assert beyond.reachable == [True, False, False, False]
     assert beyond.message == (
         'lever angles 0.5, -0.5, nan cannot be reached; 0.5 needs the crank at 1.6173 rad, '
-        'outside crank.sweep [-1.3, 0.8]: beyond its upper end')
+        'outside crank.sweep [-1.3, 0.8]')
     assert 'needs the crank at -1.6173 rad' in ask(node, [-0.5]).message
-    assert 'beyond its lower end' in ask(node, [-0.5]).message
     assert ask(node, [0.7]).message == (
-        'lever angles 0.7 cannot be reached; the lever reaches [-0.422634, 0.272027] rad, its '
-        'maximum at the crank angle 0.8 rad, the upper end of crank.sweep [-1.3, 0.8]')
+        'lever angles 0.7 cannot be reached; the lever reaches [-0.422634, 0.272027] rad in '
+        'crank.sweep [-1.3, 0.8]')
 
 
 def test_the_tutorial_s_gripper_is_answered_where_its_servo_can_stand(graph):
@@ -502,10 +499,10 @@ def test_a_cylinders_length_is_answered_in_metres(call):
 
 @pytest.mark.parametrize('output, wanted, text', [
     ('OB', 3.0, 'values of OB 3 cannot be reached; 3 needs the cylinder at 3.19311 m, outside '
-                'cylinder.sweep [1.5, 2]: beyond its upper end'),
+                'cylinder.sweep [1.5, 2]'),
     ('B.y', 2.19, 'values of B.y 2.19 cannot be reached; 2.19 needs the cylinder at 2.32829 m'),
-    ('B.y', 9.0, 'values of B.y 9 cannot be reached; B.y reaches [1.272, 1.9984] m'),
-    ('B.y', 9.0, 'm, its maximum at the cylinder length 2 m, the upper end of cylinder.sweep')])
+    ('B.y', 9.0, 'values of B.y 9 cannot be reached; B.y reaches [1.272, 1.9984] m in '
+                 'cylinder.sweep [1.5, 2]')])
 def test_a_length_that_cannot_be_had_is_explained_in_metres(call, output, wanted, text):
     response = call({**BOOM, 'boom.cylinder.sweep': [1.5, 2.0]}, output=output,
                     lever_angle=[wanted])

@@ -13,7 +13,6 @@
 from __future__ import annotations
 
 from concurrent.futures import Future
-from functools import cached_property
 import math
 from typing import Any, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
@@ -22,7 +21,7 @@ import numpy as np
 from .input_settings import in_words, InputSettings
 from .scene_mechanism import SceneMechanism
 from ..formula.program import compile_in_background
-from ..linkage import Arc, CLOSE, Input, Solution
+from ..linkage import Input, Solution
 from ..words import listed
 
 LEVER = 'lever'
@@ -247,8 +246,7 @@ class InverseRequest:
         own = [value / unit for value, unit in zip(values, self._units)]
         answers = self._inverse.all(own)
         if len(values) == 1:
-            return self._reason(values[0], [answer.inputs[0] * self._scales[0]
-                                            for answer in answers])
+            return self._reason(values[0], answers)
         what = f'{listed(self.outputs)} at {listed(f"{value:.6g}" for value in values)}'
         if self._inside(answers):
             return f'the way to {what} leads through a singular pose, out of the reach or a sweep'
@@ -258,59 +256,27 @@ class InverseRequest:
                   for drive in self._drives if drive.ends)
         return f'{what} needs inputs outside {listed(sweeps)}'
 
-    def _reason(self, value: float, inputs: Sequence[float]) -> str:
-        drive = self._drives[0]
-        if inputs and drive.ends:
-            beyond = min((self._beyond(end, input_, name) for input_ in inputs
-                          for end, name in zip(drive.ends, ('lower', 'upper'))))
-            return (f'{value:.6g} needs the {drive.input.name} at {beyond[1]:.6g} '
-                    f'{self.units[0]}, outside {self._range_name}: beyond its {beyond[2]} end')
-        return self._out_of_range(value)
-
-    def _beyond(self, end: float, input_: float, name: str) -> Tuple[float, float, str]:
-        """Return how far an input is beyond an end, its value in that turn, and the end's name."""
-        sign, own = 1.0 if name == 'upper' else -1.0, self._inverse.inputs[0]
-        gap = sign * (input_ - end)
-        gap = gap % own.turn if own.wraps else gap if gap > 0.0 else math.inf
-        return gap, end + sign * gap, name
-
-    @property
-    def _range_name(self) -> str:
-        drive = self._drives[0]
-        return f'{drive.input.name}.sweep {in_words([drive.ends])}' if drive.ends else 'the reach'
-
-    def _out_of_range(self, value: float) -> str:
-        name, input_ = self.outputs[0], self._drives[0].input
-        turns = self._machine.linkage.is_angle(name)
-        gaps = [gap for (low, _), (high, _) in self._spans for gap in (low - value, value - high)]
-        nearest = int(np.argmin([gap % math.tau if turns else gap if gap > 0.0 else math.inf
-                                 for gap in gaps]))
-        (_, at), arc = self._spans[nearest // 2][nearest % 2], self._arcs[nearest // 2]
-        ends = [end for end, limit in zip(('lower', 'upper'), arc)
-                if abs(limit - at) < CLOSE * input_.size and not input_.is_whole([arc])]
-        end = f', the {ends[0]} end of {self._range_name}' if ends else ''
-        spans = in_words((low, high) for (low, _), (high, _) in self._spans)
-        what = 'the lever' if name == LEVER else name
-        return (f'{what} reaches {spans} {"rad" if turns else "m"}, its '
-                f'{("minimum", "maximum")[nearest % 2]} at the {input_.quantity} {at:.6g} '
-                f'{self.units[0]}{end}')
-
-    @property
-    def _arcs(self) -> Sequence[Arc]:
-        """Return the allowed arcs of the input, one period at most."""
-        drive = self._drives[0]
-        if not drive.ends:
-            return drive.reach
-        low, high = drive.ends
-        return [(low, min(high, low + drive.input.turn) if drive.input.wraps else high)]
-
-    @cached_property
-    def _spans(self) -> List[List[Tuple[float, float]]]:
-        """Return the minimum and the maximum on each arc, each with the input there."""
-        scale = self._scales[0]
-        found = self._machine.linkage.extremes(self.outputs[0], [
-            (low / scale, high / scale) for low, high in self._arcs])
-        return [[(value * self._units[0], at * scale) for value, at in span] for span in found]
+    def _reason(self, value: float, answers: Sequence[Solution]) -> str:
+        """Return why a value of a single output is unreachable; `answers` are out of the sweep."""
+        drive, output, scale = self._drives[0], self.outputs[0], self._scales[0]
+        arcs, where = drive.reach, ''
+        if drive.ends:
+            low, high = drive.ends
+            where = f'{drive.input.name}.sweep {in_words([drive.ends])}'
+            if answers:
+                middle = 0.5 * (low + high)
+                nearest = min((drive.input.beside(answer.inputs[0] * scale, middle)
+                               for answer in answers), key=lambda input_: abs(input_ - middle))
+                return (f'{value:.6g} needs the {drive.input.name} at {nearest:.6g} '
+                        f'{self.units[0]}, outside {where}')
+            arcs = ((low, min(high, low + drive.input.turn) if drive.input.wraps else high),)
+        spans = self._machine.linkage.extremes(output, [
+            (low / scale, high / scale) for low, high in arcs])
+        reached = in_words((low * self._units[0], high * self._units[0])
+                           for (low, _), (high, _) in spans)
+        unit = 'rad' if self._machine.linkage.is_angle(output) else 'm'
+        return (f'{"the lever" if output == LEVER else output} reaches {reached} {unit}'
+                f'{where and " in "}{where}')
 
 
 def _times(values: Sequence[Any], factors: Sequence[float]) -> List[Any]:
