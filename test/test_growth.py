@@ -102,14 +102,14 @@ def test_of_a_change_to_one_only_that_is_read_prepared_and_announced(graph, monk
     from rcl_interfaces.msg import ParameterEvent
 
     read, made = [], []
-    read_machine, model = scene.read_machine, mechanism_topics.MechanismModel
+    read_mechanism, model = scene.read_mechanism, mechanism_topics.MechanismModel
 
     def reading(name, given, old, strict):
-        machine = read_machine(name, given, old, strict)
+        machine = read_mechanism(name, given, old, strict)
         read.extend([name] if machine is not old else [])
         return machine
 
-    monkeypatch.setattr(scene, 'read_machine', reading)
+    monkeypatch.setattr(scene, 'read_mechanism', reading)
     monkeypatch.setattr(mechanism_topics, 'MechanismModel', lambda machine, *args: (
         made.append(machine.name) or model(machine, *args)))
     node = graph.start(kinematics.Kinematics, MANY)
