@@ -146,9 +146,10 @@ class InProcessPublisher:
 
     def __init__(self, node: Any, name: str, nodes: Sequence[Any]):
         path = self.topic_name = node.resolve_topic_name(name)
-        self._subscriptions = [one for other in nodes for one in other.subscriptions
-                               if one.topic_name == path]
-        self._others = TrackedPublisher(node, JointState, name, 10, own=len(self._subscriptions))
+        self._subscriptions = [
+            subscription for other in nodes for subscription in other.subscriptions
+            if subscription.topic_name == path]
+        self._others = TrackedPublisher(node, JointState, name, 10, len(self._subscriptions))
 
     @property
     def has_subscribers(self) -> bool:

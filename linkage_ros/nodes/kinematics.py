@@ -64,7 +64,7 @@ class Kinematics(scene_node.SceneNode):
         self._reader = joint_state_reader.Reader(self._interpret)
         # That of the last message that set an input.
         self._stamp = NEVER
-        self._own: frozenset = frozenset()
+        self._joint_names: frozenset = frozenset()
         self._unknown = Once(MAX_NAMES)
         self._missing_timer = self.create_timer(
             MISSING_AFTER_S, self.guarded('the check for missing inputs', self._warn_of_missing),
@@ -118,8 +118,8 @@ class Kinematics(scene_node.SceneNode):
         changed = [self._mechanisms[name] for name, model in models.items()
                    if model is not self._models.get(name)]
         is_first, self._models = not self._models, models
-        self._own = frozenset(joint.name for model in models.values()
-                              for joint in model.mechanism.joints.values())
+        self._joint_names = frozenset(joint.name for model in models.values()
+                                      for joint in model.mechanism.joints.values())
         for topics in changed:
             topics.adopt(models[topics.name])
         if not is_first:
@@ -193,7 +193,7 @@ class Kinematics(scene_node.SceneNode):
     def _check_names(self, names: Iterable[str]) -> None:
         """Warn once of each unknown name."""
         unknown = self._unknown.new(name for name in names if name not in self._inputs
-                                    and name not in self._own)
+                                    and name not in self._joint_names)
         if unknown:
             self.get_logger().warning(
                 f'crank_states: no input is called {listed(unknown, 150)}; the inputs are '

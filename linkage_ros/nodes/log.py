@@ -58,7 +58,8 @@ class Once:
         """Return the subjects that no call has returned before; none after `most` subjects."""
         if len(self._logged) >= self._most:
             return []
-        new = [one for one in dict.fromkeys(subjects) if hash(one) not in self._logged]
+        new = [subject for subject in dict.fromkeys(subjects)
+               if hash(subject) not in self._logged]
         self._logged.update(map(hash, new))
         return new
 

@@ -62,7 +62,7 @@ class MechanismTopics:
         self.speeds: List[Optional[float]] = [None] * len(mechanism.inputs)
         self.stamp = NEVER
         self.state: Optional[AssemblyState] = None
-        # The last position of a source joint, and the last input that one has given.
+        # The last position of a source joint, and the last input that it gave.
         self._position = math.nan
         self._seed: Optional[float] = None
         # Ids of the displayed markers, whether the locus is displayed, and the last robot model.
@@ -189,8 +189,9 @@ class MechanismTopics:
         """Return the first joint line of a leg that has no place at the present inputs."""
         mechanism, (lag, start, side, _) = self.model.mechanism, [
             *self.model.assembly.legs.values()][leg]
-        own = [(start + side * (value - lag)) / mechanism.scale_of(name)
-               for name, value in zip(mechanism.inputs, self.inputs)]
-        found = {**mechanism.linkage.solve(own), **mechanism.linkage.joint_angles(own)}
-        return next((line.text for line in mechanism.linkage.design.lines
-                     if any(np.isnan(found.get(name, 0.0)).any() for name in line.names)), '')
+        inputs = [(start + side * (value - lag)) / mechanism.scale_of(name)
+                  for name, value in zip(mechanism.inputs, self.inputs)]
+        linkage = mechanism.linkage
+        quantities = {**linkage.solve(inputs), **linkage.joint_angles(inputs)}
+        return next((line.text for line in linkage.design.lines
+                     if any(np.isnan(quantities.get(name, 0.0)).any() for name in line.names)), '')

@@ -106,7 +106,8 @@ class MessageLayout:
         self._fixed, self._data, self._place = bytearray(len(data)), data, 0
         self._advance(1, HEADER)
         self._walk(message)
-        self._bytes, self.fixed = (np.frombuffer(each, np.uint8) for each in (data, self._fixed))
+        self._bytes, self.fixed = (
+            np.frombuffer(part, np.uint8) for part in (data, self._fixed))
 
     def fits(self, data: bytes) -> bool:
         """Return whether a serialised message has this layout and the same constant bytes."""

@@ -61,21 +61,22 @@ class SceneParameters:
                  changed: Callable[[list[scenes.Parameter]], None]):
         self._node, self._check, self._changed = node, check, changed
         # An empty list in a parameter file has neither type nor value.
-        given = {name: () if parameter.value is None else scenes.plain(parameter.value)
-                 for name, parameter in node.get_parameters_by_prefix('').items()}
-        self.scene = scenes.read(given)
-        own = [parameter for parameter in self.scene.parameters if role == parameter.field.owner]
-        self.fields = {parameter.name: parameter.field for parameter in own}
+        values = {name: () if parameter.value is None else scenes.plain(parameter.value)
+                  for name, parameter in node.get_parameters_by_prefix('').items()}
+        self.scene = scenes.read(values)
+        owned = [parameter for parameter in self.scene.parameters
+                 if role == parameter.field.owner]
+        self.fields = {parameter.name: parameter.field for parameter in owned}
         self.followed = {parameter.name: parameter.field for parameter in self.scene.parameters
                          if role in parameter.field.readers and parameter.name not in self.fields}
         # An input that has left its start is not checked to be in its sweep.
         self._is_strict = role in scenes.START.readers
-        of_scene = given.keys() & {parameter.name for parameter in self.scene.parameters}
+        of_scene = values.keys() & {parameter.name for parameter in self.scene.parameters}
         self.is_given = bool(of_scene)
         # A parameter is declared by its owner alone.
         for name in of_scene:
             node.undeclare_parameter(name)
-        self._declare(own)
+        self._declare(owned)
         # The scene that a change leads to, and why it is refused.
         self._next, self._refusal = self.scene, ''
         node.add_pre_set_parameters_callback(self._read)
@@ -124,13 +125,13 @@ class SceneParameters:
             descriptor.floating_point_range = [] if whole else [FloatingPointRange(**ends)]
         return descriptor
 
-    def _declare(self, own: Sequence[scenes.Parameter]) -> None:
-        descriptors = {parameter.field: _descriptor(parameter.field) for parameter in own}
+    def _declare(self, owned: Sequence[scenes.Parameter]) -> None:
+        descriptors = {parameter.field: _descriptor(parameter.field) for parameter in owned}
         # The value of an empty list does not imply its type.
-        empty = [typed(parameter) for parameter in own if parameter.value == ()]
+        empty = [typed(parameter) for parameter in owned if parameter.value == ()]
         self._node.declare_parameters('', [(
             parameter.name, None if parameter.value == () else parameter.value,
-            copy(descriptors[parameter.field])) for parameter in own], ignore_override=True)
+            copy(descriptors[parameter.field])) for parameter in owned], ignore_override=True)
         self._node.set_parameters_atomically(empty)
 
     def _read(self, parameters: list[Parameter]) -> list[Parameter]:

@@ -28,7 +28,7 @@ class TrackedPublisher:
     """
     A publisher that events tell whether it has subscribers, so that no message needs a query.
 
-    `own` is the number of this process's subscriptions, which do not count.
+    `ignored` is the number of this process's subscriptions, which do not count.
 
     Attributes
     ----------
@@ -39,14 +39,14 @@ class TrackedPublisher:
 
     """
 
-    def __init__(self, node: Node, type_: Any, name: str, qos: Any, own: int = 0):
-        self.has_subscribers, self.subscribed, self._own = False, None, own
+    def __init__(self, node: Node, type_: Any, name: str, qos: Any, ignored: int = 0):
+        self.has_subscribers, self.subscribed, self._ignored = False, None, ignored
         self.publisher = node.create_publisher(
             type_, name, qos, event_callbacks=PublisherEventCallbacks(matched=self._count))
         self.publish = self.publisher.publish
 
     def _count(self, _: Any) -> None:
-        self.has_subscribers = self.publisher.get_subscription_count() > self._own
+        self.has_subscribers = self.publisher.get_subscription_count() > self._ignored
         self.subscribed = self.publisher if self.has_subscribers else None
 
 

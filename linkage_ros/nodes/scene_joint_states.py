@@ -73,8 +73,8 @@ class SceneJointStates:
         """Build the message from the consecutive values of the solutions."""
         ends = np.cumsum([state.solution.layout.size for _, state in parts])
         names, positions, velocities, efforts = map(np.concatenate, zip(
-            *(model.joints(state, own)
-              for (model, state), own in zip(parts, np.split(values, ends)))))
+            *(model.joints(state, part)
+              for (model, state), part in zip(parts, np.split(values, ends)))))
         chosen = [name not in self._omitted for name in names]
         moving = all(state.has_velocities for _, state in parts)
         loaded = {state.has_efforts for _, state in parts

@@ -134,7 +134,7 @@ class SceneNode(Node):
     def declare_parameters(self, namespace: str, parameters: Any, ignore_override: bool = False
                            ) -> List[Parameter]:
         """Declare parameters as rclpy does, and allow empty lists in a parameter file."""
-        for _, *value, descriptor in (one for one in parameters if len(one) > 2):
+        for _, *value, descriptor in (entry for entry in parameters if len(entry) > 2):
             descriptor.dynamic_typing = descriptor.dynamic_typing or value == [None]
         return super().declare_parameters(namespace, parameters, ignore_override)
 
@@ -190,11 +190,12 @@ class SceneNode(Node):
         if len(request.parameters) > 1:
             results = await self._respond_in_turn(
                 lambda *_: self._parameters_of_scene.set_together(request.parameters), None, {})
-        for i, one in enumerate(request.parameters):
+        for i, parameter in enumerate(request.parameters):
             if i not in results:
-                own = await self._respond_in_turn(
-                    callback, SetParameters.Request(parameters=[one]), SetParameters.Response())
-                results[i], = own.results
+                single = await self._respond_in_turn(
+                    callback, SetParameters.Request(parameters=[parameter]),
+                    SetParameters.Response())
+                results[i], = single.results
         response.results = [results[i] for i in range(len(results))]
         return response
 

@@ -140,27 +140,27 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
         If the request as a whole cannot be answered.
 
     """
-    values, near = request.lever_angle, request.servo_near
+    values, seeds = request.lever_angle, request.servo_near
     n = len(values)
     if not n:
         raise ValueError('lever_angle is empty; give at least one value')
-    if len(near) not in (0, 1, n):
+    if len(seeds) not in (0, 1, n):
         raise ValueError(f'servo_near must be empty, have one angle, or one for each of the '
-                         f'{n} in lever_angle, not {len(near)}')
+                         f'{n} in lever_angle, not {len(seeds)}')
     # Most requests have one angle, for which floats are faster than arrays.
-    start = [np.array(near) if len(near) > 1 else near[0]] if near else None
-    if start and not np.all(np.abs(start[0]) <= scene.FARTHEST):
+    seed = [np.array(seeds) if len(seeds) > 1 else seeds[0]] if seeds else None
+    if seed and not np.all(np.abs(seed[0]) <= scene.FARTHEST):
         raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} '
                          f'{inverse.units[0]} of zero')
     if n > 1:
-        positions, rates = _many(inverse, np.array(values), start and start[0])
+        positions, rates = _many(inverse, np.array(values), seed and seed[0])
         finite = np.isfinite(positions)
         success = bool(finite.all())
         response.servo_angle = array('d', positions.tobytes())
         response.reduction = array('d', rates.tobytes())
         reachable = [True] * n if success else finite.tolist()
     else:
-        (positions,), (rates,) = inverse.positions([values[0]], start)
+        (positions,), (rates,) = inverse.positions([values[0]], seed)
         success = math.isfinite(positions)
         response.servo_angle, response.reduction = [positions], [rates]
         reachable = [success]
@@ -170,22 +170,21 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
             value for value, reached in zip(values, reachable) if not reached]), MESSAGE)
 
 
-def _many(inverse: InverseRequest, values: np.ndarray, near: Any
+def _many(inverse: InverseRequest, values: np.ndarray, seed: Any
           ) -> Tuple[np.ndarray, np.ndarray]:
     """Return positions and rates for many values; raise ValueError if that takes too long."""
-    each, start = np.size(near) == len(values), time.thread_time()
+    has_seeds, start = np.size(seed) == len(values), time.thread_time()
     positions, rates = np.empty((2, len(values)))
     for at in range(0, len(values), BLOCK_SIZE):
         if at and time.thread_time() > start + MAX_CPU_TIME_S:
             raise ValueError(f'after {MAX_CPU_TIME_S:g} s only {at} of the {len(values)} values '
                              f'in lever_angle are solved; give up to {at} at once')
-        some = slice(at, at + BLOCK_SIZE)
-        beside = near[some] if each else near
-        (positions[some],), (rates[some],) = inverse.positions(
-            [values[some]], None if beside is None else [beside])
-        found = np.flatnonzero(np.isfinite(positions[some]))
-        if len(found) and not each:
-            near = positions[at + found[-1]]
+        block = slice(at, at + BLOCK_SIZE)
+        (positions[block],), (rates[block],) = inverse.positions(
+            [values[block]], None if seed is None else [seed[block] if has_seeds else seed])
+        solved = np.flatnonzero(np.isfinite(positions[block]))
+        if len(solved) and not has_seeds:
+            seed = positions[at + solved[-1]]
     return positions, rates
 
 
