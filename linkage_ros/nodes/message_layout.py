@@ -114,13 +114,6 @@ class MessageLayout:
         return len(data) == len(self._data) and not (
             (np.frombuffer(data, np.uint8) ^ self._bytes) & self.fixed).any()
 
-    def is_same(self, data: bytes, other: bytes) -> bool:
-        """Return whether two serialised messages fit and differ only in padding."""
-        places = [(place, _STAMP.size) for place in self.stamps] + [
-            (place, 8 * count) for place, count in self.numbers]
-        return self.fits(data) and self.fits(other) and all(
-            data[place:place + size] == other[place:place + size] for place, size in places)
-
     def read(self, data: bytes) -> List[np.ndarray]:
         """Return the numbers of a serialised message that fits, one array per sequence."""
         return [np.frombuffer(data, '<f8', count, place) for place, count in self.numbers]
