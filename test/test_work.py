@@ -205,3 +205,21 @@ def test_a_patched_message_reads_like_one_that_is_built(count):
             patched, = template.patched(message_layout.pack(stamp), values)
             assert deserialize_message(patched, kind) == deserialize_message(
                 serialize_message(build(stamp, values)), kind)
+
+
+@pytest.mark.slow
+def test_bytes_between_fields_are_taken_for_no_value():
+    # A middleware writes messages to memory that it does not clear: in gaps stands what was there.
+    random = np.random.default_rng(0)
+    for _ in range(3000):
+        count, name = int(random.integers(2, 12)), int(random.integers(1, 9)) * 'w'
+        markers = messages.Markers(name, 'world', [0.1] * 6, 1.0, {
+            0: [(0, 1), (1, 0)], 1: list(range(count)), 7: [(0, 1, 0)]})
+        values, stamp = random.normal(size=2 * count), Time(sec=3, nanosec=4)
+
+        def drawn(stamp, values, markers=markers, count=count):
+            return markers.message(stamp, values.reshape(1, count, 2))
+
+        patched, = message_layout.Template([drawn], 2 * count).patched(
+            message_layout.pack(stamp), values)
+        assert deserialize_message(patched, MarkerArray) == drawn(stamp, values)

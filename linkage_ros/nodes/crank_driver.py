@@ -58,10 +58,11 @@ class CrankDriver(scene_node.SceneNode):
         n = len(sources)
         self._message = PatchedPublisher([(self._publisher, lambda stamp, values: joint_states(
             stamp, sources, values[:n], values[n:]))], 2 * n)
-        self._timer = self.create_timer(1.0, self.guarded('a crank message', self._tick))
-        # After system time is set back, a timer would sleep until the old time returns.
-        self.create_timer(1.0, self.guarded('the check of the clock', self._restart_timer),
-                          clock=Clock(clock_type=ClockType.STEADY_TIME))
+        # After system time is set back, a timer on it would sleep until the old time returns.
+        clock = self.get_clock()
+        self._timer = self.create_timer(
+            1.0, self.guarded('a crank message', self._tick),
+            clock=clock if clock.ros_time_is_active else Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
 
     def adopt(self, new: scene.Scene) -> None:
@@ -91,15 +92,11 @@ class CrankDriver(scene_node.SceneNode):
             self._timer.timer_period_ns = period
             self._timer.reset()
 
-    def _time(self) -> Tuple[int, bool]:
-        """Return the node's time [ns] and whether it is simulated."""
-        clock = self.get_clock()
-        simulated = clock.ros_time_is_active
-        return clock.now().nanoseconds if simulated else self.system_time(), simulated
-
     def _follow_clock(self) -> int:
         """Return the time [ns]; if it has jumped, shift the motions, so that no input jumps."""
-        (now, simulated), steady = self._time(), monotonic_ns()
+        clock, steady = self.get_clock(), monotonic_ns()
+        simulated = clock.ros_time_is_active
+        now = clock.now().nanoseconds if simulated else self.system_time()
         reached = 0
         if self._now is not None:
             reached = self._now if simulated else self._now + steady - self._steady
@@ -125,15 +122,6 @@ class CrankDriver(scene_node.SceneNode):
         """Return the source joints and their rate, in words."""
         sources = [settings.source for settings in self._settings.values()]
         return f'moves {listed(sources, 200)} on crank_states at {self.scene.rate:g} Hz'
-
-    def _restart_timer(self) -> None:
-        """Restart the timer if the clock was set back since the last message."""
-        set_back = self._now is not None and self._time()[0] < self._now
-        if set_back and self.scene.rate:
-            # From here on the time is no longer set back: a timer that is reset again and again
-            # never fires.
-            self._follow_clock()
-            self._timer.reset()
 
 
 class InProcessPublisher:

@@ -35,8 +35,9 @@ LITTLE_ENDIAN = b'\0\1'
 MIN_BYTES = 8
 # The packed stamp of a message whose publisher has not set it: time zero.
 NEVER = bytes(8)
-# Seconds and nanoseconds, and a unit of values, that mark their places in a template.
-MARK, TINY = 0x12345678, 2.0 ** -1000
+# Stamp and first value that mark their places in a template: as integers, values are this and the
+# next. A field beside padding, which has any bytes, is not half of one.
+MARKED_STAMP, MARKED_VALUE = Time(sec=0x2C83A6F1, nanosec=0x1E94B7D5), 0x01708A3D5A1C3E77
 
 _STAMP, _COUNT = struct.Struct('<iI'), struct.Struct('<I')
 _SIZES = {'boolean': 1, 'octet': 1, 'uint8': 1, 'int8': 1, 'uint16': 2, 'int16': 2, 'uint32': 4,
@@ -169,16 +170,16 @@ class Template:
 
     def __init__(self, builds: Sequence[Callable], count: int):
         # In messages of a stamp and values that no others have, these mark their places.
-        stamp, marks = Time(sec=MARK, nanosec=MARK), TINY * np.arange(1, count + 1)
+        marks = (MARKED_VALUE + np.arange(count)).view(float)
         self._bytes, places = bytearray(), []
         for build in builds:
-            data = serialize_message(build(stamp, marks))
+            data = serialize_message(build(MARKED_STAMP, marks))
             # Numbers are aligned to 8 bytes after the header; LEAD aligns them in memory, too.
             start = len(self._bytes) + len(LEAD)
             self._bytes += LEAD + data + bytes(-(len(data) - HEADER) % 8)
             places.append(slice(start, start + len(data)))
         self._stamps = [slice(*match.span()) for match in re.finditer(
-            re.escape(pack(stamp)), self._bytes)]
+            re.escape(pack(MARKED_STAMP)), self._bytes)]
         if len(self._stamps) < len(builds):
             raise NoLayout('the middleware does not serialise to little-endian CDR')
         self._messages = [memoryview(self._bytes)[place] for place in places]
@@ -186,9 +187,9 @@ class Template:
         # The values, then all eight-byte words of the messages.
         self._table = np.concatenate([marks, self._numbers])
         self._values = self._table[:count]
-        self._sources = np.arange(count, len(self._table))
-        marked = np.flatnonzero(np.isin(self._numbers, marks))
-        self._sources[marked] = self._numbers[marked] / TINY - 1.0
+        indices = self._numbers.view(np.int64) - MARKED_VALUE
+        self._sources = np.where((0 <= indices) & (indices < count), indices,
+                                 np.arange(count, len(self._table)))
 
     def patched(self, stamp: bytes, values: Any) -> List[bytes]:
         """Return the serialised messages with a packed stamp and values (count,)."""
