@@ -222,4 +222,5 @@ def test_bytes_between_fields_are_taken_for_no_value():
 
         patched, = message_layout.Template([drawn], 2 * count).patched(
             message_layout.pack(stamp), values)
-        assert deserialize_message(patched, MarkerArray) == drawn(stamp, values)
+        assert deserialize_message(patched, MarkerArray) == deserialize_message(
+            serialize_message(drawn(stamp, values)), MarkerArray)
