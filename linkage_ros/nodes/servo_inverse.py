@@ -77,8 +77,7 @@ class ServoInverse(scene_node.SceneNode):
 
     def destroy_node(self) -> None:
         """End the trajectories, and destroy the node."""
-        if hasattr(self, '_stream'):
-            self._stream.end()
+        self._stream.end()
         super().destroy_node()
 
     def answer(self, request: Any, response: Any) -> Any:
