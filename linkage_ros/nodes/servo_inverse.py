@@ -77,7 +77,9 @@ class ServoInverse(scene_node.SceneNode):
 
     def destroy_node(self) -> None:
         """End the trajectories, and destroy the node."""
-        self._stream.end()
+        # A context that ends destroys nodes whose constructor has failed, too.
+        if hasattr(self, '_stream'):
+            self._stream.end()
         super().destroy_node()
 
     def answer(self, request: Any, response: Any) -> Any:
