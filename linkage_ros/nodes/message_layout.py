@@ -38,11 +38,7 @@ NEVER = bytes(8)
 # next. A field beside padding, which has any bytes, is not half of one.
 MARKED_STAMP, MARKED_VALUE = Time(sec=0x2C83A6F1, nanosec=0x1E94B7D5), 0x01708A3D5A1C3E77
 
-_STAMP, _COUNT = struct.Struct('<iI'), struct.Struct('<I')
-_SIZES = {'boolean': 1, 'octet': 1, 'uint8': 1, 'int8': 1, 'uint16': 2, 'int16': 2, 'uint32': 4,
-          'int32': 4, 'float': 4, 'uint64': 8, 'int64': 8, 'double': 8}
-# Types that consist of float64 only, and of how many.
-_DOUBLES = {'double': 1, 'geometry_msgs/Point': 3}
+_STAMP = struct.Struct('<iI')
 
 
 def pack(stamp: Time) -> bytes:
@@ -76,90 +72,6 @@ def deserialized(data: bytes, kind: type) -> Any:
         raise Unreadable(' '.join(str(error).split())[:200]) from None
 
 
-class NoLayout(Exception):
-    """A message whose numbers cannot be accessed in place; the exception's text has the reason."""
-
-
-class MessageLayout:
-    """
-    Places of the numbers in a serialised message, and a mask of its constant bytes.
-
-    `data` is the serialised `message`. Fixed-size arrays and wide strings are not supported.
-    Raises NoLayout if the encoding is not little-endian CDR.
-
-    Attributes
-    ----------
-    stamps : list of int
-        Offsets of the stamps [bytes].
-    numbers : list of (int, int)
-        Offset [bytes] and count of the float64 numbers of each sequence of numbers or points.
-    fixed : uint8 array (bytes,)
-        Mask of the constant bytes: 0 at stamps, numbers and padding, 255 elsewhere.
-
-    """
-
-    def __init__(self, data: bytes, message: Any):
-        if data[:len(LITTLE_ENDIAN)] != LITTLE_ENDIAN:
-            raise NoLayout('its encoding is not little-endian CDR')
-        self.stamps: List[int] = []
-        self.numbers: List[Tuple[int, int]] = []
-        self._fixed, self._data, self._place = bytearray(len(data)), data, 0
-        self._advance(1, HEADER)
-        self._walk(message)
-        self._bytes, self.fixed = (
-            np.frombuffer(part, np.uint8) for part in (data, self._fixed))
-
-    def fits(self, data: bytes) -> bool:
-        """Return whether a serialised message has this layout and the same constant bytes."""
-        return len(data) == len(self._data) and not (
-            (np.frombuffer(data, np.uint8) ^ self._bytes) & self.fixed).any()
-
-    def read(self, data: bytes) -> List[np.ndarray]:
-        """Return the numbers of a serialised message that fits, one array per sequence."""
-        return [np.frombuffer(data, '<f8', count, place) for place, count in self.numbers]
-
-    def _walk(self, message: Any) -> None:
-        for name, kind in message.get_fields_and_field_types().items():
-            self._field(kind, getattr(message, name))
-
-    def _field(self, kind: str, value: Any) -> None:
-        if kind == 'string':
-            self._advance(1, self._count())
-        elif kind in _SIZES:
-            self._advance(_SIZES[kind], _SIZES[kind])
-        elif kind == 'builtin_interfaces/Time':
-            self.stamps.append(self._advance(4, _STAMP.size, b'\0'))
-        elif kind.startswith('sequence<'):
-            self._sequence(kind[len('sequence<'):-1], value)
-        else:
-            self._walk(value)
-
-    def _sequence(self, kind: str, values: Any) -> None:
-        count = self._count()
-        if count != len(values):
-            raise NoLayout('its bytes are not those of the message')
-        if kind in _DOUBLES:
-            count *= _DOUBLES[kind]
-            self.numbers.append((self._advance(8 if count else 1, 8 * count, b'\0'), count))
-        elif kind in _SIZES:
-            self._advance(_SIZES[kind], count * _SIZES[kind])
-        else:
-            for value in values:
-                self._field(kind, value)
-
-    def _count(self) -> int:
-        return _COUNT.unpack_from(self._data, self._advance(4, 4))[0]
-
-    def _advance(self, alignment: int, size: int, mask: bytes = b'\xff') -> int:
-        """Mask the next `size` bytes, advance to their end, and return their aligned offset."""
-        place = self._place + (HEADER - self._place) % alignment
-        self._place = end = place + size
-        if end > len(self._data):
-            raise NoLayout('it ends too early')
-        self._fixed[place:end] = mask * size
-        return place
-
-
 class Template:
     """
     Serialised messages whose stamps and float64 values are patched in place.
@@ -180,7 +92,7 @@ class Template:
         self._stamps = [slice(*match.span()) for match in re.finditer(
             re.escape(pack(MARKED_STAMP)), self._bytes)]
         if len(self._stamps) < len(builds):
-            raise NoLayout('the middleware does not serialise to little-endian CDR')
+            raise RuntimeError('the middleware does not serialise to little-endian CDR')
         self._messages = [memoryview(self._bytes)[place] for place in places]
         self._numbers = np.frombuffer(self._bytes, float)
         # The values, then all eight-byte words of the messages.
