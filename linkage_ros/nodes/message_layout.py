@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import re
 import struct
-from typing import Any, Callable, List, Sequence, Tuple
+from typing import Any, Callable, List, Sequence
 
 from builtin_interfaces.msg import Time
 import numpy as np
