@@ -212,9 +212,10 @@ class Model:
     """What a node with these parameters has to publish."""
 
     def __init__(self, parameters):
-        self._given = {name: scene.plain(value) for name, value in parameters.items()}
         self.stamp = (0, 0)
-        self._take(scene.read(self._given))
+        self._take(scene.read(parameters))
+        # A default is that of the start.
+        self._given = {parameter.name: parameter.value for parameter in self.scene.parameters}
         self.states = {name: State([None] * len(machine.inputs), [None] * len(machine.inputs))
                        for name, machine in self.scene.machines.items()}
 

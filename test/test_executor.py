@@ -134,12 +134,12 @@ def test_a_signal_amid_a_callback_ends_a_node_quietly(stop, plain):
                 super().__init__()
                 self.create_subscription(JointState, 'crank_states', print, 1)
 
-            def _time(self):
+            def _tick(self):
                 if self._publisher.has_subscribers:
                     signal.raise_signal({int(stop)})
                     while rclpy.ok():
                         pass
-                return super()._time()
+                super()._tick()
 
         executor = SingleThreadedExecutor if {plain} else scene_node.Executor
         sys.exit(scene_node.run(Ended, 'ended', [], executor))

@@ -83,15 +83,16 @@ VALUE = st.sampled_from(sorted(CHANGES)).flatmap(
 @settings(max_examples=40)
 @given(st.lists(st.lists(VALUE, min_size=1, max_size=3).map(dict), max_size=6))
 def test_a_scene_with_any_history_is_what_its_values_read_anew_make(history):
-    values = {'mechanisms': ['m3', 'm4'], 'm3.type': 'four_bar', 'm4.type': 'slider_crank'}
-    made = scene.read(values)
+    made = scene.read({
+        'mechanisms': ['m3', 'm4'], 'm3.type': 'four_bar', 'm4.type': 'slider_crank'})
     for change in history:
         before = made.parameters
         found, new = outcome(scene.changed, made, change)
+        # All that was not changed keeps its value, defaults, too.
+        values = {parameter.name: parameter.value for parameter in before}
         assert found == outcome(scene.read, {**values, **change})[0]
         assert made.parameters == before
-        if new:
-            values, made = {**values, **change}, new
+        made = new or made
 
 
 @pytest.mark.slow
@@ -101,14 +102,14 @@ def test_of_a_change_to_one_only_that_is_read_prepared_and_announced(graph, monk
     from rcl_interfaces.msg import ParameterEvent
 
     read, made = [], []
-    read_machine, model = scene.read_machine, mechanism_topics.MechanismModel
+    read_mechanism, model = scene.read_mechanism, mechanism_topics.MechanismModel
 
     def reading(name, given, old, strict):
-        machine = read_machine(name, given, old, strict)
+        machine = read_mechanism(name, given, old, strict)
         read.extend([name] if machine is not old else [])
         return machine
 
-    monkeypatch.setattr(scene, 'read_machine', reading)
+    monkeypatch.setattr(scene, 'read_mechanism', reading)
     monkeypatch.setattr(mechanism_topics, 'MechanismModel', lambda machine, *args: (
         made.append(machine.name) or model(machine, *args)))
     node = graph.start(kinematics.Kinematics, MANY)

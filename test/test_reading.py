@@ -170,18 +170,6 @@ def test_any_number_of_senders_is_learnt(reader, senders):
     assert reader.looked == senders
 
 
-def test_more_senders_than_are_remembered_cost_no_more_than_reading_each(reader, monkeypatch):
-    learnt = Counter()
-    layout = joint_state_reader.MessageLayout
-    monkeypatch.setattr(joint_state_reader, 'MessageLayout', lambda *args: (
-        learnt.update('1') or layout(*args)))
-    texts = [serialize_message(message([f'robot{i}_crank'])) for i in range(1000)]
-    for _ in range(8):
-        for text in texts:
-            reader.sender(text)
-    assert reader.looked <= 8000 and learnt.total() < 8000 / 12
-
-
 def held(owner):
     """Return how many objects an object holds, itself and by way of others."""
     found, waiting = {}, [owner]

@@ -587,7 +587,7 @@ def test_a_stroke_takes_three_seconds_by_default_and_its_lengths_are_scaled():
         assert (stroke.input.low, stroke.input.high) == pytest.approx((0.5 * scale, 2.5 * scale))
         assert stroke.reach == ((stroke.input.low, stroke.input.high),)
         assert stroke.sweep == pytest.approx((0.52 * scale, 2.48 * scale))
-        assert made['tilt'].sweep is None and stroke.ends is None and stroke.is_plain
+        assert made['tilt'].sweep is None and stroke.ends is None
         assert made['tilt'].source == 'own_tilt' and stroke.actuator == (1.0, 0.0)
     swept = scene.read({**ACTUATED, 'own.cylinder.sweep': [1, 2], 'own.cylinder.ratio': 2.0})
     drive = swept.machines['own'].inputs['cylinder']

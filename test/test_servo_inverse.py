@@ -98,7 +98,7 @@ def test_one_angle_out_of_reach_does_not_spoil_the_others(call):
     assert '[-0.562536, 0.562536] rad' in response.message
 
 
-LEVERS, MECHANISMS = 'slotted_lever', 'water_drop, jansen, peaucellier, slotted_lever'
+MECHANISMS = 'water_drop, jansen, peaucellier, slotted_lever'
 OUTPUTS = ('; allowed: distance(A,B) and angle(A,B) of two joints, crank, BC, AC, BE, AE, EF, DF, '
            'O.x, O.y, B.x, B.y, A.x, A.y, ... (23)')
 FAR = 'servo_near must be finite and within 1e+06 rad of zero'
@@ -116,13 +116,12 @@ def cut(letter):
         ({'servo_near': [0.1, 0.2]}, 'servo_near must be empty, have one angle, or one for each '
          'of the 1 in lever_angle, not 2'),
         *(({'servo_near': [bad]}, FAR) for bad in (math.nan, 1e308, -1.1 * scene.FARTHEST)),
-        *(({'mechanism': name}, f'there is no mechanism {shown}; allowed: {LEVERS}')
+        *(({'mechanism': name}, f'there is no mechanism {shown}; allowed: {MECHANISMS}')
           for name, shown in (('arm', "'arm'"), ('x' * 10 ** 6, cut('x')))),
-        ({'mechanism': 'slotted_levr'}, f"there is no mechanism 'slotted_levr'; allowed: {LEVERS}"
-         '; did you mean slotted_lever?'),
-        ({'mechanism': 'jansen'}, 'jansen is a jansen, not a slotted lever; name an output, or '
-         f'use one of: {LEVERS}'),
-        ({'output': 'C.y'}, f'{ONE} one; allowed: {MECHANISMS}'),
+        ({'mechanism': 'slotted_levr'}, "there is no mechanism 'slotted_levr'; allowed: "
+         f'{MECHANISMS}; did you mean slotted_lever?'),
+        ({'mechanism': 'jansen'}, f"jansen has no output 'lever'{OUTPUTS}"),
+        ({'output': 'C.y'}, f'{ONE} mechanism; allowed: {MECHANISMS}'),
         ({'mechanism': 'arm', 'output': 'C.y'},
          f"there is no mechanism 'arm'; allowed: {MECHANISMS}"),
         *(({'mechanism': 'jansen', 'output': name}, f'jansen has no output {shown}{OUTPUTS}{hint}')
@@ -132,10 +131,10 @@ def cut(letter):
         ({'mechanism': 'jansen', 'output': 'O.x'}, 'O.x of jansen does not move with the crank'),
         ({'mechanism': 'peaucellier', 'output': 'C.x'},
          'C.x of peaucellier does not move with the crank')]),
-    (TWO, [({}, f'{ONE} slotted lever; allowed: left, right'),
-           ({'output': 'lever'}, f'{ONE} one; allowed: left, right, drop')]),
+    (TWO, [({'output': output}, f'{ONE} slotted lever; allowed: left, right, drop')
+           for output in ('', 'lever')]),
     ({'mechanisms': ['jansen']}, [
-        ({}, f'{ONE} slotted lever; allowed: none: the scene has no slotted_lever')]),
+        ({}, f"jansen has no output 'lever'{OUTPUTS}")]),
     ({'mechanisms': ['five_bar']}, [
         ({'output': 'P.y'}, 'five_bar has several inputs, which one output does not determine; '
          'call the service inputs_for')])])
@@ -148,10 +147,9 @@ def test_a_request_that_cannot_be_answered_gets_the_reason_alone(graph, paramete
 
 @pytest.mark.parametrize('fields, message', [
     ({'lever_angle': [0.1] + [1.0] * 9}, 'lever angles 1, 1, 1, 1, 1 and 4 more cannot be reached'
-     '; the lever reaches [-0.562536, 0.562536] rad, its maximum at the crank angle 2.13333 rad'),
+     '; the lever reaches [-0.562536, 0.562536] rad'),
     ({'lever_angle': [1e308], 'output': 'G.x', 'mechanism': 'jansen'},
-     'values of G.x 1e+308 cannot be reached; G.x reaches [-0.357608, -0.0180657] m, its maximum '
-     'at the crank angle 2.04479 rad'),
+     'values of G.x 1e+308 cannot be reached; G.x reaches [-0.357608, -0.0180657] m'),
     ({'lever_angle': [-math.inf], 'output': 'BC', 'mechanism': 'jansen'},
      'values of BC -inf cannot be reached; a value must be finite')])
 def test_a_value_that_cannot_be_had_is_nan_with_the_reason(graph, fields, message):
@@ -172,8 +170,7 @@ def test_any_output_of_any_mechanism_is_put_where_it_is_wanted(call):
         assert 0.1 * 65.0 / 6.0 * math.tan(servo / 2.0) == pytest.approx(y, abs=1e-15)
         assert slope == pytest.approx(0.1 * 65.0 / 12.0 / math.cos(servo / 2.0) ** 2)
     assert response.message == (
-        'values of C.y 5 cannot be reached; C.y reaches [-0.718602, 0.718602] m, its '
-        'maximum at the crank angle 1.17137 rad, the upper end of the reach')
+        'values of C.y 5 cannot be reached; C.y reaches [-0.718602, 0.718602] m')
 
 
 def test_a_link_is_turned_to_an_angle_by_the_answer_nearest_to_a_servo(call):
@@ -238,8 +235,7 @@ INPUTS_REFUSED = [
      '... (14)'),
     ({'outputs': ['A.x', 'A.y']},
      'A.x, A.y do not determine all inputs: A.y depends on too few'),
-    ({'mechanism': 'boom'}, 'mechanism must be one of leg, drop, or empty if a single one has '
-     "several inputs, not 'boom'"),
+    ({'mechanism': 'boom'}, "there is no mechanism 'boom'; allowed: leg, drop"),
     ({'mechanism': 'drop'}, 'drop has 1 inputs: as many outputs are needed, not 2')]
 
 
@@ -299,12 +295,11 @@ def test_an_answer_lies_in_the_sweep_or_the_reason_says_which_end_forbids(graph)
     assert beyond.reachable == [True, False, False, False]
     assert beyond.message == (
         'lever angles 0.5, -0.5, nan cannot be reached; 0.5 needs the crank at 1.6173 rad, '
-        'outside crank.sweep [-1.3, 0.8]: beyond its upper end')
+        'outside crank.sweep [-1.3, 0.8]')
     assert 'needs the crank at -1.6173 rad' in ask(node, [-0.5]).message
-    assert 'beyond its lower end' in ask(node, [-0.5]).message
     assert ask(node, [0.7]).message == (
-        'lever angles 0.7 cannot be reached; the lever reaches [-0.422634, 0.272027] rad, its '
-        'maximum at the crank angle 0.8 rad, the upper end of crank.sweep [-1.3, 0.8]')
+        'lever angles 0.7 cannot be reached; the lever reaches [-0.422634, 0.272027] rad in '
+        'crank.sweep [-1.3, 0.8]')
 
 
 def test_the_tutorial_s_gripper_is_answered_where_its_servo_can_stand(graph):
@@ -375,7 +370,6 @@ def test_a_million_angles_are_answered(graph):
 
 
 @pytest.mark.parametrize('count, longest, request_, text', [
-    (1_000_001, 9.0, {}, '1000001 values; give up to 1000000 at once'),
     (20_001, 0.0, {}, 'after 0 s only 10000 of the 20001 values in lever_angle are solved; give '
                       'up to 10000 at once')])
 def test_an_answer_that_others_would_wait_for_is_refused(
@@ -505,10 +499,10 @@ def test_a_cylinders_length_is_answered_in_metres(call):
 
 @pytest.mark.parametrize('output, wanted, text', [
     ('OB', 3.0, 'values of OB 3 cannot be reached; 3 needs the cylinder at 3.19311 m, outside '
-                'cylinder.sweep [1.5, 2]: beyond its upper end'),
+                'cylinder.sweep [1.5, 2]'),
     ('B.y', 2.19, 'values of B.y 2.19 cannot be reached; 2.19 needs the cylinder at 2.32829 m'),
-    ('B.y', 9.0, 'values of B.y 9 cannot be reached; B.y reaches [1.272, 1.9984] m'),
-    ('B.y', 9.0, 'm, its maximum at the cylinder length 2 m, the upper end of cylinder.sweep')])
+    ('B.y', 9.0, 'values of B.y 9 cannot be reached; B.y reaches [1.272, 1.9984] m in '
+                 'cylinder.sweep [1.5, 2]')])
 def test_a_length_that_cannot_be_had_is_explained_in_metres(call, output, wanted, text):
     response = call({**BOOM, 'boom.cylinder.sweep': [1.5, 2.0]}, output=output,
                     lever_angle=[wanted])

@@ -17,6 +17,7 @@ KIND is one of KINDS below. With --times FILE it says at its end how long its pa
 """
 
 import argparse
+from functools import partial
 import json
 from pathlib import Path
 import pickle
@@ -30,6 +31,7 @@ from linkage_ros.nodes import mechanism_topics, messages, scene_node
 from linkage_ros.nodes.joint_state_reader import ANY
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.mechanism_model import MechanismModel
+from linkage_ros.nodes.message_layout import unpack
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -88,24 +90,24 @@ class Deaf(Node):
 
 
 class Unpatched:
-    """Publishers that never patch."""
+    """Publishes messages that are built anew each time."""
 
-    def __init__(self, publishers):
-        self._publishers = publishers
+    def __init__(self, parts):
+        self._parts = parts
 
-    def __getitem__(self, key):
-        """Return a publisher."""
-        publisher = self._publishers[key]
-        publisher.template = None
-        return publisher
+    def publish(self, stamp, values):
+        """Publish them with a packed stamp and values."""
+        for publisher, build in self._parts:
+            publisher.publish(build(unpack(stamp), values))
 
 
 class FreshModel(MechanismModel):
     """Builds ordinary messages, as one writes it: new ones each time."""
 
-    def __init__(self, *args):
-        super().__init__(*args)
-        self.publishers = Unpatched(self.publishers)
+    def _publisher(self, key):
+        state, topics = key
+        return Unpatched([(topic, partial(build, state)) for topic, build in zip(
+            topics, (self.joint_message, self.marker_message)) if topic])
 
     def marker_message(self, *args):
         """Return new markers."""

@@ -13,7 +13,6 @@
 from __future__ import annotations
 
 from functools import partial
-from itertools import chain
 import math
 import time
 from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Sequence
@@ -30,7 +29,7 @@ from .messages import joint_states
 from .publishers import PatchedPublisher, TrackedPublisher
 from .worker import Worker
 from ..cache import Cache
-from ..scene.inverse_request import InverseRequest
+from ..scene.inverse_request import Command, InverseRequest
 from ..scene.joint_names import JointName
 from ..scene.scene_mechanism import SceneMechanism
 from ..words import elided, listed
@@ -60,12 +59,19 @@ class Target(NamedTuple):
                 else settings.source for settings in self.mechanism.inputs.values()]
 
     def command(self, positions: Sequence[float], speeds: Optional[Sequence[float]],
-                seed: Sequence[float], jumps: bool) -> Any:
+                seed: Sequence[float], jumps: bool) -> Command:
         """Solve for the positions and speeds in a message; see `InverseRequest.command`."""
         return self.request.command(
             self._values(positions),
             speeds and [name.sign * speeds[i] for name, i in zip(self.names, self.indices)],
             seed, jumps)
+
+    def efforts(self, command: Command) -> list[float]:
+        """Return the static efforts of the actuators that balance the loads [N m or N]."""
+        if not self.mechanism.loads:
+            return [0.0] * len(command.inputs)
+        return [settings.actuator[0] * effort for settings, effort in zip(
+            self.mechanism.inputs.values(), self.mechanism.efforts(command.inputs))]
 
     def reason(self, positions: Sequence[float]) -> str:
         """Explain why the positions in a message are out of reach."""
@@ -75,29 +81,6 @@ class Target(NamedTuple):
     def _values(self, positions: Sequence[float]) -> list[float]:
         return [name.sign * (positions[index] - name.offset)
                 for name, index in zip(self.names, self.indices)]
-
-
-class Command(NamedTuple):
-    """Actuators' positions [rad or m] and, if known, speeds; the inputs at these positions."""
-
-    target: Target
-    inputs: Sequence[float]
-    positions: Sequence[float]
-    speeds: Optional[Sequence[float]]
-
-    @property
-    def is_valid(self) -> bool:
-        """Whether there is an answer."""
-        return all(map(math.isfinite, self.inputs))
-
-    @property
-    def efforts(self) -> list[float]:
-        """Return the static efforts of the actuators that balance the loads [N m or N]."""
-        mechanism = self.target.mechanism
-        if not mechanism.loads:
-            return [0.0] * len(self.inputs)
-        return [settings.actuator[0] * effort for settings, effort in zip(
-            mechanism.inputs.values(), mechanism.efforts(self.inputs))]
 
 
 class CommandStream:
@@ -131,10 +114,10 @@ class CommandStream:
 
     def adopt(self, mechanisms: Mapping[str, SceneMechanism]) -> None:
         """Replace the mechanisms."""
-        self._mechanisms, self._publishers = mechanisms, Cache(self._publisher, MAX_PUBLISHERS)
         # With several inputs, the changed geometry may have no pose that continues the last one.
         self._last = {name: last for name, last in self._last.items() if len(last.inputs) == 1
-                      or last.target.mechanism is mechanisms.get(name)}
+                      or self._mechanisms[name] is mechanisms[name]}
+        self._mechanisms, self._publishers = mechanisms, Cache(self._publisher, MAX_PUBLISHERS)
         self._reader = joint_state_reader.Reader(self._interpret)
 
     def end(self) -> None:
@@ -202,10 +185,10 @@ class CommandStream:
         (targets, count, known), (stamp, *numbers) = sender.routes, sender.read(data)
         if stamp == NEVER:
             stamp = pack_time(self._clock.now().nanoseconds)
-        commands = [self._command(target, stamp, numbers, numbers[count:] if known else None)
-                    for target in targets]
-        if answered := [command for command in commands if command]:
-            self._send(stamp, answered)
+        commands = [(target, command) for target in targets if (command := self._command(
+            target, stamp, numbers, numbers[count:] if known else None))]
+        if commands:
+            self._send(stamp, commands)
 
     def _seed(self, target: Target) -> Sequence[float]:
         """Return the inputs to continue from: of the last command, else present, else starts."""
@@ -221,8 +204,7 @@ class CommandStream:
         name, seed = target.mechanism.name, self._seed(target)
         last, is_slow = self._last.get(name), len(seed) > 1 and not target.request.is_closed
         # Only the first command, which continues no other, may jump.
-        command = Command(target, *target.command(
-            positions, speeds, seed, jumps=not last and not is_slow))
+        command = target.command(positions, speeds, seed, jumps=not last and not is_slow)
         if command.is_valid:
             self._last[name] = command
             return command
@@ -241,9 +223,9 @@ class CommandStream:
         start = time.monotonic()
         try:
             if seed:
-                command = Command(target, *target.command(positions, speeds, seed, jumps=True))
+                command = target.command(positions, speeds, seed, jumps=True)
                 if command.is_valid:
-                    return partial(self._begin, command, stamp)
+                    return partial(self._begin, target, command, stamp)
             self._searched.warn(target.named, lambda: f'wanted_states: {target.reason(positions)}')
             return None
         finally:
@@ -251,28 +233,29 @@ class CommandStream:
             self._searches[target.mechanism.name] = end + max(
                 SEARCH_PAUSE_S, SEARCH_PAUSE_RATIO * (end - start))
 
-    def _begin(self, command: Command, stamp: bytes) -> None:
+    def _begin(self, target: Target, command: Command, stamp: bytes) -> None:
         """Publish a first command that has been searched, unless it is out of date."""
-        mechanism = command.target.mechanism
-        if mechanism is self._mechanisms.get(mechanism.name) and mechanism.name not in self._last:
-            self._last[mechanism.name] = command
-            self._send(stamp, [command])
+        name = target.mechanism.name
+        if target.mechanism is self._mechanisms[name] and name not in self._last:
+            self._last[name] = command
+            self._send(stamp, [(target, command)])
 
-    def _send(self, stamp: bytes, commands: Sequence[Command]) -> None:
-        names = tuple(name for command in commands for name in command.target.actuators)
-        values = [position for command in commands for position in command.positions]
-        speeds = [speed for command in commands for speed in command.speeds or [math.nan]]
+    def _send(self, stamp: bytes, commands: Sequence[tuple[Target, Command]]) -> None:
+        names = tuple(name for target, _ in commands for name in target.actuators)
+        values = [position for _, command in commands for position in command.positions]
+        speeds = [speed for _, command in commands for speed in command.speeds or [math.nan]]
         moving = all(map(math.isfinite, speeds))
         if self._commands.has_subscribers:
-            if any(command.target.mechanism.loads for command in commands):
-                efforts = [effort for command in commands for effort in command.efforts]
+            if any(target.mechanism.loads for target, _ in commands):
+                efforts = [effort for target, command in commands
+                           for effort in target.efforts(command)]
                 self._commands.publish(joint_states(
                     unpack(stamp), names, values, speeds if moving else (),
                     efforts if all(map(math.isfinite, efforts)) else ()))
             else:
                 self._publishers[names, moving].publish(stamp, values + speeds * moving)
-        for command in commands:
-            publisher = self._arrays[command.target.mechanism.name]
+        for target, command in commands:
+            publisher = self._arrays[target.mechanism.name]
             if publisher.has_subscribers:
                 publisher.publish(Float64MultiArray(data=command.positions))
 
@@ -281,7 +264,7 @@ class CommandStream:
         n = len(names)
         return PatchedPublisher(
             [(self._commands.publisher, lambda stamp, values: joint_states(
-                stamp, names, values[:n], values[n:]))], (1 + moving) * n, self._logger)
+                stamp, names, values[:n], values[n:]))], (1 + moving) * n)
 
     def _receive_trajectory(self, message: JointTrajectory) -> None:
         if not self._trajectories.has_subscribers:
@@ -338,20 +321,22 @@ def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence
                          f'none, not {len(point.positions)} and {len(point.velocities)}')
     if not all(map(math.isfinite, point.velocities)):
         raise ValueError(f'point {i}: a velocity must be finite')
-    found = []
+    commands = []
     for k, target in enumerate(targets):
-        seeds[k], *actuator = target.command(
+        command = target.command(
             point.positions, list(point.velocities) or [0.0] * n, seeds[k], jumps[k])
-        if not all(map(math.isfinite, seeds[k])):
+        if not command.is_valid:
             raise ValueError(f'point {i}: {target.reason(point.positions)}')
-        if not all(map(math.isfinite, actuator[1])):
+        if not all(map(math.isfinite, command.speeds)):
             raise ValueError(f'point {i}: the motion of {target.named} reverses there; its speed '
                              'must be zero')
-        found.append(actuator)
-    positions, speeds = (list(chain.from_iterable(part)) for part in zip(*found))
-    return JointTrajectoryPoint(positions=positions,
-                                velocities=speeds if len(point.velocities) else (),
-                                time_from_start=point.time_from_start)
+        seeds[k] = command.inputs
+        commands.append(command)
+    return JointTrajectoryPoint(
+        positions=[position for command in commands for position in command.positions],
+        velocities=[speed for command in commands for speed in command.speeds
+                    if len(point.velocities)],
+        time_from_start=point.time_from_start)
 
 
 def _no_output(unknown: Sequence[str]) -> str:

@@ -13,7 +13,7 @@
 from __future__ import annotations
 
 from time import monotonic_ns, time_ns
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from rclpy.clock import Clock, ClockType
 from rclpy.serialization import serialize_message
@@ -48,17 +48,21 @@ class CrankDriver(scene_node.SceneNode):
         super().__init__(scene.DRIVER, **kwargs)
         self._motions: Dict[Tuple[str, str], Motion] = {}
         self._settings: Dict[Tuple[str, str], scene.InputSettings] = {}
-        self._mechanisms: Mapping[str, scene.SceneMechanism] = {}
         self._sent: List[Tuple[Tuple[str, str], scene.InputSettings]] = []
         self._now: Optional[int] = None
         self._steady = 0
-        self._names: List[str] = []
-        self._message: PatchedPublisher
         self._publisher = InProcessPublisher(self, 'crank_states', in_process)
-        self._timer = self.create_timer(1.0, self.guarded('a crank message', self._tick))
-        # After system time is set back, a timer would sleep until the old time returns.
-        self.create_timer(1.0, self.guarded('the check of the clock', self._restart_timer),
-                          clock=Clock(clock_type=ClockType.STEADY_TIME))
+        sources = list(dict.fromkeys(
+            settings.source for mechanism in self.scene.machines.values()
+            for settings in mechanism.inputs.values()))
+        n = len(sources)
+        self._message = PatchedPublisher([(self._publisher, lambda stamp, values: joint_states(
+            stamp, sources, values[:n], values[n:]))], 2 * n)
+        # After system time is set back, a timer on it would sleep until the old time returns.
+        clock = self.get_clock()
+        self._timer = self.create_timer(
+            1.0, self.guarded('a crank message', self._tick),
+            clock=clock if clock.ros_time_is_active else Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
 
     def adopt(self, new: scene.Scene) -> None:
@@ -73,21 +77,11 @@ class CrankDriver(scene_node.SceneNode):
             elif (old.speed, old.sweep) != (settings.speed, settings.sweep):
                 self._motions[key] = self._motions[key].changed(
                     settings.speed, settings.sweep, now)
-        self._settings, self._mechanisms = all_settings, new.machines
+        self._settings = all_settings
         # If several inputs have one source joint, it moves as the last of them.
         sent = {settings.source: (key, settings) for key, settings in all_settings.items()}
         self._sent = list(sent.values())
-        self._set_names(list(sent))
         self._set_rate(new.rate)
-
-    def _set_names(self, sources: List[str]) -> None:
-        if sources == self._names:
-            return
-        n = len(sources)
-        self._names, self._message = sources, PatchedPublisher(
-            [(self._publisher,
-              lambda stamp, values: joint_states(stamp, sources, values[:n], values[n:]))],
-            2 * n, self.get_logger())
 
     def _set_rate(self, rate: float) -> None:
         if not rate:
@@ -98,15 +92,11 @@ class CrankDriver(scene_node.SceneNode):
             self._timer.timer_period_ns = period
             self._timer.reset()
 
-    def _time(self) -> Tuple[int, bool]:
-        """Return the node's time [ns] and whether it is simulated."""
-        clock = self.get_clock()
-        simulated = clock.ros_time_is_active
-        return clock.now().nanoseconds if simulated else self.system_time(), simulated
-
     def _follow_clock(self) -> int:
         """Return the time [ns]; if it has jumped, shift the motions, so that no input jumps."""
-        (now, simulated), steady = self._time(), monotonic_ns()
+        clock, steady = self.get_clock(), monotonic_ns()
+        simulated = clock.ros_time_is_active
+        now = clock.now().nanoseconds if simulated else self.system_time()
         reached = 0
         if self._now is not None:
             reached = self._now if simulated else self._now + steady - self._steady
@@ -126,24 +116,12 @@ class CrankDriver(scene_node.SceneNode):
     def _position(self, key: Tuple[str, str], settings: scene.InputSettings,
                   now: int) -> Tuple[float, float]:
         """Return position [rad or m] and speed [rad/s or m/s] of an input's source joint."""
-        value, speed = self._motions[key].at(now)
-        if settings.is_plain:
-            return value, speed
-        return self._mechanisms[key[0]].to_source(settings, value, speed)
+        return self.scene.machines[key[0]].to_source(settings, *self._motions[key].at(now))
 
     def serves(self) -> str:
         """Return the source joints and their rate, in words."""
         sources = [settings.source for settings in self._settings.values()]
         return f'moves {listed(sources, 200)} on crank_states at {self.scene.rate:g} Hz'
-
-    def _restart_timer(self) -> None:
-        """Restart the timer if the clock was set back since the last message."""
-        set_back = self._now is not None and self._time()[0] < self._now
-        if set_back and self.scene.rate:
-            # From here on the time is no longer set back: a timer that is reset again and again
-            # never fires.
-            self._follow_clock()
-            self._timer.reset()
 
 
 class InProcessPublisher:
@@ -156,9 +134,10 @@ class InProcessPublisher:
 
     def __init__(self, node: Any, name: str, nodes: Sequence[Any]):
         path = self.topic_name = node.resolve_topic_name(name)
-        self._subscriptions = [one for other in nodes for one in other.subscriptions
-                               if one.topic_name == path]
-        self._others = TrackedPublisher(node, JointState, name, 10, own=len(self._subscriptions))
+        self._subscriptions = [
+            subscription for other in nodes for subscription in other.subscriptions
+            if subscription.topic_name == path]
+        self._others = TrackedPublisher(node, JointState, name, 10, len(self._subscriptions))
 
     @property
     def has_subscribers(self) -> bool:

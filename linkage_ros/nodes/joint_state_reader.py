@@ -18,26 +18,25 @@ is deserialised; its layout gives the places of the numbers in all others.
 from __future__ import annotations
 
 from array import array
-from collections import OrderedDict
 from contextlib import suppress
-from struct import Struct
-from typing import Any, Callable, Dict, Optional, Set, Tuple
+from struct import error as StructError, Struct
+from typing import Any, Callable, Dict, List, Optional, Tuple
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from .log import Throttle
-from .message_layout import deserialized, HEADER, MessageLayout, NoLayout, pack, Unreadable
+from .message_layout import deserialized, HEADER, LITTLE_ENDIAN, pack, Unreadable
 
 # Best effort matches publishers of any reliability. At 1000 Hz, the queue holds 100 ms.
 ANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 
-# Maximum numbers of cached senders, and of masks for one length of messages.
-MAX_SENDERS, MAX_MASKS = 256, 4
+# Maximum number of known senders; when it is reached, they are learnt anew.
+MAX_SENDERS = 256
 # Messages longer than this [bytes] are always deserialised.
 MAX_LAYOUT_BYTES = 1 << 16
-# While a cache is full, the layout of only one in SAMPLE_INTERVAL unknown messages is determined.
-SAMPLE_INTERVAL = 256
+
+COUNT = Struct('<I')
 
 # A packed stamp (bytes), then floats.
 Numbers = Tuple[Any, ...]
@@ -74,45 +73,26 @@ class Reader:
 
     def __init__(self, interpret: Callable[[JointState], Any]):
         self._interpret = interpret
-        # Masks of the constant bytes, by message length. Senders by length, mask and masked
-        # bytes, the least recently used first.
-        self._masks: Dict[int, Set[int]] = {}
-        self._senders: OrderedDict[Tuple[int, int, int], Sender] = OrderedDict()
-        self._missed = 0
+        # The known senders, by the length of their messages.
+        self._senders: Dict[int, List[Sender]] = {}
         self._last: Optional[Sender] = None
 
     def sender(self, data: bytes) -> Sender:
         """Return the sender of a serialised message; raise Unreadable if it is no JointState."""
         if self._last is None or not self._last.has_sent(data):
-            self._last = self._looked_up(data)
+            number = int.from_bytes(data, 'little')
+            self._last = next((sender for sender in self._senders.get(len(data), ())
+                               if number & sender.mask == sender.same), None) or self._new(data)
         return self._last
 
-    def _looked_up(self, data: bytes) -> Sender:
-        size, masks = len(data), self._masks.get(len(data), set())
-        number = int.from_bytes(data, 'little') if masks else 0
-        for mask in masks:
-            if sender := self._senders.get((size, mask, number & mask)):
-                self._senders.move_to_end((size, mask, number & mask))
-                return sender
+    def _new(self, data: bytes) -> Sender:
         message = deserialized(data, JointState)
-        self._missed += 1
-        is_full = len(self._senders) == MAX_SENDERS or len(masks) == MAX_MASKS
-        is_skipped = is_full and self._missed % SAMPLE_INTERVAL
-        sender = Sender(data, message, self._interpret(message),
-                        size <= MAX_LAYOUT_BYTES and not is_skipped)
-        if sender.size and (sender.mask in masks or len(masks) < MAX_MASKS):
-            if len(self._senders) == MAX_SENDERS:
-                self._drop_oldest()
-            self._masks.setdefault(size, set()).add(sender.mask)
-            self._senders[size, sender.mask, sender.same] = sender
+        sender = Sender(data, message, self._interpret(message))
+        if sender.size:
+            if sum(map(len, self._senders.values())) == MAX_SENDERS:
+                self._senders.clear()
+            self._senders.setdefault(sender.size, []).append(sender)
         return sender
-
-    def _drop_oldest(self) -> None:
-        (size, mask, _), _ = self._senders.popitem(last=False)
-        if not any(key[:2] == (size, mask) for key in self._senders):
-            self._masks[size].remove(mask)
-            if not self._masks[size]:
-                del self._masks[size]
 
 
 class Sender:
@@ -131,21 +111,21 @@ class Sender:
 
     """
 
-    def __init__(self, data: bytes, message: JointState, routes: Any, has_layout: bool):
+    def __init__(self, data: bytes, message: JointState, routes: Any):
         self.routes, self.size, self.mask, self.same = routes, 0, 0, 0
         self._numbers: Optional[Numbers] = (
             pack(message.header.stamp), *message.position, *message.velocity)
-        if has_layout:
-            with suppress(NoLayout):
-                self._set_layout(data, MessageLayout(data, message))
+        if len(data) <= MAX_LAYOUT_BYTES:
+            with suppress(StructError):
+                self._set_layout(data)
 
-    def _set_layout(self, data: bytes, layout: MessageLayout) -> None:
-        (positions, count), (velocities, others) = layout.numbers[:2]
+    def _set_layout(self, data: bytes) -> None:
+        mask, ((positions, count), (velocities, others), _) = _layout(data)
         unpack = Struct(f'<{HEADER}x8s{positions - HEADER - 8}x{count}d'
                         f'{velocities - positions - 8 * count}x{others}d').unpack_from
         if _bits(unpack(data)) == _bits(self._numbers):
-            # Integers are the fastest to compare and look up for messages this short.
-            self.size, self.mask = len(data), int.from_bytes(layout.fixed, 'little')
+            # Integers are the fastest to compare for messages this short.
+            self.size, self.mask = len(data), int.from_bytes(mask, 'little')
             self.same = int.from_bytes(data, 'little') & self.mask
             self._numbers, self._unpack = None, unpack
 
@@ -167,3 +147,36 @@ class Sender:
 def _bits(numbers: Any) -> tuple:
     """Return the numbers as bytes, because as a float, NaN is unequal to itself."""
     return numbers[0], array('d', numbers[1:]).tobytes()
+
+
+def _layout(data: bytes) -> Tuple[bytearray, List[Tuple[int, int]]]:
+    """
+    Return where the constant bytes and the numbers of a serialised JointState are.
+
+    That is a mask, 0 at stamp, numbers and padding, and place and count of positions, velocities
+    and efforts. Raises StructError if the message is not in little-endian CDR.
+    """
+    mask, place = bytearray(len(data)), HEADER + 8
+    mask[:HEADER] = HEADER * b'\xff'
+
+    def skip(size: int, alignment: int, bits: bytes) -> int:
+        nonlocal place
+        start = place + (HEADER - place) % alignment
+        place = start + size
+        if data[:len(LITTLE_ENDIAN)] != LITTLE_ENDIAN or place > len(data):
+            raise StructError
+        mask[start:place] = size * bits
+        return start
+
+    def count() -> int:
+        return int(COUNT.unpack_from(data, skip(COUNT.size, COUNT.size, b'\xff'))[0])
+
+    # The frame, and the names.
+    skip(count(), 1, b'\xff')
+    for _ in range(count()):
+        skip(count(), 1, b'\xff')
+    numbers = []
+    for _ in range(3):
+        size = count()
+        numbers.append((skip(8 * size, 8 if size else 1, b'\0'), size))
+    return mask, numbers

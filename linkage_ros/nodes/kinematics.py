@@ -30,7 +30,7 @@ from .. import scene
 from ..robot_model import bodies, urdf
 from ..words import listed
 
-# Time from the start, and from the first input received, to a warning about missing ones [s].
+# Time from the start to a warning about inputs that were not received [s].
 MISSING_AFTER_S = 5.0
 # Longest wait for subscribers to delete markers when the node ends [s].
 DELETION_TIMEOUT_S = 0.1
@@ -53,7 +53,6 @@ class Kinematics(scene_node.SceneNode):
         self._mechanisms: Dict[str, MechanismTopics] = {}
         self._models: Dict[str, MechanismModel] = {}
         super().__init__(scene.KINEMATICS, **kwargs)
-        self._clashing = Once(MAX_NAMES)
         # Mechanism and index of the inputs, by their source joint.
         self._inputs: Dict[str, List[Tuple[str, int]]] = {}
         for name, mechanism in self.scene.machines.items():
@@ -65,8 +64,8 @@ class Kinematics(scene_node.SceneNode):
         self._reader = joint_state_reader.Reader(self._interpret)
         # That of the last message that set an input.
         self._stamp = NEVER
-        self._own: frozenset = frozenset()
-        self._missing, self._unknown = set(self._inputs), Once(MAX_NAMES)
+        self._joint_names: frozenset = frozenset()
+        self._unknown = Once(MAX_NAMES)
         self._missing_timer = self.create_timer(
             MISSING_AFTER_S, self.guarded('the check for missing inputs', self._warn_of_missing),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -119,15 +118,14 @@ class Kinematics(scene_node.SceneNode):
         changed = [self._mechanisms[name] for name, model in models.items()
                    if model is not self._models.get(name)]
         is_first, self._models = not self._models, models
-        self._own = frozenset(joint.name for model in models.values()
-                              for joint in model.mechanism.joints.values())
-        self._check_clashes()
+        self._joint_names = frozenset(joint.name for model in models.values()
+                                      for joint in model.mechanism.joints.values())
         for topics in changed:
             topics.adopt(models[topics.name])
         if not is_first:
             self._publish(changed)
-        self.later([*(partial(self._latched, topics, models[topics.name]) for topics in changed),
-                    partial(self._robot, models)])
+        self.worker.add(partial(self._latched, topics, models[topics.name]) for topics in changed)
+        self.worker.add([partial(self._robot, models)])
 
     def _latched(self, topics: MechanismTopics, model: MechanismModel) -> Callable[[], None]:
         """Build a mechanism's latched messages; return a function to publish them."""
@@ -189,45 +187,27 @@ class Kinematics(scene_node.SceneNode):
         sources = [InputSource(self._mechanisms[mechanism], i, index, moving and count + index)
                    for name, index in indices.items()
                    for mechanism, i in self._inputs.get(name, ())]
-        self._check_names(message.name, indices)
+        self._check_names(message.name)
         return sources, [*dict.fromkeys(source.mechanism for source in sources)]
 
-    def _check_names(self, names: Iterable[str], received: Iterable[str]) -> None:
-        """Warn once of each unknown name; record source joints whose position is received."""
-        if len(self._missing) == len(self._inputs) and not self._missing.isdisjoint(received):
-            self._missing_timer.reset()
-        self._missing.difference_update(received)
+    def _check_names(self, names: Iterable[str]) -> None:
+        """Warn once of each unknown name."""
         unknown = self._unknown.new(name for name in names if name not in self._inputs
-                                    and name not in self._own)
+                                    and name not in self._joint_names)
         if unknown:
             self.get_logger().warning(
                 f'crank_states: no input is called {listed(unknown, 150)}; the inputs are '
                 f'{listed(self._inputs, 150)}{self._unknown.ending}')
 
-    def _check_clashes(self) -> None:
-        """Warn once of each joint that has the name of another mechanism's source on its topic."""
-        clashes = self._clashing.new(
-            joint.name for name, model in self._models.items()
-            for key, joint in model.mechanism.joints.items()
-            if joint.published and joint.name in self._scene_joint_states.omitted
-            and key not in model.mechanism.inputs
-            and name not in dict(self._inputs[joint.name]))
-        if clashes:
-            self.get_logger().warning(
-                f'joint_states: {listed(clashes, 150)} is the name of a joint and of a source of '
-                'another mechanism on the same topic, so that the joint is not published; rename '
-                f'one of them{self._clashing.ending}')
-
     def _warn_of_missing(self) -> None:
         """Warn of source joints that have not been received."""
         self._missing_timer.cancel()
-        if self._missing:
-            waiting = [name for name in self._inputs if name in self._missing]
-            stuck = dict.fromkeys(mechanism for name in waiting
-                                  for mechanism, _ in self._inputs[name])
+        waiting = {name: mechanism for name, inputs in self._inputs.items()
+                   for mechanism, i in inputs if self._mechanisms[mechanism].inputs[i] is None}
+        if waiting:
             self.get_logger().warning(
                 f'crank_states: no position of {listed(waiting, 150)} was received, without which '
-                f'{listed(stuck, 150)} cannot move')
+                f'{listed(dict.fromkeys(waiting.values()), 150)} cannot move')
 
 
 def main(args: Any = None) -> int:

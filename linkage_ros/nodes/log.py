@@ -12,12 +12,11 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from functools import wraps
 import math
 import time
 import traceback
-from typing import Any, Callable, Hashable, Iterable, List, Set
+from typing import Any, Callable, Dict, Hashable, Iterable, List, Set
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
@@ -34,17 +33,16 @@ class Throttle:
 
     def __init__(self, logger: Any):
         self._logger = logger
-        self._logged: OrderedDict[Any, float] = OrderedDict()
+        self._logged: Dict[Any, float] = {}
 
     def warn(self, subject: Any, text: Callable[[], str]) -> None:
         """Log the result of `text`, unless the subject was logged within the last `THROTTLE_S`."""
         now = time.monotonic()
         if now < self._logged.get(subject, -math.inf) + THROTTLE_S:
             return
+        if len(self._logged) == MAX_SUBJECTS:
+            self._logged.clear()
         self._logged[subject] = now
-        self._logged.move_to_end(subject)
-        if len(self._logged) > MAX_SUBJECTS:
-            self._logged.popitem(last=False)
         self._logger.warning(text())
 
 
@@ -60,7 +58,8 @@ class Once:
         """Return the subjects that no call has returned before; none after `most` subjects."""
         if len(self._logged) >= self._most:
             return []
-        new = [one for one in dict.fromkeys(subjects) if hash(one) not in self._logged]
+        new = [subject for subject in dict.fromkeys(subjects)
+               if hash(subject) not in self._logged]
         self._logged.update(map(hash, new))
         return new
 

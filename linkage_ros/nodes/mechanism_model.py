@@ -25,7 +25,7 @@ from . import messages
 from .publishers import PatchedPublisher
 from .. import scene
 from ..cache import Cache
-from ..linkage import LinkPoint, Mechanism
+from ..linkage import LinkPoint
 from ..robot_model import bodies, shapes, urdf
 from ..scene.legs import Layout, Solution
 
@@ -76,7 +76,7 @@ class MechanismModel:
 
     """
 
-    def __init__(self, mechanism: scene.SceneMechanism, frame_id: str, prefix: str, logger: Any):
+    def __init__(self, mechanism: scene.SceneMechanism, frame_id: str, prefix: str):
         self.mechanism, self.made_of = mechanism, (mechanism, frame_id, prefix)
         self.inputs = list(mechanism.inputs.values())
         self.robot = None if mechanism.in_space else bodies.robot([mechanism], frame_id)
@@ -87,7 +87,7 @@ class MechanismModel:
         drawn = mechanism.name, prefix + frame_id, mechanism.pose
         self._points, shown = _shown(mechanism)
         self._drawn = *drawn, bodies.size(mechanism), shown
-        self._conversions, self._logger = Cache(self._conversion), logger
+        self._conversions = Cache(self._conversion)
         self.regular = Cache(self._regular)
         self.publishers = Cache(self._publisher, MAX_PUBLISHERS)
 
@@ -167,7 +167,7 @@ class MechanismModel:
         builders = self.joint_message, self.marker_message
         return PatchedPublisher(
             [(topic, partial(build, state)) for topic, build in zip(topics, builders) if topic],
-            state.solution.layout.size, self._logger)
+            state.solution.layout.size)
 
     def joint_message(self, state: AssemblyState, stamp: Any, values: np.ndarray) -> JointState:
         """Build the joint states of the assembled legs from a solution's values."""
@@ -201,9 +201,9 @@ class MechanismModel:
 def _shown(mechanism: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
     """Return the markers' points and, by marker id, the point indices of each line or plate."""
     linkage, names = mechanism.linkage, mechanism.points
-    if mechanism.in_space:
-        return _shown_spatial(linkage, names)
-    cranks, plates = shapes.cranks(linkage), shapes.plates(linkage, names)
+    cranks, plates, marks, drawn = ([], [], [], []) if mechanism.in_space else (
+        shapes.cranks(linkage), shapes.plates(linkage, names), shapes.marks(linkage, names),
+        shapes.drawn(mechanism, names))
     # The edges of a plate are not drawn as bars, too: the message is smaller.
     edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}
     bars = [bar for bar in linkage.bars if bar not in cranks and frozenset(bar) not in edges]
@@ -212,8 +212,8 @@ def _shown(mechanism: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
         messages.JOINTS_ID: [(name,) for name in names],
         messages.GUIDES_ID: [], messages.BODIES_ID: [], messages.CRANKS_ID: cranks,
         messages.DRIVEN_ID: [], messages.PLATES_ID: plates,
-        messages.GROUND_ID: shapes.marks(linkage, names)}
-    for shape in shapes.drawn(mechanism, names):
+        messages.GROUND_ID: marks}
+    for shape in drawn:
         id_ = (messages.GUIDES_ID if shape.kind == shapes.GUIDE else messages.DRIVEN_ID
                if shape.slide.name in mechanism.inputs else messages.BODIES_ID)
         pieces[id_].append((shape.start, shape.end))
@@ -223,14 +223,6 @@ def _shown(mechanism: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
     return points, {
         id_: [[index[point] for point in piece] for piece in several if index.keys() >= set(piece)]
         for id_, several in pieces.items()}
-
-
-def _shown_spatial(linkage: Mechanism, names: Sequence[str]) -> Tuple[Sequence, Dict[int, list]]:
-    """Return the same as `_shown` for a spatial linkage, whose bars and cylinders are lines."""
-    index = {point: i for i, point in enumerate(names)}
-    return names, {messages.LINKS_ID: [
-        [index[end] for end in line] for line in (*linkage.bars, *linkage.cylinders)
-        if index.keys() >= {*line}], messages.JOINTS_ID: [[i] for i in index.values()]}
 
 
 def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray) -> np.ndarray:

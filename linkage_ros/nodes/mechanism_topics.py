@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import AbstractSet, Any, List, Optional, Sequence, Tuple
+from typing import AbstractSet, Any, List, Optional, Tuple
 
 import numpy as np
 from rclpy.duration import Duration
@@ -57,13 +57,12 @@ class MechanismTopics:
         self._markers = TrackedPublisher(node, MarkerArray, f'{name}/markers', 1)
         self._locus = node.create_publisher(Marker, f'{name}/locus', LATCHED)
         self._description = node.create_publisher(String, f'{name}/robot_description', LATCHED)
-        self._logger = node.get_logger().get_child(name)
-        self._throttle = Throttle(self._logger)
+        self._throttle = Throttle(node.get_logger().get_child(name))
         self.inputs: List[Any] = [None] * len(mechanism.inputs)
         self.speeds: List[Optional[float]] = [None] * len(mechanism.inputs)
         self.stamp = NEVER
         self.state: Optional[AssemblyState] = None
-        # The last position of a source joint, and the last input that one has given.
+        # The last position of a source joint, and the last input that it gave.
         self._position = math.nan
         self._seed: Optional[float] = None
         # Ids of the displayed markers, whether the locus is displayed, and the last robot model.
@@ -121,7 +120,7 @@ class MechanismTopics:
         before, inputs = getattr(self, 'model', None), [*self.inputs]
         if before and before.made_of == (mechanism, frame_id, prefix):
             return before
-        model = MechanismModel(mechanism, frame_id, prefix, self._logger)
+        model = MechanismModel(mechanism, frame_id, prefix)
         # This runs in the worker's thread, while subscribers may change.
         topics = self._joint_states.subscribed, self._markers.subscribed
         if before and None not in inputs and (in_scene or any(topics)):
@@ -179,28 +178,20 @@ class MechanismTopics:
         failure += ' at ' + ', '.join(
             f'{settings.input.quantity} {value:.6g} {settings.input.unit}'
             for settings, value in zip(inputs, self.inputs))
-        first, *others = missing
-        reach, value, input_ = self._reach(inputs[0], first), self.inputs[0], inputs[0].input
-        if len(inputs) > 1 or any(input_.holds(arc, value, value) for arc in reach):
+        first, input_ = next(iter(missing)), inputs[0].input
+        is_inside = any(input_.holds(arc, self.inputs[0], self.inputs[0])
+                        for arc in inputs[0].reach)
+        if len(inputs) > 1 or len(self.model.assembly.legs) > 1 or is_inside:
             return f'{failure}: no place for "{self._unplaced(first)}"'
-        of = f' of {missing[first]}' if others else ''
-        return f'{failure}; the reach{of} is {scene.in_words(reach)} {input_.unit}'
+        return f'{failure}; the reach is {scene.in_words(inputs[0].reach)} {input_.unit}'
 
     def _unplaced(self, leg: int) -> str:
         """Return the first joint line of a leg that has no place at the present inputs."""
         mechanism, (lag, start, side, _) = self.model.mechanism, [
             *self.model.assembly.legs.values()][leg]
-        own = [(start + side * (value - lag)) / mechanism.scale_of(name)
-               for name, value in zip(mechanism.inputs, self.inputs)]
-        found = {**mechanism.linkage.solve(own), **mechanism.linkage.joint_angles(own)}
-        return next((line.text for line in mechanism.linkage.design.lines
-                     if any(np.isnan(found.get(name, 0.0)).any() for name in line.names)), '')
-
-    def _reach(self, settings: scene.InputSettings, leg: int) -> Sequence[Tuple[float, float]]:
-        """Return the reach of a leg, by the crank that all legs have in common."""
-        if len(self.model.assembly.legs) == 1:
-            return settings.reach
-        lag, start, side, _ = [*self.model.assembly.legs.values()][leg]
-        arcs = [sorted(lag + side * (end - start) for end in arc) for arc in settings.reach]
-        turns = [settings.input.turns_of(low) for low, _ in arcs]
-        return sorted((low - turn, high - turn) for (low, high), turn in zip(arcs, turns))
+        inputs = [(start + side * (value - lag)) / mechanism.scale_of(name)
+                  for name, value in zip(mechanism.inputs, self.inputs)]
+        linkage = mechanism.linkage
+        quantities = {**linkage.solve(inputs), **linkage.joint_angles(inputs)}
+        return next((line.text for line in linkage.design.lines
+                     if any(np.isnan(quantities.get(name, 0.0)).any() for name in line.names)), '')

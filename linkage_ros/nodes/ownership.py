@@ -19,7 +19,7 @@ changed. A late subscriber receives the last full announcement and those after i
 
 from __future__ import annotations
 
-from typing import Any, Callable, Dict, Iterable, List, Mapping, Sequence, Set, Tuple
+from typing import Any, Dict, Iterable, List, Mapping, Sequence, Set, Tuple
 
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import parameter_value_to_python
@@ -35,42 +35,25 @@ LATCHED = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Announcer:
-    """Publishes the values of the parameters that a node owns."""
+    """Publishes the values of the parameters that a node owns: first all, then changed ones."""
 
     def __init__(self, node: Any):
-        self._node = node
+        self._node, self._count = node, 0
         self._publisher = node.create_publisher(ParameterEvent, TOPIC, LATCHED)
-        # Number of announcements since the last full one, including that.
-        self._announced = 0
 
-    def first(self) -> Callable[[], None]:
-        """Return a function that makes the first announcement, with all values."""
-        read, values = self._node.scene, self._messages(self._node.scene.parameters)
-
-        def publish() -> None:
-            if not self._announced:
-                self._announced = 1
-                self._publish(new_parameters=values if read is self._node.scene else
-                              self._messages(self._node.scene.parameters))
-        return publish
-
-    def announce(self, changed: Iterable[scene.Parameter]) -> None:
-        """Publish those changed values that the node owns; nothing before the first."""
-        values = self._messages(changed)
-        if self._announced and values:
-            # A late subscriber receives DEPTH messages, and needs the full one among them.
-            self._announced = 1 if self._announced == DEPTH else self._announced + 1
-            self._publish(changed_parameters=values if self._announced > 1 else self._messages(
-                self._node.scene.parameters))
-
-    def _publish(self, **values: Any) -> None:
-        self._publisher.publish(ParameterEvent(
-            stamp=self._node.get_clock().now().to_msg(),
-            node=self._node.get_fully_qualified_name(), **values))
-
-    def _messages(self, parameters: Iterable[scene.Parameter]) -> List:
-        return [typed(parameter).to_parameter_msg() for parameter in parameters
-                if parameter.name in self._node.fields]
+    def announce(self, changed: Iterable[scene.Parameter] = ()) -> None:
+        """Publish those changed values that the node owns; the first time all values."""
+        # A late subscriber receives DEPTH messages, and needs the full one among them.
+        is_full = self._count % DEPTH == 0
+        values = [typed(parameter).to_parameter_msg()
+                  for parameter in (self._node.scene.parameters if is_full else changed)
+                  if parameter.name in self._node.fields]
+        if values:
+            self._count += 1
+            self._publisher.publish(ParameterEvent(
+                stamp=self._node.get_clock().now().to_msg(),
+                node=self._node.get_fully_qualified_name(),
+                **{'new_parameters' if is_full else 'changed_parameters': values}))
 
 
 class Follower:
@@ -90,7 +73,7 @@ class Follower:
                              self._parameters.followed)
         mechanisms = values.pop('mechanisms', None)
         if mechanisms is not None:
-            self._compare(event, mechanisms, values, self._present(values))
+            self._compare(event, mechanisms, values)
         elif event.node != self._owner:
             # Those of an owner of other parameters, or one whose full announcement follows.
             return
@@ -98,46 +81,29 @@ class Follower:
         self._waiting.update((name, value) for name, value in values.items()
                              if name.partition('.')[0] in self._mechanisms
                              and not self._parameters.followed[name].read_only)
-        self._warn('refused', wrong + self._follow(), 'values that cannot be followed')
-
-    def _follow(self) -> List[str]:
-        """Adopt what waits, together or else by mechanism; return the reasons of refusals."""
-        present = self._present(self._waiting)
-        waiting = {name: value for name, value in self._waiting.items() if value != present[name]}
-        parts: Dict[str, Dict[str, Any]] = {}
-        for name, value in waiting.items():
-            parts.setdefault(name.partition('.')[0], {})[name] = value
-        self._waiting = waiting
-        if not waiting or not self._parameters.follow(waiting):
-            parts = {}
-        refused = {mechanism: reason for mechanism, part in parts.items()
-                   if (reason := self._parameters.follow(part))}
-        self._waiting = {name: value for mechanism in refused
-                         for name, value in parts[mechanism].items()}
-        return [*refused.values()]
-
-    def _present(self, names: Iterable[str]) -> Dict[str, Any]:
-        """Return this node's values of all parameters of the mechanisms that names begin with."""
-        mechanisms = self._parameters.scene.machines
-        return {parameter.name: parameter.value
-                for mechanism in {name.partition('.')[0] for name in names} & mechanisms.keys()
-                for parameter in mechanisms[mechanism].parameters}
+        if refused := self._parameters.follow(self._waiting):
+            wrong.append(refused)
+        else:
+            self._waiting = {}
+        self._warn('refused', wrong, 'values that cannot be followed')
 
     def _compare(self, event: ParameterEvent, mechanisms: Iterable[str],
-                 there: Mapping[str, Any], here: Mapping[str, Any]) -> None:
+                 there: Mapping[str, Any]) -> None:
         """Compare a full announcement with this node's mechanisms: equal ones are followed."""
-        fields, present = self._parameters.followed, self._parameters.scene.machines.keys()
-        started = event.node != self._owner or event.new_parameters
+        fields, present = self._parameters.followed, self._parameters.scene.machines
+        here = {parameter.name: parameter.value
+                for name in {name.partition('.')[0] for name in there} & present.keys()
+                for parameter in present[name].parameters}
         self._owner, self._waiting = event.node, {}
         unlike = {name.partition('.')[0]: name for name in there
                   if fields[name].read_only and here[name] != there[name]}
-        missing = present ^ set(mechanisms)
-        self._mechanisms = present - missing - unlike.keys()
+        missing = present.keys() ^ set(mechanisms)
+        self._mechanisms = present.keys() - missing - unlike.keys()
         self._warn('unlike', [f'{name} is {quoted(here[name])} here and '
                               f'{quoted(there[name])} there' for name in unlike.values()],
                    'another mechanism, which is not followed')
         self._warn('missing', sorted(missing), 'other mechanisms; only one of the nodes has')
-        if started:
+        if event.new_parameters:
             self._warned.pop('values', None)
             self._warn('values', [
                 f'{name} was {quoted(here[name])} and is now {quoted(there[name])}'

@@ -61,27 +61,24 @@ class SceneParameters:
                  changed: Callable[[list[scenes.Parameter]], None]):
         self._node, self._check, self._changed = node, check, changed
         # An empty list in a parameter file has neither type nor value.
-        given = {name: () if parameter.value is None else scenes.plain(parameter.value)
-                 for name, parameter in node.get_parameters_by_prefix('').items()}
-        self.scene = scenes.read(given)
-        own = [parameter for parameter in self.scene.parameters if role == parameter.field.owner]
-        self.fields = {parameter.name: parameter.field for parameter in own}
+        values = {name: () if parameter.value is None else scenes.plain(parameter.value)
+                  for name, parameter in node.get_parameters_by_prefix('').items()}
+        self.scene = scenes.read(values)
+        owned = [parameter for parameter in self.scene.parameters
+                 if role == parameter.field.owner]
+        self.fields = {parameter.name: parameter.field for parameter in owned}
         self.followed = {parameter.name: parameter.field for parameter in self.scene.parameters
                          if role in parameter.field.readers and parameter.name not in self.fields}
         # An input that has left its start is not checked to be in its sweep.
         self._is_strict = role in scenes.START.readers
-        of_scene = given.keys() & {parameter.name for parameter in self.scene.parameters}
+        of_scene = values.keys() & {parameter.name for parameter in self.scene.parameters}
         self.is_given = bool(of_scene)
         # A parameter is declared by its owner alone.
         for name in of_scene:
             node.undeclare_parameter(name)
-        self._declare(own)
-        # The scene that a change leads to, what differs in it, why it is refused, and the first
-        # of its parameters: rclpy calls back for other ones, too.
+        self._declare(owned)
+        # The scene that a change leads to, and why it is refused.
         self._next, self._refusal = self.scene, ''
-        self._difference: list[scenes.Parameter] = []
-        self._first: Any = None
-        self._follows = False
         node.add_pre_set_parameters_callback(self._read)
         node.add_on_set_parameters_callback(self._answer)
         node.add_post_set_parameters_callback(self._accept)
@@ -106,16 +103,10 @@ class SceneParameters:
 
     def follow(self, values: Mapping[str, Any]) -> str:
         """Adopt values of parameters of another node; return the reason of a refusal, or ''."""
-        self._refusal = ''
         try:
-            self._prepare(values, strict=False)
+            self._adopt(self._changed_scene(values, strict=False))
         except scenes.SceneError as error:
             return str(error)
-        if derived := self._derived(()):
-            self._first, self._follows = derived[0], True
-            self._node.set_parameters_atomically(derived)
-        else:
-            self._adopt()
         return ''
 
     def ranged(self, name: str, descriptor: ParameterDescriptor) -> ParameterDescriptor:
@@ -134,30 +125,25 @@ class SceneParameters:
             descriptor.floating_point_range = [] if whole else [FloatingPointRange(**ends)]
         return descriptor
 
-    def _declare(self, own: Sequence[scenes.Parameter]) -> None:
-        descriptors = {parameter.field: _descriptor(parameter.field) for parameter in own}
+    def _declare(self, owned: Sequence[scenes.Parameter]) -> None:
+        descriptors = {parameter.field: _descriptor(parameter.field) for parameter in owned}
         # The value of an empty list does not imply its type.
-        empty = [typed(parameter) for parameter in own if parameter.value == ()]
+        empty = [typed(parameter) for parameter in owned if parameter.value == ()]
         self._node.declare_parameters('', [(
             parameter.name, None if parameter.value == () else parameter.value,
-            copy(descriptors[parameter.field])) for parameter in own], ignore_override=True)
+            copy(descriptors[parameter.field])) for parameter in owned], ignore_override=True)
         self._node.set_parameters_atomically(empty)
 
     def _read(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Read the changed scene; return the parameters in their declared types, and derived."""
-        if self._follows:
-            self._follows = False
-            return parameters
-        # rclpy may have refused what was read before.
-        self._refusal, self._difference = '', []
-        self._first = parameters[0] if parameters else None
+        """Read the changed scene; return the parameters in their declared types."""
+        self._refusal = ''
         for parameter in parameters:
             if not self._node.has_parameter(parameter.name):
                 raise Undeclared(self._unknown(parameter.name))
         try:
             values = {parameter.name: self._checked(parameter) for parameter in parameters
                       if parameter.name in self.fields}
-            self._prepare(values, self._is_strict)
+            self._next = self._changed_scene(values, self._is_strict)
         except scenes.SceneError as error:
             self._refusal = str(error)
             return parameters
@@ -165,11 +151,9 @@ class SceneParameters:
             self._node.report('a changed parameter', error)
             self._refusal = elided(f'internal error: {error!r}', 299)
             return parameters
-        read = [typed(scenes.Parameter(
+        return [typed(scenes.Parameter(
             parameter.name, self.fields[parameter.name], values[parameter.name]))
             if parameter.name in values else parameter for parameter in parameters]
-        self._first = read[0] if read else None
-        return read + self._derived(values)
 
     def _unknown(self, name: str) -> str:
         field = self.followed.get(name)
@@ -177,11 +161,13 @@ class SceneParameters:
         node = self._node.get_fully_qualified_name()
         return f'{elided(name)} is not a parameter of {node}{owner}'
 
-    def _prepare(self, values: Mapping[str, Any], strict: bool) -> None:
-        """Read the scene with changed values; raise SceneError if it is refused."""
-        changed = scenes.changed(self.scene, values, strict) if values else self.scene
+    def _changed_scene(self, values: Mapping[str, Any], strict: bool) -> scenes.Scene:
+        """Return the scene with changed values; raise SceneError if it is refused."""
+        if not values:
+            return self.scene
+        changed = scenes.changed(self.scene, values, strict)
         self._check(changed)
-        self._next, self._difference = changed, changed.changed_from(self.scene)
+        return changed
 
     def _checked(self, parameter: Parameter) -> Any:
         """Return the value of a parameter of the scene, valid by itself; raise SceneError."""
@@ -192,27 +178,21 @@ class SceneParameters:
             raise scenes.SceneError(f'{name} cannot be removed; it must be {field.allowed}')
         return field.checked(name, parameter.value)
 
-    def _derived(self, given: Any) -> list[Parameter]:
-        """Return those whose defaults depend on others that have changed."""
-        return [typed(parameter) for parameter in self._difference
-                if parameter.name in self.fields and parameter.name not in given
-                and not parameter.field.read_only]
-
-    def _is_read(self, parameters: list[Parameter]) -> bool:
-        return any(parameter is self._first for parameter in parameters)
-
     def _answer(self, parameters: list[Parameter]) -> SetParametersResult:
-        reason = self._refusal if self._is_read(parameters) else ''
+        reason = self._refusal if self._has_any(parameters) else ''
         return SetParametersResult(successful=not reason, reason=reason)
 
     def _accept(self, parameters: list[Parameter]) -> None:
-        if self._is_read(parameters):
-            self._adopt()
+        if self._has_any(parameters):
+            self._adopt(self._next)
 
-    def _adopt(self) -> None:
-        difference, self._difference = self._difference, []
-        if difference:
-            self.scene = self._next
+    def _has_any(self, parameters: list[Parameter]) -> bool:
+        """Return whether any is of the scene; rclpy calls back for those declared later, too."""
+        return any(parameter.name in self.fields for parameter in parameters)
+
+    def _adopt(self, changed: scenes.Scene) -> None:
+        if difference := changed.changed_from(self.scene):
+            self.scene = changed
             self._changed(difference)
 
 

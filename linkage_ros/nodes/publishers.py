@@ -18,7 +18,7 @@ from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from .message_layout import NoLayout, Template, unpack
+from .message_layout import Template
 
 # Later subscribers receive the last message, too.
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -28,7 +28,7 @@ class TrackedPublisher:
     """
     A publisher that events tell whether it has subscribers, so that no message needs a query.
 
-    `own` is the number of this process's subscriptions, which do not count.
+    `ignored` is the number of this process's subscriptions, which do not count.
 
     Attributes
     ----------
@@ -39,14 +39,14 @@ class TrackedPublisher:
 
     """
 
-    def __init__(self, node: Node, type_: Any, name: str, qos: Any, own: int = 0):
-        self.has_subscribers, self.subscribed, self._own = False, None, own
+    def __init__(self, node: Node, type_: Any, name: str, qos: Any, ignored: int = 0):
+        self.has_subscribers, self.subscribed, self._ignored = False, None, ignored
         self.publisher = node.create_publisher(
             type_, name, qos, event_callbacks=PublisherEventCallbacks(matched=self._count))
         self.publish = self.publisher.publish
 
     def _count(self, _: Any) -> None:
-        self.has_subscribers = self.publisher.get_subscription_count() > self._own
+        self.has_subscribers = self.publisher.get_subscription_count() > self._ignored
         self.subscribed = self.publisher if self.has_subscribers else None
 
 
@@ -55,25 +55,15 @@ class PatchedPublisher:
     Publishes messages again and again with new values.
 
     `parts` are, for each message, its publisher and its builder; builders and `count` are as for
-    Template. If a message cannot be patched, a warning is logged, `template` is None, and every
-    message is built.
+    Template.
     """
 
-    def __init__(self, parts: Sequence[Tuple[Any, Callable]], count: int, logger: Any):
-        self._parts, self.template = parts, None
-        self._publish = [publisher.publish for publisher, _ in parts]
-        try:
-            self.template = Template([build for _, build in parts], count)
-        except NoLayout as reason:
-            topics = ', '.join(publisher.topic_name for publisher, _ in parts)
-            logger.warning(f'{topics}: {reason}; each message is built anew, which takes longer',
-                           once=True)
+    def __init__(self, parts: Sequence[Tuple[Any, Callable]], count: int):
+        publishers, builders = zip(*parts)
+        self._publish = [publisher.publish for publisher in publishers]
+        self._template = Template(builders, count)
 
     def publish(self, stamp: bytes, values: Any) -> None:
         """Publish the messages with a packed stamp and values (count,)."""
-        if self.template:
-            for publish, data in zip(self._publish, self.template.patched(stamp, values)):
-                publish(data)
-        else:
-            for publish, (_, build) in zip(self._publish, self._parts):
-                publish(build(unpack(stamp), values))
+        for publish, data in zip(self._publish, self._template.patched(stamp, values)):
+            publish(data)

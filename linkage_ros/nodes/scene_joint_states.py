@@ -37,12 +37,6 @@ class SceneJointStates:
 
     If `crank_states` is remapped to `joint_states`, the source joints `sources` are on that topic
     already, and are not published again.
-
-    Attributes
-    ----------
-    omitted : frozenset of str
-        The names that are not published, since they are on the topic already.
-
     """
 
     def __init__(self, node: Any, sources: Iterable[str]):
@@ -50,8 +44,7 @@ class SceneJointStates:
         # If the topics are the same, the node's own subscription does not count.
         self._joint_states = TrackedPublisher(node, JointState, 'joint_states', 10, int(same))
         self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
-        self.omitted = frozenset(sources if same else ())
-        self._logger = node.get_logger()
+        self._omitted = frozenset(sources if same else ())
         self._publishers = Cache(self._publisher, MAX_PUBLISHERS)
         self._description = ''
 
@@ -74,16 +67,15 @@ class SceneJointStates:
 
     def _publisher(self, parts: Parts) -> PatchedPublisher:
         return PatchedPublisher([(self._joint_states.publisher, partial(self._build, parts))],
-                                sum(state.solution.layout.size for _, state in parts),
-                                self._logger)
+                                sum(state.solution.layout.size for _, state in parts))
 
     def _build(self, parts: Parts, stamp: Any, values: np.ndarray) -> JointState:
         """Build the message from the consecutive values of the solutions."""
         ends = np.cumsum([state.solution.layout.size for _, state in parts])
         names, positions, velocities, efforts = map(np.concatenate, zip(
-            *(model.joints(state, own)
-              for (model, state), own in zip(parts, np.split(values, ends)))))
-        chosen = [name not in self.omitted for name in names]
+            *(model.joints(state, part)
+              for (model, state), part in zip(parts, np.split(values, ends)))))
+        chosen = [name not in self._omitted for name in names]
         moving = all(state.has_velocities for _, state in parts)
         loaded = {state.has_efforts for _, state in parts
                   if state.solution.layout.efforts} == {True}

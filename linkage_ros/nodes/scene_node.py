@@ -12,19 +12,18 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import partial
 import gc
 import sys
 import types
-from typing import Any, Callable, Generator, Iterable, Iterator, List, Mapping, Optional
+from typing import Any, Callable, Generator, Iterable, List, Mapping, Optional
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -35,7 +34,7 @@ from .log import Incidents, InvalidHandle, RCLError
 from .ownership import Announcer, Follower
 from .parameters import SceneParameters
 from .shutdown import ShutdownHandler
-from .worker import Job, Worker
+from .worker import Worker
 from .. import scene as scenes
 from ..words import elided, listed, quoted
 
@@ -73,19 +72,17 @@ class SceneNode(Node):
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         incidents = Incidents(self.get_logger(), lambda: not self.context.ok())
         self.guarded, self.report = incidents.guarded, incidents.report
-        self._worker = Worker(self, incidents.report)
+        self.worker = Worker(self, incidents.report)
         self._announcer: Optional[Announcer] = None
         self._adopted: Optional[scenes.Scene] = None
         # Numbers of requests to set parameters: answered, and waiting.
         self._answered = self._waiting = 0
         # The scene that was passed to the worker last.
         self._passed: Optional[scenes.Scene] = None
-        with self._or_destroyed():
-            self._parameters_of_scene = SceneParameters(self, name, self.check, self._changed)
+        self._parameters_of_scene = SceneParameters(self, name, self.check, self._changed)
         self._role = name
-        self._later: List[Job] = []
         self._first_spin = self.create_timer(
-            0.0, self.guarded('the start of the worker', self._start_later),
+            0.0, self.guarded('the first spin', self._start),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     @property
@@ -110,13 +107,10 @@ class SceneNode(Node):
 
     def begin(self) -> None:
         """Adopt the first scene; then announce the node's parameters, and follow the others."""
-        with self._or_destroyed():
-            self.check(self.scene)
-            prepared = self.prepare(self.scene)
-        self._adopt(self.scene, prepared)
+        self.check(self.scene)
+        self._adopt(self.scene, self.prepare(self.scene))
         if self.fields:
             self._announcer = Announcer(self)
-            self.later([self._announcer.first])
         if self._role != scenes.OWNER:
             Follower(self, self._parameters_of_scene)
         self._namesakes = self.create_timer(
@@ -133,13 +127,6 @@ class SceneNode(Node):
     def adopt(self, prepared: Any) -> None:
         """Use the result of `prepare` from now on. It delays messages: be fast."""
 
-    def later(self, jobs: Iterable[Job]) -> None:
-        """Run jobs in the worker's thread, after the node has begun to spin."""
-        if self._first_spin.is_canceled():
-            self._worker.add(jobs)
-        else:
-            self._later.extend(jobs)
-
     def serves(self) -> str:
         """Return what the node does, in words, for its first log message."""
         return listed(self.scene.machines, 200)
@@ -147,7 +134,7 @@ class SceneNode(Node):
     def declare_parameters(self, namespace: str, parameters: Any, ignore_override: bool = False
                            ) -> List[Parameter]:
         """Declare parameters as rclpy does, and allow empty lists in a parameter file."""
-        for _, *value, descriptor in (one for one in parameters if len(one) > 2):
+        for _, *value, descriptor in (entry for entry in parameters if len(entry) > 2):
             descriptor.dynamic_typing = descriptor.dynamic_typing or value == [None]
         return super().declare_parameters(namespace, parameters, ignore_override)
 
@@ -172,7 +159,7 @@ class SceneNode(Node):
         """Delete displayed markers, stop the worker, and destroy the node."""
         with suppress(RCLError, InvalidHandle):
             self.delete_displayed()
-        self._worker.end()
+        self.worker.end()
         super().destroy_node()
 
     def _respond(self, callback: Callable, request: Any, response: Any) -> Any:
@@ -203,11 +190,12 @@ class SceneNode(Node):
         if len(request.parameters) > 1:
             results = await self._respond_in_turn(
                 lambda *_: self._parameters_of_scene.set_together(request.parameters), None, {})
-        for i, one in enumerate(request.parameters):
+        for i, parameter in enumerate(request.parameters):
             if i not in results:
-                own = await self._respond_in_turn(
-                    callback, SetParameters.Request(parameters=[one]), SetParameters.Response())
-                results[i], = own.results
+                single = await self._respond_in_turn(
+                    callback, SetParameters.Request(parameters=[parameter]),
+                    SetParameters.Response())
+                results[i], = single.results
         response.results = [results[i] for i in range(len(results))]
         return response
 
@@ -223,7 +211,7 @@ class SceneNode(Node):
         """Pass a changed scene to the worker, unless waiting requests may change it again."""
         if not (self._waiting or self.is_settled or self._passed is self.scene):
             self._passed = self.scene
-            self._worker.replace('a changed scene', partial(self._prepared, self.scene))
+            self.worker.replace('a changed scene', partial(self._prepared, self.scene))
 
     def _prepared(self, new: scenes.Scene) -> Callable[[], None]:
         """Prepare a scene; return a function that adopts it."""
@@ -233,9 +221,12 @@ class SceneNode(Node):
         self._adopted = new
         self.adopt(prepared)
 
-    def _start_later(self) -> None:
+    def _start(self) -> None:
+        """Do what would delay the start."""
         self._first_spin.cancel()
-        self._worker.add(self._later)
+        self.worker.run_next()
+        if self._announcer:
+            self._announcer.announce()
 
     def _warn_of_namesake(self) -> None:
         me = self.get_name(), self.get_namespace()
@@ -244,14 +235,6 @@ class SceneNode(Node):
             self.get_logger().warning(
                 f'there is another node {self.get_fully_qualified_name()}: both publish every '
                 'message and answer every request; give each its own name or namespace')
-
-    @contextmanager
-    def _or_destroyed(self) -> Iterator[None]:
-        try:
-            yield
-        except scenes.SceneError:
-            self.destroy_node()
-            raise
 
 
 @types.coroutine
@@ -304,10 +287,7 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
     except (RuntimeError, scenes.SceneError) as error:
         # The message of rclpy may quote a long argument.
         try_shutdown()
-        unknown = isinstance(error, rclpy_implementation.UnknownROSArgsError)
-        what = 'unknown after --ros-args: ' if unknown else ''
-        hint = '; allowed: -p, -r, --params-file, --log-level, ...' if unknown else ''
-        return _failed(name, elided(f'bad arguments: {what}{error}', 240) + hint)
+        return _failed(name, elided(f'bad arguments: {error}', 240))
     nodes: List[Node] = []
     try:
         # The creation of nodes leaves no garbage; collecting would only delay it.

@@ -31,9 +31,9 @@ from ..robot_model import bodies
 from ..scene.inverse_request import InverseRequest, LEVER, present_inputs
 from ..words import elided, listed, meant, MESSAGE, quoted
 
-# Other callers and messages wait for an answer: most values at once, and the CPU time after
-# which an answer is given up [s], seen after a block of them.
-MAX_VALUES, MAX_CPU_TIME_S, BLOCK_SIZE = 1_000_000, 1.0, 10_000
+# Other callers and messages wait for an answer: the CPU time after which it is given up [s], seen
+# after a block of values.
+MAX_CPU_TIME_S, BLOCK_SIZE = 1.0, 10_000
 # Maximum number of values, and of letters of allowed names, in a message.
 MAX_NAMED_VALUES, MAX_NAMES_LENGTH = 5, 150
 
@@ -77,6 +77,7 @@ class ServoInverse(scene_node.SceneNode):
 
     def destroy_node(self) -> None:
         """End the trajectories, and destroy the node."""
+        # A context that ends destroys nodes whose constructor has failed, too.
         if hasattr(self, '_stream'):
             self._stream.end()
         super().destroy_node()
@@ -89,14 +90,25 @@ class ServoInverse(scene_node.SceneNode):
     def answer_inputs_for(self, request: Any, response: Any) -> Any:
         """Answer a request of `inputs_for`; the response names an error, if any."""
         return self._filled(lambda: solve_inputs_for(
-            _machine_with_inputs(self.scene, request.mechanism), request, response), response)
+            self._with_several_inputs(request.mechanism), request, response), response)
 
     def _request(self, key: Tuple[str, str]) -> InverseRequest:
-        mechanism = _machine(self.scene, *key)
+        (name, output), mechanisms = key, self.scene.machines
+        levers = {} if output not in ('', LEVER) else {
+            name: mechanism for name, mechanism in mechanisms.items()
+            if mechanism.linkage.type == 'slotted_lever'}
+        mechanism = _chosen(mechanisms, name, levers or mechanisms,
+                            'slotted lever' if levers else 'mechanism')
         if len(mechanism.inputs) > 1:
             raise ValueError(f'{mechanism.name} has several inputs, which one output does not '
                              'determine; call the service inputs_for')
-        return InverseRequest(mechanism, [key[1]])
+        return InverseRequest(mechanism, [output])
+
+    def _with_several_inputs(self, name: str) -> scene.SceneMechanism:
+        mechanisms = self.scene.machines
+        return _chosen(mechanisms, name, {
+            name: mechanism for name, mechanism in mechanisms.items()
+            if len(mechanism.inputs) > 1}, 'mechanism with several inputs')
 
     def _filled(self, fill: Callable[[], None], response: Any) -> Any:
         response.success = False
@@ -129,29 +141,27 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
         If the request as a whole cannot be answered.
 
     """
-    values, near = request.lever_angle, request.servo_near
+    values, seeds = request.lever_angle, request.servo_near
     n = len(values)
     if not n:
         raise ValueError('lever_angle is empty; give at least one value')
-    if n > MAX_VALUES:
-        raise ValueError(f'lever_angle has {n} values; give up to {MAX_VALUES} at once')
-    if len(near) not in (0, 1, n):
+    if len(seeds) not in (0, 1, n):
         raise ValueError(f'servo_near must be empty, have one angle, or one for each of the '
-                         f'{n} in lever_angle, not {len(near)}')
+                         f'{n} in lever_angle, not {len(seeds)}')
     # Most requests have one angle, for which floats are faster than arrays.
-    start = [np.array(near) if len(near) > 1 else near[0]] if near else None
-    if start and not np.all(np.abs(start[0]) <= scene.FARTHEST):
+    seed = [np.array(seeds) if len(seeds) > 1 else seeds[0]] if seeds else None
+    if seed and not np.all(np.abs(seed[0]) <= scene.FARTHEST):
         raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} '
                          f'{inverse.units[0]} of zero')
     if n > 1:
-        positions, rates = _many(inverse, np.array(values), start and start[0])
+        positions, rates = _many(inverse, np.array(values), seed and seed[0])
         finite = np.isfinite(positions)
         success = bool(finite.all())
         response.servo_angle = array('d', positions.tobytes())
         response.reduction = array('d', rates.tobytes())
         reachable = [True] * n if success else finite.tolist()
     else:
-        (positions,), (rates,) = inverse.positions([values[0]], start)
+        (positions,), (rates,) = inverse.positions([values[0]], seed)
         success = math.isfinite(positions)
         response.servo_angle, response.reduction = [positions], [rates]
         reachable = [success]
@@ -161,22 +171,21 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
             value for value, reached in zip(values, reachable) if not reached]), MESSAGE)
 
 
-def _many(inverse: InverseRequest, values: np.ndarray, near: Any
+def _many(inverse: InverseRequest, values: np.ndarray, seed: Any
           ) -> Tuple[np.ndarray, np.ndarray]:
     """Return positions and rates for many values; raise ValueError if that takes too long."""
-    each, start = np.size(near) == len(values), time.thread_time()
+    has_seeds, start = np.size(seed) == len(values), time.thread_time()
     positions, rates = np.empty((2, len(values)))
     for at in range(0, len(values), BLOCK_SIZE):
         if at and time.thread_time() > start + MAX_CPU_TIME_S:
             raise ValueError(f'after {MAX_CPU_TIME_S:g} s only {at} of the {len(values)} values '
                              f'in lever_angle are solved; give up to {at} at once')
-        some = slice(at, at + BLOCK_SIZE)
-        beside = near[some] if each else near
-        (positions[some],), (rates[some],) = inverse.positions(
-            [values[some]], None if beside is None else [beside])
-        found = np.flatnonzero(np.isfinite(positions[some]))
-        if len(found) and not each:
-            near = positions[at + found[-1]]
+        block = slice(at, at + BLOCK_SIZE)
+        (positions[block],), (rates[block],) = inverse.positions(
+            [values[block]], None if seed is None else [seed[block] if has_seeds else seed])
+        solved = np.flatnonzero(np.isfinite(positions[block]))
+        if len(solved) and not has_seeds:
+            seed = positions[at + solved[-1]]
     return positions, rates
 
 
@@ -202,41 +211,17 @@ def solve_inputs_for(mechanism: scene.SceneMechanism, request: Any, response: An
     response.message = '' if answers else elided(inverse.reason(*values), MESSAGE)
 
 
-def _machine(scene_: scene.Scene, name: str, output: str) -> scene.SceneMechanism:
-    """Return a mechanism by its name, or the only one, or for a lever the only slotted lever."""
-    levers = {key: mechanism for key, mechanism in scene_.machines.items()
-              if mechanism.linkage.type == 'slotted_lever'}
-    mechanisms: Mapping[str, scene.SceneMechanism] = scene_.machines if output else levers
+def _chosen(mechanisms: Mapping[str, scene.SceneMechanism], name: str,
+            default: Mapping[str, scene.SceneMechanism], what: str) -> scene.SceneMechanism:
+    """Return a mechanism by its name or, if that is empty, the only one in `default`."""
     if name in mechanisms:
         return mechanisms[name]
-    if not name:
-        for only in (mechanisms, levers if output in ('', LEVER) else {}):
-            if len(only) == 1:
-                return next(iter(only.values()))
-    allowed = (listed(mechanisms, MAX_NAMES_LENGTH) if mechanisms
-               else 'none: the scene has no slotted_lever')
-    if name in scene_.machines:
-        raise ValueError(f'{name} is a {scene_.machines[name].linkage.type}, not a slotted lever; '
-                         f'name an output, or use one of: {allowed}')
-    if name:
-        raise ValueError(f'there is no mechanism {quoted(name)}; allowed: {allowed}'
-                         f'{meant(name, mechanisms)}')
-    what = '' if output else ' slotted lever'
-    raise ValueError(f'mechanism may be empty only if the scene has a single{what or " one"}; '
-                     f'allowed: {allowed}')
-
-
-def _machine_with_inputs(scene_: scene.Scene, name: str) -> scene.SceneMechanism:
-    """Return a mechanism by its name, or the only one with several inputs."""
-    mechanisms = scene_.machines
-    several = [mechanism for mechanism in mechanisms.values() if len(mechanism.inputs) > 1]
-    if name in mechanisms:
-        return mechanisms[name]
-    if name or len(several) != 1:
-        raise ValueError(f'mechanism must be one of {listed(mechanisms, MAX_NAMES_LENGTH)}, or '
-                         f'empty if a single one has several inputs, not {quoted(name)}'
-                         f'{meant(name, mechanisms)}')
-    return several[0]
+    if not name and len(default) == 1:
+        return next(iter(default.values()))
+    problem = (f'there is no mechanism {quoted(name)}' if name else
+               f'mechanism may be empty only if the scene has a single {what}')
+    raise ValueError(f'{problem}; allowed: {listed(mechanisms, MAX_NAMES_LENGTH)}'
+                     f'{meant(name, mechanisms)}')
 
 
 def _unreachable(inverse: InverseRequest, values: Sequence[float]) -> str:

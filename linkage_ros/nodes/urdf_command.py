@@ -12,7 +12,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from typing import List, Optional
 
@@ -30,18 +29,13 @@ def main(args: Optional[List[str]] = None) -> int:
 
 
 def _show(args: List[str]) -> None:
-    from_ros = '--ros-args' in args
-    show(_without_ros(args) if from_ros else args, _scene(args) if from_ros else None)
-
-
-def _without_ros(args: List[str]) -> List[str]:
-    """Return the arguments without those for ROS; raise RequestError if these are invalid."""
+    if '--ros-args' not in args:
+        show(args, None)
+        return
     try:
-        return remove_ros_args([NAME, *args])[1:]
+        show(remove_ros_args([NAME, *args])[1:], _scene(args))
     except RuntimeError as error:
-        # Remove the source location from rcl's message.
-        why = re.sub(r'Failed to parse ROS arguments: |, at /\S+:\d+', '', str(error))
-        raise command.RequestError(f'the arguments for ROS are wrong: {why}') from None
+        raise command.RequestError(f'the arguments for ROS are wrong: {error}') from None
 
 
 def _scene(args: List[str]) -> scene.Scene:

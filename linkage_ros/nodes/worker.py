@@ -33,7 +33,8 @@ class Worker:
     A thread that runs jobs one after the other.
 
     The function that a job returns is called on the thread of rclpy's executor, before the next
-    job runs: a queue of such calls would delay messages. `failed` is called with the kind of job
+    job runs: a queue of such calls would delay messages. Jobs that are queued before the node has
+    an executor wait for `run_next`. `failed` is called with the kind of job
     and the exception that it or its function has raised.
     """
 
@@ -48,12 +49,12 @@ class Worker:
     def replace(self, kind: str, job: Job) -> None:
         """Queue a job; it replaces a job of the same kind that has not begun."""
         self._newest[kind] = job
-        self._run_next()
+        self.run_next()
 
     def add(self, jobs: Iterable[Job]) -> None:
         """Queue jobs; they run when no job from `replace` is left."""
         self._others.extend(jobs)
-        self._run_next()
+        self.run_next()
 
     def is_newest(self, kind: str) -> bool:
         """Return whether a running job of this kind should go on: no newer one is queued."""
@@ -68,9 +69,11 @@ class Worker:
             self._thread.shutdown(wait=False)
             wait([last], TIMEOUT_S)
 
-    def _run_next(self) -> None:
+    def run_next(self) -> None:
+        """Run the next job, unless one is running."""
         with self._lock:
-            if self._is_busy or self._has_ended or not (self._newest or self._others):
+            if (self._is_busy or self._has_ended or not self._node.executor
+                    or not (self._newest or self._others)):
                 return
             self._is_busy = True
             kind = next(iter(self._newest), OTHER)
@@ -101,4 +104,4 @@ class Worker:
 
     def _end_of_job(self) -> None:
         self._is_busy = False
-        self._run_next()
+        self.run_next()

@@ -19,9 +19,9 @@ raises an error that names the wrong parameter and its allowed values. Nodes dec
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field as some
+from dataclasses import dataclass
 import re
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any, Dict, Iterable, List, Optional, Tuple
 
 from .input_settings import FARTHEST, in_words, InputSettings, START
 from .joint_names import check_distinct
@@ -39,7 +39,7 @@ from .parameters import (
     SceneError,
     Values,
 )
-from .scene_mechanism import FRAME, FRAME_NAME, FRAME_RULE, read_machine, SceneMechanism
+from .scene_mechanism import FRAME, FRAME_NAME, FRAME_RULE, read_mechanism, SceneMechanism
 from .. import mechanisms
 from ..words import plain_text, quoted
 
@@ -73,20 +73,18 @@ class Scene:
     rate: float
     # Parameters that belong to no mechanism.
     general: Tuple[Parameter, ...]
-    # What it was read from, by mechanism ('' for general parameters) and full parameter name.
-    values: Mapping[str, Mapping[str, Any]] = some(compare=False, repr=False)
 
     @property
     def parameters(self) -> Tuple[Parameter, ...]:
         """All parameters, the general ones first."""
-        return (*self.general, *(parameter for machine in self.machines.values()
-                                 for parameter in machine.parameters))
+        return (*self.general, *(parameter for mechanism in self.machines.values()
+                                 for parameter in mechanism.parameters))
 
     def changed_from(self, old: 'Scene') -> List[Parameter]:
         """Return the parameters whose values differ from an older scene of the same mechanisms."""
         parts = [(self.general, old.general), *(
-            (machine.parameters, old.machines[name].parameters)
-            for name, machine in self.machines.items() if machine is not old.machines[name])]
+            (mechanism.parameters, old.machines[name].parameters)
+            for name, mechanism in self.machines.items() if mechanism is not old.machines[name])]
         before = {parameter.name: parameter.value for _, part in parts for parameter in part}
         return [parameter for part, _ in parts for parameter in part
                 if parameter.value != before.get(parameter.name)]
@@ -96,16 +94,17 @@ def load(path: str) -> Scene:
     """Read a scene from a parameter file, as nodes without a namespace do; needs PyYAML."""
     given = sections(path)
     found = {node: overrides(given, f'/{node}') for node in ALL}
-    if not any(own is not None for own in found.values()):
+    if not any(values is not None for values in found.values()):
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:'")
-    values = {node: own or {} for node, own in found.items()}
+    values = {node: part or {} for node, part in found.items()}
     merged = {name: value for node in (*ALL, OWNER) for name, value in values[node].items()}
     scene = read(merged)
-    if all(own == merged for own in values.values()):
+    if all(part == merged for part in values.values()):
         return scene
     # Each parameter has the value that the file gives to the parameter's owner.
-    return read({one.name: values[one.field.owner][one.name] for one in scene.parameters
-                 if one.name in values[one.field.owner]})
+    return read({parameter.name: values[parameter.field.owner][parameter.name]
+                 for parameter in scene.parameters
+                 if parameter.name in values[parameter.field.owner]})
 
 
 def read(values: Mapping[str, Any], before: Optional[Scene] = None, strict: bool = True) -> Scene:
@@ -134,11 +133,16 @@ def changed(before: Scene, values: Mapping[str, Any], strict: bool = True) -> Sc
     """
     Return the scene `before` with some other values, by full parameter name.
 
-    Mechanisms without a changed value are reused. `strict` and SceneError are those of `read`.
+    All other parameters keep their values, defaults, too. Mechanisms without a changed value are
+    reused. `strict` and SceneError are those of `read`.
     """
-    parts = dict(before.values)
+    parts = {'': _values(before.general),
+             **{name: mechanism.values for name, mechanism in before.machines.items()}}
     for name, part in _by_mechanism(values).items():
-        parts[name] = {**parts.get(name, {}), **part}
+        mechanism = before.machines.get(name)
+        present = _values(mechanism.parameters) if mechanism else parts.get(name, {})
+        if not part.items() <= present.items():
+            parts[name] = {**present, **part}
     return _read(parts, before, strict)
 
 
@@ -151,16 +155,20 @@ def _read(parts: Mapping[str, Mapping[str, Any]], before: Optional[Scene], stric
     frame_prefix = values.take('frame_prefix', FRAME_PREFIX, '')
     rate = values.take('rate', RATE, 50.0)
     known = before.machines if before else {}
-    machines = {name: read_machine(name, parts.get(name, {}), known.get(name), strict)
+    machines = {name: read_mechanism(name, parts.get(name, {}), known.get(name), strict)
                 for name in names}
-    joints = {name: machine.joints for name, machine in machines.items()}
-    if joints != {name: machine.joints for name, machine in known.items()}:
+    joints = {name: mechanism.joints for name, mechanism in machines.items()}
+    if joints != {name: mechanism.joints for name, mechanism in known.items()}:
         check_distinct(joints)
     allowed = ['mechanisms', 'frame_id', 'frame_prefix', 'rate', *(f'{name}.*' for name in names)]
     for unused in (values.unused(), *(part for name, part in parts.items()
                                       if name and name not in machines)):
         refuse_unknown(unused, allowed)
-    return Scene(machines, frame_id, frame_prefix, rate, tuple(values.parameters), parts)
+    return Scene(machines, frame_id, frame_prefix, rate, tuple(values.parameters))
+
+
+def _values(parameters: Iterable[Parameter]) -> Dict[str, Any]:
+    return {parameter.name: parameter.value for parameter in parameters}
 
 
 def _by_mechanism(values: Any) -> Dict[str, Dict[str, Any]]:

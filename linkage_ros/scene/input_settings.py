@@ -13,7 +13,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 import math
 from typing import Iterable, Optional, Tuple
 
@@ -94,11 +93,6 @@ class InputSettings:
     offset: float
     measures: str
 
-    @cached_property
-    def is_plain(self) -> bool:
-        """Whether the position of the source joint is the input, without conversion."""
-        return (self.ratio, self.offset, self.measures) == (1.0, 0.0, '')
-
     @property
     def period(self) -> int:
         """Return the turns of a crank after which poses repeat; above one with gears."""
@@ -164,13 +158,13 @@ def _read(name: str, input_: Input, reach: Tuple[Arc, ...], values: Values,
     around_start = [arc for arc in arcs if input_.holds(arc, start, start)]
     low, high = (around_start or arcs)[0]
     margin = 0.0 if sweep else MARGIN * (high - low)
-    drive = InputSettings(input_, reach, speed, start, (low + margin, high - margin),
-                          tuple(sweep) or None, *source)
-    is_free = not strict or old and (old.start, old.sweep) == (drive.start, drive.sweep)
+    settings = InputSettings(input_, reach, speed, start, (low + margin, high - margin),
+                             tuple(sweep) or None, *source)
+    is_free = not strict or old and (old.start, old.sweep) == (settings.start, settings.sweep)
     if has_start and not around_start and not is_free:
         raise SceneError(f'{name}.start must be inside the {"sweep" if sweep else "reach"} '
                          f'{in_words(arcs)} {input_.unit}, not {start}')
-    return drive
+    return settings
 
 
 def _source(name: str, input_: Input, values: Values) -> Tuple[str, float, float, str]:
@@ -185,15 +179,15 @@ def _source(name: str, input_: Input, values: Values) -> Tuple[str, float, float
     return source or f'{mechanism}_{measures or input_.name}', ratio, offset, measures
 
 
-def _check_measures(name: str, linkage: Mechanism, drive: InputSettings) -> None:
-    if not drive.measures:
+def _check_measures(name: str, linkage: Mechanism, settings: InputSettings) -> None:
+    if not settings.measures:
         return
-    key = f'{name}.{drive.input.name}.measures'
+    key = f'{name}.{settings.input.name}.measures'
     if len(linkage.inputs) > 1:
         raise SceneError(f'{key} must be empty: only a linkage with one input can be solved for '
                          f'an output, and {name} has {len(linkage.inputs)}')
     try:
-        linkage.check_output(drive.measures)
+        linkage.check_output(settings.measures)
     except ValueError as error:
         raise SceneError(f'{key}: {error}') from None
 

@@ -13,7 +13,6 @@
 from __future__ import annotations
 
 from concurrent.futures import Future
-from functools import cached_property
 import math
 from typing import Any, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
@@ -22,7 +21,7 @@ import numpy as np
 from .input_settings import in_words, InputSettings
 from .scene_mechanism import SceneMechanism
 from ..formula.program import compile_in_background
-from ..linkage import Arc, CLOSE, Input, Solution
+from ..linkage import Input, Solution
 from ..words import listed
 
 LEVER = 'lever'
@@ -40,14 +39,19 @@ class Command(NamedTuple):
         The inputs [rad or m]; NaN if the reach and sweeps have none for the outputs' values.
     positions : sequence of float
         The actuators' positions.
-    speeds : sequence of float, optional
+    speeds : sequence of float
         The actuators' speeds, if known; infinite where an output that moves would turn back.
 
     """
 
     inputs: Sequence[float]
     positions: Sequence[float]
-    speeds: Optional[Sequence[float]]
+    speeds: Sequence[float]
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether there is an answer."""
+        return all(map(math.isfinite, self.inputs))
 
 
 class SceneAnswer(NamedTuple):
@@ -58,10 +62,11 @@ class SceneAnswer(NamedTuple):
     is_singular: bool
 
 
-def present_inputs(machine: SceneMechanism, positions: Mapping[str, float]) -> List[float]:
+def present_inputs(mechanism: SceneMechanism, positions: Mapping[str, float]) -> List[float]:
     """Return the inputs [rad or m] at the last position of each source; inf if unknown."""
-    known = [machine.from_source(drive, positions[drive.source], None, None)[0]
-             if drive.source in positions else math.inf for drive in machine.inputs.values()]
+    known = [mechanism.from_source(settings, positions[settings.source], None, None)[0]
+             if settings.source in positions else math.inf
+             for settings in mechanism.inputs.values()]
     return [value if math.isfinite(value) else math.inf for value in known]
 
 
@@ -72,14 +77,14 @@ class InverseRequest:
     Outputs are joint angles, slides, coordinates, distances and angles, named as in
     `Mechanism.has_output`; an empty name is the lever. All values are those of the scene: lengths
     [m] include its scale, positions are those of the actuators. Every answer lies inside the
-    sweeps and the reach, on the linkage's own assembly.
+    sweeps and the reach, on the linkage's assembly.
 
-    - `positions(values)`: positions and rates for arrays of values. Without `near` the first
-      value is solved on the working branch, independently of the present inputs; with one `near`,
-      next to it. Each further value continues from the one before. With a `near` for each value,
+    - `positions(values)`: positions and rates for arrays of values. Without `seed` the first
+      value is solved on the working branch, independently of the present inputs; with one `seed`,
+      next to it. Each further value continues from the one before. With a `seed` for each value,
       each is solved next to its own.
-    - `answers(values, near)`: all answers to one value of each output, the nearest first.
-    - `command(values, speeds, near)`: the answer that continues from the last without a jump.
+    - `answers(values, seed)`: all answers to one value of each output, the nearest first.
+    - `command(values, speeds, seed)`: the answer that continues from the last without a jump.
     - `reason(values)`: why values are unreachable; expensive, and only for messages.
 
     Raises
@@ -89,24 +94,24 @@ class InverseRequest:
 
     """
 
-    def __init__(self, machine: SceneMechanism, outputs: Sequence[str]):
-        self._machine, self._drives = machine, list(machine.inputs.values())
+    def __init__(self, mechanism: SceneMechanism, outputs: Sequence[str]):
+        self._mechanism, self._settings = mechanism, list(mechanism.inputs.values())
         self.outputs = [output or LEVER for output in outputs]
-        self._inverse = machine.linkage.inverse(tuple(self.outputs))
+        self._inverse = mechanism.linkage.inverse(tuple(self.outputs))
         self.quantity = 'lever angles' if self.outputs == [LEVER] else \
             f'values of {listed(self.outputs)}'
-        self.sources = [drive.source for drive in self._drives]
-        self.units = [drive.input.unit for drive in self._drives]
-        self._units = [machine.scale_of(name) for name in self.outputs]
-        self._scales = [machine.scale_of(name) for name in machine.inputs]
-        self._actuators = [drive.actuator for drive in self._drives]
+        self.sources = [settings.source for settings in self._settings]
+        self.units = [settings.input.unit for settings in self._settings]
+        self._units = [mechanism.scale_of(name) for name in self.outputs]
+        self._scales = [mechanism.scale_of(name) for name in mechanism.inputs]
+        self._actuators = [settings.actuator for settings in self._settings]
         # Factors of the linkage's rates: of each output by the first actuator, by the second, ...
         self._rate_units = [unit / scale * ratio
                             for scale, (ratio, _) in zip(self._scales, self._actuators)
                             for unit in self._units]
         # The ends of the sweeps, without the scale.
-        self._ends = [drive.ends and (drive.ends[0] / scale, drive.ends[1] / scale)
-                      for drive, scale in zip(self._drives, self._scales)]
+        self._ends = [settings.ends and (settings.ends[0] / scale, settings.ends[1] / scale)
+                      for settings, scale in zip(self._settings, self._scales)]
         self._compilation: Optional[Future] = None
 
     @property
@@ -124,7 +129,7 @@ class InverseRequest:
         return [(input_ - offset) / ratio if offset or ratio != 1.0 else input_
                 for (ratio, offset), input_ in zip(self._actuators, inputs)]
 
-    def positions(self, values: Sequence[Any], near: Optional[Sequence[Any]] = None
+    def positions(self, values: Sequence[Any], seed: Optional[Sequence[Any]] = None
                   ) -> Tuple[List[Any], List[Any]]:
         """
         Return actuators' positions for values of the outputs, and the rates there.
@@ -133,7 +138,7 @@ class InverseRequest:
         ----------
         values : sequence of float or array (n,)
             For each output its values.
-        near : sequence of float or array (n,), optional
+        seed : sequence of float or array (n,), optional
             For each actuator a position next to the first answer, or one for each value.
 
         Returns
@@ -144,21 +149,21 @@ class InverseRequest:
 
         """
         inverse, many = self._inverse, isinstance(values[0], np.ndarray)
-        each = near is not None and np.size(near[0]) == np.size(values[0])
+        has_seeds = seed is not None and np.size(seed[0]) == np.size(values[0])
         values = [value / unit for value, unit in zip(values, self._units)]
-        if near is not None:
-            near = [input_ / scale for input_, scale in zip(self.inputs_of(near), self._scales)]
+        if seed is not None:
+            seed = [input_ / scale for input_, scale in zip(self.inputs_of(seed), self._scales)]
         if many and np.size(values[0]) >= MANY:
             inverse = self._accelerated()
-        found, rates = (inverse.path if many and not each else inverse.nearest)(
-            values, near, self._ends)
-        return self.positions_of(_times(found, self._scales)), _times(rates, self._rate_units)
+        inputs, rates = (inverse.path if many and not has_seeds else inverse.nearest)(
+            values, seed, self._ends)
+        return self.positions_of(_times(inputs, self._scales)), _times(rates, self._rate_units)
 
     def _accelerated(self) -> Any:
         """Return the inverse in machine code once it is compiled; until then in Python."""
         if self._compilation is None:
             def make() -> Any:
-                inverse = self._machine.linkage.accelerated().inverse(tuple(self.outputs))
+                inverse = self._mechanism.linkage.accelerated().inverse(tuple(self.outputs))
                 inverse.path([np.zeros(MANY)] * len(self.outputs))
                 return inverse
 
@@ -167,7 +172,7 @@ class InverseRequest:
         return self._compilation.result() if done else self._inverse
 
     def command(self, values: Sequence[float], speeds: Optional[Sequence[float]],
-                near: Sequence[float], jumps: bool = False) -> Command:
+                seed: Sequence[float], jumps: bool = False) -> Command:
         """
         Return the command for values of the outputs and their speeds.
 
@@ -175,21 +180,22 @@ class InverseRequest:
         ----------
         values, speeds : sequence of float
             For each output [rad or m, per second]; speeds only if known.
-        near : sequence of float
+        seed : sequence of float
             The last inputs [rad or m], from which the answer continues without a jump.
         jumps : bool
             Whether several inputs may jump to the nearest answer if none continues from the last;
             a single input always may.
 
         """
-        own = [value / unit for value, unit in zip(values, self._units)]
-        start = [input_ / scale for input_, scale in zip(near, self._scales)]
-        found, rates = self._inverse.follow(own, start)
-        if not self._are_inside(found):
-            found, rates = self._inverse.nearest(own, start, self._ends) \
+        unscaled = [value / unit for value, unit in zip(values, self._units)]
+        start = [input_ / scale for input_, scale in zip(seed, self._scales)]
+        solution, rates = self._inverse.follow(unscaled, start)
+        if not self._are_inside(solution):
+            solution, rates = self._inverse.nearest(unscaled, start, self._ends) \
                 if jumps or len(start) == 1 else ((math.nan,) * len(start), rates)
-        inputs = [x * scale for x, scale in zip(found, self._scales)]
-        return Command(inputs, self.positions_of(inputs), speeds and self._speeds(speeds, rates))
+        inputs = [input_ * scale for input_, scale in zip(solution, self._scales)]
+        return Command(inputs, self.positions_of(inputs),
+                       self._speeds(speeds, rates) if speeds else ())
 
     def _are_inside(self, inputs: Sequence[float]) -> bool:
         return all(end[0] <= value <= end[1] if end else value == value
@@ -204,116 +210,82 @@ class InverseRequest:
                     if speeds[0] else 0.0]
         jacobian = np.reshape(rates, (n, n)).T * np.divide.outer(self._units, self._scales)
         try:
-            found = np.linalg.solve(jacobian, speeds) / [ratio for ratio, _ in self._actuators]
+            inputs = np.linalg.solve(jacobian, speeds)
+            return (inputs / [ratio for ratio, _ in self._actuators]).tolist()
         except np.linalg.LinAlgError:
-            found = np.full(n, math.inf if any(speeds) else 0.0)
-        return found.tolist()
+            return n * [math.inf if any(speeds) else 0.0]
 
-    def answers(self, values: Sequence[float], near: Optional[Sequence[float]] = None
+    def answers(self, values: Sequence[float], seed: Optional[Sequence[float]] = None
                 ) -> List[SceneAnswer]:
         """
         Return all answers to one value of each output, as inputs [rad or m] of the scene.
 
-        They are sorted by their distance from the inputs `near` [rad or m], by default the start.
+        They are sorted by their distance from the inputs `seed` [rad or m], by default the start.
         """
-        near = [drive.start for drive in self._drives] if near is None else near
-        found = self._inside(self._inverse.all(np.divide(values, self._units),
-                                               np.divide(near, self._scales)))
-        sizes = [drive.input.size for drive in self._drives]
-        return sorted(found, key=lambda answer: math.dist(
-            np.divide(answer.inputs, sizes), np.divide(near, sizes)))
+        seed = [settings.start for settings in self._settings] if seed is None else seed
+        answers = self._inside(self._inverse.all(np.divide(values, self._units),
+                                                 np.divide(seed, self._scales)))
+        sizes = [settings.input.size for settings in self._settings]
+        return sorted(answers, key=lambda answer: math.dist(
+            np.divide(answer.inputs, sizes), np.divide(seed, sizes)))
 
     def _inside(self, answers: Sequence[Solution]) -> List[SceneAnswer]:
         """Return those of the linkage's answers that lie inside the sweeps."""
-        found = []
+        inside = []
         for answer in answers:
-            inputs = [_between_ends(drive, input_, value * scale)
-                      for drive, input_, value, scale in zip(
-                          self._drives, self._inverse.inputs, answer.inputs, self._scales)]
+            inputs = [_between_ends(settings, input_, value * scale)
+                      for settings, input_, value, scale in zip(
+                          self._settings, self._inverse.inputs, answer.inputs, self._scales)]
             if not any(map(math.isnan, inputs)):
-                found.append(SceneAnswer(tuple(inputs), answer.mode, answer.is_singular))
-        return found
+                inside.append(SceneAnswer(tuple(inputs), answer.mode, answer.is_singular))
+        return inside
 
     def reason(self, *values: float) -> str:
         """Return in words why values are unreachable."""
         if not all(map(math.isfinite, values)):
             return 'a value must be finite'
-        own = [value / unit for value, unit in zip(values, self._units)]
-        answers = self._inverse.all(own)
+        answers = self._inverse.all([value / unit for value, unit in zip(values, self._units)])
         if len(values) == 1:
-            return self._reason(values[0], [answer.inputs[0] * self._scales[0]
-                                            for answer in answers])
+            return self._reason(values[0], answers)
         what = f'{listed(self.outputs)} at {listed(f"{value:.6g}" for value in values)}'
         if self._inside(answers):
             return f'the way to {what} leads through a singular pose, out of the reach or a sweep'
-        if not answers or not any(drive.ends for drive in self._drives):
+        if not answers or not any(settings.ends for settings in self._settings):
             return f'{what} is outside the reach'
-        sweeps = (f'{drive.input.name}.sweep {in_words([drive.ends])}'
-                  for drive in self._drives if drive.ends)
+        sweeps = (f'{settings.input.name}.sweep {in_words([settings.ends])}'
+                  for settings in self._settings if settings.ends)
         return f'{what} needs inputs outside {listed(sweeps)}'
 
-    def _reason(self, value: float, inputs: Sequence[float]) -> str:
-        drive = self._drives[0]
-        if inputs and drive.ends:
-            beyond = min((self._beyond(end, input_, name) for input_ in inputs
-                          for end, name in zip(drive.ends, ('lower', 'upper'))))
-            return (f'{value:.6g} needs the {drive.input.name} at {beyond[1]:.6g} '
-                    f'{self.units[0]}, outside {self._range_name}: beyond its {beyond[2]} end')
-        return self._out_of_range(value)
-
-    def _beyond(self, end: float, input_: float, name: str) -> Tuple[float, float, str]:
-        """Return how far an input is beyond an end, its value in that turn, and the end's name."""
-        sign, own = 1.0 if name == 'upper' else -1.0, self._inverse.inputs[0]
-        gap = sign * (input_ - end)
-        gap = gap % own.turn if own.wraps else gap if gap > 0.0 else math.inf
-        return gap, end + sign * gap, name
-
-    @property
-    def _range_name(self) -> str:
-        drive = self._drives[0]
-        return f'{drive.input.name}.sweep {in_words([drive.ends])}' if drive.ends else 'the reach'
-
-    def _out_of_range(self, value: float) -> str:
-        name, input_ = self.outputs[0], self._drives[0].input
-        turns = self._machine.linkage.is_angle(name)
-        gaps = [gap for (low, _), (high, _) in self._spans for gap in (low - value, value - high)]
-        nearest = int(np.argmin([gap % math.tau if turns else gap if gap > 0.0 else math.inf
-                                 for gap in gaps]))
-        (_, at), arc = self._spans[nearest // 2][nearest % 2], self._arcs[nearest // 2]
-        ends = [end for end, limit in zip(('lower', 'upper'), arc)
-                if abs(limit - at) < CLOSE * input_.size and not input_.is_whole([arc])]
-        end = f', the {ends[0]} end of {self._range_name}' if ends else ''
-        spans = in_words((low, high) for (low, _), (high, _) in self._spans)
-        what = 'the lever' if name == LEVER else name
-        return (f'{what} reaches {spans} {"rad" if turns else "m"}, its '
-                f'{("minimum", "maximum")[nearest % 2]} at the {input_.quantity} {at:.6g} '
-                f'{self.units[0]}{end}')
-
-    @property
-    def _arcs(self) -> Sequence[Arc]:
-        """Return the allowed arcs of the input, one period at most."""
-        drive = self._drives[0]
-        if not drive.ends:
-            return drive.reach
-        low, high = drive.ends
-        return [(low, min(high, low + drive.input.turn) if drive.input.wraps else high)]
-
-    @cached_property
-    def _spans(self) -> List[List[Tuple[float, float]]]:
-        """Return the minimum and the maximum on each arc, each with the input there."""
-        scale = self._scales[0]
-        found = self._machine.linkage.extremes(self.outputs[0], [
-            (low / scale, high / scale) for low, high in self._arcs])
-        return [[(value * self._units[0], at * scale) for value, at in span] for span in found]
+    def _reason(self, value: float, answers: Sequence[Solution]) -> str:
+        """Return why a value of a single output is unreachable; `answers` are out of the sweep."""
+        settings, output, scale = self._settings[0], self.outputs[0], self._scales[0]
+        arcs, where = settings.reach, ''
+        if settings.ends:
+            low, high = settings.ends
+            where = f'{settings.input.name}.sweep {in_words([settings.ends])}'
+            if answers:
+                middle = 0.5 * (low + high)
+                nearest = min((settings.input.beside(answer.inputs[0] * scale, middle)
+                               for answer in answers), key=lambda input_: abs(input_ - middle))
+                return (f'{value:.6g} needs the {settings.input.name} at {nearest:.6g} '
+                        f'{self.units[0]}, outside {where}')
+            arcs = ((low, min(high, low + settings.input.turn) if settings.input.wraps else high),)
+        spans = self._mechanism.linkage.extremes(output, [
+            (low / scale, high / scale) for low, high in arcs])
+        reached = in_words((low * self._units[0], high * self._units[0])
+                           for (low, _), (high, _) in spans)
+        unit = 'rad' if self._mechanism.linkage.is_angle(output) else 'm'
+        return (f'{"the lever" if output == LEVER else output} reaches {reached} {unit}'
+                f'{where and " in "}{where}')
 
 
 def _times(values: Sequence[Any], factors: Sequence[float]) -> List[Any]:
     return [value if factor == 1.0 else value * factor for value, factor in zip(values, factors)]
 
 
-def _between_ends(drive: InputSettings, input_: Input, value: float) -> float:
+def _between_ends(settings: InputSettings, input_: Input, value: float) -> float:
     """Return an input between its ends, a crank after whole periods if needed; else NaN."""
-    low, high = drive.ends or (value, value)
+    low, high = settings.ends or (value, value)
     if input_.wraps and not low <= value <= high:
         turn = input_.turn
         value += turn * (math.ceil((low - value) / turn) if value < low else

@@ -69,19 +69,19 @@ def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable
     """
     default = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
                for joint in joints}
-    own: Dict[str, JointName] = {}
+    listed_names: Dict[str, JointName] = {}
     for line in lines:
         match = _LINE.fullmatch(line)
         name = _unquoted(match[3]) if match else ''
-        if not match or not name or match[1] not in default or match[1] in own:
+        if not match or not name or match[1] not in default or match[1] in listed_names:
             raise SceneError(
                 f"{mechanism}.joint_names must be texts such as 'BC=left_shin' or "
                 f"'EF=-\"ankle-2\"+0.35', each for a different one of {listed(joints, 90)}, not "
-                f'{elided(line)!r}{meant(match and match[1], {*joints} - {*own})}')
+                f'{elided(line)!r}{meant(match and match[1], {*joints} - {*listed_names})}')
         offset = float(match[4] or 0.0)
-        own[match[1]] = JointName(name, -1.0 if match[2] else 1.0, offset,
-                                  wraps=joints[match[1]] and offset != 0.0)
-    return {**default, **own}
+        listed_names[match[1]] = JointName(
+            name, -1.0 if match[2] else 1.0, offset, wraps=joints[match[1]] and offset != 0.0)
+    return {**default, **listed_names}
 
 
 def quoted_name(name: str) -> str:
@@ -101,9 +101,9 @@ def check_distinct(names: Mapping[str, Mapping[str, JointName]]) -> None:
     """Raise SceneError if two joints of the scene are published by one name."""
     owners: Dict[str, str] = {}
     for mechanism, joints in names.items():
-        for joint, own in joints.items():
+        for joint, name in joints.items():
             full_name = f'{mechanism}.{joint}'
-            other = owners.setdefault(own.name, full_name) if own.published else full_name
+            other = owners.setdefault(name.name, full_name) if name.published else full_name
             if other != full_name:
                 raise SceneError(f'{mechanism}.joint_names must give each joint of the scene a '
-                                 f'name of its own: {other} and {full_name} are both {own.name}')
+                                 f'name of its own: {other} and {full_name} are both {name.name}')

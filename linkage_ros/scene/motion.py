@@ -78,9 +78,10 @@ class Motion:
         return angle, self._speed if ahead else -self._speed or 0.0
 
     @classmethod
-    def of(cls, drive: InputSettings, since: int = 0) -> Motion:
+    def of(cls, settings: InputSettings, since: int = 0) -> Motion:
         """Return the motion of an input, which is at its `start` at the time `since` [ns]."""
-        return cls(drive.speed, drive.sweep, drive.start, since, drive.input.turns, drive.period)
+        return cls(settings.speed, settings.sweep, settings.start, since, settings.input.turns,
+                   settings.period)
 
     def changed(self, speed: float, sweep: Optional[Arc], now: int) -> Motion:
         """Return a motion with this speed and sweep from this one's value at `now` [ns]."""

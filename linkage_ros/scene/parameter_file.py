@@ -21,7 +21,7 @@ from functools import reduce
 import math
 import re
 import sys
-from typing import Any, Dict, Iterator, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, Iterator, Optional, Sequence, Tuple
 
 from .parameters import SceneError
 from ..cache import cached
@@ -55,9 +55,12 @@ def sections(path: str) -> Sections:
     found: Sections = {}
     try:
         with open(path, 'rb') as file:
-            root = yaml.compose(file, Loader=loader)
+            text = file.read()
+        for event in yaml.parse(text, Loader=loader):
+            if isinstance(event, yaml.AliasEvent):
+                raise ValueError(f'ROS does not support aliases{_line(event)}')
+        root = yaml.compose(text, Loader=loader)
         if root is not None and root.value:
-            _refuse_aliases(root, set())
             _add_sections(found, root, ())
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         mark = getattr(error, 'problem_mark', None)
@@ -92,15 +95,6 @@ def _loader(yaml: Any) -> Any:
     for tag, pattern in TYPES.items():
         Loader.add_implicit_resolver(tag, re.compile(pattern), None)
     return Loader
-
-
-def _refuse_aliases(node: Any, visited: Set[int]) -> None:
-    if id(node) in visited:
-        raise ValueError(f'ROS does not support aliases{_line(node)}')
-    visited.add(id(node))
-    for child in node.value if node.id != 'scalar' else ():
-        for part in child if node.id == 'mapping' else (child,):
-            _refuse_aliases(part, visited)
 
 
 def _add_sections(found: Sections, node: Any, names: Tuple[str, ...]) -> None:

@@ -124,55 +124,58 @@ class SceneMechanism:
         """Return the factor from the linkage to the scene: the scale for a length, else 1."""
         return 1.0 if self.linkage.is_angle(output) else self.scale
 
-    def measured(self, output: str, value: float, near: float) -> Tuple[float, float]:
+    def measured(self, output: str, value: float, seed: float) -> Tuple[float, float]:
         """
         Return the input at which an output has a value [rad or m], and d output / d input.
 
-        Of several solutions it is the one that continues from the input `near`, or else the
+        Of several solutions it is the one that continues from the input `seed`, or else the
         nearest. It is NaN if there is none in the reach and in the sweep that a user has set.
         """
-        drive, own, unit = self.first, self.scale_of(self.first.input.name), self.scale_of(output)
-        ends = drive.ends and (drive.ends[0] / own, drive.ends[1] / own)
-        inverse, values, seed = self.linkage.inverse(output), (value / unit,), (near / own,)
-        (found,), (rate,) = inverse.follow(values, seed)
-        if not (ends[0] <= found <= ends[1] if ends else found == found):
-            (found,), (rate,) = inverse.nearest(values, seed, (ends,))
-        return found * own, rate * unit / own
+        settings, unit = self.first, self.scale_of(output)
+        scale = self.scale_of(settings.input.name)
+        ends = settings.ends and (settings.ends[0] / scale, settings.ends[1] / scale)
+        inverse, values, seeds = self.linkage.inverse(output), (value / unit,), (seed / scale,)
+        (input_,), (rate,) = inverse.follow(values, seeds)
+        if not (ends[0] <= input_ <= ends[1] if ends else input_ == input_):
+            (input_,), (rate,) = inverse.nearest(values, seeds, (ends,))
+        return input_ * scale, rate * unit / scale
 
-    def from_source(self, drive: InputSettings, position: float, speed: Optional[float],
-                    near: Optional[float]) -> Tuple[float, Optional[float]]:
+    def from_source(self, settings: InputSettings, position: float, speed: Optional[float],
+                    seed: Optional[float]) -> Tuple[float, Optional[float]]:
         """
         Return an input and its speed, from those of its source joint [rad or m, per second].
 
-        If the source joint measures an output, the input continues from `near`, by default its
+        If the source joint measures an output, the input continues from `seed`, by default its
         start, and is NaN if there is none. The speed is None if it is unknown, and NaN at an
         extreme of the output.
         """
-        value = drive.ratio * position + drive.offset
-        speed = None if speed is None else drive.ratio * speed
-        if not drive.measures:
+        value = settings.ratio * position + settings.offset
+        speed = None if speed is None else settings.ratio * speed
+        if not settings.measures:
             return value, speed
-        found, rate = self.measured(drive.measures, value, drive.start if near is None else near)
-        return found, None if speed is None else speed / rate if rate else math.nan
+        input_, rate = self.measured(
+            settings.measures, value, settings.start if seed is None else seed)
+        return input_, None if speed is None else speed / rate if rate else math.nan
 
-    def to_source(self, drive: InputSettings, value: float, speed: float) -> Tuple[float, float]:
+    def to_source(self, settings: InputSettings, value: float, speed: float
+                  ) -> Tuple[float, float]:
         """Return position and speed of an input's source joint, from those of the input."""
-        if output := drive.measures:
-            own, unit = self.scale_of(drive.input.name), self.scale_of(output)
-            rate = float(self.linkage.joint_rates(value / own, [output])[output]) * unit / own
-            value = float(self.linkage.joint_angles(value / own, [output])[output]) * unit
+        if output := settings.measures:
+            scale, unit = self.scale_of(settings.input.name), self.scale_of(output)
+            rate = float(self.linkage.joint_rates(value / scale, [output])[output]) * unit / scale
+            value = float(self.linkage.joint_angles(value / scale, [output])[output]) * unit
             speed = rate * speed
-        return (value - drive.offset) / drive.ratio, speed / drive.ratio
+        return (value - settings.offset) / settings.ratio, speed / settings.ratio
 
     def efforts(self, values: Sequence[float]) -> Tuple[float, ...]:
         """Return the inputs' efforts [N m or N] that balance the loads at inputs `values`."""
         units = [self.scale_of(name) for name in self.inputs]
-        own = [value / unit for value, unit in zip(values, units)]
+        inputs = [value / unit for value, unit in zip(values, units)]
         # The scale lengthens the lever arms of forces; moments do not depend on it.
         loads = {name: load if isinstance(load, float) else tuple(
             self.scale * part for part in load) for name, load in self.loads.items()}
-        found = self.linkage.effort(own if len(own) > 1 else own[0], loads)
-        return tuple(float(effort) / unit for effort, unit in zip(found, units))
+        efforts = self.linkage.effort(inputs if len(inputs) > 1 else inputs[0], loads)
+        return tuple(float(effort) / unit for effort, unit in zip(efforts, units))
 
     def assembly(self) -> Assembly:
         """Return the solver of all legs."""
@@ -184,12 +187,12 @@ class SceneMechanism:
         return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
 
 
-def read_machine(name: str, own: Mapping[str, Any], old: Optional[SceneMechanism],
-                 strict: bool) -> SceneMechanism:
-    """Read a mechanism from its own values, or return `old` if they are unchanged."""
-    if old and old.is_from(own):
+def read_mechanism(name: str, entries: Mapping[str, Any], old: Optional[SceneMechanism],
+                   strict: bool) -> SceneMechanism:
+    """Read a mechanism from its values, or return `old` if they are unchanged."""
+    if old and old.is_from(entries):
         return old
-    values = Values(own)
+    values = Values(entries)
     type_ = values.take(f'{name}.type', TYPE, name)
     if type_ not in TYPES:
         raise SceneError(f'{name}.type must be {TYPE.rule}, not {quoted(type_)}'
@@ -215,7 +218,7 @@ def read_machine(name: str, own: Mapping[str, Any], old: Optional[SceneMechanism
         raise SceneError(f'{name}.loads must be empty for more than one leg')
     refuse_unknown(values.unused(), [parameter.name for parameter in values.parameters])
     return SceneMechanism(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs,
-                          frame_id, joints, only_named, loads, own, tuple(values.parameters))
+                          frame_id, joints, only_named, loads, entries, tuple(values.parameters))
 
 
 def _linkage(name: str, type_: str, values: Values) -> Tuple[Mechanism, Tuple[Arc, ...]]:
@@ -271,9 +274,9 @@ def _branches(name: str, design: Design, values: Values) -> Dict[str, int]:
 @cached(16, shared=True)
 def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
     """Build a linkage, or return an equal one that is cached or in use."""
-    own: Dict[str, Any] = {} if design.name in mechanisms.TYPES else {
+    lines: Dict[str, Any] = {} if design.name in mechanisms.TYPES else {
         'joints': design.joints, 'tracer': design.tracer}
-    return mechanisms.create(design.name, branches=dict(branches), **own, **dict(dimensions))
+    return mechanisms.create(design.name, branches=dict(branches), **lines, **dict(dimensions))
 
 
 def _legs(name: str, linkage: Mechanism, values: Values) -> Tuple[int, bool]:

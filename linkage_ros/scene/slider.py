@@ -46,22 +46,22 @@ def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
     if field.kind != 'double':
         return None
     name, what, key = (parameter.name.split('.') + ['', ''])[:3]
-    machine = scene.machines.get(name)
-    if machine and what == 'dimensions':
-        return _dimension_ends(machine.linkage, key, field.positive, _required_range(machine))
-    if machine and what in machine.inputs and key == 'start':
-        reach = machine.inputs[what].reach
+    mechanism = scene.machines.get(name)
+    if mechanism and what == 'dimensions':
+        return _dimension_ends(mechanism.linkage, key, field.positive, _required_range(mechanism))
+    if mechanism and what in mechanism.inputs and key == 'start':
+        reach = mechanism.inputs[what].reach
         ends = [value, *(end for arc in reach for end in arc)]
         return _in_whole_steps(value, min(ends), max(ends))
-    if machine and key == 'offset':
-        half = math.pi * machine.inputs[what].input.size
+    if mechanism and key == 'offset':
+        half = math.pi * mechanism.inputs[what].input.size
         return _in_whole_steps(value, value - half, value + half)
     return _in_whole_steps(value, *sorted((0.1 * value, 10.1 * value)))
 
 
-def _required_range(machine: SceneMechanism) -> Optional[Arc]:
+def _required_range(mechanism: SceneMechanism) -> Optional[Arc]:
     """Return the angles [rad] that a fully rotatable crank passes; None for other inputs."""
-    first, *others = machine.inputs.values()
+    first, *others = mechanism.inputs.values()
     if others or not first.input.is_whole(first.reach):
         return None
     return first.sweep or first.reach[0]
@@ -111,7 +111,7 @@ def _are_assembled(linkage: Mechanism, key: str, values: np.ndarray,
     many = ANGLES if len(linkage.inputs) == 1 else FEW_ANGLES
     samples = [np.linspace(low, high, many) for low, high in (
         required or (input_.low, input_.high) for input_ in linkage.inputs)]
-    theta = [each.ravel() for each in np.meshgrid(*samples)] if len(samples) > 1 else samples[0]
+    theta = [grid.ravel() for grid in np.meshgrid(*samples)] if len(samples) > 1 else samples[0]
     placed = np.ones((len(values), 1), dtype=bool)
     for places in tried.solve(theta).values():
         placed = placed & np.isfinite(places).all(axis=-1)
