@@ -18,6 +18,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 
 import pytest
@@ -69,10 +70,13 @@ def test_a_program_that_a_node_ran_in_gets_its_signals_back(harness):
     def handlers():
         return [signal.getsignal(stop) for stop in (signal.SIGINT, signal.SIGTERM)]
 
-    before = handlers()
+    before, threads = handlers(), {*threading.enumerate()}
     with ShutdownHandler() as shutdown:
         assert not set(handlers()) & set(before) and not shutdown.is_over
+        own, = {*threading.enumerate()} - threads
     assert handlers() == before and signal.set_wakeup_fd(-1) == -1
+    own.join(harness.DEADLINE)
+    assert not own.is_alive()
 
 
 @pytest.mark.slow
