@@ -88,12 +88,16 @@ def test_the_same_request_gives_the_same_bytes(tmp_path, ending, args):
     assert rendered(tmp_path, *args, config='all', ending=ending).read_bytes() == once
 
 
-@pytest.mark.long
 @pytest.mark.skipif(not shutil.which('ffmpeg'), reason='ffmpeg is not installed')
-def test_an_mp4_has_the_same_bytes_each_time(tmp_path):
-    once = rendered(tmp_path, '--frames', '3', ending='mp4').read_bytes()
-    assert rendered(tmp_path, '--frames', '3', ending='mp4').read_bytes() == once
-    assert once[4:8] == b'ftyp'
+def test_an_mp4_has_the_frames_asked_for_and_the_same_bytes_each_time(tmp_path):
+    asked = '--frames', '3', '--fps', '5', '--size', '320x240'
+    once = rendered(tmp_path, *asked, ending='mp4').read_bytes()
+    file = rendered(tmp_path, *asked, ending='mp4')
+    assert file.read_bytes() == once and once[4:8] == b'ftyp'
+    raw = subprocess.run(['ffmpeg', '-v', 'info', '-i', file, '-f', 'rawvideo', '-'],
+                         capture_output=True, check=True)
+    assert len(raw.stdout) == 3 * 320 * 240 * 3 // 2 and b'yuv420p' in raw.stderr
+    assert re.search(rb'Duration: 00:00:00.60,.*\n.*h264.* 320x240.* 5 fps', raw.stderr)
 
 
 def test_without_ffmpeg_there_is_no_mp4_but_a_reason(tmp_path, monkeypatch, capsys):
