@@ -506,12 +506,14 @@ def test_the_time_to_be_used_can_be_set_as_ever(graph):
 
 
 def test_a_node_ends_while_its_worker_is_busy(graph):
+    threads = {*threading.enumerate()}
     node = graph.start(Slow, LEG)
     held_up(graph, Client(graph, node))
     prepared = len(node.prepared)
     node.destroy_node()
     assert len(node.prepared) == prepared
     node.free.set()
+    graph.until(lambda: {*threading.enumerate()} <= threads)
 
 
 def test_what_no_robot_model_can_have_is_refused(graph):
