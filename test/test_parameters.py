@@ -10,6 +10,7 @@
 
 """Parameters that are set while nodes run: answered one by one, prepared aside, then adopted."""
 
+from importlib.metadata import version
 import json
 import math
 import threading
@@ -422,7 +423,9 @@ def test_messages_are_handled_between_requests_that_come_at_once(graph, executor
         node.destroy_node()
     assert [value for value in handled if value is not None] == [0.5, *wanted]
     between = handled[handled.index(wanted[0]):handled.index(wanted[-1])]
-    assert between.count(None) > 10 or not nodes.AWAITS
+    # Jazzy's EventsExecutor awaits no service.
+    assert between.count(None) > 10 or (
+        executor is not SingleThreadedExecutor and version('rclpy').startswith('7.'))
 
 
 def test_an_executor_that_awaits_no_service_answers_at_once(graph, monkeypatch):
