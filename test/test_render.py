@@ -13,6 +13,7 @@
 import csv
 import itertools
 import math
+import os
 from pathlib import Path
 import re
 import shutil
@@ -108,6 +109,16 @@ def test_without_ffmpeg_there_is_no_mp4_but_a_reason(tmp_path, monkeypatch, caps
     assert not list(tmp_path.iterdir())
 
 
+def test_why_ffmpeg_fails_is_said(tmp_path, monkeypatch, capsys):
+    failing = tmp_path / 'ffmpeg'
+    failing.write_text('#!/bin/sh\necho no such codec >&2\nexit 1\n')
+    failing.chmod(0o755)
+    monkeypatch.setenv('PATH', str(tmp_path), prepend=os.pathsep)
+    assert main([str(CONFIG / 'jansen.yaml'), '--out', str(tmp_path / 'leg.mp4')]) == 1
+    assert capsys.readouterr().err.splitlines()[-1] == 'render: ffmpeg failed: no such codec'
+    assert [*tmp_path.iterdir()] == [failing]
+
+
 def test_a_gif_has_the_frames_the_rate_the_loops_and_the_size_asked_for(tmp_path):
     file = rendered(tmp_path, '--frames', '7', '--fps', '30', '--loop', '3', '--size', '320x240',
                     '--hide', 'axes', ending='gif')
@@ -131,6 +142,8 @@ def test_a_turn_is_drawn_in_the_time_it_takes(tmp_path):
     times = [row['time'] for row in rows_of(data)]
     cranks = [row['jansen_crank'] for row in rows_of(data)]
     assert len(times) == round(2 * 2 * math.tau / 2.0)  # two turns at 2 rad/s, 2 frames a second
+    rendered(tmp_path, '--turns', '0.01', '--fps', '2', '--size', '99x99', '--hide', 'axes,title',
+             ending='gif')
     assert times == pytest.approx(math.tau / len(times) * np.arange(len(times)))
     assert np.allclose(np.remainder(2.0 * np.array(times), math.tau), cranks, atol=1e-12)
 
@@ -362,6 +375,15 @@ def test_angles_and_ratio_of_a_slotted_lever_are_printed():
 @pytest.mark.parametrize('type_', ['jansen', 'five_bar'])
 def test_every_trace_and_part_can_be_drawn(type_, trace):
     picture_of(machine(type_), trace=trace, parts=frozenset(PARTS)).at(0.4)
+
+
+@pytest.mark.parametrize('part', [
+    'axes', 'title', 'dimensions', 'labels', 'links', 'joints', 'guides', 'floor'])
+def test_a_part_is_seen_unless_it_is_hidden(part):
+    def drawn(parts):
+        return picture_of(machine('jansen'), size=(320, 320), parts=parts).at(0.0)
+
+    assert (drawn(frozenset(PARTS)) != drawn(frozenset(PARTS) - {part})).any()
 
 
 @pytest.mark.parametrize('crank', [
@@ -605,6 +627,19 @@ def test_no_name_is_on_a_joint_or_on_another(name):
     joints = [text.axes.transData.transform(text.xy) for text in names]
     assert not any(box.contains(*joint) for box in boxes for joint in joints)
     assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
+
+
+def test_names_are_around_their_joints_however_long():
+    shown, = scene.read({'mechanisms': ['own'], 'own.type': 'custom', 'own.joints': [
+        'O ground 0 0', 'Motor ground 3 0', 'Pin crank O 1', 'Elbow_joint dyad Pin Motor 3 2 left',
+        ]}).machines.values()
+    picture = picture_of(shown, size=(720, 720), parts=frozenset({'labels'}))
+    picture.show(0.0)
+    for text in picture.panels[0].moving[-1].artists:
+        x, y = text.get_position()
+        # In points: farther away to the side by half of what a long name is wider.
+        assert math.hypot(x / (13.0 + 3.5 * (len(text.get_text()) - 1)), y / 13.0) \
+            == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize('rows', [1, 3])
