@@ -170,17 +170,16 @@ $(venv)/.tools: $(venv)/.installed $(tools)
 	  || echo 'planegcs and SolveSpace cannot be built here, and are left out.'
 	@touch $@
 
-# A plugin of flake8 comes as source.
-.venv-ament/.installed: $(lock)/ament.txt
-	@about='what ament checks style with.' wheels/install.sh --to-compile '$(PYTHON)' .venv-ament $<
-	@touch $@
-
 # Environments beside that of the nodes, each of one lock file.
+.venv-ament/.installed: private export about := what ament checks style with.
 .venv-docs/.installed: private export about := what draws and what makes the pages.
 .venv-lint/.installed: private export about := what checks style and types.
 .venv-lock/.installed: private export about := what pins the rest.
 .venv-mutants/.installed: private export about := what puts bugs into the package.
-.venv-docs/.installed .venv-lint/.installed .venv-lock/.installed .venv-mutants/.installed: \
+# A package of these comes as source.
+.venv-ament/.installed .venv-mutants/.installed: private from_source := --to-compile
+.venv-ament/.installed .venv-docs/.installed .venv-lint/.installed .venv-lock/.installed \
+.venv-mutants/.installed: \
 .venv-%/.installed: $(lock)/%.txt
-	@wheels/install.sh '$(PYTHON)' .venv-$* $<
+	@wheels/install.sh $(from_source) '$(PYTHON)' .venv-$* $<
 	@touch $@

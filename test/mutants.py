@@ -63,7 +63,7 @@ WORKERS = 2
 MEMORY = 12 << 30
 # What the start of the tests takes at most [s of the processor], and how much slower than measured
 # they may be; how much longer all of it may take where the machine has more to do.
-START, SLOWER, BUSY = 20.0, 4.0, 15.0
+START, SLOWER, BUSY = 20.0, 4.0, 4.0
 CHOSEN = re.compile(
     '.*_(Add_Sub|Sub_Add|Mul_Div|Div_Mul|Mul_Add|FloorDiv_Div|Mod_FloorDiv|Pow_Mul|BitAnd_BitOr'
     '|BitOr_BitAnd|Lt_LtE|LtE_Lt|Gt_GtE|GtE_Gt|Lt_Gt|Gt_Lt|LtE_GtE|GtE_LtE|Eq_NotEq|NotEq_Eq'
@@ -453,13 +453,13 @@ def main():
         mutants = [mutant for mutant in chosen if key(diff(mutant)) not in equivalent]
         jobs = ((mutant, [*batches(mutant, measurement)]) for mutant in mutants)
         results = []
+        out = options.out / f'{room}-again.json' if options.again else options.out / f'{room}.json'
         with pool(folder) as workers:
             for result in workers.imap_unordered(tested, jobs):
                 results.append(result)
+                out.write_text(json.dumps(results, indent=1))
                 if result['state'] == 'survived':
                     print(f'\n{diff(result)}\n# {result["tests"]} tests', flush=True)
-        out = options.out / f'{room}-again.json' if options.again else options.out / f'{room}.json'
-        out.write_text(json.dumps(results, indent=1))
         states = Counter(mutant['state'] for mutant in results)
         states['equivalent'] = len(chosen) - len(mutants)
         caught = states['killed'] + states['hung or crashed']

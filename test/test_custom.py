@@ -282,9 +282,12 @@ def test_questions_about_the_reach_are_for_one_set_of_dimensions():
 def test_arrays_of_dimensions_are_checked_too():
     with pytest.raises(ValueError, match='dimension b must be positive'):
         four_bar(1.0, np.array([3.0, -3.0]), 2.5, 4.0)
-    with pytest.raises(ValueError, match='line "P line A B b-c": the bar A-P must be longer'):
-        mechanisms.create('custom', joints=(*FOUR_BAR, 'P line A B b-c'), m=1.0, g=4.0, c=2.5,
-                          b=np.array([3.0, 2.5]))
+    for line, wrong in (('P line A B b-c', 'the bar A-P must be longer'),
+                        ('P rigid A B 2 0.7 left', 'no triangle has these sides'),
+                        ('P carriage O along Q 2.75 b', 'the lower end of the carriage must be')):
+        with pytest.raises(ValueError, match=f'line "{line}": {wrong}'):
+            mechanisms.create('custom', joints=(*FOUR_BAR, line), m=1.0, g=4.0, c=2.5,
+                              b=np.array([3.0, 2.5]))
 
 
 def test_the_page_of_words_says_what_is_refused():

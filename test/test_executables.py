@@ -18,6 +18,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 
 import pytest
@@ -36,13 +37,16 @@ def harness():
     return ros_harness
 
 
-@pytest.mark.parametrize('module', [
-    'c_code.command', 'c_code.transmission', 'render.command', 'robot_files.command',
-    'robot_model.command'])
-def test_the_help_of_a_command_explains_each_of_its_options(capsys, module):
+@pytest.mark.parametrize('module, file', [
+    ('c_code.command', 'SCENE'), ('c_code.transmission', 'SCENE'), ('render.command', 'SCENE'),
+    ('robot_files.command', 'FILE'), ('robot_model.command', '[SCENE]')])
+def test_the_help_of_a_command_names_its_file_and_explains_each_of_its_options(
+        capsys, module, file):
     with pytest.raises(SystemExit):
         import_module(f'linkage_ros.{module}').main(['--help'])
-    options = re.findall(r'^  (-.*(?:\n {4}.*)*)', capsys.readouterr().out, re.M)
+    printed = capsys.readouterr().out
+    assert printed.partition('\n\n')[0].endswith(f' {file}')
+    options = re.findall(r'^  (-.*(?:\n {4}.*)*)', printed, re.M)
     for option in options:
         assert re.fullmatch(r'-\S+(?: \S+)*(?:  +|\n +)\w[^\n]{3,}(\n.*)*', option), option
     assert len(options) > 3
@@ -69,10 +73,13 @@ def test_a_program_that_a_node_ran_in_gets_its_signals_back(harness):
     def handlers():
         return [signal.getsignal(stop) for stop in (signal.SIGINT, signal.SIGTERM)]
 
-    before = handlers()
+    before, threads = handlers(), {*threading.enumerate()}
     with ShutdownHandler() as shutdown:
         assert not set(handlers()) & set(before) and not shutdown.is_over
+        own, = {*threading.enumerate()} - threads
     assert handlers() == before and signal.set_wakeup_fd(-1) == -1
+    own.join(harness.DEADLINE)
+    assert not own.is_alive()
 
 
 @pytest.mark.slow

@@ -310,6 +310,7 @@ def test_of_several_inputs_the_line_without_a_place_is_named(graph, parameters, 
 
 @pytest.mark.parametrize('type_, positions, said', [
     ('four_bar', [math.nan], ': m_crank is at nan'),
+    ('custom', [math.nan], ': m_crank is at nan'),
     ('peaucellier', [math.inf], ': m_crank is at inf'),
     ('five_bar', [0.3, -math.inf], ': m_crank2 is at -inf'),
     ('peaucellier', [2.0], ' at crank angle 2 rad; the reach is [-1.17137, 1.17137] rad'),
@@ -317,7 +318,9 @@ def test_of_several_inputs_the_line_without_a_place_is_named(graph, parameters, 
     ('peaucellier', [1e300], ' at crank angle 1e+300 rad: no place for "B C D inversor P A a b"')])
 def test_a_limit_is_named_only_if_it_was_left(graph, type_, positions, said):
     heard = graph.log()
-    node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': type_})
+    # A crank alone, which nothing needs to be assembled with.
+    joints = {'m.joints': ['O ground 0 0', 'A crank O 1']} if type_ == 'custom' else {}
+    node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': type_, **joints})
     graph.listen(JointState, 'm/joint_states')
     graph.until(lambda: node.count_subscribers('/rosout'))
     push = graph.crank([settings.source for settings in node.scene.machines['m'].inputs.values()])

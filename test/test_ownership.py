@@ -231,6 +231,8 @@ def test_a_cylinder_is_moved_over_its_scaled_stroke_whoever_sets_the_scale(graph
     given = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.joints': [
         'O ground 0 0', 'P ground 1 0', 'B cylinder P O 1.5 left']}
     owner, driver = graph.start(Kinematics, given), graph.start(CrankDriver, given)
+    # What was refused is not what is followed.
+    assert not graph.set(driver, boom__cylinder__start=-1.0).successful
     graph.until(lambda: graph.set(owner, boom__scale=5.0).successful
                 and of(driver, 'boom.scale') == 5.0)
     assert driver.scene.machines['boom'].inputs == owner.scene.machines['boom'].inputs

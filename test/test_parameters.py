@@ -10,6 +10,7 @@
 
 """Parameters that are set while nodes run: answered one by one, prepared aside, then adopted."""
 
+from importlib.metadata import version
 import json
 import math
 import threading
@@ -422,7 +423,9 @@ def test_messages_are_handled_between_requests_that_come_at_once(graph, executor
         node.destroy_node()
     assert [value for value in handled if value is not None] == [0.5, *wanted]
     between = handled[handled.index(wanted[0]):handled.index(wanted[-1])]
-    assert between.count(None) > 10 or not nodes.AWAITS
+    # Jazzy's EventsExecutor awaits no service.
+    assert between.count(None) > 10 or (
+        executor is not SingleThreadedExecutor and version('rclpy').startswith('7.'))
 
 
 def test_an_executor_that_awaits_no_service_answers_at_once(graph, monkeypatch):
@@ -506,12 +509,14 @@ def test_the_time_to_be_used_can_be_set_as_ever(graph):
 
 
 def test_a_node_ends_while_its_worker_is_busy(graph):
+    threads = {*threading.enumerate()}
     node = graph.start(Slow, LEG)
     held_up(graph, Client(graph, node))
     prepared = len(node.prepared)
     node.destroy_node()
     assert len(node.prepared) == prepared
     node.free.set()
+    graph.until(lambda: {*threading.enumerate()} <= threads)
 
 
 def test_what_no_robot_model_can_have_is_refused(graph):

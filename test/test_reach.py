@@ -135,6 +135,12 @@ def test_the_lever_swings_between_the_textbook_angles():
     assert hi == -lo == pytest.approx(math.asin(80 / 150), rel=1e-15)
 
 
+@pytest.mark.parametrize('a, e', [(80.0, 0.0), (math.nextafter(80.0, 90.0), 0.0), (80.0, 1e-9)])
+def test_a_lever_that_swings_a_half_turn_does_so_up_to_rounding(a, e):
+    (lo, hi), = mechanisms.create('slotted_lever', a=a, b=80.0, e=e).lever_reach()
+    assert hi == pytest.approx(-lo, abs=1e-5) == pytest.approx(0.5 * math.pi, abs=1e-5)
+
+
 def test_the_lever_returns_quickly_by_the_textbook_ratio():
     lever = mechanisms.create('slotted_lever', a=80.0, b=150.0)
     (lo, hi), = lever.lever_reach()

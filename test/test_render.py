@@ -13,6 +13,7 @@
 import csv
 import itertools
 import math
+import os
 from pathlib import Path
 import re
 import shutil
@@ -88,12 +89,16 @@ def test_the_same_request_gives_the_same_bytes(tmp_path, ending, args):
     assert rendered(tmp_path, *args, config='all', ending=ending).read_bytes() == once
 
 
-@pytest.mark.long
 @pytest.mark.skipif(not shutil.which('ffmpeg'), reason='ffmpeg is not installed')
-def test_an_mp4_has_the_same_bytes_each_time(tmp_path):
-    once = rendered(tmp_path, '--frames', '3', ending='mp4').read_bytes()
-    assert rendered(tmp_path, '--frames', '3', ending='mp4').read_bytes() == once
-    assert once[4:8] == b'ftyp'
+def test_an_mp4_has_the_frames_asked_for_and_the_same_bytes_each_time(tmp_path):
+    asked = '--frames', '3', '--fps', '5', '--size', '320x240'
+    once = rendered(tmp_path, *asked, ending='mp4').read_bytes()
+    file = rendered(tmp_path, *asked, ending='mp4')
+    assert file.read_bytes() == once and once[4:8] == b'ftyp'
+    raw = subprocess.run(['ffmpeg', '-v', 'info', '-i', file, '-f', 'rawvideo', '-'],
+                         capture_output=True, check=True)
+    assert len(raw.stdout) == 3 * 320 * 240 * 3 // 2 and b'yuv420p' in raw.stderr
+    assert re.search(rb'Duration: 00:00:00.60,.*\n.*h264.* 320x240.* 5 fps', raw.stderr)
 
 
 def test_without_ffmpeg_there_is_no_mp4_but_a_reason(tmp_path, monkeypatch, capsys):
@@ -102,6 +107,16 @@ def test_without_ffmpeg_there_is_no_mp4_but_a_reason(tmp_path, monkeypatch, caps
     assert capsys.readouterr().err == ('render: ffmpeg, which writes .mp4, is not installed: apt '
                                        'install ffmpeg, or choose .gif\n')
     assert not list(tmp_path.iterdir())
+
+
+def test_why_ffmpeg_fails_is_said(tmp_path, monkeypatch, capsys):
+    failing = tmp_path / 'ffmpeg'
+    failing.write_text('#!/bin/sh\necho no such codec >&2\nexit 1\n')
+    failing.chmod(0o755)
+    monkeypatch.setenv('PATH', str(tmp_path), prepend=os.pathsep)
+    assert main([str(CONFIG / 'jansen.yaml'), '--out', str(tmp_path / 'leg.mp4')]) == 1
+    assert capsys.readouterr().err.splitlines()[-1] == 'render: ffmpeg failed: no such codec'
+    assert [*tmp_path.iterdir()] == [failing]
 
 
 def test_a_gif_has_the_frames_the_rate_the_loops_and_the_size_asked_for(tmp_path):
@@ -127,6 +142,8 @@ def test_a_turn_is_drawn_in_the_time_it_takes(tmp_path):
     times = [row['time'] for row in rows_of(data)]
     cranks = [row['jansen_crank'] for row in rows_of(data)]
     assert len(times) == round(2 * 2 * math.tau / 2.0)  # two turns at 2 rad/s, 2 frames a second
+    rendered(tmp_path, '--turns', '0.01', '--fps', '2', '--size', '99x99', '--hide', 'axes,title',
+             ending='gif')
     assert times == pytest.approx(math.tau / len(times) * np.arange(len(times)))
     assert np.allclose(np.remainder(2.0 * np.array(times), math.tau), cranks, atol=1e-12)
 
@@ -358,6 +375,15 @@ def test_angles_and_ratio_of_a_slotted_lever_are_printed():
 @pytest.mark.parametrize('type_', ['jansen', 'five_bar'])
 def test_every_trace_and_part_can_be_drawn(type_, trace):
     picture_of(machine(type_), trace=trace, parts=frozenset(PARTS)).at(0.4)
+
+
+@pytest.mark.parametrize('part', [
+    'axes', 'title', 'dimensions', 'labels', 'links', 'joints', 'guides', 'floor'])
+def test_a_part_is_seen_unless_it_is_hidden(part):
+    def drawn(parts):
+        return picture_of(machine('jansen'), size=(320, 320), parts=parts).at(0.0)
+
+    assert (drawn(frozenset(PARTS)) != drawn(frozenset(PARTS) - {part})).any()
 
 
 @pytest.mark.parametrize('crank', [
@@ -601,6 +627,19 @@ def test_no_name_is_on_a_joint_or_on_another(name):
     joints = [text.axes.transData.transform(text.xy) for text in names]
     assert not any(box.contains(*joint) for box in boxes for joint in joints)
     assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
+
+
+def test_names_are_around_their_joints_however_long():
+    shown, = scene.read({'mechanisms': ['own'], 'own.type': 'custom', 'own.joints': [
+        'O ground 0 0', 'Motor ground 3 0', 'Pin crank O 1', 'Elbow_joint dyad Pin Motor 3 2 left',
+        ]}).machines.values()
+    picture = picture_of(shown, size=(720, 720), parts=frozenset({'labels'}))
+    picture.show(0.0)
+    for text in picture.panels[0].moving[-1].artists:
+        x, y = text.get_position()
+        # In points: farther away to the side by half of what a long name is wider.
+        assert math.hypot(x / (13.0 + 3.5 * (len(text.get_text()) - 1)), y / 13.0) \
+            == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize('rows', [1, 3])

@@ -18,6 +18,7 @@ import sys
 from xml.etree import ElementTree
 
 from linkage_ros import optional
+import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / 'linkage_ros'
@@ -95,6 +96,11 @@ def test_other_rooms_import_the_core_by_its_public_names():
         for name in imported(module) if room(module) != 'linkage' else ():
             core, _, below = name.partition('linkage_ros.linkage.')
             assert core or below in public, f'{module.name} imports {name}'
+
+
+@pytest.mark.parametrize('room_', ['linkage', 'linkage.inverse', 'scene', 'render'])
+def test_there_are_all_names_that_a_room_makes_public(room_):
+    exec(f'from linkage_ros.{room_} import *')
 
 
 def test_the_floors_of_the_core_stand_on_each_other():

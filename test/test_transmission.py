@@ -341,9 +341,14 @@ def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
 
 
 @pytest.mark.parametrize('type_, given, chosen', [
-    # A chain of links from the ground.
+    # A chain of links from the ground, each of which tells more than those before, wherever it is.
     ('five_bar', {}, ['m_crank', 'm_AP']), ('slider_crank', {}, ['m_block']),
     ('klann', {}, ['m_BD']),
+    ('custom', {'joints': [
+        'O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 3 2.5 left',
+        'C crank Q 1', 'D dyad C O 3 2.5 left']}, ['m_QB', 'm_CD']),
+    ('five_bar', {'dimensions.b': 0.05, 'crank.start': 3.1, 'crank2.start': 0.0},
+     ['m_crank', 'm_AP']),
     # With preference for those that have a name, on the links before them.
     ('klann', {'joint_names': ['CF=knee']}, ['knee']),
     ('klann', {'joint_names': ['AD=knee']}, ['m_BD']),

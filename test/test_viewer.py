@@ -1343,6 +1343,14 @@ def test_half_a_request_is_not_waited_for_and_a_page_stays(show, monkeypatch, ha
     asyncio.run(use())
 
 
+def test_what_fails_in_the_server_is_logged_in_one_line(show, monkeypatch, tmp_path, capfd):
+    (tmp_path / 'broken.js').write_bytes(b'\xff')
+    monkeypatch.setitem(server.FOLDERS, '', tmp_path)
+    assert asyncio.run(status(show(LEG).viewer.url + 'broken.js')) == 500
+    line, = (line for line in capfd.readouterr().err.splitlines() if '[INFO]' not in line)
+    assert re.search(r"\[WARN\] .*Error handling request.*: UnicodeDecodeError\('utf-8', b", line)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize('last', [b'', b'nonsense'])
 def test_a_client_that_does_not_read_is_sent_home(show, monkeypatch, last):
@@ -1899,11 +1907,13 @@ def test_what_a_page_looked_at_is_not_subscribed_to_when_it_is_gone(graph, show)
     at_rest = running.entities()
 
     async def use(url):
+        tasks = len(served())
         async with Page(url) as page:
             await page.cast('/leg')
             await browser.until(lambda: len(page.drawn('/leg', 'joints')))
             assert running.entities()[0] >= at_rest[0] + 4
         await browser.until(lambda: running.entities() == at_rest)
+        await browser.until(lambda: len(served()) <= tasks)
 
     asyncio.run(use(running.viewer.url))
 

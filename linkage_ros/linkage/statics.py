@@ -84,4 +84,4 @@ def output_effort(linkage: Kinematics, output: str, theta: Inputs, effort: Array
                          'a linkage with one input')
     linkage.check_output(output)
     with np.errstate(divide='ignore', invalid='ignore'):
-        return (numbers('effort', effort) / linkage.joint_rates(theta, (output,))[output])[()]
+        return numbers('effort', effort) / linkage.joint_rates(theta, (output,))[output]

@@ -40,11 +40,13 @@ from ..words import elided, listed, quoted
 
 try:
     from rclpy.experimental import EventsExecutor as Executor
-except ImportError:
-    Executor = SingleThreadedExecutor
+    from rclpy.impl.implementation_singleton import rclpy_implementation as implementation
 
-# Jazzy's EventsExecutor awaits no callback of a service; it has no `create_future` either.
-AWAITS = hasattr(Executor, 'create_future') or Executor is SingleThreadedExecutor
+    # `Executor` is a function that makes one. Jazzy's awaits no callback of a service; it has no
+    # `create_future` either.
+    AWAITS = hasattr(implementation.EventsExecutor, 'create_future')
+except ImportError:
+    Executor, AWAITS = SingleThreadedExecutor, True
 
 # Longest wait for an event [s]: some builds of the EventsExecutor do not wait without a limit.
 # They loop at full load and ignore signals.
