@@ -11,9 +11,8 @@
 """
 Robots in URDF, with the ways in which tools write the loops that it has no word for.
 
-Sources: https://wiki.ros.org/urdf/XML; urdfdom #264 (`constraint`); RigidBodyDynamics.jl, Isaac
-Sim and Drake (`loop_joint`, `drake:`); URDF+ of generalized_rbda (`loop`); Gazebo's tutorial on
-kinematic loops (`gazebo`); onshape-to-robot's documentation (`closing_`); example-parallel-robots
+Sources: https://wiki.ros.org/urdf/XML; RigidBodyDynamics.jl, Isaac Sim and Drake (`loop_joint`,
+`drake:`); URDF+ of generalized_rbda (`loop`); Gazebo's tutorial on kinematic loops (`gazebo`); onshape-to-robot's documentation (`closing_`); example-parallel-robots
 (`closed_loop`); solidworks_urdf_exporter2 (`closures`); Robonex (`pin_loops`, `ball_loops`).
 """
 
@@ -116,25 +115,18 @@ class Reader:
 
     def _of_elements(self) -> None:
         """Add the loops that elements of the URDF close."""
-        for cut in (*self._root.findall('constraint'), *self._root.findall('loop_joint'),
-                    *self._root.findall('loop')):
-            # An example of Isaac Sim has an empty one first.
-            for empty in [part for part in cut if part.tag in ('link1', 'link2')
-                          and not part.get('link')]:
-                cut.remove(empty)
-            tags = next((tags for tags in (('link1', 'link2'), ('predecessor', 'successor'))
-                         if cut.find(tags[0]) is not None), ('parent', 'child'))
-            own = [origin(next((part for part in map(cut.find, (
-                f'{tag}_origin', f'{tag}/origin', tag)) if part is not None), None))
-                for tag in tags]
-            axes = [numbers(attribute(cut, 'axis', 'xyz', '0 0 1'))]
-            if attribute(cut, f'{tags[0]}_axis', 'xyz'):
-                # These are in the frames of links, not in that of the joint.
-                axes = [frame[:3, :3].T @ numbers(way) for tag, frame in zip(tags, own)
-                        if (way := attribute(cut, f'{tag}_axis', 'xyz'))]
-            self.robot.close(
-                cut.get('name', ''), cut.get('type', ''),
-                (attribute(cut, tags[0], 'link'), attribute(cut, tags[1], 'link')), own, *axes)
+        for tag, ends in (('loop_joint', ('link1', 'link2')), (
+                'loop', ('predecessor', 'successor'))):
+            for cut in self._root.findall(tag):
+                # An example of Isaac Sim has an empty end first.
+                one, other = (cut.find(f'{end}[@link]') for end in ends)
+                if one is None or other is None:
+                    raise RequestError(f'{tag} {cut.get("name")} has no {ends[0]} or {ends[1]}')
+                self.robot.close(
+                    cut.get('name', ''), cut.get('type', ''), (one.get('link', ''), other.get(
+                        'link', '')), [origin(part if (own := part.find('origin')) is None else own)
+                                       for part in (one, other)],
+                    numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
         for cut in self._root.findall('ball_constraint'):
             one, other = (attribute(cut, f'ball_constraint_body_{end}', 'name') for end in 'AB')
             self.robot.close(f'{one}={other}', BALL, (one, other), [
