@@ -12,8 +12,9 @@
 Robots in URDF, with the ways in which tools write the loops that it has no word for.
 
 Sources: https://wiki.ros.org/urdf/XML; RigidBodyDynamics.jl, Isaac Sim and Drake (`loop_joint`,
-`drake:`); URDF+ of generalized_rbda (`loop`); Gazebo's tutorial on kinematic loops (`gazebo`); onshape-to-robot's documentation (`closing_`); example-parallel-robots
-(`closed_loop`); solidworks_urdf_exporter2 (`closures`); Robonex (`pin_loops`, `ball_loops`).
+`drake:`); URDF+ of generalized_rbda (`loop`); Gazebo's tutorial on kinematic loops (`gazebo`);
+onshape-to-robot's documentation (`closing_`); example-parallel-robots (`closed_loop`);
+solidworks_urdf_exporter2 (`closures`); Robonex (`pin_loops`, `ball_loops`).
 """
 
 from __future__ import annotations
@@ -122,11 +123,12 @@ class Reader:
                 one, other = (cut.find(f'{end}[@link]') for end in ends)
                 if one is None or other is None:
                     raise RequestError(f'{tag} {cut.get("name")} has no {ends[0]} or {ends[1]}')
+                frames = [origin(part if part.find('origin') is None else part.find('origin'))
+                          for part in (one, other)]
                 self.robot.close(
-                    cut.get('name', ''), cut.get('type', ''), (one.get('link', ''), other.get(
-                        'link', '')), [origin(part if (own := part.find('origin')) is None else own)
-                                       for part in (one, other)],
-                    numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
+                    cut.get('name', ''), cut.get('type', ''), (one.attrib['link'],
+                                                               other.attrib['link']),
+                    frames, numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
         for cut in self._root.findall('ball_constraint'):
             one, other = (attribute(cut, f'ball_constraint_body_{end}', 'name') for end in 'AB')
             self.robot.close(f'{one}={other}', BALL, (one, other), [
