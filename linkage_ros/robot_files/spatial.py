@@ -32,7 +32,7 @@ STRIDE = 0.5
 # The last step [rad, or of the size]: steps square, so that the next would be rounding.
 STILL = 1e-8
 # The most bodies of one component.
-MOST = 100
+MOST = 150
 # Hinges nearer to each other [m] cross in a point.
 TOGETHER = 1e-6
 # Loops open by less, of their size, are closed.

@@ -120,15 +120,14 @@ class Reader:
                 'loop', ('predecessor', 'successor'))):
             for cut in self._root.findall(tag):
                 # An example of Isaac Sim has an empty end first.
-                one, other = (cut.find(f'{end}[@link]') for end in ends)
-                if one is None or other is None:
+                parts = [part for end in ends if (part := cut.find(f'{end}[@link]')) is not None]
+                if len(parts) < 2:
                     raise RequestError(f'{tag} {cut.get("name")} has no {ends[0]} or {ends[1]}')
-                frames = [origin(part if part.find('origin') is None else part.find('origin'))
-                          for part in (one, other)]
                 self.robot.close(
-                    cut.get('name', ''), cut.get('type', ''), (one.attrib['link'],
-                                                               other.attrib['link']),
-                    frames, numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
+                    cut.get('name', ''), cut.get('type', ''),
+                    (parts[0].attrib['link'], parts[1].attrib['link']),
+                    [origin(part if part.find('origin') is None else part.find('origin'))
+                     for part in parts], numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
         for cut in self._root.findall('ball_constraint'):
             one, other = (attribute(cut, f'ball_constraint_body_{end}', 'name') for end in 'AB')
             self.robot.close(f'{one}={other}', BALL, (one, other), [
