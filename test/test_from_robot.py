@@ -18,8 +18,8 @@ import shlex
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import check, closing, command, model, readers
-from linkage_ros.robot_files.spatial import posed
 from linkage_ros.robot_model.command import main as robot_model
+from linkage_ros.robot_model.robot import posed
 import numpy as np
 import pytest
 from test_robot_files import (

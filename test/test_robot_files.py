@@ -27,7 +27,7 @@ from xml.etree import ElementTree
 from hypothesis import example, given, settings, strategies as st
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import check, closing, command, model, readers
-from linkage_ros.robot_files.spatial import posed, trees
+from linkage_ros.robot_model.robot import posed, trees
 import numpy as np
 import pytest
 from robots import LIBRARIES

@@ -19,8 +19,8 @@ from typing import Any, Collection, Dict, List, Mapping, NamedTuple, Sequence, T
 
 import numpy as np
 
-from .robot import FIXED, Robot
-from .spatial import CLOSED, Component, components, DEAD, displaced, posed, Poses, trees
+from .spatial import CLOSED, Component, components, DEAD, Poses
+from ..robot_model.robot import displaced, FIXED, posed, Robot, trees
 from ..words import listed
 
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.

@@ -27,9 +27,9 @@ import numpy as np
 
 from . import check
 from .loops import Group
-from .robot import BALL, HINGE, Joint, Limits, NotDriven, plain, Robot, SLIDE
 from .. import mechanisms, scene
 from ..linkage import FORMS, short, WindowError
+from ..robot_model.robot import BALL, HINGE, Joint, Limits, NotDriven, plain, Robot, SLIDE
 from ..scene.joint_names import quoted_name
 from ..words import listed
 

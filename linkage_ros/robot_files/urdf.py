@@ -24,9 +24,10 @@ from typing import Any, Dict, Iterable, List, Mapping, Sequence, Tuple
 
 import numpy as np
 
-from .elements import at, attribute, Element, numbers, once, origin, pose, text, weld
-from .robot import BALL, FIXED, HINGE, KINDS, Robot, UNIVERSAL
+from .elements import attribute, Element, numbers, once, origin, text, weld
 from ..command import RequestError
+from ..robot_model.places import at, pose
+from ..robot_model.robot import BALL, FIXED, HINGE, KINDS, Robot, UNIVERSAL
 from ..words import listed, meant, quoted
 
 _ENDS = ('name', 'parent', 'child', 'parent_xyz', 'child_xyz', 'axis')
