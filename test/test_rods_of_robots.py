@@ -236,6 +236,6 @@ def test_a_foot_without_one_end_is_said_to_have_none(tmp_path, capsys):
 @pytest.mark.slow
 def test_without_limits_the_largest_are_taken_and_said(tmp_path, capsys):
     machine, said = imported(tmp_path, turning(4), None, capsys)
-    assert 'these are the largest proved to have one at most: pitch from -' in said
+    assert 'these are the largest proved to have one pose at most: pitch from -' in said
     assert all(math.isfinite(end) for held in machine.linkage.windows()
                for ends in held.limits for end in ends)

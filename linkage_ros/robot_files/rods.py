@@ -264,16 +264,17 @@ def _lines(found: Rods) -> Tuple[List[str], List[str]]:
         ranges = ', '.join(f'{name} from {low + zero:.4g} to {high + zero:.4g}'
                            for name, (low, high) in error.limits.items()
                            for zero in [found.links[name].start])
+        angles = ' (angles from the pose of the file)' * (' at ' in error.problem)
         return found.lines(limits=error.limits), [
-            f'Limits: {error.problem}, counted from the pose of the file; these are the largest '
-            f'proved to have one at most: {ranges}.']
+            f'Limits: {error.problem}{angles}; these are the largest proved to have one pose at '
+            f'most: {ranges}.']
 
 
 def _ranges(machine: scene.SceneMechanism, found: Rods, limits: Mapping[str, Limits]
             ) -> Dict[str, Tuple[float, float]]:
     """Return the motors' limits, made smaller until every pose in them exists."""
     places = [(joint.name, drive.start - drive.offset, drive.offset)
-              for (name, joint), drive in zip(found.inputs.items(), machine.inputs.values())]
+              for joint, drive in zip(found.inputs.values(), machine.inputs.values())]
     low, high = np.array([limits.get(name, (-math.inf, math.inf))[:2] for name, *_ in places]).T
     start, zero = np.array([place[1:] for place in places]).T
     start = np.clip(start, low, high)
