@@ -343,6 +343,14 @@ def test_the_motors_of_a_pose_are_those_on_the_drawn_sides(g1):
     assert g1.inputs_for(('pitch', 'roll'), (1.0, 0.05)) == []
 
 
+def test_a_branch_has_its_crank_on_the_other_side_and_no_pose_in_common(g1):
+    folded, wanted = mechanisms.create('rods', joints=G1, branches={'R': -1}), (-0.1, 0.05)
+    for linkage, other in ((g1, folded), (folded, g1)):
+        answer, = linkage.inputs_for(('pitch', 'roll'), wanted)
+        np.testing.assert_allclose(pose(linkage, answer.inputs), wanted, atol=1e-14)
+        assert np.isnan(pose(other, answer.inputs)).all()
+
+
 def test_the_inverse_s_rates_are_those_of_the_outputs(g1):
     inputs, rates = g1.inverse(('pitch', 'roll')).over([-0.1, 0.2], [0.05, -0.1])
     assert inputs.shape == (2, 2, 1)
