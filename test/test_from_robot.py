@@ -18,7 +18,8 @@ import shlex
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import check, closing, command, model, readers
-from linkage_ros.robot_files.spatial import posed
+from linkage_ros.robot_model.command import main as robot_model
+from linkage_ros.robot_model.robot import posed
 import numpy as np
 import pytest
 from test_robot_files import (
@@ -425,7 +426,7 @@ def refusals():
         tree = ast.parse(Path(command.__file__).with_name(f'{name}.py').read_text())
         for node in ast.walk(tree):
             is_reason = isinstance(node, ast.FunctionDef) and node.name in (
-                '_fault', '_why', '_elsewhere')
+                '_fault', '_rigid', '_why', '_elsewhere')
             for part in ast.walk(node) if is_reason else [node]:
                 if isinstance(part, (ast.Raise, ast.Return) if is_reason else ast.Raise):
                     yield from (each.value.strip(' :;,') for each in ast.walk(part)
@@ -444,6 +445,32 @@ def test_the_table_of_messages_has_all_refusals_and_no_others():
     others = {'choose by', 'not driven', 'free: choose another pose by'}
     assert not [quote for quote in quotes if quote not in said and quote not in others
                 and not quote.startswith('m, more')]
+
+
+def test_what_cannot_move_is_said_to_be_so_without_motors_too(capsys, tmp_path):
+    # A body on three bars: of four bodies and six hinges none moves.
+    rods, places = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.3)], [(0.1, 1.0), (0.6, 1.1), (1.1, 1.5)]
+    links = '<link name="base"/><link name="top"/>'
+    for i, ((x, z), (u, w)) in enumerate(zip(rods, places)):
+        links += (f'<link name="r{i}"/><joint name="a{i}" type="continuous"><parent link="base"/>'
+                  f'<child link="r{i}"/><origin xyz="{x} 0 {z}"/><axis xyz="0 1 0"/></joint>')
+        links += (
+            f'<loop_joint name="b{i}" type="continuous"><link1 link="r{i}" xyz="{u - x} 0 {w - z}"'
+            f'/><link2 link="top" xyz="{u - 0.1} 0 {w - 1.0}"/><axis xyz="0 1 0"/></loop_joint>'
+            if i else '<joint name="b0" type="continuous"><parent link="r0"/><child link="top"/>'
+            '<origin xyz="0.1 0 1"/><axis xyz="0 1 0"/></joint>')
+    file = tmp_path / 'platform.urdf'
+    file.write_text(f'<robot name="p">{links}</robot>')
+    assert 'it cannot move, as its joints hold each other' in refused(capsys, file)
+
+
+@pytest.mark.slow
+def test_the_twelve_legs_of_a_strandbeest_come_back_from_its_sdf(tmp_path, capsys):
+    config, file = ROBOTS.parents[1] / 'config' / 'strandbeest.yaml', tmp_path / 'legs.sdf'
+    assert robot_model(['--format', 'sdf', str(config)]) == 0
+    file.write_text(capsys.readouterr().out)
+    assert command.main([str(file)]) == 0
+    assert 'Checked: strandbeest_crank: in 240 poses' in capsys.readouterr().err
 
 
 def test_a_mechanism_that_cannot_move_is_not_checked():

@@ -47,9 +47,9 @@ from std_msgs.msg import Float64MultiArray  # noqa: E402
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / 'docs'
 # Pages that are followed step by step.
-FOLLOWED = ['first-ten-minutes', 'tutorial', 'commands', *(
+FOLLOWED = ['first-ten-minutes', 'tutorial', 'commands', 'robot-files', *(
     f'how-to/{page.stem}' for page in (DOCS / 'how-to').glob('*.md') if page.stem != 'index')]
-BLOCK = re.compile(r'(?:^`([\w.]+)`:\n\n)?^```(\w+)\n(.*?)^```', re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r'(?:`([\w.]+)`:\n\n)?^```(\w+)\n(.*?)^```', re.MULTILINE | re.DOTALL)
 NODES = {'kinematics': Kinematics, 'crank_driver': CrankDriver, 'servo_inverse': ServoInverse}
 COMMANDS = {'from_robot': from_robot, 'linkage_ros.robot_model': urdf,
             'linkage_ros.c_code': c_code, 'linkage_ros.render': render,
@@ -272,9 +272,21 @@ def test_two_robots_of_one_kind(graph, follow):
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('library', LIBRARIES)
-def test_a_urdf_with_pairs_of_frames(graph, follow, library):
-    follow('how-to/existing-urdf')
-    answers, robot = [], library((ROOT / 'examples/leg.urdf').read_text())
+def test_robots_of_each_format(graph, follow, library):
+    pytest.importorskip('mujoco')
+    follow('robot-files')
+    check_finger(graph)
+    check_leg(graph, library((ROOT / 'examples/leg.urdf').read_text()))
+    lid = scene.load('lid.yaml').machines['motor']
+    # The lid is closed in the pose of its file, in which all joints are at zero.
+    angles = lid.linkage.joint_angles(lid.first.offset)
+    names = {called.name: called.of(angles[link]) for link, called in lid.joints.items()
+             if called.published}
+    assert names == pytest.approx({'pin': 0.0, 'eye': 0.0, 'hinge': 0.0}, abs=1e-12)
+
+
+def check_leg(graph, robot):
+    answers = []
     graph.node.create_subscription(
         JointState, 'joint_states', lambda m: 'knee' in m.name and answers.append(m), 10)
     cranks = ['abduction_crank', 'knee_crank']
@@ -287,18 +299,7 @@ def test_a_urdf_with_pairs_of_frames(graph, follow, library):
             assert places[f'{loop}_eye'] == pytest.approx(places[f'{loop}_pin'], abs=1e-12)
 
 
-@pytest.mark.slow
-def test_the_scene_of_a_whole_robot(follow):
-    follow('how-to/whole-robot')
-    shown = scene.load('robot.yaml')
-    assert len(shown.machines) == 2
-    line = Path('robot.yaml').read_text().splitlines()[1]
-    assert line.startswith('# ros2 launch linkage_ros robot.launch.py robot:=examples/leg.urdf')
-
-
-def test_a_model_for_mujoco(graph, follow):
-    pytest.importorskip('mujoco')
-    follow('how-to/mujoco')
+def check_finger(graph):
     answers = []
     graph.node.create_subscription(
         JointState, 'joint_states', lambda m: 'rod_joint' in m.name and answers.append(m), 10)
@@ -309,6 +310,15 @@ def test_a_model_for_mujoco(graph, follow):
                        for name in ('rod', 'finger'))
         eye = 0.03j * cmath.exp(-1j * driver) + (0.05 + 0.01j) * cmath.exp(-1j * (driver + rod))
         assert eye == pytest.approx(0.05 + 0.04j * cmath.exp(-1j * finger), abs=1e-12)
+
+
+@pytest.mark.slow
+def test_the_scene_of_a_whole_robot(follow):
+    follow('how-to/whole-robot')
+    shown = scene.load('robot.yaml')
+    assert len(shown.machines) == 2
+    line = Path('robot.yaml').read_text().splitlines()[1]
+    assert line.startswith('# ros2 launch linkage_ros robot.launch.py robot:=examples/leg.urdf')
 
 
 def test_coordinates_of_a_drawing(follow):

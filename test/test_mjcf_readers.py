@@ -22,9 +22,9 @@ from xml.sax.saxutils import quoteattr
 
 from linkage_ros import scene
 from linkage_ros.robot_files import command, readers
-from linkage_ros.robot_files.spatial import trees
 from linkage_ros.robot_model import bodies, mjcf, sdf
 from linkage_ros.robot_model.assembled import assembled
+from linkage_ros.robot_model.robot import trees
 import numpy as np
 import pytest
 from test_robot_files import check_comes_back, published, random_robot, words

@@ -27,7 +27,7 @@ from xml.etree import ElementTree
 from hypothesis import example, given, settings, strategies as st
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import check, closing, command, model, readers
-from linkage_ros.robot_files.spatial import posed, trees
+from linkage_ros.robot_model.robot import posed, trees
 import numpy as np
 import pytest
 from robots import LIBRARIES
@@ -294,7 +294,7 @@ def checked(text):
 @pytest.mark.parametrize('place', ['0 0 0.2', '0 0 0.20001', '0 0.01 0.2', '0 0 0.26'])
 def test_a_scene_is_held_against_its_robot_over_the_range_of_its_motor(tmp_path, place):
     text = printed(written(tmp_path, 'four_bar.urdf', (
-        '<child_origin xyz="0 0 0.2"/>', f'<child_origin xyz="{place}"/>')))
+        '<link2 link="rocker" xyz="0 0 0.2"/>', f'<link2 link="rocker" xyz="{place}"/>')))
     (count, worst), = checked(text)
     assert count >= 200 and worst < 1e-12 and 'motor from -1.2 to 1.2' in text
     assert ('# wrist has its ends 0.01 m apart along its axis' in text) == ('0.01' in place)
@@ -404,8 +404,8 @@ def test_angles_that_are_rounded_in_the_file_are_in_one_plane(imported, tmp_path
     rounded = written(tmp_path, 'four_bar.urdf', (
         'xyz="0.3 0 0"/><axis xyz="0 -1 0"/>',
         'xyz="0.3 0 0" rpy="1.5708 0 0"/><axis xyz="0 0 1"/>'), (
-        '<child_origin xyz="0 0 0.2"/><child_axis xyz="0 1 0"/>',
-        '<child_origin xyz="0 0.2 0"/><child_axis xyz="0 0 -1"/>'))
+        '<link2 link="rocker" xyz="0 0 0.2"/>',
+        '<link2 link="rocker" xyz="0 0.2 0" rpy="-1.5708 0 0"/>'))
     machine, = imported(rounded).values()
     assert machine.linkage.solve(machine.first.offset)['D'] == pytest.approx([0.3, -0.2], abs=1e-5)
 
@@ -463,8 +463,8 @@ def test_what_is_left_out_is_named_with_the_reason(capsys, tmp_path):
     assert 'not planar: the axes of motor and shoulder are 11.3 degrees from it' in refused(
         capsys, written(tmp_path, 'four_bar.urdf', ('0 -1 0', '0 -1 0.2')))
     assert 'its loops cannot be closed: they stay open by' in refused(
-        capsys, written(tmp_path, 'four_bar.urdf', ('xyz="0 0 0.2"/><child_axis',
-                                                    'xyz="0 0 2.2"/><child_axis')))
+        capsys, written(tmp_path, 'four_bar.urdf', ('link="rocker" xyz="0 0 0.2"',
+                                                    'link="rocker" xyz="0 0 2.2"')))
     assert 'no joint of this robot closes a loop' in refused(capsys, ROBOTS / 'five_bar.urdf')
     assert refused(capsys, ROBOTS / 'four_bar.sdf', '--driven', 'joint_a') == (
         "from_robot: there is no joint 'joint_a'; allowed: joint_A, joint_B, joint_C, joint_D; "
@@ -671,7 +671,7 @@ def test_a_pose_at_the_end_of_its_loops_is_no_side(capsys, tmp_path):
         '<limit lower="-1.2" upper="1.2"', '<limit lower="-2" upper="-1"'), (
         'xyz="0 0 0.2"/><axis', f'xyz="0 0 0.2" rpy="0 {math.atan2(2.0, 3.0)!r} 0"/><axis'), (
         'xyz="0.3 0 0"/><axis', f'xyz="0.3 0 0" rpy="0 {-math.atan2(3.0, 2.0)!r} 0"/><axis'), (
-        '<parent_origin xyz="0.3 0 0"/>', f'<parent_origin xyz="{13 ** 0.5 / 10 - 0.2!r} 0 0"/>'))
+        'link="coupler" xyz="0.3 0 0"', f'link="coupler" xyz="{13 ** 0.5 / 10 - 0.2!r} 0 0"'))
     line = refused(capsys, file, '--driven', 'motor')
     assert 'its loops end where the file has motor: choose another pose by --pose motor=' in line
     # What is printed leads on: the loops do not let the motor inside its limits.
@@ -768,7 +768,7 @@ def test_axes_and_poses_of_an_sdf_are_seen_as_its_version_says(
     assert joint.places[0] == pytest.approx(np.array([0.0, 0.0, 1.0]))
 
 
-CUT = re.compile('<constraint.*</constraint>', re.DOTALL)
+CUT = re.compile('<loop_joint.*</loop_joint>', re.DOTALL)
 LINKS = ('<link name="closing_w_1"/><link name="closing_w_2"/>'
          '<joint name="c1" type="fixed"><parent link="coupler"/><child link="closing_w_1"/>'
          '<origin xyz="0.3 0 0" rpy="1 2 3"/></joint><joint name="c2" type="fixed">'
@@ -1099,8 +1099,7 @@ def test_all_joints_of_a_whole_robot_are_published(imported, file):
 
 def test_a_universal_joint_with_one_axis_is_refused(capsys, tmp_path):
     file = written(tmp_path, 'four_bar.urdf', ('name="wrist" type="revolute"',
-                                               'name="wrist" type="universal"'), (
-        '<child_axis xyz="0 1 0"/>', ''))
+                                               'name="wrist" type="universal"'))
     assert 'joint wrist is universal and must have two axes' in refused(capsys, file)
 
 
@@ -1130,8 +1129,8 @@ def test_a_loop_of_too_many_links_is_refused_at_once(capsys, tmp_path):
                      f'<child link="l{i + 1}"/><origin xyz="0.1 0 0"/></joint>'
                      for i in range(count))
     file.write_text(f'<robot name="r">{links}{joints}<loop_joint name="w" type="revolute">'
-                    f'<parent link="l0"/><child link="l{count}"/></loop_joint></robot>')
-    assert f'{count} bodies are in loops that share joints: no more than 100' in refused(
+                    f'<link1 link="l0"/><link2 link="l{count}"/></loop_joint></robot>')
+    assert f'{count} bodies are in loops that share joints: no more than 150' in refused(
         capsys, file)
 
 
@@ -1359,10 +1358,6 @@ def fixed(link, name, place):
 
 # What closes a hinge about z, in any dialect: of its name, its links and its place on both.
 CLOSINGS = [
-    lambda name, one, other, at, to: (
-        f'<constraint name="{name}" type="revolute"><parent link="{one}"/><parent_origin '
-        f'xyz="{words(at)}"/><parent_axis xyz="0 0 1"/><child link="{other}"/><child_origin '
-        f'xyz="{words(to)}"/><child_axis xyz="0 0 1"/></constraint>'),
     lambda name, one, other, at, to: (
         f'<loop_joint name="{name}" type="continuous"><link1 link="{one}" xyz="{words(at)}" '
         f'rpy="0 0 1"/><link2 link="{other}" xyz="{words(to)}" rpy="0 0 2"/><axis xyz="0 0 1"/>'

@@ -36,6 +36,22 @@ G1 = (
     'left motor ground at 0.022 0 0.1509 axis 1 0 0',
     'R rod right 0.0395 -0.0164 0.2112 roll 0.022 -0.015 -0.0096',
     'L rod left 0.035 0.0165 0.1469 roll 0.022 0.015 -0.0096')
+# Ankles of public models, and the ranges that their makers name [deg].
+REAL = {
+    'Digit': (([-0.325998, -0.038658, -0.014], [0.0, 0.0, -1.0],
+               [-0.328453, -0.029999, 0.0], [0.272692, -0.962101, 0.0],
+               [[-0.0888, -0.026114, 0.03], [-0.0888, -0.026114, -0.03]],
+               [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]],
+               [[-0.083933, -0.082906, 0.0275], [-0.082649, -0.082781, -0.0275]],
+               [[-0.323444, -0.083473, 0.01385], [-0.322206, -0.083122, -0.014673]]),
+              [(-44, -37), (34, 33)]),
+    'battobot': (([0.25, 0.0, 0.0], [0.0, 0.0, -1.0],
+                  [0.263995, -0.021827, 0.0165], [0.305869, 0.952074, 0.0],
+                  [[0.051, 0.0, -0.001], [0.131946, 0.0, 0.034]],
+                  [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]],
+                  [[0.045877, 0.029559, -0.025], [0.145471, 0.026778, 0.058]],
+                  [[0.289183, 0.057935, -0.020861], [0.308263, 0.051805, 0.048294]]),
+                 [(-28, -36), (30, 4)])}
 ONE_ROD = (
     'out hinge ground at ox oy oz axis hx hy hz', 'crank motor ground at mx my mz axis ax ay az',
     'R rod crank px py pz out ex ey ez length l')
@@ -171,6 +187,7 @@ def check_assemblies(ankle, window, rng, count):
     inside = ((all_ > window[0]) & (all_ < window[1])).all(axis=-1)
     # Where a root is on the edge but for the rounding of the judge either will do.
     edge = np.abs(np.minimum(all_ - window[0], window[1] - all_)).min(axis=-1) < 1e-6
+    inside &= rods.are_drawn(ankle, inputs[..., None], all_[..., 0], all_[..., 1])
     clear = ~edge.any(axis=1)
     assert inside.sum(axis=1).max() <= 1
     assert (np.isnan(found[0]) == ~inside.any(axis=1))[clear].all()
@@ -188,6 +205,15 @@ def test_no_pose_is_of_another_assembly(seed, count, poses):
     assert sum(found) > 0.02 * count * poses
 
 
+@pytest.mark.parametrize('turned', [1, -1])
+@pytest.mark.parametrize('robot', REAL)
+def test_the_ranges_of_real_ankles_are_proved_whatever_their_signs(robot, turned):
+    parts, window = REAL[robot]
+    window = np.sort(np.multiply(window, turned), axis=0) * DEGREE
+    found = check_assemblies(rods.drawn(*parts), window, np.random.default_rng(1), 400)
+    assert found > 3
+
+
 def check_windows(seed, count):
     """Refuse windows with a second or a singular pose; return how many of them there were."""
     rng, ambiguous = np.random.default_rng(seed), 0
@@ -200,7 +226,7 @@ def check_windows(seed, count):
         try:
             made(ankle.within(middle - half, middle + half))
         except WindowError as error:
-            assert 'there may be a second pose' in str(error)
+            assert re.search('there (is|may be) a second pose|do not lead to', str(error))
             ambiguous += rods.is_ambiguous(ankle, middle - half, middle + half)
             # The largest that is offered instead is as near to a second pose as the proof goes.
             if error.limits:
@@ -221,9 +247,32 @@ def test_limits_with_a_second_or_a_singular_pose_are_refused(seed, count):
 @pytest.mark.slow
 def test_of_limits_that_are_too_wide_the_largest_that_can_be_are_named():
     wide = [line.replace('-50deg 30deg', '-170deg 150deg') for line in G1]
-    with pytest.raises(ValueError, match='there may be a second pose in these limits; the largest '
-                       r'proved to have one at most: pitch within -\d.*deg, roll within -\d.*deg'):
+    with pytest.raises(ValueError, match='there is a second pose in these limits: with right at '
+                       '.*, left at .*, pitch at .*, roll at .* as well as pitch at .*; the '
+                       r'largest proved to have one at most: pitch within -\d.*deg, roll '
+                       r'within -\d.*deg'):
         made(wide)
+
+
+@pytest.mark.parametrize('seed', [1, 2])
+def test_the_two_poses_of_refused_limits_are_two_poses(seed):
+    rng, found = np.random.default_rng(seed), 0
+    for _ in range(4):
+        ankle = rods.random_ankle(rng)
+        try:
+            made(ankle.within([-1.6, -1.4], [1.6, 1.4]))
+        except WindowError as error:
+            said = re.findall(r'[lr] at ([^,]+), [lr] at ([^,]+), pitch at (\S+), roll at (\S+) '
+                              r'as well as pitch at (\S+), roll at ([^;]+)$', error.problem)
+            for left, right, *poses in np.array(said, float):
+                # With six digits they are next to poses of these motors.
+                for pitch, roll in (poses[:2], poses[2:]):
+                    every = np.stack(rods.assemblies(ankle, [[left], [right]]), axis=-1)[0]
+                    assert np.nanmin(np.abs(every - (pitch, roll)).max(axis=-1)) < 1e-3
+                    assert rods.are_drawn(ankle, [left, right], pitch, roll)
+                assert max(abs(np.subtract(poses[:2], poses[2:]))) > 1e-2
+                found += 1
+    assert found
 
 
 @pytest.fixture(scope='module')
@@ -286,20 +335,25 @@ def test_motors_give_the_power_that_the_joints_take(g1, poses):
     assert (np.abs(product - np.eye(2)[..., None]).max(axis=(0, 1)) <= 1e-13 * (1 + worst)).all()
 
 
-def test_all_motors_of_a_pose_are_found_and_the_nearest(g1):
-    found = g1.inputs_for(('pitch', 'roll'), (-0.1, 0.05))
-    assert len(found) == 4
-    for answer in found:
-        np.testing.assert_allclose(pose(g1, answer.inputs), (-0.1, 0.05), atol=1e-14)
-    nearest = g1.inputs_for(('pitch', 'roll'), (-0.1, 0.05), near=(0.0, 0.0))[0]
+def test_the_motors_of_a_pose_are_those_on_the_drawn_sides(g1):
+    answer, = g1.inputs_for(('pitch', 'roll'), (-0.1, 0.05))
+    np.testing.assert_allclose(pose(g1, answer.inputs), (-0.1, 0.05), atol=1e-14)
     drawn = g1.driven_by('pitch', 'roll').joint_angles((-0.1, 0.05), ('right', 'left'))
-    assert np.allclose(nearest.inputs, list(drawn.values()), atol=1e-15)
+    assert np.allclose(answer.inputs, list(drawn.values()), atol=1e-15)
     assert g1.inputs_for(('pitch', 'roll'), (1.0, 0.05)) == []
+
+
+def test_a_branch_has_its_crank_on_the_other_side_and_no_pose_in_common(g1):
+    folded, wanted = mechanisms.create('rods', joints=G1, branches={'R': -1}), (-0.1, 0.05)
+    for linkage, other in ((g1, folded), (folded, g1)):
+        answer, = linkage.inputs_for(('pitch', 'roll'), wanted)
+        np.testing.assert_allclose(pose(linkage, answer.inputs), wanted, atol=1e-14)
+        assert np.isnan(pose(other, answer.inputs)).all()
 
 
 def test_the_inverse_s_rates_are_those_of_the_outputs(g1):
     inputs, rates = g1.inverse(('pitch', 'roll')).over([-0.1, 0.2], [0.05, -0.1])
-    assert inputs.shape == (2, 2, 4)
+    assert inputs.shape == (2, 2, 1)
     forward = [g1.joint_rates(inputs, [name], by)[name]
                for by in (0, 1) for name in ('pitch', 'roll')]
     np.testing.assert_allclose(rates, forward, rtol=1e-12)

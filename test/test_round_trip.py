@@ -18,6 +18,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import model, readers
 from linkage_ros.robot_model import bodies, mjcf, sdf, urdf
 from linkage_ros.robot_model.assembled import assembled
+from linkage_ros.robot_model.pieces import BALL, Piece
 import numpy as np
 import pytest
 from sweeps import EXHAUSTIVE
@@ -40,76 +41,59 @@ def matrix(numbers):
     return made
 
 
-def motion(joint, position):
-    """Return the displacement of a body by its joint: Rodrigues' formula."""
-    made, axis = np.eye(4), np.array(joint.axis) / np.linalg.norm(joint.axis)
-    if joint.kind == 'prismatic':
-        made[:3, 3] = position * axis
-        return made
-    for k, unit in enumerate(np.eye(3)):
-        made[:3, k] = (unit * math.cos(position) + np.cross(axis, unit) * math.sin(position)
-                       + axis * (axis @ unit) * (1.0 - math.cos(position)))
-    return made
-
-
-def check_read(robot, form, folder):
-    """Write a robot model and compare all that is read of it."""
+def check_read(model, form, folder):
+    """Write a model and compare all that is read of it: the same bodies, joints, motors, gears."""
     file = folder / 'robot.xml'
-    file.write_text(FORMATS[form](robot), encoding='utf-8')
-    read = readers.read(str(file))
-    frames, homes = {robot.root: np.eye(4)}, {}
-    root = {'urdf': robot.root}.get(form, 'world')
-    frames[root] = np.eye(4)
-    for body in robot.bodies:
-        frames[body.name] = frames[body.parent] @ matrix(body.pose) @ (
-            motion(body.joint, body.position) if body.joint else np.eye(4))
-        for point in body.points:
-            homes[point.name] = body.name
-            frames[point.name] = frames[body.name] @ matrix([*point.place, *[0.0] * 4])
+    file.write_text(FORMATS[form](model), encoding='utf-8')
+    read, (part,) = readers.read(str(file)), model.parts
+    robot, root = part.robot, {'urdf': model.root}.get(form, 'world')
+    stands = matrix(part.pose) if part.base else np.eye(4)
+    frames = {name: stands @ frame for name, frame in robot.frames.items()}
+    assert read.root == root and {*frames} - {model.root} <= read.frames.keys()
     size = max(1e-3, *(np.abs(frame[:3, 3]).max() for frame in frames.values()))
+    for point in robot.points:
+        frames[point.name] = frames[point.body] @ matrix([*point.place, *[0.0] * 4])
     for name, frame in read.frames.items():
         if name in frames:
             assert name == read.root or frame[:3, :3] == pytest.approx(
                 frames[name][:3, :3], abs=1e-12)
             assert frame[:3, 3] == pytest.approx(frames[name][:3, 3], abs=1e-12 * size)
-    assert read.root == root and {body.name for body in robot.bodies} <= read.frames.keys()
-    # In an SDF all positions are 0 where it starts.
-    zeros = {body.joint.name: 0.0 if form == 'sdf' else body.position
-             for body in robot.bodies if body.joint}
-    starts = {body.joint.name: body.position for body in robot.bodies if body.joint}
-    sweeps = {motor.joint: motor.sweep for motor in robot.motors}
     joints = {joint.name: joint for joint in read.joints}
-    for body in robot.bodies:
-        if body.joint is None:
+    # In an SDF all positions are 0 where it starts.
+    starts = robot.positions
+    zeros = {name: 0.0 if form == 'sdf' else start for name, start in starts.items()}
+    for joint in robot.joints:
+        if joint.position is None:
             continue
-        found, frame = joints.pop(body.joint.name), frames[body.name]
-        parent = root if body.parent == robot.root else body.parent
-        assert found.kind == {'revolute': 'hinge', 'prismatic': 'slide'}[body.joint.kind]
-        assert found.bodies == (parent, body.name)
-        axis = frame[:3, :3] @ body.joint.axis / np.linalg.norm(body.joint.axis)
+        found = joints.pop(joint.name)
+        assert found.kind == joint.kind
+        assert found.bodies == tuple(root if body == model.root else body for body in joint.bodies)
         for place, way in zip(found.places, found.axes):
-            assert place == pytest.approx(frame[:3, 3], abs=1e-12 * size)
-            assert way == pytest.approx(axis, abs=1e-12)
+            assert place == pytest.approx(
+                (stands @ [*joint.places[1], 1.0])[:3], abs=1e-12 * size)
+            assert way == pytest.approx(stands[:3, :3] @ joint.axes[0], abs=1e-12)
         assert found.position == pytest.approx(zeros[found.name], abs=1e-15)
-        ends = body.joint.travel if form == 'urdf' else sweeps.get(found.name)
         shift = zeros[found.name] - starts[found.name]
-        assert found.limits == (pytest.approx(tuple(end + shift for end in ends), rel=1e-12)
-                                if ends else None)
+        limits = joint.limits
+        if form == 'urdf' and not limits and joint.kind == 'slide':
+            limits = (-1e3, 1e3)
+        assert found.limits == (pytest.approx(tuple(end + shift for end in limits), rel=1e-12)
+                                if limits else None)
     if form == 'urdf':
         assert {joint.kind for joint in joints.values()} <= {'fixed'}
         return
-    assert read.driven == [motor.joint for motor in robot.motors]
-    assert read.follows.keys() == robot.gears.keys()
-    for name, (other, ratio) in robot.gears.items():
+    assert read.driven == robot.driven and read.follows.keys() == robot.follows.keys()
+    for name, (other, ratio, offset) in robot.follows.items():
+        offset += ratio * (starts[other] - zeros[other]) - (starts[name] - zeros[name])
         assert read.follows[name] == (other, pytest.approx(ratio), pytest.approx(
-            zeros[name] - ratio * zeros[other], abs=1e-12))
-    check_loops(robot, form, joints, frames, homes, size)
+            offset, abs=1e-12))
+    check_loops(robot, form, joints, frames, size)
 
 
-def check_loops(robot, form, joints, frames, homes, size):
+def check_loops(robot, form, joints, frames, size):
     """Check that loops are closed where points meet, and nothing else is."""
-    cuts = [point for body in robot.bodies for point in body.points if point.meets]
-    for point in cuts:
+    homes = {point.name: point.body for point in robot.points}
+    for point in (point for point in robot.points if point.meets):
         ends, places = (homes[point.meets], homes[point.name]), None
         if form == 'mjcf':
             cut = joints.pop(point.name)
@@ -191,12 +175,12 @@ def test_random_trees_of_a_file_come_back_in_each_format(tmp_path, seed, form):
         pytest.importorskip('mujoco')
     file = tmp_path / 'tree.urdf'
     file.write_text(random_urdf(np.random.default_rng(seed))[0])
-    robot = model.drawn(readers.read(str(file)))
-    for body in robot.bodies:
-        # What moves in MuJoCo weighs something.
-        body.pieces.append(bodies.Piece(bodies.BALL, 'joint', 0.1, (0.0, 0.0), (0.1, 0.0)))
-    robot.density = 1000.0
-    check_read(robot, form, tmp_path)
+    drawn = model.drawn(readers.read(str(file)))
+    # What moves in MuJoCo weighs something.
+    drawn.parts[0].robot.pieces.update((body, [Piece(BALL, 'joint', 0.1, (0.0, 0.0), (0.1, 0.0))])
+                                       for body in drawn.parts[0].robot.frames)
+    drawn.density = 1000.0
+    check_read(drawn, form, tmp_path)
 
 
 @pytest.mark.parametrize('file', ['four_bar.urdf', 'boom.urdf', 'palletiser.urdf',

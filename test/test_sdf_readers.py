@@ -19,7 +19,8 @@ from itertools import count
 import math
 from xml.sax.saxutils import quoteattr
 
-from linkage_ros.robot_files import readers, spatial
+from linkage_ros.robot_files import readers
+from linkage_ros.robot_model.robot import posed
 import numpy as np
 import pytest
 
@@ -217,7 +218,7 @@ def test_many_robots_are_read_as_they_were(tmp_path):
 
 def turn(robot, name, body, base):
     """Return how a body is turned as seen from another, from where the file has both."""
-    here = spatial.posed(robot, name).frames
+    here = posed(robot, name).frames
     was = np.linalg.inv(robot.frames[base]) @ robot.frames[body]
     return (np.linalg.inv(here[base]) @ here[body])[:3, :3] @ was[:3, :3].T
 

@@ -191,10 +191,9 @@ def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
     given, said, _ = from_robot.described(readers.read(str(file)))
     assert not any(line.startswith('Left out') for line in said)
     # An SDF has its zeros where it starts.
-    zeros = {solid.joint.name: solid.position if form is sdf else 0.0
-             for solid in built.bodies if solid.joint}
-    turns = {solid.joint.name: solid.joint.kind == 'revolute'
-             for solid in built.bodies if solid.joint}
+    joints = [joint for part in built.parts for joint in part.robot.joints]
+    zeros = {joint.name: joint.start if form is sdf else 0.0 for joint in joints}
+    turns = {joint.name: joint.kind == 'hinge' for joint in joints}
     machines = scene.read(given).machines.values()
     for thetas in drives(one, 7):
         wanted = {name: value - zeros[name] for name, value in posed(one, thetas)[0].items()}
@@ -211,12 +210,13 @@ def test_bodies_weigh_what_mujoco_finds_their_shapes_to_weigh():
     text = mjcf.write(built)
     given, shapes = (MuJoCo(text.replace('angle="radian"', f'angle="radian" {by}')).model
                      for by in ('', 'inertiafromgeom="true"'))
-    moving = [given.body(solid.name).id for solid in built.bodies if solid.joint]
+    moving = [given.body(body.name).id for body in built.parts[0].bodies() if body.joint]
     for what in 'body_mass', 'body_ipos', 'body_inertia':
         assert getattr(given, what)[moving] == pytest.approx(getattr(shapes, what)[moving])
     wide = model([simulated('engine')], density=2000.0)
-    assert weight(wide.bodies[1].solid, wide.density).mass == pytest.approx(
-        2.0 * weight(built.bodies[1].solid, built.density).mass)
+    masses = [weight(each.parts[0].robot.solid('m_crank_link'), each.density).mass
+              for each in (wide, built)]
+    assert masses[0] == pytest.approx(2.0 * masses[1])
 
 
 def test_a_start_out_of_reach_is_refused():

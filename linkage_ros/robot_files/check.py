@@ -24,9 +24,9 @@ from typing import Any, Dict, List, Mapping, NamedTuple, Sequence, Set, Tuple
 
 import numpy as np
 
-from .robot import Robot, SLIDE
 from .spatial import Component, components, EXACT, Poses
 from .. import scene
+from ..robot_model.robot import Robot, SLIDE
 
 # Number of paths of several motors, of poses on all paths, and of poses that a check needs.
 PATHS, POSES, FEWEST = 12, 240, 200

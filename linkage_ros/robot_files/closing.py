@@ -19,8 +19,8 @@ from typing import Any, Collection, Dict, List, Mapping, NamedTuple, Sequence, T
 
 import numpy as np
 
-from .robot import FIXED, Robot
-from .spatial import CLOSED, Component, components, DEAD, displaced, posed, Poses, trees
+from .spatial import CLOSED, Component, components, DEAD, Poses
+from ..robot_model.robot import displaced, FIXED, posed, Robot, trees
 from ..words import listed
 
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
@@ -67,7 +67,7 @@ class Closed(NamedTuple):
     report : list of str
         Which motors had to move.
     open_loops : dict
-        For each joint whose loops cannot be closed, the reason.
+        For each joint whose loops cannot be closed, or cannot move, the reason.
     immobile : list of str
         Joints that cannot move.
     faults : dict
@@ -124,9 +124,13 @@ def _closed(robot: Robot) -> Tuple[Closed, Dict[str, float]]:
             outside.update(component.outside(INSIDE))
             continue
         if component.gap(poses)[0] < CLOSED:
-            made.immobile.extend(component.immobile(poses))
-            if fault := _fault(component, poses, names, followers, made.immobile):
-                made.faults.update((joint.name, fault) for joint in component.joints)
+            still = component.immobile(poses)
+            made.immobile.extend(still)
+            is_rigid = {*component.positions} <= {*still}
+            if fault := _rigid(component) if is_rigid else _fault(
+                    component, poses, names, followers):
+                (made.open_loops if is_rigid else made.faults).update(
+                    (joint.name, fault) for joint in component.joints)
                 outside.update(component.outside(INSIDE))
         moves.update(component.moves(poses))
         positions.update((name, float(value[0])) for name, value in component.read(poses).items())
@@ -140,14 +144,15 @@ def option(word: str, values: Mapping[str, str]) -> str:
                                    for name, value in values.items())
 
 
-def _fault(component: Component, poses: Poses, motors: List[str], followers: List[str],
-           immobile: List[str]) -> str:
+def _rigid(component: Component) -> str:
+    """Return that loops cannot move, and what joint may be wrong."""
+    fixed = [joint.name for joint in component.joints if joint.kind == FIXED and joint.is_cut]
+    return 'it cannot move, as its joints hold each other' + (
+        f': {listed(fixed)} makes one body of two, where a pin has the type 3d' if fixed else '')
+
+
+def _fault(component: Component, poses: Poses, motors: List[str], followers: List[str]) -> str:
     """Return why motors and their followers do not determine a pose; empty if they do."""
-    if {*component.positions} <= {*immobile}:
-        rigid = [joint.name for joint in component.joints if joint.kind == FIXED and joint.is_cut]
-        return 'it cannot move, as its joints hold each other' + (
-            f': {listed(rigid)} makes one body of two, where a pin has the type 3d'
-            if rigid else '')
     ways = component.free_ways(poses, component.columns_of([]))[:, component.columns_of(motors)]
     count = int(np.linalg.matrix_rank(ways, 1e-6)) if ways.size else 0
     if count < len(motors):

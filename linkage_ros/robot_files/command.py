@@ -19,10 +19,20 @@ from typing import Any, Collection, Dict, List, Mapping, Optional, Sequence, Tup
 
 import numpy as np
 
-from . import check, closing, loops, model, planar, readers, rods, spatial
-from .robot import FARTHEST, FIXED, HINGE, Joint, NotDriven, Robot, SLIDE
+from . import check, closing, loops, model, planar, readers, rods
 from .. import command, scene
 from ..linkage import short
+from ..robot_model.robot import (
+    FARTHEST,
+    FIXED,
+    HINGE,
+    Joint,
+    NotDriven,
+    posed,
+    Robot,
+    SLIDE,
+    trees,
+)
 from ..scene.writing import in_yaml
 from ..words import elided, listed, sentence
 
@@ -53,7 +63,7 @@ def show(args: Optional[List[str]]) -> None:
         robot = readers.read(asked.file, asked.loops)
         robot.driven = asked.driven or robot.driven
         robot.check_names(asked.driven or ())
-        robot = spatial.posed(robot, _values(asked.pose))
+        robot = posed(robot, _values(asked.pose))
         robot = closing.held(robot, {**robot.held, **_values(asked.hold)})
         given, reports, still = described(robot, [*_values(asked.pose)])
     # Unprintable characters in names of the file could end a comment.
@@ -127,7 +137,7 @@ def described(robot: Robot, given_pose: Collection[str] = ()
     if not given['mechanisms']:
         raise command.RequestError(' '.join(reports) or 'no joint of this robot closes a loop')
     machines = scene.read(given).machines
-    tree = {joint.name for _, joint in spatial.trees(robot)[0].values()}
+    tree = {joint.name for _, joint in trees(robot)[0].values()}
     stay = {*closed.immobile, *(name for made in imported for name in made.still)}
     still = {name: value for name, value in robot.positions.items()
              if name in tree & stay - check.published(machines)}
@@ -136,7 +146,7 @@ def described(robot: Robot, given_pose: Collection[str] = ()
         machines = scene.read({**given, **rest, 'mechanisms': [*machines, model.OTHERS]}).machines
     if lost:
         reports.append(model.not_published(lost))
-    if free := [joint.name for _, joint in spatial.trees(robot)[0].values()
+    if free := [joint.name for _, joint in trees(robot)[0].values()
                 if joint.name and joint.kind not in (HINGE, SLIDE, FIXED)]:
         reports.append(f'Not published: {", ".join(free)}: a ball or a free joint has no one '
                        'position. The model of the robot has them fixed where the file has them.')

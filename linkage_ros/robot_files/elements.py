@@ -19,9 +19,9 @@ from xml.parsers import expat
 
 import numpy as np
 
-from .robot import FARTHEST, FIXED, Robot
 from ..command import RequestError
-from ..robot_model.bodies import pose
+from ..robot_model.places import pose
+from ..robot_model.robot import FARTHEST, FIXED, Robot
 
 Element = ElementTree.Element
 
@@ -90,13 +90,6 @@ def origin(part: Optional[Element]) -> np.ndarray:
     if part is None:
         return np.eye(4)
     return pose(*numbers(f'{part.get("xyz", "0 0 0")} {part.get("rpy", "0 0 0")}', 6))
-
-
-def at(place: Any, turned: Any = ((1, 0, 0), (0, 1, 0), (0, 0, 1))) -> np.ndarray:
-    """Return a pose by its place and its rotation matrix."""
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = turned, place
-    return made
 
 
 def turned_by(quaternion: Any) -> np.ndarray:

@@ -17,9 +17,9 @@ from typing import Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE
-from .spatial import blocks, EXACT, TOGETHER, top, trees
+from .spatial import blocks, EXACT, TOGETHER
 from ..linkage import ROUNDING
+from ..robot_model.robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE, top, trees
 
 # Kinds of joints in planar loops.
 FLAT = (HINGE, SLIDE, BALL)

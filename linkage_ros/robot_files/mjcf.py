@@ -29,9 +29,10 @@ from mujoco import (
 )
 import numpy as np
 
-from .elements import at, turned_by
-from .robot import BALL, FIXED, HINGE, Robot, SLIDE
+from .elements import turned_by
 from ..command import RequestError
+from ..robot_model.places import at
+from ..robot_model.robot import BALL, FIXED, HINGE, Robot, SLIDE
 
 # What MuJoCo says of a file, and the sentence for it.
 _ERRORS = [

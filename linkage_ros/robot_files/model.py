@@ -15,16 +15,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
-import numpy as np
-
 from . import closing, readers
 from .check import published
-from .elements import at, parse
-from .robot import FARTHEST, HINGE, Robot, SLIDE
-from .spatial import components, posed, trees
+from .elements import parse
+from .spatial import components
 from .. import scene
 from ..robot_model import bodies
-from ..robot_model.bodies import coordinates
+from ..robot_model.robot import posed, Robot, trees
 from ..robot_model.urdf import write
 from ..scene.joint_names import quoted_name
 
@@ -42,26 +39,11 @@ def urdf(robot: Robot) -> str:
     return write(drawn(robot))
 
 
-def drawn(robot: Robot) -> bodies.Robot:
-    """Return the tree of a robot as what all formats are written from, its joints at zero."""
+def drawn(robot: Robot) -> bodies.Model:
+    """Return the tree of a robot as a model that is written, its joints at zero."""
     names = {joint.name for _, joint in trees(robot)[0].values()}
-    robot = posed(robot, {name: 0.0 for name in robot.positions if name in names})
-    found = []
-    for body, (base, joint) in trees(robot)[0].items():
-        frame, seen = robot.frames[body], np.linalg.inv(robot.frames[base])
-        if joint.kind in (HINGE, SLIDE) and joint.position is not None:
-            # The frame of a joint is that of its child.
-            home = at(joint.place(base), frame[:3, :3])
-            child = body if np.array_equal(home, frame) else f'{body}/joint'
-            kind = 'prismatic' if joint.kind == SLIDE else 'revolute'
-            ends = joint.limits or ((-FARTHEST, FARTHEST) if joint.kind == SLIDE else ())
-            axis = home[:3, :3].T @ joint.motion(body)
-            found.append(bodies.Body(child, base, coordinates(seen @ home), bodies.Joint(
-                joint.name, kind, axis.tolist(), tuple(np.clip(ends, -1e3, 1e3).tolist()))))
-            base, seen = child, np.linalg.inv(home)
-        if base != body:
-            found.append(bodies.Body(body, base, coordinates(seen @ frame)))
-    return bodies.Robot('robot', robot.root, [bodies.Part(found)])
+    return bodies.Model('robot', robot.root, [bodies.Part(posed(robot, {
+        name: 0.0 for name in robot.positions if name in names}))])
 
 
 def not_published(names: Sequence[str]) -> str:

@@ -24,11 +24,11 @@ from typing import Any, Dict, Iterator, List, Optional, Sequence, Set, Tuple
 import numpy as np
 
 from . import check, loops, sweeps
-from .robot import Joint, Limits, NotDriven, plain, Robot, SLIDE
 from .sweeps import Source
 from .. import mechanisms, scene
 from ..linkage import bar_name, Dyads, Hinge, Mechanism, Motor, Pin, ROUNDING, short, Slide
-from ..robot_model.bodies import coordinates
+from ..robot_model.places import coordinates
+from ..robot_model.robot import Joint, Limits, NotDriven, plain, Robot, SLIDE
 from ..scene.joint_names import quoted_name
 
 # The most joints of which pairs are tried as motors.

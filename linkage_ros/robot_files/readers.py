@@ -18,9 +18,9 @@ from typing import Any, Iterator, Mapping, Optional
 
 from . import sdf, urdf
 from .elements import parse
-from .robot import Robot
 from ..command import RequestError
 from ..optional import needs
+from ..robot_model.robot import Robot
 
 
 def read(path: str, loops: Optional[str] = None) -> Robot:

@@ -25,11 +25,11 @@ from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Set, 
 
 import numpy as np
 
-from . import check, sweeps
+from . import check
 from .loops import Group
-from .robot import BALL, HINGE, Joint, NotDriven, plain, Robot, SLIDE
 from .. import mechanisms, scene
 from ..linkage import FORMS, short, WindowError
+from ..robot_model.robot import BALL, HINGE, Joint, Limits, NotDriven, plain, Robot, SLIDE
 from ..scene.joint_names import quoted_name
 from ..words import listed
 
@@ -37,8 +37,8 @@ from ..words import listed
 _ANY = 0.999 * math.pi
 # The least sine of an angle that places a hinge of a universal joint.
 _SQUARE = 0.1
-# Number of poses along each side of the motors' ranges.
-_SIDE = 7
+# Number of poses along each side of the motors' ranges, and how these are made smaller.
+_SIDE, _SMALLER, _TRIES = 13, 0.85, 40
 
 
 class Rods:
@@ -240,11 +240,12 @@ def described(robot: Robot, group: Group, others: Sequence[str]) -> check.Import
         f'Left out: the limits of {joint.name}, {why}.' for link, joint in found.links.items()
         if link not in {*found.inputs, *found.universals}
         and (why := joint.no_limits or found.one_sided(joint))]
-    reports += sweeps.added(given, name, [
-        sweeps.Source(link, joint.name, 1.0, found.zeros[link] - joint.start, found.zeros[link])
-        for link, joint in found.inputs.items()], limits, machine.inputs)
+    ends = _ranges(machine, found, limits)
+    for link, joint in found.inputs.items():
+        sweep = [end + machine.inputs[link].offset for end in ends[joint.name]]
+        given[f'{name}.{link}.sweep'] = [float(short(end)) for end in sweep]
+        given[f'{name}.{link}.start'] = min(max(found.zeros[link], sweep[0]), sweep[1])
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
-    ends = _ranges(machine, found)
     report, ranges, _ = check.compared(
         robot, machine, [joint.name for joint in found.inputs.values()], ends, 0.0)
     return check.Imported(name, given, [*reports, report, *_corners(machine, found)], ranges,
@@ -263,29 +264,29 @@ def _lines(found: Rods) -> Tuple[List[str], List[str]]:
         ranges = ', '.join(f'{name} from {low + zero:.4g} to {high + zero:.4g}'
                            for name, (low, high) in error.limits.items()
                            for zero in [found.links[name].start])
+        angles = ' (angles from the pose of the file)' * (' at ' in error.problem)
         return found.lines(limits=error.limits), [
-            f'Limits: inside those of the file, or without any, there may be a second pose; these '
-            f'are the largest shown to have one at most: {ranges}.']
+            f'Limits: {error.problem}{angles}; these are the largest proved to have one pose at '
+            f'most: {ranges}.']
 
 
-def _ranges(machine: scene.SceneMechanism, found: Rods) -> Dict[str, Tuple[float, float]]:
-    """Return ranges of the motors' positions in which every pose exists."""
-    names = [*machine.inputs]
-    start = np.array([machine.inputs[name].start for name in names])
-    sizes = np.array([2.5 if machine.linkage.is_angle(name) else 0.5 * x
-                      for name, x in zip(names, start)])
-    share = 1.0
-    for _ in range(40):
-        axes = [np.linspace(x - share * size, x + share * size, _SIDE)
-                for x, size in zip(start, sizes)]
-        values = np.array([each.ravel() for each in np.meshgrid(*axes)])
+def _ranges(machine: scene.SceneMechanism, found: Rods, limits: Mapping[str, Limits]
+            ) -> Dict[str, Tuple[float, float]]:
+    """Return the motors' limits, made smaller until every pose in them exists."""
+    places = [(joint.name, drive.start - drive.offset, drive.offset)
+              for joint, drive in zip(found.inputs.values(), machine.inputs.values())]
+    low, high = np.array([limits.get(name, (-math.inf, math.inf))[:2] for name, *_ in places]).T
+    start, zero = np.array([place[1:] for place in places]).T
+    start = np.clip(start, low, high)
+    size = np.array([2.5 if drive.input.turns else 0.5 * drive.start
+                     for drive in machine.inputs.values()])
+    for share in _SMALLER ** np.arange(_TRIES):
+        ends = np.clip(start - share * size, low, high), np.clip(start + share * size, low, high)
+        values = np.meshgrid(*np.linspace(*ends, _SIDE).T + zero[:, None])
         angles = machine.linkage.joint_angles(values if len(values) > 1 else values[0])
         if np.isfinite(list(angles.values())).all():
             break
-        share *= 0.85
-    return {joint.name: (x - share * size - zero, x + share * size - zero)
-            for (name, joint), x, size in zip(found.inputs.items(), start, sizes)
-            for zero in [machine.inputs[name].offset]}
+    return {name: each for (name, *_), each in zip(places, zip(*map(np.ndarray.tolist, ends)))}
 
 
 def _corners(machine: scene.SceneMechanism, found: Rods) -> Iterator[str]:

@@ -20,9 +20,10 @@ from xml.etree.ElementTree import SubElement
 
 import numpy as np
 
-from .elements import at, attribute, Element, numbers, once, parse, pose, text, turned_by, weld
-from .robot import HINGE, KINDS, Robot, UNIVERSAL
+from .elements import attribute, Element, numbers, once, parse, text, turned_by, weld
 from ..command import RequestError
+from ..robot_model.places import at, pose
+from ..robot_model.robot import HINGE, KINDS, Robot, UNIVERSAL
 
 
 def read(path: str, root: Element) -> Robot:

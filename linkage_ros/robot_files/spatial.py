@@ -18,21 +18,21 @@ has it: a product of screws along a tree of joints; joints that are not in the t
 
 from __future__ import annotations
 
-from dataclasses import replace
 import math
 from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Sequence, Set, Tuple
 
 import numpy as np
 
-from .robot import BALL, FIXED, FREE, HINGE, Joint, Robot, SLIDE
 from ..command import RequestError
+from ..robot_model.places import displacements, screws
+from ..robot_model.robot import BALL, FIXED, FREE, HINGE, Joint, Robot, SLIDE, trees
 
 # The largest step of an iteration [rad, or of the size].
 STRIDE = 0.5
 # The last step [rad, or of the size]: steps square, so that the next would be rounding.
 STILL = 1e-8
 # The most bodies of one component.
-MOST = 100
+MOST = 150
 # Hinges nearer to each other [m] cross in a point.
 TOGETHER = 1e-6
 # Loops open by less, of their size, are closed.
@@ -41,8 +41,6 @@ CLOSED = 1e-10
 EXACT = 1e-9
 # Loops that are less stiff, of their size, are at a dead point.
 DEAD = 1e-6
-# The order of joints in the tree, which leaves hinges and balls to close the loops.
-_TREE = {FIXED: 0, SLIDE: 1, FREE: 2, BALL: 3, HINGE: 4}
 
 
 class Element(NamedTuple):
@@ -65,77 +63,6 @@ class Poses(NamedTuple):
     def some(self, which: Any) -> 'Poses':
         """Return some of the poses."""
         return Poses(self.positions[which], self.moved[which])
-
-
-def top(home: Dict[str, str], body: str) -> str:
-    """Return the body that represents a set of joined bodies."""
-    while home[body] != body:
-        home[body] = body = home[home[body]]
-    return body
-
-
-def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
-    """Return the parent and the joint of each body, and the joints that close loops."""
-    home = {body: body for body in robot.frames}
-    near: Dict[str, List[Tuple[str, Joint]]] = {body: [] for body in robot.frames}
-    cuts = []
-    for joint in sorted(robot.joints, key=lambda joint: (
-            joint.is_cut, joint.name not in robot.driven, _TREE.get(joint.kind, 1))):
-        ends = [top(home, body) for body in joint.bodies]
-        if joint.is_cut or ends[0] == ends[1]:
-            cuts.append(joint)
-            continue
-        home[ends[1]] = ends[0]
-        for body, other in (joint.bodies, joint.bodies[::-1]):
-            near[body].append((other, joint))
-    found: Dict[str, Tuple[str, Joint]] = {}
-    for start in (robot.root, *robot.frames):
-        if start != robot.root and start not in found:
-            # A body that only cuts connect.
-            places = [robot.frames[start][:3, 3]] * 2
-            found[start] = robot.root, Joint('', FREE, (robot.root, start), places, places)
-        row = [start]
-        for body in row:
-            for other, joint in near[body]:
-                if other != robot.root and other not in found:
-                    found[other] = body, joint
-                    row.append(other)
-    return found, cuts
-
-
-def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[str, float]
-              ) -> Robot:
-    """Return a robot with some bodies displaced on their parents, and new positions of joints."""
-    moved = {robot.root: np.eye(4)}
-    for body, (base, _) in trees(robot)[0].items():
-        moved[body] = moved[base] @ moves[body] if body in moves else moved[base]
-    joints = []
-    for joint in robot.joints:
-        ends = [moved[body] for body in joint.bodies]
-        joints.append(replace(
-            joint, places=tuple(end[:3, :3] @ place + end[:3, 3]
-                                for end, place in zip(ends, joint.places)),
-            axes=tuple(end[:3, :3] @ axis for end, axis in zip(ends, joint.axes)),
-            turns=tuple(end[:3, :3] @ turn for end, turn in zip(ends, joint.turns)),
-            position=positions.get(joint.name, joint.position)
-            if joint.position is not None else None))
-    return replace(robot, joints=joints, frames={
-        body: moved[body] @ frame for body, frame in robot.frames.items()})
-
-
-def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
-    """Return a robot with some joints moved; raise RequestError for an unknown joint."""
-    robot.check_names(values)
-    tree, moves = trees(robot)[0], {}
-    names = {joint.name for _, joint in tree.values()}
-    if cuts := [name for name in values if name not in names]:
-        raise RequestError(f'{cuts[0]} closes a loop, so that other joints say where it is')
-    for body, (base, joint) in tree.items():
-        if joint.name in values and joint.position is not None:
-            slides, change = joint.kind == SLIDE, np.array(values[joint.name] - joint.position)
-            screw = screws(joint.motion(body), joint.place(base), slides)
-            moves[body] = displacements(screw, change, slides)
-    return displaced(robot, moves, values)
 
 
 def blocks(found: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
@@ -512,18 +439,3 @@ class Component:
                 found[cut.name] = cut.position + np.arctan2(
                     np.cross(across, ahead) @ cut.axis, ahead @ across)
         return found
-
-
-def screws(axes: np.ndarray, places: np.ndarray, slides: Any = False) -> np.ndarray:
-    """Return the velocities (..., 4, 4) of unit motions about axes at places, or along them."""
-    made = np.zeros((*axes.shape[:-1], 4, 4))
-    slides = np.asarray(slides)[..., None]
-    made[..., :3, :3] = np.where(slides[..., None], 0.0, np.cross(np.eye(3), axes[..., None, :]))
-    made[..., :3, 3] = np.where(slides, axes, np.cross(places, axes))
-    return made
-
-
-def displacements(screw: np.ndarray, by: np.ndarray, slides: Any = False) -> np.ndarray:
-    """Return displacements by positions [rad or m] of screws: their exponentials."""
-    sine, less = np.where(slides, by, np.sin(by)), 1.0 - np.cos(by)
-    return np.eye(4) + sine[..., None, None] * screw + less[..., None, None] * (screw @ screw)

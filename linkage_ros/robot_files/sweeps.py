@@ -15,9 +15,9 @@ from __future__ import annotations
 import math
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-from .robot import Limits
 from .. import scene
 from ..linkage import ROUNDING, short
+from ..robot_model.robot import Limits
 from ..scene import FARTHEST
 
 # Why no motion is within limits.

@@ -11,10 +11,10 @@
 """
 Robots in URDF, with the ways in which tools write the loops that it has no word for.
 
-Sources: https://wiki.ros.org/urdf/XML; urdfdom #264 (`constraint`); RigidBodyDynamics.jl, Isaac
-Sim and Drake (`loop_joint`, `drake:`); URDF+ of generalized_rbda (`loop`); Gazebo's tutorial on
-kinematic loops (`gazebo`); onshape-to-robot's documentation (`closing_`); example-parallel-robots
-(`closed_loop`); solidworks_urdf_exporter2 (`closures`); Robonex (`pin_loops`, `ball_loops`).
+Sources: https://wiki.ros.org/urdf/XML; RigidBodyDynamics.jl, Isaac Sim and Drake (`loop_joint`,
+`drake:`); URDF+ of generalized_rbda (`loop`); Gazebo's tutorial on kinematic loops (`gazebo`);
+onshape-to-robot's documentation (`closing_`); example-parallel-robots (`closed_loop`);
+solidworks_urdf_exporter2 (`closures`); Robonex (`pin_loops`, `ball_loops`).
 """
 
 from __future__ import annotations
@@ -24,9 +24,10 @@ from typing import Any, Dict, Iterable, List, Mapping, Sequence, Tuple
 
 import numpy as np
 
-from .elements import at, attribute, Element, numbers, once, origin, pose, text, weld
-from .robot import BALL, FIXED, HINGE, KINDS, Robot, UNIVERSAL
+from .elements import attribute, Element, numbers, once, origin, text, weld
 from ..command import RequestError
+from ..robot_model.places import at, pose
+from ..robot_model.robot import BALL, FIXED, HINGE, KINDS, Robot, UNIVERSAL
 from ..words import listed, meant, quoted
 
 _ENDS = ('name', 'parent', 'child', 'parent_xyz', 'child_xyz', 'axis')
@@ -116,25 +117,18 @@ class Reader:
 
     def _of_elements(self) -> None:
         """Add the loops that elements of the URDF close."""
-        for cut in (*self._root.findall('constraint'), *self._root.findall('loop_joint'),
-                    *self._root.findall('loop')):
-            # An example of Isaac Sim has an empty one first.
-            for empty in [part for part in cut if part.tag in ('link1', 'link2')
-                          and not part.get('link')]:
-                cut.remove(empty)
-            tags = next((tags for tags in (('link1', 'link2'), ('predecessor', 'successor'))
-                         if cut.find(tags[0]) is not None), ('parent', 'child'))
-            own = [origin(next((part for part in map(cut.find, (
-                f'{tag}_origin', f'{tag}/origin', tag)) if part is not None), None))
-                for tag in tags]
-            axes = [numbers(attribute(cut, 'axis', 'xyz', '0 0 1'))]
-            if attribute(cut, f'{tags[0]}_axis', 'xyz'):
-                # These are in the frames of links, not in that of the joint.
-                axes = [frame[:3, :3].T @ numbers(way) for tag, frame in zip(tags, own)
-                        if (way := attribute(cut, f'{tag}_axis', 'xyz'))]
-            self.robot.close(
-                cut.get('name', ''), cut.get('type', ''),
-                (attribute(cut, tags[0], 'link'), attribute(cut, tags[1], 'link')), own, *axes)
+        for tag, ends in (('loop_joint', ('link1', 'link2')), (
+                'loop', ('predecessor', 'successor'))):
+            for cut in self._root.findall(tag):
+                # An example of Isaac Sim has an empty end first.
+                parts = [part for end in ends if (part := cut.find(f'{end}[@link]')) is not None]
+                if len(parts) < 2:
+                    raise RequestError(f'{tag} {cut.get("name")} has no {ends[0]} or {ends[1]}')
+                self.robot.close(
+                    cut.get('name', ''), cut.get('type', ''),
+                    (parts[0].attrib['link'], parts[1].attrib['link']),
+                    [origin(part if part.find('origin') is None else part.find('origin'))
+                     for part in parts], numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
         for cut in self._root.findall('ball_constraint'):
             one, other = (attribute(cut, f'ball_constraint_body_{end}', 'name') for end in 'AB')
             self.robot.close(f'{one}={other}', BALL, (one, other), [

@@ -18,11 +18,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
-from typing import Dict, Iterator, NamedTuple, Sequence, Tuple
+from typing import Dict, Tuple
 
 import numpy as np
 
-from .bodies import BALL, Body, BOX, Joint, Motor, Part, Piece, Point, pose, Robot, ROD, size
+from .bodies import Model, size
+from .pieces import Point, weight
+from .robot import posed, Robot, SLIDE
 from ..scene import SceneError, SceneMechanism
 from ..scene.motion import Motion
 
@@ -30,43 +32,43 @@ from ..scene.motion import Motion
 DENSITY = 2700.0
 
 
-class Weight(NamedTuple):
-    """Mass [kg], centre of mass x, y [m], moments of inertia about it xx, yy, zz, xy [kg m^2]."""
-
-    mass: float
-    centre: Tuple[float, float]
-    moments: Sequence[float]
-
-
-def assembled(robot: Robot, density: float = DENSITY) -> Robot:
+def assembled(model: Model, density: float = DENSITY) -> Model:
     """Return a robot model at the start of its inputs; raise SceneError if there is no pose."""
-    homes = {point.name: (body.name, point.place) for body in robot.bodies
-             for point in body.points}
-    made = replace(robot, parts=[], motors=[], gears={}, density=density)
-    for part in robot.parts:
-        if not (machine := part.machine):
-            made.parts.append(part)
-            continue
-        starts = {name: Motion.of(drive).at(0)[0] for name, drive in machine.inputs.items()}
-        positions, rates = _solved(machine, starts)
-        bodies = []
-        for body in (*part.bodies, *_slots(machine, part.bodies, positions)):
-            home, (x, y) = homes.get(body.parent, (body.parent, (0.0, 0.0)))
-            u, v, *turned = body.pose
-            bodies.append(replace(body, parent=home, pose=(u + x, v + y, *turned), position=(
-                positions.get(body.joint.name, 0.0) if body.joint else 0.0)))
-        made.parts.append(Part(bodies, machine))
-        tips = {link.name: link.tip for link in machine.linkage.links}
-        mass = sum(weight(body.solid, density).mass for body in bodies[1:])
-        for name, drive in machine.inputs.items():
-            joint = machine.joints[name]
-            arm = math.hypot(*machine.linkage.frames[name][tips[name]])
-            ends = sorted(map(joint.of, drive.sweep or ()))
-            made.motors.append(Motor(joint.name, drive.input.turns, joint.of(starts[name]), ends,
-                                     mass, machine.scale * arm if arm else size(machine)))
-        made.gears.update((name, max(rates[name].items(), key=lambda item: abs(item[1])))
-                          for name in rates)
+    homes = {point.name: point for part in model.parts for point in part.robot.points}
+    made = replace(model, parts=[], density=density)
+    for part in model.parts:
+        base, place = part.base, part.pose
+        if base in homes:
+            (x, y), (u, v, *turned) = homes[base].place, place
+            base, place = homes[base].body, (u + x, v + y, *turned)
+        made.parts.append(replace(part, base=base, pose=place, robot=_started(
+            part.robot, part.machine, density) if part.machine else part.robot))
     return made
+
+
+def _started(robot: Robot, machine: SceneMechanism, density: float) -> Robot:
+    """Return the robot of a mechanism at the start of its inputs, with motors and gears."""
+    starts = {name: Motion.of(drive).at(0)[0] for name, drive in machine.inputs.items()}
+    positions, rates = _solved(machine, starts)
+    robot = posed(replace(robot, points=[*robot.points], driven=[], servos={}, follows={}), {
+        name: value for name, value in positions.items() if name in robot.positions})
+    _add_slots(machine, robot)
+    tips = {link.name: link.tip for link in machine.linkage.links}
+    mass = sum(weight(robot.solid(body), density).mass for body in [*robot.frames][1:])
+    sweeps = {}
+    for name, drive in machine.inputs.items():
+        joint = machine.joints[name]
+        arm = math.hypot(*machine.linkage.frames[name][tips[name]])
+        if drive.sweep:
+            low, high = sorted(map(joint.of, drive.sweep))
+            sweeps[joint.name] = low, high
+        robot.driven.append(joint.name)
+        robot.servos[joint.name] = mass, machine.scale * arm if arm else size(machine)
+    robot.joints = [replace(joint, limits=sweeps.get(joint.name)) for joint in robot.joints]
+    for name, each in rates.items():
+        other, ratio = max(each.items(), key=lambda item: abs(item[1]))
+        robot.follow(name, other, ratio, positions[name] - ratio * positions[other])
+    return robot
 
 
 def _solved(machine: SceneMechanism, starts: Dict[str, float]
@@ -93,47 +95,15 @@ def _solved(machine: SceneMechanism, starts: Dict[str, float]
             for name, value in values.items()}, rates
 
 
-def _slots(machine: SceneMechanism, bodies: Sequence[Body], positions: Dict[str, float]
-           ) -> Iterator[Body]:
-    """Yield the bodies in slots of yokes, which have no joint in the tree."""
-    at: Dict[str, np.ndarray] = {}
-    for body in bodies:
-        own = pose(*replace(
-            body, position=positions[body.joint.name] if body.joint else 0.0).start)
-        at[body.name] = at[body.parent] @ own if at else np.eye(4)
-    points = {point.name: (at[body.name] @ (*point.place, 0.0, 1.0), point)
-              for body in bodies for point in body.points}
+def _add_slots(machine: SceneMechanism, robot: Robot) -> None:
+    """Add the bodies in slots of yokes, which have no joint in the tree."""
+    points = {point.name: point for point in robot.points}
     for prefix in machine.assembly().legs:
         for link, pin in machine.linkage.yokes.items():
-            name = f'{machine.name}_{prefix}{link}'
-            place, point = points[f'{machine.name}_{prefix}{pin}']
-            x, y = np.linalg.solve(at[f'{name}_link'], place)[:2].tolist()
-            joint = Joint(f'{name}_slot', 'prismatic', (1.0, 0.0, 0.0))
-            met = Point(f'{name}_pin', (0.0, 0.0), point.name, point.radius)
-            yield Body(f'{name}_slot_link', f'{name}_link', (x, y, 0.0, 0.0, 0.0, 0.5 * math.pi),
-                       joint, [], [met])
-
-
-def weight(pieces: Sequence[Piece], density: float) -> Weight:
-    """Return the common weight of one or more pieces of a density [kg/m^3]."""
-    solids = np.array([_solid(piece) for piece in pieces])
-    masses = density * solids[:, 0]
-    mass = float(masses.sum())
-    x, y = masses @ [piece.pose[:2] for piece in pieces] / mass
-    moments = np.zeros(4)
-    for own, (along, across), piece in zip(masses, masses[:, None] * solids[:, 1:], pieces):
-        u, v, *_, angle = piece.pose
-        u, v, c, s = u - x, v - y, math.cos(angle), math.sin(angle)
-        moments += (along * c * c + across * s * s + own * v * v,
-                    along * s * s + across * c * c + own * u * u,
-                    across + own * (u * u + v * v), (along - across) * c * s - own * u * v)
-    return Weight(mass, (float(x), float(y)), moments.tolist())
-
-
-def _solid(piece: Piece) -> Tuple[float, float, float]:
-    """Return the volume [m^3], and the squares of radii of gyration about and across it [m^2]."""
-    thick, long = piece.thickness ** 2, piece.length ** 2 / 12.0
-    return {ROD: (math.pi * thick * piece.length, 0.5 * thick, 0.25 * thick + long),
-            BOX: (thick * piece.length, thick / 6.0, thick / 12.0 + long),
-            BALL: (4.0 / 3.0 * math.pi * piece.thickness ** 3, 0.4 * thick, 0.4 * thick)
-            }[piece.shape]
+            name, point = (f'{machine.name}_{prefix}{end}' for end in (link, pin))
+            place = robot.frames[points[point].body] @ (*points[point].place, 0.0, 1.0)
+            x, y = np.linalg.solve(robot.frames[f'{name}_link'], place)[:2].tolist()
+            robot.hang(f'{name}_slot_link', f'{name}_link', (x, y, 0.0, 0.0, 0.0, 0.5 * math.pi),
+                       SLIDE, (1.0, 0.0, 0.0), None, f'{name}_slot')
+            robot.points.append(Point(f'{name}_pin', f'{name}_slot_link', (0.0, 0.0), point,
+                                      points[point].radius))

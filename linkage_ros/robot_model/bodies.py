@@ -27,17 +27,19 @@ Legs of a walker have their prefix before link and point, and one crank for all 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 import math
-from typing import Any, Dict, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterable, Iterator, List, Optional, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
 from . import shapes
 from .output_range import common_reach, ground_frame, Travel, travels
+from .pieces import BALL, BOX, Piece, Place, Point, ROD
+from .robot import Body, HINGE, Robot, SLIDE
 from .. import palette
 from ..linkage import GROUND, Link
 from ..scene import SceneError, SceneMechanism
@@ -55,154 +57,44 @@ BAR, JOINT, BARREL, GUIDE, BLOCK = 1 / 80, 1 / 40, 1 / 32, 1 / 80, 1 / 20
 # Range of sizes [m] that displays can draw in single precision.
 SMALLEST, LARGEST = 1e-30, 1e30
 
-# Names of shapes in all formats.
-ROD, BOX, BALL = 'cylinder', 'box', 'sphere'
-Place = Tuple[float, float]
-
-
-class Piece(NamedTuple):
-    """A visible shape of a body, from start to end [m], with a radius or a box's sizes [m]."""
-
-    shape: str
-    colour: str
-    thickness: float
-    start: Place
-    end: Place
-
-    @property
-    def length(self) -> float:
-        """Its length [m]."""
-        return math.dist(self.start, self.end)
-
-    @property
-    def pose(self) -> Tuple[float, ...]:
-        """Its middle x, y, z [m], roll, pitch, yaw [rad]; pitch lays a cylinder's z along x."""
-        (x, y), (u, v) = self.start, self.end
-        return (0.5 * (x + u), 0.5 * (y + v), 0.0,
-                0.0, 0.5 * math.pi if self.shape == ROD else 0.0, math.atan2(v - y, u - x))
-
-    @property
-    def sizes(self) -> Dict[str, Tuple[float, ...]]:
-        """Its sizes [m], by their names in URDF and SDF."""
-        if self.shape == BOX:
-            return {'size': (self.length, self.thickness, self.thickness)}
-        length = {'length': (self.length,)} if self.shape == ROD else {}
-        return {'radius': (self.thickness,), **length}
-
-
-class Point(NamedTuple):
-    """A joint of the linkage on a body; `meets` is the coinciding point if a loop was cut here."""
-
-    name: str
-    place: Place
-    meets: str
-    radius: float
-
-    def ball(self, place: Place = (0.0, 0.0)) -> Piece:
-        """Return its visible ball, at a place in its own frame or in another."""
-        return Piece(BALL, 'joint', self.radius, place, place)
-
-
-class Joint(NamedTuple):
-    """The joint of a body: rotation about an axis or slide along it, with optional limits."""
-
-    name: str
-    kind: str
-    axis: Sequence[float]
-    travel: Optional[Travel] = None
-
-    def motion(self, position: float) -> np.ndarray:
-        """Return the displacement by a position [rad or m] as a matrix (4, 4)."""
-        made, axis = np.eye(4), np.asarray(self.axis, float)
-        if self.kind == 'prismatic':
-            made[:3, 3] = position * axis
-        else:
-            skew = np.cross(np.eye(3), axis)
-            made[:3, :3] += math.sin(position) * skew + (1.0 - math.cos(position)) * skew @ skew
-        return made
-
-
-class Motor(NamedTuple):
-    """The motor of an input: start, sweep if any, moved mass [kg] and arm [m]."""
-
-    joint: str
-    turns: bool
-    start: float
-    sweep: Sequence[float]
-    mass: float
-    arm: float
-
-
-@dataclass
-class Body:
-    """
-    A body.
-
-    Attributes
-    ----------
-    parent : str
-        The body, or the point of one, that it hangs on.
-    pose : sequence of float
-        x, y, z [m], roll, pitch, yaw [rad] on its parent with its joint at zero.
-    position : float
-        The position of its joint where a simulation starts [rad or m].
-
-    """
-
-    name: str
-    parent: str
-    pose: Sequence[float]
-    joint: Optional[Joint] = None
-    pieces: List[Piece] = field(default_factory=list)
-    points: List[Point] = field(default_factory=list)
-    position: float = 0.0
-
-    @property
-    def start(self) -> Sequence[float]:
-        """Return its pose on its parent where a simulation starts."""
-        return coordinates(pose(*self.pose) @ self.joint.motion(self.position)) \
-            if self.joint else self.pose
-
-    @property
-    def solid(self) -> List[Piece]:
-        """Return what is seen of it and of its points."""
-        return [*self.pieces, *(point.ball(point.place) for point in self.points)]
-
 
 @dataclass(eq=False)
 class Part:
-    """The bodies of one mechanism, or of a robot's file; parents first."""
+    """The robot of one mechanism, whose root stands on a link of another; or that of a file."""
 
-    bodies: List[Body]
+    robot: Robot
+    base: str = ''
+    pose: Sequence[float] = ()
     machine: Optional[SceneMechanism] = None
+
+    def bodies(self) -> Iterator[Body]:
+        """Yield its bodies, parents first, with the root if it stands on a link."""
+        if self.base:
+            yield Body(self.robot.root, self.base, self.pose)
+        yield from self.robot.bodies()
 
     @cached_property
     def joints(self) -> List[str]:
         """Return the names of all joints, including fixed ones."""
-        return [name for body in self.bodies for name in (
-            body.joint.name if body.joint else f'{body.name}_fixed',
-            *(f'{point.name}_fixed' for point in body.points))]
+        robot = self.robot
+        return [f'{robot.root}_fixed', *(f'{point.name}_fixed' for point in robot.points),
+                *(joint.name for joint in robot.joints)]
 
     @cached_property
     def links(self) -> List[str]:
         """Return the names of the bodies and their points."""
-        return [name for body in self.bodies for name in (
-            body.name, *(point.name for point in body.points))]
+        return [*self.robot.frames, *(point.name for point in self.robot.points)]
 
 
 @dataclass
-class Robot:
+class Model:
     """
-    Bodies below a root link without a body: what all formats are written from.
+    Robots below a root link: what all formats are written from.
 
     Attributes
     ----------
     parts : list of Part
-        The bodies of each mechanism.
-    motors : list of Motor
-        The motors, for a simulation.
-    gears : dict
-        For each joint that follows another one its name and the ratio.
+        The robot of each mechanism.
     density : float
         Of all bodies [kg/m^3], for a simulation.
 
@@ -211,14 +103,7 @@ class Robot:
     name: str
     root: str
     parts: List[Part]
-    motors: List[Motor] = field(default_factory=list)
-    gears: Dict[str, Tuple[str, float]] = field(default_factory=dict)
     density: float = 0.0
-
-    @property
-    def bodies(self) -> List[Body]:
-        """Return the bodies of all mechanisms."""
-        return [body for part in self.parts for body in part.bodies]
 
     def check_names(self, parameter: str) -> None:
         """Raise SceneError if two links or two joints have the same name."""
@@ -235,7 +120,7 @@ class Robot:
 
 
 def robot(machines: Iterable[SceneMechanism], frame_id: str,
-          width: Optional[float] = None) -> Robot:
+          width: Optional[float] = None) -> Model:
     """
     Return mechanisms as one robot model.
 
@@ -258,7 +143,7 @@ def robot(machines: Iterable[SceneMechanism], frame_id: str,
     return together([_robot(machine, machine.frame_id or frame_id, width) for machine in machines])
 
 
-def together(robots: Sequence[Robot]) -> Robot:
+def together(robots: Sequence[Model]) -> Model:
     """
     Return robot models as one; raise SceneError if they do not form a tree.
 
@@ -278,26 +163,28 @@ def together(robots: Sequence[Robot]) -> Robot:
     if more or root in above:
         raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
                          f'link of another one of them, not {listed(tops, 120)}')
-    made = Robot('linkages', root, [part for robot in sorted(
+    made = Model('linkages', root, [part for robot in sorted(
         robots, key=lambda robot: len(lines[robot.root])) for part in robot.parts])
     made.check_names('mechanisms')
     return made
 
 
-def _robot(machine: SceneMechanism, frame_id: str, width: Optional[float]) -> Robot:
-    bodies = list(_Tree(machine, width).bodies(frame_id))
-    made = Robot(machine.name, frame_id, [Part(bodies, machine)])
+def _robot(machine: SceneMechanism, frame_id: str, width: Optional[float]) -> Model:
+    part = Part(_Tree(machine, width).robot(), frame_id, machine.pose, machine)
+    made = Model(machine.name, frame_id, [part])
     made.check_names(f'{machine.name}.joints')
-    _check_places(machine, _numbers(made))
+    _check_places(machine, _numbers(part))
     return made
 
 
-def _numbers(robot: Robot) -> Iterator[float]:
-    for body in robot.bodies:
-        yield from body.pose
-        yield from body.joint.travel or () if body.joint else ()
-        for point in body.points:
-            yield from point.place
+def _numbers(part: Part) -> Iterator[float]:
+    yield from part.pose
+    for frame in part.robot.frames.values():
+        yield from frame[:3, 3]
+    for joint in part.robot.joints:
+        yield from joint.limits or ()
+    for point in part.robot.points:
+        yield from point.place
 
 
 def size(machine: SceneMechanism) -> float:
@@ -340,30 +227,37 @@ class _Tree:
                          **_input_travels(machine, self._assembly)}
         self._shared = len(self._assembly.legs) > 1 and self._links[0]
 
-    def bodies(self, root: str) -> Iterator[Body]:
-        """Yield ground, crank and legs."""
+    def robot(self) -> Robot:
+        """Return ground, crank and legs; the ground is the root."""
+        ground = self._name('', GROUND)
+        self._robot = Robot(ground, {ground: np.eye(4)})
         legs = self._assembly.legs
-        ground = Body(self._name('', GROUND), root, self._machine.pose, pieces=[
+        self._robot.pieces[ground] = [
             piece for side in dict.fromkeys(leg.side for leg in legs.values())
-            for piece in self._sliding(side, GROUND)])
-        yield ground
+            for piece in self._sliding(side, GROUND)]
         if self._shared:
-            yield self._with_hub(self._moving('', 1.0, self._shared))
+            self._with_hub(self._move('', 1.0, self._shared))
         for prefix, leg in legs.items():
             ends: Counter[str] = Counter()
-            ground.points += self._points(prefix, leg.side, GROUND, ends)
+            self._robot.points += self._points(prefix, leg.side, GROUND, ground, ends)
             for link in self._links:
-                # The pins of a leg are fixed to the crank of all legs.
-                body = self._moving(prefix, leg.side, link) if link is not self._shared else Body(
-                    self._name(prefix, link.name), self._name('', link.name),
-                    (0.0, 0.0, 0.0, 0.0, 0.0, -leg.lag))
-                body.pieces += (*self._bars(leg.side, link.name),
-                                *self._sliding(leg.side, link.name))
-                body.points += self._points(prefix, leg.side, link.name, ends, link.joint)
-                yield self._with_hub(body)
+                name = self._name(prefix, link.name)
+                if link is self._shared:
+                    # The pins of a leg are fixed to the crank of all legs.
+                    self._robot.hang(name, self._name('', link.name),
+                                     (0.0, 0.0, 0.0, 0.0, 0.0, -leg.lag))
+                else:
+                    self._move(prefix, leg.side, link)
+                self._robot.pieces[name] = [*self._bars(leg.side, link.name),
+                                            *self._sliding(leg.side, link.name)]
+                points = [*self._points(prefix, leg.side, link.name, name, ends, link.joint)]
+                self._robot.points += points
+                if not points:
+                    self._with_hub(name)
+        return self._robot
 
-    def _moving(self, prefix: str, side: float, link: Link) -> Body:
-        """Return a body that moves on its parent; in a mirrored leg the other way round."""
+    def _move(self, prefix: str, side: float, link: Link) -> str:
+        """Add a body that moves on its parent; in a mirrored leg the other way round."""
         prismatic, mirrored = link.kind == 'prismatic', side < 0.0
         zero = float(np.asarray(link.zero))
         zero = math.pi - zero if mirrored and link.parent == GROUND else zero
@@ -380,12 +274,13 @@ class _Tree:
             x, y = x + side * back * math.cos(zero), y + side * back * math.sin(zero)
         else:
             zero += back
-        if travel:
-            travel = called.travel(travel)
-        axis = (called.sign * side, 0.0, 0.0) if prismatic else (0.0, 0.0, called.sign)
-        joint = Joint(called.name, link.kind, axis, travel)
-        return Body(self._name(prefix, link.name), self._name(prefix, link.parent),
-                    (x, y, 0.0, 0.0, 0.0, zero), joint)
+        name = self._name(prefix, link.name)
+        self._robot.hang(
+            name, self._name(prefix, link.parent), (x, y, 0.0, 0.0, 0.0, zero),
+            SLIDE if prismatic else HINGE,
+            (called.sign * side, 0.0, 0.0) if prismatic else (0.0, 0.0, called.sign),
+            called.travel(travel) if travel else None, called.name)
+        return name
 
     def _bars(self, side: float, name: str) -> Iterator[Piece]:
         """Yield the bars of a link as rods."""
@@ -409,23 +304,22 @@ class _Tree:
                 if start != end:
                     yield Piece(drawn, colour, thickness * self._thickness, start, end)
 
-    def _points(self, prefix: str, side: float, name: str, ends: Counter[str], but: str = ''
-                ) -> Iterator[Point]:
+    def _points(self, prefix: str, side: float, name: str, body: str, ends: Counter[str],
+                but: str = '') -> Iterator[Point]:
         """Yield joints of a link, including those that it was cut off."""
         for point, place in self._frames[name].items():
             if point != but:
                 met = f'{self._machine.name}_{prefix}{point}'
                 ends[point] += 1
                 cut = f'_cut{ends[point] - 1 if ends[point] > 2 else ""}' * (ends[point] > 1)
-                yield Point(met + cut, self._place(side, name, place), met if cut else '',
+                yield Point(met + cut, body, self._place(side, name, place), met if cut else '',
                             JOINT * self._thickness)
 
-    def _with_hub(self, body: Body) -> Body:
-        """Return a body; one without joints has a visible hub with a weight."""
-        if not body.points:
-            origin = (0.0, 0.0)
-            body.pieces.append(Piece(BALL, 'joint', JOINT * self._thickness, origin, origin))
-        return body
+    def _with_hub(self, body: str) -> None:
+        """Add a visible hub with a weight to a body without joints."""
+        origin = (0.0, 0.0)
+        self._robot.pieces.setdefault(body, []).append(
+            Piece(BALL, 'joint', JOINT * self._thickness, origin, origin))
 
     def _name(self, prefix: str, name: str) -> str:
         return f'{self._machine.name}_{"" if name == GROUND else prefix}{name}_link'
@@ -456,28 +350,6 @@ def _input_travels(machine: SceneMechanism, assembly: Assembly) -> Dict[str, Opt
 def numbers(*values: float) -> str:
     """Return numbers with all their digits; adding zero makes -0.0 plain."""
     return ' '.join(repr(float(value) + 0.0) for value in values)
-
-
-def pose(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """Return a pose as a matrix (4, 4), by its place [m] and its angles about fixed axes [rad]."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
-    about_z, about_y, about_x = np.array([
-        [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
-        [[1, 0, 0], [0, cr, -sr], [0, sr, cr]]])
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = about_z @ about_y @ about_x, (x, y, z)
-    return made
-
-
-def coordinates(matrix: np.ndarray) -> Tuple[float, ...]:
-    """Return x, y, z [m], roll, pitch and yaw [rad] of a pose (4, 4)."""
-    a, b = matrix[:2, 0]
-    yaw = math.atan2(b, a) if math.hypot(a, b) > 1e-9 else 0.0
-    sin, cos = math.sin(yaw), math.cos(yaw)
-    ahead, aside = matrix[:2, 2], matrix[:2, 1]
-    return (*matrix[:3, 3].tolist(),
-            math.atan2(sin * ahead[0] - cos * ahead[1], cos * aside[1] - sin * aside[0]),
-            math.atan2(-matrix[2, 0], cos * a + sin * b), yaw)
 
 
 def add(parent: Element, tag: str, *values: Any, **attributes: str) -> Element:

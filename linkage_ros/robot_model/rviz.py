@@ -17,7 +17,7 @@ from typing import Any, Dict, Iterable, Iterator, Mapping, Tuple
 
 import numpy as np
 
-from .bodies import pose
+from .places import pose
 from .shapes import input_values
 from ..scene import SceneMechanism
 

@@ -20,47 +20,46 @@ Format: the SDFormat specification (sdformat.org/spec).
 
 from __future__ import annotations
 
-from typing import Optional, Tuple
+from typing import Sequence
 from xml.etree import ElementTree
 
-from .assembled import weight
-from .bodies import add, Body, COLOURS, Joint, Motor, Piece, Robot
+from .bodies import add, COLOURS, Model
+from .pieces import Piece, weight
+from .robot import Body, Robot, SLIDE
 from .. import palette
 
 
-def write(model: Robot) -> str:
+def write(model: Model) -> str:
     """Return a robot model, its loops closed, as SDF."""
     # Gazebo Classic reads versions up to 1.7, which have no mimic.
-    root = ElementTree.Element('sdf', version='1.11' if model.gears else '1.7')
+    root = ElementTree.Element('sdf', version='1.11' if any(
+        part.robot.follows for part in model.parts) else '1.7')
     robot = add(root, 'model', name=model.name)
-    motors = {motor.joint: motor for motor in model.motors}
-    homes = {point.name: body.name for body in model.bodies for point in body.points}
-    for body in model.bodies:
-        is_top = body.parent == model.root
-        _add_link(robot, body, '__model__' if is_top else body.parent, model.density)
-        name = body.joint.name if body.joint else f'{body.name}_fixed'
-        joint = _add_joint(robot, name, body.joint, 'world' if is_top else body.parent, body.name)
-        if body.joint:
-            _add_ends(joint, model.gears.get(name), motors.get(name), body.position)
-        for point in body.points:
-            frame = add(robot, 'frame', name=point.name, attached_to=body.name)
+    homes = {point.name: point.body for part in model.parts for point in part.robot.points}
+    for part in model.parts:
+        for body in part.bodies():
+            is_top = body.parent == model.root
+            _add_link(robot, body.name, body.pose, '__model__' if is_top else body.parent,
+                      part.robot.solid(body.name), model.density)
+            _add_joint(robot, body, 'world' if is_top else body.parent, part.robot)
+        for point in part.robot.points:
+            frame = add(robot, 'frame', name=point.name, attached_to=point.body)
             add(frame, 'pose', *point.place, *[0.0] * 4)
-    cuts = [(body, point) for body in model.bodies for point in body.points if point.meets]
-    for body, point in cuts:
-        hinge = Joint(f'{point.name}_hinge', 'revolute', (0.0, 0.0, 1.0))
-        pin = Body(f'{point.name}_pin', body.name, (*point.place, *[0.0] * 4), hinge,
-                   [point.ball()])
-        _add_link(robot, pin, body.name, model.density)
-        _add_joint(robot, hinge.name, hinge, body.name, pin.name)
-    for _, point in cuts:
+    cuts = [point for part in model.parts for point in part.robot.points if point.meets]
+    for point in cuts:
+        _add_link(robot, f'{point.name}_pin', (*point.place, *[0.0] * 4), point.body,
+                  [point.ball()], model.density)
+        axis = _joint(robot, f'{point.name}_hinge', 'revolute', point.body, f'{point.name}_pin')
+        add(add(axis, 'axis'), 'xyz', 0.0, 0.0, 1.0)
+    for point in cuts:
         ends = homes[point.meets], f'{point.name}_pin'
-        _add_joint(robot, f'{point.name}_closed', None, *ends)
+        _joint(robot, f'{point.name}_closed', 'fixed', *ends)
         _add_plugin(robot, 'detachable-joint', 'DetachableJoint', parent_link=ends[0],
                     child_model='__model__', child_link=ends[1])
     _add_plugin(robot, 'joint-state-publisher', 'JointStatePublisher')
-    for motor in model.motors:
+    for name in (name for part in model.parts for name in part.robot.driven):
         _add_plugin(robot, 'joint-position-controller', 'JointPositionController',
-                    joint_name=motor.joint, use_velocity_commands='true')
+                    joint_name=name, use_velocity_commands='true')
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding='unicode')
 
@@ -72,43 +71,49 @@ def _add_plugin(robot: ElementTree.Element, file: str, name: str, **values: str)
         add(plugin, tag, text)
 
 
-def _add_joint(robot: ElementTree.Element, name: str, joint: Optional[Joint], parent: str,
-               child: str) -> ElementTree.Element:
-    """Add a joint, a fixed one where there is none, at the child's frame."""
-    element = add(robot, 'joint', name=name, type=joint.kind if joint else 'fixed')
+def _joint(robot: ElementTree.Element, name: str, kind: str, parent: str, child: str
+           ) -> ElementTree.Element:
+    """Add a joint at the child's frame."""
+    element = add(robot, 'joint', name=name, type=kind)
     add(element, 'parent', parent)
     add(element, 'child', child)
-    if joint:
-        add(add(element, 'axis'), 'xyz', *joint.axis)
     return element
 
 
-def _add_ends(joint: ElementTree.Element, gear: Optional[Tuple[str, float]],
-              motor: Optional[Motor], start: float) -> None:
-    """Add the gear of a joint, or the limits of its motor."""
-    axis, = joint.iter('axis')
-    if gear:
-        mimic = add(axis, 'mimic', joint=gear[0])
-        for tag, value in ('multiplier', gear[1]), ('offset', 0.0), ('reference', 0.0):
+def _add_joint(robot: ElementTree.Element, body: Body, parent: str, whole: Robot) -> None:
+    """Add the joint of a body, a fixed one where there is none; its positions begin at 0."""
+    if not (joint := body.joint):
+        _joint(robot, f'{body.name}_fixed', 'fixed', parent, body.name)
+        return
+    kind = 'prismatic' if joint.kind == SLIDE else 'revolute'
+    axis = add(_joint(robot, joint.name, kind, parent, body.name), 'axis')
+    add(axis, 'xyz', *body.axis)
+    if joint.name in whole.follows:
+        other, ratio, offset = whole.follows[joint.name]
+        positions = whole.positions
+        mimic = add(axis, 'mimic', joint=other)
+        offset += ratio * positions[other] - positions[joint.name]
+        for tag, value in ('multiplier', ratio), ('offset', offset), ('reference', 0.0):
             add(mimic, tag, value)
-    if motor and motor.sweep:
+    if joint.limits:
         limit = add(axis, 'limit')
-        for tag, end in zip(('lower', 'upper'), motor.sweep):
-            add(limit, tag, end - start)
+        for tag, end in zip(('lower', 'upper'), joint.limits):
+            add(limit, tag, end - joint.start)
 
 
-def _add_link(robot: ElementTree.Element, body: Body, parent: str, density: float) -> None:
-    link = add(robot, 'link', name=body.name)
-    add(link, 'pose', *body.start, relative_to=parent)
-    mass, centre, moments = weight(body.solid, density)
+def _add_link(robot: ElementTree.Element, name: str, place: Sequence[float], parent: str,
+              solid: Sequence[Piece], density: float) -> None:
+    link = add(robot, 'link', name=name)
+    add(link, 'pose', *place, relative_to=parent)
+    mass, centre, moments = weight(solid, density)
     inertial = add(link, 'inertial')
     add(inertial, 'pose', *centre, *[0.0] * 4)
     add(inertial, 'mass', mass)
     inertia = add(inertial, 'inertia')
     for tag, moment in zip(('ixx', 'iyy', 'izz', 'ixy'), moments):
         add(inertia, tag, moment)
-    for i, piece in enumerate(body.solid):
-        _add_visual(link, f'{body.name}_{i}', piece)
+    for i, piece in enumerate(solid):
+        _add_visual(link, f'{name}_{i}', piece)
 
 
 def _add_visual(link: ElementTree.Element, name: str, piece: Piece) -> None:

@@ -19,15 +19,20 @@ Format: the URDF XML specification of ROS (wiki.ros.org/urdf/XML).
 
 from __future__ import annotations
 
-from typing import Iterable, Sequence
+import math
+from typing import Dict, Iterable, List, Sequence
 from weakref import WeakKeyDictionary
 from xml.sax.saxutils import escape
 
 from . import bodies
-from .bodies import Body, COLOURS, numbers, Part, Piece, Robot
+from .bodies import COLOURS, Model, numbers, Part
+from .pieces import Piece, Point
+from .robot import Body, HINGE
 from .. import palette
 from ..scene import SceneMechanism
 
+# The end of a joint that has none [rad or m].
+FAR = 1e3
 # When a scene is written again, most of its mechanisms are unchanged.
 _written: WeakKeyDictionary[Part, str] = WeakKeyDictionary()
 
@@ -37,7 +42,7 @@ def describe(machines: Iterable[SceneMechanism], frame_id: str) -> str:
     return write(bodies.robot(machines, frame_id))
 
 
-def write(robot: Robot) -> str:
+def write(robot: Model) -> str:
     """Return a robot model as URDF."""
     materials = [f"""\
   <material name="{colour}">
@@ -54,27 +59,37 @@ def _escaped(text: str) -> str:
 
 def _part(part: Part) -> str:
     if part not in _written:
-        _written[part] = ''.join(
-            _joint(body) + _link(body.name, body.pieces) + ''.join(
-                _joint(Body(point.name, body.name, (*point.place, 0.0, 0.0, 0.0, 0.0)))
-                + _link(point.name, [point.ball()]) for point in body.points)
-            for body in part.bodies)
+        robot, texts = part.robot, []
+        points: Dict[str, List[Point]] = {body: [] for body in robot.frames}
+        for point in robot.points:
+            points[point.body].append(point)
+        for body in part.bodies():
+            texts += [_joint(body), _link(body.name, robot.pieces.get(body.name, ()))]
+            for point in points.get(body.name, ()):
+                texts += [_joint(Body(point.name, body.name, (*point.place, *[0.0] * 4))),
+                          _link(point.name, [point.ball()])]
+        _written[part] = ''.join(texts)
     return _written[part]
 
 
 def _joint(body: Body) -> str:
-    """Return the joint that a body hangs on; a revolute one without limits is continuous."""
-    name, kind, axis, limits = body.joint or (f'{body.name}_fixed', 'fixed', (), None)
-    kind = 'continuous' if kind == 'revolute' and not limits else kind
+    """Return the joint that a body hangs on; a hinge without limits is continuous."""
+    name, kind, limits = f'{body.name}_fixed', 'fixed', None
+    if joint := body.joint:
+        turns, limits = joint.kind == HINGE, joint.limits
+        limits = limits if turns else joint.range
+        name, kind = joint.name, 'prismatic' if not turns else (
+            'revolute' if limits else 'continuous')
     text = f"""\
   <joint name="{_escaped(name)}" type="{kind}">
     <parent link="{_escaped(body.parent)}" />
     <child link="{_escaped(body.name)}" />
 {_origin('    ', body.pose)}"""
     if body.joint:
-        text += f'    <axis xyz="{numbers(*axis)}" />\n'
+        text += f'    <axis xyz="{numbers(*body.axis)}" />\n'
     if limits:
-        lower, upper = map(numbers, limits)
+        lower, upper = (numbers(end if math.isfinite(end) else math.copysign(FAR, end))
+                        for end in limits)
         text += f'    <limit lower="{lower}" upper="{upper}" effort="0" velocity="0" />\n'
     return text + '  </joint>\n'
 

@@ -476,9 +476,25 @@ def determinants(ankle, motors, pitch, roll):
     return a * d - b * c
 
 
+def are_drawn(ankle, motors, pitch, roll):
+    """Return whether all cranks are on their drawn sides, by difference quotients."""
+    step, good = 1e-6, np.ones(np.shape(pitch), bool)
+    drawn = [0.0 if axis else length for axis, length in zip(ankle.motor_axes, ankle.lengths)]
+    for i in (0, 1):
+        slopes = []
+        for values, pose in (motors, (pitch, roll)), (drawn, (0.0, 0.0)):
+            later, before = (gaps(ankle, [x + way * (j == i) for j, x in enumerate(values)],
+                                  *pose)[i] for way in (step, -step))
+            slopes.append(later - before)
+        good &= slopes[0] * slopes[1] > 0.0
+    return good
+
+
 def is_ambiguous(ankle, low, high, count=11):
     """
     Return whether a window has a second or a singular pose for some motors that it needs.
+
+    All cranks are on their drawn sides.
 
     Between poses next to each other with determinants of opposite signs one is singular. Poses
     that are not may have such signs: a rod that does not reach all of a window may leave two parts
@@ -487,15 +503,18 @@ def is_ambiguous(ankle, low, high, count=11):
     axes = [np.linspace(*ends, count) for ends in zip(low, high)]
     pitch, roll = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2).T
     for motors in itertools.product(*(motor_values(ankle, i, pitch, roll) for i in (0, 1))):
-        there = ~np.isnan(motors).any(axis=0)
+        there = ~np.isnan(motors).any(axis=0) & are_drawn(ankle, motors, pitch, roll)
         if not there.any():
             continue
+        motors = [np.where(there, x, np.nan) for x in motors]
         signs = np.sign(determinants(ankle, motors, pitch, roll)).reshape(count, count)
         if any((one * other < 0.0).any() for one, other in (
                 (signs[1:], signs[:-1]), (signs[:, 1:], signs[:, :-1]))):
             return True
         motors = [x[there] for x in motors]
         all_ = np.stack(assemblies(ankle, motors), axis=-1)
-        if ((all_ > low + 1e-6) & (all_ < high - 1e-6)).all(axis=-1).sum(axis=1).max() > 1:
+        inside = ((all_ > low + 1e-6) & (all_ < high - 1e-6)).all(axis=-1)
+        inside &= are_drawn(ankle, [x[:, None] for x in motors], all_[..., 0], all_[..., 1])
+        if inside.sum(axis=1).max() > 1:
             return True
     return False

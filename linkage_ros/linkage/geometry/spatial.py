@@ -253,11 +253,24 @@ def rod_on_slide(axis: Vector, pivot: Vector, end: Vector, length: Real, side: R
 
 
 class Rod(NamedTuple):
-    """A rod in the frame of the first of two hinges: paths of its ends, and its length [m]."""
+    """
+    A rod in the frame of the first of two hinges: paths of its ends, and its length [m].
+
+    `side` is the sign of (A - B).A', of its pivot A and its end B, if a motor turns the pivot.
+    """
 
     pivot: Pivot
     end: Circle
     length: Real
+    side: Real
+
+    def drawn(self, first: Turn, second: Turn, span: Real) -> Limit:
+        """Return the limit of its crank, which is on its side of a dead point."""
+        place = self.end.at(second.cosine, second.sine).turned(first.cosine, first.sine)
+        turn = self.pivot.turn or Turn(real(0.0), real(1.0), real(0.0))
+        ahead = self.pivot.path.ahead(turn.cosine, turn.sine)
+        return Limit(self.side * (self.pivot.path.centre.minus(place)).dot(ahead),
+                     TOLERANCE * span * span)
 
 
 class Frame(NamedTuple):

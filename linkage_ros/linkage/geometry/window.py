@@ -11,133 +11,157 @@
 """
 A proof that a link on two hinges and two rods has one pose at most inside its joint limits.
 
-A rod from its pivot A, which a motor turns, to its end B, which both angles of the link turn, fits
-where f = (|A - B|^2 - L^2) / 2 is zero. Suppose two poses at the same motor angles. On the line
-from one to the other, each rod's f has a gradient that is square to the line (Rolle), somewhere in
-the convex hull of the poses that this rod allows at this motor angle. So there is one pose, or
-none, and it is not singular, if the gradients of one rod in its hull and those of the other rod
-have no direction in common, up to sign.
+A rod from its pivot A, on a crank that a motor turns, to its end B, which both angles of the link
+turn, fits where f = (|A - B|^2 - L^2) / 2 is zero. Each crank is on its drawn side: the sign of
+df/dtheta = (A - B).A' is that of the drawing. So a pose determines the motor angles.
 
-Rectangle and motor angles are divided into cells. In a cell, f and its gradient differ from those
-in the middle by at most their first derivatives there times half the cell, and a bound of the
-second derivatives times half the square of that: the proof covers the whole cell.
+Suppose two poses at the same motor angles, one in a box X of the joint limits and one in a box Y.
+Then the motor angles of X and those of Y have some in common. And on the line from one pose to
+the other each f has a gradient that is square to the line (Rolle), so somewhere in the box around
+X and Y, at one of these motor angles, both rods have gradients of one direction, up to sign. Pairs
+of boxes of which one of both is not so have no two poses; the others are divided. If none is left,
+there is one pose at most for any motor angles, and no pose is singular.
+
+In a box, f and its gradient differ from those in the middle by at most their first derivatives
+there times half the box, and a bound of the second derivatives times half the square of that.
 """
 
 from __future__ import annotations
 
-from itertools import product
 import math
-from typing import Any, NamedTuple, Sequence, Tuple
+from typing import Any, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .spatial import Circle, EDGE, gap, LAST_STEP, newton_step, Pose, row, STEPS, Vector
+from .spatial import Circle, EDGE, LAST_STEP, newton_step, Pose, row, STEPS, Vector
 
-# Cells per side of the rectangle, cells of all motor angles, and parts into which the needed ones
-# of these are divided. The fine cells are tried if the coarse ones prove this part of the size.
-COARSE, FINE, NEARLY = (10, 36, 2), (20, 48, 4), 0.8
-# Least angle [rad] between directions, and the rounding of f as a fraction of its terms.
+# The most pairs of boxes that a proof examines, and each trial in a search for a rectangle.
+MOST_PAIRS, MOST_IN_SEARCH = 50_000, 4_000
+# Least angle [rad] between directions, by which motor angles are made wider, too; the rounding of
+# f as a fraction of its terms.
 APART, ROUNDING = 1e-6, 1e-14
 # Newton's method is tried for this many poses per side of the rectangle. Its error [rad] one step
 # before the last is well below LAST_STEP, so that it converges between these poses, too.
 POSES, CONVERGED = 33, 0.01 * LAST_STEP
-# Halvings in the search for the largest rectangle; its factor while Newton's method fails in it.
-HALVINGS, SMALLER = 7, 0.9
-# Normals of the polygon of 16 sides that bounds the hull, in units of cells.
-NORMALS = [(math.cos(angle), math.sin(angle)) for angle in np.arange(8) * math.pi / 8.0]
+# Halvings in the search for the largest rectangle.
+HALVINGS = 7
+# Two poses differ by this [rad] at least; so many pairs are tried to find some.
+DISTINCT, TRIED = 1e-4, 1000
 
 
-class Cells(NamedTuple):
-    """Cells of one size: their middles (..., n), and half the length of their sides."""
+class Boxes(NamedTuple):
+    """Ranges of values: their middles (..., n), and half the length of their sides."""
 
     middle: np.ndarray
-    half: np.ndarray
+    half: Any
+
+    def some(self, which: np.ndarray) -> Boxes:
+        """Return some of the boxes, whose halves differ."""
+        return Boxes(self.middle[which], self.half[which])
 
 
-class Directions(NamedTuple):
-    """For cells of a motor (k,): whether each allows cells of poses (k, n), directions [rad]."""
+class TwoPoses(NamedTuple):
+    """Two poses [rad] for the same motors: the angles of cranks, or lengths [m]."""
 
-    allowed: np.ndarray
-    middle: np.ndarray
-    half: np.ndarray
+    motors: Sequence[float]
+    poses: Sequence[np.ndarray]
 
 
 class WindowRod(NamedTuple):
-    """A rod in the frame of the first hinge; its length [m] is None if it is an input."""
+    """
+    A rod in the frame of the first hinge; its length [m] is None if it is an input.
+
+    `side` is the sign of (A - B).A' in the drawing, for a pivot that a motor turns.
+    """
 
     pivot: Circle
     end: Circle
     length: Any
+    side: Any
 
     @property
-    def sides(self) -> Tuple[float, ...]:
-        """Return the sides on which a crank may be in a pose; 0 if no crank turns the pivot."""
-        return (1.0, -1.0) if self.length is not None and any(self.pivot.u) else (0.0,)
+    def turns(self) -> bool:
+        """Whether a motor turns its pivot."""
+        return self.length is not None and any(self.pivot.u)
 
-    def pivots(self, poses: np.ndarray, side: float) -> Vector:
-        """Return the place of the pivot for poses (2, n); NaN where the rod does not reach."""
+    def motors(self, poses: np.ndarray) -> np.ndarray:
+        """Return the motor's value for poses (2, n); NaN where the rod does not reach."""
         centre, u, v = self.pivot
-        if self.length is None or not side:
-            return Vector(*(x + np.zeros(poses.shape[1]) for x in centre))
         off = _place(self.end, poses).minus(centre)
+        if not self.turns:
+            return np.sqrt(off.dot(off)) if self.length is None else np.zeros(poses.shape[1])
         x, y = off.dot(u), off.dot(v)
         along = 0.5 * (u.dot(u) + off.dot(off) - self.length ** 2)
-        size = x * x + y * y
-        across = side * np.sqrt(size - along * along)
-        return self.pivot.at((along * x - across * y) / size, (along * y + across * x) / size)
+        return np.arctan2(y, x) + self.side * np.arccos(along / np.sqrt(x * x + y * y))
 
-    def directions(self, poses: Cells, count: int, again: int) -> Directions:
-        """Return the directions of its gradients in cells of a rectangle."""
-        motors = self._motors(poses, count)
-        if len(motors.middle) > 1:
-            coarse, half = self._allowed(motors, poses).any(axis=1), motors.half / again
-            motors = Cells((motors.middle[coarse, None] + half * np.arange(
-                1 - again, again, 2)).ravel(), half)
-        allowed = self._allowed(motors, poses)
-        needed = allowed.any(axis=1)
-        allowed = allowed[needed]
-        gradient, spread = self._gradients(Cells(motors.middle[needed], motors.half), poses)
-        first = np.take_along_axis(gradient, allowed.argmax(axis=1)[:, None], 1)
-        turned, hull = np.angle(gradient * first.conj()), _hull(allowed)
-        low = np.where(hull, turned - spread, np.inf).min(axis=1, initial=np.inf)
-        high = np.where(hull, turned + spread, -np.inf).max(axis=1, initial=-np.inf)
-        return Directions(allowed, np.angle(first[:, 0]) + 0.5 * (low + high), 0.5 * (high - low))
+    def bar(self, motors: np.ndarray) -> Tuple[Vector, Circle, Any]:
+        """Return the place of the pivot, the path of the end and the length at motor values."""
+        if self.turns:
+            return self.pivot.at(np.cos(motors), np.sin(motors)), self.end, self.length
+        return self.pivot.centre, self.end, motors if self.length is None else self.length
 
-    def _motors(self, poses: Cells, count: int) -> Cells:
-        """Return cells of all motor angles, or of all lengths, that poses may need."""
-        if len(self.sides) > 1:
-            low, high = -math.pi, math.pi
-        elif self.length is None:
-            off = _place(self.end, poses.middle).minus(self.pivot.centre)
-            away, slack = np.sqrt(off.dot(off)), poses.half @ (_flat(self.end), _norm(self.end.u))
-            low, high = max(away.min() - slack, 0.0), away.max() + slack
-        else:
-            return Cells(np.zeros(1), np.zeros(()))
-        half = np.array(0.5 * (high - low) / count)
-        return Cells(low + half * np.arange(1, 2 * count, 2), half)
+    def ranges(self, poses: Boxes) -> Boxes:
+        """Return the ranges of the motor's values in boxes of poses; NaN for none."""
+        pose, (centre, u, v), (k, e, *_) = _pose(poses.middle), self.pivot, self.end
+        flat, radius, (hp, hr) = _flat(self.end), _norm(e), poses.half
+        end = self.end.at(*pose[2:]).turned(*pose[:2])
+        off, ahead = end.minus(centre), self.end.ahead(*pose[2:]).turned(*pose[:2])
+        level = math.hypot(*centre[:2])
+        rest = 0.5 * (flat * hp * hp + 2.0 * radius * hp * hr + radius * hr * hr)
 
-    def _pivots(self, motors: Cells) -> Tuple[Vector, Vector, float]:
-        """Return the pivot's place, its derivative by the motor's angle, and half of a cell."""
-        turn = 0.0 if self.length is None else float(motors.half)
-        angle = motors.middle[:, None] * (turn > 0.0)
-        return (self.pivot.at(np.cos(angle), np.sin(angle)),
-                self.pivot.ahead(np.cos(angle), np.sin(angle)), turn)
+        def moved(way: Vector) -> np.ndarray:
+            return (abs(way.y * end.x - way.x * end.y) * hp + abs(way.dot(ahead)) * hr)
 
-    def _allowed(self, motors: Cells, poses: Cells) -> np.ndarray:
-        """Return whether f may be zero somewhere in cells of a motor and of poses (k, n)."""
-        pivot, moved, turn = self._pivots(motors)
-        length, half = (self.length, 0.0) if self.length is not None else (
-            motors.middle[:, None], motors.half)
-        rod, by_p, by_r = row(pivot, self.end, _pose(poses.middle))
-        *bounds, size = self._bounds()
-        halves = turn, *poses.half
-        terms = sum(abs(x) * each for x, each in zip((rod.dot(moved), by_p, by_r), halves))
-        slack = 0.5 * max(bounds) * sum(halves) ** 2 + half * (length + 0.5 * half)
-        return ~(abs(gap(rod, length)) > terms + slack + ROUNDING * (size + length) ** 2)
+        # Half the square of the distance from the crank's centre, and by how much it may differ.
+        square, size = 0.5 * off.dot(off), _norm(centre) + _norm(u) + _norm(k) + radius
+        slack = moved(off) + 0.5 * (
+            level * flat * hp * hp + 2.0 * level * radius * hp * hr
+            + (_norm(centre) + _norm(k)) * radius * hr * hr) + ROUNDING * size * size
+        if not self.turns:
+            if self.length is None:
+                low, high = (np.sqrt(np.maximum(2.0 * (square + way * slack), 0.0))
+                             for way in (-1.0, 1.0))
+                return Boxes(0.5 * (low + high), 0.5 * (high - low) + APART * size)
+            fits = abs(square - 0.5 * self.length ** 2) <= slack + ROUNDING * self.length ** 2
+            return Boxes(np.zeros_like(square), np.where(fits, 0.0, np.nan))
+        rho = _norm(u)
+        x, y = off.dot(u) / rho, off.dot(v) / rho
+        reach = np.sqrt(x * x + y * y)
+        radial, tangent = (u.times(a / reach / rho).plus(v.times(b / reach / rho))
+                           for a, b in ((x, y), (-y, x)))
+        near, aside = reach - moved(radial) - rest, moved(tangent) + rest
+        far = np.hypot(2.0 * reach - near, aside)
+        along = square + 0.5 * (rho * rho - self.length ** 2)
+        slack = slack + ROUNDING * self.length ** 2
+        least, most = ((along + way * slack) / (rho * np.where(
+            (along + way * slack) * way >= 0.0, near, far)) for way in (-1.0, 1.0))
+        first, last = (np.arccos(np.clip(cos, -1.0, 1.0)) for cos in (most, least))
+        turn = np.arctan2(aside, near) + APART
+        none = (least > 1.0) | (most < -1.0)
+        middle = np.arctan2(y, x) + self.side * 0.5 * (first + last)
+        half = np.minimum(0.5 * (last - first) + turn, math.pi)
+        return Boxes(middle, np.select([near <= 0.0, none], [math.pi, np.nan], half))
 
-    def _gradients(self, motors: Cells, poses: Cells) -> Tuple[np.ndarray, np.ndarray]:
-        """Return gradients in the middles of cells as x + iy, and bounds of their turn [rad]."""
-        pose, (pivot, moved, turn) = _pose(poses.middle), self._pivots(motors)
+    def shared(self, one: Boxes, other: Boxes) -> Boxes:
+        """Return the motor's values that ranges share with others, or more; NaN for none."""
+        start = other.middle
+        if self.turns:
+            start = start - math.tau * np.round((start - one.middle) / math.tau)
+        low = np.maximum(one.middle - one.half, start - other.half)
+        high = np.minimum(one.middle + one.half, start + other.half)
+        half = np.where(low <= high, 0.5 * (high - low), np.nan)
+        # Large ranges of angles may meet at both of their ends.
+        wide = self.turns & (one.half + other.half > math.pi - APART)
+        smaller = np.where(one.half <= other.half, one.middle, start)
+        return Boxes(np.where(wide, smaller, 0.5 * (low + high)),
+                     np.where(wide, np.minimum(one.half, other.half), half))
+
+    def directions(self, motors: Boxes, poses: Boxes) -> Boxes:
+        """Return the directions [rad] of gradients in boxes of motor values and of poses."""
+        pose = _pose(poses.middle)
+        pivot, _, _ = self.bar(motors.middle)
+        moved, turn = (self.pivot.ahead(np.cos(motors.middle), np.sin(motors.middle)),
+                       motors.half) if self.turns else (Vector(0.0, 0.0, 0.0), 0.0)
         rod, by_p, by_r = row(pivot, self.end, pose)
         centre, end, ahead = (each.turned(*pose[:2]) for each in (
             self.end.centre, self.end.at(*pose[2:]), self.end.ahead(*pose[2:])))
@@ -151,17 +175,16 @@ class WindowRod(NamedTuple):
         steep = abs(gradient)
         parts = [change * gradient.conj() * (half / steep)
                  for change, half in zip(changes, halves)]
-        rest = 0.5 * math.hypot(*self._bounds()[:2]) * sum(halves) ** 2
+        rest = 0.5 * self._bent() * sum(halves) ** 2
         along, aside = steep - rest - sum(abs(x.real) for x in parts), rest + sum(
             abs(x.imag) for x in parts)
-        return gradient, np.where(along > 0.0, np.arctan2(aside, along), np.pi)
+        return Boxes(np.angle(gradient), np.where(along > 0.0, np.arctan2(aside, along), np.pi))
 
-    def _bounds(self) -> Tuple[float, float, float, float]:
-        """Return bounds of the derivatives of f by both angles and the motor, and of |A| + |B|."""
-        (pivot, rho), (end, radius) = ((_norm(path.centre), _norm(path.u))
-                                       for path in (self.pivot, self.end))
-        return (_flat(self.pivot) * _flat(self.end), (pivot + rho + end) * radius,
-                (pivot + end + radius) * rho, pivot + rho + end + radius)
+    def _bent(self) -> float:
+        """Return a bound of the second derivatives of the gradient."""
+        pivot, end, radius = (_norm(self.pivot.centre) + _norm(self.pivot.u),
+                              _norm(self.end.centre), _norm(self.end.u))
+        return math.hypot(_flat(self.pivot) * _flat(self.end), (pivot + end) * radius)
 
 
 class Window:
@@ -172,77 +195,108 @@ class Window:
         self.low, self.high = np.asarray(low, float), np.asarray(high, float)
         self.middle = 0.5 * (self.low + self.high)
 
-    def scaled(self, factor: float) -> Window:
-        """Return the rectangle made larger or smaller about its middle."""
-        half = factor * (self.high - self.middle)
-        return Window(self.rods, self.middle - half, self.middle + half)
+    def largest(self) -> Optional[Window]:
+        """
+        Return the largest rectangle of this shape that is found to be proved, if any.
 
-    def largest(self) -> Window:
-        """Return the largest rectangle of this shape, up to its size, that is proved."""
-        size, step = 0.0, 0.5
+        Its ends are tenths of a degree.
+        """
+        size, step, best = 0.0, 0.5, None
         for _ in range(HALVINGS):
-            size += step * self.scaled(size + step).is_single(COARSE)
+            half = (size + step) * (self.high - self.middle)
+            ends = (np.ceil(10.0 * np.degrees(self.middle - half)),
+                    np.floor(10.0 * np.degrees(self.middle + half)))
+            tried = Window(self.rods, *np.radians(0.1 * np.array(ends)))
+            if (tried.low < tried.high).all() and tried.is_proved(MOST_IN_SEARCH):
+                size, best = size + step, tried
             step *= 0.5
-        while size > step and not self.scaled(size).converges():
-            size *= SMALLER
-        return self.scaled(size if size > step else 0.0)
+        return best
 
-    def is_proved(self) -> bool:
+    def is_proved(self, most: int = MOST_PAIRS) -> bool:
         """Return whether it has one pose at most, by proof, and Newton's method finds it."""
-        return (self.is_single(COARSE) or self.scaled(NEARLY).is_single(COARSE)
-                and self.is_single(FINE)) and self.converges()
+        return self.missed() is None and not self.undecided(most)[0].size
 
-    def is_single(self, cells: Tuple[int, int, int]) -> bool:
-        """Return whether it is proved to contain one pose at most, for any motor angles."""
-        count = cells[0]
+    def undecided(self, most: int = MOST_PAIRS) -> Tuple[np.ndarray, np.ndarray]:
+        """Return the middles (2, n) of pairs of boxes that may have two poses of some motors."""
         # A little beyond the edges.
-        low, half = self.low - 2.0 * EDGE, (0.5 * (self.high - self.low) + 2.0 * EDGE) / count
-        poses = Cells(low[:, None] + half[:, None] * (2.0 * np.indices(
-            (count, count)).reshape(2, -1) + 1.0), half)
-        with np.errstate(all='ignore'):
-            one, other = (rod.directions(poses, *cells[1:]) for rod in self.rods)
-            away = np.mod(one.middle[:, None] - other.middle, math.pi)
-            apart = np.minimum(away, math.pi - away) > one.half[:, None] + other.half + APART
-        shared = np.packbits(one.allowed, axis=1)[:, None] & np.packbits(other.allowed, axis=1)
-        return bool((apart | ~shared.any(axis=2)).all())
+        middle, half = self.middle[:, None], 0.5 * (self.high - self.low) + 2.0 * EDGE
+        first = second = np.zeros(1, int)
+        while len(first):
+            most -= len(first)
+            open_ = self._is_open(Boxes(middle, half), first, second)
+            first, second = first[open_], second[open_]
+            if most < 0:
+                break
+            side = int(np.argmax(half))
+            half = np.where(np.arange(2) == side, 0.5 * half, half)
+            middle = np.repeat(middle, 2, axis=1)
+            middle[side] += half[side] * np.tile((-1.0, 1.0), middle.shape[1] // 2)
+            both = first != second
+            first, second = (np.concatenate([
+                2 * first, 2 * first, 2 * first + 1, 2 * first[both] + 1]), np.concatenate([
+                    2 * second, 2 * second + 1, 2 * second + 1, 2 * second[both]]))
+            used, places = np.unique(np.concatenate([first, second]), return_inverse=True)
+            middle, (first, second) = middle[:, used], places.reshape(2, -1)
+        return middle[:, first], middle[:, second]
 
-    def converges(self) -> bool:
-        """Return whether Newton's method finds all poses of a grid, for all sides of cranks."""
+    def _is_open(self, boxes: Boxes, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Return whether pairs of boxes may have two poses of some motors."""
+        one, other = boxes.middle[:, first], boxes.middle[:, second]
+        around = Boxes(0.5 * (one + other), boxes.half[:, None] + 0.5 * abs(one - other))
+        with np.errstate(all='ignore'):
+            ranges = [rod.ranges(boxes) for rod in self.rods]
+            shared = [rod.shared(each.some(first), each.some(second))
+                      for rod, each in zip(self.rods, ranges)]
+            right, left = (rod.directions(each, around) for rod, each in zip(self.rods, shared))
+            away = np.mod(right.middle - left.middle, math.pi)
+            apart = np.minimum(away, math.pi - away) > right.half + left.half + APART
+        return ~(apart | np.isnan(shared[0].half) | np.isnan(shared[1].half))
+
+    def second_pose(self) -> Optional[TwoPoses]:
+        """Return two poses for the same motors, far from each other, if some are found."""
+        start, other = (ends.clip(self.low[:, None], self.high[:, None])
+                        for ends in self.undecided())
+        # Not more than Newton's method can try at once.
+        apart = np.abs(start - other).max(axis=0)
+        some = np.argsort(-apart, kind='stable')[::max(1, len(apart) // TRIED)]
+        start, other = start[:, some], other[:, some]
+        with np.errstate(all='ignore'):
+            motors = [rod.motors(start) for rod in self.rods]
+            found = self._closed([rod.bar(each) for rod, each in zip(self.rods, motors)], other,
+                                 2 * STEPS)
+            again = [rod.motors(found) for rod in self.rods]
+            good = (found > self.low[:, None]) & (found < self.high[:, None])
+            good &= [abs(np.exp(1j * one) - np.exp(1j * two)) < CONVERGED if rod.turns
+                     else abs(one - two) < CONVERGED * two
+                     for rod, one, two in zip(self.rods, again, motors)]
+        apart = np.abs(found - start).max(axis=0) * good.all(axis=0)
+        if not (apart > DISTINCT).any():
+            return None
+        i = int(np.nanargmax(apart))
+        return TwoPoses((motors[0][i], motors[1][i]), (start[:, i], found[:, i]))
+
+    def missed(self) -> Optional[np.ndarray]:
+        """Return a pose, of a grid, that Newton's method does not find; None if there is none."""
         axes = [np.linspace(low, high, POSES) for low, high in zip(self.low, self.high)]
         poses = np.stack(np.meshgrid(*axes)).reshape(2, -1)
         with np.errstate(all='ignore'):
-            return all(self._finds(poses, sides)
-                       for sides in product(*(rod.sides for rod in self.rods)))
-
-    def _finds(self, poses: np.ndarray, sides: Sequence[float]) -> bool:
-        pivots = [rod.pivots(poses, side) for rod, side in zip(self.rods, sides)]
-        assembled = ~np.isnan([pivot.x for pivot in pivots]).any(axis=0)
-        rods = []
-        for rod, pivot in zip(self.rods, pivots):
-            pivot = Vector(*(x[assembled] for x in pivot))
-            off = pivot.minus(_place(rod.end, poses[:, assembled]))
-            rods.append((pivot, rod.end, np.sqrt(off.dot(off))))
-        pose = _pose(self.middle)
-        for _ in range(STEPS - 1):
-            pose, _step = newton_step(rods, pose)
-        errors = [np.angle((pose[2 * i] + 1j * pose[2 * i + 1])
-                           * np.exp(-1j * poses[i, assembled])) for i in (0, 1)]
+            motors = np.array([rod.motors(poses) for rod in self.rods])
+            there = ~np.isnan(motors).any(axis=0)
+            poses, motors = poses[:, there], motors[:, there]
+            found = self._closed([rod.bar(each) for rod, each in zip(self.rods, motors)],
+                                 self.middle, STEPS - 1)
         # A NaN fails this comparison.
-        return bool((np.abs(errors) < CONVERGED).all())
+        wrong = ~(np.abs(found - poses) < CONVERGED).all(axis=0)
+        return poses[:, np.argmax(wrong)] if wrong.any() else None
 
-
-def _hull(cells: np.ndarray) -> np.ndarray:
-    """Return whether the polygon that bounds some cells (k, n) of a square touches each cell."""
-    count = round(cells.shape[1] ** 0.5)
-    hull = np.ones(cells.shape, bool)
-    for cos, sin in NORMALS:
-        middles = np.add.outer(cos * np.arange(count), sin * np.arange(count)).ravel()
-        # The distance of the middles of two cells whose corners touch.
-        size = abs(cos) + abs(sin)
-        low = np.where(cells, middles, np.inf).min(axis=1, keepdims=True) - size
-        high = np.where(cells, middles, -np.inf).max(axis=1, keepdims=True) + size
-        hull &= (low <= middles) & (middles <= high)
-    return hull
+    @staticmethod
+    def _closed(bars: Sequence[Tuple[Vector, Circle, Any]], start: np.ndarray, steps: int
+                ) -> np.ndarray:
+        """Return poses after so many steps of Newton's method."""
+        pose = _pose(start)
+        for _ in range(steps):
+            pose, _step = newton_step(bars, pose)
+        return np.arctan2(pose[1::2], pose[::2])
 
 
 def _norm(vector: Vector) -> float:

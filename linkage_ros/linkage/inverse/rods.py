@@ -11,8 +11,9 @@
 """
 The inverse of a linkage of rods: the same linkage, driven by its outputs.
 
-A rod then places each former motor, now a hinge, on either side of its crank. Each choice of sides
-is an assembly mode; the first is the one that is drawn.
+A rod then places each former motor, now a hinge, on either side of its crank, or on the drawn one
+alone if it is one of two that place two hinges. Each choice of sides is an assembly mode; the
+first is the one that is drawn.
 """
 
 from __future__ import annotations

@@ -26,14 +26,26 @@ unless it ends in `length LENGTH`. Numbers are written as in `linkage.joint_line
 
 Rods place the joints that are not driven, in any order that is possible. One rod places one hinge
 or slide, on the side on which the rod is drawn. Two rods place two hinges in a row, which both
-need `within`: there is proved to be one pose at most inside these limits.
+need `within`: with each crank on the side on which it is drawn, there is proved to be one pose at
+most inside these limits.
 """
 
 from __future__ import annotations
 
 from itertools import combinations
 import math
-from typing import Any, Collection, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple
+from typing import (
+    Any,
+    Collection,
+    Dict,
+    Iterable,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+)
 
 import numpy as np
 
@@ -83,17 +95,27 @@ _WIDEST = 0.5 * math.pi
 
 
 class WindowError(ValueError):
-    """Missing or too wide limits; `limits` has the largest valid ones by hinge [rad], if any."""
+    """
+    Missing or too wide limits.
 
-    def __init__(self, problem: ValueError, limits: Dict[str, Tuple[float, float]]):
-        super().__init__(str(problem))
-        self.limits = limits
+    `problem` says why; `limits` has the largest valid ones by hinge [rad], if any.
+    """
+
+    def __init__(self, line: Line, problem: str, limits: Dict[str, Tuple[float, float]]):
+        largest = ', '.join(f'{name} within {math.degrees(low):.4g}deg {math.degrees(high):.4g}deg'
+                            for name, (low, high) in limits.items())
+        # Not shortened: two poses are a proof.
+        super().__init__(f'{line.error("")}{problem}; ' + (
+            f'the largest proved to have one at most: {largest}' if limits else
+            'no limits about their middle are proved to have one at most'))
+        self.problem, self.limits = problem, limits
 
 
 class TwoRodLink(NamedTuple):
     """A link on two hinges in a row and two rods: the data of its window, as expressions."""
 
     lines: Tuple[Line, Line]
+    inputs: Tuple[str, ...]
     limits: Tuple[Optional[Tuple[Real, ...]], ...]
     rods: Tuple[WindowRod, ...]
 
@@ -148,9 +170,15 @@ def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],
 
 
 def turning_rods(lines: List[Line], inputs: Collection[str]) -> List[str]:
-    """Return the rods that place one joint each, on either of two sides, for these inputs."""
+    """
+    Return the rods that place one joint each, on either of two sides, for these inputs.
+
+    A rod that places two hinges with another one, for the motors, keeps its crank's drawn side.
+    """
+    paired = {rod.names[0] for rods, _ in _Assembly(lines).order() if len(rods) == 2
+              for rod in rods}
     return [rods[0].names[0] for rods, links in _Assembly(lines, inputs).order()
-            if len(rods) == 1 and links]
+            if len(rods) == 1 and links and rods[0].names[0] not in paired]
 
 
 # Rods, and the hinges or slide that they place together.
@@ -398,7 +426,7 @@ class _Drawing:
         frame, link = Frame.of(first.hinge, second.hinge), second.line.names[0]
         self._require(second.line, first.hinge.leaning(second.hinge) - _LEANING,
                       f'its axis is nearly parallel to that of {first.line.names[0]}')
-        rods = []
+        rods, inputs = [], []
         for line in lines:
             end, base = self._beyond(line, link)
             pivot, length = self._pivot(base, first.parent), self._lengths[line.names[0]]
@@ -409,17 +437,27 @@ class _Drawing:
                 what = 'be fixed to' if length.varies else 'turn about one axis on'
                 raise line.error(f'its end on {base.link} must {what} {first.parent}, which '
                                  'carries the two hinges that it shares with another rod')
+            side, name = real(0.0), line.names[0]
+            if pivot.turn:
+                name, = self._moving(base.link, first.parent)
+                side, sided = drawn_side(self._joints[name].hinge, end.point, base.point)
+                side *= self._signs.get(line.names[0], 1)
+                self._require(line, sided - _SIDED, f'as drawn it is at a dead point of {name}, '
+                              'on neither side; draw the linkage in another pose')
+            inputs.append(name)
             rods.append(Rod(pivot._replace(path=frame.transformed(pivot.path)),
-                            frame.transformed(second.hinge.circle(end.point)), length))
+                            frame.transformed(second.hinge.circle(end.point)), length, side))
         limits = first.limits, second.limits
         self._builder.windows.append(TwoRodLink(
-            (first.line, second.line), tuple(tuple(each) or None for each in limits),
-            tuple(WindowRod(rod.pivot.path, rod.end, None if rod.length.varies else rod.length)
-                  for rod in rods)))
+            (first.line, second.line), tuple(inputs),
+            tuple(tuple(each) or None for each in limits), tuple(WindowRod(
+                rod.pivot.path, rod.end, None if rod.length.varies else rod.length, rod.side)
+                for rod in rods)))
         first.turn, second.turn, limit = two_rods(rods, [
             0.5 * (each[0] + each[1]) if each else real(0.0) for each in limits])
-        self._builder.limits.append(limit)
-        edges = [limit, *self._add_limits(first, first.turn.angle),
+        drawn = [rod.drawn(first.turn, second.turn, self._span) for rod in rods if rod.pivot.turn]
+        self._builder.limits += [limit, *drawn]
+        edges = [limit, *drawn, *self._add_limits(first, first.turn.angle),
                  *self._add_limits(second, second.turn.angle)]
         for joint in (first, second):
             joint.gate(edges)
@@ -480,18 +518,21 @@ def _check_window(link: TwoRodLink) -> None:
     limited = all(link.limits)
     if limited and window.is_proved():
         return
-    problem = 'there may be a second pose in these limits' if limited else \
-        'both hinges need limits'
-    # In degrees, rounded to the inside.
     largest = window.largest()
-    ends = np.transpose([np.ceil(10.0 * np.degrees(largest.low)),
-                         np.floor(10.0 * np.degrees(largest.high))]) / 10.0
-    if (ends[:, 0] >= ends[:, 1]).any():
-        raise WindowError(line.error(f'{problem}; their middle is next to a singular pose: no '
-                                     'limits about it are possible'), {})
     names = [each.names[0] for each in link.lines]
-    largest_limits = ', '.join(
-        f'{name} within {a:g}deg {b:g}deg' for name, (a, b) in zip(names, ends))
-    raise WindowError(
-        line.error(f'{problem}; the largest proved to have one at most: {largest_limits}'),
-        {name: (a, b) for name, (a, b) in zip(names, np.radians(ends).tolist())})
+    raise WindowError(line, _why_not(window, link.inputs, names) if limited
+                      else 'both hinges need limits', dict(zip(names, zip(
+                          largest.low.tolist(), largest.high.tolist()))) if largest else {})
+
+
+def _why_not(window: Window, inputs: Sequence[str], hinges: Sequence[str]) -> str:
+    """Return why limits are not proved: two poses if there are some."""
+    def at(names: Sequence[str], values: Iterable[float]) -> str:
+        return ', '.join(f'{name} at {value:.6g}' for name, value in zip(names, values))
+
+    if two := window.second_pose():
+        return (f'there is a second pose in these limits: with {at(inputs, two.motors)}, '
+                + ' as well as '.join(at(hinges, pose) for pose in two.poses))
+    missed = window.missed()
+    return 'there may be a second pose in these limits' if missed is None else (
+        f"the steps of Newton's method do not lead to {at(hinges, missed)}")

@@ -8,17 +8,34 @@
 # express or implied. See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Robots: bodies and the joints between them, all in the pose of the file."""
+"""
+The model of a robot: bodies and the joints between them, all in one pose.
+
+Readers of MJCF, SDF and URDF fill it, and so do the mechanisms of a scene; writers print it.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 import math
 import re
-from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import (
+    Any,
+    Dict,
+    Iterable,
+    Iterator,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+)
 
 import numpy as np
 
+from .pieces import Piece, Point
+from .places import at, coordinates, displacements, pose, screws
 from ..command import RequestError
 from ..words import listed, meant
 
@@ -29,6 +46,10 @@ KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical'
          '6d': FIXED, 'revolute2': UNIVERSAL, 'floating': FREE}
 # No robot has parts farther off [m], or limits [m or rad].
 FARTHEST = 1e9
+
+
+# Joints that a tree prefers, if they are not driven.
+_TREE = {FIXED: 0, SLIDE: 1, FREE: 2, BALL: 3, HINGE: 4}
 
 
 class NotDriven(ValueError):
@@ -139,7 +160,7 @@ def plain(name: str, most: int) -> str:
     return found if found[:1].isalpha() else f'joint_{found}'.rstrip('_')
 
 
-@dataclass
+@dataclass(eq=False)
 class Robot:
     """
     Bodies and joints of a robot, in the pose of its file.
@@ -158,6 +179,12 @@ class Robot:
         For each dependent joint another joint, the ratio and the offset.
     held : dict
         Positions of joints that are fixed.
+    pieces : dict
+        What is seen of bodies.
+    points : list of Point
+        Joints of linkages on bodies, which are pieces of them, too.
+    servos : dict
+        The mass [kg] and the arm [m] that a driven joint moves, where they are known.
 
     """
 
@@ -167,6 +194,40 @@ class Robot:
     driven: List[str] = field(default_factory=list)
     follows: Dict[str, Tuple[str, float, float]] = field(default_factory=dict)
     held: Dict[str, float] = field(default_factory=dict)
+    pieces: Dict[str, List[Piece]] = field(default_factory=dict)
+    points: List[Point] = field(default_factory=list)
+    servos: Dict[str, Tuple[float, float]] = field(default_factory=dict)
+
+    def hang(self, name: str, parent: str, place: Sequence[float], kind: str = FIXED,
+             axis: Sequence[float] = (0.0, 0.0, 1.0),
+             limits: Optional[Tuple[float, float]] = None, joint: str = '') -> None:
+        """Add a body on another one, at x, y, z [m], roll, pitch, yaw [rad], by its joint at 0."""
+        frame = self.frames[name] = self.frames[parent] @ pose(*place)
+        self.joints.append(Joint(
+            joint or f'{name}_fixed', kind, (parent, name), (frame[:3, 3],) * 2,
+            (frame[:3, :3] @ axis,) * 2, None if kind == FIXED else 0.0, limits, '',
+            (frame[:3, :3],) * 2))
+
+    def solid(self, body: str) -> List[Piece]:
+        """Return what is seen of a body and of its points."""
+        return [*self.pieces.get(body, ()), *(
+            point.ball(point.place) for point in self.points if point.body == body)]
+
+    def bodies(self) -> Iterator['Body']:
+        """Yield the bodies on the root, parents first; a joint is at the origin of its body."""
+        span = max(float(np.max(np.abs(frame[:3, 3]))) for frame in self.frames.values())
+        for name, (base, joint) in trees(self)[0].items():
+            frame, seen = self.frames[name], self.frames[base]
+            moves = joint.kind in (HINGE, SLIDE) and joint.position is not None
+            home = at(joint.place(name) if moves else frame[:3, 3], frame[:3, :3])
+            is_apart = np.abs(home - frame).max() > 1e-12 * span
+            if moves:
+                axis = np.round(home[:3, :3].T @ joint.motion(name), 15) + 0.0
+                yield Body(f'{name}/joint' if is_apart else name, base, _seen(seen, home, span),
+                           joint, axis.tolist())
+                base, seen = f'{name}/joint', home
+            if is_apart or not moves:
+                yield Body(name, base, _seen(seen, frame, span))
 
     def join(self, name: str, kind: str, bodies: Tuple[str, str], frame: np.ndarray,
              axis: Any = (0.0, 0.0, 1.0), other: Optional[np.ndarray] = None,
@@ -275,6 +336,25 @@ class Robot:
         return found, [*reports.values()]
 
 
+class Body(NamedTuple):
+    """A body as formats write it: its pose on its parent, and its joint with its axis on it."""
+
+    name: str
+    parent: str
+    pose: Sequence[float]
+    joint: Optional[Joint] = None
+    axis: Sequence[float] = ()
+
+
+def _seen(base: np.ndarray, frame: np.ndarray, span: float) -> List[float]:
+    """Return the coordinates of a pose in another, without rounding of places up to `span` [m]."""
+    turned = base[:3, :3].T
+    *place, roll, pitch, yaw = coordinates(at(turned @ (frame[:3, 3] - base[:3, 3]),
+                                              turned @ frame[:3, :3]))
+    return [*(float(f'{x:.15g}') * (abs(x) > 4e-16 * span) for x in place),
+            *(round(angle, 15) for angle in (roll, pitch, yaw))]
+
+
 def _limits(limits: Sequence[Any], is_continuous: bool
             ) -> Tuple[Optional[Tuple[float, float]], str]:
     """Return the limits that count, None without any, and those that do not, with the reason."""
@@ -286,3 +366,74 @@ def _limits(limits: Sequence[Any], is_continuous: bool
     if is_continuous:
         return None, f'{text}: it is continuous' if low < high else ''
     return ((low, high), '') if low < high else (None, f'{text}: they are no range')
+
+
+def top(home: Dict[str, str], body: str) -> str:
+    """Return the body that represents a set of joined bodies."""
+    while home[body] != body:
+        home[body] = body = home[home[body]]
+    return body
+
+
+def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
+    """Return the parent and the joint of each body, and the joints that close loops."""
+    home = {body: body for body in robot.frames}
+    near: Dict[str, List[Tuple[str, Joint]]] = {body: [] for body in robot.frames}
+    cuts = []
+    for joint in sorted(robot.joints, key=lambda joint: (
+            joint.is_cut, joint.name not in robot.driven, _TREE.get(joint.kind, 1))):
+        ends = [top(home, body) for body in joint.bodies]
+        if joint.is_cut or ends[0] == ends[1]:
+            cuts.append(joint)
+            continue
+        home[ends[1]] = ends[0]
+        for body, other in (joint.bodies, joint.bodies[::-1]):
+            near[body].append((other, joint))
+    found: Dict[str, Tuple[str, Joint]] = {}
+    for start in (robot.root, *robot.frames):
+        if start != robot.root and start not in found:
+            # A body that only cuts connect.
+            places = [robot.frames[start][:3, 3]] * 2
+            found[start] = robot.root, Joint('', FREE, (robot.root, start), places, places)
+        row = [start]
+        for body in row:
+            for other, joint in near[body]:
+                if other != robot.root and other not in found:
+                    found[other] = body, joint
+                    row.append(other)
+    return found, cuts
+
+
+def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[str, float]
+              ) -> Robot:
+    """Return a robot with some bodies displaced on their parents, and new positions of joints."""
+    moved = {robot.root: np.eye(4)}
+    for body, (base, _) in trees(robot)[0].items():
+        moved[body] = moved[base] @ moves[body] if body in moves else moved[base]
+    joints = []
+    for joint in robot.joints:
+        ends = [moved[body] for body in joint.bodies]
+        joints.append(replace(
+            joint, places=tuple(end[:3, :3] @ place + end[:3, 3]
+                                for end, place in zip(ends, joint.places)),
+            axes=tuple(end[:3, :3] @ axis for end, axis in zip(ends, joint.axes)),
+            turns=tuple(end[:3, :3] @ turn for end, turn in zip(ends, joint.turns)),
+            position=positions.get(joint.name, joint.position)
+            if joint.position is not None else None))
+    return replace(robot, joints=joints, frames={
+        body: moved[body] @ frame for body, frame in robot.frames.items()})
+
+
+def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
+    """Return a robot with some joints moved; raise RequestError for an unknown joint."""
+    robot.check_names(values)
+    tree, moves = trees(robot)[0], {}
+    names = {joint.name for _, joint in tree.values()}
+    if cuts := [name for name in values if name not in names]:
+        raise RequestError(f'{cuts[0]} closes a loop, so that other joints say where it is')
+    for body, (base, joint) in tree.items():
+        if joint.name in values and joint.position is not None:
+            slides, change = joint.kind == SLIDE, np.array(values[joint.name] - joint.position)
+            screw = screws(joint.motion(body), joint.place(base), slides)
+            moves[body] = displacements(screw, change, slides)
+    return displaced(robot, moves, values)
