@@ -64,15 +64,19 @@ PORT ?= 8020
 view: build ## Show SCENE=config/all.yaml in the browser, at PORT=8020
 	@$(in_ros) PYTHONPATH=$$PYTHONPATH:test exec python demo/view.py '$(SCENE)' '$(PORT)'
 
+# Pages are written by the same commands with --document, of a commit alone.
 .PHONY: bench
-bench: ready .venv-bench/.installed ## Measure run time against error, stability, and the nodes
+bench: ready .venv-bench/.installed ## Measure run time against error, stability, inverses, calls, nodes, C
 	@.venv-bench/bin/python -m benchmark.run
 	@.venv-bench/bin/python -m benchmark.stability
-	@.venv-bench/bin/python -m benchmark.report
-	@.venv-bench/bin/python -m benchmark.engines --document
-	@.venv-bench/bin/python -m benchmark.arrays --document
-	@$(in_ros) python -m benchmark.calls --document
+	@.venv-bench/bin/python -m benchmark.inverse_rule --linkages 50 --minutes 5
+	@$(in_ros) python -m benchmark.calls
 	@$(in_ros) python -m benchmark.nodes --quick
+	@$(in_ros) python -m benchmark.c_code
+
+.PHONY: verify
+verify: .venv-bench/.installed ## Compare with pylinkage, MuJoCo and, with PMKS=FOLDER, a clone of PMKS_Verification
+	@.venv-bench/bin/python -m benchmark.verify $(if $(PMKS),--pmks '$(PMKS)')
 
 .PHONY: pictures
 pictures: .venv-docs/.installed ## Draw what pictures/pictures.txt lists, without ROS
@@ -159,28 +163,18 @@ $(venv)/.tools: $(venv)/.installed $(tools)
 	@about='what the tests need.' wheels/install.sh '$(bin)/python' $(venv) $(requirements) $(tools)
 	@touch $@
 
-# What there is to compare with is large: some 2 GB. What comes as source is left out where it cannot
-# be built.
-.venv-bench/.installed: $(lock)/bench.txt $(lock)/bench-source.txt
-	@about='what there is to compare with: 2 GB, some minutes, once.' wheels/install.sh \
-	  --to-compile '$(PYTHON)' .venv-bench $<
-	@CMAKE_PREFIX_PATH=$$(echo $(CURDIR)/.venv-bench/lib/python*/site-packages/cmeel.prefix) \
-	  PATH=$(CURDIR)/.venv-bench/bin:$$PATH about='what of it comes as source.' \
-	  wheels/install.sh '$(PYTHON)' .venv-bench $(lock)/bench-source.txt \
-	  || echo 'planegcs and SolveSpace cannot be built here, and are left out.'
-	@touch $@
-
 # A plugin of flake8 comes as source.
 .venv-ament/.installed: $(lock)/ament.txt
 	@about='what ament checks style with.' wheels/install.sh --to-compile '$(PYTHON)' .venv-ament $<
 	@touch $@
 
 # Environments beside that of the nodes, each of one lock file.
+.venv-bench/.installed: private export about := what there is to compare with: some minutes, once.
 .venv-docs/.installed: private export about := what draws and what makes the pages.
 .venv-lint/.installed: private export about := what checks style and types.
 .venv-lock/.installed: private export about := what pins the rest.
 .venv-mutants/.installed: private export about := what puts bugs into the package.
-.venv-docs/.installed .venv-lint/.installed .venv-lock/.installed .venv-mutants/.installed: \
+.venv-bench/.installed .venv-docs/.installed .venv-lint/.installed .venv-lock/.installed .venv-mutants/.installed: \
 .venv-%/.installed: $(lock)/%.txt
 	@wheels/install.sh '$(PYTHON)' .venv-$* $<
 	@touch $@

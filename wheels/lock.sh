@@ -30,7 +30,6 @@ pin mutants 3.10 wheels/mutants.txt
 pin ament 3.11 wheels/ament.txt
 pin docs 3.10 docs/requirements.txt
 pin bench 3.11 benchmark/requirements.txt
-pin bench-source 3.11 benchmark/source.txt --constraint wheels/lock/bench.txt
 for distro in kilted jazzy; do
   pin $distro 3.10 wheels/{$distro,build,demo}.txt
   pin dev-$distro 3.10 wheels/dev.txt wheels/dev-$distro*.txt --constraint wheels/lock/$distro.txt
