@@ -146,12 +146,17 @@ clean: ## Remove everything that was made
 	  docs/_build docs/mechanisms benchmark/.cache .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
+# What building against wheels needs besides; setup.py builds the nested package, with this as well.
+cmake_args := -DBUILD_TESTING=OFF -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=$(CURDIR)/$(venv) \
+  -DCMAKE_PROJECT_INCLUDE=$(CURDIR)/wheels/prefix.cmake -DPython3_EXECUTABLE=$(bin)/python
+
 $(install)/.built: $(venv)/.installed $(sources)
 	@echo 'Building linkage_interfaces and linkage_ros: a minute, once.'
-	@colcon --log-base $(log) build --build-base $(build) --install-base $(install) \
-	  --event-handlers console_start_end- summary- --cmake-args \
-	  -DBUILD_TESTING=OFF -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=$(CURDIR)/$(venv) \
-	  -DCMAKE_PROJECT_INCLUDE=$(CURDIR)/wheels/prefix.cmake -DPython3_EXECUTABLE=$(bin)/python
+	@mkdir -p $(build)
+	@printf 'build:\n  cmake-args:\n' >$(build)/colcon.yaml
+	@printf '  - %s\n' $(cmake_args) >>$(build)/colcon.yaml
+	@COLCON_DEFAULTS_FILE=$(CURDIR)/$(build)/colcon.yaml colcon --log-base $(log) build \
+	  --build-base $(build) --install-base $(install) --event-handlers console_start_end- summary-
 	@touch $@
 
 $(venv)/.installed: $(requirements)
