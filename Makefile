@@ -123,13 +123,6 @@ lint: .venv-lint/.installed ## Check style and types
 	@$(lint_bin)/python -c 'import sys; from xml.dom.minidom import parse; [parse(f) for f in sys.argv[1:]]' \
 	  package.xml linkage_interfaces/package.xml
 
-# ament_copyright is on no package index; test_package.py holds every file to its notice.
-.PHONY: ament
-ament: .venv-ament/.installed ## Check style as ament_flake8 and ament_pep257 do
-	@git ls-files -z '*.py' | xargs -0 .venv-ament/bin/python -m flake8 --config setup.cfg
-	@git ls-files -z '*.py' | xargs -0 .venv-ament/bin/python -m pydocstyle --config=setup.cfg \
-	  --property-decorators=''
-
 .PHONY: lock
 lock: .venv-lock/.installed ## Pin with hashes what wheels/*.txt ask for; UPGRADE=1: to the newest
 	@wheels/lock.sh $(if $(UPGRADE),--upgrade)
@@ -166,11 +159,6 @@ $(venv)/.installed: $(requirements)
 
 $(venv)/.tools: $(venv)/.installed $(tools)
 	@about='what the tests need.' wheels/install.sh '$(bin)/python' $(venv) $(requirements) $(tools)
-	@touch $@
-
-# A plugin of flake8 comes as source.
-.venv-ament/.installed: $(lock)/ament.txt
-	@about='what ament checks style with.' wheels/install.sh --to-compile '$(PYTHON)' .venv-ament $<
 	@touch $@
 
 # Environments beside that of the nodes, each of one lock file.

@@ -102,13 +102,30 @@ def test_the_workflow_runs_what_has_to_be_green():
     workflow = (ROOT / '.github/workflows/ci.yml').read_text()
     jobs = yaml.safe_load(workflow)['jobs']
     steps = [step['run'] for job in jobs.values() for step in job['steps'] if 'run' in step]
-    # The nodes without llvmlite are its alone.
-    assert set().union(*map(made, steps)) == made(
-        (ROOT / '.ci/run').read_text()) - {'ready'} | {'nodes'}
+    # The nodes without llvmlite and the demo are its alone.
+    assert set().union(*map(made, steps)) == made(without_comments(
+        (ROOT / '.ci/run').read_text())) - {'ready'} | {'nodes', 'demo'}
     for job in ('test', 'long'):
         assert set(jobs[job]['strategy']['matrix']['distro']) == {
             file.stem for file in (ROOT / 'wheels').glob('*.txt')
             if 'ros-rclpy' in file.read_text()}
+
+
+def without_comments(text):
+    return re.sub(r'^ *#.*', '', text, flags=re.MULTILINE)
+
+
+def test_what_is_promised_is_run_or_is_said_not_to_be():
+    program = (r'(make [a-z]+|(?:ros2|colcon|python|source|pip|git|pre-commit|rosdep)(?= [a-z.-])'
+               r'|bloom-\w+|catkin_\w+_version|\.ci/run)')
+    pages = ''.join((ROOT / name).read_text() for name in ('README.md', 'CONTRIBUTING.md'))
+    named = set(re.findall(rf'(?:`|^ *\$ |^    |&& ){program}', pages, re.MULTILINE)) - {'.ci/run'}
+    script = (ROOT / '.ci/run').read_text()
+    excused = dict(re.findall(r'^#   ([\w -]+): (.+)', script, re.MULTILINE))
+    run = set(re.findall(rf'(?:^|run: |&& |\| ) *(?:timeout .* )?{program}', without_comments(
+        script + (ROOT / '.github/workflows/ci.yml').read_text()), re.MULTILINE))
+    assert len(named) > 15 and {'make test', 'colcon', 'ros2'} <= run
+    assert named - run == set(excused), (named - run) ^ set(excused)
 
 
 def test_both_manifests_say_where_the_repository_is():

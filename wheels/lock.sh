@@ -27,7 +27,6 @@ pin source 3.10 wheels/source.txt
 pin fast 3.10 wheels/fast.txt
 pin lint 3.10 wheels/lint.txt
 pin mutants 3.10 wheels/mutants.txt
-pin ament 3.11 wheels/ament.txt
 pin docs 3.10 docs/requirements.txt
 pin bench 3.11 benchmark/requirements.txt
 for distro in kilted jazzy; do
