@@ -11,6 +11,7 @@
 """The pages: what they link to is there, what they say to type works, and nothing is left out."""
 
 import doctest
+import json
 from pathlib import Path
 import pkgutil
 import re
@@ -264,7 +265,15 @@ def measured(monkeypatch):
     pytest.importorskip('mpmath')
     monkeypatch.syspath_prepend(ROOT)
     import benchmark.document
+    import benchmark.nodes.report
     return benchmark
+
+
+def test_what_a_scene_costs_is_what_was_measured(measured):
+    results = json.loads((ROOT / 'benchmark' / 'results' / 'nodes.json').read_text())
+    benchmark = measured
+    assert benchmark.document.written('design/performance.md') == benchmark.nodes.report.document(
+        results).strip()
 
 
 def test_what_is_measured_is_of_a_commit():

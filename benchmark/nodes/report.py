@@ -43,9 +43,10 @@ def document(result):
         parts += ['### Changes of parameters', change(changes)]
     where = {}
     for name, piece in result.items():
-        where.setdefault(piece['machine'], []).append(name)
-    return '\n\n'.join([*parts, *(f'{", ".join(names)}: {machine}'
-                                  for machine, names in where.items())])
+        where.setdefault(piece['machine'], {})[name] = piece['load']
+    return '\n\n'.join([*parts, *(
+        f'{", ".join(loads)}: {machine} Load {min(loads.values()):.1f} to '
+        f'{max(loads.values()):.1f}.' for machine, loads in where.items())])
 
 
 def ratio(values, others):
