@@ -116,10 +116,11 @@ mutants: ready .venv-mutants/.installed ## Put COUNT=40 random bugs into ROOM=sc
 	  --room '$(ROOM)' --count $(or $(COUNT),40) --seed $(or $(SEED),1) $(if $(AGAIN),--again '$(AGAIN)')
 
 .PHONY: lint
-lint: .venv-lint/.installed ## Check style and types
+lint: .venv-lint/.installed ## Check style, types and licences
 	@$(lint_bin)/ruff check .
 	@$(lint_bin)/mypy
 	@$(lint_bin)/oxlint linkage_ros/web/page
+	@$(lint_bin)/reuse lint -q
 	@$(lint_bin)/python -c 'import sys; from xml.dom.minidom import parse; [parse(f) for f in sys.argv[1:]]' \
 	  package.xml linkage_interfaces/package.xml
 
