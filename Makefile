@@ -68,7 +68,7 @@ view: build ## Show SCENE=config/all.yaml in the browser, at PORT=8020
 .PHONY: bench
 bench: ready .venv-bench/.installed ## Measure run time against error, stability, inverses, calls, nodes, C
 	@.venv-bench/bin/python -m benchmark.run
-	@.venv-bench/bin/python -m benchmark.stability
+	@.venv-bench/bin/python -m benchmark.stability --samples 500 --linkages 50
 	@.venv-bench/bin/python -m benchmark.inverse_rule --linkages 50 --minutes 5
 	@$(in_ros) python -m benchmark.calls
 	@$(in_ros) python -m benchmark.nodes --quick
