@@ -64,15 +64,19 @@ PORT ?= 8020
 view: build ## Show SCENE=config/all.yaml in the browser, at PORT=8020
 	@$(in_ros) PYTHONPATH=$$PYTHONPATH:test exec python demo/view.py '$(SCENE)' '$(PORT)'
 
+# Pages are written by the same commands with --document, of a commit alone.
 .PHONY: bench
-bench: ready .venv-bench/.installed ## Measure run time against error, stability, and the nodes
+bench: ready .venv-bench/.installed ## Measure run time against error, stability, inverses, calls, nodes, C
 	@.venv-bench/bin/python -m benchmark.run
-	@.venv-bench/bin/python -m benchmark.stability
-	@.venv-bench/bin/python -m benchmark.report
-	@.venv-bench/bin/python -m benchmark.engines --document
-	@.venv-bench/bin/python -m benchmark.arrays --document
-	@$(in_ros) python -m benchmark.calls --document
+	@.venv-bench/bin/python -m benchmark.stability --samples 500 --linkages 50
+	@.venv-bench/bin/python -m benchmark.inverse_rule --linkages 50 --minutes 5
+	@$(in_ros) python -m benchmark.calls
 	@$(in_ros) python -m benchmark.nodes --quick
+	@$(in_ros) python -m benchmark.c_code
+
+.PHONY: verify
+verify: .venv-bench/.installed ## Compare with pylinkage, MuJoCo and, with PMKS=FOLDER, a clone of PMKS_Verification
+	@.venv-bench/bin/python -m benchmark.verify $(if $(PMKS),--pmks '$(PMKS)')
 
 .PHONY: pictures
 pictures: .venv-docs/.installed ## Draw what pictures/pictures.txt lists, without ROS
@@ -112,19 +116,13 @@ mutants: ready .venv-mutants/.installed ## Put COUNT=40 random bugs into ROOM=sc
 	  --room '$(ROOM)' --count $(or $(COUNT),40) --seed $(or $(SEED),1) $(if $(AGAIN),--again '$(AGAIN)')
 
 .PHONY: lint
-lint: .venv-lint/.installed ## Check style and types
+lint: .venv-lint/.installed ## Check style, types and licences
 	@$(lint_bin)/ruff check .
 	@$(lint_bin)/mypy
 	@$(lint_bin)/oxlint linkage_ros/web/page
+	@$(lint_bin)/reuse lint -q
 	@$(lint_bin)/python -c 'import sys; from xml.dom.minidom import parse; [parse(f) for f in sys.argv[1:]]' \
 	  package.xml linkage_interfaces/package.xml
-
-# ament_copyright is on no package index; test_package.py holds every file to its notice.
-.PHONY: ament
-ament: .venv-ament/.installed ## Check style as ament_flake8 and ament_pep257 do
-	@git ls-files -z '*.py' | xargs -0 .venv-ament/bin/python -m flake8 --config setup.cfg
-	@git ls-files -z '*.py' | xargs -0 .venv-ament/bin/python -m pydocstyle --config=setup.cfg \
-	  --property-decorators=''
 
 .PHONY: lock
 lock: .venv-lock/.installed ## Pin with hashes what wheels/*.txt ask for; UPGRADE=1: to the newest
@@ -142,12 +140,17 @@ clean: ## Remove everything that was made
 	  docs/_build docs/mechanisms benchmark/.cache .hypothesis .mypy_cache .pytest_cache .ruff_cache *.egg-info
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
+# What building against wheels needs besides; setup.py builds the nested package, with this as well.
+cmake_args := -DBUILD_TESTING=OFF -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=$(CURDIR)/$(venv) \
+  -DCMAKE_PROJECT_INCLUDE=$(CURDIR)/wheels/prefix.cmake -DPython3_EXECUTABLE=$(bin)/python
+
 $(install)/.built: $(venv)/.installed $(sources)
 	@echo 'Building linkage_interfaces and linkage_ros: a minute, once.'
-	@colcon --log-base $(log) build --build-base $(build) --install-base $(install) \
-	  --event-handlers console_start_end- summary- --cmake-args \
-	  -DBUILD_TESTING=OFF -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=$(CURDIR)/$(venv) \
-	  -DCMAKE_PROJECT_INCLUDE=$(CURDIR)/wheels/prefix.cmake -DPython3_EXECUTABLE=$(bin)/python
+	@mkdir -p $(build)
+	@printf 'build:\n  cmake-args:\n' >$(build)/colcon.yaml
+	@printf '  - %s\n' $(cmake_args) >>$(build)/colcon.yaml
+	@COLCON_DEFAULTS_FILE=$(CURDIR)/$(build)/colcon.yaml colcon --log-base $(log) build \
+	  --build-base $(build) --install-base $(install) --event-handlers console_start_end- summary-
 	@touch $@
 
 $(venv)/.installed: $(requirements)
@@ -159,27 +162,15 @@ $(venv)/.tools: $(venv)/.installed $(tools)
 	@about='what the tests need.' wheels/install.sh '$(bin)/python' $(venv) $(requirements) $(tools)
 	@touch $@
 
-# What there is to compare with is large: some 2 GB. What comes as source is left out where it cannot
-# be built.
-.venv-bench/.installed: $(lock)/bench.txt $(lock)/bench-source.txt
-	@about='what there is to compare with: 2 GB, some minutes, once.' wheels/install.sh \
-	  --to-compile '$(PYTHON)' .venv-bench $<
-	@CMAKE_PREFIX_PATH=$$(echo $(CURDIR)/.venv-bench/lib/python*/site-packages/cmeel.prefix) \
-	  PATH=$(CURDIR)/.venv-bench/bin:$$PATH about='what of it comes as source.' \
-	  wheels/install.sh '$(PYTHON)' .venv-bench $(lock)/bench-source.txt \
-	  || echo 'planegcs and SolveSpace cannot be built here, and are left out.'
-	@touch $@
-
 # Environments beside that of the nodes, each of one lock file.
-.venv-ament/.installed: private export about := what ament checks style with.
+.venv-bench/.installed: private export about := what there is to compare with: some minutes, once.
 .venv-docs/.installed: private export about := what draws and what makes the pages.
 .venv-lint/.installed: private export about := what checks style and types.
 .venv-lock/.installed: private export about := what pins the rest.
 .venv-mutants/.installed: private export about := what puts bugs into the package.
 # A package of these comes as source.
-.venv-ament/.installed .venv-mutants/.installed: private from_source := --to-compile
-.venv-ament/.installed .venv-docs/.installed .venv-lint/.installed .venv-lock/.installed \
-.venv-mutants/.installed: \
+.venv-mutants/.installed: private from_source := --to-compile
+.venv-bench/.installed .venv-docs/.installed .venv-lint/.installed .venv-lock/.installed .venv-mutants/.installed: \
 .venv-%/.installed: $(lock)/%.txt
 	@wheels/install.sh $(from_source) '$(PYTHON)' .venv-$* $<
 	@touch $@

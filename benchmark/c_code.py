@@ -9,16 +9,15 @@
 # limitations under the License.
 
 """
-What a linkage in C takes: code, stack and cycles on microcontrollers, and time in a controller.
+What a linkage in C takes on an ATmega328P: code, stack and cycles.
 
     python -m benchmark.c_code [--document]
 
-Compilers that are not installed are left out (apt install gcc-avr avr-libc simavr
-gcc-arm-none-eabi libnewlib-arm-none-eabi). With --document the tables go into docs/c-code.md.
+It needs gcc-avr, avr-libc and simavr (apt install). With --document the table goes into
+docs/c-code.md.
 """
 
 import argparse
-from itertools import chain
 from pathlib import Path
 import re
 import shutil
@@ -30,21 +29,14 @@ from linkage_ros.c_code import header
 import numpy as np
 
 from . import document
-from .nodes.report import table
 
-TARGETS = {
-    'ATmega328P, avr-gcc': ('avr', ['-mmcu=atmega328p']),
-    'Cortex-M4F, arm-none-eabi-gcc': ('arm-none-eabi', [
-        '-mcpu=cortex-m4', '-mthumb', '-mfloat-abi=hard', '-mfpu=fpv4-sp-d16',
-        '--specs=nosys.specs'])}
 CASES = {'slotted_lever': 'lever', 'four_bar': 'QB', 'jansen': 'BC'}
-SCENES = ('config/slotted_lever', 'config/jansen', 'config/excavator', 'examples/leg')
-# Poses at which cycles and times are taken.
-POSES, CALLS = 16, 20_000
+# Poses at which cycles are taken.
+POSES = 16
 USES = {
     'pose': '{name}_pose p; {name}_solve(given[k], &p); out = p.angle_{output};',
     # Next to the other end of the reach, so that each assembly mode is chosen somewhere.
-    'inverse': '{number} x = given[{last} - k]; {name}_crank_for_angle_{output}(found[k], x, &x); '
+    'inverse': 'float x = given[{last} - k]; {name}_crank_for_angle_{output}(found[k], x, &x); '
                'out = x;',
     'actuators to joints': 'side.position[0] = given[k]; out = side.velocity[0] = 1.0f; '
                            '{name}_actuators_to_joints(&memory, &side, &other); '
@@ -99,133 +91,57 @@ int main(void)
     cli(); sleep_enable(); sleep_cpu();
 }}
 """
-NOW = """
-#include <stdio.h>
-#include <time.h>
-static double now(void) {{ struct timespec t; clock_gettime(CLOCK_MONOTONIC, &t);
-    return 1e9 * (double)t.tv_sec + (double)t.tv_nsec; }}
-"""
-# Nanoseconds of a call at each pose, by repeating it, the least of some tries.
-PACE = NOW + """
-static volatile {number} given[] = {{ {given} }}, found[] = {{ {found} }}, out;
-int main(void)
-{{
-    for (int k = 0; k < {count}; k++) {{
-        double best = 1e30;
-        for (int tries = 0; tries < 50; tries++) {{
-            double start = now();
-            for (int i = 0; i < 1000; i++) {{ {body} }}
-            double taken = (now() - start) / 1000;
-            best = taken < best ? taken : best;
-        }}
-        printf("%.2f\\n", best);
-    }}
-    return 0;
-}}
-"""
-# Nanoseconds of each call, the least of some tries, in a controller's double precision.
-TIMES = NOW + """
-int main(void)
-{{
-    static {name}_memory m;
-    {name}_begin(&m);
-    for (long k = 1; k <= {count}; k++) {{
-        double q[{n}], best[2] = {{ 1e30, 1e30 }};
-        {name}_point p;
-        {name}_side a = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, j = a, b = a;
-        {name}_sample(k, q);
-        if (!{name}_at(q, 1, &p)) continue;
-        for (int i = 0; i < {n}; i++) {{
-            a.position[i] = p.position[0][i];
-            a.velocity[i] = a.effort[i] = 1;
-        }}
-        for (int tries = 0; tries < 5; tries++) {{
-            double t0 = now(); {name}_actuators_to_joints(&m, &a, &j);
-            double t1 = now(); {name}_joints_to_actuators(&m, &j, &b);
-            double t2 = now();
-            best[0] = t1 - t0 < best[0] ? t1 - t0 : best[0];
-            best[1] = t2 - t1 < best[1] ? t2 - t1 : best[1];
-        }}
-        printf("%.0f %.0f\\n", best[0], best[1]);
-    }}
-    return 0;
-}}
-"""
 
 
 def main():
     """Compile, run and print."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
-    parser.add_argument('--document', action='store_true', help='write the tables to docs/')
-    rows = [[f'{name}, {use}', target, *measured(compiler, flags, name, output, use)]
-            for target, (compiler, flags) in TARGETS.items() if shutil.which(f'{compiler}-gcc')
-            for name, output in CASES.items() for use in USES]
-    text = table(['linkage', 'target', 'code [bytes]', 'of it the C library', 'stack [bytes]',
-                  'cycles, median', 'at most'], rows)
-    text += '\n\n' + table(
-        ['linkage', 'actuators to joints [us], median', 'at most', 'joints to actuators [us], '
-         'median', 'at most'], [[name, *times] for name, times in timed()])
-    text += '\n\n' + table(
-        ['linkage', 'number', 'pose [ns], median', 'at most', 'inverse [ns], median', 'at most'],
-        [[name, number, *chain.from_iterable(paced(name, output, number, use)
-                                             for use in ('pose', 'inverse'))]
-         for name, output in CASES.items() for number in ('float', 'double')])
+    parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
+    parser.add_argument('--document', action='store_true', help='write the table to docs/')
+    options = parser.parse_args()
+    if not shutil.which('avr-gcc'):
+        parser.exit(1, 'avr-gcc is not installed.\n')
+    text = document.table(
+        ['linkage', 'code [bytes]', 'of it the C library', 'stack [bytes]', 'cycles, median',
+         'at most'], [[f'{name}, {use}', *measured(name, output, use)]
+                      for name, output in CASES.items() for use in USES])
+    text += '\n\n' + document.machine()
     print(text)
-    if parser.parse_args().document:
+    if options.document:
         document.write('c-code.md', text)
 
 
-def measured(compiler, flags, name, output, use):
+def measured(name, output, use):
     """Return code, that of the C library, the stack of the linkage's own code, and cycles."""
-    machine, values = prepared(name, output, 'float', use)
+    machine, values = prepared(name, output, use)
     body = values['body']
     begin = f'{name}_begin(&memory);' if 'memory' in body else ''
     text = header.written(machine, (output,), True, [f'{name}_{output}'])
     with tempfile.TemporaryDirectory() as folder:
-        sizes = [built(Path(folder), compiler, [*flags, *extra], text + MAIN.format(
+        sizes = [built(Path(folder), extra, text + MAIN.format(
             **{**values, 'body': each}, begin=each and begin)) for extra in ((), ('-c',))
             for each in ('', body)]
         (idle, _), (linked, _), (empty, _), (own, stack) = sizes
         return [linked - idle, linked - idle - (own - empty), stack,
-                *cycles(Path(folder), compiler, flags, text + CYCLES.format(**values))]
+                *cycles(Path(folder), text + CYCLES.format(**values))]
 
 
-def prepared(name, output, number, use):
+def prepared(name, output, use):
     """Return a mechanism, and what the programs that call its C are filled with."""
     machine = scene.read({'mechanisms': [name], f'{name}.type': name}).machines[name]
     given = np.linspace(*machine.first.reach[0], POSES + 2)[1:-1]
     found = machine.linkage.joint_angles(given, [output])[output]
     return machine, {
-        'name': name, 'count': POSES, 'number': number,
-        'body': USES[use].format(name=name, output=output, number=number, last=POSES - 1),
-        **{key: ', '.join(f'{value:.7g}f' if number == 'float' else repr(float(value))
-                          for value in each)
+        'name': name, 'count': POSES,
+        'body': USES[use].format(name=name, output=output, last=POSES - 1),
+        **{key: ', '.join(f'{value:.7g}f' for value in each)
            for key, each in (('given', given + 1e-7), ('found', found))}}
 
 
-def paced(name, output, number, use):
-    """Return the time of a call on this machine: median and most [ns]."""
-    machine, values = prepared(name, output, number, use)
-    with tempfile.TemporaryDirectory() as folder:
-        taken = run(folder, header.written(machine, (output,), number == 'float')
-                    + PACE.format(**values))
-    return [f'{value:.0f}' for value in (np.median(taken), max(taken))]
-
-
-def run(folder, text):
-    """Compile a program for this machine, and return the numbers that it prints."""
-    source, program = Path(folder) / 'main.c', Path(folder) / 'main'
-    source.write_text(text)
-    subprocess.run(['cc', '-O2', source, '-o', program, '-lm'], check=True)
-    return np.array(subprocess.run([program], capture_output=True, text=True, check=True)
-                    .stdout.split(), float)
-
-
-def cycles(folder, compiler, flags, text):
+def cycles(folder, text):
     """Return the median and the most cycles of a call, where there is a simulator."""
-    if compiler != 'avr' or not shutil.which('simavr'):
+    if not shutil.which('simavr'):
         return ['not measured'] * 2
-    built(folder, compiler, flags, text)
+    built(folder, (), text)
     printed = subprocess.run(['timeout', '60', 'simavr', '-m', 'atmega328p', '-f', '16000000',
                               folder / 'main.o'], text=True, capture_output=True)
     taken = [int(number) for number in re.findall(r'(\d{3,})\.', printed.stdout + printed.stderr)]
@@ -233,28 +149,16 @@ def cycles(folder, compiler, flags, text):
     return [int(np.median(taken)), max(taken)]
 
 
-def timed():
-    """Yield the time both ways of each mechanism: median and most [us]."""
-    root = Path(__file__).parents[1]
-    for path in SCENES:
-        for name, machine in scene.load(str(root / f'{path}.yaml')).machines.items():
-            with tempfile.TemporaryDirectory() as folder:
-                rows = run(folder, header.written(machine) + TIMES.format(
-                    name=name, n=len(machine.inputs), count=CALLS)).reshape(-1, 2) / 1000.0
-            yield name, [f'{value:.2f}' for row in rows.T
-                         for value in (np.median(row), row.max())]
-
-
-def built(folder, compiler, flags, text):
+def built(folder, extra, text):
     """Return the size of the code and the largest frame."""
     source, made = folder / 'main.c', folder / 'main.o'
     source.write_text(text)
     for usage in folder.glob('*.su'):
         usage.unlink()
-    subprocess.run([f'{compiler}-gcc', '-std=gnu99', '-Os', '-Wall', '-Wextra', '-Wno-unused',
-                    '-fstack-usage', *flags, str(source), '-o', str(made), '-lm'],
+    subprocess.run(['avr-gcc', '-mmcu=atmega328p', '-std=gnu99', '-Os', '-Wall', '-Wextra',
+                    '-Wno-unused', '-fstack-usage', *extra, str(source), '-o', str(made), '-lm'],
                    check=True, cwd=folder)
-    size = subprocess.run([f'{compiler}-size', str(made)], check=True, text=True,
+    size = subprocess.run(['avr-size', str(made)], check=True, text=True,
                           capture_output=True).stdout.splitlines()[1].split()
     frames = [int(number) for usage in folder.glob('*.su')
               for number in re.findall(r'\t(\d+)\t', usage.read_text())]

@@ -14,7 +14,7 @@ What each call of the library costs that README.md and docs/tutorial.md show.
     python -m benchmark.calls [--document]
 
 The calls are read from the pages. Each is timed in turn with the call below it: the compiled code
-of a pose, or the inverse. With --document the table goes into docs/performance.md.
+of a pose, or the inverse. With --document the table goes into docs/design/performance.md.
 """
 
 import argparse
@@ -30,10 +30,8 @@ from linkage_ros.linkage import Mechanism
 import numpy as np
 
 from . import document
-from .machine import machine
-from .nodes.report import table
 
-ROOT = document.DOCS.parent
+ROOT = document.ROOT
 ROUNDS, SAMPLE = 100, 1e-3
 KINDS = {'solve': ('points', lambda x: x.points), 'velocity': ('velocities', lambda x: x.points),
          'joint_angles': ('angles', lambda x: x.joints),
@@ -126,17 +124,15 @@ def rows():
 def main():
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
-    parser.add_argument('--document', action='store_true', help='write it to docs/performance.md')
+    parser.add_argument('--document', action='store_true', help='write it to docs/')
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
-        text = table(('page', 'call', '[us]', 'below it', '[us]', 'more [us]'), rows())
-    about = machine(())
-    text += (f'\n\n{about["date"]}, {about["cpu"]}, one core; Python {about["python"]}, numpy '
-             f'{about["packages"]["numpy"]}.')
+        text = document.table(('page', 'call', '[us]', 'below it', '[us]', 'more [us]'), rows())
+    text += '\n\n' + document.machine()
     print(text)
     if options.document:
-        document.write('performance.md', text, 'measured: calls')
+        document.write('design/performance.md', text, 'measured: calls')
 
 
 if __name__ == '__main__':

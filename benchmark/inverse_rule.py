@@ -15,7 +15,7 @@ How many solutions inverses lose and invent, judged by sampled and bisected pose
 
 The judge is `test/truth/inverse_judge.py`. All of the catalogue are asked, and random linkages:
 three outputs of each at ordinary poses, next to and at ends of the reach, at extremes and at dead
-points. With --document the table goes into docs/accuracy.md.
+points. With --document the table goes into docs/design/accuracy.md.
 """
 
 import argparse
@@ -29,7 +29,6 @@ from linkage_ros import mechanisms
 import numpy as np
 
 from . import document
-from .nodes.report import table
 
 sys.path.append(str(Path(__file__).parents[1] / 'test'))
 from truth import inverse_judge, linkage_checks  # noqa: E402
@@ -87,19 +86,20 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--linkages', type=int, default=2000, help='random linkages')
     parser.add_argument('--minutes', type=float, default=60.0, help='stop after these')
-    parser.add_argument('--document', action='store_true', help='write it to docs/accuracy.md')
+    parser.add_argument('--document', action='store_true', help='write it to docs/')
     options = parser.parse_args()
     total, worst, used = measure(options.linkages, options.minutes)
     places = dict.fromkeys(chain.from_iterable([key[:2]] for key in sorted(total)))
-    text = table(('asked', *COLUMNS), [
+    text = document.table(('asked', *COLUMNS), [
         (f'{kind}, {where}', *(total[kind, where, what] for what in COLUMNS))
         for kind, where in places])
     text += (f'\n\n{used} linkages. The largest error of a solution at an ordinary value is '
              f"{worst:.2g} in units of the rule: half an ulp of the output's size, and half an "
              'ulp of the input times the rate.')
+    text += '\n\n' + document.machine()
     print(text)
     if options.document:
-        document.write('accuracy.md', text, 'measured: inverse')
+        document.write('design/accuracy.md', text, 'measured: inverse')
 
 
 if __name__ == '__main__':

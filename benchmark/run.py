@@ -9,113 +9,130 @@
 # limitations under the License.
 
 """
-Run time against error: every method on every linkage at several batch sizes.
+Run time against error, side by side: ours, C, the original formulas, what one would pick instead.
 
-    python -m benchmark.run                      everything, in some two minutes
-    python -m benchmark.run --quick              a look, within a minute
-    python -m benchmark.run --compare old.json   ratios to an earlier run, nothing is run
+    python -m benchmark.run [--document] [--budget SECONDS]
 
-Rows go to benchmark/results/latest.json, those of a look to benchmark/.cache/, with a table and
-pictures beside it. What it needs is in benchmark/requirements.txt; a method whose package is not
-installed is named and left out.
+All are asked for the same poses in turn, on one core; times are CPU time, medians. A peer whose
+package is not installed is left out. With --document the table goes into docs/design/accuracy.md.
 """
 
 import argparse
-import json
 import os
-from pathlib import Path
 import sys
 import time
 
-# One core for every method: the numbers are per core.
+# One core for every method.
 for library in ('OMP', 'OPENBLAS', 'MKL', 'NUMEXPR'):
     os.environ.setdefault(f'{library}_NUM_THREADS', '1')
 os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
 
 import numpy as np  # noqa: E402
 
-from . import methods, plots, problems, report, timing  # noqa: E402
-from .errors import judge  # noqa: E402
-from .machine import machine  # noqa: E402
+from . import document, peers  # noqa: E402
 
-QUICK = ('ours', 'compiled_c', 'original', 'sympy_expression', 'table', 'newton', 'pylinkage_step')
+ROUNDS, BATCHES = 9, (1, 1000, 100_000)
+# Half of the crank's reach: half a turn, or nearly up to where a Peaucellier cell folds.
+REACH = {'peaucellier': 0.999 * 2 * np.arccos(5 / 6)}
+# What is off by more of the longest bar is another assembly, or no answer.
+ASTRAY = 0.05
+
+
+def angles(kind):
+    """Return the crank angles [rad] at which errors are looked at, in order."""
+    reach, tiny = REACH.get(kind, np.pi), 10.0 ** -np.arange(1, 16)
+    near = np.concatenate([-tiny, [0.0], tiny])
+    return np.unique(np.concatenate([np.linspace(-reach, reach, 721), near, *(
+        [reach - tiny, tiny - reach] if kind not in REACH else [])]))
+
+
+def errors(method, theta, places, size):
+    """Return the median and largest error [2^-53 of the longest bar] and how many are wrong."""
+    found = []
+    for value, true in zip(theta.tolist(), places):
+        try:
+            answer = method.one(value) if method.one else method.many(np.array([value]))
+            row = np.reshape(method.rows(answer), (-1, 2))
+            error = max(float(abs(peers.exact_poses.mp.mpc(x, y) - place))
+                        for (x, y), place in zip(row.tolist(), true))
+        except (ValueError, ArithmeticError, RuntimeError):  # no pose
+            error = np.inf
+        found.append(error if error < ASTRAY * size else np.inf)
+    found = np.array(found) / (size * 2.0 ** -53)
+    right = found[np.isfinite(found)]
+    return np.median(right), right.max(), len(found) - len(right)
+
+
+def times(methods, kind, batch, budget):
+    """Return the CPU time of a pose [us] of each method, all in turn; None where it has none."""
+    reach, begin = 0.99 * REACH.get(kind, np.pi), angles(kind)[-1]
+    scattered = np.random.default_rng(1).uniform(-reach, reach, batch)
+    even = begin + 0.01 * np.arange(1, batch + 1)
+    steps = begin + np.radians(np.arange(1, 64 * (ROUNDS + 1) + 1))
+    taken = {method: [] for method in methods if (method.one if batch == 1 else method.many)}
+    for n in range(-1, ROUNDS):
+        for method, samples in taken.items():
+            if batch == 1:
+                # Those that follow go on from where they stand; all others may as well.
+                given = steps[64 * (n + 1):64 * (n + 2)].tolist()
+            start, count = time.process_time(), 0
+            while count == 0 or (time.process_time() - start < budget and not (
+                    method.follows or n < 0)):
+                if batch == 1:
+                    for theta in given:
+                        _try(method.one, theta)
+                    count += len(given)
+                else:
+                    method.many(even if method.follows else scattered)
+                    count += batch
+            if n >= 0:
+                samples.append(1e6 * (time.process_time() - start) / count)
+    return {method: np.median(samples) for method, samples in taken.items()}
+
+
+def _try(solve, theta):
+    try:
+        solve(theta)
+    except (ValueError, ArithmeticError):
+        pass
+
+
+def compared(kind, budget):
+    """Yield the rows of a linkage."""
+    theta = angles(kind)
+    true = [[peers.truth(kind, value)[name] for name in peers.POINTS[kind]]
+            for value in theta.tolist()]
+    size = float(max(peers.exact_poses.bars(kind, peers.DIMENSIONS[kind]).values()))
+    methods = [method for make in peers.KINDS for method in make(kind)]
+    if kind == peers.LEG:
+        for package, make in peers.PEERS.items():
+            try:
+                methods += make(float(theta[0]) - 0.01)
+            except ImportError as missing:
+                print(f'left out: {package}: {missing}', file=sys.stderr)
+    wrong = {method: errors(method, theta, true, size) for method in methods}
+    took = [times(methods, kind, batch, budget) for batch in BATCHES]
+    for method in methods:
+        median, most, failed = wrong[method]
+        yield [f'{kind}, {method.name}' + ' *' * method.follows, *(
+            f'{each[method]:#.3g}' if method in each else '' for each in took),
+            f'{median:.2g}', f'{most:.2g}', f'{failed} of {len(theta)}']
 
 
 def main():
-    """Run, write and print."""
-    options = arguments()
-    if options.compare:
-        old, new = (json.loads(path.read_text()) for path in (options.compare, options.output))
-        print(report.comparison(old, new))
-        return
-    result = run(options)
-    options.output.parent.mkdir(parents=True, exist_ok=True)
-    options.output.write_text(json.dumps(result, indent=1) + '\n')
-    options.output.with_suffix('.md').write_text(report.document(result))
-    plots.draw(result, options.output.parent)
-    print(report.targets(result))
-
-
-def arguments():
-    """Return what the command line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
-    parser.add_argument('--quick', action='store_true', help='fewer methods, less time each')
-    parser.add_argument('--families', nargs='+', choices=methods.FAMILIES, metavar='FAMILY',
-                        help=f'only these: {", ".join(methods.FAMILIES)}')
-    parser.add_argument('--output', type=Path, metavar='JSON')
-    parser.add_argument('--compare', type=Path, metavar='JSON',
-                        help='print the ratios of the output to an earlier one')
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
+    parser.add_argument('--document', action='store_true', help='write it to docs/')
+    parser.add_argument('--budget', type=float, default=0.02, help='a sample [s]')
     options = parser.parse_args()
-    options.output = options.output or (
-        problems.CACHE if options.quick else report.RESULTS) / 'latest.json'
-    return options
-
-
-def run(options):
-    """Return {machine, absent, rows}."""
-    started = time.time()
-    families = options.families or (QUICK if options.quick else methods.FAMILIES)
-    chosen, absent = methods.load(families)
-    # Once for all: nobody pays for it in what is timed.
     np.seterr(all='ignore')
-    for family, reason in absent.items():
-        print(f'left out: {family}: {reason}', file=sys.stderr)
-    rows = []
-    for kind in problems.DIMENSIONS:
-        rows += solve(kind, [m for m in chosen if kind in m.mechanisms],
-                      0.03 if options.quick else 0.12)
-        print(f'{kind}: {time.time() - started:.0f} s', file=sys.stderr)
-    return {'machine': machine(chosen), 'seconds': round(time.time() - started),
-            'absent': absent, 'rows': rows}
-
-
-def solve(kind, chosen, budget):
-    """Return the rows of one linkage."""
-    problem = problems.problem(kind)
-    wrong = {}
-    for method in chosen:
-        method.prepare(kind, problem.dimensions)
-        wrong[method, True] = judge(method, problem, True)
-        # What follows goes one by one whatever is asked.
-        one_by_one = method.follows or method.batches == (1,)
-        wrong[method, False] = (wrong[method, True] if one_by_one
-                                else judge(method, problem, False))
-    rows = []
-    for batch in timing.BATCHES:
-        able = [method for method in chosen if batch in method.batches]
-        samples = timing.measure(able, kind, batch, budget)
-        rows += [{'mechanism': kind, 'method': method.name, 'knob': method.knob,
-                  'kind': method.kind, 'follows': method.follows, 'batch': batch,
-                  **times(samples[method]), **wrong[method, batch == 1]} for method in able]
-    return rows
-
-
-def times(samples):
-    """Return the columns of a row that tell about time."""
-    if samples is None:
-        return {'status': 'not run: over budget', 'samples': 0, 'median_us': None, 'p95_us': None}
-    return {'status': 'ok', 'samples': len(samples), 'median_us': float(np.median(samples)),
-            'p95_us': float(np.percentile(samples, 95))}
+    rows = [row for kind in peers.POINTS for row in compared(kind, options.budget)]
+    text = document.table(['CPU time per pose [us]', *BATCHES, 'median error [uL]', 'worst [uL]',
+                           'wrong'], rows)
+    text += '\n\n' + document.machine('llvmlite', *peers.PEERS)
+    print(text)
+    if options.document:
+        document.write('design/accuracy.md', text, 'measured: comparison')
 
 
 if __name__ == '__main__':

@@ -40,6 +40,9 @@ html_title = 'linkage_ros'
 html_show_sphinx = False
 html_static_path = ['_static']
 html_css_files = ['page.css']
+html_theme_options = {'announcement': (
+    'No <code>ros2</code> command? <em>Install</em> says what to type instead: '
+    '<em>Without the ros2 command line</em>.')}
 
 
 def setup(app):

@@ -26,8 +26,8 @@ from linkage_ros.linkage import joint_lines
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').glob('*.md'),
-                *(ROOT / 'docs' / 'how-to').glob('*.md')])
+PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').glob('*.md'), *(
+    page for folder in ('how-to', 'design') for page in (ROOT / 'docs' / folder).glob('*.md'))])
 # Pages of the catalogue, which are made when the others are built.
 MADE = {ROOT / 'docs' / 'mechanisms' / f'{name}.md'
         for name in ('index', 'constructions', *mechanisms.TYPES)}
@@ -113,11 +113,12 @@ def test_what_a_page_says_to_type_is_there():
                 assert (ROOT / file).exists(), (page, words)
 
 
-def test_a_page_with_the_ros2_command_line_says_what_to_type_without_it():
-    with_ros2 = {page for page, words in typed() if words[0] == 'ros2'}
-    assert len(with_ros2) > 15
-    for page in with_ros2:
+def test_the_first_pages_and_the_head_of_all_say_what_to_type_without_ros2():
+    for page in (ROOT / 'README.md', ROOT / 'docs' / 'first-ten-minutes.md'):
         assert 'install.md#without-the-ros2-command-line' in page.read_text(), page
+    heading = re.search(r'^### (Without the ros2 .*)$', (ROOT / 'docs' / 'install.md').read_text(),
+                        re.MULTILINE)[1]
+    assert heading in (ROOT / 'docs' / 'conf.py').read_text()
 
 
 def test_nobody_is_told_to_install_a_release_that_there_is_not():
@@ -264,39 +265,21 @@ def measured(monkeypatch):
     pytest.importorskip('mpmath')
     monkeypatch.syspath_prepend(ROOT)
     import benchmark.document
-    import benchmark.engines
     import benchmark.nodes.report
-    import benchmark.report
-    results = {path.stem: json.loads(path.read_text())
-               for path in (ROOT / 'benchmark' / 'results').glob('*.json')}
-    return benchmark, results
+    return benchmark
 
 
 def test_what_a_scene_costs_is_what_was_measured(measured):
-    benchmark, results = measured
-    report, written = benchmark.nodes.report, benchmark.document.written
-    assert written('performance.md') == report.document(results['nodes']).strip()
-    assert written('performance.md', 'measured: in short') == report.in_short(results['nodes'])
+    results = json.loads((ROOT / 'benchmark' / 'results' / 'nodes.json').read_text())
+    benchmark = measured
+    assert benchmark.document.written('design/performance.md') == benchmark.nodes.report.document(
+        results).strip()
 
 
-def test_how_quick_and_how_exact_it_is_said_to_be_is_what_was_measured(measured):
-    benchmark, results = measured
-    for part, text in benchmark.report.page(results['latest'], results['stability']).items():
-        assert benchmark.document.written('accuracy.md', part) == text.strip()
-
-
-def test_a_picture_of_the_comparison_names_eight_curves_at_most(measured):
-    benchmark, results = measured
-    for kind in benchmark.report.TITLES:
-        names = [curve.name for curve in benchmark.report.chosen(results['latest'], kind)]
-        assert len(set(names)) == len(names) <= 8
-        assert sum(name.startswith('linkage_ros') for name in names) >= 2
-
-
-def test_the_table_of_engines_is_that_of_the_last_run(measured):
-    benchmark, results = measured
-    assert (benchmark.document.written('architecture.md')
-            == benchmark.engines.table(results['engines']))
+def test_what_is_measured_is_of_a_commit():
+    parts = [part.partition('<!-- end of')[0] for page in (ROOT / 'docs').rglob('*.md')
+             for part in page.read_text().split('<!-- measured')[1:]]
+    assert len(parts) >= 6 and not [part for part in parts if 'dirty' in part]
 
 
 JOURNEYS = {
@@ -312,7 +295,7 @@ def test_the_files_of_a_journey_are_those_that_run(graph, heading):
     from rcl_interfaces.msg import ParameterEvent
     from sensor_msgs.msg import JointState
 
-    page = (ROOT / 'docs' / 'architecture.md').read_text()
+    page = (ROOT / 'docs' / 'design' / 'architecture.md').read_text()
     steps = re.findall(r'^\d\. .*(?:\n   .*)*', page.partition(f'## {heading}')[2].partition(
         '\n## ')[0], re.MULTILINE)
     named = {file for step in steps for file in re.findall(r'`((?:nodes|linkage)/\w+\.py)`', step)}
@@ -342,7 +325,7 @@ def test_the_files_of_a_journey_are_those_that_run(graph, heading):
 
 def test_every_file_that_the_architecture_names_is_there():
     # The recipes write files of their own.
-    page = (ROOT / 'docs' / 'architecture.md').read_text().partition('## Recipes')[0]
+    page = (ROOT / 'docs' / 'design' / 'architecture.md').read_text().partition('## Recipes')[0]
     files = set(re.findall(r'`((?:\w+/)*\w+\.py)`', page))
     assert len(files) > 40 and not [file for file in files if not any(
         (folder / file).exists() for folder in (ROOT, ROOT / 'linkage_ros'))]
@@ -354,7 +337,7 @@ def test_every_call_that_the_pages_show_is_timed(measured, tmp_path, monkeypatch
     shown = [[page, f'`{calls.short(call)}`'] for page, code in calls.code_of_pages().items()
              for call, _ in calls.calls(code)]
     timed = [re.split(r' ?\| ', line)[1:3] for line in document.written(
-        'performance.md', 'measured: calls').splitlines()[2:] if line.startswith('|')]
+        'design/performance.md', 'measured: calls').splitlines()[2:] if line.startswith('|')]
     assert timed == shown and len(shown) > 20
 
 

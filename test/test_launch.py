@@ -11,6 +11,7 @@
 """The layouts for RViz and Foxglove and the launch file: they name what there is."""
 
 import ast
+import configparser
 from importlib.util import find_spec
 import json
 import math
@@ -148,7 +149,9 @@ def test_the_launch_file_starts_executables_that_there_are(constants, monkeypatc
     monkeypatch.setattr(setuptools, 'setup', handed.update)
     runpy.run_path('setup.py')
     installed = [line.split(' = ')[0] for line in handed['entry_points']['console_scripts']]
-    assert constants['PACKAGE'] == handed['name']
+    config = configparser.ConfigParser()
+    config.read(ROOT / 'setup.cfg')
+    assert constants['PACKAGE'] == config['metadata']['name']
     assert {*constants['NODES'], *constants['TOGETHER'], constants['VIEWER']} <= set(installed)
     files = {name for folder, names in handed['data_files'] for name in names}
     assert {f'config/{constants["RVIZ_CONFIG"]}', 'launch/scene.launch.py'} <= files

@@ -27,8 +27,8 @@ CRANK = mechanisms.create('custom', tracer='A', r=1.2, joints=(
 LINKAGES = {
     **{kind: mechanisms.create(kind) for kind in mechanisms.TYPES}, 'custom': CRANK,
     'other dimensions': CRANK.with_dimensions(r=0.1 + 0.2),
-    'another branch': mechanisms.create('water_drop', branches={
-        name: -1 for name in mechanisms.design('water_drop').branches}),
+    'another branch': mechanisms.create('water_drop', branches=dict.fromkeys(
+        mechanisms.design('water_drop').branches, -1)),
     'many at once': mechanisms.create('four_bar', a=np.linspace(0.5, 1.0, 5)),
     'a cylinder': mechanisms.create('custom', joints=(
         'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right'))}

@@ -8,7 +8,7 @@
 # express or implied. See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The recipes of docs/architecture.md, followed to the letter in a copy of the repository."""
+"""The recipes of docs/design/architecture.md, followed to the letter in a copy of it all."""
 
 from pathlib import Path
 import re
@@ -20,7 +20,7 @@ import sys
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / 'docs' / 'architecture.md'
+PAGE = ROOT / 'docs' / 'design' / 'architecture.md'
 # What is made, or belongs to no release.
 MADE = re.compile(r'\..*|__pycache__|(build|install|log)(-.*)?|out|_build')
 

@@ -1420,7 +1420,7 @@ def test_the_page_is_served_with_nothing_from_outside(address, name):
 
 def test_the_page_is_as_small_as_the_docs_say():
     said = re.search(r'\| ([0-9]+) kB, and ([0-9]+) kB with the first plot',
-                     (ROOT / 'docs' / 'viewer.md').read_text())
+                     (ROOT / 'docs' / 'design' / 'page.md').read_text())
     for folder, kilobytes in zip((PAGE, PAGE / 'vendor'), said.groups()):
         size = sum(file.stat().st_size for file in folder.iterdir()
                    if file.suffix in ('.html', '.css', '.js', '.svg'))

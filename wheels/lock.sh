@@ -27,10 +27,8 @@ pin source 3.10 wheels/source.txt
 pin fast 3.10 wheels/fast.txt
 pin lint 3.10 wheels/lint.txt
 pin mutants 3.10 wheels/mutants.txt
-pin ament 3.11 wheels/ament.txt
 pin docs 3.10 docs/requirements.txt
 pin bench 3.11 benchmark/requirements.txt
-pin bench-source 3.11 benchmark/source.txt --constraint wheels/lock/bench.txt
 for distro in kilted jazzy; do
   pin $distro 3.10 wheels/{$distro,build,demo}.txt
   pin dev-$distro 3.10 wheels/dev.txt wheels/dev-$distro*.txt --constraint wheels/lock/$distro.txt

@@ -9,17 +9,17 @@
 # limitations under the License.
 
 """
-What the nodes cost, next to what any node costs, in the same run.
+What `kinematics` costs beside a floor and a relay, and how long changes hold it up.
 
-    python -m benchmark.nodes --missing          what is not measured of these sources yet
-    python -m benchmark.nodes --quick            a look, within two or three minutes
-    python -m benchmark.nodes services changes   these pieces alone, in full or --quick
-    python -m benchmark.nodes --tables           the tables of the last results
+    python -m benchmark.nodes --missing     what is not measured of these sources yet, in minutes
+    python -m benchmark.nodes --quick       a look at all, in a few minutes
+    python -m benchmark.nodes changes       this piece alone, in full or --quick
+    python -m benchmark.nodes --tables      the tables of the last results
 
-Everything takes 100 minutes at most, first with machine code, then without llvmlite. `--missing`
-stops before ten minutes are over and ends with 3 while something is left: call it again. The
-pieces are those of `piece.py`. Results go to benchmark/results/nodes.json, those of a look to
-benchmark/.cache/; the tables are printed, and written into docs/performance.md by --document.
+Pieces are the scenes and `changes`; --plain measures them where llvmlite cannot be imported.
+`--missing` stops before ten minutes are over and ends with 3 while something is left: call it
+again. Results go to benchmark/results/nodes.json, those of a look to benchmark/.cache/; the tables
+are printed, and written into docs/design/performance.md by --document.
 """
 
 import argparse
@@ -37,10 +37,13 @@ from . import report
 from .. import document
 
 HERE = Path(__file__).parents[1]
+# About how long a piece takes [minutes], and what is measured without llvmlite, too.
+PIECES = {'one leg': 2.0, '12 legs': 3.0, 'four mechanisms': 1.5, 'sixty mechanisms': 2.0,
+          'changes': 3.0}
+PLAIN = '12 legs', 'changes'
 # One call of `--missing` takes no longer than this [minutes], if no piece does.
-LONGEST = 9.8
-LEFT = 3
-QUICK = 'one leg', '12 legs', 'four mechanisms', 'layers', 'services'
+LONGEST, LEFT = 9.8, 3
+ROUNDS, QUICK_ROUNDS = 7, 2
 # What a Python imports at its start, so that it finds no llvmlite.
 WITHOUT = "import sys\nsys.modules['llvmlite'] = None\n"
 
@@ -50,26 +53,18 @@ def main():
     options = arguments()
     result = json.loads(options.output.read_text()) if options.output.exists() else {}
     options.output.parent.mkdir(parents=True, exist_ok=True)
-    is_left = False
-    if not options.tables:
-        is_left = run(options, result)
+    is_left = False if options.tables else run(options, result)
     tables = report.document(result)
+    print(tables)
     if options.document:
-        document.write('performance.md', report.in_short(result), 'measured: in short')
-        document.write('performance.md', tables)
-        if 'growth' in result.get(report.NATIVE, {}):
-            from . import growth_plot
-
-            growth_plot.draw(result[report.NATIVE]['growth']['found'],
-                             document.DOCS / 'images' / 'growth.png')
-    print(report.in_short(result), tables, sep='\n\n')
+        document.write('design/performance.md', tables)
     return LEFT if is_left else 0
 
 
 def arguments():
     """Return what the command line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
-    parser.add_argument('pieces', nargs='*', help='which pieces, by their names in piece.py')
+    parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
+    parser.add_argument('pieces', nargs='*', metavar='PIECE', help=', '.join(PIECES))
     mode = parser.add_mutually_exclusive_group()
     mode.add_argument('--missing', action='store_true', help='what is not measured yet')
     mode.add_argument('--quick', action='store_true', help='one rate and fewer rounds')
@@ -79,53 +74,46 @@ def arguments():
     parser.add_argument('--rounds', type=int, help='bursts of each subject')
     parser.add_argument('--output', type=Path, metavar='JSON')
     options = parser.parse_args()
-    options.output = options.output or (
-        HERE / ('.cache' if options.quick else 'results') / 'nodes.json')
+    if unknown := set(options.pieces) - set(PIECES):
+        parser.error(f'no piece {unknown}: {", ".join(PIECES)}')
     if not (options.pieces or options.missing or options.quick or options.tables):
         parser.error('name some pieces, or --missing, --quick or --tables')
+    options.output = options.output or (
+        HERE / ('.cache' if options.quick else 'results') / 'nodes.json')
     return options
 
 
 def run(options, result):
     """Measure what was asked for, and write each piece at once; return whether some is left."""
-    from .piece import PIECES
-
     # The processes find each other here and nobody else.
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     domain = Domain()
     os.environ.setdefault('ROS_DOMAIN_ID', str(domain.id))
     started, sources = time.time(), _sources()
+    chosen = [(name, options.plain) for name in options.pieces or PIECES]
     if options.missing:
-        columns = [(report.NATIVE, name) for name in PIECES] + [
-            (report.PLAIN, name) for name, piece in PIECES.items() if piece.is_plain]
-        chosen = [(column, name) for column, name in columns
-                  if result.get(column, {}).get(name, {}).get('sources') != sources]
-    else:
-        column = report.PLAIN if options.plain else report.NATIVE
-        chosen = [(column, name) for name in options.pieces or QUICK]
-    for i, (column, name) in enumerate(chosen):
-        minutes = (time.time() - started) / 60 + PIECES[name].minutes
-        if i and options.missing and minutes > LONGEST:
+        chosen = [(name, plain) for plain in (False, True) for name in (PLAIN if plain else PIECES)
+                  if result.get(report.titled(name, plain), {}).get('sources') != sources]
+    for i, (name, plain) in enumerate(chosen):
+        if i and options.missing and (time.time() - started) / 60 + PIECES[name] > LONGEST:
             return True
-        measured = {**_measured(column, name, options), 'sources': sources}
-        result.setdefault(column, {})[name] = measured
+        result[report.titled(name, plain)] = {**_measured(name, plain, options),
+                                              'sources': sources}
         options.output.write_text(json.dumps(result, indent=1) + '\n')
-        print(f'{column}, {name}: {measured["seconds"]} s', file=sys.stderr)
+        print(f'{report.titled(name, plain)}: {time.time() - started:.0f} s', file=sys.stderr)
     return False
 
 
-def _measured(column, name, options):
+def _measured(name, plain, options):
     """Return what a process measures."""
     with tempfile.TemporaryDirectory() as folder:
         env, path = dict(os.environ), Path(folder) / 'found.json'
-        if column == report.PLAIN:
+        if plain:
             (Path(folder) / 'sitecustomize.py').write_text(WITHOUT)
             env['PYTHONPATH'] = os.pathsep.join([folder, env.get('PYTHONPATH', '')])
-        more = ['--quick'] * options.quick
-        if options.rounds:
-            more += ['--rounds', str(options.rounds)]
-        subprocess.run([sys.executable, '-m', 'benchmark.nodes.piece', name, str(path), *more],
-                       env=env, check=True)
+        rounds = options.rounds or (QUICK_ROUNDS if options.quick else ROUNDS)
+        subprocess.run([sys.executable, '-m', 'benchmark.nodes.piece', name, str(path),
+                        str(rounds), *['--quick'] * options.quick], env=env, check=True)
         return json.loads(path.read_text())
 
 

@@ -11,43 +11,35 @@
 """Short bursts, each subject in turn, round after round."""
 
 from contextlib import contextmanager
-import json
 import pickle
 import statistics
-import subprocess
-import sys
 import threading
 import time
 
-from linkage_interfaces.srv import ServoInverse
 from linkage_ros.nodes import scene_node
 import numpy as np
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
 from . import scenes, subject
 from .driving import Process
 
 SUBJECT = ('-m', 'benchmark.nodes.subject')
 NODE = ('-m', 'linkage_ros.nodes.kinematics')
-RATES = (50.0, 200.0, 1000.0)
-# The scenes whose cost is compared. With sixty mechanisms one core is not enough for 1000 Hz, not
-# even for the floor.
-COMPARED = {'one leg': RATES, '12 legs': RATES, 'four mechanisms': RATES,
-            'sixty mechanisms': RATES[:2]}
-# How long a burst takes [s], by rate.
+# How long a burst takes [s], by rate [Hz].
 SECONDS = {50.0: 1.2, 200.0: 1.0, 1000.0: 0.6}
 WARM_UP = 60
-# After so long all is known and made [s].
-COMPILING = 1.0
 # What else is compared in a scene, in a loop and in processes.
-BESIDE = {'one leg': ('relay',), '12 legs': ('fresh',)}
-# In a loop, in a round: topics to publish on, and ticks at least.
-PUBLISHED, TICKS = 600, 20
-MAKE = ('import rclpy; from linkage_ros.nodes.kinematics import Kinematics; '
-        'rclpy.init(); Kinematics()')
+BESIDE = {'one leg': ('relay',)}
+# In a loop, in a round: topics to publish on, and ticks at least. After so long, all is known and
+# made [s].
+PUBLISHED, TICKS, COMPILING = 600, 20, 1.0
+
+
+def rates(scene):
+    """Return the rates [Hz]; for sixty mechanisms no core is enough at 1000 Hz."""
+    return [*SECONDS][:2 if scene == 'sixty mechanisms' else 3]
 
 
 class Bench:
@@ -94,34 +86,18 @@ class Bench:
         if scene == '12 legs':
             wanted['joints'] = NODE, heard[:1]
             wanted['unheard'], wanted['deaf'] = (NODE, ()), ((*SUBJECT, 'deaf'), ())
-            wanted['kinematics_plain'] = (*SUBJECT, 'kinematics', '--single'), heard
         with self.subjects(scene, wanted) as lines:
             for line in lines.values():
                 line.burst(200.0, WARM_UP)
             return [row for rate in rates for row in self._rows(scene, rate, lines)]
 
     def _rows(self, scene, rate, lines):
-        return [{'scene': scene, 'rate': rate, 'subject': name, **_summary(found)}
-                for name, found in self._bursts(rate, lines).items()]
-
-    def _bursts(self, rate, lines):
         bursts = {name: [] for name in lines}
         for _ in range(self.rounds):
             for name, line in lines.items():
                 bursts[name].append(line.burst(rate, round(rate * SECONDS[rate])))
-        return bursts
-
-    def parts(self, scene, rate):
-        """Return the parts of a tick [us] in a process that is driven at a rate [Hz]."""
-        heard = scenes.topics(scene)
-        wanted = {}
-        for kind in ('kinematics', 'floor'):
-            given = ('--ready', str(self.ready(scene))) if kind == 'floor' else ()
-            wanted[kind] = (*SUBJECT, kind, '--times', str(self.folder / kind), *given), heard
-        with self.subjects(scene, wanted) as lines:
-            self._bursts(rate, lines)
-        return [{'scene': scene, 'rate': rate, 'subject': kind,
-                 **json.loads((self.folder / kind).read_text())} for kind in wanted]
+        return [{'scene': scene, 'rate': rate, 'subject': name, **_summary(found)}
+                for name, found in bursts.items()]
 
     def bodies(self, scene):
         """Return what a tick takes [us], one after the other without a pause, in this process."""
@@ -160,64 +136,6 @@ class Bench:
         return [{'scene': scene, 'subject': kind, 'ticks': times,
                  'tick': statistics.median(times)} for kind, times in ticks.items()]
 
-    def starts(self, scene='12 legs'):
-        """Return the seconds from the start of a process to its first joint states, or its end."""
-        heard = scenes.topics(scene)[:1]
-        floor = (*SUBJECT, 'floor', '--ready', str(self.ready(scene)))
-        found = {'kinematics': [], 'floor': [], 'made': []}
-        for _ in range(2 * self.rounds):
-            begin = time.perf_counter()
-            subprocess.run([sys.executable, '-c', MAKE], check=True)
-            found['made'].append(time.perf_counter() - begin)
-            for name, arguments in (('kinematics', NODE), ('floor', floor)):
-                begin = time.perf_counter()
-                with self.subjects(scene, {name: (arguments, heard)}):
-                    found[name].append(time.perf_counter() - begin)
-        return found
-
-    def services(self, calls):
-        """Return rows of round trips [us] and CPU time a call [us]."""
-        servo = Process('servo', '-m', 'linkage_ros.nodes.servo_inverse')
-        trigger = Process('plain', *SUBJECT, 'trigger')
-        echo = Process('echo', *SUBJECT, 'echo')
-        try:
-            node = self.driver.node
-            asks = node.create_client(ServoInverse, '/servo/servo_inverse')
-            pulls = node.create_client(Trigger, '/plain/trigger')
-            shouts = node.create_client(ServoInverse, '/echo/servo_inverse')
-            clients = asks, pulls, shouts
-            assert self.driver.until(lambda: all(c.service_is_ready() for c in clients))
-            wanted = {
-                'trigger': (trigger, pulls, Trigger.Request(), calls),
-                'echo 1': (echo, shouts, _request(1), calls),
-                'servo 1': (servo, asks, _request(1), calls),
-                'echo 1000': (echo, shouts, _request(1000), calls // 4),
-                'servo 1000': (servo, asks, _request(1000), calls // 4)}
-            bursts = {name: [] for name in wanted}
-            for _ in range(self.rounds + 1):
-                for name, call in wanted.items():
-                    bursts[name].append(self._calls(*call))
-        finally:
-            for process in (servo, trigger, echo):
-                process.end()
-        return [{'subject': name,
-                 'round_trips': [statistics.median(times) for times, _ in found[1:]],
-                 'p50': statistics.median(statistics.median(times) for times, _ in found[1:]),
-                 'p99': float(np.percentile(np.concatenate([t for t, _ in found[1:]]), 99)),
-                 'cpus': [cpu for _, cpu in found[1:]],
-                 'cpu': statistics.median(cpu for _, cpu in found[1:])}
-                for name, found in bursts.items()]
-
-    def _calls(self, process, client, request, count):
-        times, spin, cpu = [], self.driver.executor.spin_once, process.cpu()
-        for _ in range(count):
-            start = time.perf_counter()
-            future = client.call_async(request)
-            while not future.done():
-                spin(timeout_sec=1.0)
-            times.append(1e6 * (time.perf_counter() - start))
-        return times, 1e6 * (process.cpu() - cpu) / count
-
 
 def _is_heard(node, topics):
     """Return whether somebody listens to each of some topics that a node publishes on."""
@@ -235,11 +153,6 @@ def _ticks(node, cranks, count):
         heard.callback(given)
         times.append(1e-3 * (time.thread_time_ns() - start))
     return times[count // 10:]
-
-
-def _request(count):
-    angles = np.linspace(-0.5, 0.5, count) if count > 1 else np.array([0.1])
-    return ServoInverse.Request(lever_angle=angles.tolist())
 
 
 def _summary(bursts):

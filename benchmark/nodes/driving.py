@@ -10,7 +10,6 @@
 
 """Processes that are measured, and the one that drives them and hears them."""
 
-import os
 import pickle
 import signal
 import subprocess
@@ -25,22 +24,10 @@ from visualization_msgs.msg import MarkerArray
 from . import scenes
 
 DEADLINE = 30.0
-# Where the stamp is in the bytes of a message.
-STAMP = slice(4, 12)
 # How late a message may be sent before all that follow are sent later [s].
 LATE = 0.01
 # After the last message of a burst, answers are waited for this long [s].
 PATIENCE = 0.5
-# How many messages are under way at most where each is sent as soon as it may be.
-AHEAD = 4
-# For how long no answer may come until it is lost [s].
-STALL = 5.0
-
-
-def resident(pid='self') -> int:
-    """Return the resident set size of a process [bytes]."""
-    with open(f'/proc/{pid}/statm') as text:
-        return int(text.read().split()[1]) * os.sysconf('SC_PAGE_SIZE')
 
 
 class Process:
@@ -62,23 +49,6 @@ class Process:
         """Return the CPU time of the thread that it began with [s]."""
         with open(f'/proc/{self._process.pid}/task/{self._process.pid}/schedstat') as text:
             return 1e-9 * int(text.read().split()[0])
-
-    def resident(self) -> int:
-        """Return its resident set size [bytes]."""
-        return resident(self._process.pid)
-
-    def proportional(self) -> int:
-        """Return its part of the memory, what it shares divided by those who do [bytes]."""
-        with open(f'/proc/{self._process.pid}/smaps_rollup') as text:
-            return 1024 * next(int(line.split()[1]) for line in text if line.startswith('Pss:'))
-
-    def running(self) -> bool:
-        """Return whether it has not ended."""
-        return self._process.poll() is None
-
-    def signal(self, number):
-        """Send a signal."""
-        self._process.send_signal(number)
 
     def end(self):
         """End it as a user does."""
@@ -131,9 +101,9 @@ class Driver:
             (executor or self.executor).spin_once(timeout_sec=0.02)
         return held
 
-    def line(self, process, scene, topics, stamped=False):
+    def line(self, process, scene, topics):
         """Return what drives a process that answers on some topics, when both are connected."""
-        line = Line(self, process, scene, topics, stamped)
+        line = Line(self, process, scene, topics)
         if not self.until(line.connected):
             raise RuntimeError(f'{process.name} did not answer in {DEADLINE} s')
         return line
@@ -160,16 +130,10 @@ class Driver:
 
 
 class Line:
-    """
-    From the driver to one process and back.
+    """From the driver to one process and back."""
 
-    Where answers are `stamped` as their messages are, what a node shows again after a change, with
-    the stamp of the one before, is not taken for an answer.
-    """
-
-    def __init__(self, driver, process, scene, topics, stamped=False):
-        self.process, self._stamped = process, stamped
-        self._driver = driver
+    def __init__(self, driver, process, scene, topics):
+        self.process, self._driver = process, driver
         self.cranks = scenes.Cranks(scene)
         self.publisher = driver.node.create_publisher(
             JointState, f'/{process.name}/crank_states', 10)
@@ -181,16 +145,10 @@ class Line:
             for topic in topics]
 
     def _hear(self, path):
-        times, last = [], b''
-
-        def hear(text):
-            nonlocal last
-            if not self._stamped or text[STAMP] != last:
-                last = text[STAMP]
-                times.append(time.perf_counter())
-
+        times = []
         self.heard.append(times)
-        return self._driver.node.create_subscription(JointState, path, hear, 1000, raw=True)
+        return self._driver.node.create_subscription(
+            JointState, path, lambda _: times.append(time.perf_counter()), 1000, raw=True)
 
     def _ignore(self, _):
         pass
@@ -239,18 +197,3 @@ class Line:
         if not self.heard:
             self._driver.wait(0.05)
         return Burst(sent, self.heard, self.process.cpu() - cpu)
-
-    def flow(self, count):
-        """Send messages, each when nearly all before it are answered; return how many are lost."""
-        for times in self.heard:
-            times.clear()
-        for sent in range(1, count + 1):
-            self.send()
-            if not self._answered(sent - AHEAD):
-                break
-        self._answered(sent)
-        return sent - min(map(len, self.heard))
-
-    def _answered(self, count):
-        return self._driver.until(
-            lambda: all(len(times) >= count for times in self.heard), STALL)

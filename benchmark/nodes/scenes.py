@@ -31,16 +31,16 @@ SCENES = {
     'one leg': {'mechanisms': ['leg'], 'leg.type': 'jansen', 'leg.scale': 0.01},
     '12 legs': {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.scale': 0.01,
                 'walker.leg_pairs': 6},
-    'four mechanisms': {'mechanisms': list(KINDS)},
+    'four mechanisms': many(4),
+    'sixty mechanisms': many(60),
 }
-MANY = {'sixteen mechanisms': many(16), 'sixty mechanisms': many(60)}
 # Of the motion, between two messages [ns]: a hundredth of a second or so, but never the same.
 STEP = 10_000_019
 
 
 def given(name: str) -> dict:
     """Return the parameters of a scene."""
-    return SCENES[name] if name in SCENES else MANY[name]
+    return SCENES[name]
 
 
 class Topic(NamedTuple):
