@@ -32,12 +32,11 @@ from typing import Any, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from .spatial import Circle, EDGE, gap, LAST_STEP, newton_step, Pose, row, STEPS, Vector
+from ..tolerances import ROUNDING, SINGULAR
 
 # Cells per side of the rectangle, cells of all motor angles, and parts into which the needed ones
 # of these are divided. The fine cells are tried if the coarse ones prove this part of the size.
 COARSE, FINE, NEARLY = (10, 36, 2), (20, 48, 4), 0.8
-# Least angle [rad] between directions, and the rounding of f as a fraction of its terms.
-APART, ROUNDING = 1e-6, 1e-14
 # Newton's method is tried for this many poses per side of the rectangle. Its error [rad] one step
 # before the last is well below LAST_STEP, so that it converges between these poses, too.
 POSES, CONVERGED = 33, 0.01 * LAST_STEP
@@ -202,7 +201,7 @@ class Window:
         with np.errstate(all='ignore'):
             one, other = (rod.directions(poses, *cells[1:]) for rod in self.rods)
             away = np.mod(one.middle[:, None] - other.middle, math.pi)
-            apart = np.minimum(away, math.pi - away) > one.half[:, None] + other.half + APART
+            apart = np.minimum(away, math.pi - away) > one.half[:, None] + other.half + SINGULAR
         shared = np.packbits(one.allowed, axis=1)[:, None] & np.packbits(other.allowed, axis=1)
         return bool((apart | ~shared.any(axis=2)).all())
 

@@ -18,12 +18,7 @@ from typing import Any, List, Optional, Sequence
 import numpy as np
 
 from .problem import Found, InverseProblem
-from ..geometry.planar import TOLERANCE
-
-# Distance to an end of a sweep that counts as that end, in sizes and as a part of the end.
-CLOSE, ULPS = 1e-7, 4 * 2.0 ** -52
-# Inputs that differ by less are the same one, of which the next input decides [rad, sizes].
-TIE = 1e-9
+from ..tolerances import CLOSE, SINGULAR, TOLERANCE
 
 # For each input its two ends, () if it has none.
 Limits = Sequence[Sequence[float]]
@@ -58,7 +53,7 @@ def choose(problem: InverseProblem, solutions: Sequence[Found], near: Optional[S
 def _before(order: Sequence[float], other: Sequence[float]) -> bool:
     """Return whether numbers precede others in lexicographic order; rounding is a tie."""
     for x, y in zip(order, other):
-        if abs(x - y) > TIE:
+        if abs(x - y) > CLOSE:
             return x < y
     return False
 
@@ -78,12 +73,13 @@ def _inside(problem: InverseProblem, by: int, place: float, rates: Sequence[floa
 def _slack(problem: InverseProblem, by: int, speeds: Sequence[Any], low: Any, high: Any) -> Any:
     """Return how far rounding of the outputs moves an input; rates may be NaN."""
     n, size = problem.n, problem.sizes[by]
-    far: Any = CLOSE * size
+    # Next to an extreme, half of all digits.
+    far: Any = SINGULAR * size
     for speed, scale in zip(speeds[n * by:n * by + n], problem.scales):
         # The distance from which on the output changes by more than its rounding.
         moved = TOLERANCE * math.pi * scale / (speed + 1e-300)
         far = np.fmin(far, moved) if isinstance(moved, np.ndarray) else min(far, moved)
-    return far + ULPS * (4.0 * size + abs(low) + abs(high))
+    return far + TOLERANCE * (4.0 * size + abs(low) + abs(high))
 
 
 def choose_arrays(problem: InverseProblem, solutions: np.ndarray,
@@ -114,7 +110,7 @@ def choose_arrays(problem: InverseProblem, solutions: np.ndarray,
         before, tied = np.zeros(len(column), bool), np.ones(len(column), bool)
         for order in orders:
             gap = order[k] - order[best, column]
-            before |= tied & (gap < -TIE)
-            tied &= np.abs(gap) <= TIE
+            before |= tied & (gap < -CLOSE)
+            tied &= np.abs(gap) <= CLOSE
         best = np.where(valid[k] & (before | ~valid[best, column]), k, best)
     return np.where(valid[best, column], solutions[best, :, column].T, math.nan)

@@ -30,9 +30,8 @@ from .problem import Found, InverseProblem
 from .refine import refine
 from .segments import Segments
 
-# Steps of a motion at most, the shortest of them [part of the motion], and the longest of an input
-# [rad, sizes].
-STEPS, SHORTEST, LONGEST = 200, 1e-10, 0.7
+# Steps of a motion at most, and the longest of an input [rad, sizes].
+STEPS, LONGEST = 200, 0.7
 
 
 def follow(problem: InverseProblem, values: Sequence[float], near: Sequence[float],
@@ -74,8 +73,8 @@ def _followed(problem: InverseProblem, values: Sequence[float], near: Sequence[f
             if not left:
                 return found, near
             part = min(4.0 * part, left)
-        elif (part := 0.25 * part) < SHORTEST:
-            break
+        else:
+            part *= 0.25
     return None, near
 
 

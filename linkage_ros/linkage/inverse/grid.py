@@ -26,22 +26,19 @@ from typing import Callable, Iterator, List, Sequence, Set, Tuple, Union
 
 import numpy as np
 
+from .follow import LONGEST
 from .problem import Found, InverseProblem
 from .refine import refine_inside
 from .segments import segments_of
 from ..formulas import Names
 from ..kinematics import Kinematics
+from ..tolerances import CLOSE, ROUNDING
 from ...words import listed
 
 # Grid points at first and at most, and the least number of them that can be assembled.
 STARTS, MAX_STARTS, ASSEMBLED = 1024, 1 << 16, 250
-# Steps from a start (few need many), the longest one [sizes], and their damping: initial, and of
-# giving up.
-STEPS, LONGEST_STEP, DAMPING, HOPELESS = 100, 0.7, 1e-3, 1e4
-# Errors of a solution of the search [sizes]; `refine` removes them.
-NEAR = 1e-12
-# Outputs are dependent if in nine of ten poses the Jacobian is singular by less than this.
-DEPENDENT = 1e-10
+# Steps from a start (few need many), and their damping: initial, and of giving up.
+STEPS, DAMPING, HOPELESS = 100, 1e-3, 1e4
 # Halvings of the distance at which a twin behind a fold is searched.
 TWINS = 24
 
@@ -155,7 +152,7 @@ class Grid:
         def beyond(q: np.ndarray) -> np.ndarray:
             """Return poses on both sides of solutions: a twin may lie behind a fold."""
             weakest = np.linalg.svd(missed(q)[2])[2][:, -1]
-            away = LONGEST_STEP * np.outer([1.0, -1.0], 0.5 ** np.arange(TWINS)).ravel()
+            away = LONGEST * np.outer([1.0, -1.0], 0.5 ** np.arange(TWINS)).ravel()
             return known(moved(np.repeat(q, len(away), axis=0),
                                np.kron(weakest, away[:, None])))
 
@@ -186,9 +183,9 @@ class Grid:
         q = self._starts(np.zeros(n), list(range(n)), lambda q: q[np.isfinite(
             self._missed(q, np.zeros(n))[1]).all(axis=(1, 2))])
         values = np.linalg.svd(self._missed(q, np.zeros(n))[1], compute_uv=False)
-        # An output may stand still in a part of the poses.
+        # An output may stand still in a tenth of the poses.
         if len(q) and np.quantile(values[:, -1] / np.fmax(values[:, 0], 1e-300),
-                                  0.9) <= DEPENDENT:
+                                  0.9) <= CLOSE:
             raise dependent(self._problem.outputs, range(n))
 
     def _distinct(self, q: np.ndarray, missed: Callable) -> np.ndarray:
@@ -198,7 +195,7 @@ class Grid:
         for i in np.argsort(-weakest):
             if all(max(input_.apart(x, y) for input_, x, y in zip(self._inputs, q[i], other)) > far
                    for other, far in distinct):
-                distinct.append((q[i], 4.0 * NEAR / max(weakest[i], NEAR)))
+                distinct.append((q[i], 4.0 * ROUNDING / max(weakest[i], ROUNDING)))
         return np.array([each for each, _ in distinct]).reshape(-1, q.shape[1])
 
 
@@ -206,7 +203,7 @@ def _descended(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
     """Return the solutions that Levenberg-Marquardt steps reach from some poses."""
     (gap, size, jacobian), damping, found = missed(q), np.full(len(q), DAMPING), []
     for _ in range(STEPS):
-        there = size <= NEAR * (1.0 + np.abs(jacobian).max(axis=(1, 2)))
+        there = size <= ROUNDING * (1.0 + np.abs(jacobian).max(axis=(1, 2)))
         found.append(q[there])
         going = ~there & (damping < HOPELESS)
         if not going.any():
@@ -218,7 +215,7 @@ def _descended(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
         step = np.linalg.solve(square + weight[:, None, None] * np.eye(gap.shape[1]),
                                turned @ gap[going, :, None])[..., 0]
         longest = np.abs(step).max(axis=1, keepdims=True)
-        trial = moved(q, -step * (LONGEST_STEP / np.maximum(longest, LONGEST_STEP)))
+        trial = moved(q, -step * (LONGEST / np.maximum(longest, LONGEST)))
         better = missed(trial)[1] < size
         damping = np.where(better, 0.1 * damping, 10.0 * damping).clip(1e-14)
         q = np.where(better[:, None], trial, q)

@@ -47,12 +47,11 @@ from .refine import distinct, distinct_arrays, refine, refine_arrays
 from .segments import Segments, segments_of
 from ..kinematics import Kinematics
 from ..text.arguments import numbers
+from ..tolerances import SINGULAR
 from ...words import listed, plain_text, quoted
 
 # Arrays are solved in blocks that stay in a processor's cache, and few values as floats.
 BLOCK, FEW = 8192, 32
-# Below this margin a pose is singular, and signs are 0.
-SINGULAR = 1e-6
 
 Ends = Optional[Sequence[Optional[Tuple[float, float]]]]
 

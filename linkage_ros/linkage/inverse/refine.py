@@ -25,7 +25,8 @@ from typing import Any, Callable, List, Optional, Sequence, Tuple
 import numpy as np
 
 from .problem import Found, InverseProblem
-from .segments import Bracket, SPECIAL, STEEPEST
+from .segments import Bracket
+from ..tolerances import ONE, SINGULAR
 
 # Errors in units of rounding (half an ulp of the output's size and of the inputs times the rates):
 # where refinement stops; and the largest of a solution, which rounding of all joints may explain.
@@ -34,8 +35,8 @@ ROUNDED, ACCEPTED = 2.0, 64.0
 FAR = 0.1
 # Steps at most: bisection alone needs one per bit of a float.
 MAX_STEPS = 64
-# Two solutions are one if they are no farther apart than SPECIAL [rad, sizes], or than this and
-# the rates say that the outputs differ by no more than SPECIAL [sizes].
+# Two solutions are one if they are no farther apart than ONE [rad, sizes], or than this and
+# the rates say that the outputs differ by no more than ONE [sizes].
 NEIGHBOURS = 1e-4
 
 _UNIT = 2.0 ** -53
@@ -85,7 +86,7 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Sequence
         return None
     inputs, row, gaps = found
     # Where rates are low, rounding is that of the outputs alone.
-    if least > ACCEPTED * _UNIT and not (least <= STEEPEST and _errors(
+    if least > ACCEPTED * _UNIT and not (least <= SINGULAR and _errors(
             problem, *(np.reshape(part, (-1, 1)) for part in (gaps, row, inputs)))[0] <= ACCEPTED):
         return None
     return problem.wrapped(inputs), row[n:]
@@ -100,7 +101,7 @@ def refine_inside(at: Callable, value: float, period: float, scale: float, size:
     """
     low, high, x, sign = bracket
     x, best, least = x if low <= x <= high else 0.5 * (low + high), (math.nan, math.nan), math.inf
-    most = STEEPEST / ACCEPTED * scale
+    most = SINGULAR / ACCEPTED * scale
     for _ in range(MAX_STEPS):
         output, rate = at(x)
         gap = output - value
@@ -120,7 +121,7 @@ def refine_inside(at: Callable, value: float, period: float, scale: float, size:
             if x in (low, high):
                 break
     # At a jump or in noise both sides enclose values that the output never has.
-    if not least <= STEEPEST * scale:
+    if not least <= SINGULAR * scale:
         return None
     x, rate = best
     if not -math.inf < rate < math.inf:
@@ -199,7 +200,7 @@ def _errors(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray,
         rounding = scale + sum(np.abs(rate) * weight for rate, weight in zip(
             rows[n + i::n], weights))
         # Where a pose has no rates, they explain nothing.
-        most = scale * (STEEPEST / (ACCEPTED * _UNIT))
+        most = scale * (SINGULAR / (ACCEPTED * _UNIT))
         errors.append(np.abs(gap) / (_UNIT * np.where(np.isnan(rounding), scale, np.minimum(
             rounding, most))))
     return np.max(errors, axis=0) if n > 1 else errors[0]
@@ -226,11 +227,11 @@ def same(problem: InverseProblem, one: Found, other: Found) -> bool:
             return False
     steps = [math.remainder(x - y, turn) for x, y, turn in zip(one[0], other[0], problem.turns)]
     apart = max([abs(step) / size for step, size in zip(steps, problem.sizes)])
-    if not SPECIAL < apart <= NEIGHBOURS:
-        return apart <= SPECIAL
+    if not ONE < apart <= NEIGHBOURS:
+        return apart <= ONE
     n = problem.n
     return any(all(abs(sum(rate * step for rate, step in zip(rates[i::n], steps)))
-                   <= SPECIAL * scale for i, scale in enumerate(problem.scales))
+                   <= ONE * scale for i, scale in enumerate(problem.scales))
                for _, rates in (one, other))
 
 

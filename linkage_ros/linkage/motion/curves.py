@@ -22,6 +22,8 @@ from typing import Callable, Tuple
 
 import numpy as np
 
+from ..tolerances import ROUNDING
+
 # Samples of a whole turn; halvings of the distance to each end of an arc, for more samples there.
 TURN_SAMPLES, END_HALVINGS = 360, 48
 # For extremes: samples of an arc, number of peaks that are refined, samples around each, zooms.
@@ -30,8 +32,8 @@ EXTREME_SAMPLES, REFINED_PEAKS, ZOOM_SAMPLES, ZOOMS = 385, 4, 17, 10
 CUTS = np.arange(1, 16) / 16
 # For a drawn curve: even samples at first, rounds of division, maximum number of samples.
 DRAWN, DRAWN_ROUNDS, MOST_DRAWN = 181, 30, 4000
-# Tolerance of a drawn curve, as a fraction of its size and of its coordinates.
-CHORD, NOISE = 1 / 600, 1e-12
+# Tolerance of a drawn curve, as a fraction of its size.
+CHORD = 1 / 600
 # Angles below this [rad] are zero: the rounding of any other angle is coarser.
 LEAST = 1e-18
 
@@ -62,7 +64,7 @@ def drawn(curve: Callable, lo: float, hi: float) -> np.ndarray:
     for _ in range(DRAWN_ROUNDS):
         known = np.isfinite(places).all(axis=1)
         size = np.ptp(places[known], axis=0).max(initial=0.0)
-        most = max(CHORD * size, NOISE * abs(places[known]).max(initial=0.0))
+        most = max(CHORD * size, ROUNDING * abs(places[known]).max(initial=0.0))
         first = np.flatnonzero(known[:-1] & known[1:] & (at[1:] - at[:-1] > LEAST))
         inner = at[first, None] + (at[first + 1] - at[first])[:, None] * parts
         between = curve(inner.ravel()).reshape(-1, 3, 2)

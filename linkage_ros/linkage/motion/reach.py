@@ -36,9 +36,8 @@ HALVINGS = 12
 # Fraction at which an arc is tested: in the exact middle, an arm of a symmetric linkage may have
 # no length.
 INSIDE = 0.49
-# The search stops at more ends than these: they are rounding, of the direction of an arm without
-# length.
-MOST = 100
+# More ends a turn than these are rounding, of the direction of an arm without length.
+MAX_ENDS = 100
 
 
 def reach_of(linkage: Kinematics, others: Tuple[float, ...] = ()) -> List[Arc]:
@@ -136,7 +135,7 @@ def _limits(margins: Callable, lo: float, hi: float) -> List[float]:
             lambda x, as_before=first[place][:, None]: _failing(margins, x) == as_before,
             theta[place], theta[place + 1])
         known, ends = len(ends), sorted({lo, hi, *before.tolist(), *after.tolist()})
-        if len(ends) == known or len(ends) > MOST * max(1.0, (hi - lo) / math.tau):
+        if len(ends) == known or len(ends) > MAX_ENDS * max(1.0, (hi - lo) / math.tau):
             break
     return ends[1:-1]
 
