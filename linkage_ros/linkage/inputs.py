@@ -21,19 +21,17 @@ from typing import Any, Callable, Iterable, Iterator, List, NamedTuple, Sequence
 
 import numpy as np
 
-from .tolerances import ROUNDING, SINGULAR
+from .tolerances import ONE, ROUNDING, SINGULAR
 
 Arc = Tuple[float, float]
 
 ANGLE, LENGTH = 'angle', 'length'
 
-# Longest period that is computed as a whole, and the part that is computed of a longer one [turns;
-# fewer where a geared link is fast]. Of several inputs it is the product, which is the cost.
-MOST_COUNTED, WINDOW = 1024, 64
+# The longest period that is computed as a whole, and the part of a longer one [turns; fewer where
+# a geared link is fast]. Of several inputs it is the product, which is the cost.
+MAX_COUNTED = 128
 # Greatest denominator of a gear ratio with a period, and greatest ratio.
 MOST_TURNS, FASTEST = 10 ** 6, 1000
-# Arcs below this width [rad] are the rounding of one angle.
-NARROWEST = 2e-15
 # Poses that are compared with those a period later.
 PERIODIC = 64
 
@@ -173,7 +171,7 @@ class Input(NamedTuple):
         inside = (end - self.turns_of(end) for end in ends) if self.wraps else (
             end for end in (self.low, *ends, self.high) if self.low <= end <= self.high)
         for end in sorted(inside):
-            if not marks or end - marks[-1] > NARROWEST:
+            if not marks or end - marks[-1] > ONE:
                 marks.append(end)
         if not marks:
             return [(self.low, self.high)]

@@ -35,13 +35,13 @@ from .spatial import Circle, EDGE, gap, LAST_STEP, newton_step, Pose, row, STEPS
 from ..tolerances import ROUNDING, SINGULAR
 
 # Cells per side of the rectangle, cells of all motor angles, and parts into which the needed ones
-# of these are divided. The fine cells are tried if the coarse ones prove this part of the size.
-COARSE, FINE, NEARLY = (10, 36, 2), (20, 48, 4), 0.8
+# of these are divided. The fine cells are tried if the coarse ones are too coarse.
+COARSE, FINE = (10, 36, 2), (20, 48, 4)
 # Newton's method is tried for this many poses per side of the rectangle. Its error [rad] one step
 # before the last is well below LAST_STEP, so that it converges between these poses, too.
 POSES, CONVERGED = 33, 0.01 * LAST_STEP
-# Halvings in the search for the largest rectangle; its factor while Newton's method fails in it.
-HALVINGS, SMALLER = 7, 0.9
+# Halvings in the search for the largest rectangle.
+HALVINGS = 7
 # Normals of the polygon of 16 sides that bounds the hull, in units of cells.
 NORMALS = [(math.cos(angle), math.sin(angle)) for angle in np.arange(8) * math.pi / 8.0]
 
@@ -180,16 +180,14 @@ class Window:
         """Return the largest rectangle of this shape, up to its size, that is proved."""
         size, step = 0.0, 0.5
         for _ in range(HALVINGS):
-            size += step * self.scaled(size + step).is_single(COARSE)
+            larger = self.scaled(size + step)
+            size += step * (larger.is_single(COARSE) and larger.converges())
             step *= 0.5
-        while size > step and not self.scaled(size).converges():
-            size *= SMALLER
         return self.scaled(size if size > step else 0.0)
 
     def is_proved(self) -> bool:
         """Return whether it has one pose at most, by proof, and Newton's method finds it."""
-        return (self.is_single(COARSE) or self.scaled(NEARLY).is_single(COARSE)
-                and self.is_single(FINE)) and self.converges()
+        return (self.is_single(COARSE) or self.is_single(FINE)) and self.converges()
 
     def is_single(self, cells: Tuple[int, int, int]) -> bool:
         """Return whether it is proved to contain one pose at most, for any motor angles."""

@@ -29,9 +29,10 @@ import numpy as np
 from .problem import Found, InverseProblem
 from .refine import refine
 from .segments import Segments
+from ..motion.curves import HALVINGS
 
-# Steps of a motion at most, and the longest of an input [rad, sizes].
-STEPS, LONGEST = 200, 0.7
+# The longest step of an input [rad, sizes].
+LONGEST = 0.7
 
 
 def follow(problem: InverseProblem, values: Sequence[float], near: Sequence[float],
@@ -62,7 +63,7 @@ def _followed(problem: InverseProblem, values: Sequence[float], near: Sequence[f
     gaps = [math.remainder(now - value, turn) for now, value, turn in zip(
         start, values, problem.periods)]
     side, left, part = _side(problem, problem.forward.at(*near)[problem.n:]), 1.0, 1.0
-    for _ in range(STEPS if side else 0):
+    for _ in range(4 * HALVINGS if side else 0):
         rest = max(left - part, 0.0)
         found = refine(problem, [x + rest * gap for x, gap in zip(values, gaps)], tuple(near))
         # A fold is not passed, nor is the motion left for another one.

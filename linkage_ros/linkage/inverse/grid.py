@@ -32,13 +32,14 @@ from .refine import refine_inside
 from .segments import segments_of
 from ..formulas import Names
 from ..kinematics import Kinematics
+from ..motion.curves import HALVINGS
 from ..tolerances import CLOSE, ROUNDING
 from ...words import listed
 
 # Grid points at first and at most, and the least number of them that can be assembled.
 STARTS, MAX_STARTS, ASSEMBLED = 1024, 1 << 16, 250
-# Steps from a start (few need many), and their damping: initial, and of giving up.
-STEPS, DAMPING, HOPELESS = 100, 1e-3, 1e4
+# Damping of steps: initial, and of giving up.
+DAMPING, HOPELESS = 1e-3, 1e4
 # Halvings of the distance at which a twin behind a fold is searched.
 TWINS = 24
 
@@ -202,7 +203,7 @@ class Grid:
 def _descended(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
     """Return the solutions that Levenberg-Marquardt steps reach from some poses."""
     (gap, size, jacobian), damping, found = missed(q), np.full(len(q), DAMPING), []
-    for _ in range(STEPS):
+    for _ in range(2 * HALVINGS):
         there = size <= ROUNDING * (1.0 + np.abs(jacobian).max(axis=(1, 2)))
         found.append(q[there])
         going = ~there & (damping < HOPELESS)

@@ -325,7 +325,10 @@ class Segments:
         for first, last in zip(cuts, cuts[1:]):
             part = slice(first, last + 1)
             sign = 1.0 if value[last] >= value[first] else -1.0
-            values = np.maximum.accumulate(sign * value[part])
+            values = sign * value[part]
+            # An extreme in noise has a value of its own.
+            values[0] = values[:2].min()
+            values = np.maximum.accumulate(values)
             yield Segment(theta[part], values, _cells(theta[part], values, sign * rate[part]),
                           sign)
 
