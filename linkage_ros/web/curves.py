@@ -54,7 +54,7 @@ class Sweep:
             raise Refused(f'{mechanism.name} cannot be assembled where its other inputs are')
         # A NaN separates two arcs.
         own = ascending(np.concatenate([
-            *(sampled(low, high, 0, SAMPLES) if dense_ends and not self.input.is_whole(reach)
+            *(sampled(low, high, SAMPLES) if dense_ends and not self.input.is_whole(reach)
               else np.linspace(low, high, SAMPLES) for low, high in reach),
             [0.5 * (before + after) for (_, before), (after, _) in zip(reach, reach[1:])]]))
         self._size, still = sizes[0], [0.0] * len(others)

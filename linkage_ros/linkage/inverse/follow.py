@@ -62,12 +62,12 @@ def _followed(problem: InverseProblem, values: Sequence[float], near: Sequence[f
     """Return the end of the motion, None if there is none, and inputs in its turn."""
     gaps = [math.remainder(now - value, turn) for now, value, turn in zip(
         start, values, problem.periods)]
-    side, left, part = _side(problem, problem.forward.at(*near)[problem.n:]), 1.0, 1.0
+    side, left, part = _side(problem.forward.at(*near)[problem.n:]), 1.0, 1.0
     for _ in range(4 * HALVINGS if side else 0):
         rest = max(left - part, 0.0)
         found = refine(problem, [x + rest * gap for x, gap in zip(values, gaps)], tuple(near))
         # A fold is not passed, nor is the motion left for another one.
-        if found and _side(problem, found[1]) == side and all(
+        if found and _side(found[1]) == side and all(
                 abs(x - y) <= LONGEST * size for x, y, size in zip(
                     problem.beside(found[0], near), near, problem.sizes)):
             near, left = problem.beside(found[0], near), rest
@@ -79,7 +79,8 @@ def _followed(problem: InverseProblem, values: Sequence[float], near: Sequence[f
     return None, near
 
 
-def _side(problem: InverseProblem, rates: Sequence[float]) -> float:
-    """Return the sign of the determinant, 0 where there is none."""
-    jacobian = problem.jacobian(rates)
-    return float(np.sign(np.linalg.det(jacobian))) if np.isfinite(jacobian).all() else 0.0
+def _side(rates: Sequence[float]) -> float:
+    """Return the sign of the Jacobian's determinant, 0 where there is none."""
+    n = math.isqrt(len(rates))
+    return float(np.sign(np.linalg.det(np.reshape(rates, (n, n))))) if math.isfinite(
+        sum(rates)) else 0.0

@@ -134,10 +134,6 @@ class InverseProblem:
         return tuple([x if turn == math.inf else x + turn * round((y - x) / turn)
                       for x, y, turn in zip(inputs, others, self.turns)])
 
-    def jacobian(self, rates: Sequence[float]) -> np.ndarray:
-        """Return d outputs / d inputs (outputs, inputs), in their units, from rates by inputs."""
-        return self.scaled(np.reshape(rates, (self.n, self.n)).T)
-
     def scaled(self, jacobian: np.ndarray) -> np.ndarray:
         """Return a Jacobian in units of outputs and inputs."""
         return jacobian * self.sizes / np.reshape(self.scales, (-1, 1))

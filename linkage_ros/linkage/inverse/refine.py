@@ -142,6 +142,8 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
     The solutions have the shape (inputs and rates, m), NaN where there is none.
     """
     n, inputs = problem.n, candidates
+    # What closed forms lose next to a singular pose; more is another assembly.
+    far = math.inf if n == 1 else SINGULAR
     with np.errstate(all='ignore'):
         if n == 1:
             # Estimates need a step; closed forms may be right.
@@ -153,7 +155,7 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
         rows = problem.over(*inputs)
         gaps = _gaps(problem, rows, values)
         error = _errors(problem, gaps, rows, inputs)
-        again = np.flatnonzero((error > ROUNDED) & (error <= FAR))
+        again = np.flatnonzero((error > ROUNDED) & (error <= far))
         x = inputs[:, again] - _step_arrays(problem, gaps[:, again], rows[:, again])
         new = problem.over(*x)
         less = _errors(problem, _gaps(problem, new, values[:, again]), new, x)
@@ -164,7 +166,7 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
         inputs[:, again], rows[:, again], error[again] = x[:, better], new[:, better], less[better]
         # A part needs more steps, shorter ones at an end of the reach, or rates from beside it.
         left = ~(error <= ACCEPTED) | ~np.isfinite(rows[1]) if n == 1 else ~(
-            (error <= ACCEPTED) | (error > FAR))
+            (error <= ACCEPTED) | (error > far))
         left[beyond] = True
     solutions = np.concatenate([problem.wrapped_arrays(inputs), rows[n:]])
     solutions[:, ~(error <= ACCEPTED)] = np.nan
@@ -230,7 +232,9 @@ def distinct(problem: InverseProblem, solutions: Sequence[Found]) -> List[Found]
     """Return solutions in order, one of those that are one."""
     found: List[Found] = []
     for solution in sorted(solutions):
-        if not any(same(problem, solution, other) for other in found):
+        # Of one input only neighbours can be one, a turn apart too.
+        others = found if problem.n > 1 else found[-1:] + found[:1]
+        if not any(same(problem, solution, other) for other in others):
             found.append(solution)
     return found
 

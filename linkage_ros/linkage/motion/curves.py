@@ -22,18 +22,12 @@ from typing import Callable, Tuple
 
 import numpy as np
 
-from ..tolerances import ROUNDING
-
 # Even samples of a whole turn; halvings of a distance after which few of its digits are left.
 TURN_SAMPLES, HALVINGS = 360, 48
 # Peaks of a curve that are refined for its extremes.
 REFINED_PEAKS = 4
 # Fractions at which a bracket is divided; an odd number of them, so that one is its middle.
 CUTS = np.arange(1, 16) / 16
-# For a drawn curve: even samples at first, maximum number of samples.
-DRAWN, MOST_DRAWN = 181, 4000
-# Tolerance of a drawn curve, as a fraction of its size.
-CHORD = 1 / 600
 # Angles below this [rad] are zero: the rounding of any other angle is coarser.
 LEAST = 1e-18
 
@@ -49,41 +43,6 @@ def ascending(values: np.ndarray) -> np.ndarray:
     """Return values in order, each once; np.unique would take 8 ms to import masked arrays."""
     values = np.sort(values)
     return values[np.append(True, values[1:] > values[:-1])]
-
-
-def drawn(curve: Callable, lo: float, hi: float) -> np.ndarray:
-    """
-    Return points (n, 2) of a plane curve on an arc, the closer together the more it bends.
-
-    The curve takes values of an input (m,) and returns points (m, 2), NaN where there is none.
-    Between neighbours no point is farther from their chord than CHORD of the curve's size.
-    """
-    at = sampled(lo, hi, DRAWN)
-    places = curve(at)
-    parts = np.array([0.25, 0.5, 0.75])
-    for _ in range(HALVINGS):
-        known = np.isfinite(places).all(axis=1)
-        size = np.ptp(places[known], axis=0).max(initial=0.0)
-        most = max(CHORD * size, ROUNDING * abs(places[known]).max(initial=0.0))
-        first = np.flatnonzero(known[:-1] & known[1:] & (at[1:] - at[:-1] > LEAST))
-        inner = at[first, None] + (at[first + 1] - at[first])[:, None] * parts
-        between = curve(inner.ravel()).reshape(-1, 3, 2)
-        bent = np.nanmax(_from_chord(places[first], places[first + 1], between), axis=1)
-        halved = bent > most
-        if not halved.any() or len(at) > MOST_DRAWN:
-            break
-        # A piece that bends too much gets its three inner points.
-        at = np.insert(at, first[halved].repeat(3) + 1, inner[halved].ravel())
-        places = np.insert(places, first[halved].repeat(3) + 1, between[halved].reshape(-1, 2), 0)
-    return places[np.isfinite(places).all(axis=1)]
-
-
-def _from_chord(start: np.ndarray, end: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the distances of points (n, m, 2) from chords (n, 2)."""
-    along = (end - start)[:, None]
-    away = points - start[:, None]
-    part = (away * along).sum(axis=-1) / np.maximum((along ** 2).sum(axis=-1), 1e-300)
-    return np.hypot(*np.moveaxis(away - part.clip(0.0, 1.0)[..., None] * along, -1, 0))
 
 
 def refined(test: Callable, lo: np.ndarray, hi: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
