@@ -35,48 +35,48 @@ from ..motion.curves import HALVINGS
 LONGEST = 0.7
 
 
-def follow(problem: InverseProblem, values: Sequence[float], near: Sequence[float],
+def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
            source: object) -> Optional[Found]:
-    """Return the solution, with the whole turns of `near`, and its rates; None if none."""
-    start = problem.forward.at(*near)[:problem.n]
+    """Return the solution, with the whole turns of `seed`, and its rates; None if none."""
+    start = problem.forward.at(*seed)[:problem.n]
     if not all(map(math.isfinite, start)):
         return None
     found: Optional[Found]
     if isinstance(source, Segments):
         input_ = problem.inputs[0]
-        turns = input_.turns_of(near[0])
-        way = source.follow(values[0], start[0], (near[0] - turns) / input_.step,
+        turns = input_.turns_of(seed[0])
+        way = source.follow(values[0], start[0], (seed[0] - turns) / input_.step,
                             problem.turns[0])
         if not way:
             return None
         bracket, passed = way
         found = refine(problem, values, bracket)
-        near = (turns + passed + bracket[2],)
+        seed = (turns + passed + bracket[2],)
     else:
-        found, near = _followed(problem, values, near, start)
-    return found and (problem.beside(found[0], near), found[1])
+        found, seed = _followed(problem, values, seed, start)
+    return found and (problem.nearest_equivalent(found[0], seed), found[1])
 
 
-def _followed(problem: InverseProblem, values: Sequence[float], near: Sequence[float],
+def _followed(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
               start: Sequence[float]) -> Tuple[Optional[Found], Sequence[float]]:
     """Return the end of the motion, None if there is none, and inputs in its turn."""
     gaps = [math.remainder(now - value, turn) for now, value, turn in zip(
         start, values, problem.periods)]
-    side, left, part = _side(problem.forward.at(*near)[problem.n:]), 1.0, 1.0
+    side, left, part = _side(problem.forward.at(*seed)[problem.n:]), 1.0, 1.0
     for _ in range(4 * HALVINGS if side else 0):
         rest = max(left - part, 0.0)
-        found = refine(problem, [x + rest * gap for x, gap in zip(values, gaps)], tuple(near))
+        found = refine(problem, [x + rest * gap for x, gap in zip(values, gaps)], tuple(seed))
         # A fold is not passed, nor is the motion left for another one.
         if found and _side(found[1]) == side and all(
                 abs(x - y) <= LONGEST * size for x, y, size in zip(
-                    problem.beside(found[0], near), near, problem.sizes)):
-            near, left = problem.beside(found[0], near), rest
+                    problem.nearest_equivalent(found[0], seed), seed, problem.sizes)):
+            seed, left = problem.nearest_equivalent(found[0], seed), rest
             if not left:
-                return found, near
+                return found, seed
             part = min(4.0 * part, left)
         else:
             part *= 0.25
-    return None, near
+    return None, seed
 
 
 def _side(rates: Sequence[float]) -> float:

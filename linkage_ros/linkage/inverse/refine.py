@@ -243,7 +243,7 @@ def distinct_arrays(problem: InverseProblem, solutions: np.ndarray) -> np.ndarra
     """Return solutions (solutions, inputs and rates, m) in order, one of those that are one."""
     n, solutions = problem.n, _ordered(problem, solutions)
     pairs = np.triu_indices(len(solutions), 1)
-    apart = np.max([problem.apart(by, *(solutions[k, by] for k in pairs)) for by in range(n)],
+    apart = np.max([problem.distance(by, *(solutions[k, by] for k in pairs)) for by in range(n)],
                    axis=0)
     for k in np.flatnonzero((apart <= SINGULAR).any(axis=0)).tolist():
         several = distinct(problem, [(tuple(x[:n]), tuple(x[n:]))
