@@ -29,7 +29,7 @@ ANGLE, LENGTH = 'angle', 'length'
 
 # The longest period that is computed as a whole, and the part of a longer one [turns; fewer where
 # a geared link is fast]. Of several inputs it is the product, which is the cost.
-MAX_COUNTED = 128
+MAX_COUNTED = 100
 # Greatest denominator of a gear ratio with a period, and greatest ratio.
 MOST_TURNS, FASTEST = 10 ** 6, 1000
 # Poses that are compared with those a period later.
