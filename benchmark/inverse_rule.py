@@ -66,7 +66,7 @@ def measure(count, minutes):
             break
         used += 1
         asked = judged(linkage, rng)
-        while True:
+        while time.monotonic() - start < 60.0 * minutes:
             try:
                 kind, (found, error) = next(asked)
             except StopIteration:

@@ -27,8 +27,8 @@ ROOMS = ('words', 'optional', 'palette', 'cache', 'formula', 'linkage', 'mechani
          'command', 'c_code', 'robot_model', 'robot_files', 'render', 'nodes', 'web',
          'executables')
 # The floors of the core, in the same order.
-FLOORS = ('inputs', 'geometry', 'text', 'formulas', 'kinematics', 'statics', 'motion', 'dyads',
-          'inverse', 'mechanism', '__init__')
+FLOORS = ('tolerances', 'inputs', 'geometry', 'text', 'formulas', 'kinematics', 'statics',
+          'motion', 'dyads', 'inverse', 'mechanism', '__init__')
 CORE = PACKAGE / 'linkage'
 WITH_ROS = ('nodes', 'web')
 ROS = ('rclpy', 'builtin_interfaces', 'geometry_msgs', 'rcl_interfaces', 'sensor_msgs', 'std_msgs',

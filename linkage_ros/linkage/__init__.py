@@ -10,25 +10,26 @@
 
 """Linkages in the plane and in space: what other rooms import; `__all__` lists it. No ROS."""
 
-from .dyads import bar_name, Dyads, Hinge, Motor, Pin, ROUNDING, short, Slide
+from .dyads import bar_name, Dyads, Hinge, Motor, Pin, short, Slide
 from .formulas import Leg, LinkPoint
 from .geometry.builder import GROUND, Link
-from .geometry.planar import LEAST_SQUARE, TINY, TOLERANCE
+from .geometry.planar import LEAST_SQUARE, TINY
 from .geometry.spatial import EDGE, LAST_STEP
 from .inputs import Arc, Input, spread
-from .inverse import Answer, CLOSE, Inverse, InverseLinkage, Mode, Solution
+from .inverse import Answer, Inverse, InverseLinkage, Mode, Solution
 from .kinematics import check_bars
 from .mechanism import Mechanism
-from .motion.curves import ascending, drawn, extremes, sampled
+from .motion.curves import ascending, extremes, sampled
 from .motion.reach import reachable_arcs
 from .text import joint_lines, rod_lines
 from .text.arguments import checked_branches, checked_dimensions
 from .text.arithmetic import Formula
 from .text.design import Design
 from .text.rod_lines import FORMS, WindowError
+from .tolerances import CLOSE, ROUNDING, TOLERANCE
 
 __all__ = ['Answer', 'Arc', 'ascending', 'bar_name', 'check_bars', 'checked_branches',
-           'checked_dimensions', 'CLOSE', 'Design', 'drawn', 'Dyads', 'EDGE', 'extremes', 'FORMS',
+           'checked_dimensions', 'CLOSE', 'Design', 'Dyads', 'EDGE', 'extremes', 'FORMS',
            'Formula', 'GROUND', 'Hinge', 'Input', 'Inverse', 'InverseLinkage', 'joint_lines',
            'LAST_STEP', 'LEAST_SQUARE', 'Leg', 'Link', 'LinkPoint', 'Mechanism', 'Mode', 'Motor',
            'Pin', 'reachable_arcs', 'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide',

@@ -38,8 +38,8 @@ from typing import (
     Union,
 )
 
-# Rounding of a coordinate, as a fraction of the linkage's size.
-ROUNDING = 1e-12
+from .tolerances import ROUNDING
+
 # A joint collinear with a bar is placed from it within this many bar lengths of its first end.
 BESIDE = 1.0 + ROUNDING
 

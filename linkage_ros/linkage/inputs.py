@@ -21,22 +21,19 @@ from typing import Any, Callable, Iterable, Iterator, List, NamedTuple, Sequence
 
 import numpy as np
 
+from .tolerances import ONE, ROUNDING, SINGULAR
+
 Arc = Tuple[float, float]
 
 ANGLE, LENGTH = 'angle', 'length'
 
-# Longest period that is computed as a whole, and the part that is computed of a longer one [turns;
-# fewer where a geared link is fast]. Of several inputs it is the product, which is the cost.
-MOST_COUNTED, WINDOW = 1024, 64
+# The longest period that is computed as a whole, and the part of a longer one [turns; fewer where
+# a geared link is fast]. Of several inputs it is the product, which is the cost.
+MAX_COUNTED = 100
 # Greatest denominator of a gear ratio with a period, and greatest ratio.
 MOST_TURNS, FASTEST = 10 ** 6, 1000
-# Values beyond an end of the reach by no more than this [rad] may be that end, rounded.
-ROUNDED_END = 1e-12
-# Arcs below this width [rad] are the rounding of one angle.
-NARROWEST = 2e-15
-# Poses that are compared with those a period later. Their places are equal if they differ by at
-# most this fraction of their size.
-PERIODIC, ALIKE = 64, 1e-6
+# Poses that are compared with those a period later.
+PERIODIC = 64
 
 
 class Input(NamedTuple):
@@ -146,7 +143,7 @@ class Input(NamedTuple):
         """
         if self.is_part and (value < self.low or self.high < value):
             return True
-        slack = ROUNDED_END * self.size
+        slack = ROUNDING * self.size
         for low, high in arcs:
             ahead = value - low + slack
             if 0.0 <= (ahead % self.turn if self.wraps else ahead) <= high - low + 2.0 * slack:
@@ -174,7 +171,7 @@ class Input(NamedTuple):
         inside = (end - self.turns_of(end) for end in ends) if self.wraps else (
             end for end in (self.low, *ends, self.high) if self.low <= end <= self.high)
         for end in sorted(inside):
-            if not marks or end - marks[-1] > NARROWEST:
+            if not marks or end - marks[-1] > ONE:
                 marks.append(end)
         if not marks:
             return [(self.low, self.high)]
@@ -210,5 +207,6 @@ def is_periodic(places: Callable, input_: Input) -> bool:
     theta = np.linspace(input_.low, input_.high, PERIODIC + 2)[1:-1]
     now, later = (places(theta + turn) for turn in (0.0, input_.turn))
     with np.errstate(invalid='ignore'):
-        alike = np.abs(now - later) <= ALIKE * np.fmax.reduce(np.abs(now), axis=None, initial=0.0)
+        size = np.fmax.reduce(np.abs(now), axis=None, initial=0.0)
+        alike = np.abs(now - later) <= SINGULAR * size
     return bool(np.all(alike | (np.isnan(now) & np.isnan(later))))

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 
 from .formulas import LinkPoint, Points, structure_of
 from .geometry.builder import in_metres, UNIT
-from .inputs import FASTEST, Input, is_periodic, MOST_COUNTED, MOST_TURNS, spread, WINDOW
+from .inputs import FASTEST, Input, is_periodic, MAX_COUNTED, MOST_TURNS, spread
 from .text import joint_lines
 from .text.arguments import checked_dimensions, numbers
 from .text.design import Design
@@ -34,9 +34,9 @@ from ..formula.program import evaluate, Pose, Program
 from ..optional import needs
 from ..words import listed, meant, plain_text, quoted
 
-# Lengths beyond these have a unit of their own, a power of two. It changes no bit of a result and
-# keeps squares and products of lengths inside the range of float64.
-SMALL_LENGTH, LARGE_LENGTH = 1e-30, 1e30
+# Lengths beyond this [m] and its inverse have a unit of their own, a power of two. It changes no
+# bit of a result and keeps squares and products of lengths inside the range of float64.
+LARGE_LENGTH = 1e30
 # Cached values of expressions of dimensions: some twenty times those of Jansen's leg.
 MOST_VALUES = 10000
 # Quantities of joints; all others are of links.
@@ -275,10 +275,9 @@ class Kinematics:
             return self._with_stroke(input_)
         ratios = self._ratios(by)
         input_ = input_._replace(speed=max(1.0, *map(abs, ratios)))
-        most, window = (input_.step * count ** (1.0 / len(self.structure.built.inputs))
-                        for count in (MOST_COUNTED, WINDOW))
+        most = input_.step * MAX_COUNTED ** (1.0 / len(self.structure.built.inputs))
         period = self._period(by, ratios, most)
-        turns = period if period <= max(most, 1.0) else max(2.0, 2.0 * round(0.5 * window))
+        turns = period if period <= max(most, 1.0) else max(2.0, 2.0 * round(0.5 * most))
         return input_._replace(low=-math.pi * turns, high=math.pi * turns, period=period)
 
     def _with_stroke(self, input_: Input) -> Input:
@@ -523,7 +522,7 @@ class Kinematics:
 def _in_own_unit(dimensions: Mapping, fixed: bool) -> dict:
     """Return dimensions in a unit that is a power of two, and that unit [m]."""
     longest = max((np.max(np.abs(length)) for length in dimensions.values()), default=1.0)
-    if fixed or SMALL_LENGTH < longest < LARGE_LENGTH:
+    if fixed or 1.0 / LARGE_LENGTH < longest < LARGE_LENGTH:
         return {**dimensions, UNIT.args[0]: 1.0}
     unit = 2.0 ** np.frexp(longest)[1]
     return {UNIT.args[0]: unit, **{name: length / unit for name, length in dimensions.items()}}

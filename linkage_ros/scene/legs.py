@@ -22,8 +22,9 @@ from typing import Any, List, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 
+from .drawn_curve import drawn
 from ..formula.program import Batch, Pose
-from ..linkage import drawn, Leg, LinkPoint, Mechanism
+from ..linkage import Leg, LinkPoint, Mechanism
 
 
 class Layout(NamedTuple):

@@ -23,6 +23,7 @@ from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tup
 
 from . import planar
 from ..inputs import ANGLE, Input, LENGTH
+from ..tolerances import TOLERANCE
 from ...formula.expression import (
     arctangent,
     argument,
@@ -200,7 +201,7 @@ class Builder:
         # A carriage has no place beyond its ends, as a cylinder beyond its stroke.
         way = abs(low) + abs(high)
         for margin in (place - low, high - place):
-            limit = planar.Limit(margin, planar.TOLERANCE * way)
+            limit = planar.Limit(margin, TOLERANCE * way)
             self.limits.append(limit)
             self.ways.append(limit)
             place = gated(place, limit.margin, limit.tolerance)
@@ -344,7 +345,7 @@ class Builder:
         """Join bars to two joints that are parallel to the bars from a corner to them."""
         to_first, to_second = (self._side(corner, end) for end in (first, second))
         self.folds.append(planar.Limit(cross(to_first.vector, to_second.vector),
-                                       planar.TOLERANCE * to_first.length * to_second.length))
+                                       TOLERANCE * to_first.length * to_second.length))
         place = self.points[first].place + to_second.vector
         from_first, from_second = (planar.parallel(side.vector, place)
                                    for side in (to_second, to_first))
@@ -372,7 +373,7 @@ class Builder:
 
         A place that is known in a better way is given.
         """
-        self.folds.append(planar.Limit(offset, planar.TOLERANCE * to_first * to_second))
+        self.folds.append(planar.Limit(offset, TOLERANCE * to_first * to_second))
         place, from_second, from_first = planar.mirror(arm, point, offset, ends, place)
         self._pair(name, first, second, planar.Dyad(from_first, from_second, ()), to_first,
                    to_second, *others, place=place)

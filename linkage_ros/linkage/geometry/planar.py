@@ -32,6 +32,7 @@ from dataclasses import dataclass
 from functools import reduce
 from typing import NamedTuple, Optional, Sequence, Tuple
 
+from ..tolerances import TOLERANCE
 from ...formula.expression import (
     arctangent,
     Complex,
@@ -54,10 +55,6 @@ from ...formula.expression import (
     with_spin,
 )
 
-LEFT, RIGHT = 1.0, -1.0
-
-# A margin counts as zero within rounding: eight half ulps of the scale.
-TOLERANCE = 8 * 2.0 ** -53
 # Added to a cosine that may vanish where the quotient of two zeros has a limit: its square is a
 # normal number, and it is far below the rounding of a direction.
 TINY = 2.0 ** -330
@@ -506,8 +503,8 @@ def inversor(arm: Arm, long: Real, short: Real) -> Inversor:
     The traced corner is pole + (long^2 - short^2) / conjugate(w): it runs on a straight line
     when the pole lies on the crank circle.
     """
-    right = dyad(arm, long, short, RIGHT, smooth=False)
-    left = dyad(arm, long, short, LEFT, smooth=False)
+    right = dyad(arm, long, short, -1.0, smooth=False)
+    left = dyad(arm, long, short, 1.0, smooth=False)
     power = (long - short) * (long + short)
     straight = arm.inverse_of_isosceles() if isinstance(arm, CrankArm) else None
     inverse = (arm.vector * (power / arm.divisor) if straight is None else straight * power)

@@ -30,7 +30,8 @@ from __future__ import annotations
 
 from typing import Any, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
-from .planar import Limit, TOLERANCE
+from .planar import Limit
+from ..tolerances import TOLERANCE
 from ...formula.expression import (
     arctangent,
     cosine,

@@ -34,12 +34,10 @@ from typing import Any, NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 
 from .spatial import Circle, EDGE, LAST_STEP, newton_step, Pose, row, STEPS, Vector
+from ..tolerances import ROUNDING, SINGULAR
 
 # The most pairs of boxes that a proof examines, and each trial in a search for a rectangle.
 MOST_PAIRS, MOST_IN_SEARCH = 50_000, 4_000
-# Least angle [rad] between directions, by which motor angles are made wider, too; the rounding of
-# f as a fraction of its terms.
-APART, ROUNDING = 1e-6, 1e-14
 # Newton's method is tried for this many poses per side of the rectangle. Its error [rad] one step
 # before the last is well below LAST_STEP, so that it converges between these poses, too.
 POSES, CONVERGED = 33, 0.01 * LAST_STEP
@@ -121,7 +119,7 @@ class WindowRod(NamedTuple):
             if self.length is None:
                 low, high = (np.sqrt(np.maximum(2.0 * (square + way * slack), 0.0))
                              for way in (-1.0, 1.0))
-                return Boxes(0.5 * (low + high), 0.5 * (high - low) + APART * size)
+                return Boxes(0.5 * (low + high), 0.5 * (high - low) + SINGULAR * size)
             fits = abs(square - 0.5 * self.length ** 2) <= slack + ROUNDING * self.length ** 2
             return Boxes(np.zeros_like(square), np.where(fits, 0.0, np.nan))
         rho = _norm(u)
@@ -136,7 +134,7 @@ class WindowRod(NamedTuple):
         least, most = ((along + way * slack) / (rho * np.where(
             (along + way * slack) * way >= 0.0, near, far)) for way in (-1.0, 1.0))
         first, last = (np.arccos(np.clip(cos, -1.0, 1.0)) for cos in (most, least))
-        turn = np.arctan2(aside, near) + APART
+        turn = np.arctan2(aside, near) + SINGULAR
         none = (least > 1.0) | (most < -1.0)
         middle = np.arctan2(y, x) + self.side * 0.5 * (first + last)
         half = np.minimum(0.5 * (last - first) + turn, math.pi)
@@ -151,7 +149,7 @@ class WindowRod(NamedTuple):
         high = np.minimum(one.middle + one.half, start + other.half)
         half = np.where(low <= high, 0.5 * (high - low), np.nan)
         # Large ranges of angles may meet at both of their ends.
-        wide = self.turns & (one.half + other.half > math.pi - APART)
+        wide = self.turns & (one.half + other.half > math.pi - SINGULAR)
         smaller = np.where(one.half <= other.half, one.middle, start)
         return Boxes(np.where(wide, smaller, 0.5 * (low + high)),
                      np.where(wide, np.minimum(one.half, other.half), half))
@@ -249,7 +247,7 @@ class Window:
                       for rod, each in zip(self.rods, ranges)]
             right, left = (rod.directions(each, around) for rod, each in zip(self.rods, shared))
             away = np.mod(right.middle - left.middle, math.pi)
-            apart = np.minimum(away, math.pi - away) > right.half + left.half + APART
+            apart = np.minimum(away, math.pi - away) > right.half + left.half + SINGULAR
         return ~(apart | np.isnan(shared[0].half) | np.isnan(shared[1].half))
 
     def second_pose(self) -> Optional[TwoPoses]:

@@ -10,7 +10,6 @@
 
 """The inverse of a linkage: candidates, refined, distinct, and one chosen or followed."""
 
-from .choice import CLOSE
 from .inverse import Inverse, inverse_of, Solution
 from .linkage import InverseLinkage, Mode
 from .segments import extremes_of, Segments, segments_of
@@ -18,5 +17,5 @@ from .segments import extremes_of, Segments, segments_of
 # The former name of a solution; deprecated.
 Answer = Solution
 
-__all__ = ['Answer', 'CLOSE', 'extremes_of', 'Inverse', 'inverse_of', 'InverseLinkage', 'Mode',
+__all__ = ['Answer', 'extremes_of', 'Inverse', 'inverse_of', 'InverseLinkage', 'Mode',
            'Segments', 'segments_of', 'Solution']

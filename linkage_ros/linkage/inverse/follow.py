@@ -29,57 +29,58 @@ import numpy as np
 from .problem import Found, InverseProblem
 from .refine import refine
 from .segments import Segments
+from ..motion.curves import HALVINGS
 
-# Steps of a motion at most, the shortest of them [part of the motion], and the longest of an input
-# [rad, sizes].
-STEPS, SHORTEST, LONGEST = 200, 1e-10, 0.7
+# The longest step of an input [rad, sizes].
+LONGEST = 0.7
 
 
-def follow(problem: InverseProblem, values: Sequence[float], near: Sequence[float],
+def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
            source: object) -> Optional[Found]:
-    """Return the solution, with the whole turns of `near`, and its rates; None if none."""
-    start = problem.forward.at(*near)[:problem.n]
+    """Return the solution, with the whole turns of `seed`, and its rates; None if none."""
+    start = problem.forward.at(*seed)[:problem.n]
     if not all(map(math.isfinite, start)):
         return None
     found: Optional[Found]
     if isinstance(source, Segments):
         input_ = problem.inputs[0]
-        turns = input_.turns_of(near[0])
-        way = source.follow(values[0], start[0], (near[0] - turns) / input_.step,
+        turns = input_.turns_of(seed[0])
+        way = source.follow(values[0], start[0], (seed[0] - turns) / input_.step,
                             problem.turns[0])
         if not way:
             return None
         bracket, passed = way
         found = refine(problem, values, bracket)
-        near = (turns + passed + bracket[2],)
+        seed = (turns + passed + bracket[2],)
     else:
-        found, near = _followed(problem, values, near, start)
-    return found and (problem.beside(found[0], near), found[1])
+        found, seed = _followed(problem, values, seed, start)
+    return found and (problem.nearest_equivalent(found[0], seed), found[1])
 
 
-def _followed(problem: InverseProblem, values: Sequence[float], near: Sequence[float],
+def _followed(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
               start: Sequence[float]) -> Tuple[Optional[Found], Sequence[float]]:
     """Return the end of the motion, None if there is none, and inputs in its turn."""
     gaps = [math.remainder(now - value, turn) for now, value, turn in zip(
         start, values, problem.periods)]
-    side, left, part = _side(problem, problem.forward.at(*near)[problem.n:]), 1.0, 1.0
-    for _ in range(STEPS if side else 0):
+    side, left, part = _side(problem.forward.at(*seed)[problem.n:]), 1.0, 1.0
+    for _ in range(4 * HALVINGS if side else 0):
         rest = max(left - part, 0.0)
-        found = refine(problem, [x + rest * gap for x, gap in zip(values, gaps)], tuple(near))
+        found = refine(problem, [x + rest * gap for x, gap in zip(values, gaps)], tuple(seed))
         # A fold is not passed, nor is the motion left for another one.
-        if found and _side(problem, found[1]) == side and all(
+        if found and _side(found[1]) == side and all(
                 abs(x - y) <= LONGEST * size for x, y, size in zip(
-                    problem.beside(found[0], near), near, problem.sizes)):
-            near, left = problem.beside(found[0], near), rest
+                    problem.nearest_equivalent(found[0], seed), seed, problem.sizes)):
+            seed, left = problem.nearest_equivalent(found[0], seed), rest
             if not left:
-                return found, near
+                return found, seed
             part = min(4.0 * part, left)
-        elif (part := 0.25 * part) < SHORTEST:
-            break
-    return None, near
+        else:
+            part *= 0.25
+    return None, seed
 
 
-def _side(problem: InverseProblem, rates: Sequence[float]) -> float:
-    """Return the sign of the determinant, 0 where there is none."""
-    jacobian = problem.jacobian(rates)
-    return float(np.sign(np.linalg.det(jacobian))) if np.isfinite(jacobian).all() else 0.0
+def _side(rates: Sequence[float]) -> float:
+    """Return the sign of the Jacobian's determinant, 0 where there is none."""
+    n = math.isqrt(len(rates))
+    return float(np.sign(np.linalg.det(np.reshape(rates, (n, n))))) if math.isfinite(
+        sum(rates)) else 0.0

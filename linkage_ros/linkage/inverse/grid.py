@@ -26,22 +26,20 @@ from typing import Callable, Iterator, List, Sequence, Set, Tuple, Union
 
 import numpy as np
 
+from .follow import LONGEST
 from .problem import Found, InverseProblem
 from .refine import refine_inside
 from .segments import segments_of
 from ..formulas import Names
 from ..kinematics import Kinematics
+from ..motion.curves import HALVINGS
+from ..tolerances import CLOSE, ROUNDING
 from ...words import listed
 
 # Grid points at first and at most, and the least number of them that can be assembled.
 STARTS, MAX_STARTS, ASSEMBLED = 1024, 1 << 16, 250
-# Steps from a start (few need many), the longest one [sizes], and their damping: initial, and of
-# giving up.
-STEPS, LONGEST_STEP, DAMPING, HOPELESS = 100, 0.7, 1e-3, 1e4
-# Errors of a solution of the search [sizes]; `refine` removes them.
-NEAR = 1e-12
-# Outputs are dependent if in nine of ten poses the Jacobian is singular by less than this.
-DEPENDENT = 1e-10
+# Damping of steps: initial, and of giving up.
+DAMPING, HOPELESS = 1e-3, 1e4
 # Halvings of the distance at which a twin behind a fold is searched.
 TWINS = 24
 
@@ -119,24 +117,24 @@ class Grid:
                                       problem.sizes[0], bracket):
                 yield (found[0], *others), tuple(problem.rated.at(found[0], *others)[n:])
 
-    def _missed(self, q: np.ndarray, target: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    def _errors(self, q: np.ndarray, target: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return the errors of the outputs from their target, and the Jacobian, per row of q."""
         problem, n, count = self._problem, len(target), len(q)
         rows = problem.over(*(q * self._sizes).T)
-        missed = rows[:n].T - target
-        for column, turn in zip(missed.T, problem.periods):
+        errors = rows[:n].T - target
+        for column, turn in zip(errors.T, problem.periods):
             if turn < math.inf:
                 column -= turn * np.round(column / turn)
         jacobian = rows[n:].reshape(n, n, count).transpose(2, 1, 0)
         scales = np.array(problem.scales)
-        return missed / scales, jacobian * self._sizes / scales[:, None]
+        return errors / scales, jacobian * self._sizes / scales[:, None]
 
     def _solutions(self, q: np.ndarray, target: np.ndarray, rows: List[int],
                    columns: List[int]) -> np.ndarray:
         """Return the poses at which some outputs have their values; other inputs are fixed."""
-        def missed(q: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        def errors(q: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
             """Return errors, their norm (inf where there is none), and the Jacobian."""
-            gap, jacobian = self._missed(q, target)
+            gap, jacobian = self._errors(q, target)
             gap, jacobian = gap[:, rows], jacobian[:, rows][:, :, columns]
             known = np.isfinite(gap).all(axis=1) & np.isfinite(jacobian).all(axis=(1, 2))
             return gap, np.where(known, np.linalg.norm(gap, axis=1), np.inf), jacobian
@@ -150,12 +148,12 @@ class Grid:
             return q
 
         def known(q: np.ndarray) -> np.ndarray:
-            return q[np.isfinite(missed(q)[1])]
+            return q[np.isfinite(errors(q)[1])]
 
-        def beyond(q: np.ndarray) -> np.ndarray:
+        def twins(q: np.ndarray) -> np.ndarray:
             """Return poses on both sides of solutions: a twin may lie behind a fold."""
-            weakest = np.linalg.svd(missed(q)[2])[2][:, -1]
-            away = LONGEST_STEP * np.outer([1.0, -1.0], 0.5 ** np.arange(TWINS)).ravel()
+            weakest = np.linalg.svd(errors(q)[2])[2][:, -1]
+            away = LONGEST * np.outer([1.0, -1.0], 0.5 ** np.arange(TWINS)).ravel()
             return known(moved(np.repeat(q, len(away), axis=0),
                                np.kron(weakest, away[:, None])))
 
@@ -163,9 +161,9 @@ class Grid:
         found = starts[:0]
         while len(starts):
             before = len(found)
-            found = self._distinct(np.concatenate([found, _descended(starts, missed, moved)]),
-                                   missed)
-            starts = beyond(found) if len(found) > before else found[:0]
+            found = self._distinct(np.concatenate([found, _descended(starts, errors, moved)]),
+                                   errors)
+            starts = twins(found) if len(found) > before else found[:0]
         return found
 
     def _starts(self, q: np.ndarray, columns: List[int], known: Callable) -> np.ndarray:
@@ -184,29 +182,29 @@ class Grid:
         """Raise ValueError if the outputs do not determine the inputs in nearly all poses."""
         n = len(self._inputs)
         q = self._starts(np.zeros(n), list(range(n)), lambda q: q[np.isfinite(
-            self._missed(q, np.zeros(n))[1]).all(axis=(1, 2))])
-        values = np.linalg.svd(self._missed(q, np.zeros(n))[1], compute_uv=False)
-        # An output may stand still in a part of the poses.
+            self._errors(q, np.zeros(n))[1]).all(axis=(1, 2))])
+        values = np.linalg.svd(self._errors(q, np.zeros(n))[1], compute_uv=False)
+        # An output may stand still in a tenth of the poses.
         if len(q) and np.quantile(values[:, -1] / np.fmax(values[:, 0], 1e-300),
-                                  0.9) <= DEPENDENT:
+                                  0.9) <= CLOSE:
             raise dependent(self._problem.outputs, range(n))
 
-    def _distinct(self, q: np.ndarray, missed: Callable) -> np.ndarray:
+    def _distinct(self, q: np.ndarray, errors: Callable) -> np.ndarray:
         """Return each solution once, the farthest from singular first."""
-        weakest = np.linalg.svd(missed(q)[2], compute_uv=False)[:, -1]
+        weakest = np.linalg.svd(errors(q)[2], compute_uv=False)[:, -1]
         distinct: List[Tuple[np.ndarray, float]] = []
         for i in np.argsort(-weakest):
             if all(max(input_.apart(x, y) for input_, x, y in zip(self._inputs, q[i], other)) > far
                    for other, far in distinct):
-                distinct.append((q[i], 4.0 * NEAR / max(weakest[i], NEAR)))
+                distinct.append((q[i], 4.0 * ROUNDING / max(weakest[i], ROUNDING)))
         return np.array([each for each, _ in distinct]).reshape(-1, q.shape[1])
 
 
-def _descended(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
+def _descended(q: np.ndarray, errors: Callable, moved: Callable) -> np.ndarray:
     """Return the solutions that Levenberg-Marquardt steps reach from some poses."""
-    (gap, size, jacobian), damping, found = missed(q), np.full(len(q), DAMPING), []
-    for _ in range(STEPS):
-        there = size <= NEAR * (1.0 + np.abs(jacobian).max(axis=(1, 2)))
+    (gap, size, jacobian), damping, found = errors(q), np.full(len(q), DAMPING), []
+    for _ in range(2 * HALVINGS):
+        there = size <= ROUNDING * (1.0 + np.abs(jacobian).max(axis=(1, 2)))
         found.append(q[there])
         going = ~there & (damping < HOPELESS)
         if not going.any():
@@ -218,9 +216,9 @@ def _descended(q: np.ndarray, missed: Callable, moved: Callable) -> np.ndarray:
         step = np.linalg.solve(square + weight[:, None, None] * np.eye(gap.shape[1]),
                                turned @ gap[going, :, None])[..., 0]
         longest = np.abs(step).max(axis=1, keepdims=True)
-        trial = moved(q, -step * (LONGEST_STEP / np.maximum(longest, LONGEST_STEP)))
-        better = missed(trial)[1] < size
+        trial = moved(q, -step * (LONGEST / np.maximum(longest, LONGEST)))
+        better = errors(trial)[1] < size
         damping = np.where(better, 0.1 * damping, 10.0 * damping).clip(1e-14)
         q = np.where(better[:, None], trial, q)
-        gap, size, jacobian = missed(q)
+        gap, size, jacobian = errors(q)
     return np.concatenate(found)

@@ -47,12 +47,11 @@ from .refine import distinct, distinct_arrays, refine, refine_arrays
 from .segments import Segments, segments_of
 from ..kinematics import Kinematics
 from ..text.arguments import numbers
+from ..tolerances import SINGULAR
 from ...words import listed, plain_text, quoted
 
 # Arrays are solved in blocks that stay in a processor's cache, and few values as floats.
 BLOCK, FEW = 8192, 32
-# Below this margin a pose is singular, and signs are 0.
-SINGULAR = 1e-6
 
 Ends = Optional[Sequence[Optional[Tuple[float, float]]]]
 
@@ -205,10 +204,11 @@ class Inverse:
                     self._one_each(near), start))]
         found = [inputs for inputs, _ in self._all(self._one_each(values))]
         if near is not None:
-            beside = self._finite(near, 'near')
-            found = sorted((self._problem.beside(inputs, beside) for inputs in found),
-                           key=lambda x: sum(((a - b) / size) ** 2 for a, b, size in zip(
-                               x, beside, self._problem.sizes)))
+            seed = self._finite(near, 'near')
+            found = sorted(
+                (self._problem.nearest_equivalent(inputs, seed) for inputs in found),
+                key=lambda x: sum(((a - b) / size) ** 2 for a, b, size in zip(
+                    x, seed, self._problem.sizes)))
         return [Solution(inputs, self) for inputs in found]
 
     def _elsewhere(self, near: Sequence[float]
@@ -422,19 +422,19 @@ class Inverse:
 
         """
         problem, limits = self._problem, self._limits(ends)
-        beside = None if near is None else self._finite(near, 'near')
+        seed = None if near is None else self._finite(near, 'near')
         rows = [np.atleast_1d(row) for row in _broadcast(self._each(values))]
         if rows[0].ndim > 1:
             raise self._miscounted(values, 'values')
-        if beside and (there := self._in_turns('path', rows, beside, limits)):
+        if seed and (there := self._in_turns('path', rows, seed, limits)):
             return there
         found, n = [], self._n
         for each in self._all_arrays(rows).transpose(2, 0, 1).tolist():
-            solution = choose(problem, [(x[:n], x[n:]) for x in each if x[0] == x[0]], beside,
+            solution = choose(problem, [(x[:n], x[n:]) for x in each if x[0] == x[0]], seed,
                               limits)
             found.append([*solution[0], *solution[1]])
             if solution[0][0] == solution[0][0]:
-                beside = solution[0]
+                seed = solution[0]
         columns = np.array(found).reshape(-1, n + n * n).T
         return tuple(columns[:n]), tuple(columns[n:])
 

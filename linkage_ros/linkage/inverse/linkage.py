@@ -35,6 +35,7 @@ from ..kinematics import Kinematics
 from ..motion.reach import reach_of
 from ..text import joint_lines
 from ..text.design import Design
+from ..tolerances import CLOSE, TOLERANCE
 from ...formula.expression import (
     arctangent,
     argument,
@@ -44,14 +45,10 @@ from ...formula.expression import (
     square_root,
 )
 
-# Two to the power of this many assembly modes at most.
-MOST_SIDES = 5
-# Points nearer than this fraction of the linkage's size coincide; poses tried to find one.
-NEAR, TRIES = 1e-9, 400
-# Rounding of a sum of angles of quarter turns [rad].
-EXACT = 4 * 2.0 ** -51
-# Maximum number of assembly modes in all turns.
-MOST_MODES = 64
+# Assembly modes at most, in all turns.
+MAX_MODES = 64
+# Poses tried to find one that can be assembled.
+TRIES = 400
 
 
 class Mode(NamedTuple):
@@ -122,10 +119,8 @@ def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
     if sorted(name for name, *_ in drives.values()) != sorted(outputs):
         raise ValueError('the inputs do not depend on all of these outputs')
     branches, turns = joint_lines.branches(lines), tuple(read.turns for read in sketch.reads)
-    if len(branches) > MOST_SIDES:
-        raise ValueError(f'more than {2 ** MOST_SIDES} assembly modes')
-    if 2 ** len(branches) * math.prod(map(len, turns)) > MOST_MODES:
-        raise ValueError('too many turns')
+    if 2 ** len(branches) * math.prod(map(len, turns)) > MAX_MODES:
+        raise ValueError(f'more than {MAX_MODES} assembly modes')
     design = Design('inverse', {}, tuple(line.text for line in lines), lines[-1].names[0])
     modes = tuple(_mode(Structure(design, dict(zip(branches, signs))), outputs, sketch.reads)
                   for signs in product((1, -1), repeat=len(branches)))
@@ -260,7 +255,7 @@ class _Sketch(Dyads):
         self._named = {name: pin for name, pin in self._named.items()
                        if len(pin) > 1 or name in read}
         super().__init__(ground, list(dict.fromkeys(bodies)), list(self._named.values()), slides,
-                         motors, size, NEAR * size)
+                         motors, size, CLOSE * size)
         self.farthest = 4.0 * (sum(linkage.bar_lengths.values()) + size)
         self.take_apart()
         self.reads = [self._read(by, input_) for by, input_ in enumerate(linkage.inputs)]
@@ -310,7 +305,7 @@ class _Sketch(Dyads):
             along = cmath.rect(1.0, self._zero(link))
             part = along.real if axis == 'x' else along.imag
             if (link.tip, link.parent, link.kind) == (joint, GROUND, 'prismatic') and \
-                    abs(part) > NEAR and joint in self._frames[link.name]:
+                    abs(part) > CLOSE and joint in self._frames[link.name]:
                 # The slide of a block on a fixed line determines the block's coordinates.
                 start = self._frames[GROUND][link.joint] + along * self._frames[link.name][joint]
                 self._scaled[output] = part, start.real if axis == 'x' else start.imag
@@ -369,7 +364,7 @@ class _Sketch(Dyads):
     def quarters(self, start: float) -> Optional[int]:
         """Return 0 to 3 quarter turns: an offset added to the angle would cost its last digits."""
         quarters = round(start / (0.5 * math.pi))
-        return quarters % 4 if abs(start - 0.5 * math.pi * quarters) < EXACT else None
+        return quarters % 4 if abs(start - 0.5 * math.pi * quarters) < 2.0 * TOLERANCE else None
 
     def new_name(self, place: complex, body: str) -> str:
         """Return the linkage's own name of a joint, or a new name."""

@@ -123,20 +123,17 @@ class InverseProblem:
         return np.stack([np.asarray(input_.wrapped(np.where(np.abs(x) < LEAST * size, 0.0, x)))
                          for input_, x, size in zip(self.inputs, inputs, self.sizes)])
 
-    def apart(self, by: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def distance(self, by: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the distances of values of an input, without whole periods, in its size."""
         gap, turn = x - y, self.turns[by]
         return np.abs(gap - turn * np.rint(gap / turn) if turn < math.inf
                       else gap / self.sizes[by])
 
-    def beside(self, inputs: Sequence[float], others: Sequence[float]) -> Tuple[float, ...]:
+    def nearest_equivalent(self, inputs: Sequence[float], others: Sequence[float]
+                           ) -> Tuple[float, ...]:
         """Return inputs plus the whole periods that bring them closest to others."""
         return tuple([x if turn == math.inf else x + turn * round((y - x) / turn)
                       for x, y, turn in zip(inputs, others, self.turns)])
-
-    def jacobian(self, rates: Sequence[float]) -> np.ndarray:
-        """Return d outputs / d inputs (outputs, inputs), in their units, from rates by inputs."""
-        return self.scaled(np.reshape(rates, (self.n, self.n)).T)
 
     def scaled(self, jacobian: np.ndarray) -> np.ndarray:
         """Return a Jacobian in units of outputs and inputs."""

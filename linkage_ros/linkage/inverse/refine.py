@@ -18,27 +18,21 @@ the same on arrays. Where a bracket is known, Newton's method stays inside it.
 
 from __future__ import annotations
 
-from itertools import combinations
 import math
 from typing import Any, Callable, List, Optional, Sequence, Tuple
 
 import numpy as np
 
 from .problem import Found, InverseProblem
-from .segments import Bracket, SPECIAL, STEEPEST
+from .segments import Bracket, ULPS
+from ..motion.curves import HALVINGS
+from ..tolerances import ONE, SINGULAR
 
-# Errors in units of rounding (half an ulp of the output's size and of the inputs times the rates):
-# where refinement stops; and the largest of a solution, which rounding of all joints may explain.
-ROUNDED, ACCEPTED = 2.0, 64.0
+# Errors relative to the output's size and the inputs times the rates: where refinement stops; and
+# the largest of a solution.
+ROUNDED, ACCEPTED = 2.0 ** -52, ULPS * 2.0 ** -53
 # A larger error [sizes], or a longer step [rad, sizes], leads to another solution.
 FAR = 0.1
-# Steps at most: bisection alone needs one per bit of a float.
-MAX_STEPS = 64
-# Two solutions are one if they are no farther apart than SPECIAL [rad, sizes], or than this and
-# the rates say that the outputs differ by no more than SPECIAL [sizes].
-NEIGHBOURS = 1e-4
-
-_UNIT = 2.0 ** -53
 
 
 def refine(problem: InverseProblem, values: Sequence[float], candidate: Sequence[Any]
@@ -61,34 +55,32 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Sequence
         near = ((*inputs[:by], inputs[by] + ulps * math.ulp(inputs[by]), *inputs[by + 1:])
                 for ulps in (2.0, -2.0, 16.0, -16.0) for by in range(n))
         inputs = next((x for x in near if math.isfinite(sum(at(*x)[:n]))), inputs)
-    for _ in range(MAX_STEPS):
+    for _ in range(HALVINGS):
         row = at(*inputs)
         gaps = [math.remainder(y - x, turn) if -math.inf < y < math.inf else math.nan
                 for y, x, turn in zip(row, values, problem.periods)]
-        missed = max([abs(gap) / scale for gap, scale in zip(gaps, problem.scales)])
-        missed += 0.0 * sum(gaps)  # NaN if one is
-        if found and missed != missed:
+        error = max([abs(gap) / scale for gap, scale in zip(gaps, problem.scales)])
+        error += 0.0 * sum(gaps)  # NaN if one is
+        if found and error != error:
             # The step leads out of the reach.
             step = [0.5 * by for by in step]
             inputs = tuple([x - by for x, by in zip(found[0], step)])
             continue
-        if not missed < least:
+        if not error < least:
             break
-        least, found = missed, (inputs, row, gaps)
-        if not ROUNDED * _UNIT < missed <= FAR:
+        least, found = error, (inputs, row, gaps)
+        if not ROUNDED < error <= FAR:
             break
         step = _step(problem, gaps, row)
         if not sum([abs(x) / size for x, size in zip(step, problem.sizes)]) <= FAR:
             break
         inputs = tuple([x - by for x, by in zip(inputs, step)])
-    if not found or least > FAR:
-        return None
-    inputs, row, gaps = found
     # Where rates are low, rounding is that of the outputs alone.
-    if least > ACCEPTED * _UNIT and not (least <= STEEPEST and _errors(
-            problem, *(np.reshape(part, (-1, 1)) for part in (gaps, row, inputs)))[0] <= ACCEPTED):
+    if not found or least > ACCEPTED and not (least <= SINGULAR and _errors(
+            problem, *(np.reshape(part, (-1, 1)) for part in (
+                found[2], found[1], found[0])))[0] <= ACCEPTED):
         return None
-    return problem.wrapped(inputs), row[n:]
+    return problem.wrapped(found[0]), found[1][n:]
 
 
 def refine_inside(at: Callable, value: float, period: float, scale: float, size: float,
@@ -100,13 +92,13 @@ def refine_inside(at: Callable, value: float, period: float, scale: float, size:
     """
     low, high, x, sign = bracket
     x, best, least = x if low <= x <= high else 0.5 * (low + high), (math.nan, math.nan), math.inf
-    most = STEEPEST / ACCEPTED * scale
-    for _ in range(MAX_STEPS):
+    most = SINGULAR / ACCEPTED * scale
+    for _ in range(HALVINGS):
         output, rate = at(x)
         gap = output - value
         if not -period <= 2.0 * gap <= period:
             gap = math.remainder(gap, period) if -math.inf < gap < math.inf else math.nan
-        rounding = min(_UNIT * (scale + abs(rate) * max(abs(x), size)), most)
+        rounding = min(scale + abs(rate) * max(abs(x), size), most)
         if abs(gap) < least:
             least, best = abs(gap), (x, rate)
             if least <= ROUNDED * rounding:
@@ -120,12 +112,12 @@ def refine_inside(at: Callable, value: float, period: float, scale: float, size:
             if x in (low, high):
                 break
     # At a jump or in noise both sides enclose values that the output never has.
-    if not least <= STEEPEST * scale:
+    if not least <= SINGULAR * scale:
         return None
     x, rate = best
     if not -math.inf < rate < math.inf:
         # At an end of a segment, those of the nearest float that has rates.
-        near = (x + side * 2.0 ** k * math.ulp(x) for k in range(MAX_STEPS // 2)
+        near = (x + side * 2.0 ** k * math.ulp(x) for k in range(HALVINGS // 2)
                 for side in (1, -1))
         rate = next(filter(math.isfinite, (at(y)[1] for y in near)), rate)
     return x, rate
@@ -150,6 +142,8 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
     The solutions have the shape (inputs and rates, m), NaN where there is none.
     """
     n, inputs = problem.n, candidates
+    # What closed forms lose next to a singular pose; more is another assembly.
+    far = math.inf if n == 1 else SINGULAR
     with np.errstate(all='ignore'):
         if n == 1:
             # Estimates need a step; closed forms may be right.
@@ -161,7 +155,7 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
         rows = problem.over(*inputs)
         gaps = _gaps(problem, rows, values)
         error = _errors(problem, gaps, rows, inputs)
-        again = np.flatnonzero((error > ROUNDED) & (error <= FAR / _UNIT))
+        again = np.flatnonzero((error > ROUNDED) & (error <= far))
         x = inputs[:, again] - _step_arrays(problem, gaps[:, again], rows[:, again])
         new = problem.over(*x)
         less = _errors(problem, _gaps(problem, new, values[:, again]), new, x)
@@ -172,7 +166,7 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
         inputs[:, again], rows[:, again], error[again] = x[:, better], new[:, better], less[better]
         # A part needs more steps, shorter ones at an end of the reach, or rates from beside it.
         left = ~(error <= ACCEPTED) | ~np.isfinite(rows[1]) if n == 1 else ~(
-            (error <= ACCEPTED) | (error > FAR / _UNIT))
+            (error <= ACCEPTED) | (error > far))
         left[beyond] = True
     solutions = np.concatenate([problem.wrapped_arrays(inputs), rows[n:]])
     solutions[:, ~(error <= ACCEPTED)] = np.nan
@@ -192,16 +186,15 @@ def _gaps(problem: InverseProblem, rows: np.ndarray, values: np.ndarray) -> np.n
 
 def _errors(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray,
             inputs: np.ndarray) -> np.ndarray:
-    """Return the largest of the outputs' errors in units of their rounding, for columns."""
+    """Return the largest of the outputs' errors relative to their rounding, for columns."""
     n, errors = problem.n, []
     weights = [np.maximum(np.abs(x), size) for x, size in zip(inputs, problem.sizes)]
     for i, (gap, scale) in enumerate(zip(gaps, problem.scales)):
         rounding = scale + sum(np.abs(rate) * weight for rate, weight in zip(
             rows[n + i::n], weights))
         # Where a pose has no rates, they explain nothing.
-        most = scale * (STEEPEST / (ACCEPTED * _UNIT))
-        errors.append(np.abs(gap) / (_UNIT * np.where(np.isnan(rounding), scale, np.minimum(
-            rounding, most))))
+        errors.append(np.abs(gap) / np.where(np.isnan(rounding), scale, np.minimum(
+            rounding, scale * (SINGULAR / ACCEPTED))))
     return np.max(errors, axis=0) if n > 1 else errors[0]
 
 
@@ -220,18 +213,19 @@ def _step_arrays(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray) ->
 
 
 def same(problem: InverseProblem, one: Found, other: Found) -> bool:
-    """Return whether two solutions are one."""
+    """
+    Return whether two solutions are one.
+
+    They are if they are as near as ONE, or if they are nearly as near as half of all digits and
+    the rates say that the outputs differ by no more than ONE.
+    """
     for x, y, turn, size in zip(one[0], other[0], problem.turns, problem.sizes):
-        if NEIGHBOURS * size < abs(x - y) < turn - NEIGHBOURS * size:
+        if SINGULAR * size < abs(x - y) < turn - SINGULAR * size:
             return False
     steps = [math.remainder(x - y, turn) for x, y, turn in zip(one[0], other[0], problem.turns)]
-    apart = max([abs(step) / size for step, size in zip(steps, problem.sizes)])
-    if not SPECIAL < apart <= NEIGHBOURS:
-        return apart <= SPECIAL
-    n = problem.n
-    return any(all(abs(sum(rate * step for rate, step in zip(rates[i::n], steps)))
-                   <= SPECIAL * scale for i, scale in enumerate(problem.scales))
-               for _, rates in (one, other))
+    return max([abs(step) / size for step, size in zip(steps, problem.sizes)]) <= ONE or any(
+        all(abs(sum(rate * step for rate, step in zip(rates[i::problem.n], steps))) <= ONE * scale
+            for i, scale in enumerate(problem.scales)) for _, rates in (one, other))
 
 
 def distinct(problem: InverseProblem, solutions: Sequence[Found]) -> List[Found]:
@@ -239,8 +233,8 @@ def distinct(problem: InverseProblem, solutions: Sequence[Found]) -> List[Found]
     found: List[Found] = []
     for solution in sorted(solutions):
         # Of one input only neighbours can be one, a turn apart too.
-        beside = found if problem.n > 1 else found[-1:] + found[:1]
-        if not any(same(problem, solution, other) for other in beside):
+        others = found if problem.n > 1 else found[-1:] + found[:1]
+        if not any(same(problem, solution, other) for other in others):
             found.append(solution)
     return found
 
@@ -248,21 +242,14 @@ def distinct(problem: InverseProblem, solutions: Sequence[Found]) -> List[Found]
 def distinct_arrays(problem: InverseProblem, solutions: np.ndarray) -> np.ndarray:
     """Return solutions (solutions, inputs and rates, m) in order, one of those that are one."""
     n, solutions = problem.n, _ordered(problem, solutions)
-    count, places = len(solutions), np.arange(solutions.shape[2])
-    last = np.isfinite(solutions[:, 0]).sum(axis=0).clip(1) - 1
-    # Of one input only neighbours can be one, a turn apart too.
-    pairs = [(k, np.full_like(last, i)) for k, i in combinations(range(count), 2)
-             if n > 1 or k + 1 == i] + [(0, last)] * (count > 1)
-    again = False
-    for k, i in pairs:
-        apart = np.max([problem.apart(by, solutions[k, by], solutions[i, by, places])
-                        for by in range(n)], axis=0)
-        for place in np.flatnonzero((apart <= NEIGHBOURS) & (i > k)):
-            one, other = ((tuple(x[:n]), tuple(x[n:])) for x in solutions[
-                [k, i[place]], :, place].tolist())
-            if same(problem, one, other):
-                solutions[i[place], :, place], again = math.nan, True
-    solutions = _ordered(problem, solutions) if again else solutions
+    pairs = np.triu_indices(len(solutions), 1)
+    apart = np.max([problem.distance(by, *(solutions[k, by] for k in pairs)) for by in range(n)],
+                   axis=0)
+    for k in np.flatnonzero((apart <= SINGULAR).any(axis=0)).tolist():
+        several = distinct(problem, [(tuple(x[:n]), tuple(x[n:]))
+                                     for x in solutions[:, :, k].tolist() if x[0] == x[0]])
+        solutions[:, :, k] = math.nan
+        solutions[:len(several), :, k] = [(*inputs, *rates) for inputs, rates in several]
     return solutions[:max(int(np.isfinite(solutions[:, 0]).any(axis=1).sum()), 1)]
 
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 from itertools import product
 from typing import Optional
 
-from .linkage import InverseLinkage, Mode, MOST_SIDES
+from .linkage import InverseLinkage, MAX_MODES, Mode
 from ..formulas import Names, Structure
 from ..kinematics import Kinematics
 from ..text.rod_lines import turning_rods
@@ -33,7 +33,7 @@ def taken_apart(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]
     try:
         design, n = linkage.driven_by(*outputs).design, len(outputs)
         rods = tuple(turning_rods(design.lines, outputs))
-        if len(rods) > MOST_SIDES:
+        if 2 ** len(rods) > MAX_MODES:
             return None
         # Solved once for all modes: the sides are arguments here, and constants in each mode.
         structure = Structure(design, {**linkage.branches, **{

@@ -33,32 +33,18 @@ import numpy as np
 
 from ..inputs import Arc, Input
 from ..kinematics import Kinematics
-from ..motion.curves import ascending, extremes, LEAST, refined, sampled, turns
-from ..motion.reach import reach_of
+from ..motion.curves import ascending, CUTS, extremes, LEAST, refined, sampled, turns
+from ..motion.reach import MAX_ENDS, reach_of
 from ..motion.singularities import Analysis, distinct, NEAR, NearZero
+from ..tolerances import CLOSE, ONE, ROUNDING, SINGULAR, TOLERANCE
 
-# A value this near to a special input's is that input's; and this near, if no other input has it
-# [parts of the output's size].
-SPECIAL, BEYOND = 1e-13, 1e-9
-# Next to an end at which its rate is infinite, a value is the end's if so many ulps of the input
-# change the output as much, up to the second [part of the output's size].
-ULPS, STEEPEST = 64.0, 1e-6
-# An end of the reach is answered by an input so many ulps inside.
-INSIDE = 2.0
-# The output's error between samples [part of its range]; cells narrower than the second [rad] are
-# only divided where it jumps, by more than the third [part of its range].
-EXPLAINED, NARROW, JUMP = 1e-4, 1e-6, 0.05
-# Jumps that are no farther apart than this [rad] are noise, of an arm that nearly vanishes.
-NARROWEST = 1e-12
-# Parts of a divided cell, and rounds: a turn is divided down to neighbouring floats.
-PARTS, ROUNDS = 8, 20
-# The output has rounding of this part of its size; changes up to STILL times that are none.
-ROUNDING, STILL = 2.0 ** -50, 64.0
-# Samples at an end with more noise than this multiple of rounding are left out.
-NOISY = 1e9
-# More additional samples of an arc, and more jumps and dead points a turn, are those of a linkage
-# that is singular nearly everywhere.
-MAX_SAMPLES, MAX_RUNS = 10000, 100
+# Rounding of a pose, which that of all joints may explain: so many ulps of an input, or multiples
+# of the rounding of one sum.
+ULPS = 64.0
+# The output's error between samples, and the least jump [parts of its range].
+EXPLAINED, JUMP = 1e-4, 0.05
+# More additional samples of an arc are those of a linkage that is singular nearly everywhere.
+MAX_SAMPLES = 10000
 
 
 # Two inputs [rad or m] between which an output has a value once, a first estimate, and the sign of
@@ -111,7 +97,7 @@ class Segments:
     def __init__(self, curve: Callable, arcs: Sequence[Arc], near_zeros: Sequence[NearZero],
                  input_: Input, period: float, size: float):
         self._curve, self._period, self._size, self._unit = curve, period, size, input_.step
-        self._rounding, counted = ROUNDING * size, input_.counted()
+        self._rounding, counted = TOLERANCE * size, input_.counted()
         special = distinct((near.value for near in near_zeros if near.gap <= near.rounding),
                            counted)
         marks = distinct((near.value for near in near_zeros if near.gap <= NEAR * near.size),
@@ -119,7 +105,7 @@ class Segments:
         self.jumps: List[float] = []
         self._ends = {end for arc in arcs for end in arc if not counted.is_cut(end)}
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
-        if not 0 < len(runs) <= MAX_RUNS * max(1.0, sum(hi - lo for lo, hi in arcs) / math.tau) \
+        if not 0 < len(runs) <= MAX_ENDS * max(1.0, sum(hi - lo for lo, hi in arcs) / math.tau) \
                 or not self._moves(runs):
             runs, self.jumps = [], []
         self.all = [segment for run in runs for segment in self._monotone(*run)]
@@ -140,9 +126,9 @@ class Segments:
         outer cells have no width: those of values that are answered by the end of the segment.
         """
         theta, value, cells, sign = segment
-        rounded, ends = SPECIAL * self._size, [0, -1]
+        rounded, ends = ONE * self._size, [0, -1]
         # At an end of the reach there is a pose also when whole turns are added.
-        start, end = (x + side * INSIDE * math.ulp(max(abs(x), math.pi)) * (x in self._ends)
+        start, end = (x + side * 2.0 * math.ulp(max(abs(x), math.pi)) * (x in self._ends)
                       for x, side in zip(theta[ends].tolist(), (1.0, -1.0)))
         none, one = np.zeros(2), np.ones(2)
         special = np.stack([(start, end), none, value[ends], one, one, none, none, none])
@@ -276,8 +262,8 @@ class Segments:
         known = np.isfinite(value[0])
         cuts = np.unique(np.concatenate([np.flatnonzero(~known), jumped + 1]))
         for run in np.split(np.arange(len(theta)), cuts):
-            clear = np.flatnonzero((known & (noise <= NOISY * self._rounding))[run])
-            if len(clear) > 1 and theta[run[-1]] - theta[run[0]] > NARROWEST:
+            clear = np.flatnonzero((known & (noise <= SINGULAR * self._size))[run])
+            if len(clear) > 1 and theta[run[-1]] - theta[run[0]] > ROUNDING:
                 run = run[clear[0]:clear[-1] + 1]
                 steps = self._difference(np.diff(value[0, run]))
                 yield (theta[run], value[0, run[0]] + np.append(0.0, np.cumsum(steps))
@@ -285,19 +271,19 @@ class Segments:
 
     def _divided(self, theta: np.ndarray, most: int) -> Tuple[np.ndarray, np.ndarray]:
         """Return samples that explain the output, and after which of them it jumps."""
-        inner, jumped = np.arange(1, PARTS) / PARTS, np.empty(0, int)
+        jumped = np.empty(0, int)
         value, rate = self._curve(theta)
-        for _ in range(ROUNDS):
+        while True:
             width, change = np.diff(theta), self._difference(np.diff(value))
             with np.errstate(all='ignore'):
                 size = 0.5 * self._period if self._period < math.inf else max(
-                    float(np.nanmax(value) - np.nanmin(value)), BEYOND * self._size)
+                    float(np.nanmax(value) - np.nanmin(value)), CLOSE * self._size)
                 slopes = np.stack([rate[1:], rate[:-1]])
                 # At an end a rate may be infinite.
                 slopes = np.where(np.isfinite(slopes), slopes, slopes[::-1])
                 mean = 0.5 * width * slopes.sum(axis=0)
                 missed = np.abs(change - np.where(np.isfinite(mean), mean, 0.0))
-                wide = (width > NARROW) & (missed > STILL * self._rounding)
+                wide = (width > SINGULAR) & (missed > ULPS * self._rounding)
                 # Two extremes may hide where the change is less than half of what rates say.
                 hidden = (slopes[0] * slopes[1] > 0.0) & (missed > 0.5 * np.abs(mean))
                 place = np.flatnonzero((missed > JUMP * size) | wide & (
@@ -306,18 +292,17 @@ class Segments:
             jumped = place[neighbours & (np.abs(change[place]) > JUMP * size)]
             place = place[~neighbours]
             if not len(place) or len(theta) > most:
-                break
-            new = (theta[place, None] + width[place, None] * inner).ravel()
+                return theta, jumped
+            new = (theta[place, None] + width[place, None] * CUTS).ravel()
             found = self._curve(new)
             order = np.argsort(np.concatenate([theta, new]))
             theta, value, rate = (np.concatenate(parts)[order] for parts in (
                 (theta, new), (value, found[0]), (rate, found[1])))
-        return theta, jumped
 
     def _moves(self, runs: Sequence[Tuple]) -> bool:
         """Return whether the output changes by more than rounding."""
         _, values, _, noise = (np.concatenate(part) for part in zip(*runs))
-        noise = STILL * (noise + np.median(noise)) + self._rounding
+        noise = ULPS * (noise + np.median(noise)) + self._rounding
         return bool(np.any(np.abs(self._difference(values - np.median(values))) > noise))
 
     def _monotone(self, theta: np.ndarray, value: np.ndarray, rate: np.ndarray,
@@ -340,7 +325,10 @@ class Segments:
         for first, last in zip(cuts, cuts[1:]):
             part = slice(first, last + 1)
             sign = 1.0 if value[last] >= value[first] else -1.0
-            values = np.maximum.accumulate(sign * value[part])
+            values = sign * value[part]
+            # An extreme in noise has a value of its own.
+            values[0] = values[:2].min()
+            values = np.maximum.accumulate(values)
             yield Segment(theta[part], values, _cells(theta[part], values, sign * rate[part]),
                           sign)
 
@@ -356,16 +344,16 @@ class Segments:
             beside = x + np.copysign(ULPS * np.spacing(np.maximum(abs(x), 1.0)), other - x)
             change = np.abs(self._difference(self._curve(beside)[0] - sign * value))
             found.append(np.where(
-                goes_on, SPECIAL * self._size + np.abs(self._difference(there - value)),
-                np.fmin(np.fmax(change, BEYOND * self._size), STEEPEST * self._size)))
+                goes_on, ONE * self._size + np.abs(self._difference(there - value)),
+                np.fmin(np.fmax(change, CLOSE * self._size), SINGULAR * self._size)))
         return found
 
     def _continues(self, segment: Segment, other: Segment, turn: float) -> bool:
         """Return whether the output goes on from a segment to the next one."""
         apart = float(other.theta[0] - segment.theta[-1])
         return other.sign == segment.sign and abs(
-            math.remainder(apart, turn)) <= SPECIAL and bool(abs(self._difference(
-                other.value[0] - segment.value[-1])) <= BEYOND * self._size)
+            math.remainder(apart, turn)) <= ONE and bool(abs(self._difference(
+                other.value[0] - segment.value[-1])) <= CLOSE * self._size)
 
 
 def segments_of(linkage: Kinematics, output: str, others: Sequence[float] = (),

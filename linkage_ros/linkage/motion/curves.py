@@ -22,24 +22,20 @@ from typing import Callable, Tuple
 
 import numpy as np
 
-# Samples of a whole turn; halvings of the distance to each end of an arc, for more samples there.
-TURN_SAMPLES, END_HALVINGS = 360, 48
-# For extremes: samples of an arc, number of peaks that are refined, samples around each, zooms.
-EXTREME_SAMPLES, REFINED_PEAKS, ZOOM_SAMPLES, ZOOMS = 385, 4, 17, 10
+# Even samples of a whole turn; halvings of a distance after which few of its digits are left.
+TURN_SAMPLES, HALVINGS = 360, 48
+# Peaks of a curve that are refined for its extremes.
+REFINED_PEAKS = 4
 # Fractions at which a bracket is divided; an odd number of them, so that one is its middle.
 CUTS = np.arange(1, 16) / 16
-# For a drawn curve: even samples at first, rounds of division, maximum number of samples.
-DRAWN, DRAWN_ROUNDS, MOST_DRAWN = 181, 30, 4000
-# Tolerance of a drawn curve, as a fraction of its size and of its coordinates.
-CHORD, NOISE = 1 / 600, 1e-12
 # Angles below this [rad] are zero: the rounding of any other angle is coarser.
 LEAST = 1e-18
 
 
-def sampled(lo: float, hi: float, samples: int = TURN_SAMPLES, fewest: int = 9) -> np.ndarray:
+def sampled(lo: float, hi: float, count: int = 0) -> np.ndarray:
     """Return angles [rad] on an arc, evenly spaced, with more of them towards both ends."""
-    even = np.linspace(lo, hi, max(fewest, math.ceil(samples * (hi - lo) / math.tau)))
-    steps = (hi - lo) * 0.5 ** np.arange(2, END_HALVINGS)
+    even = np.linspace(lo, hi, count or max(9, math.ceil(TURN_SAMPLES * (hi - lo) / math.tau)))
+    steps = (hi - lo) * 0.5 ** np.arange(2, HALVINGS)
     return ascending(np.clip(np.concatenate([even, lo + steps, hi - steps]), lo, hi))
 
 
@@ -47,41 +43,6 @@ def ascending(values: np.ndarray) -> np.ndarray:
     """Return values in order, each once; np.unique would take 8 ms to import masked arrays."""
     values = np.sort(values)
     return values[np.append(True, values[1:] > values[:-1])]
-
-
-def drawn(curve: Callable, lo: float, hi: float) -> np.ndarray:
-    """
-    Return points (n, 2) of a plane curve on an arc, the closer together the more it bends.
-
-    The curve takes values of an input (m,) and returns points (m, 2), NaN where there is none.
-    Between neighbours no point is farther from their chord than CHORD of the curve's size.
-    """
-    at = sampled(lo, hi, 0, DRAWN)
-    places = curve(at)
-    parts = np.array([0.25, 0.5, 0.75])
-    for _ in range(DRAWN_ROUNDS):
-        known = np.isfinite(places).all(axis=1)
-        size = np.ptp(places[known], axis=0).max(initial=0.0)
-        most = max(CHORD * size, NOISE * abs(places[known]).max(initial=0.0))
-        first = np.flatnonzero(known[:-1] & known[1:] & (at[1:] - at[:-1] > LEAST))
-        inner = at[first, None] + (at[first + 1] - at[first])[:, None] * parts
-        between = curve(inner.ravel()).reshape(-1, 3, 2)
-        bent = np.nanmax(_from_chord(places[first], places[first + 1], between), axis=1)
-        halved = bent > most
-        if not halved.any() or len(at) > MOST_DRAWN:
-            break
-        # A piece that bends too much gets its three inner points.
-        at = np.insert(at, first[halved].repeat(3) + 1, inner[halved].ravel())
-        places = np.insert(places, first[halved].repeat(3) + 1, between[halved].reshape(-1, 2), 0)
-    return places[np.isfinite(places).all(axis=1)]
-
-
-def _from_chord(start: np.ndarray, end: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the distances of points (n, m, 2) from chords (n, 2)."""
-    along = (end - start)[:, None]
-    away = points - start[:, None]
-    part = (away * along).sum(axis=-1) / np.maximum((along ** 2).sum(axis=-1), 1e-300)
-    return np.hypot(*np.moveaxis(away - part.clip(0.0, 1.0)[..., None] * along, -1, 0))
 
 
 def refined(test: Callable, lo: np.ndarray, hi: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
@@ -156,30 +117,32 @@ def extremes(curve: Callable, lo: float, hi: float, angular: np.ndarray) -> np.n
     The curve takes values of an input (n,) and returns the outputs (outputs, n). Those that are
     `angular` (outputs,) are angles [rad], continued past -pi and pi.
     """
-    theta = np.linspace(lo, hi, EXTREME_SAMPLES)
+    theta = np.linspace(lo, hi, TURN_SAMPLES + 1)
     value = curve(theta)
     for i, known in zip(np.flatnonzero(angular), np.isfinite(value[angular])):
         value[i, known] = np.unwrap(value[i, known])
     # Two searches for maxima: of each output's negative, and of each output.
     row, sign = np.tile(np.arange(len(value)), 2), np.repeat([-1.0, 1.0], len(value))[:, None]
-    turn = np.where(angular, math.tau, 0.0)[row][:, None, None]
-    height = np.where(np.isfinite(value), value, np.nan)[row] * sign
-    beside = np.pad(np.nan_to_num(height, nan=-np.inf), ((0, 0), (1, 1)), constant_values=-np.inf)
-    peaks = (beside[:, 1:-1] >= beside[:, :-2]) & (beside[:, 1:-1] >= beside[:, 2:])
-    best = np.argsort(np.where(peaks, -beside[:, 1:-1], np.inf), axis=1)[:, :REFINED_PEAKS]
-    top = np.take_along_axis(value[row], best, 1)
-    at = theta[best]
-    low, high = theta[(best - 1).clip(0)], theta[(best + 1).clip(max=EXTREME_SAMPLES - 1)]
-    for _ in range(ZOOMS):
-        near = np.linspace(low, high, ZOOM_SAMPLES, axis=-1)
-        now = curve(near.ravel()).reshape(len(value), *near.shape)[row, np.arange(len(row))]
-        with np.errstate(invalid='ignore'):
-            now = now + turn * np.round((top[..., None] - now) / math.tau)
-        rank = np.where(np.isfinite(now), now * sign[..., None], -np.inf)
-        place = rank.argmax(axis=-1)[..., None]
-        top, at = (np.take_along_axis(x, place, -1)[..., 0] for x in (now, near))
-        low, high = (np.take_along_axis(near, (place + step).clip(0, ZOOM_SAMPLES - 1), -1)[..., 0]
-                     for step in (-1, 1))
-    place = np.where(np.isfinite(top), top * sign, -np.inf).argmax(axis=1)[:, None]
-    found = [np.take_along_axis(x, place, 1).reshape(2, -1) for x in (top, at)]
-    return np.stack(found).transpose(2, 1, 0)
+    height = np.where(np.isfinite(value)[row], value[row] * sign, -np.inf)
+    beside = np.pad(height, ((0, 0), (1, 1)), constant_values=-np.inf)
+    peaks = (height >= beside[:, :-2]) & (height >= beside[:, 2:])
+    best = np.argsort(np.where(peaks, -height, np.inf), axis=1)[:, :REFINED_PEAKS]
+    row, sign = row.repeat(best.shape[1]), sign.repeat(best.shape[1], axis=0)
+    best = best.ravel()
+    top, at = value[row, best], theta[best]
+
+    def depth(x: np.ndarray) -> np.ndarray:
+        """Return how far curves are below zero, or above for minima, in the turn of their top."""
+        now = curve(x.ravel()).reshape(len(value), *x.shape)[row, np.arange(len(row))]
+        turns = np.where(angular[row, None], np.round((top[:, None] - now) / math.tau), 0.0)
+        return -sign * (now + math.tau * turns)
+
+    with np.errstate(invalid='ignore'):
+        refined_at = lowest(depth, theta[(best - 1).clip(0)],
+                            theta[(best + 1).clip(max=TURN_SAMPLES)])
+        refined_top = -(sign * depth(refined_at[:, None]))[:, 0]
+        higher = sign[:, 0] * refined_top > sign[:, 0] * top
+    found = np.where(higher, (refined_top, refined_at), (top, at)).reshape(2, 2 * len(value), -1)
+    rank = np.where(np.isfinite(found[0]), found[0] * sign.reshape(found[0].shape), -np.inf)
+    place = rank.argmax(axis=1)[None, :, None]
+    return np.take_along_axis(found, place, 2).reshape(2, 2, -1).transpose(2, 1, 0)

@@ -23,22 +23,17 @@ from typing import Any, Callable, Iterable, List, Sequence, Tuple
 
 import numpy as np
 
-from .curves import ascending, lowest, near_misses, refined, sampled
+from .curves import ascending, HALVINGS, lowest, near_misses, refined, sampled
 from ..geometry.planar import Limit
-from ..inputs import Arc, CRANK, Input, is_periodic, NARROWEST
+from ..inputs import Arc, CRANK, Input, is_periodic
 from ..kinematics import Kinematics
+from ..tolerances import ONE
 
-# In the search for ends without a closed form: samples of a whole turn, least samples of an arc,
-# and rounds of search inside the arcs that were found.
-SAMPLES, FEWEST, ROUNDS = 720, 33, 4
-# Halvings of the step towards a value at which a margin nearly vanishes.
-HALVINGS = 12
 # Fraction at which an arc is tested: in the exact middle, an arm of a symmetric linkage may have
 # no length.
 INSIDE = 0.49
-# The search stops at more ends than these: they are rounding, of the direction of an arm without
-# length.
-MOST = 100
+# More ends a turn than these are rounding, of the direction of an arm without length.
+MAX_ENDS = 100
 
 
 def reach_of(linkage: Kinematics, others: Tuple[float, ...] = ()) -> List[Arc]:
@@ -122,9 +117,9 @@ def _limits(margins: Callable, lo: float, hi: float) -> List[float]:
     that is found is searched again.
     """
     ends = [lo, hi]
-    for _ in range(ROUNDS):
+    while True:
         theta = ascending(np.concatenate([
-            sampled(*arc, SAMPLES, FEWEST) for arc in zip(ends, ends[1:])]))
+            sampled(*arc) for arc in zip(ends, ends[1:])]))
         values = margins(theta)
         touches = _touches(margins, theta, values)
         if len(touches):
@@ -136,9 +131,8 @@ def _limits(margins: Callable, lo: float, hi: float) -> List[float]:
             lambda x, as_before=first[place][:, None]: _failing(margins, x) == as_before,
             theta[place], theta[place + 1])
         known, ends = len(ends), sorted({lo, hi, *before.tolist(), *after.tolist()})
-        if len(ends) == known or len(ends) > MOST * max(1.0, (hi - lo) / math.tau):
-            break
-    return ends[1:-1]
+        if len(ends) == known or len(ends) > MAX_ENDS * max(1.0, (hi - lo) / math.tau):
+            return ends[1:-1]
 
 
 def _touches(margins: Callable, theta: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -186,11 +180,11 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
         return [(input_.low, input_.high)]
     found: List[Arc] = []
     for lo, hi in reached:
-        if found and lo - found[-1][1] <= NARROWEST:
+        if found and lo - found[-1][1] <= ONE:
             found[-1] = found[-1][0], hi
         else:
             found.append((lo, hi))
-    if (input_.wraps and len(found) > 1 and found[0][0] + input_.turn - found[-1][1] <= NARROWEST
+    if (input_.wraps and len(found) > 1 and found[0][0] + input_.turn - found[-1][1] <= ONE
             and joined()):
         found[-1] = found[-1][0], found.pop(0)[1] + input_.turn
     return [(lo - input_.turn, hi - input_.turn) if input_.wraps and lo >= input_.high

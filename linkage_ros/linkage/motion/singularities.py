@@ -24,18 +24,14 @@ import numpy as np
 
 from .curves import LEAST, refined, sampled
 from .reach import reach_of
-from ..geometry.planar import TOLERANCE
 from ..inputs import Arc, Input
 from ..kinematics import Kinematics
+from ..tolerances import CLOSE, ONE, TOLERANCE
 
 # Outputs change quickly where a closure is below this fraction of its size.
 NEAR = 1e-2
 # A closure whose size is below this multiple of its rounding is zero everywhere.
 FLAT = 256.0
-# Dead points nearer to an end of the reach than this [rad] are that end.
-ONE = 1e-9
-# Inputs no farther apart than this [rad] are one.
-SAME = 1e-13
 
 Places = Tuple[np.ndarray, ...]
 
@@ -130,9 +126,9 @@ def distinct(values: Iterable[float], input_: Input) -> List[float]:
     """Return values of an input in order, wrapped, one of those that differ by rounding."""
     found: List[float] = []
     for x in sorted(float(input_.wrapped(0.0 if abs(x) < LEAST else x)) for x in values):
-        if not found or x - found[-1] > SAME:
+        if not found or x - found[-1] > ONE:
             found.append(x)
-    if input_.wraps and len(found) > 1 and found[0] + input_.turn - found[-1] <= SAME:
+    if input_.wraps and len(found) > 1 and found[0] + input_.turn - found[-1] <= ONE:
         found.pop()
     return found
 
@@ -158,7 +154,7 @@ class Analysis:
         ends = [end for arc in self.reach() for end in arc if not first.is_cut(end)]
         touched = [near.value for near in self.near_zeros()
                    if near.gap <= near.rounding
-                   and all(first.apart(near.value, end) > ONE for end in ends)]
+                   and all(first.apart(near.value, end) > CLOSE for end in ends)]
         return distinct([*ends, *touched], first)
 
     def reach(self) -> List[Arc]:

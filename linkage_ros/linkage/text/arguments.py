@@ -45,9 +45,11 @@ def _checked(design: Design, name: str, value: Any) -> Any:
         return ValueError(f'{design.name}: dimension {name} must {rule}, got {quoted(value)}')
 
     try:
-        length = _numbers(value)
-    except (TypeError, ValueError, OverflowError, RecursionError):
+        length = numbers(name, value)
+    except ValueError:
         raise error('be a number or an array of numbers') from None
+    if not length.size or np.asarray(value).dtype == bool:
+        raise error('be a number or an array of numbers')
     if not np.all(np.isfinite(length)):
         raise error('be finite')
     if name not in design.signed and not np.all(length > 0.0):
@@ -58,36 +60,22 @@ def _checked(design: Design, name: str, value: Any) -> Any:
     return length if length.ndim else float(length)
 
 
-# What numpy takes for numbers, a byte each.
-BYTES = (bytes, bytearray, memoryview)
+# What numpy takes for numbers.
+NOT_NUMBERS = (str, bytes, bytearray, memoryview, type(None))
 
 
 def numbers(name: str, value: Any) -> np.ndarray:
     """Return a number or an array as float64; raise ValueError, with the name, if invalid."""
     try:
-        if isinstance(value, (str, *BYTES)):
-            raise TypeError
         found = np.asarray(value)
-        if found.dtype.kind != 'f' and not _are_numbers(found, 'biuO'):
+        kind = found.dtype.kind
+        if isinstance(value, NOT_NUMBERS) or kind not in 'fbiuO' or kind == 'O' and any(
+                isinstance(each, NOT_NUMBERS) for each in found.flat):
             raise TypeError
         return found.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError, RecursionError):
         raise ValueError(f'{name} must be a number or an array of numbers, '
                          f'got {quoted(value)}') from None
-
-
-def _numbers(value: Any) -> np.ndarray:
-    """Return numbers as an array; raise for other types that numpy would convert."""
-    given = np.asarray(value)
-    if isinstance(value, BYTES) or not given.size or not _are_numbers(given, 'iufO', bool):
-        raise TypeError
-    return given.astype(float)
-
-
-def _are_numbers(given: np.ndarray, kinds: str, *others: type) -> bool:
-    """Return whether an array has one of numpy's kinds of numbers, and no other objects."""
-    return given.dtype.kind in kinds and not (given.dtype.kind == 'O' and any(
-        isinstance(each, (str, bytes, type(None), *others)) for each in given.flat))
 
 
 def checked_branches(design: Design, given: Optional[Mapping[str, int]]) -> dict:

@@ -32,7 +32,8 @@ Step = Union[float, str]
 # Power of a length in a result; None for zero, which has any power, NaN for mixed powers.
 Degree = Optional[float]
 
-SMALLEST_NUMBER, LARGEST_NUMBER = 1e-70, 1e70
+# The largest number; the smallest is its inverse.
+LARGEST_NUMBER = 1e70
 IN_RANGE = '0 or between 1e-70 and 1e70'
 
 _TOKEN = re.compile(r'(?P<number>(?:0|[1-9][0-9]*|(?=\.[0-9]))(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?)'
@@ -65,7 +66,7 @@ _DEGREES: Mapping[Step, Callable] = {
 def in_range(number: ArrayLike) -> Any:
     """Return whether a number, or each of an array, satisfies IN_RANGE."""
     size = np.abs(number)
-    return (number == 0.0) | (size >= SMALLEST_NUMBER) & (size <= LARGEST_NUMBER)
+    return (number == 0.0) | (size >= 1.0 / LARGEST_NUMBER) & (size <= LARGEST_NUMBER)
 
 
 class Formula:
@@ -189,7 +190,7 @@ class Formula:
             return number
         size = abs(number)
         raise self._out_of_range(word or self.text, 'too large' if size > LARGEST_NUMBER else
-                                 'too small' if size < SMALLEST_NUMBER else 'not real')
+                                 'too small' if size < 1.0 else 'not real')
 
     def _out_of_range(self, word: str, wrong: str) -> ValueError:
         return ValueError(f'{quoted(word)} is {wrong}: a number is {IN_RANGE}')

@@ -65,12 +65,11 @@ import numpy as np
 
 from .arithmetic import ARITHMETIC_WORDS, Formula, IN_RANGE, in_range
 from ..geometry.builder import Builder, ConstructionError, Gear
-from ..geometry.planar import LEFT, RIGHT
 from ...cache import cached
 from ...formula.expression import dimension, Real
 from ...words import elided, listed, meant, quoted
 
-_WORDS = {'left': LEFT, 'right': RIGHT, 'out': 1.0, 'in': -1.0}
+_WORDS = {'left': 1.0, 'right': -1.0, 'out': 1.0, 'in': -1.0}
 _JOINTS = ('CENTRE', 'BASE', 'FIRST', 'SECOND', 'POINT', 'CORNER', 'POLE', 'PIN', 'PIVOT',
            'ORIGIN', 'JOINT', 'TOWARDS')
 _NUMBERS = ('X', 'Y', 'Z', 'U', 'V', 'W', 'LENGTH', 'DISTANCE', 'OFFSET', 'ANGLE', 'RATIO')

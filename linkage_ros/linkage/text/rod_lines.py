@@ -51,7 +51,7 @@ import numpy as np
 
 from .joint_lines import check_numbers, formula, Line, parsed
 from ..geometry.builder import Bar, Builder, GROUND, Link, Point
-from ..geometry.planar import Limit, TOLERANCE
+from ..geometry.planar import Limit
 from ..geometry.spatial import (
     Circle,
     drawn_ahead,
@@ -71,6 +71,7 @@ from ..geometry.spatial import (
 )
 from ..geometry.window import Window, WindowRod
 from ..inputs import ANGLE, Input, LENGTH
+from ..tolerances import SINGULAR, TOLERANCE
 from ...formula.expression import Real, real
 from ...words import listed, meant, quoted
 
@@ -86,12 +87,8 @@ INPUTS = 'motor', 'cylinder'
 _JOINTS, _RODS = ('hinge', 'slide', 'motor'), ('rod', 'cylinder')
 # Maximum number of lines of a linkage: the order of solution is searched among all rods.
 MOST_LINES = 200
-# A rod that is drawn nearer to a dead point than this (a sine) has no defined side.
-_SIDED = 1e-6
 # Least sine of the angle between the axes of two hinges in a row.
 _LEANING = 1e-3
-# Without limits, the largest window is searched up to this angle to each side [rad].
-_WIDEST = 0.5 * math.pi
 
 
 class WindowError(ValueError):
@@ -407,7 +404,7 @@ class _Drawing:
         else:
             joint.turn, *limits, self._builder.transmissions[name] = rod_on_hinge(
                 hinge, base, point, length, side, span)
-        self._require(line, sided - _SIDED, f'as drawn it is at a dead point of {link}, on '
+        self._require(line, sided - SINGULAR, f'as drawn it is at a dead point of {link}, on '
                       'neither side; draw the linkage in another pose')
         self._builder.limits += limits
         joint.gate(self._add_limits(joint, joint.turn.angle if joint.turn else joint.shift))
@@ -514,7 +511,9 @@ def _check_window(link: TwoRodLink) -> None:
            for part in vector):
         raise line.error('two rods on two hinges need one set of dimensions, not arrays: the '
                          'proof of their single pose takes numbers')
-    window = Window(link.rods, *zip(*(each or (-_WIDEST, _WIDEST) for each in link.limits)))
+    # Without limits, the largest window is searched up to a quarter turn to each side.
+    window = Window(link.rods, *zip(*(
+        each or (-0.5 * math.pi, 0.5 * math.pi) for each in link.limits)))
     limited = all(link.limits)
     if limited and window.is_proved():
         return

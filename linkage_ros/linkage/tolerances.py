@@ -1,0 +1,26 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The tolerances of the core: what counts as equal, from the rounding of one sum upwards.
+
+All are without a unit: parts of a size, or angles [rad]; inputs and outputs count in their sizes.
+"""
+
+# A margin or a sum counts as zero within rounding: eight half ulps of the scale.
+TOLERANCE = 8 * 2.0 ** -53
+# Inputs, or values of an output, no farther apart than this are one: the rounding of many sums.
+ONE = 1e-13
+# Rounding that a whole linkage of joints has piled up.
+ROUNDING = 1e-12
+# What differs by less is one where nothing else tells: roots of rounding are ten times as far.
+CLOSE = 1e-9
+# Next to a singular pose half of all digits are lost: no sine or margin below this is trusted.
+SINGULAR = 1e-6
