@@ -118,7 +118,8 @@ class Component:
         self.actuator, self.joint = self._memory
         described = [*lines]
         for side, (what, axes) in enumerate((('actuator', actuators), ('joint', joints))):
-            described += [f'{what}\t{each}\t{role}\t1\t0' for each, role in axes.items()]
+            described += [f'{what}\t{each}\t{role}\t1\t0' for each, role in axes.items()
+                          if role is not None]
             described += [
                 f'{what}_handle\t{each}\t{kind}\t{(3 * side + KINDS.index(kind)) * n + i}'
                 for i, each in enumerate(axes) for kind in kinds]
@@ -451,34 +452,49 @@ def test_an_interface_of_one_side_is_refused(plugins, name, side, kind):
                                   for axis in named[name]), kinds=both)
 
 
-@pytest.mark.parametrize('words, said', [
-    ('joint\tknee_QB\tQB\t2\t0', 'must have no mechanical_reduction'),
-    ('joint\tknee_QB\tQB\t1\t0.5', 'must have no mechanical_reduction and no offset')])
-def test_gears_are_those_of_the_scene(plugins, words, said):
-    with pytest.raises(Refused, match=said):
+@pytest.mark.parametrize('words', [
+    'joint\tknee_QB\tQB\t0\t0', 'joint\tknee_QB\tQB\tnan\t0', 'joint\tknee_QB\tQB\tinf\t0',
+    'joint\tknee_QB\tQB\t1\tnan'])
+def test_a_reduction_that_cannot_be_is_refused(plugins, words):
+    with pytest.raises(Refused, match="joint 'knee_QB' needs a finite offset"):
         plugins.component('knee', words, joints={})
 
 
-@pytest.mark.parametrize('key, value, said', [
-    ('a', '90', ''), ('e', '-3', ''), ('a', 'wide', "must be a number [m], not 'wide'"),
-    ('a', '-1', 'a must be a positive number'), ('a', '1e999', 'must be a number'),
-    ('a', '1 2', 'must be a number'), ('a', '', 'must be a number'),
-    ('a', '0x1p9', 'must be a number'), ('e', '1e6', 'it cannot be assembled'),
-    ('x', '1', "transmission 'tested': there is no parameter 'x'; allowed: a b e")])
-def test_dimensions_are_parameters(plugins, key, value, said):
-    line = f'parameter\t{key}\t{value}'
-    if said:
-        with pytest.raises(Refused, match=re.escape(said)):
-            plugins.component('lever', line)
-        return
-    component = plugins.component('lever', line)
-    lever = plugins.machines['lever'].linkage.with_dimensions(**{key: float(value)})
-    for crank in (0.2, -0.3):
-        status, (position, *_) = component.read((crank - 0.3) / -0.5)
-        angle = float(lever.joint_angles(crank)['lever'])
-        assert position == pytest.approx(0.1 - angle, abs=1e-13)
-        assert status == OK and component.write(position)[1][0] == pytest.approx(
-            (crank - 0.3) / -0.5, abs=1e-12)
+def test_a_robot_has_its_own_gears_and_encoder_zeros(plugins):
+    """Of the built-in transmissions: joint = actuator / reduction + offset, both ways."""
+    inputs, rng = (1.9, 1.24), np.random.default_rng(8)
+    plain = plugins.component('leg')
+    numbers = {name: (rng.uniform(-3.0, 3.0), rng.uniform(-1.0, 1.0)) for name in (
+        'a', 'b', 'c', 'd')}
+    lines = [f'{kind}\t{name}\t{role}\t{numbers[name][0]!r}\t{numbers[name][1]!r}'
+             for kind, name, role in (('actuator', 'a', 'crank'), ('actuator', 'b', 'crank2'),
+                                      ('joint', 'c', 'crank'), ('joint', 'd', 'AP'))]
+    geared = plugins.component('leg', *lines, actuators={'a': None, 'b': None},
+                               joints={'c': None, 'd': None})
+    (reduction, offset), (joint_reduction, joint_offset) = (
+        np.array([numbers[name] for name in names]).T for names in ('ab', 'cd'))
+    actuator, joint = poses(plugins.machines['leg'], *inputs)
+    _, seen = plain.read(actuator, [0.3, -0.2], [2.0, 5.0])
+    status, found = geared.read(actuator * reduction + offset, np.array([0.3, -0.2]) * reduction,
+                                np.array([2.0, 5.0]) / reduction)
+    assert status == OK
+    np.testing.assert_allclose(found, [
+        seen[0] / joint_reduction + joint_offset, seen[1] / joint_reduction,
+        seen[2] * joint_reduction], rtol=1e-9, atol=1e-9)
+    _, seen = plain.write(joint, [0.4, 0.1], [1.0, -2.0])
+    status, found = geared.write(
+        joint / joint_reduction + joint_offset, np.array([0.4, 0.1]) / joint_reduction,
+        np.array([1.0, -2.0]) * joint_reduction)
+    assert status == OK
+    np.testing.assert_allclose(found, [
+        seen[0] * reduction + offset, seen[1] * reduction, seen[2] / reduction],
+        rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize('key', ['a', 'x'])
+def test_other_lengths_need_another_package(plugins, key):
+    with pytest.raises(Refused, match=f"there is no parameter '{key}': write the package again"):
+        plugins.component('lever', f'parameter\t{key}\t90')
 
 
 def test_why_values_are_held_is_logged_once_per_reason(plugins, capfd):

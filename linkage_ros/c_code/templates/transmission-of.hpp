@@ -19,10 +19,8 @@
 #include <condition_variable>
 #include <cstddef>
 #include <limits>
-#include <locale>
 #include <mutex>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <type_traits>
@@ -38,9 +36,6 @@ namespace @namespace@
 {
 /// The name of an actuator or a joint in the scene, and its role in the linkage.
 struct Axis { const char * name, * role; };
-
-/// A dimension [m] that a parameter of the transmission may replace.
-struct Dimension { const char * name; double value; };
 
 /// Logs why values are held, from a thread of its own: a control loop only sets bits.
 class HeldLog
@@ -144,11 +139,14 @@ public:
       if (i == size || !names[i].empty()) {
         throw Exception(what + " '" + info.name + "', role '" + info.role + "', is none of" + allowed);
       }
-      if (info.mechanical_reduction != 1.0 || info.offset != 0.0) {
-        throw Exception(what + " '" + info.name + "' must have no mechanical_reduction and no offset: "
-          "the scene has them");
+      if (!std::isfinite(info.offset) || !std::isnormal(info.mechanical_reduction)) {
+        throw Exception(what + " '" + info.name + "' needs a finite offset, and a finite "
+          "mechanical_reduction other than 0");
       }
       names[i] = info.name;
+      // A reduction is that of the built-in transmissions: from the joint to the actuator.
+      offset_[i] = info.offset;
+      factor_[i] = is_actuator ? info.mechanical_reduction : 1.0 / info.mechanical_reduction;
     }
     for (std::size_t i = 0; i < size; ++i) {
       if (names[i].empty()) {
@@ -189,23 +187,44 @@ public:
 
   bool have(std::size_t kind) const { return handles_[kind][0].has_value(); }
 
-  void read(std::size_t kind, double (&values)[size]) const
+  /// Read values as the scene has them; those without a handle are 0.
+  linkage_side read() const
   {
+    linkage_side values{};
     for (std::size_t i = 0; i < size; ++i) {
-      values[i] = have(kind) ? handles_[kind][i]->get_value() : 0.0;
+      values.position[i] = (value(0, i) - offset_[i]) / factor_[i];
+      values.velocity[i] = value(1, i) / factor_[i];
+      values.effort[i] = value(2, i) * factor_[i];
     }
+    return values;
   }
 
-  void write(std::size_t kind, const double (&values)[size])
+  /// Write what is finite.
+  void write(const linkage_side & values)
   {
     for (std::size_t i = 0; i < size; ++i) {
-      if (handles_[kind][i] && std::isfinite(values[i])) {
-        (void)handles_[kind][i]->set_value(values[i]);
-      }
+      set(0, i, values.position[i] * factor_[i] + offset_[i]);
+      set(1, i, values.velocity[i] * factor_[i]);
+      set(2, i, values.effort[i] / factor_[i]);
     }
   }
 
 private:
+  static constexpr bool is_actuator =
+    std::is_same_v<Handle, transmission_interface::ActuatorHandle>;
+
+  double value(std::size_t kind, std::size_t i) const
+  {
+    return have(kind) ? handles_[kind][i]->get_value() : 0.0;
+  }
+
+  void set(std::size_t kind, std::size_t i, double value)
+  {
+    if (handles_[kind][i] && std::isfinite(value)) {
+      (void)handles_[kind][i]->set_value(value);
+    }
+  }
+
   /// The place of a role; of a name, if there is no role.
   static std::size_t place(
     const std::array<Axis, size> & axes, const std::string & name, const std::string & role)
@@ -222,14 +241,14 @@ private:
   template <class Info>
   static bool is_added(const Info & info)
   {
-    return size == 1 && std::is_same_v<Handle, transmission_interface::ActuatorHandle> &&
-      info.name == "actuator1" && info.role == "actuator1";
+    return size == 1 && is_actuator && info.name == "actuator1" && info.role == "actuator1";
   }
 
   std::array<std::array<std::optional<Handle>, size>, 3> handles_;
+  std::array<double, size> offset_{}, factor_{};
 };
 
-/// A linkage between actuators and joints; Code_ wraps its generated C.
+/// A linkage between actuators and joints; Code_ wraps its generated C, which is included before.
 template <class Code_>
 class TransmissionOf : public linkage_ros::LinkageTransmission
 {
@@ -243,7 +262,10 @@ public:
     const std::vector<transmission_interface::JointHandle> & joint_handles,
     const std::vector<transmission_interface::ActuatorHandle> & actuator_handles) override
   {
-    set_dimensions();
+    if (!info_.parameters.empty()) {
+      refuse("there is no parameter '" + info_.parameters.begin()->first +
+        "': write the package again for other lengths");
+    }
     actuators_ = {};
     joints_ = {};
     actuators_.find("actuator", Code::actuators, info_.actuators, actuator_handles);
@@ -256,12 +278,29 @@ public:
           (kind ? ", or none of them" : ": velocities and efforts depend on the pose"));
       }
     }
+    if (!linkage_begin(&Code::model, &memory_)) {
+      refuse("it cannot be assembled");
+    }
     log_.start(info_.name);
   }
 
-  void actuator_to_joint() override { transmit(actuators_, joints_, Code::to_joints); }
+  void actuator_to_joint() override
+  {
+    auto found = unwritten();
+    const auto given = actuators_.read();
+    status_ = linkage_to_joints(&Code::model, Code::from_actuators, &memory_, &given, &found);
+    note(false);
+    joints_.write(found);
+  }
 
-  void joint_to_actuator() override { transmit(joints_, actuators_, Code::to_actuators); }
+  void joint_to_actuator() override
+  {
+    auto found = unwritten();
+    const auto given = joints_.read();
+    status_ = linkage_to_actuators(&Code::model, Code::from_joints, &memory_, &given, &found);
+    note(true);
+    actuators_.write(found);
+  }
 
   std::size_t num_actuators() const override { return Code::size; }
 
@@ -270,68 +309,31 @@ public:
   int status() const noexcept override { return status_; }
 
 private:
-  void set_dimensions()
-  {
-    auto left = info_.parameters;
-    std::array<double, Code::dimensions.size() + 1> values{};
-    std::string allowed = Code::dimensions.size() ? "" : " none";
-    for (std::size_t i = 0; i < Code::dimensions.size(); ++i) {
-      const std::string name = Code::dimensions[i].name;
-      const auto own = left.find(name);
-      allowed += " " + name;
-      values[i] = Code::dimensions[i].value;
-      if (own != left.end()) {
-        std::istringstream text(own->second);
-        text.imbue(std::locale::classic());
-        std::string rest;
-        if (!(text >> values[i]) || text >> rest) {
-          refuse("parameter " + name + " must be a number [m], not '" + own->second + "'");
-        }
-        left.erase(own);
-      }
-    }
-    if (!left.empty()) {
-      refuse("there is no parameter '" + left.begin()->first + "'; allowed:" + allowed);
-    }
-    if (const char * wrong = Code::set(linkage_, values.data())) {
-      refuse(wrong);
-    }
-    if (!Code::begin(linkage_, memory_)) {
-      refuse("with these dimensions it cannot be assembled");
-    }
-  }
-
   [[noreturn]] void refuse(const std::string & why) const
   {
     throw transmission_interface::Exception("transmission '" + info_.name + "': " + why);
   }
 
-  template <class From, class To, class Function>
-  void transmit(const From & from, To & to, Function function)
+  /// Values that are not written unless they are set.
+  static linkage_side unwritten()
   {
-    typename Code::Side given{}, found{};
-    double (*values[3])[Code::size] = {&given.position, &given.velocity, &given.effort};
-    for (std::size_t kind = 0; kind < 3; ++kind) {
-      from.read(kind, *values[kind]);
-    }
-    // What stays NaN is not written.
-    double (*made[3])[Code::size] = {&found.position, &found.velocity, &found.effort};
-    for (auto & each : made) {
-      std::fill_n(*each, Code::size, std::numeric_limits<double>::quiet_NaN());
-    }
-    status_ = function(linkage_, memory_, given, found);
-    if (!from.have(1) && !from.have(2)) {
+    linkage_side made;
+    std::fill_n(made.position, LINKAGE_MAX_INPUTS, LINKAGE_NAN);
+    std::fill_n(made.velocity, LINKAGE_MAX_INPUTS, LINKAGE_NAN);
+    std::fill_n(made.effort, LINKAGE_MAX_INPUTS, LINKAGE_NAN);
+    return made;
+  }
+
+  void note(bool is_command)
+  {
+    if (!joints_.have(1) && !joints_.have(2)) {
       status_ &= ~SINGULAR;
     }
-    log_.note(status_, std::is_same_v<To, decltype(actuators_)>);
-    for (std::size_t kind = 0; kind < 3; ++kind) {
-      to.write(kind, *made[kind]);
-    }
+    log_.note(status_, is_command);
   }
 
   hardware_interface::TransmissionInfo info_;
-  typename Code::Linkage linkage_{};
-  typename Code::Memory memory_{};
+  linkage_memory memory_{};
   Handles<transmission_interface::ActuatorHandle, Code::size> actuators_;
   Handles<transmission_interface::JointHandle, Code::size> joints_;
   int status_ = OK;
