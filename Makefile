@@ -126,6 +126,10 @@ ament: .venv-ament/.installed ## Check style as ament_flake8 and ament_pep257 do
 	@git ls-files -z '*.py' | xargs -0 .venv-ament/bin/python -m pydocstyle --config=setup.cfg \
 	  --property-decorators=''
 
+.PHONY: ctidy
+ctidy: ready ## Check the C that is printed with clang-tidy and cppcheck, which have to be installed
+	@$(in_ros) .ci/ctidy
+
 .PHONY: lock
 lock: .venv-lock/.installed ## Pin with hashes what wheels/*.txt ask for; UPGRADE=1: to the newest
 	@wheels/lock.sh $(if $(UPGRADE),--upgrade)

@@ -27,6 +27,7 @@ import tempfile
 
 from linkage_ros import scene
 from linkage_ros.c_code import header
+from linkage_ros.c_code.names import field
 import numpy as np
 
 from . import document
@@ -37,28 +38,34 @@ TARGETS = {
     'Cortex-M4F, arm-none-eabi-gcc': ('arm-none-eabi', [
         '-mcpu=cortex-m4', '-mthumb', '-mfloat-abi=hard', '-mfpu=fpv4-sp-d16',
         '--specs=nosys.specs'])}
-CASES = {'slotted_lever': 'lever', 'four_bar': 'QB', 'jansen': 'BC'}
+# Mechanisms and outputs: what a joint follows, and what the inverse is asked for.
+CASES = (('slotted_lever', ('lever',)), ('four_bar', ('QB',)), ('jansen', ('BC',)),
+         ('jansen', ('EF',)), ('five_bar', ('P.x', 'P.y')), ('klann', ('CF',)))
 SCENES = ('config/slotted_lever', 'config/jansen', 'config/excavator', 'examples/leg')
 # Poses at which cycles and times are taken.
 POSES, CALLS = 16, 20_000
+SIDE = ' '.join(f'side.{what}[{{i}}] = {value};' for what, value in (
+    ('position', '{from}[k][{i}]'), ('velocity', '1.0f'), ('effort', '0.0f')))
 USES = {
-    'pose': '{name}_pose p; {name}_solve(given[k], &p); out = p.angle_{output};',
+    'pose': '{name}_pose p; {name}_solve({given}, &p); out = p.{field};',
     # Next to the other end of the reach, so that each assembly mode is chosen somewhere.
-    'inverse': '{number} x = given[{last} - k]; {name}_crank_for_angle_{output}(found[k], x, &x); '
-               'out = x;',
-    'actuators to joints': 'side.position[0] = given[k]; out = side.velocity[0] = 1.0f; '
-                           '{name}_actuators_to_joints(&memory, &side, &other); '
-                           'out = other.effort[0];',
-    'joints to actuators': 'side.position[0] = found[k]; out = side.velocity[0] = 1.0f; '
-                           '{name}_joints_to_actuators(&memory, &side, &other); '
-                           'out = other.effort[0];'}
+    'inverse': '{number} x[2] = {{ given[{last} - k][0], given[{last} - k][{other}] }}; '
+               '{inverse} out = x[0];',
+    'actuators to joints': '{measured} {name}_actuators_to_joints(&memory, &side, &to); '
+                           'out = to.effort[0];',
+    'joints to actuators': '{commanded} {name}_joints_to_actuators(&memory, &side, &to); '
+                           'out = to.effort[0];'}
 MAIN = """
-static const float given[] = {{ {given} }}, found[] = {{ {found} }};
-static {name}_memory memory;
-static {name}_side side, other;
+static const float given[][{n}] = {{ {given_rows} }}, found[][{n}] = {{ {found_rows} }};
+static linkage_memory memory;
+static linkage_side side, to;
 volatile float out;
 volatile int from;
-int main(void) {{ int k = from; {begin} {body} return (int)(given[k] + found[k]); }}
+int main(void)
+{{
+    int k = from; {begin} {body} (void)&memory; (void)&side; (void)&to;
+    return (int)(given[k][0] + found[k][0]);
+}}
 """
 # The cycles of each call on the serial line, which simavr prints.
 CYCLES = """
@@ -79,9 +86,9 @@ static unsigned long now(void)
 }}
 static void put(char c) {{ while (!(UCSR0A & (1 << UDRE0))) ; UDR0 = c; }}
 static void say(unsigned long n) {{ if (n > 9) say(n / 10); put('0' + n % 10); }}
-static const float given[] = {{ {given} }}, found[] = {{ {found} }};
-static {name}_memory memory;
-static {name}_side side, other;
+static const float given[][{n}] = {{ {given_rows} }}, found[][{n}] = {{ {found_rows} }};
+static linkage_memory memory;
+static linkage_side side, to;
 volatile float out;
 volatile int from;
 int main(void)
@@ -89,8 +96,8 @@ int main(void)
     UCSR0B = 1 << TXEN0; TCCR1B = 1; TIMSK1 = 1; sei();
     {name}_begin(&memory);
     for (int k = from; k < {count}; k++) {{
-        side.position[0] = given[k];
-        {name}_actuators_to_joints(&memory, &side, &other);
+        {measured}
+        {name}_actuators_to_joints(&memory, &side, &to);
         unsigned long start = now();
         {{ {body} }}
         unsigned long end = now();
@@ -107,14 +114,18 @@ static double now(void) {{ struct timespec t; clock_gettime(CLOCK_MONOTONIC, &t)
 """
 # Nanoseconds of a call at each pose, by repeating it, the least of some tries.
 PACE = NOW + """
-static volatile {number} given[] = {{ {given} }}, found[] = {{ {found} }}, out;
+static {number} given[][{n}] = {{ {given_rows} }}, found[][{n}] = {{ {found_rows} }};
+static volatile {number} out;
 int main(void)
 {{
     for (int k = 0; k < {count}; k++) {{
         double best = 1e30;
         for (int tries = 0; tries < 50; tries++) {{
             double start = now();
-            for (int i = 0; i < 1000; i++) {{ {body} }}
+            for (int i = 0; i < 1000; i++) {{
+                __asm__ volatile ("" ::: "memory");
+                {body}
+            }}
             double taken = (now() - start) / 1000;
             best = taken < best ? taken : best;
         }}
@@ -131,10 +142,10 @@ int main(void)
     {name}_begin(&m);
     for (long k = 1; k <= {count}; k++) {{
         double q[{n}], best[2] = {{ 1e30, 1e30 }};
-        {name}_point p;
-        {name}_side a = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, j = a, b = a;
-        {name}_sample(k, q);
-        if (!{name}_at(q, 1, &p)) continue;
+        linkage_point p;
+        linkage_side a = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, j = a, b = a;
+        linkage_sample(&{name}_model, k, q);
+        if (!{name}_at(q, &p)) continue;
         for (int i = 0; i < {n}; i++) {{
             a.position[i] = p.position[0][i];
             a.velocity[i] = a.effort[i] = 1;
@@ -157,58 +168,76 @@ def main():
     """Compile, run and print."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--document', action='store_true', help='write the tables to docs/')
-    rows = [[f'{name}, {use}', target, *measured(compiler, flags, name, output, use)]
+    rows = [[f'{name} {", ".join(outputs)}, {use}', target, *measured(
+                compiler, flags, name, outputs, use)]
             for target, (compiler, flags) in TARGETS.items() if shutil.which(f'{compiler}-gcc')
-            for name, output in CASES.items() for use in USES]
-    text = table(['linkage', 'target', 'code [bytes]', 'of it the C library', 'stack [bytes]',
-                  'cycles, median', 'at most'], rows)
+            for name, outputs in CASES for use in USES]
+    text = table(['linkage and output', 'target', 'flash [bytes]', 'of it the C library',
+                  'RAM [bytes]', 'stack [bytes]', 'cycles, median', 'at most'], rows)
     text += '\n\n' + table(
         ['linkage', 'actuators to joints [us], median', 'at most', 'joints to actuators [us], '
          'median', 'at most'], [[name, *times] for name, times in timed()])
     text += '\n\n' + table(
-        ['linkage', 'number', 'pose [ns], median', 'at most', 'inverse [ns], median', 'at most'],
-        [[name, number, *chain.from_iterable(paced(name, output, number, use)
-                                             for use in ('pose', 'inverse'))]
-         for name, output in CASES.items() for number in ('float', 'double')])
+        ['linkage and output', 'number', 'pose [ns], median', 'at most', 'inverse [ns], median',
+         'at most'],
+        [[f'{name} {", ".join(outputs)}', number, *chain.from_iterable(
+            paced(name, outputs, number, use) for use in ('pose', 'inverse'))]
+         for name, outputs in CASES for number in ('float', 'double')])
     print(text)
     if parser.parse_args().document:
         document.write('c-code.md', text)
 
 
-def measured(compiler, flags, name, output, use):
-    """Return code, that of the C library, the stack of the linkage's own code, and cycles."""
-    machine, values = prepared(name, output, 'float', use)
+def measured(compiler, flags, name, outputs, use):
+    """Return flash, that of the C library, RAM, the stack of the linkage's code, and cycles."""
+    text, values = prepared(name, outputs, 'float', use)
     body = values['body']
     begin = f'{name}_begin(&memory);' if 'memory' in body else ''
-    text = header.written(machine, (output,), True, [f'{name}_{output}'])
     with tempfile.TemporaryDirectory() as folder:
         sizes = [built(Path(folder), compiler, [*flags, *extra], text + MAIN.format(
             **{**values, 'body': each}, begin=each and begin)) for extra in ((), ('-c',))
             for each in ('', body)]
-        (idle, _), (linked, _), (empty, _), (own, stack) = sizes
-        return [linked - idle, linked - idle - (own - empty), stack,
+        (idle, unused, _), (linked, used, _), (empty, *_), (own, _, stack) = sizes
+        return [linked - idle, linked - idle - (own - empty), used - unused, stack,
                 *cycles(Path(folder), compiler, flags, text + CYCLES.format(**values))]
 
 
-def prepared(name, output, number, use):
-    """Return a mechanism, and what the programs that call its C are filled with."""
-    machine = scene.read({'mechanisms': [name], f'{name}.type': name}).machines[name]
-    given = np.linspace(*machine.first.reach[0], POSES + 2)[1:-1]
-    found = machine.linkage.joint_angles(given, [output])[output]
-    return machine, {
-        'name': name, 'count': POSES, 'number': number,
-        'body': USES[use].format(name=name, output=output, number=number, last=POSES - 1),
-        **{key: ', '.join(f'{value:.7g}f' if number == 'float' else repr(float(value))
-                          for value in each)
-           for key, each in (('given', given + 1e-7), ('found', found))}}
+def prepared(name, outputs, number, use):
+    """Return the header of a mechanism, and what the programs that call its C are filled with."""
+    given = {'mechanisms': [name], f'{name}.type': name}
+    if name == 'five_bar':
+        given |= {f'{name}.{input_}.sweep': ends for input_, ends in (
+            ('crank', [1.7, 2.1]), ('crank2', [1.0, 1.4]))}
+    machine = scene.read(given).machines[name]
+    n, linkage = len(machine.inputs), machine.linkage
+    rows = np.stack([np.linspace(*(drive.ends or drive.reach[0]), POSES + 2)[1:-1]
+                     for drive in machine.inputs.values()])
+    rows[1:] = np.roll(rows[1:], POSES // 3, axis=1)
+    values = linkage.joint_angles(rows if n > 1 else rows[0], outputs)
+    found = np.stack([values[output] for output in outputs])
+    joints = [f'{name}_{output}' for output in outputs]
+    fields = [field(linkage, output) for output in outputs]
+    inverse = (f'{name}_inputs_for_{"_".join(fields)}(found[k], x, x);' if n > 1 else
+               f'{name}_crank_for_{fields[0]}(found[k][0], x[0], x);')
+    named = {'name': name, 'n': n, 'count': POSES, 'number': number, 'last': POSES - 1,
+             'other': n - 1, 'inverse': inverse, 'field': fields[0],
+             'given': ', '.join(f'given[k][{i}]' for i in range(n)),
+             **{what: ' '.join(SIDE.replace('{from}', table_).replace('{i}', str(i))
+                               for i in range(n))
+                for what, table_ in (('measured', 'given'), ('commanded', 'found'))}}
+    named['body'] = USES[use].format(**named)
+    for key, each in (('given', rows + 1e-7), ('found', found)):
+        named[f'{key}_rows'] = ', '.join('{ %s }' % ', '.join(
+            f'{value:.7g}f' if number == 'float' else repr(float(value)) for value in row)
+            for row in each.T)
+    return header.written(machine, outputs, number == 'float', joints), named
 
 
-def paced(name, output, number, use):
+def paced(name, outputs, number, use):
     """Return the time of a call on this machine: median and most [ns]."""
-    machine, values = prepared(name, output, number, use)
+    text, values = prepared(name, outputs, number, use)
     with tempfile.TemporaryDirectory() as folder:
-        taken = run(folder, header.written(machine, (output,), number == 'float')
-                    + PACE.format(**values))
+        taken = run(folder, text + PACE.format(**values))
     return [f'{value:.0f}' for value in (np.median(taken), max(taken))]
 
 
@@ -216,7 +245,7 @@ def run(folder, text):
     """Compile a program for this machine, and return the numbers that it prints."""
     source, program = Path(folder) / 'main.c', Path(folder) / 'main'
     source.write_text(text)
-    subprocess.run(['cc', '-O2', source, '-o', program, '-lm'], check=True)
+    subprocess.run(['cc', '-O2', '-w', source, '-o', program, '-lm'], check=True)
     return np.array(subprocess.run([program], capture_output=True, text=True, check=True)
                     .stdout.split(), float)
 
@@ -246,7 +275,7 @@ def timed():
 
 
 def built(folder, compiler, flags, text):
-    """Return the size of the code and the largest frame."""
+    """Return the sizes of flash and RAM, and the largest frame."""
     source, made = folder / 'main.c', folder / 'main.o'
     source.write_text(text)
     for usage in folder.glob('*.su'):
@@ -258,7 +287,7 @@ def built(folder, compiler, flags, text):
                           capture_output=True).stdout.splitlines()[1].split()
     frames = [int(number) for usage in folder.glob('*.su')
               for number in re.findall(r'\t(\d+)\t', usage.read_text())]
-    return int(size[0]) + int(size[1]), max(frames)
+    return int(size[0]) + int(size[1]), int(size[1]) + int(size[2]), max(frames)
 
 
 if __name__ == '__main__':

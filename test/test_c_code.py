@@ -505,6 +505,14 @@ def test_loads_compile_without_a_warning(with_loads, tmp_path, number, compiler,
     assert not ended.returncode, ended.stderr[:2000]
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which('clang-tidy') or not shutil.which('cppcheck'),
+                    reason='clang-tidy or cppcheck is not installed')
+def test_linters_find_nothing():
+    ended = subprocess.run([ROOT / '.ci' / 'ctidy'], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+
+
 @pytest.mark.parametrize('arguments, said', [
     (['all', '--mechanism', 'arm'], "there is no mechanism 'arm'; allowed: water_drop"),
     (['all', '--mechanism', 'jansen', '--output', 'arm'], 'jansen has no'),

@@ -653,7 +653,8 @@ def test_options_are_described(capsys, main, about, options):
 @pytest.mark.parametrize('arguments, said', [
     *((['--out', '{0}/' + name], f"single underscores, a letter first, not '{name}'")
       for name in ('My-Package', 'a', '1a', 'a__b', 'a_', 'a' * 65)),
-    (['--out', '{0}'], 'or one written by this command'), ([], 'required: --out'),
+    (['--out', '{0}'], 'or one written by this command'),
+    ([], 'one of the arguments --out --limits is required'),
     (['--out', '{0}/legs', '--joints', 'elbow'], "no mechanism has a joint 'elbow'"),
     (['--out', '{0}/legs', '--joints', 'kneee'], 'did you mean knee?')])
 def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, said):
@@ -665,6 +666,47 @@ def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, sai
     printed = capsys.readouterr().err
     assert printed.startswith('transmission: ') and printed.count('\n') == 1 and said in printed
     assert (folder / 'notes.txt').read_text() == 'keep'
+
+
+def limits_of(path, *arguments):
+    """Return the limits that the command prints, by joint; None for one that turns."""
+    ended = subprocess.run([sys.executable, '-m', 'linkage_ros.c_code.transmission', str(path),
+                            '--limits', *arguments], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    found = {}
+    for joint in ElementTree.fromstring(f'<robot>{ended.stdout}</robot>'):
+        limit = joint.find('limit')
+        found[joint.get('name')] = limit is not None and tuple(
+            float(limit.get(end)) for end in ('lower', 'upper'))
+    return found
+
+
+@pytest.mark.parametrize('path', ['examples/leg.yaml', 'config/excavator.yaml',
+                                  'examples/ankle.yaml', 'config/slotted_lever.yaml'])
+def test_joint_limits_are_those_of_all_poses(path):
+    found, rng = limits_of(ROOT / path), np.random.default_rng(9)
+    for machine in scene.load(ROOT / path).machines.values():
+        # What the joints are at poses of the sweeps, by another way than that of the limits.
+        given = [rng.uniform(*(drive.ends or drive.reach[0]), 3000).tolist()
+                 for drive in machine.inputs.values()]
+        chosen = [each.output for each in joints(machine)]
+        prefix = next(iter(machine.assembly().legs))
+        names = [machine.joints[key if key in machine.inputs else prefix + key] for key in chosen]
+        seen = np.array([outputs(machine, row, chosen) for row in zip(*given)])
+        for name, values in zip(names, seen.T):
+            values = np.array([name.of(value) for value in values[np.isfinite(values)]])
+            low, high = found[name.name]
+            slack = 0.05 * (high - low)
+            assert low - 1e-9 <= values.min() <= low + slack
+            assert high - slack <= values.max() <= high + 1e-9
+
+
+def test_a_joint_that_turns_has_no_limits(tmp_path):
+    file = tmp_path / 'turning.yaml'
+    file.write_text('/**: {ros__parameters: {mechanisms: [drag], drag: {type: custom, joints: ['
+                    'O ground 0 0, Q ground 0.3 0, A crank O 1, B dyad A Q 0.9 1.1 left]}}}')
+    assert limits_of(file) == {'drag_QB': False}
+    assert limits_of(file, '--joints', 'drag_crank') == {'drag_crank': False}
 
 
 def test_a_package_is_written_again(tmp_path, capsys, monkeypatch):
