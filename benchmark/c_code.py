@@ -207,7 +207,7 @@ def prepared(name, outputs, number, use):
     given = {'mechanisms': [name], f'{name}.type': name}
     if name == 'five_bar':
         given |= {f'{name}.{input_}.sweep': ends for input_, ends in (
-            ('crank', [1.7, 2.1]), ('crank2', [1.0, 1.4]))}
+            ('crank', [1.5, 1.9]), ('crank2', [1.24, 1.6]))}
     machine = scene.read(given).machines[name]
     n, linkage = len(machine.inputs), machine.linkage
     rows = np.stack([np.linspace(*(drive.ends or drive.reach[0]), POSES + 2)[1:-1]

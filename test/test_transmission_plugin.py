@@ -98,10 +98,14 @@ class Plugins:
         self.host.component_made.restype = ctypes.c_void_p
         self.host.component_problem.restype = ctypes.c_char_p
 
-    def component(self, name, *lines, kinds=KINDS, actuators=None, joints=None):
-        """Return a component with one transmission; `lines` are added to what describes it."""
+    def component(self, name, *lines, kinds=KINDS, actuators=None, joints=None, extra=()):
+        """
+        Return a component with one transmission; `lines` are added to what describes it.
+
+        Values of `extra` come after those of actuators and joints in its memory.
+        """
         return Component(self, name, lines, kinds, ACTUATORS[name] if actuators is None
-                         else actuators, JOINTS[name] if joints is None else joints)
+                         else actuators, JOINTS[name] if joints is None else joints, extra)
 
 
 class Component:
@@ -111,11 +115,12 @@ class Component:
     Its values are arrays `actuator` and `joint` of shape (kinds, axes); `end` deletes it.
     """
 
-    def __init__(self, plugins, name, lines, kinds, actuators, joints):
+    def __init__(self, plugins, name, lines, kinds, actuators, joints, extra):
         self._host = plugins.host
         n = len(actuators)
-        self._memory = np.full((2, 3, n), NAN)
-        self.actuator, self.joint = self._memory
+        self._memory = np.concatenate([np.full(6 * n, NAN), np.ravel(extra)])
+        self.actuator, self.joint = self._memory[:6 * n].reshape(2, 3, n)
+        self.extra = self._memory[6 * n:].reshape(np.shape(extra))
         described = [*lines]
         for side, (what, axes) in enumerate((('actuator', actuators), ('joint', joints))):
             described += [f'{what}\t{each}\t{role}\t1\t0' for each, role in axes.items()
@@ -401,7 +406,7 @@ def test_a_singular_pose_of_positions_alone_is_not_told(plugins):
     ('knee', [], {'left_motor': 'crank'}, {'left_knee': 'QB'}, ''),
     ('knee', [], {'knee_motor': ''}, {'knee_QB': ''}, ''),
     ('knee', [], {'knee_motor': 'crank'}, {'left_knee': 'banana'}, "role 'banana', is"),
-    ('knee', [], {'knee_motor': 'crank'}, {'left_knee': 'AB'}, "role 'AB', is none of 'knee_QB'"),
+    ('knee', [], {'knee_motor': 'crank'}, {'left_knee': 'AB'}, "joint 'knee_QB' is missing"),
     ('knee', [], {'knee_motor': 'crank'}, {'left_knee': ''}, "'left_knee', role '', is none of"),
     ('knee', [], {'knee_motor': 'crank'}, {'knee_QB': 'banana'}, "role 'banana', is none of"),
     ('knee', [], {'knee_motor': 'QB'}, {'knee_QB': 'QB'}, "role 'QB', is none of 'knee_motor'"),
@@ -495,6 +500,50 @@ def test_a_robot_has_its_own_gears_and_encoder_zeros(plugins):
 def test_other_lengths_need_another_package(plugins, key):
     with pytest.raises(Refused, match=f"there is no parameter '{key}': write the package again"):
         plugins.component('lever', f'parameter\t{key}\t90')
+
+
+@pytest.mark.parametrize('name', ['knee', 'leg', 'lever'])
+@pytest.mark.parametrize('renamed', [False, True])
+def test_passive_joints_have_states_where_there_are_handles(plugins, name, renamed):
+    machine = plugins.machines[name]
+    linkage, inputs = machine.linkage, INPUTS[name][1]
+    prefix = next(iter(machine.assembly().legs))
+    passive = {link.name: machine.joints[link.name if link.name in machine.inputs else
+                                         prefix + link.name]
+               for link in linkage.links if link.name not in JOINTS[name].values()}
+    values = np.full((2, len(passive)), UNWRITTEN)
+    lines, called = [], [f'{name}_{i}' if renamed else joint.name
+                         for i, joint in enumerate(passive.values())]
+    factor, offset = (-2.0, 0.3) if renamed else (1.0, 0.0)
+    if renamed:
+        lines += [f'joint\t{own}\t{link}\t{factor}\t{offset}'
+                  for own, link in zip(called, passive)]
+    n = len(inputs)
+    component = plugins.component(
+        name, *lines, *(f'joint_handle\t{own}\t{kind}\t{6 * n + row * len(called) + i}'
+                        for i, own in enumerate(called)
+                        for row, kind in enumerate(('position', 'velocity'))),
+        extra=values)
+    actuator, _ = poses(machine, *inputs)
+    ratios = np.array([drive.ratio for drive in machine.inputs.values()])
+    speeds = np.arange(1.0, n + 1.0)
+    status, _ = component.read(actuator, speeds / ratios, 0.0)
+    assert status == OK
+    given = inputs if n > 1 else inputs[0]
+    rates = [linkage.joint_rates(given, [*passive], by) for by in range(n)]
+    angles = linkage.joint_angles(given, [*passive])
+    for i, (link, joint) in enumerate(passive.items()):
+        speed = joint.sign * sum(float(each[link]) * v for each, v in zip(rates, speeds))
+        assert component.extra[:, i] == pytest.approx(
+            [joint.of(float(angles[link])) / factor + offset, speed / factor], abs=1e-9)
+    # What cannot be measured is held, and stands still; a command is no state.
+    before = component.extra.copy()
+    component.write(poses(machine, *INPUTS[name][0])[1], 1.0)
+    assert np.array_equal(component.extra, before)
+    component.read(actuator)
+    status, _ = component.read(NAN)
+    assert status & NOT_KNOWN and np.array_equal(component.extra[0], before[0])
+    assert not component.extra[1].any()
 
 
 def test_why_values_are_held_is_logged_once_per_reason(plugins, capfd):

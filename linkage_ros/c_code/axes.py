@@ -97,6 +97,16 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
             for output, joint in zip(outputs, named)]
 
 
+def passive(machine: SceneMechanism, commanded: Sequence[Axis]) -> List[Axis]:
+    """Return the joints of the first leg's links that are not commanded."""
+    outputs = [each.output for each in commanded]
+    links = [link.name for link in machine.linkage.links if link.name not in outputs]
+    named = [(link, machine.joints[_key(machine, link)]) for link in links
+             if _key(machine, link) in machine.joints]
+    return [axis(machine, link, joint.name, joint.sign, joint.offset, joint.wraps)
+            for link, joint in named]
+
+
 def output_of(machine: SceneMechanism, name: str) -> Optional[str]:
     """Return the output with a name in the scene, or None."""
     for link in machine.linkage.joints:

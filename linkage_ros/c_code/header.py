@@ -45,12 +45,15 @@ class Request(NamedTuple):
         Outputs, as for `input_for`, with an inverse each.
     joints : sequence of str
         Commanded joints, see `axes.joints`.
+    passive : sequence of Axis
+        Joints that are not commanded, in a function of their own.
 
     """
 
     machine: SceneMechanism
     outputs: Sequence[str] = ()
     joints: Sequence[str] = ()
+    passive: Sequence[Axis] = ()
 
 
 def written(machine: SceneMechanism, outputs: Sequence[str] = (), single: bool = False,
@@ -107,12 +110,14 @@ class _Header:
         self._models += [Model(self.machine, self._code, self._formulas, ([], axes), tag)
                          for axes, tag in zip(inverses, tags)]
         self._inverses = list(zip(tags, inverses))
+        self._passive = request.passive
 
     def text(self, most: int, common: str) -> str:
         """Return the whole header."""
         first, *others = self._models
         models = [first.text(), *(text for model, (tag, axes) in zip(others, self._inverses)
                                   for text in (model.text(), self._inverse(tag, axes)))]
+        models += [first.passive(self._passive)] * bool(self._passive)
         return filled(template('mechanism.h.in'), {
             'about': '\n'.join(f' * {line}' for line in self._about()),
             'name': self.name, 'N': prefix(self.name), 'common': common.rstrip(), 'most': most,

@@ -83,27 +83,15 @@ class Model:
     def _at(self) -> str:
         """Return the function for a pose: positions, rates by each input, and loads."""
         code, formulas, name = self._code, self._formulas, self.machine.name
-        units = [size * formulas.unit(input_) for size, input_ in zip(
-            self._sizes, formulas.inputs)]
-        called = formulas.called([code.times(f'q[{i}]', unit) for i, unit in enumerate(units)],
-                                 '&s', [f'&{by}' for by in formulas.by])
+        called, units = self._call()
         lines = [f'{name}_pose s, {", ".join(formulas.by)};', f'if (!{called}) {{',
                  '    return 0;', '}']
         rates, places = [], []
         for side, axes in enumerate(self.sides):
             for i, each in enumerate(axes):
-                place, field = f'p->position[{side}][{i}]', formulas.fields[each.output]
-                factor = each.factor / formulas.unit(each.output)
-                lines.append(f'{place} = {code.times(f"s.{field}", factor)}' + (
-                    f' + {code.literal(each.offset)};' if each.offset else ';'))
-                if each.wraps:
-                    turn = code.literal(math.tau)
-                    lines.append(f'{place} -= {turn} * linkage_floor({place} / {turn} '
-                                 '+ LINKAGE_HALF);')
-                places.append(place)
-                rates += [f'p->rate[{side}][{i}][{j}] = '
-                          f'{code.times(f"{by}.{field}", factor * unit)};'
-                          for j, (by, unit) in enumerate(zip(formulas.by, units))]
+                places.append(f'p->position[{side}][{i}]')
+                lines += self._position(places[-1], each)
+                rates += self._rates(f'p->rate[{side}][{i}]', each, units)
         powers = [] if self._tag else [
             (load / formulas.unit(output), formulas.fields[output])
             for output, load in loads(self.machine)]
@@ -118,6 +106,47 @@ class Model:
             f'static inline int {name}_at{self._tag}(const {code.number} *q, linkage_point *p)',
             '{',
             *indented(lines), '}', ''])
+
+    def _position(self, place: str, each: Axis) -> Iterator[str]:
+        """Yield the statements for the position of an axis."""
+        code, unit = self._code, self._formulas.unit(each.output)
+        field = f's.{self._formulas.fields[each.output]}'
+        yield f'{place} = {code.times(field, each.factor / unit)}' + (
+            f' + {code.literal(each.offset)};' if each.offset else ';')
+        if each.wraps:
+            turn = code.literal(math.tau)
+            yield f'{place} -= {turn} * linkage_floor({place} / {turn} + LINKAGE_HALF);'
+
+    def _rates(self, place: str, each: Axis, units: Sequence[float]) -> Iterator[str]:
+        """Yield the statements for the rates of an axis by each input."""
+        factor = each.factor / self._formulas.unit(each.output)
+        field = self._formulas.fields[each.output]
+        for j, (by, unit) in enumerate(zip(self._formulas.by, units)):
+            yield f'{place}[{j}] = {self._code.times(f"{by}.{field}", factor * unit)};'
+
+    def passive(self, axes: Sequence[Axis]) -> str:
+        """Return the function for joints that are not commanded."""
+        called, units = self._call()
+        lines = [f'{self.machine.name}_pose s, {", ".join(self._formulas.by)};',
+                 f'(void){called};', '(void)position;', '(void)rate;']
+        for i, each in enumerate(axes):
+            lines += [*self._position(f'position[{i}]', each),
+                      *self._rates(f'rate[{i}]', each, units)]
+        return '\n'.join([
+            '/* The joints that are not commanded, at inputs: positions, and rates by each. */',
+            f'static inline void {self.machine.name}_passive(const {self._code.number} *q, '
+            f'{self._code.number} *position,',
+            f'    {self._code.number} (*rate)[LINKAGE_MAX_INPUTS])', '{', *indented(lines), '}',
+            ''])
+
+    def _call(self) -> Tuple[str, List[float]]:
+        """Return a call of the formulas at inputs q, and the units of these."""
+        formulas = self._formulas
+        units = [size * formulas.unit(input_) for size, input_ in zip(
+            self._sizes, formulas.inputs)]
+        return formulas.called([self._code.times(f'q[{i}]', unit)
+                                for i, unit in enumerate(units)],
+                               '&s', [f'&{by}' for by in formulas.by]), units
 
     # --- tables ---
 

@@ -16,7 +16,7 @@ from typing import Dict, Mapping, Sequence, Tuple
 from xml.sax.saxutils import escape, quoteattr
 
 from . import header
-from .axes import actuators, Axis, joints
+from .axes import actuators, Axis, joints, passive
 from .names import comment, distinct, filled, literal, template
 from ..scene import SceneMechanism
 
@@ -71,7 +71,8 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
     for part, (machine, chosen) in zip(parts, machines):
         own = part['name']
         files[Path(f'src/{own}_linkage.h')] = header.header(
-            header.Request(machine, (), chosen), False, most, '#include "linkage.h"')
+            header.Request(machine, (), chosen, passive(machine, joints(machine, chosen))), False,
+            most, '#include "linkage.h"')
         files[Path(f'src/{own}.hpp')] = filled(template('mechanism.hpp'), part)
         files[Path(f'test/test_{own}.cpp')] = filled(template('test.cpp'), part)
     return files
@@ -79,7 +80,7 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
 
 def _values(package_name: str, class_: str, machine: SceneMechanism,
             commanded: Sequence[Axis]) -> Mapping[str, str]:
-    driven = actuators(machine)
+    driven, others = actuators(machine), passive(machine, commanded)
     roles = list(machine.inputs), [axis.output for axis in commanded]
 
     def rows(axes: Sequence[Axis], own: Sequence[str]) -> str:
@@ -96,6 +97,10 @@ def _values(package_name: str, class_: str, machine: SceneMechanism,
         'package': package_name, 'namespace': f'{package_name}_plugins', 'class': class_,
         'name': machine.name, 'n': str(len(driven)), 'actuators': rows(driven, roles[0]),
         'joints': rows(commanded, roles[1]),
+        'passive': rows(others, [each.output for each in others]) and '{%s}' % rows(
+            others, [each.output for each in others]),
+        'passive_count': str(len(others)),
+        'passive_function': f'{machine.name}_passive' if others else 'nullptr',
         'axes': f'{listed(driven)} and {listed(commanded)}',
         'lines': '\n'.join(lines),
         'row': f'| `{package_name}/{class_}` | {listed(driven)} | {listed(commanded)} |'}

@@ -25,6 +25,9 @@ struct @class@Code
   static constexpr std::size_t size = @n@;
   static constexpr std::array<Axis, size> actuators{{@actuators@}};
   static constexpr std::array<Axis, size> joints{{@joints@}};
+  /// Joints that are not commanded, and the function for them.
+  static constexpr std::array<Axis, @passive_count@> passive{@passive@};
+  static constexpr Passive * at_passive = @passive_function@;
   static constexpr const linkage_model & model = @name@_model;
   static constexpr linkage_inverse * from_actuators = @name@_from_actuators;
   static constexpr linkage_inverse * from_joints = @name@_from_joints;

@@ -37,6 +37,9 @@ namespace @namespace@
 /// The name of an actuator or a joint in the scene, and its role in the linkage.
 struct Axis { const char * name, * role; };
 
+/// Positions of joints that are not commanded, and their rates by each input, at inputs.
+using Passive = void(const double * q, double * position, double (*rate)[LINKAGE_MAX_INPUTS]);
+
 /// Logs why values are held, from a thread of its own: a control loop only sets bits.
 class HeldLog
 {
@@ -248,6 +251,82 @@ private:
   std::array<double, size> offset_{}, factor_{};
 };
 
+/// States of the joints that are not commanded, where the component has handles for them.
+template <class Code>
+class PassiveJoints
+{
+public:
+  static constexpr std::size_t size = Code::passive.size();
+
+  /// Take a joint of the description if its role is that of a passive joint.
+  template <class Info>
+  bool take_info(const Info & info)
+  {
+    for (std::size_t i = 0; i < size; ++i) {
+      if (info.role == Code::passive[i].role) {
+        names_[i] = info.name;
+        offset_[i] = info.offset;
+        reduction_[i] = info.mechanical_reduction;
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// Take a handle of a passive joint, by the name of the description or of the scene.
+  bool take_handle(const transmission_interface::JointHandle & handle)
+  {
+    for (std::size_t i = 0; i < size; ++i) {
+      if (handle.get_prefix_name() == (names_[i].empty() ? Code::passive[i].name : names_[i])) {
+        const bool is_velocity = handle.get_interface_name() == "velocity";
+        if (handle && (is_velocity || handle.get_interface_name() == "position")) {
+          handles_[is_velocity][i].emplace(handle);
+          ++count_;
+        }
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// Write states at the inputs of the newest measurement; they stand still if that is held.
+  void write(const linkage_memory & memory, const linkage_side & actuators, bool is_moving)
+  {
+    if constexpr (size > 0) {
+      double position[size], rate[size][LINKAGE_MAX_INPUTS], x[LINKAGE_MAX_INPUTS];
+      if (count_ == 0 || !memory.is_known || memory.newer != LINKAGE_ACTUATORS) {
+        return;
+      }
+      Code::at_passive(memory.q[LINKAGE_ACTUATORS], position, rate);
+      is_moving = is_moving && linkage_input_change(
+        &Code::model, LINKAGE_ACTUATORS, &memory.point[LINKAGE_ACTUATORS], LINKAGE_SINGULAR,
+        actuators.velocity, x) != 0;
+      for (std::size_t i = 0; i < size; ++i) {
+        double velocity = 0.0;
+        for (std::size_t j = 0; is_moving && j < Code::size; ++j) {
+          velocity += rate[i][j] * x[j];
+        }
+        const double reduction = names_[i].empty() ? 1.0 : reduction_[i];
+        set(0, i, position[i] / reduction + offset_[i]);
+        set(1, i, std::isfinite(velocity) ? velocity / reduction : 0.0);
+      }
+    }
+  }
+
+private:
+  void set(std::size_t kind, std::size_t i, double value)
+  {
+    if (handles_[kind][i] && std::isfinite(value)) {
+      (void)handles_[kind][i]->set_value(value);
+    }
+  }
+
+  std::array<std::string, size> names_;
+  std::array<double, size> offset_{}, reduction_{};
+  std::array<std::array<std::optional<transmission_interface::JointHandle>, size>, 2> handles_;
+  std::size_t count_ = 0;
+};
+
 /// A linkage between actuators and joints; Code_ wraps its generated C, which is included before.
 template <class Code_>
 class TransmissionOf : public linkage_ros::LinkageTransmission
@@ -269,7 +348,14 @@ public:
     actuators_ = {};
     joints_ = {};
     actuators_.find("actuator", Code::actuators, info_.actuators, actuator_handles);
-    joints_.find("joint", Code::joints, info_.joints, joint_handles);
+    passive_ = {};
+    auto infos = info_.joints;
+    infos.erase(std::remove_if(infos.begin(), infos.end(), [this](const auto & info) {
+      return passive_.take_info(info); }), infos.end());
+    auto handles = joint_handles;
+    handles.erase(std::remove_if(handles.begin(), handles.end(), [this](const auto & handle) {
+      return passive_.take_handle(handle); }), handles.end());
+    joints_.find("joint", Code::joints, infos, handles);
     static const std::array<const char *, 3> kinds{"position", "velocity", "effort"};
     for (std::size_t kind = 0; kind < 3; ++kind) {
       const auto count = actuators_.count(kind) + joints_.count(kind);
@@ -291,6 +377,7 @@ public:
     status_ = linkage_to_joints(&Code::model, Code::from_actuators, &memory_, &given, &found);
     note(false);
     joints_.write(found);
+    passive_.write(memory_, given, !(status_ & OUT_OF_REACH));
   }
 
   void joint_to_actuator() override
@@ -336,6 +423,7 @@ private:
   linkage_memory memory_{};
   Handles<transmission_interface::ActuatorHandle, Code::size> actuators_;
   Handles<transmission_interface::JointHandle, Code::size> joints_;
+  PassiveJoints<Code> passive_;
   int status_ = OK;
   HeldLog log_;
 };
