@@ -96,7 +96,7 @@ int main(void)
     UCSR0B = 1 << TXEN0; TCCR1B = 1; TIMSK1 = 1; sei();
     {name}_begin(&memory);
     for (int k = from; k < {count}; k++) {{
-        {measured}
+        {before}
         {name}_actuators_to_joints(&memory, &side, &to);
         unsigned long start = now();
         {{ {body} }}
@@ -139,11 +139,12 @@ TIMES = NOW + """
 int main(void)
 {{
     static {name}_memory m;
+    linkage_side last = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, b;
     {name}_begin(&m);
     for (long k = 1; k <= {count}; k++) {{
         double q[{n}], best[2] = {{ 1e30, 1e30 }};
         linkage_point p;
-        linkage_side a = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, j = a, b = a;
+        linkage_side a = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, j = a;
         linkage_sample(&{name}_model, k, q);
         if (!{name}_at(q, &p)) continue;
         for (int i = 0; i < {n}; i++) {{
@@ -151,12 +152,16 @@ int main(void)
             a.velocity[i] = a.effort[i] = 1;
         }}
         for (int tries = 0; tries < 5; tries++) {{
+            // Measured at another pose before each call.
+            {name}_actuators_to_joints(&m, &last, &b);
             double t0 = now(); {name}_actuators_to_joints(&m, &a, &j);
-            double t1 = now(); {name}_joints_to_actuators(&m, &j, &b);
-            double t2 = now();
+            double t1 = now(); {name}_actuators_to_joints(&m, &last, &b);
+            double t2 = now(); {name}_joints_to_actuators(&m, &j, &b);
+            double t3 = now();
             best[0] = t1 - t0 < best[0] ? t1 - t0 : best[0];
-            best[1] = t2 - t1 < best[1] ? t2 - t1 : best[1];
+            best[1] = t3 - t2 < best[1] ? t3 - t2 : best[1];
         }}
+        last = a;
         printf("%.0f %.0f\\n", best[0], best[1]);
     }}
     return 0;
@@ -225,6 +230,8 @@ def prepared(name, outputs, number, use):
              **{what: ' '.join(SIDE.replace('{from}', table_).replace('{i}', str(i))
                                for i in range(n))
                 for what, table_ in (('measured', 'given'), ('commanded', 'found'))}}
+    # Measured at another pose before each call.
+    named['before'] = named['measured'].replace('[k]', f'[{POSES - 1} - k]')
     named['body'] = USES[use].format(**named)
     for key, each in (('given', rows + 1e-7), ('found', found)):
         named[f'{key}_rows'] = ', '.join('{ %s }' % ', '.join(

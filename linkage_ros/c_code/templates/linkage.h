@@ -221,9 +221,11 @@ static inline linkage_real linkage_gap(const linkage_model *model, int side, con
 }
 
 /* Solve a x = b in place, b in x; returns the determinant's sign, 0 where a is singular. */
-static inline int linkage_solve(int n, linkage_real least,
+static inline int linkage_solve(int size, linkage_real least,
     linkage_real a[LINKAGE_MAX_INPUTS][LINKAGE_MAX_INPUTS], linkage_real *x)
 {
+    /* A compiler knows this bound. */
+    const int n = size < LINKAGE_MAX_INPUTS ? size : LINKAGE_MAX_INPUTS;
     linkage_real most = 1;
     int i, j, k, sign = 1;
     for (i = 0; i < n; i++) {
