@@ -269,6 +269,25 @@ def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
         assert status == 0 and found[0] == pytest.approx(expected_, rel=1e-12)
 
 
+@pytest.mark.parametrize('name', ['leg', 'boom', 'beast', 'rocker'])
+def test_a_new_position_takes_one_pose(machines, tmp_path, name):
+    """Actuators count inputs, and these joints have closed forms."""
+    machine = machines[name]
+    text = re.sub(rf'(int {name}_at\([^;]*?\)\n{{\n)', r'\1    taken++;\n',
+                  header.written(machine))
+    code = f'static int taken;\n{text}' + CALLER.format(name=name, n=len(machine.inputs)) + (
+        'int poses(void) { int before = taken; taken = 0; return before; }\n')
+    library = loaded(tmp_path, code)
+    memory, (first, second, *_) = Memory(library, name, len(machine.inputs)), states(machine, 4)
+    for inputs in (first, second, first):
+        actuator, _, joint, _ = expected(machine, inputs)
+        library.poses()
+        assert memory.send(0, actuator)[0] & 1 == 0 and library.poses() == 1
+        memory.send(0, expected(machine, second if inputs is first else first)[0])
+        library.poses()
+        assert memory.send(1, joint)[0] & 1 == 0 and library.poses() == 1
+
+
 @pytest.mark.parametrize('ratio', [-2.0, 0.25])
 def test_a_sensor_repeats_after_a_turn_of_what_it_measures(tmp_path, ratio):
     machines = scene.read({

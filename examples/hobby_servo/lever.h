@@ -489,8 +489,8 @@ static inline int linkage_reach(const linkage_model *model, int side, const link
         && linkage_refine(model, side, goal->to, x, p);
 }
 
-/* The inputs nearest to those of the goal, of the starts, whose inputs are given, or if none has it by
-   Newton's method from the near ones. */
+/* The inputs nearest to those of the goal, of the starts; what an axis counts is known. If no start
+   leads there, by Newton's method from the near ones. */
 static inline int linkage_choose(const linkage_model *model, int side, const linkage_goal *goal,
     int count, linkage_start *start, linkage_real *q, linkage_point *p)
 {
@@ -498,6 +498,12 @@ static inline int linkage_choose(const linkage_model *model, int side, const lin
     linkage_real inside;
     int i, k;
     for (k = 0; k < count; k++) {
+        for (i = 0; i < model->inputs; i++) {
+            const linkage_axis *axis = &model->axis[side][i];
+            if (axis->rate != 0) {
+                start[k].q[axis->input] = goal->near[axis->input] - goal->whole[axis->input];
+            }
+        }
         start[k].away = linkage_bring(model, side, goal, start[k].q, q);
         if (model->arcs > 0 && !linkage_is_within(model, start[k].q[0], &inside)) {
             start[k].away = -1;
