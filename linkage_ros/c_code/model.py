@@ -86,7 +86,8 @@ class Model:
         called, units = self._call()
         lines = [f'{name}_pose s, {", ".join(formulas.by)};', f'if (!{called}) {{',
                  '    return 0;', '}']
-        rates, places = [], []
+        rates: List[str] = []
+        places: List[str] = []
         for side, axes in enumerate(self.sides):
             for i, each in enumerate(axes):
                 places.append(f'p->position[{side}][{i}]')
