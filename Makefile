@@ -124,6 +124,10 @@ lint: .venv-lint/.installed ## Check style, types and licences
 	@$(lint_bin)/python -c 'import sys; from xml.dom.minidom import parse; [parse(f) for f in sys.argv[1:]]' \
 	  package.xml linkage_interfaces/package.xml
 
+.PHONY: ctidy
+ctidy: ready ## Check the C that is printed with clang-tidy and cppcheck, which have to be installed
+	@$(in_ros) .ci/ctidy
+
 .PHONY: lock
 lock: .venv-lock/.installed ## Pin with hashes what wheels/*.txt ask for; UPGRADE=1: to the newest
 	@wheels/lock.sh $(if $(UPGRADE),--upgrade)

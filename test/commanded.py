@@ -53,16 +53,17 @@ static void {name}_asked(long poses, long *counts)
     START({name});
     for (i = 1; i <= poses; i++) {{
         {number} q[{n}], beside[{n}], gap[{n}], least;
-        {name}_point p, goal;
-        {name}_side measured = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, asked = measured, found = measured;
-        {name}_sample(i, q);
-        if (!{name}_at({c}q, 1, &p))
+        linkage_point p, goal;
+        linkage_side measured = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }};
+        linkage_side asked = measured, found = measured;
+        linkage_sample(&{name}_model, i, q);
+        if (!{name}_at(q, &p))
             continue;
         for (k = 0; k < {n}; k++)
             beside[k] = q[k] + (i & 1 << k ? 1 : -1) * ({number})1e-3;
         for (side = 0; side < 2; side++) {{
             goal = p;
-            if (side && !{name}_at({c}beside, 1, &goal))
+            if (side && !{name}_at(beside, &goal))
                 continue;
             for (k = 0; k < {n}; k++)
                 measured.position[k] = p.position[0][k];
@@ -75,9 +76,9 @@ static void {name}_asked(long poses, long *counts)
                 counts[3 * side + 1]++;
                 continue;
             }}
-            least = {name}_gap(found.position, &goal, 0, gap);
-            if (least > slack && {name}_gap(found.position, &p, 0, gap)
-                > slack + 2 * {name}_gap(goal.position[0], &p, 0, beside))
+            least = linkage_gap(&{name}_model, 0, found.position, &goal, gap);
+            if (least > slack && linkage_gap(&{name}_model, 0, found.position, &p, gap)
+                > slack + 2 * linkage_gap(&{name}_model, 0, goal.position[0], &p, beside))
                 counts[3 * side + 2]++;
         }}
     }}
@@ -85,7 +86,8 @@ static void {name}_asked(long poses, long *counts)
 """
 IN_C = """
 #define START(name) static name##_memory m; if (!name##_begin(&m)) return
-#define SEND(side, name, from, to) name##_transmit(&m, side, &from, &to)
+#define SEND(side, name, from, to) ((side) ? name##_joints_to_actuators(&m, &from, &to) \\
+    : name##_actuators_to_joints(&m, &from, &to))
 """
 CALL = """
 void {name}_counts(long poses, long *counts) {{ {name}_asked(poses, counts); }}
@@ -131,19 +133,8 @@ template <class Class, class Side> struct Robot
     return transmission.status();
   }
 };
-#define START(name) static Robot<name##_class, name##_side> robot; name##_linkage c; \\
-  name##_dimensions(c)
+#define START(name) static Robot<name##_class, linkage_side> robot
 #define SEND(side, name, from, to) robot.send(side, from, to)
-"""
-IN_CPP_EACH = """
-static void {name}_dimensions({name}_linkage & c)
-{{
-  double own[{name}_class::Code::dimensions.size() + 1] = {{}};
-  for (std::size_t i = 0; i < {name}_class::Code::dimensions.size(); ++i) {{
-    own[i] = {name}_class::Code::dimensions[i].value;
-  }}
-  (void){name}_class::Code::set(c, own);
-}}
 """
 
 
@@ -204,7 +195,7 @@ def asked(folder, cases, kind, poses):
     number = 'float' if kind == 'float' else 'double'
     questions = [QUESTIONS.format(
         name=case.machine.name, number=number, n=len(case.machine.inputs),
-        slack='1e-2f' if kind == 'float' else '1e-6', c='&c, ' if kind == 'transmission' else '')
+        slack='1e-2f' if kind == 'float' else '1e-6')
         for case in cases]
     calls = ''.join(CALL.format(name=name) for name in names)
     library = folder / 'asked.so'
@@ -216,15 +207,14 @@ def asked(folder, cases, kind, poses):
         classes = re.findall(r' type="(.*?)Loader"', files[Path('plugins.xml')])
         code = ''.join(f'#include "{name}.hpp"\n' for name in names) + IN_CPP + ''.join(
             f'using {name}_class = {class_}Transmission;'
-            + IN_CPP_EACH.format(name=name) for name, class_ in zip(names, classes)
-        ) + ''.join(questions) + (
+            for name, class_ in zip(names, classes)) + ''.join(questions) + (
                 f'extern "C" {{{calls}}}\n')
         compiler = ['g++', '-std=c++17', '-isystem', STAND_IN / 'include', '-I', folder / 'src',
                     '-I', folder / 'include', *ROS]
         source = folder / 'asked.cpp'
     else:
-        code = ''.join(header.written(case.machine, (), number == 'float', case.names)
-                       for case in cases) + IN_C + ''.join(questions) + calls
+        code = header.printed([header.Request(case.machine, (), case.names) for case in cases],
+                              number == 'float') + IN_C + ''.join(questions) + calls
         compiler, source = ['cc', '-std=c99'], folder / 'asked.c'
     source.write_text(code)
     subprocess.run([*compiler, '-O1', '-shared', '-fPIC', source, '-o', library, '-lm',

@@ -31,6 +31,7 @@ from c_libraries import loaded, ROS, shared, STAND_IN, STRICT
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import command, header, transmission
 from linkage_ros.c_code.axes import actuators, joints
+from linkage_ros.c_code.names import template
 from linkage_ros.c_code.package import package
 import numpy as np
 import pytest
@@ -73,11 +74,29 @@ SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 
 UNWRITTEN = 0.123456789
 CALLER = """
 static {name}_memory {name}_m;
-const char *{name}_named(int side, int i) {{ return {name}_name(side, i); }}
+const char *{name}_named(int side, int i) {{ return {name}_model.axis[side][i].name; }}
 int {name}_started(void) {{ return {name}_begin(&{name}_m); }}
 int {name}_sent(int side, const double *from, double *to)
 {{
-    return {name}_transmit(&{name}_m, side, (const {name}_side *)from, ({name}_side *)to);
+    enum {{ N = {n} }};
+    linkage_side given, found;
+    int i, status;
+    for (i = 0; i < N; i++) {{
+        given.position[i] = from[i];
+        given.velocity[i] = from[N + i];
+        given.effort[i] = from[2 * N + i];
+        found.position[i] = to[i];
+        found.velocity[i] = to[N + i];
+        found.effort[i] = to[2 * N + i];
+    }}
+    status = side ? {name}_joints_to_actuators(&{name}_m, &given, &found)
+        : {name}_actuators_to_joints(&{name}_m, &given, &found);
+    for (i = 0; i < N; i++) {{
+        to[i] = found.position[i];
+        to[N + i] = found.velocity[i];
+        to[2 * N + i] = found.effort[i];
+    }}
+    return status;
 }}
 """
 
@@ -85,7 +104,7 @@ int {name}_sent(int side, const double *from, double *to)
 def compiled(folder, machines, *names, flags=()):
     """Return a library with the actuators and joints of mechanisms."""
     return loaded(folder, ''.join(header.written(machine, joints=names) + CALLER.format(
-        name=machine.name) for machine in machines), *flags)
+        name=machine.name, n=len(machine.inputs)) for machine in machines), *flags)
 
 
 class Memory:
@@ -237,7 +256,7 @@ def choosing(tmp_path_factory):
             'type': 'custom', 'joints': joints_, **given}.items()}}).machines.values()
         code += header.written(machine, joints=[
             each if each == 'wheel' else f'm{i}_{each}' for each in names])
-        code += CALLER.format(name=f'm{i}')
+        code += CALLER.format(name=f'm{i}', n=1)
     with shared(tmp_path_factory, 'choosing') as folder:
         return loaded(folder, code)
 
@@ -248,6 +267,25 @@ def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
     for position, expected_ in pairs:
         status, (found, *_) = Memory(choosing, f'm{i}', 1).send(side, [position])
         assert status == 0 and found[0] == pytest.approx(expected_, rel=1e-12)
+
+
+@pytest.mark.parametrize('name', ['leg', 'boom', 'beast', 'rocker'])
+def test_a_new_position_takes_one_pose(machines, tmp_path, name):
+    """Actuators count inputs, and these joints have closed forms."""
+    machine = machines[name]
+    text = re.sub(rf'(int {name}_at\([^;]*?\)\n{{\n)', r'\1    taken++;\n',
+                  header.written(machine))
+    code = f'static int taken;\n{text}' + CALLER.format(name=name, n=len(machine.inputs)) + (
+        'int poses(void) { int before = taken; taken = 0; return before; }\n')
+    library = loaded(tmp_path, code)
+    memory, (first, second, *_) = Memory(library, name, len(machine.inputs)), states(machine, 4)
+    for inputs in (first, second, first):
+        actuator, _, joint, _ = expected(machine, inputs)
+        library.poses()
+        assert memory.send(0, actuator)[0] & 1 == 0 and library.poses() == 1
+        memory.send(0, expected(machine, second if inputs is first else first)[0])
+        library.poses()
+        assert memory.send(1, joint)[0] & 1 == 0 and library.poses() == 1
 
 
 @pytest.mark.parametrize('ratio', [-2.0, 0.25])
@@ -261,7 +299,7 @@ def test_a_sensor_repeats_after_a_turn_of_what_it_measures(tmp_path, ratio):
         'wheel.crank.ratio': ratio}).machines
     lift, wheel = machines.values()
     library = loaded(tmp_path, ''.join(
-        header.written(machine, joints=[f'{name}_crank']) + CALLER.format(name=name)
+        header.written(machine, joints=[f'{name}_crank']) + CALLER.format(name=name, n=1)
         for name, machine in machines.items()))
     memory, (reading, *_) = Memory(library, 'lift', 1), expected(lift, [0.5])
     for turns in (0, 1, -1, 3, -100):
@@ -509,99 +547,6 @@ def test_mechanisms_of_any_names_are_classes_of_their_own(tmp_path):
                     package / 'include', *ROS, package / 'all.cpp'], check=True)
 
 
-def opened(folder, machines, *flags):
-    """Return functions that place the first joint of mechanisms with any dimensions."""
-    library = loaded(folder, ''.join(header.opened(machine) + f"""
-const char *{name}_placed(const double *dimension, const double *q, double *position)
-{{
-    static {name}_linkage c;
-    {name}_point p;
-    const char *wrong = {name}_set(&c, dimension);
-    if (!wrong)
-        position[0] = {name}_at(&c, q, 1, &p) ? p.position[1][0] : NAN;
-    return wrong;
-}}
-""" for name, machine in machines.items()), *flags)
-    functions = {name: library[f'{name}_placed'] for name in machines}
-    for function in functions.values():
-        function.restype = ctypes.c_char_p
-    return functions
-
-
-ODD = {'mechanisms': ['odd'], 'odd.type': 'custom', 'odd.dimensions.u': 0.5,
-       'odd.dimensions.w': 0.7, 'odd.dimensions.s': 0.1, 'odd.joints': [
-           'O ground s 0', 'H ground w 0', 'R carriage O along H 0.1*w 0.9*w', 'Q ground 0 w',
-           'B dyad R Q u+w 0.9 left', 'C rigid R B u w left']}
-
-
-@pytest.mark.parametrize('types, count', [
-    (['slotted_lever', 'five_bar', 'four_bar'], 20),
-    pytest.param(list(mechanisms.TYPES), 60, marks=pytest.mark.slow)], ids=['few', 'all'])
-def test_any_dimensions_are_those_of_python(tmp_path, types, count):
-    machines = scene.read({**ODD, 'mechanisms': [*types, 'odd'],
-                           **{f'{name}.type': name for name in types}}).machines
-    functions = opened(tmp_path, machines)
-    rng, tried = np.random.default_rng(7), 0
-    for name, machine in machines.items():
-        place, linkage = functions[name], machine.linkage
-        output = joints(machine)[0].output
-        for _ in range(count):
-            own = {key: value * rng.choice([1.0, 1.0, rng.uniform(0.4, 2.0), -1.0],
-                                           p=[0.3, 0.2, 0.45, 0.05])
-                   for key, value in linkage.dimensions.items()}
-            q = [rng.uniform(input_.low, input_.high) for input_ in linkage.inputs]
-            counted = np.array(q) / [input_.size for input_ in linkage.inputs]
-            position = ctypes.c_double(math.inf)
-            wrong = place((ctypes.c_double * 20)(*own.values()),
-                          (ctypes.c_double * 4)(*counted), ctypes.byref(position))
-            try:
-                other = linkage.with_dimensions(**own)
-            except ValueError:
-                assert wrong
-                continue
-            expected = other.bound('checked', (output,))(*q)[0]
-            if wrong:
-                assert b'triangle' in wrong and not all(other.triangles().values())
-                continue
-            if not all(input_.turns or input_.low <= value <= input_.high
-                       for input_, value in zip(other.inputs, q)):
-                expected = math.nan
-            assert position.value == pytest.approx(
-                expected, abs=1e-14, rel=1e-14, nan_ok=True), (name, own)
-            tried += math.isfinite(position.value)
-    assert tried > len(machines) * count / 5
-
-
-@pytest.mark.parametrize('own, said', [
-    ({}, None), ({'s': -0.2, 'u': -0.1}, None), ({'v': -1.0}, 'v must be a positive number [m]'),
-    ({'v': 0.0}, 'v must be a positive number [m]'), ({'s': math.nan}, 's must be a number [m]'),
-    ({'s': math.inf}, 's must be a number [m]'), ({'v': math.inf}, 'v must be a positive number'),
-    ({'v': 0.1}, 'the bar B-D must be longer than zero'),
-    ({'v': 5.0}, 'no triangle has the sides at C: each must be shorter than the others'),
-    ({'u': 0.9}, 'the carriage must have a way to go')])
-def test_why_dimensions_cannot_be_is_said(strict, own, said):
-    place, count = strict
-    given = {'s': 0.1, 'u': 0.5, 'w': 0.7, 'v': 0.6} | own
-    found = place((ctypes.c_double * 4)(*given.values()), (ctypes.c_double * 1)(1.0),
-                  ctypes.byref(ctypes.c_double()))
-    assert count == 4 and (found is None if said is None else found.decode().startswith(said))
-
-
-@pytest.fixture(scope='module')
-def strict(tmp_path_factory):
-    """Return the function of a mechanism of all that may be wrong with dimensions."""
-    machines = scene.read({
-        'mechanisms': ['picky'], 'picky.type': 'custom', 'picky.dimensions.s': 0.1,
-        'picky.dimensions.u': 0.5, 'picky.dimensions.v': 0.6, 'picky.dimensions.w': 0.7,
-        'picky.joints': [
-            'O ground s 0', 'H ground 3 0', 'R carriage O along H u w', 'Q ground 0 1',
-            'B dyad R Q 0.9 0.8 left', 'C rigid R B v 0.8 left',
-            'D dyad B C v-0.2 0.7 left']}).machines
-    machine, = machines.values()
-    return (opened(tmp_path_factory.mktemp('strict'), machines)['picky'],
-            len(machine.linkage.dimensions))
-
-
 @pytest.mark.long
 @pytest.mark.skipif(not shutil.which('cmake'), reason='cmake is not installed')
 def test_a_package_is_built_and_tests_itself(tmp_path):
@@ -655,7 +600,7 @@ def files(machines):
 def test_a_package_is_complete(files):
     assert {*files} == {
         'CMakeLists.txt', 'package.xml', 'README.md', 'plugins.xml', 'urdf/transmissions.xml',
-        'src/plugins.cpp', 'src/transmission-of.hpp',
+        'src/plugins.cpp', 'src/transmission-of.hpp', 'src/linkage.h',
         'include/linkage_ros/linkage_transmission.hpp', *(
             path.format(name) for name in AXES for path in (
                 'src/{}.hpp', 'src/{}_linkage.h', 'test/test_{}.cpp'))}
@@ -670,11 +615,9 @@ def test_a_package_is_complete(files):
     assert 'project(robot_1 ' in files['CMakeLists.txt']
     assert f'foreach(mechanism {" ".join(AXES)})' in files['CMakeLists.txt']
     rows = [line for line in files['README.md'].splitlines() if line.startswith('| `')]
-    assert rows[0] == '| `robot_1/Leg` | leg_crank, leg_crank2 | leg_crank, leg_AP | ' \
-        'a, b, c, d, f |'
-    assert rows[1] == (
-        '| `robot_1/Int` | a* / "b"/ ? ?/?%s ? | while/1:x | a, b, c, d, p |')
-    assert rows[2] == '| `robot_1/Boom` | boom_cylinder | boom_OB | none |' and len(rows) == 4
+    assert rows[0] == '| `robot_1/Leg` | leg_crank, leg_crank2 | leg_crank, leg_AP |'
+    assert rows[1] == '| `robot_1/Int` | a* / "b"/ ? ?/?%s ? | while/1:x |'
+    assert rows[2] == '| `robot_1/Boom` | boom_cylinder | boom_OB |' and len(rows) == 4
     assert '# robot_1\n' in files['README.md'] and len(files['README.md'].splitlines()) <= 30
 
 
@@ -689,7 +632,7 @@ def test_a_package_names_what_the_scene_names(files, machines):
     assert re.findall('#include "(.*).hpp"', files['src/plugins.cpp'])[:-1] == [*AXES]
     for (name, axes), plugin, own in zip(
             AXES.items(), plugins, (each for each in pasted if each.tag == 'transmission')):
-        dimensions, code = machines[name].linkage.dimensions, files[f'src/{name}.hpp']
+        code = files[f'src/{name}.hpp']
         assert own.get('name') == name and own.findtext('plugin') == plugin.get('name')
         assert plugin.get('name') == f'robot_1/{name.title()}'
         assert plugin.get('type') == f'robot_1_plugins::{name.title()}Loader'
@@ -703,18 +646,14 @@ def test_a_package_names_what_the_scene_names(files, machines):
             row, = re.findall(rf'array<Axis, size> {side}s{{{{(.*)}}}};', code)
             assert [tuple(ast.literal_eval(f'b"{text}"').decode() for text in each)
                     for each in re.findall(r'{"(.*?)", "(.*?)"}', row)] == [*named.items()]
-        notes = [each.text for each in own if not isinstance(each.tag, str)]
-        assert notes == [f' <param name="{key}">{value!r}</param> for another length [m] '
-                         for key, value in [*dimensions.items()][:1]]
-        count, rows = re.search(r'array<Dimension, (\d+)> dimensions{(.*)};', code).groups()
-        assert {key: float(value) for key, value in re.findall(r'{"(\w+)", (.*?)}', rows)} == {
-            **dimensions} and int(count) == len(dimensions)
-        assert f'size = {len(axes[0])};' in code and f'{name}_set(&c' in code
+        assert f'size = {len(axes[0])};' in code and f'model = {name}_model;' in code
         proof = files[f'test/test_{name}.cpp']
-        assert f'#include "{name}.hpp"' in proof and f'dimensions[{len(dimensions)} + 1]' in proof
-        assert f'robot_1_plugins::{name.title()}Code;' in proof and f'  {name}_linkage c;' in proof
-        assert files[f'src/{name}_linkage.h'] == header.opened(machines[name])
-        assert f'be given: {", ".join(dimensions) or "none"}.' in files[f'src/{name}_linkage.h']
+        assert f'#include "{name}.hpp"' in proof
+        assert f'robot_1_plugins::{name.title()}Code;' in proof
+        own = files[f'src/{name}_linkage.h']
+        assert '#include "linkage.h"\n' in own and 'linkage_ros: what' not in own
+        assert '#define LINKAGE_MAX_INPUTS 2\n' in own
+    assert files['src/linkage.h'] == template('linkage.h')
 
 
 OPTIONS = ["SCENE the scene's parameter file",
@@ -738,7 +677,8 @@ def test_options_are_described(capsys, main, about, options):
 @pytest.mark.parametrize('arguments, said', [
     *((['--out', '{0}/' + name], f"single underscores, a letter first, not '{name}'")
       for name in ('My-Package', 'a', '1a', 'a__b', 'a_', 'a' * 65)),
-    (['--out', '{0}'], 'or one written by this command'), ([], 'required: --out'),
+    (['--out', '{0}'], 'or one written by this command'),
+    ([], 'one of the arguments --out --limits is required'),
     (['--out', '{0}/legs', '--joints', 'elbow'], "no mechanism has a joint 'elbow'"),
     (['--out', '{0}/legs', '--joints', 'kneee'], 'did you mean knee?')])
 def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, said):
@@ -750,6 +690,47 @@ def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, sai
     printed = capsys.readouterr().err
     assert printed.startswith('transmission: ') and printed.count('\n') == 1 and said in printed
     assert (folder / 'notes.txt').read_text() == 'keep'
+
+
+def limits_of(path, *arguments):
+    """Return the limits that the command prints, by joint; None for one that turns."""
+    ended = subprocess.run([sys.executable, '-m', 'linkage_ros.c_code.transmission', str(path),
+                            '--limits', *arguments], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    found = {}
+    for joint in ElementTree.fromstring(f'<robot>{ended.stdout}</robot>'):
+        limit = joint.find('limit')
+        found[joint.get('name')] = limit is not None and tuple(
+            float(limit.get(end)) for end in ('lower', 'upper'))
+    return found
+
+
+@pytest.mark.parametrize('path', ['examples/leg.yaml', 'config/excavator.yaml',
+                                  'examples/ankle.yaml', 'config/slotted_lever.yaml'])
+def test_joint_limits_are_those_of_all_poses(path):
+    found, rng = limits_of(ROOT / path), np.random.default_rng(9)
+    for machine in scene.load(ROOT / path).machines.values():
+        # What the joints are at poses of the sweeps, by another way than that of the limits.
+        given = [rng.uniform(*(drive.ends or drive.reach[0]), 3000).tolist()
+                 for drive in machine.inputs.values()]
+        chosen = [each.output for each in joints(machine)]
+        prefix = next(iter(machine.assembly().legs))
+        names = [machine.joints[key if key in machine.inputs else prefix + key] for key in chosen]
+        seen = np.array([outputs(machine, row, chosen) for row in zip(*given)])
+        for name, values in zip(names, seen.T):
+            values = np.array([name.of(value) for value in values[np.isfinite(values)]])
+            low, high = found[name.name]
+            slack = 0.05 * (high - low)
+            assert low - 1e-9 <= values.min() <= low + slack
+            assert high - slack <= values.max() <= high + 1e-9
+
+
+def test_a_joint_that_turns_has_no_limits(tmp_path):
+    file = tmp_path / 'turning.yaml'
+    file.write_text('/**: {ros__parameters: {mechanisms: [drag], drag: {type: custom, joints: ['
+                    'O ground 0 0, Q ground 0.3 0, A crank O 1, B dyad A Q 0.9 1.1 left]}}}')
+    assert limits_of(file) == {'drag_QB': False}
+    assert limits_of(file, '--joints', 'drag_crank') == {'drag_crank': False}
 
 
 def test_a_package_is_written_again(tmp_path, capsys, monkeypatch):

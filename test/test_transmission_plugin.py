@@ -98,10 +98,14 @@ class Plugins:
         self.host.component_made.restype = ctypes.c_void_p
         self.host.component_problem.restype = ctypes.c_char_p
 
-    def component(self, name, *lines, kinds=KINDS, actuators=None, joints=None):
-        """Return a component with one transmission; `lines` are added to what describes it."""
+    def component(self, name, *lines, kinds=KINDS, actuators=None, joints=None, extra=()):
+        """
+        Return a component with one transmission; `lines` are added to what describes it.
+
+        Values of `extra` come after those of actuators and joints in its memory.
+        """
         return Component(self, name, lines, kinds, ACTUATORS[name] if actuators is None
-                         else actuators, JOINTS[name] if joints is None else joints)
+                         else actuators, JOINTS[name] if joints is None else joints, extra)
 
 
 class Component:
@@ -111,14 +115,16 @@ class Component:
     Its values are arrays `actuator` and `joint` of shape (kinds, axes); `end` deletes it.
     """
 
-    def __init__(self, plugins, name, lines, kinds, actuators, joints):
+    def __init__(self, plugins, name, lines, kinds, actuators, joints, extra):
         self._host = plugins.host
         n = len(actuators)
-        self._memory = np.full((2, 3, n), NAN)
-        self.actuator, self.joint = self._memory
+        self._memory = np.concatenate([np.full(6 * n, NAN), np.ravel(extra)])
+        self.actuator, self.joint = self._memory[:6 * n].reshape(2, 3, n)
+        self.extra = self._memory[6 * n:].reshape(np.shape(extra))
         described = [*lines]
         for side, (what, axes) in enumerate((('actuator', actuators), ('joint', joints))):
-            described += [f'{what}\t{each}\t{role}\t1\t0' for each, role in axes.items()]
+            described += [f'{what}\t{each}\t{role}\t1\t0' for each, role in axes.items()
+                          if role is not None]
             described += [
                 f'{what}_handle\t{each}\t{kind}\t{(3 * side + KINDS.index(kind)) * n + i}'
                 for i, each in enumerate(axes) for kind in kinds]
@@ -400,7 +406,7 @@ def test_a_singular_pose_of_positions_alone_is_not_told(plugins):
     ('knee', [], {'left_motor': 'crank'}, {'left_knee': 'QB'}, ''),
     ('knee', [], {'knee_motor': ''}, {'knee_QB': ''}, ''),
     ('knee', [], {'knee_motor': 'crank'}, {'left_knee': 'banana'}, "role 'banana', is"),
-    ('knee', [], {'knee_motor': 'crank'}, {'left_knee': 'AB'}, "role 'AB', is none of 'knee_QB'"),
+    ('knee', [], {'knee_motor': 'crank'}, {'left_knee': 'AB'}, "joint 'knee_QB' is missing"),
     ('knee', [], {'knee_motor': 'crank'}, {'left_knee': ''}, "'left_knee', role '', is none of"),
     ('knee', [], {'knee_motor': 'crank'}, {'knee_QB': 'banana'}, "role 'banana', is none of"),
     ('knee', [], {'knee_motor': 'QB'}, {'knee_QB': 'QB'}, "role 'QB', is none of 'knee_motor'"),
@@ -451,34 +457,93 @@ def test_an_interface_of_one_side_is_refused(plugins, name, side, kind):
                                   for axis in named[name]), kinds=both)
 
 
-@pytest.mark.parametrize('words, said', [
-    ('joint\tknee_QB\tQB\t2\t0', 'must have no mechanical_reduction'),
-    ('joint\tknee_QB\tQB\t1\t0.5', 'must have no mechanical_reduction and no offset')])
-def test_gears_are_those_of_the_scene(plugins, words, said):
-    with pytest.raises(Refused, match=said):
+@pytest.mark.parametrize('words', [
+    'joint\tknee_QB\tQB\t0\t0', 'joint\tknee_QB\tQB\tnan\t0', 'joint\tknee_QB\tQB\tinf\t0',
+    'joint\tknee_QB\tQB\t1\tnan'])
+def test_a_reduction_that_cannot_be_is_refused(plugins, words):
+    with pytest.raises(Refused, match="joint 'knee_QB' needs a finite offset"):
         plugins.component('knee', words, joints={})
 
 
-@pytest.mark.parametrize('key, value, said', [
-    ('a', '90', ''), ('e', '-3', ''), ('a', 'wide', "must be a number [m], not 'wide'"),
-    ('a', '-1', 'a must be a positive number'), ('a', '1e999', 'must be a number'),
-    ('a', '1 2', 'must be a number'), ('a', '', 'must be a number'),
-    ('a', '0x1p9', 'must be a number'), ('e', '1e6', 'it cannot be assembled'),
-    ('x', '1', "transmission 'tested': there is no parameter 'x'; allowed: a b e")])
-def test_dimensions_are_parameters(plugins, key, value, said):
-    line = f'parameter\t{key}\t{value}'
-    if said:
-        with pytest.raises(Refused, match=re.escape(said)):
-            plugins.component('lever', line)
-        return
-    component = plugins.component('lever', line)
-    lever = plugins.machines['lever'].linkage.with_dimensions(**{key: float(value)})
-    for crank in (0.2, -0.3):
-        status, (position, *_) = component.read((crank - 0.3) / -0.5)
-        angle = float(lever.joint_angles(crank)['lever'])
-        assert position == pytest.approx(0.1 - angle, abs=1e-13)
-        assert status == OK and component.write(position)[1][0] == pytest.approx(
-            (crank - 0.3) / -0.5, abs=1e-12)
+def test_a_robot_has_its_own_gears_and_encoder_zeros(plugins):
+    """Of the built-in transmissions: joint = actuator / reduction + offset, both ways."""
+    inputs, rng = (1.9, 1.24), np.random.default_rng(8)
+    plain = plugins.component('leg')
+    numbers = {name: (rng.uniform(-3.0, 3.0), rng.uniform(-1.0, 1.0)) for name in (
+        'a', 'b', 'c', 'd')}
+    lines = [f'{kind}\t{name}\t{role}\t{numbers[name][0]!r}\t{numbers[name][1]!r}'
+             for kind, name, role in (('actuator', 'a', 'crank'), ('actuator', 'b', 'crank2'),
+                                      ('joint', 'c', 'crank'), ('joint', 'd', 'AP'))]
+    geared = plugins.component('leg', *lines, actuators={'a': None, 'b': None},
+                               joints={'c': None, 'd': None})
+    (reduction, offset), (joint_reduction, joint_offset) = (
+        np.array([numbers[name] for name in names]).T for names in ('ab', 'cd'))
+    actuator, joint = poses(plugins.machines['leg'], *inputs)
+    _, seen = plain.read(actuator, [0.3, -0.2], [2.0, 5.0])
+    status, found = geared.read(actuator * reduction + offset, np.array([0.3, -0.2]) * reduction,
+                                np.array([2.0, 5.0]) / reduction)
+    assert status == OK
+    np.testing.assert_allclose(found, [
+        seen[0] / joint_reduction + joint_offset, seen[1] / joint_reduction,
+        seen[2] * joint_reduction], rtol=1e-9, atol=1e-9)
+    _, seen = plain.write(joint, [0.4, 0.1], [1.0, -2.0])
+    status, found = geared.write(
+        joint / joint_reduction + joint_offset, np.array([0.4, 0.1]) / joint_reduction,
+        np.array([1.0, -2.0]) * joint_reduction)
+    assert status == OK
+    np.testing.assert_allclose(found, [
+        seen[0] * reduction + offset, seen[1] * reduction, seen[2] / reduction],
+        rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize('key', ['a', 'x'])
+def test_other_lengths_need_another_package(plugins, key):
+    with pytest.raises(Refused, match=f"there is no parameter '{key}': write the package again"):
+        plugins.component('lever', f'parameter\t{key}\t90')
+
+
+@pytest.mark.parametrize('name', ['knee', 'leg', 'lever'])
+@pytest.mark.parametrize('renamed', [False, True])
+def test_passive_joints_have_states_where_there_are_handles(plugins, name, renamed):
+    machine = plugins.machines[name]
+    linkage, inputs = machine.linkage, INPUTS[name][1]
+    prefix = next(iter(machine.assembly().legs))
+    passive = {link.name: machine.joints[link.name if link.name in machine.inputs else
+                                         prefix + link.name]
+               for link in linkage.links if link.name not in JOINTS[name].values()}
+    values = np.full((2, len(passive)), UNWRITTEN)
+    lines, called = [], [f'{name}_{i}' if renamed else joint.name
+                         for i, joint in enumerate(passive.values())]
+    factor, offset = (-2.0, 0.3) if renamed else (1.0, 0.0)
+    if renamed:
+        lines += [f'joint\t{own}\t{link}\t{factor}\t{offset}'
+                  for own, link in zip(called, passive)]
+    n = len(inputs)
+    component = plugins.component(
+        name, *lines, *(f'joint_handle\t{own}\t{kind}\t{6 * n + row * len(called) + i}'
+                        for i, own in enumerate(called)
+                        for row, kind in enumerate(('position', 'velocity'))),
+        extra=values)
+    actuator, _ = poses(machine, *inputs)
+    ratios = np.array([drive.ratio for drive in machine.inputs.values()])
+    speeds = np.arange(1.0, n + 1.0)
+    status, _ = component.read(actuator, speeds / ratios, 0.0)
+    assert status == OK
+    given = inputs if n > 1 else inputs[0]
+    rates = [linkage.joint_rates(given, [*passive], by) for by in range(n)]
+    angles = linkage.joint_angles(given, [*passive])
+    for i, (link, joint) in enumerate(passive.items()):
+        speed = joint.sign * sum(float(each[link]) * v for each, v in zip(rates, speeds))
+        assert component.extra[:, i] == pytest.approx(
+            [joint.of(float(angles[link])) / factor + offset, speed / factor], abs=1e-9)
+    # What cannot be measured is held, and stands still; a command is no state.
+    before = component.extra.copy()
+    component.write(poses(machine, *INPUTS[name][0])[1], 1.0)
+    assert np.array_equal(component.extra, before)
+    component.read(actuator)
+    status, _ = component.read(NAN)
+    assert status & NOT_KNOWN and np.array_equal(component.extra[0], before[0])
+    assert not component.extra[1].any()
 
 
 def test_why_values_are_held_is_logged_once_per_reason(plugins, capfd):

@@ -2,26 +2,850 @@
  * lever: slotted_lever, written by linkage_ros.
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
  * Input: crank [rad]. Angles [rad] count counterclockwise.
+ * It can be assembled in [-3.14159, 3.14159] rad.
+ * A call takes at most 12 poses.
  * float: joints are off by up to 1e-07 of the longest bar at 2001 poses over the reach, without its outermost hundredth.
- * C99 and C++17 without heap, lock or recursion; compile without -ffast-math, which drops the checks.
- * A call of the transmission takes at most 18 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
 
+#ifndef LINKAGE_MAX_INPUTS
+#define LINKAGE_MAX_INPUTS 1
+#endif
+#ifndef LINKAGE_FLOAT
+#define LINKAGE_FLOAT 1
+#endif
+// Copyright 2026 linkage_ros contributors
+//
+// Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+// in compliance with the License. You may obtain a copy of the License at
+// http://www.apache.org/licenses/LICENSE-2.0
+// Unless required by applicable law or agreed to in writing, software distributed under the
+// License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+// express or implied. See the License for the specific language governing permissions and
+// limitations under the License.
+
+/*
+ * What the headers of all linkages have in common.
+ *
+ * A generated header has the formulas and tables of one linkage; here is how they are used: the
+ * inverse, and the conversion between actuators and joints. C99 and C++17 without heap, lock,
+ * recursion or exception; every loop is bounded. Compile without -ffast-math, which drops the checks.
+ */
+#ifndef LINKAGE_ROS_LINKAGE_H
+#define LINKAGE_ROS_LINKAGE_H
+
 #include <float.h>
 #include <math.h>
+#include <string.h>
+
+/* The most inputs of a linkage in this program, and whether it computes in float. */
+#ifndef LINKAGE_MAX_INPUTS
+#define LINKAGE_MAX_INPUTS 6
+#endif
+#ifndef LINKAGE_FLOAT
+#define LINKAGE_FLOAT 0
+#endif
+
+#if LINKAGE_FLOAT
+typedef float linkage_real;
+#define linkage_abs fabsf
+#define linkage_floor floorf
+#define linkage_max fmaxf
+#define linkage_min fminf
+#define linkage_sqrt sqrtf
+#define linkage_atan2 atan2f
+/* A Jacobian below this part of its size is singular: for velocities, and for Newton's method. */
+#define LINKAGE_SINGULAR 1e-3f
+#define LINKAGE_LEAST 1e-5f
+/* Newton's method ends at ENOUGH, and may leave CLOSE, times the rate or STEEPEST [rad, sizes]. */
+#define LINKAGE_ENOUGH 2e-6f
+#define LINKAGE_CLOSE 4e-6f
+#define LINKAGE_STEEPEST 1e3f
+/* An input may be beyond an end of the reach by SLACK; it is taken further inside by INSIDE. */
+#define LINKAGE_SLACK 1e-5f
+#define LINKAGE_INSIDE 2e-6f
+#else
+#if DBL_MANT_DIG < 53
+#error "double is a float on this machine: print the header again with --float"
+#endif
+typedef double linkage_real;
+#define linkage_abs fabs
+#define linkage_floor floor
+#define linkage_max fmax
+#define linkage_min fmin
+#define linkage_sqrt sqrt
+#define linkage_atan2 atan2
+#define LINKAGE_SINGULAR 1e-6
+#define LINKAGE_LEAST 1e-12
+#define LINKAGE_ENOUGH 1e-14
+#define LINKAGE_CLOSE 1e-13
+#define LINKAGE_STEEPEST 4e6
+#define LINKAGE_SLACK 1e-9
+#define LINKAGE_INSIDE 1e-14
+#endif
+
+/* Poses of Newton's method: from a closed form, and of a search in a piece of the reach. */
+#define LINKAGE_CLOSED_POSES 4
+#define LINKAGE_SEARCH_POSES 64
+/* States that are tried for a first pose. */
+#define LINKAGE_SAMPLES 4096
+#define LINKAGE_NAN ((linkage_real)NAN)
+/* Farther than anything. */
+#define LINKAGE_FAR ((linkage_real)1e30)
+/* A closed form that misses by more than this belongs to another assembly [rad, sizes]. */
+#define LINKAGE_OTHER ((linkage_real)0.01)
+/* Half, in a form that both kinds of numbers have. */
+#define LINKAGE_HALF ((linkage_real)0.5)
+
+/* Formulas are inlined wherever a pose is needed, so that only what is used there is computed. */
+#ifdef __GNUC__
+#define LINKAGE_FORMULA static inline __attribute__((always_inline))
+#define LINKAGE_PURE static __attribute__((const, noinline, unused))
+#else
+#define LINKAGE_FORMULA static inline
+#define LINKAGE_PURE static inline
+#endif
+
+/* --- what formulas use --- */
 
 /* A limit that is missed by rounding counts as reached. */
-static inline float lever_root(float x, float tolerance)
+static inline linkage_real linkage_root(linkage_real x, linkage_real tolerance)
 {
-    return x > 0.0f ? sqrtf(x) : x >= -tolerance ? 0.0f : (float)NAN;
+    if (x > 0) {
+        return linkage_sqrt(x);
+    }
+    return x >= -tolerance ? 0 : LINKAGE_NAN;
 }
 
-static inline float lever_gated(float x, float margin, float tolerance)
+static inline linkage_real linkage_gated(linkage_real x, linkage_real margin, linkage_real tolerance)
 {
-    return margin >= -tolerance ? x : (float)NAN;
+    return margin >= -tolerance ? x : LINKAGE_NAN;
 }
+
+/* The angle of (x, y); a compiler leaves it out where it is not used. */
+LINKAGE_PURE linkage_real linkage_angle(linkage_real y, linkage_real x)
+{
+    return linkage_atan2(y, x);
+}
+
+/* --- types --- */
+
+enum { LINKAGE_ACTUATORS = 0, LINKAGE_JOINTS = 1 };
+
+/* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep. SINGULAR: a
+   velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or infinite, which of a command
+   means that there is none. */
+enum { LINKAGE_OK = 0, LINKAGE_OUT_OF_REACH = 1, LINKAGE_SINGULAR_POSE = 2, LINKAGE_NOT_KNOWN = 4 };
+
+/* Positions, velocities and efforts of the actuators, or of the joints. */
+typedef struct {
+    linkage_real position[LINKAGE_MAX_INPUTS];
+    linkage_real velocity[LINKAGE_MAX_INPUTS];
+    linkage_real effort[LINKAGE_MAX_INPUTS];
+} linkage_side;
+
+/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and the inputs'
+   efforts against the loads. */
+typedef struct {
+    linkage_real position[2][LINKAGE_MAX_INPUTS];
+    linkage_real rate[2][LINKAGE_MAX_INPUTS][LINKAGE_MAX_INPUTS];
+    linkage_real load[LINKAGE_MAX_INPUTS];
+} linkage_point;
+
+/* The place of an actuator or a joint in a linkage. */
+typedef struct {
+    const char *name;
+    /* One over the size of its position, and what it may change by without effect, or 0. */
+    linkage_real scale, turn;
+    /* If it counts the turns of an input: the input, the rate by it, and the position where that is 0.
+       Otherwise the rate is 0. */
+    int input;
+    linkage_real rate, zero;
+} linkage_axis;
+
+/* An input, in rad or in its size: after how much poses repeat, or 0; its start, the range of its
+   samples, their step, and its sweep. */
+typedef struct {
+    linkage_real turn, start, low, width, step;
+    linkage_real sweep[2];
+} linkage_input;
+
+/* A linkage. Inputs q are in rad or in sizes. */
+typedef struct {
+    int inputs;
+    /* The pose at inputs; 0 if it cannot be assembled. */
+    int (*at)(const linkage_real *q, linkage_point *p);
+    linkage_axis axis[2][LINKAGE_MAX_INPUTS];
+    linkage_input input[LINKAGE_MAX_INPUTS];
+    /* After how much of each input the actuators or the joints repeat, or 0. */
+    linkage_real turn[2][LINKAGE_MAX_INPUTS];
+    /* The reach of its only input, if it has ends: middles of arcs and half their lengths. */
+    int arcs;
+    const linkage_real (*arc)[2];
+} linkage_model;
+
+/* From positions of actuators or joints to the inputs nearest to q, and the pose there. */
+typedef int linkage_inverse(const linkage_real *position, linkage_real *q, linkage_point *p);
+
+/* What an inverse looks for: positions and near inputs without the whole turns that are counted. */
+typedef struct {
+    linkage_real to[LINKAGE_MAX_INPUTS];
+    linkage_real near[LINKAGE_MAX_INPUTS];
+    linkage_real whole[LINKAGE_MAX_INPUTS];
+} linkage_goal;
+
+/* Inputs from which a goal may be reached, and how far they are from the near ones, or -1. */
+typedef struct {
+    linkage_real q[LINKAGE_MAX_INPUTS];
+    linkage_real away;
+} linkage_start;
+
+/* A part of the reach in which a position only rises, or only falls: both ends. */
+typedef struct {
+    linkage_real q[2];
+    linkage_real position[2];
+} linkage_piece;
+
+/* The state between calls: the last poses and inputs by measured actuators [0] and by commanded
+   joints [1], which of them is newer, and whether there is one; what is held: the actuators [0] where
+   they were last commanded or measured, whichever is newer, and the joints [1] where they were last
+   measured. NaN was never there. */
+typedef struct {
+    linkage_point point[2];
+    linkage_real q[2][LINKAGE_MAX_INPUTS];
+    int newer, is_known;
+    linkage_side held[2];
+} linkage_memory;
+
+/* --- a pose and positions --- */
+
+/* Gaps from a pose to positions, the shorter way round; returns the largest, in sizes. */
+static inline linkage_real linkage_gap(const linkage_model *model, int side, const linkage_real *to,
+    const linkage_point *p, linkage_real *gap)
+{
+    linkage_real most = 0;
+    int i;
+    for (i = 0; i < model->inputs; i++) {
+        const linkage_axis *axis = &model->axis[side][i];
+        gap[i] = to[i] - p->position[side][i];
+        if (axis->turn > 0 && linkage_abs(gap[i]) > axis->turn / 2) {
+            gap[i] -= axis->turn * linkage_floor(gap[i] / axis->turn + LINKAGE_HALF);
+        }
+        most = linkage_max(most, linkage_abs(gap[i]) * axis->scale);
+    }
+    return most;
+}
+
+/* Solve a x = b in place, b in x; returns the determinant's sign, 0 where a is singular. */
+static inline int linkage_solve(int size, linkage_real least,
+    linkage_real a[LINKAGE_MAX_INPUTS][LINKAGE_MAX_INPUTS], linkage_real *x)
+{
+    /* A compiler knows this bound. */
+    const int n = size < LINKAGE_MAX_INPUTS ? size : LINKAGE_MAX_INPUTS;
+    linkage_real most = 1;
+    int i, j, k, sign = 1;
+    for (i = 0; i < n; i++) {
+        for (j = 0; j < n; j++) {
+            if (!isfinite(a[i][j])) {
+                return 0;
+            }
+            most = linkage_max(most, linkage_abs(a[i][j]));
+        }
+    }
+    for (k = 0; k < n; k++) {
+        linkage_real pivot;
+        int best = k;
+        for (i = k + 1; i < n; i++) {
+            best = linkage_abs(a[i][k]) > linkage_abs(a[best][k]) ? i : best;
+        }
+        if (!(linkage_abs(a[best][k]) > least * most)) {
+            return 0;
+        }
+        for (j = k; j < n; j++) {
+            const linkage_real swapped = a[k][j];
+            a[k][j] = a[best][j];
+            a[best][j] = swapped;
+        }
+        pivot = x[best];
+        x[best] = x[k];
+        x[k] = pivot;
+        sign = (best == k) == (a[k][k] > 0) ? sign : -sign;
+        for (i = k + 1; i < n; i++) {
+            const linkage_real factor = a[i][k] / a[k][k];
+            for (j = k; j < n; j++) {
+                a[i][j] -= factor * a[k][j];
+            }
+            x[i] -= factor * x[k];
+        }
+    }
+    for (i = n - 1; i >= 0; i--) {
+        for (j = i + 1; j < n; j++) {
+            x[i] -= a[i][j] * x[j];
+        }
+        x[i] /= a[i][i];
+        if (!isfinite(x[i])) {
+            return 0;
+        }
+    }
+    return sign;
+}
+
+/* The change of the inputs for a change of positions; returns as linkage_solve. */
+static inline int linkage_input_change(const linkage_model *model, int side, const linkage_point *p,
+    linkage_real least, const linkage_real *change, linkage_real *x)
+{
+    linkage_real a[LINKAGE_MAX_INPUTS][LINKAGE_MAX_INPUTS];
+    int i, j;
+    for (i = 0; i < model->inputs; i++) {
+        const linkage_real scale = model->axis[side][i].scale;
+        for (j = 0; j < model->inputs; j++) {
+            a[i][j] = p->rate[side][i][j] * scale;
+        }
+        x[i] = change[i] * scale;
+    }
+    return linkage_solve(model->inputs, least, a, x);
+}
+
+/* Whether a pose at inputs q misses positions by rounding only: of the inputs, where it moves fast. */
+static inline int linkage_is_at(const linkage_model *model, int side, const linkage_point *p,
+    const linkage_real *q, linkage_real left)
+{
+    linkage_real steepest = 1;
+    int i, j;
+    for (i = 0; i < model->inputs; i++) {
+        for (j = 0; j < model->inputs; j++) {
+            const linkage_real rate = linkage_abs(p->rate[side][i][j]) * model->axis[side][i].scale;
+            steepest = linkage_max(steepest, rate * linkage_max(1, linkage_abs(q[j])));
+        }
+    }
+    /* At an end of the reach the rate is infinite, yet rounding is not. */
+    return left <= LINKAGE_CLOSE * linkage_min(steepest, LINKAGE_STEEPEST);
+}
+
+/* --- the inverse --- */
+
+/* What to look for; returns 0 if a position is not finite. */
+static inline int linkage_aim(const linkage_model *model, int side, const linkage_real *position,
+    const linkage_real *q, linkage_goal *goal)
+{
+    int i;
+    for (i = 0; i < model->inputs; i++) {
+        goal->near[i] = q[i];
+        goal->whole[i] = 0;
+    }
+    for (i = 0; i < model->inputs; i++) {
+        const linkage_axis *axis = &model->axis[side][i];
+        if (!isfinite(position[i])) {
+            return 0;
+        }
+        goal->to[i] = position[i];
+        if (axis->rate != 0) {
+            /* It tells the input; whole turns are taken away, so that they cost no digits. */
+            const int k = axis->input;
+            const linkage_real turn = model->input[k].turn;
+            goal->near[k] = (position[i] - axis->zero) / axis->rate;
+            if (turn > 0) {
+                goal->whole[k] = turn * linkage_floor(goal->near[k] / turn + LINKAGE_HALF);
+                goal->to[i] -= axis->rate * goal->whole[k];
+            }
+        }
+    }
+    return 1;
+}
+
+/* Whether an input is in its reach, or beyond an end by rounding. */
+static inline int linkage_is_within(const linkage_model *model, linkage_real q, linkage_real *inside)
+{
+    int i;
+    for (i = 0; i < model->arcs; i++) {
+        const linkage_real turn = model->input[0].turn;
+        linkage_real gap = q - model->arc[i][0];
+        linkage_real over;
+        if (turn > 0) {
+            gap -= turn * linkage_floor(gap / turn + LINKAGE_HALF);
+        }
+        over = linkage_abs(gap) - model->arc[i][1];
+        if (over <= LINKAGE_SLACK) {
+            *inside = q;
+            if (over > 0) {
+                *inside += gap > 0 ? -over : over;
+            }
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* Add the whole turns to x that bring it nearest to the goal; returns how far it is from there, -1 if
+   not allowed. A command has to be in the sweeps. What is measured may be outside, which counts ten
+   times more. */
+static inline linkage_real linkage_bring(const linkage_model *model, int side,
+    const linkage_goal *goal, const linkage_real *x, linkage_real *q)
+{
+    linkage_real away = 0;
+    int i;
+    for (i = 0; i < model->inputs; i++) {
+        const linkage_real *sweep = model->input[i].sweep;
+        const linkage_real turn = model->turn[side][i];
+        linkage_real outside;
+        q[i] = x[i] + goal->whole[i];
+        if (turn > 0) {
+            linkage_real near = goal->near[i];
+            if (side == LINKAGE_JOINTS) {
+                near = linkage_min(linkage_max(near, sweep[0]), sweep[1]);
+            }
+            q[i] += turn * linkage_floor((near - q[i]) / turn + LINKAGE_HALF);
+            if (side == LINKAGE_JOINTS && q[i] < sweep[0]) {
+                q[i] += turn;
+            } else if (side == LINKAGE_JOINTS && q[i] > sweep[1]) {
+                q[i] -= turn;
+            }
+        }
+        outside = linkage_max(sweep[0] - q[i], q[i] - sweep[1]);
+        if (side == LINKAGE_JOINTS && outside > 0) {
+            return -1;
+        }
+        away += linkage_abs(q[i] - goal->near[i]) + 10 * linkage_max(outside, 0);
+    }
+    return isfinite(away) ? away : -1;
+}
+
+/* Give the positions of a pose at x the whole turns of q. */
+static inline void linkage_count_turns(const linkage_model *model, const linkage_real *x,
+    const linkage_real *q, linkage_point *p)
+{
+    int side, i;
+    for (side = LINKAGE_ACTUATORS; side <= LINKAGE_JOINTS; side++) {
+        for (i = 0; i < model->inputs; i++) {
+            const linkage_axis *axis = &model->axis[side][i];
+            if (axis->rate != 0) {
+                p->position[side][i] += axis->rate * (q[axis->input] - x[axis->input]);
+            }
+        }
+    }
+}
+
+/* Newton's method from a pose at inputs q to positions: each step comes nearer, and stays on its side
+   of singular poses. Returns 0, with any q, if it does not get there. */
+static inline int linkage_refine(const linkage_model *model, int side, const linkage_real *to,
+    linkage_real *q, linkage_point *p)
+{
+    linkage_point next;
+    linkage_real gap[LINKAGE_MAX_INPUTS], moved[LINKAGE_MAX_INPUTS];
+    linkage_real x[LINKAGE_MAX_INPUTS], y[LINKAGE_MAX_INPUTS];
+    linkage_real share = 1;
+    linkage_real left = linkage_gap(model, side, to, p, gap);
+    int i, step, sign;
+    if (left <= LINKAGE_ENOUGH) {
+        return 1;
+    }
+    sign = linkage_input_change(model, side, p, LINKAGE_LEAST, gap, x);
+    for (step = 1; step < LINKAGE_CLOSED_POSES && sign != 0 && left > LINKAGE_ENOUGH; step++) {
+        linkage_real now = left;
+        linkage_real longest = LINKAGE_HALF;
+        int other = 0;
+        for (i = 0; i < model->inputs; i++) {
+            longest = linkage_max(longest, linkage_abs(x[i]));
+        }
+        for (i = 0; i < model->inputs; i++) {
+            moved[i] = q[i] + share * LINKAGE_HALF / longest * x[i];
+        }
+        if (model->at(moved, &next)) {
+            now = linkage_gap(model, side, to, &next, gap);
+        }
+        if (now < left) {
+            other = linkage_input_change(model, side, &next, LINKAGE_LEAST, gap, y);
+        }
+        if (now < left && (other == sign || now <= LINKAGE_CLOSE)) {
+            *p = next;
+            left = now;
+            sign = other;
+            share = 1;
+            for (i = 0; i < model->inputs; i++) {
+                q[i] = moved[i];
+                x[i] = y[i];
+            }
+        } else if (left <= LINKAGE_CLOSE) {
+            break;
+        } else {
+            share /= 2;
+        }
+    }
+    return linkage_is_at(model, side, p, q, left);
+}
+
+/* From a start to positions; returns 0 if they are not reached in this assembly. */
+static inline int linkage_reach(const linkage_model *model, int side, const linkage_goal *goal,
+    linkage_real most, linkage_real *x, linkage_point *p)
+{
+    linkage_real gap[LINKAGE_MAX_INPUTS];
+    /* A start may be beyond an end of the reach by rounding. */
+    if (!model->at(x, p)
+        && !(linkage_is_within(model, x[0], &x[0]) && model->at(x, p))) {
+        return 0;
+    }
+    return linkage_gap(model, side, goal->to, p, gap) <= most
+        && linkage_refine(model, side, goal->to, x, p);
+}
+
+/* The inputs nearest to those of the goal, of the starts; what an axis counts is known. If no start
+   leads there, by Newton's method from the near ones. */
+static inline int linkage_choose(const linkage_model *model, int side, const linkage_goal *goal,
+    int count, linkage_start *start, linkage_real *q, linkage_point *p)
+{
+    linkage_real x[LINKAGE_MAX_INPUTS];
+    linkage_real inside;
+    int i, k;
+    for (k = 0; k < count; k++) {
+        for (i = 0; i < model->inputs; i++) {
+            const linkage_axis *axis = &model->axis[side][i];
+            if (axis->rate != 0) {
+                start[k].q[axis->input] = goal->near[axis->input] - goal->whole[axis->input];
+            }
+        }
+        start[k].away = linkage_bring(model, side, goal, start[k].q, q);
+        if (model->arcs > 0 && !linkage_is_within(model, start[k].q[0], &inside)) {
+            start[k].away = -1;
+        }
+    }
+    for (;;) {
+        linkage_start *nearest = 0;
+        for (k = 0; k < count; k++) {
+            if (start[k].away >= 0 && (!nearest || start[k].away < nearest->away)) {
+                nearest = &start[k];
+            }
+        }
+        if (!nearest) {
+            break;
+        }
+        nearest->away = -1;
+        if (linkage_reach(model, side, goal, LINKAGE_OTHER, nearest->q, p)
+            && linkage_bring(model, side, goal, nearest->q, q) >= 0) {
+            linkage_count_turns(model, nearest->q, q, p);
+            return 1;
+        }
+    }
+    for (i = 0; i < model->inputs; i++) {
+        const linkage_real turn = model->input[i].turn;
+        x[i] = goal->near[i] - goal->whole[i];
+        if (turn > 0) {
+            x[i] -= turn * linkage_floor(x[i] / turn + LINKAGE_HALF);
+        }
+    }
+    if (linkage_reach(model, side, goal, LINKAGE_FAR, x, p)
+        && linkage_bring(model, side, goal, x, q) >= 0) {
+        linkage_count_turns(model, x, q, p);
+        return 1;
+    }
+    return 0;
+}
+
+/* Search a position in a piece of the reach, by Newton's method between brackets. */
+static inline int linkage_search_piece(const linkage_model *model, int side,
+    const linkage_piece *piece, linkage_real position, linkage_real near, linkage_real *x,
+    linkage_point *p)
+{
+    const linkage_real turn = model->turn[side][0];
+    const linkage_real range = piece->position[1] - piece->position[0];
+    const linkage_real middle = (piece->q[0] + piece->q[1]) / 2;
+    const linkage_real scale = model->axis[side][0].scale;
+    linkage_real low = piece->q[0];
+    linkage_real high = piece->q[1];
+    linkage_real left = LINKAGE_FAR;
+    linkage_real gap, inside, next;
+    int step;
+    p->position[side][0] = (piece->position[0] + piece->position[1]) / 2;
+    (void)linkage_gap(model, side, &position, p, &gap);
+    inside = (linkage_abs(range) / 2 - linkage_abs(gap)) * scale;
+    if (!(inside >= -LINKAGE_CLOSE)) {
+        return 0;
+    }
+    next = low + (high - low) * (LINKAGE_HALF + gap / range);
+    if (turn > 0) {
+        near -= turn * linkage_floor((near - middle) / turn + LINKAGE_HALF);
+    }
+    if (inside <= LINKAGE_CLOSE) {
+        next = next > middle ? high : low;
+    } else if (near > low && near < high) {
+        next = near;
+    }
+    for (step = 0; step < LINKAGE_SEARCH_POSES; step++) {
+        const linkage_real before = left;
+        int is_at = 0;
+        *x = next;
+        if (!model->at(x, p)) {
+            /* Beyond an end by rounding. */
+            if (*x < middle) {
+                low = *x;
+            } else {
+                high = *x;
+            }
+            next = (low + high) / 2;
+        } else {
+            left = linkage_gap(model, side, &position, p, &gap);
+            is_at = linkage_is_at(model, side, p, x, left);
+            if (left <= LINKAGE_ENOUGH || (left <= LINKAGE_CLOSE && left > before / 2)) {
+                return is_at;
+            }
+            if ((gap > 0) == (range > 0)) {
+                low = *x;
+            } else {
+                high = *x;
+            }
+            next = *x + gap / p->rate[side][0][0];
+            if (!(next > low && next < high) || left > before / 2) {
+                next = (low + high) / 2;
+            }
+        }
+        if (!(next > low && next < high)) {
+            return is_at;
+        }
+    }
+    return 0;
+}
+
+/* The input nearest to q, searched in all pieces of the reach that have the position. */
+static inline int linkage_search(const linkage_model *model, int side, int count,
+    const linkage_piece *piece, const linkage_real *position, linkage_real *q, linkage_point *p)
+{
+    const linkage_goal goal = { { 0 }, { q[0] }, { 0 } };
+    linkage_real best = -1;
+    int k;
+    for (k = 0; k < count && isfinite(position[0]); k++) {
+        linkage_point found;
+        linkage_real x, brought, away;
+        if (!linkage_search_piece(model, side, &piece[k], position[0], goal.near[0], &x, &found)) {
+            continue;
+        }
+        away = linkage_bring(model, side, &goal, &x, &brought);
+        if (away >= 0 && (best < 0 || away < best)) {
+            best = away;
+            *q = brought;
+            *p = found;
+            linkage_count_turns(model, &x, q, p);
+        }
+    }
+    return best >= 0;
+}
+
+/* --- actuators and joints --- */
+
+/* Sample i of the inputs, all over their ranges; 0 is where they start. */
+static inline void linkage_sample(const linkage_model *model, long i, linkage_real *q)
+{
+    int k;
+    for (k = 0; k < model->inputs; k++) {
+        const linkage_input *input = &model->input[k];
+        const linkage_real x = input->step * (linkage_real)i;
+        q[k] = i ? input->low + input->width * (x - linkage_floor(x)) : input->start;
+    }
+}
+
+/* Initialize the memory and find a first pose; returns 0 if there is none. */
+static inline int linkage_begin(const linkage_model *model, linkage_memory *m)
+{
+    int i;
+    memset(m, 0, sizeof *m);
+    m->newer = LINKAGE_JOINTS;
+    for (i = 0; i < model->inputs; i++) {
+        m->held[LINKAGE_ACTUATORS].position[i] = LINKAGE_NAN;
+        m->held[LINKAGE_JOINTS].position[i] = LINKAGE_NAN;
+    }
+    for (i = 0; i < LINKAGE_SAMPLES; i++) {
+        linkage_sample(model, i, m->q[LINKAGE_JOINTS]);
+        if (model->at(m->q[LINKAGE_JOINTS], &m->point[LINKAGE_JOINTS])) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+static inline int linkage_are_finite(int n, const linkage_real *x)
+{
+    int i;
+    for (i = 0; i < n; i++) {
+        if (!isfinite(x[i])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* Find the pose of positions, and keep it as the newest; returns a status. */
+static inline int linkage_move(const linkage_model *model, linkage_inverse *inverse,
+    linkage_memory *m, int side, const linkage_real *position)
+{
+    const int other = 1 - side;
+    linkage_point p = m->point[m->newer];
+    linkage_real q[LINKAGE_MAX_INPUTS], gap[LINKAGE_MAX_INPUTS];
+    int i, is_there;
+    if (!linkage_are_finite(model->inputs, position)) {
+        return LINKAGE_NOT_KNOWN;
+    }
+    /* Where it is already needs no search; but a command has to be in the sweep. */
+    is_there = m->is_known && linkage_gap(model, side, position, &p, gap) <= LINKAGE_ENOUGH;
+    for (i = 0; i < model->inputs; i++) {
+        const linkage_real *sweep = model->input[i].sweep;
+        q[i] = m->q[m->newer][i];
+        if (side == LINKAGE_JOINTS && !(q[i] >= sweep[0] && q[i] <= sweep[1])) {
+            is_there = 0;
+        }
+    }
+    if (!is_there && !inverse(position, q, &p)) {
+        return LINKAGE_OUT_OF_REACH;
+    }
+    if (!linkage_are_finite(model->inputs, p.position[other])) {
+        return LINKAGE_OUT_OF_REACH;
+    }
+    m->newer = side;
+    m->is_known = 1;
+    m->point[side] = p;
+    for (i = 0; i < model->inputs; i++) {
+        m->q[side][i] = q[i];
+        m->held[other].position[i] = p.position[other][i];
+    }
+    return LINKAGE_OK;
+}
+
+/* Velocities of the other side at the newest pose, 0 where they are not OK; returns a status, from
+   that of the positions: velocities alone are those at the last pose. */
+static inline int linkage_velocities(const linkage_model *model, const linkage_memory *m, int side,
+    int status, const linkage_real *velocity, linkage_real *other)
+{
+    const linkage_point *p = &m->point[m->newer];
+    linkage_real x[LINKAGE_MAX_INPUTS];
+    int i, j;
+    if (status == LINKAGE_NOT_KNOWN && m->is_known) {
+        status = LINKAGE_OK;
+    }
+    if (!linkage_are_finite(model->inputs, velocity)) {
+        status |= LINKAGE_NOT_KNOWN;
+    }
+    if (status == LINKAGE_OK
+        && !linkage_input_change(model, side, p, LINKAGE_SINGULAR, velocity, x)) {
+        status = LINKAGE_SINGULAR_POSE;
+    }
+    for (i = 0; i < model->inputs; i++) {
+        other[i] = 0;
+        for (j = 0; j < model->inputs && status == LINKAGE_OK; j++) {
+            other[i] += p->rate[1 - side][i][j] * x[j];
+        }
+        if (!isfinite(other[i])) {
+            other[i] = 0;
+            status = LINKAGE_SINGULAR_POSE;
+        }
+    }
+    return status;
+}
+
+/* Efforts of the other side at a pose; returns a status. The power of the actuators is that of the
+   joints less that of the loads. */
+static inline int linkage_efforts(const linkage_model *model, const linkage_point *p, int side,
+    const linkage_real *effort, linkage_real *other)
+{
+    linkage_real a[LINKAGE_MAX_INPUTS][LINKAGE_MAX_INPUTS];
+    int i, j;
+    if (!linkage_are_finite(model->inputs, effort)) {
+        return LINKAGE_NOT_KNOWN;
+    }
+    for (i = 0; i < model->inputs; i++) {
+        other[i] = side == LINKAGE_JOINTS ? p->load[i] : -p->load[i];
+        for (j = 0; j < model->inputs; j++) {
+            other[i] += p->rate[side][j][i] * effort[j];
+            a[i][j] = p->rate[1 - side][j][i] * model->axis[1 - side][j].scale;
+        }
+    }
+    if (!linkage_solve(model->inputs, LINKAGE_SINGULAR, a, other)) {
+        return LINKAGE_SINGULAR_POSE;
+    }
+    for (i = 0; i < model->inputs; i++) {
+        other[i] *= model->axis[1 - side][i].scale;
+    }
+    return linkage_are_finite(model->inputs, other) ? LINKAGE_OK : LINKAGE_SINGULAR_POSE;
+}
+
+/* Copy the values that are finite. */
+static inline void linkage_copy(int n, const linkage_real *from, linkage_real *to)
+{
+    int i;
+    for (i = 0; i < n; i++) {
+        if (isfinite(from[i])) {
+            to[i] = from[i];
+        }
+    }
+}
+
+/* From the actuators' positions, velocities and efforts to the joints'. Returns a status: where it is
+   not OK, positions and efforts are the last measured ones, and velocities 0. */
+static inline int linkage_to_joints(const linkage_model *model, linkage_inverse *inverse,
+    linkage_memory *m, const linkage_side *from, linkage_side *to)
+{
+    linkage_side *held = &m->held[LINKAGE_JOINTS];
+    linkage_real made[LINKAGE_MAX_INPUTS];
+    const int n = model->inputs;
+    int position, velocity, effort = LINKAGE_NOT_KNOWN;
+    /* Where an actuator is measured is newer than its command, within the reach or not. */
+    linkage_copy(n, from->position, m->held[LINKAGE_ACTUATORS].position);
+
+    position = linkage_move(model, inverse, m, LINKAGE_ACTUATORS, from->position);
+    linkage_copy(n, held->position, to->position);
+
+    velocity = linkage_velocities(model, m, LINKAGE_ACTUATORS, position, from->velocity, made);
+    linkage_copy(n, made, to->velocity);
+
+    if (m->is_known) {
+        effort = linkage_efforts(model, &m->point[m->newer], LINKAGE_ACTUATORS, from->effort, made);
+    }
+    if (effort == LINKAGE_OK) {
+        linkage_copy(n, made, held->effort);
+    }
+    linkage_copy(n, held->effort, to->effort);
+    return position | velocity | effort;
+}
+
+/* The same from the joints to the actuators, to the inputs nearest to the last ones. Out of reach the
+   actuators are commanded to where they are: what was last commanded or measured, whichever is newer.
+   What is not commanded, NaN, is not written. */
+static inline int linkage_to_actuators(const linkage_model *model, linkage_inverse *inverse,
+    linkage_memory *m, const linkage_side *from, linkage_side *to)
+{
+    const int before = m->newer, was_known = m->is_known;
+    linkage_side *held = &m->held[LINKAGE_ACTUATORS];
+    linkage_real made[LINKAGE_MAX_INPUTS];
+    const int n = model->inputs;
+    int i, position, velocity, effort = LINKAGE_NOT_KNOWN;
+    /* Efforts act where the actuators are, not where they are commanded to be. */
+    const linkage_point here = m->point[before];
+
+    position = linkage_move(model, inverse, m, LINKAGE_JOINTS, from->position);
+    if (position != LINKAGE_NOT_KNOWN) {
+        linkage_copy(n, held->position, to->position);
+    }
+
+    velocity = linkage_velocities(model, m, LINKAGE_JOINTS, position, from->velocity, made);
+    if (!(velocity & LINKAGE_NOT_KNOWN)) {
+        linkage_copy(n, made, to->velocity);
+    }
+
+    if (m->is_known) {
+        effort = linkage_efforts(model, was_known ? &here : &m->point[m->newer], LINKAGE_JOINTS,
+            from->effort, made);
+    }
+    for (i = 0; i < n && effort != LINKAGE_SINGULAR_POSE; i++) {
+        /* What was commanded before a pause is not held after it. */
+        held->effort[i] = effort == LINKAGE_OK ? made[i] : 0;
+    }
+    if (effort != LINKAGE_NOT_KNOWN) {
+        linkage_copy(n, held->effort, to->effort);
+    }
+    return position | velocity | effort;
+}
+
+#endif /* LINKAGE_ROS_LINKAGE_H */
+#if LINKAGE_FLOAT != 1 || LINKAGE_MAX_INPUTS < 1
+#error "lever computes in float and has 1 inputs: define LINKAGE_FLOAT as 1 and LINKAGE_MAX_INPUTS as 1 or more"
+#endif
 
 /* Where the joints are, and each link to its parent. */
 typedef struct {
@@ -34,617 +858,266 @@ typedef struct {
     float slide_slide;            /* [m] */
 } lever_pose;
 
+/* The pose, and its rates by crank. Returns 0 if a limit is exceeded. */
+LINKAGE_FORMULA int lever_formulas(float crank, lever_pose *p, lever_pose *by_crank)
+{
+    const float length_a = 0.02f;
+    const float k7 = -0.045f; /* -b */
+    const float k10 = -0.045f; /* -b */
+    const float k29 = 0.04f; /* 2 * a */
+    const float k33 = 0.025f; /* b - a */
+    const float k34 = 0.000625f; /* (b - a) * (b - a) */
+    const float k37 = 0.0036f; /* (4 * b) * a */
+    const float k43 = 1.0f;
+    const float k61 = 0.081f; /* 1.8 * b */
+    const float k80 = 0.000625f;
+    const float k87 = 0.0f; /* (8.88178e-16 * abs(e)) * ((abs(e) + b) + a) */
+    const float k89 = -0.025f; /* a - b */
+    const float k90 = 0.09f; /* 2 * b */
+    const float x0 = crank;
+    /* O ground 0 0 */
+    p->O_x = 0.0f;
+    p->O_y = 0.0f;
+    by_crank->O_x = 0.0f;
+    by_crank->O_y = 0.0f;
+    /* Q ground 0 -b */
+    p->Q_x = 0.0f;
+    p->Q_y = k10;
+    by_crank->Q_x = 0.0f;
+    by_crank->Q_y = 0.0f;
+    /* A crank O a up */
+    const float v14 = 0.5f * x0;
+    const float v15 = sinf(v14);
+    const float v17 = cosf(v14);
+    const float v21 = -(((2.0f * v15) * v17) * length_a);
+    const float v25 = (1.0f - (2.0f * (v15 * v15))) * length_a;
+    p->A_x = v21;
+    p->A_y = v25;
+    p->angle_crank = x0;
+    by_crank->A_x = (-v25);
+    by_crank->A_y = v21;
+    by_crank->angle_crank = linkage_gated(1.0f, fabsf(x0), 0.0f);
+    /* L slot Q A e out max(1.8*b,a+b) */
+    const float v38 = v17 * v17;
+    const float v39 = k37 * v38;
+    const float v40 = k34 + v39;
+    const float v47 = linkage_gated(v40, ((v38 + k43) - 7.888609e-31f), 0.0f);
+    const float v48 = linkage_gated((-((k29 * v15) * v17)), v47, 0.0f);
+    const float v52 = linkage_gated((k33 + (k29 * v38)), v47, 0.0f);
+    const float v55 = sqrtf(((v48 * v48) + (v52 * v52)));
+    const float v56 = v48 / v55;
+    const float v63 = v52 / v55;
+    const float v88 = linkage_root((k80 + v39), k87);
+    const float v95 = ((length_a * (k89 + (k90 * v38))) / v40) + 0.0f;
+    p->L_x = (v56 * k61);
+    p->L_y = (k7 + (v63 * k61));
+    p->angle_lever = linkage_angle((-v56), v63);
+    p->slide_slide = v88;
+    by_crank->L_x = (-((v95 * v63) * k61));
+    by_crank->L_y = ((v95 * v56) * k61);
+    by_crank->angle_lever = v95;
+    by_crank->slide_slide = (-(((((v15 * 0.5f) * v17) * 2.0f) * k37) / (2.0f * v88)));
+    return 1;
+}
+
 /* Place the joints. Return 0 if not all can be assembled: NaN is what cannot. */
 static inline int lever_solve(float crank, lever_pose *p)
 {
-    const float k7 = (-0.045f);
-    const float k10 = (-0.045f);
-    const float k19 = 0.02f;
-    const float k26 = 0.04f;
-    const float k30 = 0.025f;
-    const float k31 = 0.000625f;
-    const float k34 = 0.0036f;
-    const float k40 = 1.0f;
-    const float k58 = 0.081f;
-    const float k77 = 0.000625f;
-    const float k84 = 0.0f;
-    const float x0 = crank;
-    const float v14 = (0.5f * x0);
-    const float v15 = sinf(v14);
-    const float v17 = cosf(v14);
-    const float v35 = (v17 * v17);
-    const float v36 = (k34 * v35);
-    const float v44 = lever_gated((k31 + v36), ((v35 + k40) - 7.888609e-31f), 0.0f);
-    const float v45 = lever_gated((-((k26 * v15) * v17)), v44, 0.0f);
-    const float v49 = lever_gated((k30 + (k26 * v35)), v44, 0.0f);
-    const float v52 = sqrtf(((v45 * v45) + (v49 * v49)));
-    const float v53 = (v45 / v52);
-    const float v60 = (v49 / v52);
-    p->O_x = 0.0f;
-    p->O_y = 0.0f;
-    p->Q_x = 0.0f;
-    p->Q_y = k10;
-    p->A_x = (-(((2.0f * v15) * v17) * k19));
-    p->A_y = ((1.0f - (2.0f * (v15 * v15))) * k19);
-    p->L_x = (v53 * k58);
-    p->L_y = (k7 + (v60 * k58));
-    p->angle_crank = x0;
-    p->angle_lever = atan2f((-v53), v60);
-    p->slide_slide = lever_root((k77 + v36), k84);
-    return isfinite(p->O_x)
-        && isfinite(p->O_y)
-        && isfinite(p->Q_x)
-        && isfinite(p->Q_y)
-        && isfinite(p->A_x)
-        && isfinite(p->A_y)
-        && isfinite(p->L_x)
-        && isfinite(p->L_y)
-        && isfinite(p->angle_crank)
-        && isfinite(p->angle_lever)
-        && isfinite(p->slide_slide);
+    lever_pose by_crank;
+    (void)lever_formulas(crank, p, &by_crank);
+    return isfinite(p->O_x + p->O_y + p->Q_x + p->Q_y + p->A_x + p->A_y + p->L_x + p->L_y
+        + p->angle_crank + p->angle_lever + p->slide_slide);
 }
 
 /* Differentiate all of it by crank. */
 static inline void lever_rates(float crank, lever_pose *by_crank)
 {
-    const float k10 = 0.02f;
-    const float k19 = (-0.025f);
-    const float k20 = 0.09f;
-    const float k25 = 0.025f;
-    const float k26 = 0.000625f;
-    const float k29 = 0.0036f;
-    const float k34 = 0.04f;
-    const float k39 = 1.0f;
-    const float k59 = 0.081f;
-    const float k83 = 0.000625f;
-    const float k90 = 0.0f;
-    const float x0 = crank;
-    const float v5 = (0.5f * x0);
-    const float v6 = sinf(v5);
-    const float v14 = cosf(v5);
-    const float v21 = (v14 * v14);
-    const float v30 = (k29 * v21);
-    const float v31 = (k26 + v30);
-    const float v33 = (((k10 * (k19 + (k20 * v21))) / v31) + 0.0f);
-    const float v43 = lever_gated(v31, ((v21 + k39) - 7.888609e-31f), 0.0f);
-    const float v44 = lever_gated((k25 + (k34 * v21)), v43, 0.0f);
-    const float v48 = lever_gated((-((k34 * v6) * v14)), v43, 0.0f);
-    const float v52 = sqrtf(((v48 * v48) + (v44 * v44)));
-    by_crank->O_x = 0.0f;
-    by_crank->O_y = 0.0f;
-    by_crank->Q_x = 0.0f;
-    by_crank->Q_y = 0.0f;
-    by_crank->A_x = (-((1.0f - (2.0f * (v6 * v6))) * k10));
-    by_crank->A_y = (-(((2.0f * v6) * v14) * k10));
-    by_crank->L_x = (-((v33 * (v44 / v52)) * k59));
-    by_crank->L_y = ((v33 * (v48 / v52)) * k59);
-    by_crank->angle_crank = lever_gated(1.0f, fabsf(x0), 0.0f);
-    by_crank->angle_lever = v33;
-    by_crank->slide_slide = (-(((((v6 * 0.5f) * v14) * 2.0f) * k29) / (2.0f * lever_root((k83 + v30), k90))));
+    lever_pose p;
+    (void)lever_formulas(crank, &p, by_crank);
 }
 
-/* Whether it can be assembled: [-3.14159, 3.14159] rad. */
-static inline int lever_reaches(float crank)
-{
-    return isfinite(crank);
-}
-
-/* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep, or not found
-   by a search. SINGULAR: a velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or
-   infinite, which of a command means that there is none. */
-enum { LEVER_OK = 0, LEVER_OUT_OF_REACH = 1, LEVER_SINGULAR = 2, LEVER_NOT_KNOWN = 4 };
+enum {
+    LEVER_OK = LINKAGE_OK,
+    LEVER_OUT_OF_REACH = LINKAGE_OUT_OF_REACH,
+    LEVER_SINGULAR = LINKAGE_SINGULAR_POSE,
+    LEVER_NOT_KNOWN = LINKAGE_NOT_KNOWN
+};
 enum { LEVER_ACTUATOR_LEVER_CRANK = 0 };
 enum { LEVER_JOINT_LEVER_LEVER = 0 };
 /* Actuators: lever_crank [rad]; joints: lever_lever [rad]. */
-typedef struct { float position[1], velocity[1], effort[1]; } lever_side;
-typedef lever_side lever_actuators;
-typedef lever_side lever_joints;
+typedef linkage_side lever_actuators;
+typedef linkage_side lever_joints;
+typedef linkage_memory lever_memory;
 
-/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and the inputs'
-   efforts against the loads. */
-typedef struct { float position[2][1], rate[2][1][1], load[1]; } lever_point;
-
-/* The state between calls, which lever_begin initializes: the last poses and inputs by measured
-   actuators [0] and by commanded joints [1], which of them is newer, and whether there is one; what
-   is held: the actuators [0] where they were last commanded or measured, whichever is newer, and the
-   joints [1] where they were last measured. NaN was never there. */
-typedef struct {
-    lever_point point[2];
-    float input[2][1];
-    int newer, is_known;
-    lever_side held[2];
-} lever_memory;
-
-/* The scene's names. */
-static inline const char *lever_name(int side, int i)
+/* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be assembled. */
+static inline int lever_at(const float *q, linkage_point *p)
 {
-    static const char *const name[2][1] = { { "lever_crank" }, { "lever_lever" } };
-    return name[side][i];
-}
-
-/* Place it at inputs, each in rad or in its size; 0 if it cannot be assembled. */
-static inline int lever_at(const float *q, int is_rated, lever_point *p)
-{
-    const float k2 = 0.02f;
-    const float k3 = 0.04f;
-    const float k12 = 0.025f;
-    const float k13 = 0.000625f;
-    const float k16 = 0.0036f;
-    const float k24 = 1.0f;
-    const float k37 = (-0.025f);
-    const float k38 = 0.09f;
-    const float x0 = q[0];
-    const float v5 = (0.5f * x0);
-    const float v8 = cosf(v5);
-    const float v17 = (v8 * v8);
-    const float v19 = (k13 + (k16 * v17));
-    const float v28 = lever_gated(v19, ((v17 + k24) - 7.888609e-31f), 0.0f);
-    p->position[0][0] = x0;
-    p->position[1][0] = atan2f((-lever_gated((-((k3 * sinf(v5)) * v8)), v28, 0.0f)), lever_gated((k12 + (k3 * v17)), v28, 0.0f));
-    if (!isfinite(p->position[0][0] + p->position[1][0]))
+    lever_pose s, by_crank;
+    if (!lever_formulas(q[0], &s, &by_crank)) {
         return 0;
-    if (!is_rated)
-        return 1;
-    p->rate[0][0][0] = lever_gated(1.0f, fabsf(x0), 0.0f);
-    p->rate[1][0][0] = (((k2 * (k37 + (k38 * v17))) / v19) + 0.0f);
+    }
+    p->position[0][0] = s.angle_crank;
+    p->position[1][0] = s.angle_lever;
+    p->rate[0][0][0] = by_crank.angle_crank;
+    p->rate[1][0][0] = by_crank.angle_lever;
     p->load[0] = 0.0f;
-    return 1;
+    return isfinite(p->position[0][0] + p->position[1][0]);
 }
 
-/* Place it at inputs, each in rad or in its size; 0 if it cannot be assembled. */
-static inline int lever_at_angle_lever(const float *q, int is_rated, lever_point *p)
+/* Tables of the actuators and joints, see linkage_model. */
+static const linkage_model lever_model = {
+    1, lever_at,
+    { { { "lever_crank", 1.0f, 0.0f, 0, 1.0f, 0.0f } },
+      { { "lever_lever", 1.0f, 6.2831855f, 0, 0.0f, 0.0f } } },
+    { { 6.2831855f, 0.0f, -3.1415927f, 6.2831855f, 0.41421357f, { -1e+30f, 1e+30f } } },
+    { { 0.0f }, { 6.2831855f } },
+    0, 0
+};
+
+/* From positions to the inputs nearest to q. By their gears, 8 poses at most. */
+static inline int lever_from_actuators(const float *position, float *q, linkage_point *p)
 {
-    const float k1 = 0.02f;
-    const float k2 = 0.04f;
-    const float k12 = 0.025f;
-    const float k13 = 0.000625f;
-    const float k16 = 0.0036f;
-    const float k24 = 1.0f;
-    const float k35 = (-0.025f);
-    const float k36 = 0.09f;
-    const float x0 = q[0];
-    const float v5 = (0.5f * x0);
-    const float v8 = cosf(v5);
-    const float v17 = (v8 * v8);
-    const float v19 = (k13 + (k16 * v17));
-    const float v28 = lever_gated(v19, ((v17 + k24) - 7.888609e-31f), 0.0f);
-    p->position[1][0] = atan2f((-lever_gated((-((k2 * sinf(v5)) * v8)), v28, 0.0f)), lever_gated((k12 + (k2 * v17)), v28, 0.0f));
-    if (!isfinite(p->position[1][0]))
+    linkage_goal goal;
+    linkage_start start[1] = { { { 0 }, 0 } };
+    if (!linkage_aim(&lever_model, 0, position, q, &goal)) {
         return 0;
-    if (!is_rated)
-        return 1;
-    p->rate[1][0][0] = (((k1 * (k35 + (k36 * v17))) / v19) + 0.0f);
-    p->load[0] = 0.0f;
-    return 1;
+    }
+    return linkage_choose(&lever_model, 0, &goal, 1, start, q, p);
 }
 
-/* One over the size of a position; or half the turn after which it is the same again, or 0. */
-static inline float lever_scale(int side, int i, int is_turn)
-{
-    static const float scale[3][1][2] = { { { 1.0f, 0.0f } }, { { 1.0f, 3.1415927f } }, { { 1.0f, 3.1415927f } } };
-    return scale[side][i][is_turn];
-}
-
-/* Gaps from a pose to positions, the shorter way round; returns the largest, in sizes. */
-static inline float lever_gap(const float to[1], const lever_point *p, int side, float gap[1])
-{
-    float most = 0;
-    int i;
-    for (i = 0; i < 1; i++) {
-        const float half = lever_scale(side, i, 1);
-        gap[i] = to[i] - p->position[side > 0][i];
-        if (half > 0 && fabsf(gap[i]) > half)
-            gap[i] -= 2 * half * floorf(0.5f * gap[i] / half + 0.5f);
-        most = fmaxf(most, fabsf(gap[i]) * lever_scale(side, i, 0));
-    }
-    return most;
-}
-
-/* Solve rate x = b, or transposed; returns the determinant's sign, 0 where that is singular. */
-static inline int lever_solved(const lever_point *p, int side, int transposed, float least,
-    const float b[1], float x[1])
-{
-    float a[1][1 + 1], most = 1, t;
-    int i, j, k, best, sign = 1;
-    for (i = 0; i < 1; i++) {
-        for (j = 0; j < 1; j++) {
-            a[i][j] = transposed ? p->rate[side > 0][j][i] * lever_scale(side, j, 0)
-                : p->rate[side > 0][i][j] * lever_scale(side, i, 0);
-            if (!isfinite(a[i][j]))
-                return 0;
-            most = fmaxf(most, fabsf(a[i][j]));
-        }
-        a[i][1] = transposed ? b[i] : b[i] * lever_scale(side, i, 0);
-    }
-    for (k = 0; k < 1; k++) {
-        for (best = k, i = k + 1; i < 1; i++)
-            best = fabsf(a[i][k]) > fabsf(a[best][k]) ? i : best;
-        if (!(fabsf(a[best][k]) > least * most))
-            return 0;
-        for (j = k; j <= 1; j++) {
-            t = a[k][j];
-            a[k][j] = a[best][j];
-            a[best][j] = t;
-        }
-        sign = (best == k) == (a[k][k] > 0) ? sign : -sign;
-        for (i = k + 1; i < 1; i++)
-            for (t = a[i][k] / a[k][k], j = k; j <= 1; j++)
-                a[i][j] -= t * a[k][j];
-    }
-    for (i = 1 - 1; i >= 0; i--) {
-        for (x[i] = a[i][1], j = i + 1; j < 1; j++)
-            x[i] -= a[i][j] * x[j];
-        x[i] /= a[i][i];
-    }
-    for (i = 0; i < 1; i++) {
-        x[i] *= transposed ? lever_scale(side, i, 0) : 1;
-        if (!isfinite(x[i]))
-            return 0;
-    }
-    return sign;
-}
-
-/* Whether a pose at inputs q is at positions, but for rounding: of the inputs, where it moves fast. */
-static inline int lever_near(const lever_point *p, int side, const float q[1], float left)
-{
-    float steepest = 1;
-    int i, j;
-    for (i = 0; i < 1; i++)
-        for (j = 0; j < 1; j++)
-            steepest = fmaxf(steepest, fabsf(p->rate[side > 0][i][j]) * lever_scale(side, i, 0)
-                * fmaxf(1, fabsf(q[j])));
-    /* At an end of the reach the rate is infinite, yet rounding is not. */
-    return left <= 4e-06f * fminf(steepest, 1000.0f);
-}
-
-/* Newton's method from inputs q to positions: each step comes nearer, and stays on its side of
-   singular poses. Returns 0, with any q, if it does not converge; -1 if it is strict and q misses
-   by so much that it belongs to another assembly. */
-static inline int lever_reached(int side, int (*at)(const float *, int, lever_point *),
-    int steps, int is_strict, const float position[1], float q[1], lever_point *p)
-{
-    lever_point next;
-    float gap[1], x[1] = { 0 }, y[1] = { 0 }, to[1], share = 1, longest, left, now;
-    int i, sign, other = 0;
-    if (!at(q, side < 2, p))
-        return 0;
-    left = lever_gap(position, p, side, gap);
-    if (left <= 2e-06f)
-        return 1;
-    if (is_strict && left > 0.01f)
-        return -1;
-    if (side > 1 && !at(q, 1, p))
-        return 0;
-    sign = lever_solved(p, side, 0, 1e-05f, gap, x);
-    while (--steps > 0 && sign && left > 2e-06f && share > 0.00024414062f) {
-        for (longest = 1, i = 0; i < 1; i++)
-            longest = fmaxf(longest, fabsf(x[i]) / 0.5f);
-        for (i = 0; i < 1; i++)
-            to[i] = q[i] + share / longest * x[i];
-        now = at(to, 1, &next) ? lever_gap(position, &next, side, gap) : left;
-        if (now < left)
-            other = lever_solved(&next, side, 0, 1e-05f, gap, y);
-        if (now < left && (other == sign || now <= 4e-06f)) {
-            *p = next;
-            left = now;
-            sign = other;
-            share = 1;
-            for (i = 0; i < 1; i++) {
-                q[i] = to[i];
-                x[i] = y[i];
-            }
-        } else
-            share = left <= 4e-06f ? 0 : 0.5f * share;
-    }
-    return lever_near(p, side, q, left);
-}
-
-/* Inputs x plus whole turns, and those that bring them nearest to others; returns how far they are.
-   What is commanded has to be in the sweeps: infinitely far if it is not. What is measured may be
-   outside, which counts as further. */
-static inline float lever_turned(int side, const float turn[1][2], const float whole[1],
-    const float x[1], const float near[1], float q[1])
-{
-    static const float end[1][2] = { { (-INFINITY), (INFINITY) } };
-    float sum = 0, to;
-    int i;
-    for (i = 0; i < 1; i++) {
-        to = near[i];
-        if (side == 1)
-            to = to < end[i][0] ? end[i][0] : to > end[i][1] ? end[i][1] : to;
-        q[i] = x[i] + whole[i];
-        if (turn[i][0] > 0)
-            q[i] += turn[i][0] * floorf((to - q[i]) * turn[i][1] + 0.5f);
-        if (side == 1 && q[i] < end[i][0])
-            q[i] += turn[i][0];
-        else if (side == 1 && q[i] > end[i][1])
-            q[i] -= turn[i][0];
-        sum += fabsf(q[i] - near[i]);
-        if (side < 2 && (q[i] < end[i][0] || q[i] > end[i][1]))
-            sum += side ? (INFINITY) : 10.0f * fabsf(q[i] - end[i][q[i] > end[i][1]]);
-    }
-    return sum;
-}
-
-/* From positions to the inputs nearest to q. By its gear, 4 poses at most. */
-static inline int lever_from_actuators(const float position[1], float q[1], lever_point *p)
-{
-    /* The inputs' turns, and one over them; 0 where there is none. */
-    static const float turn[1][2] = { { 0.0f, 0.0f } };
-    /* Whole turns that a position counts are taken away, so that they cost no digits. */
-    float whole[1] = { 0 }, to[1], near[1];
-    float start[1][1], away[1], far;
-    lever_point found;
-    int i, k, next, ended;
-    for (i = 0; i < 1; i++) {
-        to[i] = position[i];
-        near[i] = q[i];
-    }
-    near[0] = position[0];
-    whole[0] = 6.2831855f * floorf(near[0] * 0.15915494f + 0.5f);
-    to[0] -= whole[0];
-    for (k = 0; k < 1; k++) {
-        start[k][0] = near[0] - whole[0];
-        away[k] = lever_turned(0, turn, whole, start[k], near, q);
-    }
-    for (;;) {
-        for (next = 0, k = 1; k < 1; k++)
-            next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
-        if (!isfinite(away[next]))
-            return 0;
-        far = away[next];
-        ended = lever_reached(0, lever_at, 4, 0, to, start[next], &found);
-        away[next] = ended < 0 ? far + 1000000.0f : (INFINITY);
-        if (ended > 0 && isfinite(lever_turned(0, turn, whole, start[next], near, q))) {
-            *p = found;
-            p->position[0][0] += q[0] - start[next][0];
-            return 1;
-        }
-    }
-}
-
-/* The inputs in each assembly mode, NAN where there is none. */
-static inline void lever_modes_joints(const float position[1],
-    float start[2][1])
+/* The inputs in each assembly mode of the inverse linkage, NAN where there is none:
+     O ground 0.0 0.0
+     Q ground 0.0 -0.045
+     X crank Q 0.081 up
+     A slider O 0.02 Q along X out
+*/
+static inline void lever_modes_joints(const float *position, linkage_start *start)
 {
     const float k26 = 0.70710677f;
     const float k33 = 0.70710677f;
     const float x0 = position[0];
-    const float v3 = (0.5f * x0);
+    /* A left */
+    const float v3 = 0.5f * x0;
     const float v4 = sinf(v3);
     const float v6 = cosf(v3);
-    const float v9 = (((2.0f * v4) * v6) * 0.081f);
-    const float v15 = ((1.0f - (2.0f * (v4 * v4))) * 0.081f);
+    const float v9 = ((2.0f * v4) * v6) * 0.081f;
+    const float v15 = (1.0f - (2.0f * (v4 * v4))) * 0.081f;
     const float v18 = sqrtf(((v9 * v9) + (v15 * v15)));
-    const float v19 = (v9 / v18);
-    const float v35 = ((-(v4 * k26)) + (v6 * k33));
-    const float v43 = ((v6 * k26) + (v4 * k33));
-    const float v48 = (lever_root(((-0.025f) + (0.09f * (v35 * v35))), 5.7731595e-17f) * lever_root(((-0.025f) + (0.09f * (v43 * v43))), 5.7731595e-17f));
-    const float v49 = (v19 * v48);
-    const float v51 = (v15 / v18);
-    const float v53 = (v19 * 0.045f);
-    const float v54 = (v51 * v53);
-    const float v58 = (-(v19 * v53));
-    const float v59 = (v51 * v48);
-    start[0][0] = atan2f((-((-v49) - v54)), (v58 + v59));
-    start[1][0] = atan2f((-(v49 - v54)), (v58 - v59));
-}
-/* From positions to the inputs nearest to q. In closed form, 18 poses at most. */
-static inline int lever_from_joints(const float position[1], float q[1], lever_point *p)
-{
-    /* The inputs' turns, and one over them; 0 where there is none. */
-    static const float turn[1][2] = { { 6.2831855f, 0.15915494f } };
-    /* Whole turns that a position counts are taken away, so that they cost no digits. */
-    float whole[1] = { 0 }, to[1], near[1];
-    float start[3][1], away[3], far;
-    lever_point found;
-    int i, k, next, ended;
-    for (i = 0; i < 1; i++) {
-        to[i] = position[i];
-        near[i] = q[i];
-    }
-    lever_modes_joints(to, start);
-    for (i = 0; i < 1; i++) start[2][i] = q[i] - turn[i][0] * floorf(q[i] * turn[i][1] + 0.5f);
-    for (k = 0; k < 3; k++) {
-        away[k] = lever_turned(1, turn, whole, start[k], near, q);
-    }
-    away[2] = 1000000.0f;
-    for (;;) {
-        for (next = 0, k = 1; k < 3; k++)
-            next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
-        if (!isfinite(away[next]))
-            return 0;
-        far = away[next];
-        ended = lever_reached(1, lever_at, 4, far < 1000000.0f, to, start[next], &found);
-        away[next] = ended < 0 ? far + 1000000.0f : (INFINITY);
-        if (ended > 0 && isfinite(lever_turned(1, turn, whole, start[next], near, q))) {
-            *p = found;
-            p->position[0][0] += q[0] - start[next][0];
-            return 1;
-        }
-    }
+    const float v19 = v9 / v18;
+    const float v35 = (-(v4 * k26)) + (v6 * k33);
+    const float v43 = (v6 * k26) + (v4 * k33);
+    const float v48 = linkage_root((-0.025f + (0.09f * (v35 * v35))), 5.7731595e-17f)
+        * linkage_root((-0.025f + (0.09f * (v43 * v43))), 5.7731595e-17f);
+    const float v49 = v19 * v48;
+    const float v51 = v15 / v18;
+    const float v53 = v19 * 0.045f;
+    const float v54 = v51 * v53;
+    const float v58 = -(v19 * v53);
+    const float v59 = v51 * v48;
+    start[0].q[0] = linkage_angle((-((-v49) - v54)), (v58 + v59));
+    /* A right */
+    start[1].q[0] = linkage_angle((-(v49 - v54)), (v58 - v59));
 }
 
-/* The inputs in each assembly mode, NAN where there is none. */
-static inline void lever_modes_angle_lever(const float position[1],
-    float start[2][1])
+/* From positions to the inputs nearest to q. In closed form, 12 poses at most. */
+static inline int lever_from_joints(const float *position, float *q, linkage_point *p)
 {
-    const float k26 = 0.70710677f;
-    const float k33 = 0.70710677f;
-    const float x0 = position[0];
-    const float v3 = (0.5f * x0);
-    const float v4 = sinf(v3);
-    const float v6 = cosf(v3);
-    const float v9 = (((2.0f * v4) * v6) * 0.081f);
-    const float v15 = ((1.0f - (2.0f * (v4 * v4))) * 0.081f);
-    const float v18 = sqrtf(((v9 * v9) + (v15 * v15)));
-    const float v19 = (v9 / v18);
-    const float v35 = ((-(v4 * k26)) + (v6 * k33));
-    const float v43 = ((v6 * k26) + (v4 * k33));
-    const float v48 = (lever_root(((-0.025f) + (0.09f * (v35 * v35))), 5.7731595e-17f) * lever_root(((-0.025f) + (0.09f * (v43 * v43))), 5.7731595e-17f));
-    const float v49 = (v19 * v48);
-    const float v51 = (v15 / v18);
-    const float v53 = (v19 * 0.045f);
-    const float v54 = (v51 * v53);
-    const float v58 = (-(v19 * v53));
-    const float v59 = (v51 * v48);
-    start[0][0] = atan2f((-((-v49) - v54)), (v58 + v59));
-    start[1][0] = atan2f((-(v49 - v54)), (v58 - v59));
-}
-/* From positions to the inputs nearest to q. In closed form, 18 poses at most. */
-static inline int lever_from_angle_lever(const float position[1], float q[1], lever_point *p)
-{
-    /* The inputs' turns, and one over them; 0 where there is none. */
-    static const float turn[1][2] = { { 6.2831855f, 0.15915494f } };
-    /* Whole turns that a position counts are taken away, so that they cost no digits. */
-    float whole[1] = { 0 }, to[1], near[1];
-    float start[3][1], away[3], far;
-    lever_point found;
-    int i, k, next, ended;
-    for (i = 0; i < 1; i++) {
-        to[i] = position[i];
-        near[i] = q[i];
+    linkage_goal goal;
+    linkage_start start[2] = { { { 0 }, 0 } };
+    if (!linkage_aim(&lever_model, 1, position, q, &goal)) {
+        return 0;
     }
-    lever_modes_angle_lever(to, start);
-    for (i = 0; i < 1; i++) start[2][i] = q[i] - turn[i][0] * floorf(q[i] * turn[i][1] + 0.5f);
-    for (k = 0; k < 3; k++) {
-        away[k] = lever_turned(2, turn, whole, start[k], near, q);
-    }
-    away[2] = 1000000.0f;
-    for (;;) {
-        for (next = 0, k = 1; k < 3; k++)
-            next = away[k] < away[next] || !isfinite(away[next]) ? k : next;
-        if (!isfinite(away[next]))
-            return 0;
-        far = away[next];
-        ended = lever_reached(2, lever_at_angle_lever, 4, far < 1000000.0f, to, start[next], &found);
-        away[next] = ended < 0 ? far + 1000000.0f : (INFINITY);
-        if (ended > 0 && isfinite(lever_turned(2, turn, whole, start[next], near, q))) {
-            *p = found;
-            return 1;
-        }
-    }
-}
-
-/* Sample i of the inputs, all over their ranges; 0 is where they start. */
-static inline void lever_sample(long i, float q[1])
-{
-    static const float range[1][4] = { { 0.0f, (-3.1415927f), 6.2831855f, 0.41421357f } };
-    int k;
-    for (k = 0; k < 1; k++) {
-        const float x = range[k][3] * (float)i;
-        q[k] = i ? range[k][1] + range[k][2] * (x - floorf(x)) : range[k][0];
-    }
+    lever_modes_joints(goal.to, start);
+    return linkage_choose(&lever_model, 1, &goal, 2, start, q, p);
 }
 
 /* Initialize the memory and find a first pose; returns 0 if there is none. */
 static inline int lever_begin(lever_memory *m)
 {
-    static const lever_side none = { { 0 }, { 0 }, { 0 } };
-    int i;
-    m->newer = 1;
-    m->is_known = 0;
-    m->held[0] = m->held[1] = none;
-    for (i = 0; i < 1; i++)
-        m->held[0].position[i] = m->held[1].position[i] = (float)NAN;
-    for (i = 0; i < 4096; i++) {
-        lever_sample(i, m->input[1]);
-        if (lever_at(m->input[1], 1, &m->point[1]))
-            return 1;
-    }
-    return 0;
+    return linkage_begin(&lever_model, m);
 }
 
-static inline int lever_transmit(lever_memory *m, int side, const lever_side *from, lever_side *to)
+/* From actuators to joints, see linkage_to_joints; returns a status. */
+static inline int lever_actuators_to_joints(lever_memory *m, const lever_actuators *from,
+    lever_joints *to)
 {
-    const int other = 1 - side, before = m->newer, was_known = m->is_known;
-    static const float none[1][2] = { { 0 } };
-    lever_side *held = &m->held[other];
-    lever_point found = m->point[before];
-    const lever_point *at;
-    float q[1], x[1], y[1] = { 0 };
-    int i, j, status = LEVER_OK, all;
-    for (i = 0; i < 1; i++) {
-        q[i] = m->input[before][i];
-        status = isfinite(from->position[i]) ? status : LEVER_NOT_KNOWN;
-        /* Where an actuator is measured is newer than its command, within the reach or not. */
-        if (!side && isfinite(from->position[i]))
-            m->held[0].position[i] = from->position[i];
-    }
-    /* Where it is already needs no search; but a command has to be in the sweep. */
-    if (status == LEVER_OK && !(was_known && lever_gap(from->position, &found, side, x) <= 2e-06f
-            && isfinite(lever_turned(side, none, y, q, q, x)))
-            && !(side ? lever_from_joints(from->position, q, &found)
-            : lever_from_actuators(from->position, q, &found)))
-        status = LEVER_OUT_OF_REACH;
-    for (i = 0; status == LEVER_OK && i < 1; i++)
-        status = isfinite(found.position[other][i]) ? LEVER_OK : LEVER_OUT_OF_REACH;
-    if (status == LEVER_OK) {
-        m->newer = side;
-        m->is_known = 1;
-        m->point[side] = found;
-        for (i = 0; i < 1; i++) {
-            m->input[side][i] = q[i];
-            held->position[i] = found.position[other][i];
-        }
-    }
-    /* A position that is not commanded is not written. */
-    for (i = 0; i < 1; i++)
-        if (!(side && status == LEVER_NOT_KNOWN) && isfinite(held->position[i]))
-            to->position[i] = held->position[i];
-    all = status;
-
-    /* Velocities at the newest pose; a held position has velocity 0. */
-    at = &m->point[m->newer];
-    if (status == LEVER_NOT_KNOWN && m->is_known)
-        status = LEVER_OK;
-    for (i = 0; i < 1; i++)
-        status |= isfinite(from->velocity[i]) ? LEVER_OK : LEVER_NOT_KNOWN;
-    if (status == LEVER_OK && !lever_solved(at, side, 0, 0.001f, from->velocity, x))
-        status = LEVER_SINGULAR;
-    for (i = 0; status == LEVER_OK && i < 1; i++)
-        for (j = 0; j < 1; j++)
-            y[i] += at->rate[other][i][j] * x[j];
-    for (i = 0; i < 1; i++)
-        status |= isfinite(y[i]) ? LEVER_OK : LEVER_SINGULAR;
-    for (i = 0; i < 1; i++)
-        if (!(side && status & LEVER_NOT_KNOWN))
-            to->velocity[i] = status == LEVER_OK ? y[i] : 0;
-    all |= status;
-
-    /* Efforts where the actuators are: their power is that of the joints, less that of the loads. */
-    at = &m->point[side && was_known ? before : m->newer];
-    status = m->is_known ? LEVER_OK : LEVER_NOT_KNOWN;
-    for (i = 0; i < 1; i++)
-        status = isfinite(from->effort[i]) ? status : LEVER_NOT_KNOWN;
-    for (i = 0; status == LEVER_OK && i < 1; i++)
-        for (x[i] = side ? at->load[i] : -at->load[i], j = 0; j < 1; j++)
-            x[i] += at->rate[side][j][i] * from->effort[j];
-    if (status == LEVER_OK && !lever_solved(at, other, 1, 0.001f, x, y))
-        status = LEVER_SINGULAR;
-    for (i = 0; i < 1; i++) {
-        /* What was commanded before a pause is not held after it. */
-        if (status != LEVER_SINGULAR && (side || status == LEVER_OK))
-            held->effort[i] = status == LEVER_OK ? y[i] : 0;
-        if (!(side && status == LEVER_NOT_KNOWN))
-            to->effort[i] = held->effort[i];
-    }
-    return all | status;
+    return linkage_to_joints(&lever_model, lever_from_actuators, m, from, to);
 }
 
-/* From the actuators' positions, velocities and efforts to the joints'. Returns a status: where it
-   is not OK, positions and efforts are the last measured ones, and velocities 0. */
-static inline int lever_actuators_to_joints(lever_memory *m, const lever_actuators *from, lever_joints *to)
+/* From joints to actuators, see linkage_to_actuators; returns a status. */
+static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints *from,
+    lever_actuators *to)
 {
-    return lever_transmit(m, 0, from, to);
+    return linkage_to_actuators(&lever_model, lever_from_joints, m, from, to);
 }
 
-/* The same from the joints to the actuators, to the inputs nearest to the last ones. Out of reach
-   the actuators are commanded to where they are: what was last commanded or measured, whichever is
-   newer. What is not commanded, NaN, is not written. */
-static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints *from, lever_actuators *to)
+/* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be assembled. */
+static inline int lever_at_angle_lever(const float *q, linkage_point *p)
 {
-    return lever_transmit(m, 1, from, to);
+    lever_pose s, by_crank;
+    if (!lever_formulas(q[0], &s, &by_crank)) {
+        return 0;
+    }
+    p->position[1][0] = s.angle_lever;
+    p->rate[1][0][0] = by_crank.angle_lever;
+    p->load[0] = 0.0f;
+    return isfinite(p->position[1][0]);
+}
+
+/* Tables of the inverse, see linkage_model. */
+static const linkage_model lever_model_angle_lever = {
+    1, lever_at_angle_lever,
+    { { { 0, 0.0f, 0.0f, 0, 0.0f, 0.0f } },
+      { { "lever", 1.0f, 6.2831855f, 0, 0.0f, 0.0f } } },
+    { { 6.2831855f, 0.0f, -3.1415927f, 6.2831855f, 0.41421357f, { -1e+30f, 1e+30f } } },
+    { { 6.2831855f }, { 6.2831855f } },
+    0, 0
+};
+
+/* The inputs in each assembly mode of the inverse linkage, NAN where there is none:
+     O ground 0.0 0.0
+     Q ground 0.0 -0.045
+     X crank Q 0.081 up
+     A slider O 0.02 Q along X out
+*/
+static inline void lever_modes_angle_lever(const float *position, linkage_start *start)
+{
+    const float k26 = 0.70710677f;
+    const float k33 = 0.70710677f;
+    const float x0 = position[0];
+    /* A left */
+    const float v3 = 0.5f * x0;
+    const float v4 = sinf(v3);
+    const float v6 = cosf(v3);
+    const float v9 = ((2.0f * v4) * v6) * 0.081f;
+    const float v15 = (1.0f - (2.0f * (v4 * v4))) * 0.081f;
+    const float v18 = sqrtf(((v9 * v9) + (v15 * v15)));
+    const float v19 = v9 / v18;
+    const float v35 = (-(v4 * k26)) + (v6 * k33);
+    const float v43 = (v6 * k26) + (v4 * k33);
+    const float v48 = linkage_root((-0.025f + (0.09f * (v35 * v35))), 5.7731595e-17f)
+        * linkage_root((-0.025f + (0.09f * (v43 * v43))), 5.7731595e-17f);
+    const float v49 = v19 * v48;
+    const float v51 = v15 / v18;
+    const float v53 = v19 * 0.045f;
+    const float v54 = v51 * v53;
+    const float v58 = -(v19 * v53);
+    const float v59 = v51 * v48;
+    start[0].q[0] = linkage_angle((-((-v49) - v54)), (v58 + v59));
+    /* A right */
+    start[1].q[0] = linkage_angle((-(v49 - v54)), (v58 - v59));
+}
+
+/* From positions to the inputs nearest to q. In closed form, 12 poses at most. */
+static inline int lever_from_angle_lever(const float *position, float *q, linkage_point *p)
+{
+    linkage_goal goal;
+    linkage_start start[2] = { { { 0 }, 0 } };
+    if (!linkage_aim(&lever_model_angle_lever, 1, position, q, &goal)) {
+        return 0;
+    }
+    lever_modes_angle_lever(goal.to, start);
+    return linkage_choose(&lever_model_angle_lever, 1, &goal, 2, start, q, p);
 }
 
 /* The crank for lever [rad], nearest to `near`, whole turns included. Returns 0, and
@@ -652,10 +1125,11 @@ static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints 
 static inline int lever_crank_for_angle_lever(float value, float near, float *crank)
 {
     float q[1];
-    lever_point p;
+    linkage_point p;
     q[0] = near;
-    if (!(isfinite(value)) || !lever_from_angle_lever(&value, q, &p))
+    if (!lever_from_angle_lever(&value, q, &p)) {
         return 0;
+    }
     *crank = q[0];
     return 1;
 }

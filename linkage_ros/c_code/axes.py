@@ -11,11 +11,11 @@
 """The actuators and the commanded joints of a mechanism, one of each for every input."""
 
 import math
-from typing import Any, List, NamedTuple, Optional, Sequence
+from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ..linkage import GROUND, Link, spread
+from ..linkage import GROUND, Link, Mechanism, spread
 from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion
@@ -76,7 +76,7 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
     Raises
     ------
     ValueError
-        If one does not exist, or they do not determine all inputs.
+        If one does not exist, they do not determine all inputs, or there is no inverse.
 
     """
     for name in names:
@@ -87,14 +87,24 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
     if len({*outputs}) != len(machine.inputs):
         raise ValueError(f'{machine.name} has {len(machine.inputs)} inputs: as many joints are '
                          f'needed, not {listed(names)}')
-    machine.linkage.inverse(tuple(outputs))
     if names and not _tell(machine, outputs, spread(machine.linkage.inputs, SPREAD)):
         raise ValueError(f'{listed(names)} of {machine.name} moves with none of the inputs, or '
                          'only together with another joint')
+    check_inverse(machine, [axis(machine, output) for output in outputs])
     named = [machine.joints.get(_key(machine, output)) or JointName(f'{machine.name}_{output}')
              for output in outputs]
     return [axis(machine, output, joint.name, joint.sign, joint.offset, joint.wraps)
             for output, joint in zip(outputs, named)]
+
+
+def passive(machine: SceneMechanism, commanded: Sequence[Axis]) -> List[Axis]:
+    """Return the joints of the first leg's links that are not commanded."""
+    outputs = [each.output for each in commanded]
+    links = [link.name for link in machine.linkage.links if link.name not in outputs]
+    named = [(link, machine.joints[_key(machine, link)]) for link in links
+             if _key(machine, link) in machine.joints]
+    return [axis(machine, link, joint.name, joint.sign, joint.offset, joint.wraps)
+            for link, joint in named]
 
 
 def output_of(machine: SceneMechanism, name: str) -> Optional[str]:
@@ -105,6 +115,58 @@ def output_of(machine: SceneMechanism, name: str) -> Optional[str]:
             return link
     output = name.removeprefix(f'{machine.name}_')
     return output if output != name and machine.linkage.has_output(output) else None
+
+
+def gears(linkage: Mechanism, axes: Sequence[Axis]) -> Iterator[Tuple[int, int, float, float]]:
+    """Yield the axes that count an input, maybe geared: number, input, ratio and offset."""
+    for k, each in enumerate(axes):
+        for i, input_ in enumerate(linkage.inputs):
+            if each.output == input_.name:
+                yield k, i, 1.0, 0.0
+            elif each.output in linkage.geared_to(i) and not each.wraps:
+                yield k, i, *linkage.gear(each.output, i)
+
+
+def check_inverse(machine: SceneMechanism, axes: Sequence[Axis]) -> None:
+    """Raise ValueError if positions of axes give the inputs neither in closed form nor safely."""
+    linkage, names = machine.linkage, [each.output for each in axes]
+    if len(list(gears(linkage, axes))) == len(axes) or linkage.inverse(tuple(names)).closed:
+        return
+    if len(axes) > 1:
+        raise ValueError(f'{listed(names)} of {machine.name} have no inverse in closed form, and '
+                         'a search of several inputs may miss; choose other joints, or the inputs')
+    only = linkage.inputs[0]
+    low, high = machine.first.ends or (-math.inf, math.inf)
+    if only.is_part and not only.low <= low <= high <= only.high:
+        raise ValueError(f'{names[0]} of {machine.name} repeats after too many turns to be '
+                         f'searched: set a {machine.name}.{only.name}.sweep in '
+                         f'{only.low:.6g} to {only.high:.6g} rad')
+    if not pieces(machine, axes[0]):
+        raise ValueError(f'{names[0]} of {machine.name} moves nowhere')
+
+
+def pieces(machine: SceneMechanism, axis: Axis) -> List[Tuple[float, ...]]:
+    """Return parts of the reach in which an axis only rises or falls: inputs, and outputs."""
+    linkage, drive = machine.linkage, machine.first
+    # In a piece an angle changes by half a turn at most, so that its gaps are known.
+    found, _ = linkage.monotone(axis.output, math.pi if axis.turn else math.inf)
+    if linkage.inputs[0].is_part and drive.ends:
+        low, high = (end / machine.scale_of(linkage.inputs[0].name) for end in drive.ends)
+        found = [piece for piece in found if piece[0] <= high and low <= piece[1]]
+    return found
+
+
+def loads(machine: SceneMechanism) -> Iterator[Tuple[str, float]]:
+    """Yield outputs on which the scene's loads work, with their factors."""
+    scale, links = machine.scale, {link.name: link for link in machine.linkage.links}
+    for name, load in machine.loads.items():
+        if not isinstance(load, float):
+            yield from ((f'{name}.{way}', scale * part) for way, part in zip('xy', load))
+            continue
+        while name in links:
+            if links[name].kind != 'prismatic':
+                yield name, load
+            name = links[name].parent
 
 
 def start(machine: SceneMechanism) -> List[float]:
@@ -136,7 +198,7 @@ def _chain(machine: SceneMechanism) -> List[str]:
             and _tell(machine, [*chosen, link.name])]):
         chosen.append(min(candidates, key=rank).name)
     try:
-        machine.linkage.inverse(tuple(chosen))
+        check_inverse(machine, [axis(machine, output) for output in chosen])
         return chosen
     except ValueError:
         return list(machine.inputs)

@@ -8,18 +8,18 @@
 # express or implied. See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Poses of a linkage as C functions, for constant or changeable dimensions."""
+"""Formulas as C functions."""
 
 from __future__ import annotations
 
 import math
 import re
-from typing import Any, Callable, Dict, Iterable, Iterator, List, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Sequence
 
 import numpy as np
 
-from .names import literal as text_literal
-from ..formula.expression import Real, real, unknown
+from .names import comment
+from ..formula.expression import Real, unknown
 from ..formula.operations import OPERATIONS
 from ..formula.program import Dialect, evaluate, Pose
 from ..linkage import EDGE, LAST_STEP, LEAST_SQUARE, Mechanism, TINY, TOLERANCE
@@ -31,6 +31,18 @@ _NAMED = re.compile(r'\b[kxv]\d+\b')
 # What formulas count as rounding, and what that is in float.
 _IN_FLOAT = {TOLERANCE: 8 * 2.0 ** -24, -TOLERANCE: -8 * 2.0 ** -24, LAST_STEP: 2.0 ** -11,
              EDGE: 2.0 ** -17, TINY: 2.0 ** -26, LEAST_SQUARE: 2.0 ** -100}
+# Longest formula of a constant in a comment, and longest line of code.
+FORMULA, LINE = 60, 100
+# A constant's formula is written as in Python, with the names of dimensions.
+_WRITTEN = {name: row.python for name, row in OPERATIONS.items()}
+
+
+class Block(NamedTuple):
+    """A part of a function: its comment, its number of outputs, and what is done with them."""
+
+    about: str
+    size: int
+    ending: Callable[[List[str]], List[str]]
 
 
 class Code:
@@ -39,67 +51,98 @@ class Code:
 
     Parameters
     ----------
-    name : str
-        Prefix of its functions.
     linkage : Mechanism
-        The linkage; with changeable dimensions it is that of `open_linkage`.
+        The linkage.
     single : bool
         Whether it computes with float instead of double.
-    is_open : bool
-        Whether the constants are in a struct, for changeable dimensions.
 
     """
 
-    def __init__(self, name: str, linkage: Mechanism, single: bool = False,
-                 is_open: bool = False):
-        self.name, self.linkage, self.is_open = name, linkage, is_open
+    def __init__(self, linkage: Mechanism, single: bool = False):
+        self.linkage = linkage
         self.number, self.suffix = ('float', 'f') if single else ('double', '')
         self.literal = _literal(single)
-        self.dialect = Dialect(
-            {operation: row.c.replace('{f}', self.suffix).replace('{name}', name)
-             for operation, row in OPERATIONS.items()}, {},
+        templates = {operation: row.c.replace('{f}', self.suffix).replace('{name}', 'linkage')
+                     for operation, row in OPERATIONS.items()}
+        self._dialect = Dialect(
+            {**templates, 'atan2': 'linkage_angle({}, {})'}, {},
             lambda value: self.literal(_IN_FLOAT.get(value, value) if single else value))
-        self._constants: Dict[Real, int] = {}
 
-    def rows(self, rows: Iterable[Iterable[float]]) -> str:
-        """Return rows of numbers as initializers."""
-        return ', '.join('{ %s }' % ', '.join(map(self.literal, row)) for row in rows)
+    def row(self, row: Iterable[float]) -> str:
+        """Return numbers as an initializer."""
+        return '{ %s }' % ', '.join(map(self.literal, row))
 
     def times(self, code: str, factor: float) -> str:
         """Return code times a number."""
-        return code if factor == 1.0 else f'{self.literal(factor)} * ({code})'
+        return code if factor == 1.0 else f'{self.literal(factor)} * {code}'
 
     def function(self, head: str, pose: Pose, arguments: Sequence[str],
-                 ending: Callable[[List[str]], List[str]]) -> str:
+                 blocks: Sequence[Block]) -> str:
         """Return a C function with the operations of a Pose, from the code of its arguments."""
-        constants, listed, outputs = pose.statements(self.dialect)
-        ends = ending(outputs)
-        lines: List[Tuple[str, str]] = []
-        used = set(_NAMED.findall('\n'.join(ends)))
+        constants, statements, outputs = pose.statements(self._dialect)
+        nodes = dict(zip(constants, map(self._decided, pose.variant.constants)))
+        # A value is computed in the first block that needs it.
+        numbers, reached, body = pose.variant.listing.outputs, -1, []
+        left, done = list(statements), 0
+        for block in blocks:
+            end = done + block.size
+            reached = max([reached, *numbers[done:end]])
+            own = [line for line in left if int(line[0][1:]) <= reached]
+            left = left[len(own):]
+            body.append((block.about, own, block.ending(outputs[done:end])))
+            done = end
         # Compilers warn of what is computed and not used, such as a coordinate with a load.
-        for name, code in reversed(listed):
+        used = {name for *_, ends in body for name in _NAMED.findall('\n'.join(ends))}
+        for name, code in reversed(statements):
             if name in used:
-                lines.insert(0, (name, code))
                 used.update(_NAMED.findall(code))
-        nodes = dict(zip(constants, pose.variant.constants))
-        body = [f'    const {_kind(nodes[name], self.number)} {name} = '
-                f'{self.constant(nodes[name], value)};'
-                for name, value in constants.items() if name in used]
-        body += [f'    const {self.number} x{i} = {code};' for i, code in enumerate(arguments)
+        lines = []
+        for about, own, ends in body:
+            made = [f'const {self.number} {name} = {_bare(code)};'
+                    for name, code in own if name in used]
+            if made or ends:
+                lines += [f'/* {comment(about)} */'] * bool(about) + made + ends
+        given = [f'const {self.number} x{i} = {code};' for i, code in enumerate(arguments)
                  if f'x{i}' in used]
-        body += [f'    const {self.number} {name} = {code};' for name, code in lines]
-        body += [f'    (void){code};' for i, code in enumerate(arguments)
-                 if f'x{i}' not in used and code.isidentifier()]
-        if self.is_open and not any('c->' in line for line in (*body, *ends)):
-            body.append('    (void)c;')
-        return '\n'.join([head, '{', *body, *ends, '}', ''])
+        given += [f'(void){code};' for i, code in enumerate(arguments)
+                  if f'x{i}' not in used and code.isidentifier()]
+        # The linkage's own unit is a dimension, too.
+        named = {name: f'length_{node.args[0]}' if node.op == 'dimension' and
+                 node.args[0].isidentifier() else name for name, node in nodes.items()}
+        # A length may have several nodes. Lengths by name come first.
+        declared = sorted({self._constant(named[name], nodes[name], value): None
+                           for name, value in constants.items() if name in used},
+                          key=lambda line: ' length_' not in line)
+        text = _NAMED.sub(lambda found: named.get(found[0], found[0]), '\n'.join(lines))
+        return '\n'.join([head, '{', *indented([*declared, *given, *text.split('\n')]), '}', ''])
 
-    def constant(self, node: Real, value: float) -> str:
-        """Return the code of an expression of dimensions, and its value as a constant."""
-        if not self.is_open:
-            return self.literal(self._in_float(node, value) if self.suffix else value)
-        code = f'c->k[{self._constants.setdefault(node, len(self._constants))}]'
-        return f'{code} > 0.5' if node.op in _CONDITIONS else code
+    def _decided(self, node: Real) -> Real:
+        """Return an expression of dimensions without its conditions."""
+        while node.op == 'where':
+            node = node.args[1 if evaluate(node.args[0], self.linkage.lengths, {}) else 2]
+        return node
+
+    def _constant(self, name: str, node: Real, value: float) -> str:
+        """Return the declaration of an expression of dimensions."""
+        kind = 'int' if node.op in _CONDITIONS else self.number
+        number = self.literal(self._in_float(node, value) if self.suffix else value)
+        formula = '' if node.op == 'dimension' else self._formula(node)
+        return f'const {kind} {name} = {number};' + (
+            f' /* {comment(formula)} */' if 0 < len(formula) <= FORMULA else '')
+
+    def _formula(self, node: Real) -> str:
+        """Return an expression of dimensions as text, '' where it is long or has no dimension."""
+        node, has_dimension = self._decided(node), False
+        text: Dict[Real, str] = {}
+        for x in unknown(node, lambda x: [*map(self._decided, x.operands)], text):
+            if x.operands:
+                parts = [text[self._decided(part)] for part in x.operands]
+                text[x] = _WRITTEN[x.op].format(*parts) if all(parts) else ''
+                text[x] = text[x] if len(text[x]) <= FORMULA else ''
+            else:
+                has_dimension = has_dimension or x.op == 'dimension'
+                text[x] = x.args[0] if x.op == 'dimension' else f'{x.args[0]:.6g}'
+        return _bare(text[node]) if has_dimension else ''
 
     def _in_float(self, node: Real, value: float) -> float:
         """Return the value of an expression of dimensions with the rounding of float."""
@@ -109,96 +152,48 @@ class Code:
         known = {x: rounding for x, rounding in known.items() if rounding is not None}
         return float(evaluate(node, self.linkage.lengths, known)) if known else value
 
-    def helpers(self) -> str:
-        """Return the helper functions for roots and gates, which are NaN out of reach."""
-        n, number, f, zero = self.name, self.number, self.suffix, self.literal(0.0)
-        return '\n'.join([
-            '/* A limit that is missed by rounding counts as reached. */',
-            f'static inline {number} {n}_root({number} x, {number} tolerance)', '{',
-            f'    return x > {zero} ? sqrt{f}(x) : x >= -tolerance ? {zero} : ({number})NAN;', '}',
-            '',
-            f'static inline {number} {n}_gated({number} x, {number} margin, {number} tolerance)',
-            '{', f'    return margin >= -tolerance ? x : ({number})NAN;', '}', ''])
 
-    def struct(self) -> str:
-        """Return the struct of constants; it is complete once all functions are written."""
-        return '\n'.join(['/* Constants that depend on the dimensions. */', 'typedef struct {',
-                          f'    double k[{max(len(self._constants), 1)}];', '    int is_own;',
-                          f'}} {self.name}_linkage;', ''])
-
-    def setter(self) -> str:
-        """Return the function that fills the struct of constants from dimensions."""
-        places = {name: i for i, name in enumerate(self.linkage.dimensions)}
-        demands = list(self._demands())
-        number: Dict[Real, int] = {}
-        for root in (*self._constants, *(node for node, _ in demands)):
-            for node in unknown(root, lambda node: node.operands, number):
-                number[node] = len(number)
-
-        def value(node: Real) -> str:
-            if node.op == 'constant':
-                return self.literal(node.args[0])
-            if node.op == 'dimension':
-                return f'dimension[{places[node.args[0]]}]' if node.args[0] in places else '1.0'
-            args = [f'd{number[x]}' for x in node.operands]
-            return self.dialect.templates[node.op].format(*args)
-
-        given = [node for node in number if node.op == 'dimension' and node.args[0] in places]
-        tests = [(node, node.positive, f'{node.args[0]} must be a {"positive " * node.positive}'
-                                       'number [m]') for node in reversed(given)]
-        tests += [(node, True, text) for node, text in demands]
-        own = ' && '.join(f'dimension[{i}] == {self.literal(float(np.ravel(value)[0]))}'
-                          for i, value in enumerate(self.linkage.dimensions.values())) or '1'
-        return '\n'.join([
-            '/* Set dimensions; returns 0, or what is wrong with them. */',
-            f'static inline const char *{self.name}_set({self.name}_linkage *c, '
-            'const double *dimension)', '{',
-            *(f'    const {_kind(node, "double")} d{i} = {value(node)};'
-              for node, i in number.items()),
-            *(f'    if (!({f"d{number[node]} > 0.0 && " * positive}isfinite(d{number[node]})))\n'
-              f'        return {text_literal(text)};' for node, positive, text in tests),
-            *(f'    c->k[{i}] = d{number[node]};' for node, i in self._constants.items()),
-            f'    c->is_own = {own};', *([] if places else ['    (void)dimension;']),
-            '    return 0;', '}', ''])
-
-    def _demands(self) -> Iterator[Tuple[Real, str]]:
-        """Yield expressions of dimensions that must be positive, with their error messages."""
-        built = self.linkage.structure.built
-        for bar in built.bars:
-            yield bar.length, f'the bar {bar.first}-{bar.second} must be longer than zero'
-        for name, height in built.triangles.items():
-            yield (abs(height) + real(1.0),
-                   f'no triangle has the sides at {name}: each must be shorter than the others')
-        for input_ in built.inputs:
-            if not input_.turns:
-                yield real(input_.high) - input_.low, f'the {input_.name} must have a way to go'
+def indented(lines: Iterable[str]) -> List[str]:
+    """Return lines of a function's body, broken after operators if they are long."""
+    made = []
+    for line in lines:
+        line = f'    {line}'
+        while len(line) > LINE:
+            cut = max(line.rfind(sign, 12, LINE) for sign in (' + ', ' - ', ' * ', ' / ', ', '))
+            if cut < 0 or '/*' in line:
+                break
+            # A comma ends its line, an operator begins the next.
+            cut += line[cut] == ','
+            made.append(line[:cut])
+            line = f'        {line[cut + 1:]}'
+        made.append(line)
+    return made
 
 
-def open_linkage(linkage: Mechanism) -> Mechanism:
-    """Return a linkage whose code is valid for all dimensions."""
-    return linkage.with_dimensions(**{
-        name: np.array([value]) for name, value in linkage.dimensions.items()})
-
-
-def _kind(node: Real, number: str) -> str:
-    return 'int' if node.op in _CONDITIONS else number
+def _bare(code: str) -> str:
+    """Return code without parentheses around all of it."""
+    if not code.startswith('('):
+        return code
+    depth = 0
+    for i, letter in enumerate(code):
+        depth += (letter == '(') - (letter == ')')
+        if depth == 0:
+            return code[1:-1] if i == len(code) - 1 else code
+    return code
 
 
 def _literal(single: bool) -> Callable[[float], str]:
     """Return the function that writes a number in C."""
-    f = 'f' if single else ''
-
     def literal(value: float) -> str:
         if math.isnan(value):
-            return f'({"float" if single else "double"})NAN'
+            return 'LINKAGE_NAN'
         if single:
             value = float(np.float32(value)) if abs(value) <= 3.4e38 else math.copysign(
                 math.inf, value)
             value = value if abs(value) > 1.2e-38 else 0.0
         if math.isinf(value):
             return f'({"-" * (value < 0.0)}INFINITY)'
-        text = _shortest(value) if single else repr(float(value))
-        return text + f
+        return f'{_shortest(value)}f' if single else repr(float(value))
 
     return literal
 

@@ -32,8 +32,8 @@ def show(args: Optional[List[str]]) -> None:
     asked = arguments().parse_args(args)
     machines = command.chosen(scene.load(asked.scene).machines, asked.mechanism)
     try:
-        print('\n'.join(header.written(machine, asked.output, asked.float, own)
-                        for machine, own in with_joints(machines, asked.joints)))
+        print(header.printed([header.Request(machine, asked.output, own) for machine, own
+                              in with_joints(machines, asked.joints)], asked.float))
     except ValueError as error:
         raise command.RequestError(str(error)) from None
 

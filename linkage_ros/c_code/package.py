@@ -16,7 +16,7 @@ from typing import Dict, Mapping, Sequence, Tuple
 from xml.sax.saxutils import escape, quoteattr
 
 from . import header
-from .axes import actuators, Axis, joints
+from .axes import actuators, Axis, joints, passive
 from .names import comment, distinct, filled, literal, template
 from ..scene import SceneMechanism
 
@@ -66,9 +66,13 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
         '#include "pluginlib/class_list_macros.hpp"\n',
         *(f'PLUGINLIB_EXPORT_CLASS(\n  {name}_plugins::{class_}Loader, '
           'transmission_interface::TransmissionLoader)' for class_ in classes), ''])
+    most = max(len(machine.inputs) for machine, _ in machines)
+    files[Path('src/linkage.h')] = template('linkage.h')
     for part, (machine, chosen) in zip(parts, machines):
         own = part['name']
-        files[Path(f'src/{own}_linkage.h')] = header.opened(machine, chosen)
+        files[Path(f'src/{own}_linkage.h')] = header.header(
+            header.Request(machine, (), chosen, passive(machine, joints(machine, chosen))), False,
+            most, '#include "linkage.h"')
         files[Path(f'src/{own}.hpp')] = filled(template('mechanism.hpp'), part)
         files[Path(f'test/test_{own}.cpp')] = filled(template('test.cpp'), part)
     return files
@@ -76,7 +80,7 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
 
 def _values(package_name: str, class_: str, machine: SceneMechanism,
             commanded: Sequence[Axis]) -> Mapping[str, str]:
-    driven = actuators(machine)
+    driven, others = actuators(machine), passive(machine, commanded)
     roles = list(machine.inputs), [axis.output for axis in commanded]
 
     def rows(axes: Sequence[Axis], own: Sequence[str]) -> str:
@@ -86,21 +90,17 @@ def _values(package_name: str, class_: str, machine: SceneMechanism,
     def listed(axes: Sequence[Axis]) -> str:
         return escape(comment(', '.join(axis.name for axis in axes)))
 
-    dimensions = machine.linkage.dimensions
     lines = [f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(role)}/>'
              for kind, axes, own in zip(('actuator', 'joint'), (driven, commanded), roles)
              for axis, role in zip(axes, own)]
-    if dimensions:
-        some, value = next(iter(dimensions.items()))
-        lines.append(f'  <!-- <param name="{some}">{value!r}</param> for another length [m] -->')
     return {
         'package': package_name, 'namespace': f'{package_name}_plugins', 'class': class_,
         'name': machine.name, 'n': str(len(driven)), 'actuators': rows(driven, roles[0]),
         'joints': rows(commanded, roles[1]),
+        'passive': rows(others, [each.output for each in others]) and '{%s}' % rows(
+            others, [each.output for each in others]),
+        'passive_count': str(len(others)),
+        'passive_function': f'{machine.name}_passive' if others else 'nullptr',
         'axes': f'{listed(driven)} and {listed(commanded)}',
         'lines': '\n'.join(lines),
-        'dimension_count': str(len(dimensions)),
-        'dimensions': dimensions and '{%s}' % ', '.join(
-            f'{{"{key}", {value!r}}}' for key, value in dimensions.items()) or '',
-        'row': f'| `{package_name}/{class_}` | {listed(driven)} | {listed(commanded)} | '
-               f'{", ".join(dimensions) or "none"} |'}
+        'row': f'| `{package_name}/{class_}` | {listed(driven)} | {listed(commanded)} |'}

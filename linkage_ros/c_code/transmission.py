@@ -12,11 +12,13 @@
 
 from pathlib import Path
 import sys
-from typing import List, Optional
+from typing import List, Optional, Sequence, Tuple
 
+from . import limits
 from .command import parser, with_joints
 from .package import PACKAGE, package
 from .. import command, scene
+from ..scene import SceneMechanism
 
 NAME = 'transmission'
 
@@ -27,9 +29,23 @@ def main(args: Optional[List[str]] = None) -> int:
 
 
 def write(args: Optional[List[str]]) -> None:
-    """Write the package that a command line requests."""
+    """Write the package or print the limits that a command line requests."""
     asked = arguments().parse_args(args)
-    out = Path(asked.out).absolute()
+    chosen = command.chosen(scene.load(asked.scene).machines, asked.mechanism)
+    try:
+        machines = with_joints(chosen, asked.joints)
+        if asked.limits:
+            print('\n'.join(limits.text(*each) for each in machines))
+        else:
+            write_package(asked.out, Path(asked.scene).name, machines)
+    except ValueError as error:
+        raise command.RequestError(str(error)) from None
+
+
+def write_package(folder: str, scene_file: str,
+                  machines: Sequence[Tuple[SceneMechanism, Sequence[str]]]) -> None:
+    """Write the package of mechanisms with their commanded joints."""
+    out = Path(folder).absolute()
     if not PACKAGE.fullmatch(out.name):
         raise command.RequestError(
             "--out must end in the package's name: 2 to 64 lower-case letters, digits and single "
@@ -37,15 +53,10 @@ def write(args: Optional[List[str]]) -> None:
     if out.exists() and any(out.iterdir()) and not is_ours(out):
         raise command.RequestError('--out must be a new folder, or one written by this command, '
                                    f'but {out} has other files')
-    machines = command.chosen(scene.load(asked.scene).machines, asked.mechanism)
-    try:
-        files = package(out.name, Path(asked.scene).name, with_joints(machines, asked.joints))
-    except ValueError as error:
-        raise command.RequestError(str(error)) from None
-    for path, text in files.items():
+    for path, text in package(out.name, scene_file, machines).items():
         (out / path).parent.mkdir(parents=True, exist_ok=True)
         (out / path).write_text(text, encoding='utf-8')
-    print(f'{out}: {", ".join(machine.name for machine in machines)}; see README.md')
+    print(f'{out}: {", ".join(machine.name for machine, _ in machines)}; see README.md')
 
 
 def is_ours(folder: Path) -> bool:
@@ -58,8 +69,11 @@ def arguments() -> command.Parser:
     """Return the parser of the command line."""
     made = parser(NAME, 'Write the mechanisms of a scene as a ROS 2 package of transmissions for '
                         'ros2_control.')
-    made.add_argument('--out', required=True, metavar='DIR',
+    what = made.add_mutually_exclusive_group(required=True)
+    what.add_argument('--out', metavar='DIR',
                       help='output folder; its name is the name of the package')
+    what.add_argument('--limits', action='store_true', help='print the limits of the joints that '
+                      'follow from sweeps and reach, for the URDF, and write nothing')
     return made
 
 

@@ -18,7 +18,6 @@
 
 #define JOINED_(a, b) a##b
 #define JOINED(a, b) JOINED_(a, b)
-#define OF(part) JOINED(NAME, part)
 #define TEXT_(text) #text
 #define TEXT(text) TEXT_(text)
 #include TEXT(NAME.hpp)
@@ -27,6 +26,7 @@ namespace
 {
 using Code = NAMESPACE::JOINED(CLASS, Code);
 constexpr int n = static_cast<int>(Code::size);
+constexpr const linkage_model & model = Code::model;
 constexpr double nan_ = std::numeric_limits<double>::quiet_NaN();
 constexpr double unwritten = 0.123456789;
 constexpr double inf = std::numeric_limits<double>::infinity();
@@ -83,18 +83,18 @@ struct Robot
 /// What of a pose is needed: where both sides are, and how well each tells the inputs.
 struct Pose
 {
-  OF(_point) point;
+  linkage_point point;
   bool placed, good;
 };
 
-Pose pose(const OF(_linkage) & c, const double (&q)[n])
+Pose pose(const double (&q)[n])
 {
   Pose made{};
   double zero[n] = {}, x[n];
-  made.placed = OF(_at)(&c, q, 1, &made.point) != 0;
+  made.placed = model.at(q, &made.point) != 0;
   made.good = made.placed;
   for (int side = 0; side < 2; ++side) {
-    made.good = made.good && OF(_solved)(&made.point, side, 0, 1e-2, zero, x) != 0;
+    made.good = made.good && linkage_input_change(&model, side, &made.point, 1e-2, zero, x) != 0;
   }
   return made;
 }
@@ -102,13 +102,13 @@ Pose pose(const OF(_linkage) & c, const double (&q)[n])
 double apart(int side, int i, double one, double other)
 {
   double gap[n], to[n];
-  OF(_point) p{};
+  linkage_point p{};
   for (int k = 0; k < n; ++k) {
     to[k] = p.position[side][k] = other;
   }
   to[i] = one;
-  (void)OF(_gap)(to, &p, side, gap);
-  return std::fabs(gap[i]) / OF(_scale)(side, i, 0);
+  (void)linkage_gap(&model, side, to, &p, gap);
+  return std::fabs(gap[i]) / model.axis[side][i].scale;
 }
 
 void at(Robot & robot, const Pose & where)
@@ -125,7 +125,7 @@ void at(Robot & robot, const Pose & where)
 }
 
 /// Returns whether the state is far enough from singular poses and ends to be tried.
-bool there_and_back(Robot & robot, const OF(_linkage) & c, const double (&q)[n], long state)
+bool there_and_back(Robot & robot, const double (&q)[n], long state)
 {
   constexpr double h = 1e-6;
   double before[n], after[n], beside[n], joints[n], power[2] = {}, size = 1e-300;
@@ -134,8 +134,8 @@ bool there_and_back(Robot & robot, const OF(_linkage) & c, const double (&q)[n],
     after[i] = q[i] + h * (i + 1);
     beside[i] = q[i] + 1e-2 * (state % 2 ? 1 : -1);
   }
-  const Pose here = pose(c, q), low = pose(c, before), high = pose(c, after);
-  const Pose near = pose(c, beside);
+  const Pose here = pose(q), low = pose(before), high = pose(after);
+  const Pose near = pose(beside);
   if (!here.good || !low.good || !high.good || !near.good) {
     return false;
   }
@@ -143,7 +143,7 @@ bool there_and_back(Robot & robot, const OF(_linkage) & c, const double (&q)[n],
   check(robot.transmission.status() == 0, "joints are not OK", state);
   for (int i = 0; i < n; ++i) {
     const double difference = apart(1, i, high.point.position[1][i], low.point.position[1][i]);
-    const double rate = std::fabs(robot.joint[1][i]) / OF(_scale)(1, i, 0);
+    const double rate = std::fabs(robot.joint[1][i]) / model.axis[1][i].scale;
     // What a difference misses grows so next to a pose where the rate is infinite.
     check(std::fabs(difference / (2.0 * h) - rate) <= 1e-7 * (1.0 + rate) + 1e-10 * std::pow(rate, 5),
       "a velocity differs from the difference of positions", state);
@@ -233,18 +233,13 @@ void hostile(Robot & robot, long state)
 int main(int argc, char ** argv)
 {
   const long states = argc > 1 ? std::atol(argv[1]) : 2000;
-  OF(_linkage) c;
-  double dimensions[Code::dimensions.size() + 1] = {}, q[n];
-  for (std::size_t i = 0; i < Code::dimensions.size(); ++i) {
-    dimensions[i] = Code::dimensions[i].value;
-  }
-  check(!Code::set(c, dimensions), "its own dimensions are refused", 0);
+  double q[n];
   Robot robot;
   may_allocate = false;
   long tried = 0;
   for (long i = 1; i <= states; ++i) {
-    OF(_sample)(i, q);
-    tried += there_and_back(robot, c, q, i);
+    linkage_sample(&model, i, q);
+    tried += there_and_back(robot, q, i);
   }
   check(2 * tried > states, "most states are singular", tried);
   for (long i = 0; i < states; ++i) {

@@ -22,23 +22,15 @@ namespace @namespace@
 /// The C of the mechanism @name@, for TransmissionOf.
 struct @class@Code
 {
-  using Linkage = @name@_linkage;
-  using Memory = @name@_memory;
-  using Side = @name@_side;
   static constexpr std::size_t size = @n@;
   static constexpr std::array<Axis, size> actuators{{@actuators@}};
   static constexpr std::array<Axis, size> joints{{@joints@}};
-  static constexpr std::array<Dimension, @dimension_count@> dimensions{@dimensions@};
-  static const char * set(Linkage & c, const double * values) { return @name@_set(&c, values); }
-  static bool begin(const Linkage & c, Memory & m) { return @name@_begin(&c, &m) != 0; }
-  static int to_joints(const Linkage & c, Memory & m, const Side & from, Side & to)
-  {
-    return @name@_actuators_to_joints(&c, &m, &from, &to);
-  }
-  static int to_actuators(const Linkage & c, Memory & m, const Side & from, Side & to)
-  {
-    return @name@_joints_to_actuators(&c, &m, &from, &to);
-  }
+  /// Joints that are not commanded, and the function for them.
+  static constexpr std::array<Axis, @passive_count@> passive{@passive@};
+  static constexpr Passive * at_passive = @passive_function@;
+  static constexpr const linkage_model & model = @name@_model;
+  static constexpr linkage_inverse * from_actuators = @name@_from_actuators;
+  static constexpr linkage_inverse * from_joints = @name@_from_joints;
 };
 
 using @class@Transmission = TransmissionOf<@class@Code>;

@@ -22,7 +22,7 @@ int main()
   hardware_interface::TransmissionInfo info;
   std::vector<transmission_interface::JointHandle> joint_handles;
   std::vector<transmission_interface::ActuatorHandle> actuator_handles;
-  double actuator[Code::size] = {}, joint[Code::size] = {}, dimensions[@dimension_count@ + 1] = {};
+  double actuator[Code::size] = {}, joint[Code::size] = {};
   for (std::size_t i = 0; i < Code::size; ++i) {
     info.actuators.emplace_back();
     info.actuators.back().name = Code::actuators[i].name;
@@ -34,16 +34,14 @@ int main()
   @namespace@::@class@Transmission transmission(info);
   transmission.configure(joint_handles, actuator_handles);
 
-  @name@_linkage c;
-  for (std::size_t i = 0; i < Code::dimensions.size(); ++i) {
-    dimensions[i] = Code::dimensions[i].value;
-  }
-  int tried = Code::set(c, dimensions) ? -1 : 0;
-  for (long state = 1; tried >= 0 && state <= 2000; ++state) {
-    double q[Code::size], singular[Code::size], gap[Code::size];
-    @name@_point p;
-    @name@_sample(state, q);
-    if (!@name@_at(&c, q, 1, &p) || !@name@_solved(&p, 1, 0, 1e-3, p.load, singular)) {
+  int tried = 0;
+  for (long state = 1; state <= 2000; ++state) {
+    linkage_real q[Code::size], x[Code::size], gap[Code::size];
+    linkage_point p;
+    linkage_sample(&Code::model, state, q);
+    if (!Code::model.at(q, &p) ||
+      !linkage_input_change(&Code::model, LINKAGE_JOINTS, &p, 1e-3, p.load, x))
+    {
       continue;
     }
     for (std::size_t i = 0; i < Code::size; ++i) {
@@ -51,7 +49,7 @@ int main()
     }
     transmission.actuator_to_joint();
     transmission.joint_to_actuator();
-    if (transmission.status() || !(@name@_gap(actuator, &p, 0, gap) <= 1e-9)) {
+    if (transmission.status() || !(linkage_gap(&Code::model, LINKAGE_ACTUATORS, actuator, &p, gap) <= 1e-9)) {
       std::printf("state %ld does not come back\n", state);
       return 1;
     }

@@ -19,10 +19,8 @@
 #include <condition_variable>
 #include <cstddef>
 #include <limits>
-#include <locale>
 #include <mutex>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <type_traits>
@@ -39,8 +37,8 @@ namespace @namespace@
 /// The name of an actuator or a joint in the scene, and its role in the linkage.
 struct Axis { const char * name, * role; };
 
-/// A dimension [m] that a parameter of the transmission may replace.
-struct Dimension { const char * name; double value; };
+/// Positions of joints that are not commanded, and their rates by each input, at inputs.
+using Passive = void(const double * q, double * position, double (*rate)[LINKAGE_MAX_INPUTS]);
 
 /// Logs why values are held, from a thread of its own: a control loop only sets bits.
 class HeldLog
@@ -144,11 +142,14 @@ public:
       if (i == size || !names[i].empty()) {
         throw Exception(what + " '" + info.name + "', role '" + info.role + "', is none of" + allowed);
       }
-      if (info.mechanical_reduction != 1.0 || info.offset != 0.0) {
-        throw Exception(what + " '" + info.name + "' must have no mechanical_reduction and no offset: "
-          "the scene has them");
+      if (!std::isfinite(info.offset) || !std::isnormal(info.mechanical_reduction)) {
+        throw Exception(what + " '" + info.name + "' needs a finite offset, and a finite "
+          "mechanical_reduction other than 0");
       }
       names[i] = info.name;
+      // A reduction is that of the built-in transmissions: from the joint to the actuator.
+      offset_[i] = info.offset;
+      factor_[i] = is_actuator ? info.mechanical_reduction : 1.0 / info.mechanical_reduction;
     }
     for (std::size_t i = 0; i < size; ++i) {
       if (names[i].empty()) {
@@ -189,23 +190,44 @@ public:
 
   bool have(std::size_t kind) const { return handles_[kind][0].has_value(); }
 
-  void read(std::size_t kind, double (&values)[size]) const
+  /// Read values as the scene has them; those without a handle are 0.
+  linkage_side read() const
   {
+    linkage_side values{};
     for (std::size_t i = 0; i < size; ++i) {
-      values[i] = have(kind) ? handles_[kind][i]->get_value() : 0.0;
+      values.position[i] = (value(0, i) - offset_[i]) / factor_[i];
+      values.velocity[i] = value(1, i) / factor_[i];
+      values.effort[i] = value(2, i) * factor_[i];
     }
+    return values;
   }
 
-  void write(std::size_t kind, const double (&values)[size])
+  /// Write what is finite.
+  void write(const linkage_side & values)
   {
     for (std::size_t i = 0; i < size; ++i) {
-      if (handles_[kind][i] && std::isfinite(values[i])) {
-        (void)handles_[kind][i]->set_value(values[i]);
-      }
+      set(0, i, values.position[i] * factor_[i] + offset_[i]);
+      set(1, i, values.velocity[i] * factor_[i]);
+      set(2, i, values.effort[i] / factor_[i]);
     }
   }
 
 private:
+  static constexpr bool is_actuator =
+    std::is_same_v<Handle, transmission_interface::ActuatorHandle>;
+
+  double value(std::size_t kind, std::size_t i) const
+  {
+    return have(kind) ? handles_[kind][i]->get_value() : 0.0;
+  }
+
+  void set(std::size_t kind, std::size_t i, double value)
+  {
+    if (handles_[kind][i] && std::isfinite(value)) {
+      (void)handles_[kind][i]->set_value(value);
+    }
+  }
+
   /// The place of a role; of a name, if there is no role.
   static std::size_t place(
     const std::array<Axis, size> & axes, const std::string & name, const std::string & role)
@@ -222,14 +244,90 @@ private:
   template <class Info>
   static bool is_added(const Info & info)
   {
-    return size == 1 && std::is_same_v<Handle, transmission_interface::ActuatorHandle> &&
-      info.name == "actuator1" && info.role == "actuator1";
+    return size == 1 && is_actuator && info.name == "actuator1" && info.role == "actuator1";
   }
 
   std::array<std::array<std::optional<Handle>, size>, 3> handles_;
+  std::array<double, size> offset_{}, factor_{};
 };
 
-/// A linkage between actuators and joints; Code_ wraps its generated C.
+/// States of the joints that are not commanded, where the component has handles for them.
+template <class Code>
+class PassiveJoints
+{
+public:
+  static constexpr std::size_t size = Code::passive.size();
+
+  /// Take a joint of the description if its role is that of a passive joint.
+  template <class Info>
+  bool take_info(const Info & info)
+  {
+    for (std::size_t i = 0; i < size; ++i) {
+      if (info.role == Code::passive[i].role) {
+        names_[i] = info.name;
+        offset_[i] = info.offset;
+        reduction_[i] = info.mechanical_reduction;
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// Take a handle of a passive joint, by the name of the description or of the scene.
+  bool take_handle(const transmission_interface::JointHandle & handle)
+  {
+    for (std::size_t i = 0; i < size; ++i) {
+      if (handle.get_prefix_name() == (names_[i].empty() ? Code::passive[i].name : names_[i])) {
+        const bool is_velocity = handle.get_interface_name() == "velocity";
+        if (handle && (is_velocity || handle.get_interface_name() == "position")) {
+          handles_[is_velocity][i].emplace(handle);
+          ++count_;
+        }
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// Write states at the inputs of the newest measurement; they stand still if that is held.
+  void write(const linkage_memory & memory, const linkage_side & actuators, bool is_moving)
+  {
+    if constexpr (size > 0) {
+      double position[size], rate[size][LINKAGE_MAX_INPUTS], x[LINKAGE_MAX_INPUTS];
+      if (count_ == 0 || !memory.is_known || memory.newer != LINKAGE_ACTUATORS) {
+        return;
+      }
+      Code::at_passive(memory.q[LINKAGE_ACTUATORS], position, rate);
+      is_moving = is_moving && linkage_input_change(
+        &Code::model, LINKAGE_ACTUATORS, &memory.point[LINKAGE_ACTUATORS], LINKAGE_SINGULAR,
+        actuators.velocity, x) != 0;
+      for (std::size_t i = 0; i < size; ++i) {
+        double velocity = 0.0;
+        for (std::size_t j = 0; is_moving && j < Code::size; ++j) {
+          velocity += rate[i][j] * x[j];
+        }
+        const double reduction = names_[i].empty() ? 1.0 : reduction_[i];
+        set(0, i, position[i] / reduction + offset_[i]);
+        set(1, i, std::isfinite(velocity) ? velocity / reduction : 0.0);
+      }
+    }
+  }
+
+private:
+  void set(std::size_t kind, std::size_t i, double value)
+  {
+    if (handles_[kind][i] && std::isfinite(value)) {
+      (void)handles_[kind][i]->set_value(value);
+    }
+  }
+
+  std::array<std::string, size> names_;
+  std::array<double, size> offset_{}, reduction_{};
+  std::array<std::array<std::optional<transmission_interface::JointHandle>, size>, 2> handles_;
+  std::size_t count_ = 0;
+};
+
+/// A linkage between actuators and joints; Code_ wraps its generated C, which is included before.
 template <class Code_>
 class TransmissionOf : public linkage_ros::LinkageTransmission
 {
@@ -243,11 +341,21 @@ public:
     const std::vector<transmission_interface::JointHandle> & joint_handles,
     const std::vector<transmission_interface::ActuatorHandle> & actuator_handles) override
   {
-    set_dimensions();
+    if (!info_.parameters.empty()) {
+      refuse("there is no parameter '" + info_.parameters.begin()->first +
+        "': write the package again for other lengths");
+    }
     actuators_ = {};
     joints_ = {};
     actuators_.find("actuator", Code::actuators, info_.actuators, actuator_handles);
-    joints_.find("joint", Code::joints, info_.joints, joint_handles);
+    passive_ = {};
+    auto infos = info_.joints;
+    infos.erase(std::remove_if(infos.begin(), infos.end(), [this](const auto & info) {
+      return passive_.take_info(info); }), infos.end());
+    auto handles = joint_handles;
+    handles.erase(std::remove_if(handles.begin(), handles.end(), [this](const auto & handle) {
+      return passive_.take_handle(handle); }), handles.end());
+    joints_.find("joint", Code::joints, infos, handles);
     static const std::array<const char *, 3> kinds{"position", "velocity", "effort"};
     for (std::size_t kind = 0; kind < 3; ++kind) {
       const auto count = actuators_.count(kind) + joints_.count(kind);
@@ -256,12 +364,30 @@ public:
           (kind ? ", or none of them" : ": velocities and efforts depend on the pose"));
       }
     }
+    if (!linkage_begin(&Code::model, &memory_)) {
+      refuse("it cannot be assembled");
+    }
     log_.start(info_.name);
   }
 
-  void actuator_to_joint() override { transmit(actuators_, joints_, Code::to_joints); }
+  void actuator_to_joint() override
+  {
+    auto found = unwritten();
+    const auto given = actuators_.read();
+    status_ = linkage_to_joints(&Code::model, Code::from_actuators, &memory_, &given, &found);
+    note(false);
+    joints_.write(found);
+    passive_.write(memory_, given, !(status_ & OUT_OF_REACH));
+  }
 
-  void joint_to_actuator() override { transmit(joints_, actuators_, Code::to_actuators); }
+  void joint_to_actuator() override
+  {
+    auto found = unwritten();
+    const auto given = joints_.read();
+    status_ = linkage_to_actuators(&Code::model, Code::from_joints, &memory_, &given, &found);
+    note(true);
+    actuators_.write(found);
+  }
 
   std::size_t num_actuators() const override { return Code::size; }
 
@@ -270,70 +396,34 @@ public:
   int status() const noexcept override { return status_; }
 
 private:
-  void set_dimensions()
-  {
-    auto left = info_.parameters;
-    std::array<double, Code::dimensions.size() + 1> values{};
-    std::string allowed = Code::dimensions.size() ? "" : " none";
-    for (std::size_t i = 0; i < Code::dimensions.size(); ++i) {
-      const std::string name = Code::dimensions[i].name;
-      const auto own = left.find(name);
-      allowed += " " + name;
-      values[i] = Code::dimensions[i].value;
-      if (own != left.end()) {
-        std::istringstream text(own->second);
-        text.imbue(std::locale::classic());
-        std::string rest;
-        if (!(text >> values[i]) || text >> rest) {
-          refuse("parameter " + name + " must be a number [m], not '" + own->second + "'");
-        }
-        left.erase(own);
-      }
-    }
-    if (!left.empty()) {
-      refuse("there is no parameter '" + left.begin()->first + "'; allowed:" + allowed);
-    }
-    if (const char * wrong = Code::set(linkage_, values.data())) {
-      refuse(wrong);
-    }
-    if (!Code::begin(linkage_, memory_)) {
-      refuse("with these dimensions it cannot be assembled");
-    }
-  }
-
   [[noreturn]] void refuse(const std::string & why) const
   {
     throw transmission_interface::Exception("transmission '" + info_.name + "': " + why);
   }
 
-  template <class From, class To, class Function>
-  void transmit(const From & from, To & to, Function function)
+  /// Values that are not written unless they are set.
+  static linkage_side unwritten()
   {
-    typename Code::Side given{}, found{};
-    double (*values[3])[Code::size] = {&given.position, &given.velocity, &given.effort};
-    for (std::size_t kind = 0; kind < 3; ++kind) {
-      from.read(kind, *values[kind]);
-    }
-    // What stays NaN is not written.
-    double (*made[3])[Code::size] = {&found.position, &found.velocity, &found.effort};
-    for (auto & each : made) {
-      std::fill_n(*each, Code::size, std::numeric_limits<double>::quiet_NaN());
-    }
-    status_ = function(linkage_, memory_, given, found);
-    if (!from.have(1) && !from.have(2)) {
+    linkage_side made;
+    std::fill_n(made.position, LINKAGE_MAX_INPUTS, LINKAGE_NAN);
+    std::fill_n(made.velocity, LINKAGE_MAX_INPUTS, LINKAGE_NAN);
+    std::fill_n(made.effort, LINKAGE_MAX_INPUTS, LINKAGE_NAN);
+    return made;
+  }
+
+  void note(bool is_command)
+  {
+    if (!joints_.have(1) && !joints_.have(2)) {
       status_ &= ~SINGULAR;
     }
-    log_.note(status_, std::is_same_v<To, decltype(actuators_)>);
-    for (std::size_t kind = 0; kind < 3; ++kind) {
-      to.write(kind, *made[kind]);
-    }
+    log_.note(status_, is_command);
   }
 
   hardware_interface::TransmissionInfo info_;
-  typename Code::Linkage linkage_{};
-  typename Code::Memory memory_{};
+  linkage_memory memory_{};
   Handles<transmission_interface::ActuatorHandle, Code::size> actuators_;
   Handles<transmission_interface::JointHandle, Code::size> joints_;
+  PassiveJoints<Code> passive_;
   int status_ = OK;
   HeldLog log_;
 };
