@@ -178,10 +178,10 @@ def main():
             for name, outputs in CASES for use in USES]
     text = document.table(['linkage and output', 'target', 'flash [bytes]', 'of it the C library',
                   'RAM [bytes]', 'stack [bytes]', 'cycles, median', 'at most'], rows)
-    text += '\n\n' + table(
+    text += '\n\n' + document.table(
         ['linkage', 'actuators to joints [us], median', 'at most', 'joints to actuators [us], '
          'median', 'at most'], [[name, *times] for name, times in timed()])
-    text += '\n\n' + table(
+    text += '\n\n' + document.table(
         ['linkage and output', 'number', 'pose [ns], median', 'at most', 'inverse [ns], median',
          'at most'],
         [[f'{name} {", ".join(outputs)}', number, *chain.from_iterable(
