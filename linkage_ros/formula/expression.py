@@ -26,6 +26,7 @@ from typing import (
     Iterable,
     Iterator,
     List,
+    Mapping,
     NamedTuple,
     Optional,
     Sequence,
@@ -383,14 +384,12 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
     return known[node]
 
 
-def substituted(outputs: Sequence[Real], arguments: Sequence[Real]) -> List[Real]:
+def substituted(outputs: Sequence[Real], replaced: Mapping[Real, Real]) -> List[Real]:
     """Return expressions with expressions for their arguments, and without geometric rates."""
-    known: dict = {}
+    known: dict = dict(replaced)
     for x in (x for output in outputs for x in unknown(
             output, lambda x: x.operands if x.varies else (), known)):
-        if x.op == 'argument':
-            known[x] = arguments[x.args[0]]
-        elif not x.varies:
+        if not x.varies or x.op == 'argument':
             known[x] = x
         else:
             known[x] = known[x.args[0]] if x.op == 'rated' else Real(
