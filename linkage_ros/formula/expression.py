@@ -22,6 +22,7 @@ from __future__ import annotations
 from functools import reduce
 import operator
 from typing import (
+    Any,
     Callable,
     Iterable,
     Iterator,
@@ -384,12 +385,18 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
     return known[node]
 
 
-def substituted(outputs: Sequence[Real], replaced: Mapping[Real, Real]) -> List[Real]:
-    """Return expressions with expressions for their arguments, and without geometric rates."""
+def substituted(outputs: Sequence[Real], replaced: Mapping[Any, Real]) -> List[Real]:
+    """
+    Return expressions with expressions for their arguments, and without geometric rates.
+
+    Arguments are replaced by their leaves or by their indices.
+    """
     known: dict = dict(replaced)
     for x in (x for output in outputs for x in unknown(
             output, lambda x: x.operands if x.varies else (), known)):
-        if not x.varies or x.op == 'argument':
+        if x.op == 'argument':
+            known[x] = replaced.get(x.args[0], x)
+        elif not x.varies:
             known[x] = x
         else:
             known[x] = known[x.args[0]] if x.op == 'rated' else Real(

@@ -27,6 +27,7 @@ import math
 from operator import attrgetter
 import re
 from struct import Struct
+from types import MappingProxyType
 from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 import warnings
 from weakref import finalize
@@ -82,8 +83,9 @@ def _steps(nodes: Iterable[Real]) -> List[_Step]:
     return list(known.values())
 
 
-def _evaluate_steps(steps: Iterable[_Step], dimensions: Mapping, known: dict) -> None:
-    """Add the values of expressions to those that are known."""
+def _evaluate_steps(steps: Iterable[_Step], dimensions: Mapping, known: dict,
+                    numbers: Mapping[float, float] = MappingProxyType({})) -> None:
+    """Add the values of expressions to those known, with other `numbers` in place of some."""
     for node, function, operands in steps:
         if node in known:
             continue
@@ -91,8 +93,8 @@ def _evaluate_steps(steps: Iterable[_Step], dimensions: Mapping, known: dict) ->
             known[node] = function(*[known[x] for x in operands])[()]
         else:
             value, = node.args
-            known[node] = np.asarray(
-                dimensions[value] if node.op == 'dimension' else value, float)[()]
+            value = dimensions[value] if node.op == 'dimension' else numbers.get(value, value)
+            known[node] = np.asarray(value, float)[()]
 
 
 def _with_releases(lines: Sequence[Tuple[str, str]], outputs: Sequence[str]) -> List[str]:
@@ -121,17 +123,16 @@ def _python(listing: Listing, dialect: Dialect, arguments: int,
         # Packing floats as bytes takes a quarter of the time of numpy's conversion.
         ending = [f'pairs = empty(({len(names)}, 2))', f'pack(pairs, 0, {", ".join(outputs)})',
                   f'return {{{rows}}}']
-    body = (_with_releases(lines, outputs) if dialect is ARRAYS
-            else [f'{name} = {code}' for name, code in lines])
     given = ', '.join(f'x{i}' for i in range(arguments))
+    if dialect.templates is ARRAYS.templates:
+        body = [*_with_releases(lines, outputs), *ending]
+    else:
+        body = ['try:', *(f'    {line}' for line in [
+            *(f'{name} = {code}' for name, code in lines), *ending]),
+            'except (ArithmeticError, ValueError):', f'    return instead({given})']
     source = '\n'.join([
         f'def bind({"".join(f"k{n}, " for n in listing.constants)}instead=None):',
-        f'    def pose({given}):',
-        '        try:',
-        *(f'            {line}' for line in [*body, *ending]),
-        '        except (ArithmeticError, ValueError):',
-        f'            return instead({given})',
-        '    return pose'])
+        f'    def pose({given}):', *(f'        {line}' for line in body), '    return pose'])
     scope: Dict[str, Any] = {
         **dialect.names, 'empty': np.empty, 'pack': Struct(f'{len(outputs)}d').pack_into}
     file = f'<linkage_ros formula {next(_NUMBERS)}>'
@@ -194,16 +195,21 @@ class Program:
         self._deciding = _steps(self._conditions)
         self._variants = Cache()
 
-    def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
-        """Return the outputs as functions of the arguments; dimensions are floats or arrays."""
+    def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False,
+             numbers: Mapping[float, float] = MappingProxyType({})) -> Pose:
+        """
+        Return the outputs as functions of the arguments; dimensions are floats or arrays.
+
+        `numbers` take the place of constants, such as tolerances, in what depends on dimensions.
+        """
         swept = any(np.ndim(v) for v in dimensions.values())
         with np.errstate(all='ignore'):
             if not swept:
-                _evaluate_steps(self._deciding, dimensions, known)
+                _evaluate_steps(self._deciding, dimensions, known, numbers)
             decisions = () if swept else tuple(bool(known[c]) for c in self._conditions)
             variant = self._variants.get_or_make(decisions, lambda: _Variant(
                 self._outputs, dict(zip(self._conditions, decisions)), self._arguments))
-            _evaluate_steps(variant.steps, dimensions, known)
+            _evaluate_steps(variant.steps, dimensions, known, numbers)
         constants = [known[c] for c in variant.constants]
         if not swept:
             constants = list(map(float, constants))
@@ -242,6 +248,10 @@ class Pose:
     def _quietly(self, *arguments: float) -> tuple:
         """Return the outputs at one pose with inf or nan where Python's floats raise."""
         return tuple(self.searched(*map(np.float64, arguments)).tolist())
+
+    def on(self, dialect: Dialect) -> Callable:
+        """Return the function of arrays in a dialect of `ARRAYS`, which returns a tuple."""
+        return _python(self.variant.listing, dialect, self.variant.arguments)(*self.constants)
 
     def statements(self, dialect: Dialect) -> Tuple[Dict[str, float], List[Tuple[str, str]],
                                                     List[str]]:

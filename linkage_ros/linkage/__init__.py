@@ -13,8 +13,7 @@
 from .dyads import bar_name, Dyads, Hinge, Motor, Pin, ROUNDING, short, Slide
 from .formulas import Leg, LinkPoint
 from .geometry.builder import GROUND, Link
-from .geometry.planar import LEAST_SQUARE, TINY, TOLERANCE
-from .geometry.spatial import EDGE, LAST_STEP
+from .geometry.spatial import IN_SINGLE
 from .inputs import Arc, Input, spread
 from .inverse import Answer, CLOSE, Inverse, InverseLinkage, Mode, Solution
 from .kinematics import check_bars
@@ -28,8 +27,8 @@ from .text.design import Design
 from .text.rod_lines import FORMS, WindowError
 
 __all__ = ['Answer', 'Arc', 'ascending', 'bar_name', 'check_bars', 'checked_branches',
-           'checked_dimensions', 'CLOSE', 'Design', 'drawn', 'Dyads', 'EDGE', 'extremes', 'FORMS',
-           'Formula', 'GROUND', 'Hinge', 'Input', 'Inverse', 'InverseLinkage', 'joint_lines',
-           'LAST_STEP', 'LEAST_SQUARE', 'Leg', 'Link', 'LinkPoint', 'Mechanism', 'Mode', 'Motor',
-           'Pin', 'reachable_arcs', 'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide',
-           'Solution', 'spread', 'TINY', 'TOLERANCE', 'WindowError']
+           'checked_dimensions', 'CLOSE', 'Design', 'drawn', 'Dyads', 'extremes', 'FORMS',
+           'Formula', 'GROUND', 'Hinge', 'IN_SINGLE', 'Input', 'Inverse', 'InverseLinkage',
+           'joint_lines', 'Leg', 'Link', 'LinkPoint', 'Mechanism', 'Mode', 'Motor', 'Pin',
+           'reachable_arcs', 'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide', 'Solution',
+           'spread', 'WindowError']

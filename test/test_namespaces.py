@@ -1,0 +1,202 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Formulas as functions of arrays of other packages: the same values, NaN, finite gradients."""
+
+from functools import cache
+from pathlib import Path
+
+from linkage_ros import mechanisms, scene
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+# Outputs with an inverse in closed form.
+INVERSES = {'five_bar': ('P.x', 'P.y'), 'ankle': ('pitch', 'roll'), 'four_bar': ('QB',),
+            'slotted_lever': ('lever',), 'slider_crank': ('block',)}
+KINDS = [*mechanisms.TYPES, 'excavator', 'ankle']
+FEW, MANY = 300, 10_000
+# Values of the size of each output, and rates of their own size.
+EXACT, RATED = 1e-13, 1e-12
+
+
+@cache
+def linkage(kind):
+    """Return a linkage of the catalogue, of an example or of a scene."""
+    files = {'ankle': ROOT / 'examples' / 'ankle.yaml',
+             'excavator': ROOT / 'config' / 'excavator.yaml'}
+    if kind in files:
+        return scene.load(files[kind]).machines[kind].linkage
+    return mechanisms.create(kind)
+
+
+def inputs(kind, count):
+    """Return values of the inputs, most of them in reach, as an array for each."""
+    rng, ends = np.random.default_rng(0), [(max(each.low, -3.1), min(each.high, 3.1))
+                                           for each in linkage(kind).inputs]
+    part = 0.35 if kind == 'ankle' else 1.05
+    return [0.5 * (low + high) + 0.5 * part * (high - low) * rng.uniform(-1.0, 1.0, count)
+            for low, high in ends]
+
+
+def requested(kind):
+    """Return points, joints and rates of all kinds."""
+    mechanism = linkage(kind)
+    return mechanism.points, mechanism.joints, mechanism.joints
+
+
+def expected(kind, given):
+    """Return the library's values, and the size of each output."""
+    rows = linkage(kind).posed(*requested(kind)).searched(*given)
+    return rows, np.nanmax(np.abs(rows), axis=1, keepdims=True)
+
+
+def errors(found, rows, sizes):
+    """Return errors in sizes; fail where one is NaN and the other is not."""
+    found = np.array([np.asarray(row) for row in found])
+    assert np.array_equal(np.isnan(found), np.isnan(rows))
+    return np.nan_to_num(np.abs(found - rows) / np.maximum(sizes, np.abs(rows)))
+
+
+@pytest.fixture(scope='module')
+def strict():
+    """Return what has nothing but the standard, and a device that numpy's arrays are not on."""
+    return pytest.importorskip('array_api_strict', reason='array_api_strict is not installed')
+
+
+@pytest.mark.sample(5)
+@pytest.mark.parametrize('kind', KINDS)
+def test_the_standard_is_enough_and_gives_the_bits_of_numpy(kind, strict):
+    given, device = inputs(kind, FEW), strict.Device('device1')
+    rows, _ = expected(kind, given)
+    function = linkage(kind).function(*requested(kind), xp=strict)
+    found = function(*(strict.asarray(x, device=device) for x in given))
+    assert {(each.dtype, each.device, each.shape) for each in found} == {
+        (strict.float64, device, (FEW,))}
+    home = [np.asarray(each.to_device(strict.Device('CPU_DEVICE'))) for each in found]
+    assert np.array_equal(home, rows, equal_nan=True) and np.isfinite(rows).any()
+
+
+@pytest.mark.sample(4)
+@pytest.mark.parametrize('kind', KINDS)
+def test_nothing_on_the_way_is_nan(kind):
+    given = inputs(kind, FEW)
+    given[0][::7] = np.nan
+    given[-1][::11] = np.inf
+    function = linkage(kind).function(*requested(kind), xp=np)
+    with np.errstate(divide='raise', invalid='raise', over='raise'):
+        found = function(*given)
+    with np.errstate(invalid='ignore'):
+        rows, _ = expected(kind, given)
+    known = ~np.isinf(given[-1])
+    assert np.array_equal(np.array(found)[:, known], rows[:, known], equal_nan=True)
+    # Of an infinite input all that moves is NaN, the input itself, too.
+    assert np.isnan(found)[~np.isfinite(rows)].all()
+
+
+@pytest.mark.parametrize('kind', ['five_bar', 'four_bar', 'ankle'])
+def test_single_precision_stays_single(kind, strict):
+    given = [x.astype('f4') for x in inputs(kind, FEW)]
+    rows, sizes = expected(kind, [x.astype(float) for x in given])
+    for xp, function in ((each, linkage(kind).function(*requested(kind), xp=each))
+                         for each in (strict, np)):
+        found = function(*map(xp.asarray, given))
+        assert all(each.dtype == xp.float32 for each in found)
+        found = np.array([np.asarray(each) for each in found])
+        # Next to the ends of its reach a pose may be there in one precision only.
+        there = np.isfinite(found) & np.isfinite(rows)
+        assert (np.isnan(found) == np.isnan(rows)).mean() > 0.99
+        sizes = np.maximum(sizes, 1e-3 * linkage(kind).longest)
+        assert np.quantile((np.abs(found - rows) / sizes)[there], 0.99) < 1e-4
+
+
+@pytest.mark.parametrize('shapes', [[(), (3, 2)], [(1,), (0,)], [(3, 1), (1, 2)], [(), ()]])
+def test_shapes_broadcast(shapes, strict):
+    function = linkage('five_bar').function(xp=strict)
+    found = function(*(strict.full(shape, 1.0 + i) for i, shape in enumerate(shapes)))
+    pose = linkage('five_bar').function()(1.0, 2.0)
+    for each, value in zip(found, pose):
+        assert each.shape == np.broadcast_shapes(*shapes)
+        assert np.array_equal(np.asarray(each), np.full(each.shape, value))
+
+
+def test_numbers_stand_beside_arrays(strict):
+    function = linkage('five_bar').function(xp=strict)
+    ones, two = strict.asarray([1.0, 1.1]), strict.asarray([2.0, 2.0])
+    for one, other in zip(function(ones, 2), function(ones, two)):
+        assert np.array_equal(np.asarray(one), np.asarray(other))
+
+
+@pytest.mark.filterwarnings('ignore:You are comparing')
+def test_what_cannot_be_is_refused_in_a_sentence(strict):
+    arm, leg = linkage('five_bar'), linkage('jansen')
+    function, whole = arm.function(xp=strict), strict.asarray([1, 2])
+    good, single = strict.asarray([1.0]), strict.asarray([1.0], dtype=strict.float32)
+    half = np.array([1.0], 'f2')
+    for given in ((whole, whole), (good, single), (good, np.array([1.0])), (1.0, 2.0),
+                  (good, whole), (good, 'x'), (good, True)):
+        with pytest.raises(ValueError, match='all float64 or all float32'):
+            function(*given)
+    with pytest.raises(ValueError, match='got float16'):
+        leg.function(xp=np)(half)
+    with pytest.raises(ValueError, match='2 arguments are needed, got 1'):
+        function(good)
+    with pytest.raises(ValueError, match='not for arrays'):
+        leg.with_dimensions(m=np.array([14.0, 15.0])).function(xp=strict)
+    with pytest.raises(ValueError, match='no closed form'):
+        leg.inverse('G.x').function(strict)
+    with pytest.raises(ValueError, match='no closed form'):
+        leg.inverse('G.x').modes(strict)
+
+
+def questions(kind, count):
+    """Return values of the outputs and inputs beside those that they are from."""
+    given, outputs = inputs(kind, count), INVERSES[kind]
+    rng, values = np.random.default_rng(1), linkage(kind).checked(outputs).searched(*given)
+    near = [x + 0.2 * each.size * rng.uniform(-1.0, 1.0, count)
+            for x, each in zip(given, linkage(kind).inputs)]
+    return list(values[:len(outputs)]), near
+
+
+def answers(kind, values, near):
+    """Return the library's choice, and the sizes of the inputs."""
+    inverse = linkage(kind).inverse(INVERSES[kind])
+    found = np.array(inverse.nearest(tuple(values), None if near is None else tuple(near))[0])
+    return found, np.reshape([each.size for each in inverse.inputs], (-1, 1))
+
+
+@pytest.mark.parametrize('follows', [True, False])
+@pytest.mark.parametrize('kind', INVERSES)
+def test_the_inverse_chooses_as_the_library_does(kind, follows, strict):
+    values, near = questions(kind, FEW)
+    rows, sizes = answers(kind, values, near if follows else None)
+    device = strict.Device('device1')
+    found = linkage(kind).inverse(INVERSES[kind]).function(strict, follows)(*(
+        strict.asarray(x, device=device) for x in (*values, *(near if follows else ()))))
+    assert {(each.dtype, each.device) for each in found} == {(strict.float64, device)}
+    off = errors([each.to_device(strict.Device('CPU_DEVICE')) for each in found], rows, sizes)
+    # What is next to a dead point of the inverse loses digits; no other answer does.
+    assert np.quantile(off, 0.99) < EXACT and off.max() < 1e-8
+    assert np.isfinite(rows).any()
+
+
+@pytest.mark.parametrize('kind', INVERSES)
+def test_all_modes_are_all_solutions(kind, strict):
+    values, _ = questions(kind, 40)
+    inverse = linkage(kind).inverse(INVERSES[kind])
+    modes = inverse.modes(strict)(*map(strict.asarray, values))
+    modes = np.array([[np.asarray(x) for x in mode] for mode in modes])
+    for k, value in enumerate(zip(*values)):
+        known = [mode for mode in modes[..., k] if np.isfinite(mode).all()]
+        for solution in inverse.all(value) if np.isfinite(value).all() else ():
+            assert min(np.abs(np.subtract(mode, solution.inputs)).max() for mode in known) < 1e-8
+        for mode in known:
+            assert any(np.allclose(mode, each.inputs, 0.0, 1e-8) for each in inverse.all(value))
