@@ -24,7 +24,7 @@ INVERSES = {'five_bar': ('P.x', 'P.y'), 'ankle': ('pitch', 'roll'), 'four_bar': 
             'slotted_lever': ('lever',), 'slider_crank': ('block',)}
 KINDS = [*mechanisms.TYPES, 'excavator', 'ankle']
 FEW, MANY = 300, 10_000
-# Values of the size of each output, and rates of their own size.
+# The largest error of values in the size of each output, and of rates in 99.9 % of poses.
 EXACT, RATED = 1e-13, 1e-12
 
 
@@ -56,7 +56,9 @@ def requested(kind):
 def expected(kind, given):
     """Return the library's values, and the size of each output."""
     rows = linkage(kind).posed(*requested(kind)).searched(*given)
-    return rows, np.nanmax(np.abs(rows), axis=1, keepdims=True)
+    # Some rates vanish, and are differences of others.
+    return rows, np.fmax(np.nanmax(np.abs(rows), axis=1, keepdims=True),
+                         min(linkage(kind).longest, 1.0))
 
 
 def errors(found, rows, sizes):
@@ -114,7 +116,6 @@ def test_single_precision_stays_single(kind, strict):
         # Next to the ends of its reach a pose may be there in one precision only.
         there = np.isfinite(found) & np.isfinite(rows)
         assert (np.isnan(found) == np.isnan(rows)).mean() > 0.99
-        sizes = np.maximum(sizes, 1e-3 * linkage(kind).longest)
         assert np.quantile((np.abs(found - rows) / sizes)[there], 0.99) < 1e-4
 
 
@@ -200,3 +201,147 @@ def test_all_modes_are_all_solutions(kind, strict):
             assert min(np.abs(np.subtract(mode, solution.inputs)).max() for mode in known) < 1e-8
         for mode in known:
             assert any(np.allclose(mode, each.inputs, 0.0, 1e-8) for each in inverse.all(value))
+
+
+# What differentiates and compiles, at night.
+
+
+@pytest.fixture(scope='module')
+def torch():
+    """Return torch."""
+    return pytest.importorskip('torch', reason='torch is not installed')
+
+
+@pytest.fixture(scope='module')
+def jax():
+    """Return JAX in double precision."""
+    package = pytest.importorskip('jax', reason='jax is not installed')
+    package.config.update('jax_enable_x64', True)
+    return package
+
+
+def slopes_of_torch(torch, function, given):
+    """Return the derivatives (outputs, inputs, poses) of a function of arrays."""
+    given = [torch.tensor(x, requires_grad=True) for x in given]
+    return np.array([[np.zeros(len(x)) if slope is None else slope.numpy() for x, slope in zip(
+        given, torch.autograd.grad(each.nansum(), given, retain_graph=True, allow_unused=True))]
+        for each in function(*given)])
+
+
+def slopes_of_jax(jax, function, given, is_long=False):
+    """Return the same by one vectorized function, compiled unless it is long."""
+    slopes = jax.vmap(jax.jacfwd(lambda *x: jax.numpy.stack(function(*x)), tuple(
+        range(len(given)))))
+    slopes = slopes if is_long else jax.jit(slopes)
+    return np.array(slopes(*map(jax.numpy.asarray, given))).transpose(2, 0, 1)
+
+
+def check_values(kind, found, given):
+    """Fail unless points and angles are those of the library, and rates but in few poses."""
+    off = errors(found, *expected(kind, given))
+    points, joints, _ = requested(kind)
+    values = len(linkage(kind).axes) * len(points) + len(joints)
+    assert off[:values].max() <= EXACT and np.quantile(off[values:].max(axis=0), 0.999) <= RATED
+
+
+def check_slopes(slopes, rates):
+    """Fail unless derivatives are finite, and those of the library but in a pose of a thousand."""
+    assert np.isfinite(slopes).all()
+    off = np.abs(slopes - rates) / np.maximum(1.0, np.abs(rates))
+    off = np.where(np.isfinite(rates), off, 0.0).max(axis=(0, 1))
+    worst = np.flatnonzero(off > RATED)
+    assert len(worst) <= 1e-3 * len(off), [(int(k), float(off[k])) for k in worst]
+
+
+def moving(kind):
+    """Return the joints whose rates are compared, and the library's (outputs, inputs, poses)."""
+    mechanism, given = linkage(kind), inputs(kind, MANY)
+    joints = ('pitch', 'roll') if kind == 'ankle' else mechanism.joints
+    rates = mechanism.posed((), (), joints).searched(*given)
+    return joints, given, rates.reshape(len(given), len(joints), MANY).swapaxes(0, 1)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('kind', KINDS)
+def test_torch_has_the_values_and_the_rates(kind, torch):
+    given = inputs(kind, MANY)
+    function = linkage(kind).function(*requested(kind), xp=torch)
+    for each in (function, torch.vmap(function)):
+        check_values(kind, [x.numpy() for x in each(*map(torch.tensor, given))], given)
+    joints, given, rates = moving(kind)
+    function = linkage(kind).function((), joints, xp=torch)
+    check_slopes(slopes_of_torch(torch, function, given), rates)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('kind', KINDS)
+def test_jax_has_the_values_and_the_rates(kind, jax):
+    given = inputs(kind, MANY)
+    function = linkage(kind).function(*requested(kind), xp=jax.numpy)
+    for each in (jax.jit(function), jax.jit(jax.vmap(function))):
+        check_values(kind, each(*map(jax.numpy.asarray, given)), given)
+    joints, given, rates = moving(kind)
+    function = linkage(kind).function((), joints, xp=jax.numpy)
+    check_slopes(slopes_of_jax(jax, function, given, kind == 'ankle'), rates)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('package', ['torch', 'jax'])
+@pytest.mark.parametrize('kind', INVERSES)
+def test_both_have_the_inverse_and_its_rates(kind, package, request):
+    values, near = questions(kind, MANY)
+    rows, sizes = answers(kind, values, near)
+    xp, given = request.getfixturevalue(package), [*values, *near]
+    names = xp if package == 'torch' else xp.numpy
+    function = linkage(kind).inverse(INVERSES[kind]).function(names, follows=True)
+    off = errors([np.asarray(x) for x in function(*map(names.asarray, given))], rows, sizes).max(0)
+    n = len(rows)
+    rates = linkage(kind).inverse(INVERSES[kind]).nearest(tuple(values), tuple(near))[1]
+    jacobian = np.reshape(rates, (n, n, MANY)).transpose(2, 1, 0)
+    known = np.isfinite(jacobian).all(axis=(1, 2))
+    jacobian[~known] = np.eye(n)
+    inverses = np.linalg.inv(jacobian).transpose(1, 2, 0)
+    # Next to a singular pose of the inverse, where inputs run away from outputs, digits are lost.
+    steep = np.abs(inverses).max(axis=(0, 1))
+    close = steep > 10.0 * np.median(steep[known])
+    assert np.quantile(off[known & ~close], 0.999) <= EXACT and close[known].mean() < 0.1
+    inverses[..., close | ~known] = np.nan
+    slopes = slopes_of_torch(xp, function, given) if package == 'torch' else slopes_of_jax(
+        xp, function, given, kind == 'ankle')
+    assert not slopes[:, n:].any() and np.isfinite(slopes).all()
+    check_slopes(slopes[:, :n], inverses)
+
+
+@pytest.mark.long
+def test_torch_compiles_and_exports(torch):
+    given = [torch.tensor(x) for x in inputs('five_bar', FEW)]
+    function = linkage('five_bar').function(*requested('five_bar'), xp=torch)
+
+    class Module(torch.nn.Module):
+        def forward(self, one, other):
+            return function(one, other)
+
+    exported = torch.export.export(Module(), tuple(given)).module()
+    for each in (torch.compile(function, fullgraph=True), exported):
+        check_values('five_bar', [x.numpy() for x in each(*given)], [x.numpy() for x in given])
+
+
+@pytest.mark.long
+def test_a_parameter_shared_with_poses_that_are_not_there_learns(torch):
+    function = linkage('five_bar').function(('P',), xp=torch)
+    one, other = (torch.tensor(x) for x in inputs('five_bar', FEW))
+    offset = torch.tensor(0.02, dtype=torch.float64)
+    seen = function(one + offset, other)
+    assert torch.isnan(seen[0]).any() and torch.isfinite(seen[0]).any()
+    guess = torch.zeros((), dtype=torch.float64, requires_grad=True)
+    for _ in range(6):
+        off = torch.cat(function(one + guess, other)) - torch.cat(seen)
+        slope, = torch.autograd.grad(off.nansum(), guess, retain_graph=True)
+        steps = torch.autograd.functional.jvp(
+            lambda x: torch.cat(function(one + x, other)), guess.detach(),
+            torch.ones_like(guess))[1]
+        there = torch.isfinite(off)
+        with torch.no_grad():
+            guess -= (off[there] @ steps[there]) / (steps[there] @ steps[there])
+        assert torch.isfinite(slope)
+    assert abs(guess.detach() - offset) < 1e-12
