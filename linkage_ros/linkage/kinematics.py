@@ -377,6 +377,8 @@ class Kinematics:
     def array_function(self, outputs: Sequence[Real], arguments: int, xp: Any,
                        single: Mapping[float, float] = IN_SINGLE) -> Callable:
         """Return some of its formulas as a function of arrays of a package; see `function`."""
+        if not hasattr(xp, 'float64'):
+            raise ValueError(f'xp must be a package of arrays, such as torch, got {quoted(xp)}')
         if any(np.ndim(length) for length in self.dimensions.values()):
             raise ValueError('xp is for one set of dimensions, not for arrays')
         return array_function(outputs, arguments, xp, self.lengths, single)
