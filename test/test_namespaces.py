@@ -21,7 +21,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 # Outputs with an inverse in closed form.
 INVERSES = {'five_bar': ('P.x', 'P.y'), 'ankle': ('pitch', 'roll'), 'four_bar': ('QB',),
-            'slotted_lever': ('lever',), 'slider_crank': ('block',)}
+            'slotted_lever': ('lever',), 'slider_crank': ('block',),
+            'excavator': ('OB', 'AD', 'EG')}
 KINDS = [*mechanisms.TYPES, 'excavator', 'ankle']
 FEW, MANY = 300, 10_000
 # The largest error of values in the size of each output, and of rates in 99.9 % of poses.
@@ -194,6 +195,18 @@ def test_the_inverse_chooses_as_the_library_does(kind, follows, strict):
     # What is next to a dead point of the inverse loses digits; no other answer does.
     assert np.quantile(off, 0.99) < EXACT and off.max() < 1e-8
     assert np.isfinite(rows).any()
+
+
+@pytest.mark.parametrize('kind', INVERSES)
+def test_the_inverse_in_single_precision_chooses_alike(kind):
+    values, near = questions(kind, FEW)
+    rows, sizes = answers(kind, values, near)
+    found = linkage(kind).inverse(INVERSES[kind]).function(np, follows=True)(
+        *(x.astype('f4') for x in (*values, *near)))
+    assert all(each.dtype == np.float32 for each in found)
+    off = (np.abs(found - rows) / sizes).max(axis=0)
+    assert (np.isnan(off) == np.isnan(rows).any(axis=0)).mean() > 0.99
+    assert np.nanquantile(off, 0.9) < 1e-4
 
 
 @pytest.mark.parametrize('kind', INVERSES)
