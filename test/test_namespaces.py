@@ -12,6 +12,7 @@
 """Formulas as functions of arrays of other packages: the same values, NaN, finite gradients."""
 
 from functools import cache
+import math
 from pathlib import Path
 
 from linkage_ros import mechanisms, scene
@@ -34,6 +35,10 @@ def linkage(kind):
     """Return a linkage of the catalogue, of an example or of a scene."""
     files = {'ankle': ROOT / 'examples' / 'ankle.yaml',
              'excavator': ROOT / 'config' / 'excavator.yaml'}
+    if kind == 'geared':
+        return mechanisms.create('custom', joints=(
+            'O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'C crank Q 0.5 geared crank -2 0.3',
+            'B dyad A C 2 2 left'))
     if kind in files:
         return scene.load(files[kind]).machines[kind].linkage
     return mechanisms.create(kind)
@@ -195,6 +200,30 @@ def test_the_inverse_chooses_as_the_library_does(kind, follows, strict):
     # What is next to a dead point of the inverse loses digits; no other answer does.
     assert np.quantile(off, 0.99) < EXACT and off.max() < 1e-8
     assert np.isfinite(rows).any()
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize('kind', ['geared', *(
+    kind for kind in mechanisms.TYPES if kind not in ('jansen', 'five_bar'))])
+def test_every_output_has_the_library_s_choice(kind):
+    mechanism, (given,) = linkage(kind), inputs(kind, FEW)
+    rng, tried = np.random.default_rng(3), 0
+    near = given + rng.uniform(-0.2, 0.2, FEW)
+    for output in (*mechanism.joints, *(f'{p}.{axis}' for p in mechanism.points for axis in 'xy')):
+        try:
+            inverse = mechanism.inverse(output)
+        except ValueError:
+            continue  # it does not move
+        if not inverse.closed:
+            continue
+        values = mechanism.posed((), (output,)).searched(given)[0]
+        values += math.tau * rng.integers(-2, 3, FEW) * mechanism.is_angle(output)
+        for follows in (False, True):
+            found, = inverse.function(np, follows)(values, *[near] * follows)
+            expected_, = inverse.nearest((values,), (near,) if follows else None)[0]
+            np.testing.assert_allclose(found, expected_, 0.0, 1e-6, err_msg=output)
+        tried += 1
+    assert tried > 2
 
 
 @pytest.mark.parametrize('kind', INVERSES)

@@ -59,7 +59,7 @@ def modes_of(problem: InverseProblem, closed: InverseLinkage) -> List[Inputs]:
                                               problem.scales):
             room = OFF * scale - abs(_nearest(output - value, turn))
             inputs = [gated(x, room, 0.0) for x in inputs]
-        found.append([_wrapped(x, turn) for x, turn in zip(inputs, problem.turns)])
+        found.append([_nearest(x, turn) for x, turn in zip(inputs, problem.turns)])
     return found
 
 
@@ -101,9 +101,3 @@ def _precedes(order: Inputs, best: Inputs) -> Real:
 def _nearest(gap: Real, turn: float) -> Real:
     """Return a difference without whole turns."""
     return gap - turn * nearest_integer(gap / turn) if turn < math.inf else gap
-
-
-def _wrapped(x: Real, turn: float) -> Real:
-    """Return an angle in its period around zero, half of it excluded."""
-    x = _nearest(x, turn)
-    return where(0.5 * turn <= x, x - turn, x) if turn < math.inf else x
