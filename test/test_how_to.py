@@ -239,6 +239,13 @@ def test_an_ankle_on_two_rods(graph, follow):
         assert back['left'] == pytest.approx(joints['motor_left'], abs=1e-12)
 
 
+@pytest.mark.long
+def test_an_ankle_in_a_training_loop(follow, capsys):
+    pytest.importorskip('torch', reason='torch is not installed')
+    follow('how-to/training')
+    assert capsys.readouterr().out == 'zeros of the encoders [rad]: 0.013 -0.007\n'
+
+
 def test_a_boom_on_a_cylinder(graph, follow):
     states = graph.listen(JointState, 'joint_states', 100)
     command = follow('how-to/cylinder')

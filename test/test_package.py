@@ -102,7 +102,7 @@ def test_the_workflow_runs_what_has_to_be_green():
     workflow = (ROOT / '.github/workflows/ci.yml').read_text()
     jobs = yaml.safe_load(workflow)['jobs']
     steps = [step['run'] for job in jobs.values() for step in job['steps'] if 'run' in step]
-    # The nodes without llvmlite, the demo, and linters that are no packages of Python are its alone.
+    # Its alone: the nodes without llvmlite, the demo, and linters that are no Python packages.
     assert set().union(*map(made, steps)) == made(without_comments(
         (ROOT / '.ci/run').read_text())) - {'ready'} | {'nodes', 'demo', 'ctidy'}
     for job in ('test', 'long'):

@@ -22,15 +22,12 @@ from .names import comment
 from ..formula.expression import Real, unknown
 from ..formula.operations import OPERATIONS
 from ..formula.program import Dialect, evaluate, Pose
-from ..linkage import EDGE, LAST_STEP, LEAST_SQUARE, Mechanism, TINY, TOLERANCE
+from ..linkage import IN_SINGLE, Mechanism
 
 # Expressions that are true or false.
 _CONDITIONS = ('less', 'less_equal')
 # Names of constants, arguments and values.
 _NAMED = re.compile(r'\b[kxv]\d+\b')
-# What formulas count as rounding, and what that is in float.
-_IN_FLOAT = {TOLERANCE: 8 * 2.0 ** -24, -TOLERANCE: -8 * 2.0 ** -24, LAST_STEP: 2.0 ** -11,
-             EDGE: 2.0 ** -17, TINY: 2.0 ** -26, LEAST_SQUARE: 2.0 ** -100}
 # Longest formula of a constant in a comment, and longest line of code.
 FORMULA, LINE = 60, 100
 # A constant's formula is written as in Python, with the names of dimensions.
@@ -66,7 +63,7 @@ class Code:
                      for operation, row in OPERATIONS.items()}
         self._dialect = Dialect(
             {**templates, 'atan2': 'linkage_angle({}, {})'}, {},
-            lambda value: self.literal(_IN_FLOAT.get(value, value) if single else value))
+            lambda value: self.literal(IN_SINGLE.get(value, value) if single else value))
 
     def row(self, row: Iterable[float]) -> str:
         """Return numbers as an initializer."""
@@ -148,7 +145,7 @@ class Code:
         """Return the value of an expression of dimensions with the rounding of float."""
         known: Dict[Real, Any] = {}
         for x in unknown(node, lambda x: x.operands, known):
-            known[x] = None if x.value is None else _IN_FLOAT.get(x.value)
+            known[x] = None if x.value is None else IN_SINGLE.get(x.value)
         known = {x: rounding for x, rounding in known.items() if rounding is not None}
         return float(evaluate(node, self.linkage.lengths, known)) if known else value
 

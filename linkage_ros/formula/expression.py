@@ -22,10 +22,12 @@ from __future__ import annotations
 from functools import reduce
 import operator
 from typing import (
+    Any,
     Callable,
     Iterable,
     Iterator,
     List,
+    Mapping,
     NamedTuple,
     Optional,
     Sequence,
@@ -383,13 +385,17 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
     return known[node]
 
 
-def substituted(outputs: Sequence[Real], arguments: Sequence[Real]) -> List[Real]:
-    """Return expressions with expressions for their arguments, and without geometric rates."""
-    known: dict = {}
+def substituted(outputs: Sequence[Real], replaced: Mapping[Any, Real]) -> List[Real]:
+    """
+    Return expressions with expressions for their arguments, and without geometric rates.
+
+    Arguments are replaced by their leaves or by their indices.
+    """
+    known: dict = dict(replaced)
     for x in (x for output in outputs for x in unknown(
             output, lambda x: x.operands if x.varies else (), known)):
         if x.op == 'argument':
-            known[x] = arguments[x.args[0]]
+            known[x] = replaced.get(x.args[0], x)
         elif not x.varies:
             known[x] = x
         else:

@@ -28,8 +28,8 @@ import numpy as np
 
 from .elementary import arctangent, sine_and_cosine
 from .expression import argument
+from .listing import Listing
 from .llvm_code import address, append, Builder, compiled, COUNT, count, load, NUMBER
-from .program import Program
 from ..cache import cached
 
 # One register of AVX-512; eight are also about the fastest with AVX2 and SSE2.
@@ -164,5 +164,5 @@ def _approximated(builder: Builder, spell: Dict[str, Callable], approximation: C
 @cached()
 def _listed(approximation: Callable, arguments: int) -> Tuple[Sequence, Sequence[int]]:
     outputs = approximation(*map(argument, range(arguments)))
-    operations, _, numbers = Program(outputs).bind({}, {}).variant.listing.operations()
+    operations, _, numbers = Listing(outputs, {}).operations()
     return operations, numbers

@@ -20,7 +20,6 @@ code for a pose has no branches for them.
 from __future__ import annotations
 
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import chain, count
 import linecache
@@ -28,14 +27,16 @@ import math
 from operator import attrgetter
 import re
 from struct import Struct
+from types import MappingProxyType
 from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 import warnings
 from weakref import finalize
 
 import numpy as np
 
-from .expression import Real, unknown
-from .operations import COMMUTING, OPERATIONS
+from .expression import Real, substituted, unknown
+from .listing import Dialect, Listing
+from .operations import OPERATIONS
 from ..cache import Cache
 from ..optional import needs
 
@@ -43,8 +44,6 @@ from ..optional import needs
 BLOCK_OF_POSES = 4096
 # Below this many poses the float code in a loop beats numpy's cost per call.
 FEW_POSES = 32
-# Python's parser limits the nesting of parentheses.
-DEEPEST = 16
 _NUMBERS, _NAMED, _OPERANDS = count(), re.compile(r'\bv\d+'), attrgetter('operands')
 
 _Step = Tuple[Real, Optional[Callable], Sequence[Real]]
@@ -58,37 +57,8 @@ def compile_in_background(make: Callable[[], Any]) -> Future:
     return made
 
 
-@dataclass(frozen=True)
-class Dialect:
-    """Spelling of operations and numbers in code, and the names that the code uses."""
-
-    templates: Mapping[str, str]
-    names: Mapping[str, Any]
-    number: Callable[[float], str] = repr
-
-
 FLOATS = Dialect({name: row.python for name, row in OPERATIONS.items()}, {
     name: value for name, value in vars(math).items() if not name.startswith('_')})
-
-
-def _quiet(function: Any) -> Any:
-    """Return a function of `math` that returns NaN as in IEEE 754, instead of an error."""
-    def quiet(*operands: float) -> np.float64:
-        try:
-            return np.float64(function(*operands))
-        except ValueError:
-            return np.float64(math.nan)
-
-    return quiet if callable(function) else function
-
-
-# The same bits as FLOATS, on numpy's floats, which divide by zero.
-QUIET = Dialect(
-    {**{name: f'float64({code})' for name, code in FLOATS.templates.items()},
-     'rint': 'round_even({})'},
-    {'float64': np.float64, 'round_even': np.rint,
-     **{name: _quiet(value) for name, value in FLOATS.names.items()}},
-    'float64({!r})'.format)
 ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
     **{name: row.numpy for name, row in OPERATIONS.items()}, 'nan': np.nan, 'inf': np.inf})
 
@@ -113,8 +83,9 @@ def _steps(nodes: Iterable[Real]) -> List[_Step]:
     return list(known.values())
 
 
-def _evaluate_steps(steps: Iterable[_Step], dimensions: Mapping, known: dict) -> None:
-    """Add the values of expressions to those that are known."""
+def _evaluate_steps(steps: Iterable[_Step], dimensions: Mapping, known: dict,
+                    numbers: Mapping[float, float] = MappingProxyType({})) -> None:
+    """Add the values of expressions to those known, with other `numbers` in place of some."""
     for node, function, operands in steps:
         if node in known:
             continue
@@ -122,90 +93,8 @@ def _evaluate_steps(steps: Iterable[_Step], dimensions: Mapping, known: dict) ->
             known[node] = function(*[known[x] for x in operands])[()]
         else:
             value, = node.args
-            known[node] = np.asarray(
-                dimensions[value] if node.op == 'dimension' else value, float)[()]
-
-
-class _Listing:
-    """The operations of outputs, each once, in an order of evaluation."""
-
-    def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool],
-                 replaced: Mapping[Real, Real]):
-        self.entries: List[Tuple[Real, tuple]] = []
-        self._decided = decided
-        self._numbers: Dict[tuple, int] = {}
-        self._known: Dict[Real, int] = {}
-        for leaf, expression in replaced.items():
-            self._known[leaf] = self._number(expression)
-        self.outputs = [self._number(node) for node in outputs]
-        self._uses = self._count_uses()
-        # The values of dimensions alone that varying operations use.
-        self.constants = [n for n in self._uses if not self.entries[n][0].varies
-                          and self.entries[n][0].op != 'constant']
-
-    def _number(self, node: Real) -> int:
-        for x in unknown(node, self._needed, self._known):
-            self._known[x] = self._enter(x)
-        return self._known[node]
-
-    def _needed(self, node: Real) -> tuple:
-        if node.op == 'where' and node.args[0] in self._decided:
-            return (node.args[1 if self._decided[node.args[0]] else 2],)
-        return node.operands
-
-    def _enter(self, node: Real) -> int:
-        needed = self._needed(node)
-        if len(needed) == 1 and node.op in ('where', 'rated'):
-            return self._known[needed[0]]
-        args = tuple(self._known[a] for a in needed) or node.args
-        key = (node.op, tuple(sorted(args)) if node.op in COMMUTING else args)
-        if key not in self._numbers:
-            self._numbers[key] = len(self.entries)
-            self.entries.append((node, args))
-        return self._numbers[key]
-
-    def _count_uses(self) -> Dict[int, int]:
-        """Return the number of uses of each value, in an order of evaluation."""
-        uses: Dict[int, int] = {}
-        waiting = list(self.outputs)
-        while waiting:
-            number = waiting.pop()
-            uses[number] = uses.get(number, 0) + 1
-            node, args = self.entries[number]
-            if uses[number] == 1 and node.varies and node.op != 'argument':
-                waiting.extend(args)
-        return dict(sorted(uses.items()))
-
-    def operations(self) -> tuple:
-        """Return the operations as (number, name, operands), the constants and the outputs."""
-        return [(number, self.entries[number][0].op, self.entries[number][1])
-                for number in self._uses if number not in self.constants
-                ], self.constants, self.outputs
-
-    def statements(self, dialect: Dialect) -> Tuple[List[Tuple[str, str]], List[str]]:
-        """Return the assignments as (name, code) and the code of each output."""
-        # Operands that a template repeats are evaluated before.
-        repeating = {name: [i for i in range(2) if code.count(f'{{{i}}}') > 1]
-                     for name, code in dialect.templates.items()}
-        repeated = {args[i] for node, args in map(self.entries.__getitem__, self._uses)
-                    for i in repeating.get(node.op, ())}
-        leaves = {'constant': dialect.number, 'argument': 'x{}'.format}
-        text: Dict[int, str] = {}
-        depth = dict.fromkeys(self._uses, 0)
-        lines = []
-        for number, uses in self._uses.items():
-            node, args = self.entries[number]
-            if number in self.constants:
-                text[number] = f'k{number}'
-            elif node.op in leaves:
-                text[number] = leaves[node.op](*args)
-            else:
-                text[number] = dialect.templates[node.op].format(*(text[a] for a in args))
-                depth[number] = 1 + max(depth[a] for a in args)
-                if uses > 1 or number in repeated or depth[number] > DEEPEST:
-                    lines.append((f'v{number}', text[number]))
-                    text[number], depth[number] = f'v{number}', 0
-        return lines, [text[n] for n in self.outputs]
+            value = dimensions[value] if node.op == 'dimension' else numbers.get(value, value)
+            known[node] = np.asarray(value, float)[()]
 
 
 def _with_releases(lines: Sequence[Tuple[str, str]], outputs: Sequence[str]) -> List[str]:
@@ -218,7 +107,7 @@ def _with_releases(lines: Sequence[Tuple[str, str]], outputs: Sequence[str]) -> 
             for text in (f'{name} = {code}', *([f'del {", ".join(rest)}'] if rest else []))]
 
 
-def _python(listing: _Listing, dialect: Dialect, arguments: int,
+def _python(listing: Listing, dialect: Dialect, arguments: int,
             names: Tuple[str, ...] = ()) -> Callable:
     """
     Return a factory from constants and a fallback `instead` to the function of the arguments.
@@ -234,17 +123,16 @@ def _python(listing: _Listing, dialect: Dialect, arguments: int,
         # Packing floats as bytes takes a quarter of the time of numpy's conversion.
         ending = [f'pairs = empty(({len(names)}, 2))', f'pack(pairs, 0, {", ".join(outputs)})',
                   f'return {{{rows}}}']
-    body = (_with_releases(lines, outputs) if dialect is ARRAYS
-            else [f'{name} = {code}' for name, code in lines])
     given = ', '.join(f'x{i}' for i in range(arguments))
+    if dialect.templates is ARRAYS.templates:
+        body = [*_with_releases(lines, outputs), *ending]
+    else:
+        body = ['try:', *(f'    {line}' for line in [
+            *(f'{name} = {code}' for name, code in lines), *ending]),
+            'except (ArithmeticError, ValueError):', f'    return instead({given})']
     source = '\n'.join([
         f'def bind({"".join(f"k{n}, " for n in listing.constants)}instead=None):',
-        f'    def pose({given}):',
-        '        try:',
-        *(f'            {line}' for line in [*body, *ending]),
-        '        except (ArithmeticError, ValueError):',
-        f'            return instead({given})',
-        '    return pose'])
+        f'    def pose({given}):', *(f'        {line}' for line in body), '    return pose'])
     scope: Dict[str, Any] = {
         **dialect.names, 'empty': np.empty, 'pack': Struct(f'{len(outputs)}d').pack_into}
     file = f'<linkage_ros formula {next(_NUMBERS)}>'
@@ -258,9 +146,8 @@ def _python(listing: _Listing, dialect: Dialect, arguments: int,
 class _Variant:
     """The code for one combination of the conditions on dimensions."""
 
-    def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool],
-                 replaced: Mapping[Real, Real], arguments: int):
-        self.listing = _Listing(outputs, decided, replaced)
+    def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool], arguments: int):
+        self.listing = Listing(outputs, decided)
         self.arguments, self.outputs = arguments, len(outputs)
         self.constants = [self.listing.entries[n][0] for n in self.listing.constants]
         self.steps = _steps(self.constants)
@@ -270,10 +157,6 @@ class _Variant:
     @cached_property
     def float(self) -> Callable:
         return _python(self.listing, FLOATS, self.arguments)
-
-    @cached_property
-    def quiet(self) -> Callable:
-        return _python(self.listing, QUIET, self.arguments)
 
     @cached_property
     def array(self) -> Callable:
@@ -306,24 +189,27 @@ class Program:
 
     def __init__(self, outputs: Sequence[Real], arguments: int = 1,
                  replaced: Optional[Mapping[Real, Real]] = None):
-        self._outputs = tuple(outputs)
+        self._outputs = tuple(substituted(outputs, replaced) if replaced else outputs)
         self._arguments = arguments
-        self._replaced = replaced or {}
         self._conditions = _conditions(self._outputs)
         self._deciding = _steps(self._conditions)
         self._variants = Cache()
 
-    def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
-        """Return the outputs as functions of the arguments; dimensions are floats or arrays."""
+    def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False,
+             numbers: Mapping[float, float] = MappingProxyType({})) -> Pose:
+        """
+        Return the outputs as functions of the arguments; dimensions are floats or arrays.
+
+        `numbers` take the place of constants, such as tolerances, in what depends on dimensions.
+        """
         swept = any(np.ndim(v) for v in dimensions.values())
         with np.errstate(all='ignore'):
             if not swept:
-                _evaluate_steps(self._deciding, dimensions, known)
+                _evaluate_steps(self._deciding, dimensions, known, numbers)
             decisions = () if swept else tuple(bool(known[c]) for c in self._conditions)
             variant = self._variants.get_or_make(decisions, lambda: _Variant(
-                self._outputs, dict(zip(self._conditions, decisions)), self._replaced,
-                self._arguments))
-            _evaluate_steps(variant.steps, dimensions, known)
+                self._outputs, dict(zip(self._conditions, decisions)), self._arguments))
+            _evaluate_steps(variant.steps, dimensions, known, numbers)
         constants = [known[c] for c in variant.constants]
         if not swept:
             constants = list(map(float, constants))
@@ -359,14 +245,13 @@ class Pose:
     def _given(self) -> np.ndarray:
         return np.array(self.constants)
 
-    @cached_property
-    def _quiet(self) -> Callable:
-        return self.variant.quiet(*map(np.float64, self.constants))
-
     def _quietly(self, *arguments: float) -> tuple:
         """Return the outputs at one pose with inf or nan where Python's floats raise."""
-        with np.errstate(all='ignore'):
-            return tuple(map(float, self._quiet(*map(np.float64, arguments))))
+        return tuple(self.searched(*map(np.float64, arguments)).tolist())
+
+    def on(self, dialect: Dialect) -> Callable:
+        """Return the function of arrays in a dialect of `ARRAYS`, which returns a tuple."""
+        return _python(self.variant.listing, dialect, self.variant.arguments)(*self.constants)
 
     def statements(self, dialect: Dialect) -> Tuple[Dict[str, float], List[Tuple[str, str]],
                                                     List[str]]:

@@ -13,8 +13,7 @@
 from .dyads import bar_name, Dyads, Hinge, Motor, Pin, short, Slide
 from .formulas import Leg, LinkPoint
 from .geometry.builder import GROUND, Link
-from .geometry.planar import LEAST_SQUARE, TINY
-from .geometry.spatial import EDGE, LAST_STEP
+from .geometry.spatial import IN_SINGLE
 from .inputs import Arc, Input, spread
 from .inverse import Answer, Inverse, InverseLinkage, Mode, Solution
 from .kinematics import check_bars
@@ -29,8 +28,8 @@ from .text.rod_lines import FORMS, WindowError
 from .tolerances import CLOSE, ROUNDING, TOLERANCE
 
 __all__ = ['Answer', 'Arc', 'ascending', 'bar_name', 'check_bars', 'checked_branches',
-           'checked_dimensions', 'CLOSE', 'Design', 'Dyads', 'EDGE', 'extremes', 'FORMS',
-           'Formula', 'GROUND', 'Hinge', 'Input', 'Inverse', 'InverseLinkage', 'joint_lines',
-           'LAST_STEP', 'LEAST_SQUARE', 'Leg', 'Link', 'LinkPoint', 'Mechanism', 'Mode', 'Motor',
-           'Pin', 'reachable_arcs', 'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide',
-           'Solution', 'spread', 'TINY', 'TOLERANCE', 'WindowError']
+           'checked_dimensions', 'CLOSE', 'Design', 'Dyads', 'extremes', 'FORMS', 'Formula',
+           'GROUND', 'Hinge', 'IN_SINGLE', 'Input', 'Inverse', 'InverseLinkage', 'joint_lines',
+           'Leg', 'Link', 'LinkPoint', 'Mechanism', 'Mode', 'Motor', 'Pin', 'reachable_arcs',
+           'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide', 'Solution', 'spread',
+           'TOLERANCE', 'WindowError']

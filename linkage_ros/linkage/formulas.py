@@ -85,7 +85,7 @@ class Structure:
         self._programs, self._moving = Cache(), Cache()
         self._outputs: Mapping[str, Callable] = {
             'points': self._points, 'velocities': self._velocities, 'angles': self._angles,
-            'rates': self._rates, 'parts': self._parts, 'margins': self._margins,
+            'rates': self._rates, 'parts': self.parts, 'margins': self._margins,
             'transmissions': self._transmissions, 'closures': self._closures,
             'output': self._output, 'checked': self.checked,
             'point accelerations': self._point_accelerations,
@@ -144,7 +144,8 @@ class Structure:
         pair = PAIR.fullmatch(name)
         return self.built.arm(*pair.groups()) if pair else None
 
-    def _parts(self, names: Tuple[Names, Names, Names]) -> List[Real]:
+    def parts(self, names: Tuple[Names, ...]) -> List[Real]:
+        """Return coordinates of points, joint angles, and joint rates by each input."""
         points, joints, rates = names
         turning = [self._rates(rates, by) for by in range(len(self.built.inputs))]
         return [*self._points(points), *self._angles(joints), *chain.from_iterable(turning)]
@@ -155,7 +156,7 @@ class Structure:
         for limit in self.built.limits:
             if limit.margin.varies:
                 values = [gated(value, limit.margin, limit.tolerance) for value in values]
-        return [*values, *self._parts(((), (), names))]
+        return [*values, *self.parts(((), (), names))]
 
     def _legs(self, points: Points, joints: Names, moving: Names) -> Program:
         inputs = self.built.inputs

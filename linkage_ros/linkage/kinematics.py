@@ -24,12 +24,14 @@ from numpy.typing import ArrayLike
 
 from .formulas import LinkPoint, Points, structure_of
 from .geometry.builder import in_metres, UNIT
+from .geometry.spatial import IN_SINGLE
 from .inputs import FASTEST, Input, is_periodic, MAX_COUNTED, MOST_TURNS, spread
 from .text import joint_lines
 from .text.arguments import checked_dimensions, numbers
 from .text.design import Design
 from ..cache import Cache
 from ..formula.expression import derivative, Real, real
+from ..formula.namespace import array_function
 from ..formula.program import evaluate, Pose, Program
 from ..optional import needs
 from ..words import listed, meant, plain_text, quoted
@@ -354,22 +356,41 @@ class Kinematics:
         return self._scalars('transmissions', theta, joints)
 
     def function(self, points: Names = None, joints: Sequence[str] = (),
-                 rates: Sequence[str] = ()) -> Callable:
+                 rates: Sequence[str] = (), xp: Any = None) -> Callable:
         """
-        Return the fastest function for single poses.
+        Return the fastest function for single poses, or one for arrays of another package.
 
         Its arguments are the inputs, floats. It returns a tuple of floats: x, y of each point,
         then the joint angles, then the joint rates by each input.
+
+        `xp` is a package with Python's array API, such as torch or jax.numpy: then inputs are its
+        arrays, float64 or float32, which broadcast, and so are the results, with dtype and device
+        of the inputs. The package's own differentiation, vectorization and compilation apply.
+        Where a pose cannot be assembled, values are NaN and their gradients finite.
         """
-        return self.posed(points, joints, rates).at
+        if xp is None:
+            return self.posed(points, joints, rates).at
+        return self.array_function(self.structure.parts(self._requested(points, joints, rates)),
+                                   len(self.inputs), xp)
+
+    def array_function(self, outputs: Sequence[Real], arguments: int, xp: Any,
+                       single: Mapping[float, float] = IN_SINGLE) -> Callable:
+        """Return some of its formulas as a function of arrays of a package; see `function`."""
+        if not hasattr(xp, 'float64'):
+            raise ValueError(f'xp must be a package of arrays, such as torch, got {quoted(xp)}')
+        if any(np.ndim(length) for length in self.dimensions.values()):
+            raise ValueError('xp is for one set of dimensions, not for arrays')
+        return array_function(outputs, arguments, xp, self.lengths, single)
 
     def posed(self, points: Names = None, joints: Sequence[str] = (),
               rates: Sequence[str] = ()) -> Pose:
         """Return the code behind `function`."""
-        requested = tuple(self._names(kind, _plain(_hashable(names)))
-                          for kind, names in (('points', points), ('angles', joints),
-                                              ('rates', rates)))
-        return self.bound('parts', requested)
+        return self.bound('parts', self._requested(points, joints, rates))
+
+    def _requested(self, *names: Any) -> Tuple[Tuple[str, ...], ...]:
+        """Return names of points, joints and rates."""
+        return tuple(self._names(kind, _plain(_hashable(each)))
+                     for kind, each in zip(('points', 'angles', 'rates'), names))
 
     def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]) -> Pose:
         """

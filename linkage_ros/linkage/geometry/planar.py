@@ -166,11 +166,11 @@ class Arm:
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
-        return self._limit(radius, size, 1.0, square(radius) - self.square)
+        return self._limit(radius, size, square(radius) - self.square)
 
     def beyond(self, radius: Real, size: Real) -> Limit:
         """Return the margin square - radius^2; the radius is made from lengths up to size."""
-        return self._limit(radius, size, -1.0, self.square - square(radius))
+        return self._limit(radius, size, self.square - square(radius))
 
     def stroke(self, first: Real, second: Real, size: Real) -> Tuple[Limit, Limit]:
         """Return `within` of their sum and `beyond` of their difference; first varies."""
@@ -183,19 +183,14 @@ class Arm:
         margins = (((first + near) + near_error) * (first + far),
                    ((far - first) + far_error) * ((first - near) - near_error))
         longer, shorter = (gated(margin, self.square, real(0.0)) for margin in margins)
-        return (self._limit(first + second, size, 1.0, longer),
-                self._limit(first - second, size, -1.0, shorter))
+        return (self._limit(first + second, size, longer),
+                self._limit(first - second, size, shorter))
 
     def across(self, point: Complex, offset: Real) -> Complex:
         """Return the vector from a point of this offset to its mirror image in the arm's line."""
         return self.vector.turned() * (-2.0 * offset / self.divisor)
 
-    def _with_rate(self, margin: Real, radius: Real, sign: float) -> Real:
-        return with_rate(margin, self.square, radius, formula=lambda rate, growth: (
-            2.0 * radius * growth - rate) * sign)
-
-    def _limit(self, radius: Real, size: Real, sign: float, margin: Real) -> Limit:
-        margin = self._with_rate(margin, radius, sign)
+    def _limit(self, radius: Real, size: Real, margin: Real) -> Limit:
         # At the limit the length is the radius: an error of a length changes the square by the
         # radius times that error. A tolerance is constant: size bounds a radius that varies.
         bound = (self._length or size) if radius.varies else abs(radius)
@@ -226,10 +221,6 @@ class CrankArm(Arm):
         self._line = along
         self._area = 2.0 * g * m * s * h * (1.0 if reverse else -1.0)
         self._g, self._m, self._s, self._h, self._is_smooth = g, m, s, h, smooth
-        bar = crank.bar()
-        vector = Complex(
-            with_rate(vector.x, crank.angle, formula=lambda rate: -(rate * bar.y)),
-            with_rate(vector.y, crank.angle, formula=lambda rate: rate * bar.x))
         # The arm between two equal lengths bisects them, also where it has no length itself.
         turning = where(self._is_isosceles, 0.5,
                         m * ((m - g) + 2.0 * g * square(h)) / self.square)
@@ -278,7 +269,6 @@ class CrankArm(Arm):
         # The margin can vanish only next to the smaller gap.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
                        end - sign * gm * square(h))
-        margin = self._with_rate(margin, radius, sign)
         tolerance = TOLERANCE * abs(radius) * (size + self._g + self._m)
         gap, half = (start, s) if sign > 0.0 else (end, h)
         grown = square_root(gm) * self._first_sign(sign)
@@ -324,9 +314,7 @@ def _half_angle(theta: Real, turn: Complex) -> Tuple[Real, Real]:
     small = 0.5 * abs(turn.y) / large
     cos = where(ahead, large, small)
     sin = where(ahead, small, large) * where(turn.y < 0.0, -1.0, 1.0)
-    s, h = s * cos + h * sin, h * cos - s * sin
-    return (with_rate(s, theta, formula=lambda rate: 0.5 * rate * h),
-            with_rate(h, theta, formula=lambda rate: -(0.5 * rate * s)))
+    return s * cos + h * sin, h * cos - s * sin
 
 
 class Dyad(NamedTuple):

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 from typing import Any, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
-from .planar import Limit
+from .planar import LEAST_SQUARE, Limit, TINY
 from ..tolerances import TOLERANCE
 from ...formula.expression import (
     arctangent,
@@ -55,6 +55,9 @@ STEPS = 8
 LAST_STEP = 2.0 ** -23
 # A pose beyond its window by no more than this [rad] is on its edge; the proof covers twice that.
 EDGE = 2.0 ** -30
+# What formulas count as rounding, and what that is in single precision.
+IN_SINGLE = {TOLERANCE: 8 * 2.0 ** -24, -TOLERANCE: -8 * 2.0 ** -24, LAST_STEP: 2.0 ** -11,
+             EDGE: 2.0 ** -17, TINY: 2.0 ** -26, LEAST_SQUARE: 2.0 ** -100}
 
 
 class Vector(NamedTuple):

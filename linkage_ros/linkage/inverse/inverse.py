@@ -22,6 +22,7 @@ from functools import cached_property
 import math
 from typing import (
     Any,
+    Callable,
     cast,
     Iterator,
     List,
@@ -38,6 +39,7 @@ from numpy.typing import ArrayLike
 
 from . import rods
 from .choice import choose, choose_arrays
+from .expressions import chosen_of, modes_of, SINGLE
 from .follow import follow
 from .grid import blocks, Grid
 from .linkage import InverseLinkage, taken_apart
@@ -48,6 +50,7 @@ from .segments import Segments, segments_of
 from ..kinematics import Kinematics
 from ..text.arguments import numbers
 from ..tolerances import SINGULAR
+from ...formula.expression import Real
 from ...words import listed, plain_text, quoted
 
 # Arrays are solved in blocks that stay in a processor's cache, and few values as floats.
@@ -465,6 +468,58 @@ class Inverse:
         return known and follow(self._problem, self._problem.reduced(values), near,
                                 self._source) or (
             (math.nan,) * self._n, (math.nan,) * self._n ** 2)
+
+    # --- arrays of other packages ---
+
+    def function(self, xp: Any, follows: bool = False) -> Callable:
+        """
+        Return a function of arrays from values of the outputs to one solution.
+
+        Parameters
+        ----------
+        xp : module
+            A package with Python's array API, such as torch; see `Mechanism.function`.
+        follows : bool
+            Whether the function takes values of the inputs, too, after those of the outputs, and
+            returns the solution nearest to them. Otherwise it chooses as `nearest` does.
+
+        Returns
+        -------
+        callable
+            It returns a tuple with an array for each input [rad or m], NaN where there is no
+            solution. These are closed forms, without refinement: next to a singular pose up to
+            half of the digits are lost.
+
+        Raises
+        ------
+        ValueError
+            If there is no closed form.
+
+        """
+        outputs = chosen_of(self._problem, self._modes_as_expressions(), follows)
+        return self.linkage.array_function(outputs, (1 + follows) * self._n, xp, SINGLE)
+
+    def modes(self, xp: Any) -> Callable:
+        """
+        Return a function of arrays from values of the outputs to all solutions.
+
+        It returns a tuple with a tuple for each assembly mode, in one order everywhere: an array
+        for each input, NaN where the mode is no solution. See `function`.
+        """
+        modes, n = self._modes_as_expressions(), self._n
+        flat = self.linkage.array_function([x for mode in modes for x in mode], n, xp, SINGLE)
+
+        def function(*values: Any) -> Tuple[Tuple[Any, ...], ...]:
+            found = flat(*values)
+            return tuple([found[k:k + n] for k in range(0, len(found), n)])
+
+        return function
+
+    def _modes_as_expressions(self) -> List[List[Real]]:
+        if not self.closed:
+            raise ValueError(f'{self.linkage.type} has no closed form from '
+                             f'{listed(self.outputs)}: only the values of numpy are searched')
+        return modes_of(self._problem, self.closed)
 
     # --- the working mode ---
 

@@ -36,11 +36,11 @@ def taken_apart(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]
         if 2 ** len(rods) > MAX_MODES:
             return None
         # Solved once for all modes: the sides are arguments here, and constants in each mode.
-        structure = Structure(design, {**linkage.branches, **{
-            rod: argument(n + i) for i, rod in enumerate(rods)}})
+        leaves = {rod: argument(n + i) for i, rod in enumerate(rods)}
+        structure = Structure(design, {**linkage.branches, **leaves})
         values = [structure.output(input_.name) for input_ in linkage.inputs]
         modes = tuple(Mode(structure, tuple(substituted(
-            values, [*map(argument, range(n)), *map(real, sides)])))
+            values, dict(zip(leaves.values(), map(real, sides))))))
             for sides in product((1.0, -1.0), repeat=len(rods)))
         return InverseLinkage(design.joints, {name: (name, 1.0, 0.0) for name in outputs}, rods,
                               modes, ((0.0,),) * n, {})

@@ -439,7 +439,7 @@ class _Drawing:
                 name, = self._moving(base.link, first.parent)
                 side, sided = drawn_side(self._joints[name].hinge, end.point, base.point)
                 side *= self._signs.get(line.names[0], 1)
-                self._require(line, sided - _SIDED, f'as drawn it is at a dead point of {name}, '
+                self._require(line, sided - SINGULAR, f'as drawn it is at a dead point of {name}, '
                               'on neither side; draw the linkage in another pose')
             inputs.append(name)
             rods.append(Rod(pivot._replace(path=frame.transformed(pivot.path)),

@@ -1,0 +1,130 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""
+Arrays of poses by torch and JAX, beside numpy and machine code, on one core.
+
+    python -m benchmark.namespaces               prints the table, within two minutes
+    python -m benchmark.namespaces --document    writes it to docs/how-to/training.md, too
+
+Besides what the library needs, it takes torch, JAX and llvmlite. Times are CPU times, medians of
+calls in turn; those of a first call, which compiles, are not in it.
+"""
+
+import argparse
+from collections import namedtuple
+from importlib.metadata import version
+import os
+from pathlib import Path
+import time
+
+from linkage_ros import mechanisms, scene
+import numpy as np
+
+from . import document
+from .machine import machine
+
+SIZES = 1_000, 100_000, 1_000_000
+# How long each method runs [s], and how many calls at most.
+SLICE, CALLS = 0.5, 50
+Task = namedtuple('Task', 'title linkage requested ends')
+# How many poses a method has memory for: torch keeps every operation for its gradients.
+Method = namedtuple('Method', 'title package make most', defaults=[max(SIZES)])
+
+
+def tasks():
+    """Return what is computed: a linkage, points, joints and rates, and ends of the inputs."""
+    ankle = Path(__file__).parents[1] / 'examples' / 'ankle.yaml'
+    return [
+        Task("Jansen's leg, all points", mechanisms.create('jansen'), (None, (), ()), 3.1),
+        Task('ankle, pitch, roll and rates', scene.load(ankle).machines['ankle'].linkage,
+             ((), ('pitch', 'roll'), ('pitch', 'roll')), 0.2)]
+
+
+def by_torch(task, given):
+    """Return the call of torch, without compilation."""
+    import torch
+    torch.set_num_threads(1)
+    function = task.linkage.function(*task.requested, xp=torch)
+    arrays = [torch.tensor(x) for x in given]
+    return lambda: function(*arrays)
+
+
+def by_torch_backwards(task, given):
+    """Return the call of torch, and all the gradients of the sum of its results."""
+    import torch
+    function = task.linkage.function(*task.requested, xp=torch)
+    arrays = [torch.tensor(x, requires_grad=True) for x in given]
+    return lambda: torch.autograd.grad(torch.stack(function(*arrays)).sum(), arrays)
+
+
+def by_jax(task, given):
+    """Return the call of JAX, compiled."""
+    import jax
+    jax.config.update('jax_enable_x64', True)
+    function = jax.jit(task.linkage.function(*task.requested, xp=jax.numpy))
+    arrays = [jax.numpy.asarray(x) for x in given]
+    return lambda: jax.block_until_ready(function(*arrays))
+
+
+METHODS = (
+    Method('numpy', 'numpy', lambda task, given: lambda: task.linkage.posed(
+        *task.requested).over(*given)),
+    Method('`accelerated()`', 'llvmlite', lambda task, given: lambda: task.linkage.accelerated(
+        ).posed(*task.requested).over(*given)),
+    Method('torch', 'torch', by_torch),
+    Method('with gradients', 'torch', by_torch_backwards, 100_000),
+    Method('JAX, `jit`', 'jax', by_jax))
+
+
+def measured(task, size):
+    """Return the CPU time of each method [ns per pose] as text."""
+    rng = np.random.default_rng(1)
+    given = [rng.uniform(-task.ends, task.ends, size) for _ in task.linkage.inputs]
+    return [f'{1e9 / size * timed(method.make(task, given)):.0f}' if size <= method.most else '-'
+            for method in METHODS]
+
+
+def timed(call):
+    """Return the median CPU time of a call [s]."""
+    call()
+    found, end = [], time.process_time() + SLICE
+    while len(found) < 3 or time.process_time() < end and len(found) < CALLS:
+        start = time.process_time()
+        call()
+        found.append(time.process_time() - start)
+    return np.median(found)
+
+
+def main():
+    """Run and print."""
+    parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
+    parser.add_argument('--document', action='store_true', help='write the table to docs/')
+    options = parser.parse_args()
+    os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    titles = ' | '.join(method.title for method in METHODS)
+    lines = [f'| CPU time of one core [ns per pose] | poses | {titles} | on a GPU |',
+             '|---|' + '--:|' * (len(METHODS) + 2)]
+    for task in tasks():
+        for size in SIZES:
+            times = ' | '.join(measured(task, size))
+            lines.append(f'| {task.title} | {size} | {times} | not measured |')
+    about = machine(())
+    packages = ', '.join(f'{name} {version(name)}' for name in dict.fromkeys(
+        method.package for method in METHODS))
+    lines += ['', f'{about["date"]}, {about["cpu"]}; {packages}; commit {about["commit"]}.']
+    if options.document:
+        document.write('how-to/training.md', '\n'.join(lines))
+    print('\n'.join(lines))
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,396 @@
+# Copyright 2026 linkage_ros contributors
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
+# in compliance with the License. You may obtain a copy of the License at
+# http://www.apache.org/licenses/LICENSE-2.0
+# Unless required by applicable law or agreed to in writing, software distributed under the
+# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
+# express or implied. See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""Formulas as functions of arrays of other packages: the same values, NaN, finite gradients."""
+
+from functools import cache
+import math
+from pathlib import Path
+
+from linkage_ros import mechanisms, scene
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+# Outputs with an inverse in closed form.
+INVERSES = {'five_bar': ('P.x', 'P.y'), 'ankle': ('pitch', 'roll'), 'four_bar': ('QB',),
+            'slotted_lever': ('lever',), 'slider_crank': ('block',),
+            'excavator': ('OB', 'AD', 'EG')}
+KINDS = [*mechanisms.TYPES, 'excavator', 'ankle']
+FEW, MANY = 300, 10_000
+# The largest error of values in the size of each output, and of rates in 99.9 % of poses.
+EXACT, RATED = 1e-13, 1e-12
+
+
+@cache
+def linkage(kind):
+    """Return a linkage of the catalogue, of an example or of a scene."""
+    files = {'ankle': ROOT / 'examples' / 'ankle.yaml',
+             'excavator': ROOT / 'config' / 'excavator.yaml'}
+    if kind == 'geared':
+        return mechanisms.create('custom', joints=(
+            'O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'C crank Q 0.5 geared crank -2 0.3',
+            'B dyad A C 2 2 left'))
+    if kind in files:
+        return scene.load(files[kind]).machines[kind].linkage
+    return mechanisms.create(kind)
+
+
+def inputs(kind, count):
+    """Return values of the inputs, most of them in reach, as an array for each."""
+    rng, ends = np.random.default_rng(0), [(max(each.low, -3.1), min(each.high, 3.1))
+                                           for each in linkage(kind).inputs]
+    part = 0.35 if kind == 'ankle' else 1.05
+    return [0.5 * (low + high) + 0.5 * part * (high - low) * rng.uniform(-1.0, 1.0, count)
+            for low, high in ends]
+
+
+def requested(kind):
+    """Return points, joints and rates of all kinds."""
+    mechanism = linkage(kind)
+    return mechanism.points, mechanism.joints, mechanism.joints
+
+
+def expected(kind, given):
+    """Return the library's values, and the size of each output."""
+    rows = linkage(kind).posed(*requested(kind)).searched(*given)
+    # Some rates vanish, and are differences of others.
+    return rows, np.fmax(np.nanmax(np.abs(rows), axis=1, keepdims=True),
+                         min(linkage(kind).longest, 1.0))
+
+
+def errors(found, rows, sizes):
+    """Return errors in sizes; fail where one is NaN and the other is not."""
+    found = np.array([np.asarray(row) for row in found])
+    assert np.array_equal(np.isnan(found), np.isnan(rows))
+    return np.nan_to_num(np.abs(found - rows) / np.maximum(sizes, np.abs(rows)))
+
+
+@pytest.fixture(scope='module')
+def strict():
+    """Return what has nothing but the standard, and a device that numpy's arrays are not on."""
+    return pytest.importorskip('array_api_strict', reason='array_api_strict is not installed')
+
+
+def other_device(strict):
+    """Return a device that numpy's arrays are not on; with numpy 1 strict has no way there."""
+    return strict.Device('device1' if int(np.__version__[0]) > 1 else 'CPU_DEVICE')
+
+
+@pytest.mark.sample(5)
+@pytest.mark.parametrize('kind', KINDS)
+def test_the_standard_is_enough_and_gives_the_bits_of_numpy(kind, strict):
+    given, device = inputs(kind, FEW), other_device(strict)
+    rows, _ = expected(kind, given)
+    function = linkage(kind).function(*requested(kind), xp=strict)
+    found = function(*(strict.asarray(x, device=device) for x in given))
+    assert {(each.dtype, each.device, each.shape) for each in found} == {
+        (strict.float64, device, (FEW,))}
+    home = [np.asarray(each.to_device(strict.Device('CPU_DEVICE'))) for each in found]
+    assert np.array_equal(home, rows, equal_nan=True) and np.isfinite(rows).any()
+
+
+@pytest.mark.sample(4)
+@pytest.mark.parametrize('kind', KINDS)
+def test_nothing_on_the_way_is_nan(kind):
+    given = inputs(kind, FEW)
+    given[0][::7] = np.nan
+    given[-1][::11] = np.inf
+    function = linkage(kind).function(*requested(kind), xp=np)
+    with np.errstate(divide='raise', invalid='raise', over='raise'):
+        found = function(*given)
+    with np.errstate(invalid='ignore'):
+        rows, _ = expected(kind, given)
+    known = ~np.isinf(given[-1])
+    assert np.array_equal(np.array(found)[:, known], rows[:, known], equal_nan=True)
+    # Of an infinite input all that moves is NaN, the input itself, too.
+    assert np.isnan(found)[~np.isfinite(rows)].all()
+
+
+@pytest.mark.parametrize('kind', ['five_bar', 'four_bar', 'ankle'])
+def test_single_precision_stays_single(kind, strict):
+    given = [x.astype('f4') for x in inputs(kind, FEW)]
+    rows, sizes = expected(kind, [x.astype(float) for x in given])
+    for xp, function in ((each, linkage(kind).function(*requested(kind), xp=each))
+                         for each in (strict, np)):
+        found = function(*map(xp.asarray, given))
+        assert all(each.dtype == xp.float32 for each in found)
+        found = np.array([np.asarray(each) for each in found])
+        # Next to the ends of its reach a pose may be there in one precision only.
+        there = np.isfinite(found) & np.isfinite(rows)
+        assert (np.isnan(found) == np.isnan(rows)).mean() > 0.99
+        assert np.quantile((np.abs(found - rows) / sizes)[there], 0.99) < 1e-4
+
+
+@pytest.mark.parametrize('shapes', [[(), (3, 2)], [(1,), (0,)], [(3, 1), (1, 2)], [(), ()]])
+def test_shapes_broadcast(shapes, strict):
+    function = linkage('five_bar').function(xp=strict)
+    found = function(*(strict.full(shape, 1.0 + i) for i, shape in enumerate(shapes)))
+    pose = linkage('five_bar').function()(1.0, 2.0)
+    for each, value in zip(found, pose):
+        assert each.shape == np.broadcast_shapes(*shapes)
+        assert np.array_equal(np.asarray(each), np.full(each.shape, value))
+
+
+def test_numbers_stand_beside_arrays(strict):
+    function = linkage('five_bar').function(xp=strict)
+    ones, two = strict.asarray([1.0, 1.1]), strict.asarray([2.0, 2.0])
+    for one, other in zip(function(ones, 2), function(ones, two)):
+        assert np.array_equal(np.asarray(one), np.asarray(other))
+
+
+@pytest.mark.filterwarnings('ignore:You are comparing')
+def test_what_cannot_be_is_refused_in_a_sentence(strict):
+    arm, leg = linkage('five_bar'), linkage('jansen')
+    function, whole = arm.function(xp=strict), strict.asarray([1, 2])
+    good, single = strict.asarray([1.0]), strict.asarray([1.0], dtype=strict.float32)
+    half = np.array([1.0], 'f2')
+    for given in ((whole, whole), (good, single), (good, np.array([1.0])), (1.0, 2.0),
+                  (good, whole), (good, 'x'), (good, True)):
+        with pytest.raises(ValueError, match='all float64 or all float32'):
+            function(*given)
+    with pytest.raises(ValueError, match='got float16'):
+        leg.function(xp=np)(half)
+    with pytest.raises(ValueError, match='must be a package of arrays'):
+        leg.function(xp='torch')
+    with pytest.raises(ValueError, match='2 arguments are needed, got 1'):
+        function(good)
+    with pytest.raises(ValueError, match='not for arrays'):
+        leg.with_dimensions(m=np.array([14.0, 15.0])).function(xp=strict)
+    with pytest.raises(ValueError, match='no closed form'):
+        leg.inverse('G.x').function(strict)
+    with pytest.raises(ValueError, match='no closed form'):
+        leg.inverse('G.x').modes(strict)
+
+
+def questions(kind, count):
+    """Return values of the outputs and inputs beside those that they are from."""
+    given, outputs = inputs(kind, count), INVERSES[kind]
+    rng, values = np.random.default_rng(1), linkage(kind).checked(outputs).searched(*given)
+    near = [x + 0.2 * each.size * rng.uniform(-1.0, 1.0, count)
+            for x, each in zip(given, linkage(kind).inputs)]
+    return list(values[:len(outputs)]), near
+
+
+def answers(kind, values, near):
+    """Return the library's choice, and the sizes of the inputs."""
+    inverse = linkage(kind).inverse(INVERSES[kind])
+    found = np.array(inverse.nearest(tuple(values), None if near is None else tuple(near))[0])
+    return found, np.reshape([each.size for each in inverse.inputs], (-1, 1))
+
+
+@pytest.mark.parametrize('follows', [True, False])
+@pytest.mark.parametrize('kind', INVERSES)
+def test_the_inverse_chooses_as_the_library_does(kind, follows, strict):
+    values, near = questions(kind, FEW)
+    rows, sizes = answers(kind, values, near if follows else None)
+    device = other_device(strict)
+    found = linkage(kind).inverse(INVERSES[kind]).function(strict, follows)(*(
+        strict.asarray(x, device=device) for x in (*values, *(near if follows else ()))))
+    assert {(each.dtype, each.device) for each in found} == {(strict.float64, device)}
+    off = errors([each.to_device(strict.Device('CPU_DEVICE')) for each in found], rows, sizes)
+    # What is next to a dead point of the inverse loses digits; no other answer does.
+    assert np.quantile(off, 0.99) < EXACT and off.max() < 1e-8
+    assert np.isfinite(rows).any()
+
+
+@pytest.mark.sample(3)
+@pytest.mark.parametrize('kind', ['geared', *(
+    kind for kind in mechanisms.TYPES if kind not in ('jansen', 'five_bar'))])
+def test_every_output_has_the_library_s_choice(kind):
+    mechanism, (given,) = linkage(kind), inputs(kind, FEW)
+    rng, tried = np.random.default_rng(3), 0
+    near = given + rng.uniform(-0.2, 0.2, FEW)
+    for output in (*mechanism.joints, *(f'{p}.{axis}' for p in mechanism.points for axis in 'xy')):
+        try:
+            inverse = mechanism.inverse(output)
+        except ValueError:
+            continue  # it does not move
+        if not inverse.closed:
+            continue
+        values = mechanism.posed((), (output,)).searched(given)[0]
+        values += math.tau * rng.integers(-2, 3, FEW) * mechanism.is_angle(output)
+        for follows in (False, True):
+            found, = inverse.function(np, follows)(values, *[near] * follows)
+            expected_, = inverse.nearest((values,), (near,) if follows else None)[0]
+            np.testing.assert_allclose(found, expected_, 0.0, 1e-6, err_msg=output)
+        tried += 1
+    assert tried > 2
+
+
+@pytest.mark.parametrize('kind', INVERSES)
+def test_the_inverse_in_single_precision_chooses_alike(kind):
+    values, near = questions(kind, FEW)
+    rows, sizes = answers(kind, values, near)
+    found = linkage(kind).inverse(INVERSES[kind]).function(np, follows=True)(
+        *(x.astype('f4') for x in (*values, *near)))
+    assert all(each.dtype == np.float32 for each in found)
+    off = (np.abs(found - rows) / sizes).max(axis=0)
+    assert (np.isnan(off) == np.isnan(rows).any(axis=0)).mean() > 0.99
+    assert np.nanquantile(off, 0.9) < 1e-4
+
+
+@pytest.mark.parametrize('kind', INVERSES)
+def test_all_modes_are_all_solutions(kind, strict):
+    values, _ = questions(kind, 40)
+    inverse = linkage(kind).inverse(INVERSES[kind])
+    modes = inverse.modes(strict)(*map(strict.asarray, values))
+    modes = np.array([[np.asarray(x) for x in mode] for mode in modes])
+    for k, value in enumerate(zip(*values)):
+        known = [mode for mode in modes[..., k] if np.isfinite(mode).all()]
+        for solution in inverse.all(value) if np.isfinite(value).all() else ():
+            assert min(np.abs(np.subtract(mode, solution.inputs)).max() for mode in known) < 1e-8
+        for mode in known:
+            assert any(np.allclose(mode, each.inputs, 0.0, 1e-8) for each in inverse.all(value))
+
+
+# What differentiates and compiles, at night.
+
+
+@pytest.fixture(scope='module')
+def torch():
+    """Return torch."""
+    return pytest.importorskip('torch', reason='torch is not installed')
+
+
+@pytest.fixture(scope='module')
+def jax():
+    """Return JAX in double precision."""
+    package = pytest.importorskip('jax', reason='jax is not installed')
+    package.config.update('jax_enable_x64', True)
+    return package
+
+
+def slopes_of_torch(torch, function, given):
+    """Return the derivatives (outputs, inputs, poses) of a function of arrays."""
+    given = [torch.tensor(x, requires_grad=True) for x in given]
+    return np.array([[np.zeros(len(x)) if slope is None else slope.numpy() for x, slope in zip(
+        given, torch.autograd.grad(each.nansum(), given, retain_graph=True, allow_unused=True))]
+        for each in function(*given)])
+
+
+def slopes_of_jax(jax, function, given, is_long=False):
+    """Return the same by one vectorized function, compiled unless it is long."""
+    slopes = jax.vmap(jax.jacfwd(lambda *x: jax.numpy.stack(function(*x)), tuple(
+        range(len(given)))))
+    slopes = slopes if is_long else jax.jit(slopes)
+    return np.array(slopes(*map(jax.numpy.asarray, given))).transpose(2, 0, 1)
+
+
+def check_values(kind, found, given):
+    """Fail unless points and angles are those of the library, and rates but in few poses."""
+    off = errors(found, *expected(kind, given))
+    points, joints, _ = requested(kind)
+    values = len(linkage(kind).axes) * len(points) + len(joints)
+    assert off[:values].max() <= EXACT and np.quantile(off[values:].max(axis=0), 0.999) <= RATED
+
+
+def check_slopes(slopes, rates):
+    """Fail unless derivatives are finite, and those of the library but in a pose of a thousand."""
+    assert np.isfinite(slopes).all()
+    off = np.abs(slopes - rates) / np.maximum(1.0, np.abs(rates))
+    off = np.where(np.isfinite(rates), off, 0.0).max(axis=(0, 1))
+    worst = np.flatnonzero(off > RATED)
+    assert len(worst) <= 1e-3 * len(off), [(int(k), float(off[k])) for k in worst]
+
+
+def moving(kind):
+    """Return the joints whose rates are compared, and the library's (outputs, inputs, poses)."""
+    mechanism, given = linkage(kind), inputs(kind, MANY)
+    joints = ('pitch', 'roll') if kind == 'ankle' else mechanism.joints
+    rates = mechanism.posed((), (), joints).searched(*given)
+    return joints, given, rates.reshape(len(given), len(joints), MANY).swapaxes(0, 1)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('kind', KINDS)
+def test_torch_has_the_values_and_the_rates(kind, torch):
+    given = inputs(kind, MANY)
+    function = linkage(kind).function(*requested(kind), xp=torch)
+    for each in (function, torch.vmap(function)):
+        check_values(kind, [x.numpy() for x in each(*map(torch.tensor, given))], given)
+    joints, given, rates = moving(kind)
+    function = linkage(kind).function((), joints, xp=torch)
+    check_slopes(slopes_of_torch(torch, function, given), rates)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('kind', KINDS)
+def test_jax_has_the_values_and_the_rates(kind, jax):
+    given = inputs(kind, MANY)
+    function = linkage(kind).function(*requested(kind), xp=jax.numpy)
+    for each in (jax.jit(function), jax.jit(jax.vmap(function))):
+        check_values(kind, each(*map(jax.numpy.asarray, given)), given)
+    joints, given, rates = moving(kind)
+    function = linkage(kind).function((), joints, xp=jax.numpy)
+    check_slopes(slopes_of_jax(jax, function, given, kind == 'ankle'), rates)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('package', ['torch', 'jax'])
+@pytest.mark.parametrize('kind', INVERSES)
+def test_both_have_the_inverse_and_its_rates(kind, package, request):
+    values, near = questions(kind, MANY)
+    rows, sizes = answers(kind, values, near)
+    xp, given = request.getfixturevalue(package), [*values, *near]
+    names = xp if package == 'torch' else xp.numpy
+    function = linkage(kind).inverse(INVERSES[kind]).function(names, follows=True)
+    off = errors([np.asarray(x) for x in function(*map(names.asarray, given))], rows, sizes).max(0)
+    n = len(rows)
+    rates = linkage(kind).inverse(INVERSES[kind]).nearest(tuple(values), tuple(near))[1]
+    jacobian = np.reshape(rates, (n, n, MANY)).transpose(2, 1, 0)
+    known = np.isfinite(jacobian).all(axis=(1, 2))
+    jacobian[~known] = np.eye(n)
+    inverses = np.linalg.inv(jacobian).transpose(1, 2, 0)
+    # Next to a singular pose of the inverse, where inputs run away from outputs, digits are lost.
+    steep = np.abs(inverses).max(axis=(0, 1))
+    close = steep > 10.0 * np.median(steep[known])
+    assert np.quantile(off[known & ~close], 0.999) <= EXACT and close[known].mean() < 0.1
+    inverses[..., close | ~known] = np.nan
+    slopes = slopes_of_torch(xp, function, given) if package == 'torch' else slopes_of_jax(
+        xp, function, given, kind == 'ankle')
+    assert not slopes[:, n:].any() and np.isfinite(slopes).all()
+    check_slopes(slopes[:, :n], inverses)
+
+
+@pytest.mark.long
+def test_torch_compiles_and_exports(torch):
+    given = [torch.tensor(x) for x in inputs('five_bar', FEW)]
+    function = linkage('five_bar').function(*requested('five_bar'), xp=torch)
+
+    class Module(torch.nn.Module):
+        def forward(self, one, other):
+            return function(one, other)
+
+    exported = torch.export.export(Module(), tuple(given)).module()
+    for each in (torch.compile(function, fullgraph=True), exported):
+        check_values('five_bar', [x.numpy() for x in each(*given)], [x.numpy() for x in given])
+
+
+@pytest.mark.long
+def test_a_parameter_shared_with_poses_that_are_not_there_learns(torch):
+    function = linkage('five_bar').function(('P',), xp=torch)
+    one, other = (torch.tensor(x) for x in inputs('five_bar', FEW))
+    offset = torch.tensor(0.02, dtype=torch.float64)
+    seen = function(one + offset, other)
+    assert torch.isnan(seen[0]).any() and torch.isfinite(seen[0]).any()
+    guess = torch.zeros((), dtype=torch.float64, requires_grad=True)
+    for _ in range(6):
+        off = torch.cat(function(one + guess, other)) - torch.cat(seen)
+        slope, = torch.autograd.grad(off.nansum(), guess, retain_graph=True)
+        steps = torch.autograd.functional.jvp(
+            lambda x: torch.cat(function(one + x, other)), guess.detach(),
+            torch.ones_like(guess))[1]
+        there = torch.isfinite(off)
+        with torch.no_grad():
+            guess -= (off[there] @ steps[there]) / (steps[there] @ steps[there])
+        assert torch.isfinite(slope)
+    assert abs(guess.detach() - offset) < 1e-12
