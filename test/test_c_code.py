@@ -270,6 +270,36 @@ int poses(double value, double near)
     assert machine.linkage.inverse(output).closed is None or max(taken[:200]) == 1
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize('name, output, call', [
+    ('klann', 'CF', 'angle_CF'), ('jansen', 'G.x', 'G_x')])
+def test_a_search_misses_none_of_ten_thousand(machines, tmp_path, name, output, call):
+    machine, rng = machines[name], np.random.default_rng(7)
+    linkage, scale = machine.linkage, machine.scale_of(output)
+    assert linkage.inverse(output).closed is None
+    invert = loaded(tmp_path, header.written(machine, [output]) + f"""
+int found(double value, double near, double *crank)
+{{
+    return {name}_crank_for_{call}(value, near, crank);
+}}
+""").found
+    (low, high), = machine.first.reach
+    inputs, nears = rng.uniform(low, high, 10_000), rng.uniform(-9.0, 9.0, 10_000)
+    values = linkage.joint_angles(inputs, [output])[output]
+    cranks = np.full(len(inputs), np.nan)
+    for i, (value, near) in enumerate(zip(values * scale, nears)):
+        crank = ctypes.c_double()
+        assert invert(*map(ctypes.c_double, (value, near)), ctypes.byref(crank)) == 1
+        cranks[i] = crank.value
+    gap = linkage.joint_angles(cranks, [output])[output] - values
+    gap -= linkage.is_angle(output) * math.tau * np.round(gap / math.tau)
+    assert np.abs(gap).max() < 1e-13 * max(1.0, linkage.longest)
+    # No known answer is nearer.
+    known = inputs - nears
+    assert (np.abs(cranks - nears) < np.abs(known - math.tau * np.round(known / math.tau))
+            + 1e-6).all()
+
+
 def test_several_inputs_are_found_for_as_many_outputs(machines, tmp_path):
     machine, rng = machines['five_bar'], np.random.default_rng(5)
     closed = header.written(machine, ('P.x', 'P.y'))
