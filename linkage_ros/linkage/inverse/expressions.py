@@ -48,15 +48,13 @@ Inputs = List[Real]
 
 def modes_of(problem: InverseProblem, closed: InverseLinkage) -> List[Inputs]:
     """Return the inputs in each assembly mode and its turns, NaN where it is no solution."""
-    values = {i: _nearest(argument(i), turn) for i, turn in enumerate(problem.periods)}
+    values = [argument(i) for i in range(problem.n)]
     forward = problem.linkage.structure.checked(problem.outputs)[:problem.n]
     found = []
     for mode, turns in product(closed.modes, product(*closed.turns)):
-        inputs = substituted(substituted([x + turn for x, turn in zip(
-            mode.inputs, turns)], closed.arguments), values)
+        inputs = substituted([x + turn for x, turn in zip(mode.inputs, turns)], closed.arguments)
         outputs = substituted(forward, dict(enumerate(inputs)))
-        for output, value, turn, scale in zip(outputs, values.values(), problem.periods,
-                                              problem.scales):
+        for output, value, turn, scale in zip(outputs, values, problem.periods, problem.scales):
             room = OFF * scale - abs(_nearest(output - value, turn))
             inputs = [gated(x, room, 0.0) for x in inputs]
         found.append([_nearest(x, turn) for x, turn in zip(inputs, problem.turns)])
