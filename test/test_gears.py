@@ -182,7 +182,7 @@ def test_c_goes_on_in_the_turn_of_near(tmp_path):
 
 def test_what_cannot_be_searched_in_c_is_refused():
     lines = ['O ground 0 0', 'M crank O 0.01', 'A crank O 1 geared crank sqrt(2) 0']
-    for given in ({}, {'m.crank.sweep': [300.0, 310.0]}):
+    for given in ({}, {'m.crank.sweep': [400.0, 410.0]}):
         machine = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': lines,
                               **given}).machines['m']
         with pytest.raises(ValueError, match='set a m.crank.sweep in -'):

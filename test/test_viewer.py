@@ -360,7 +360,7 @@ def test_a_page_is_told_of_legs_that_are_added(show):
     async def use(url):
         async with Page(url) as page:
             first = (await page.cast('/leg'))['/leg']
-            assert await page.set('/leg', leg_pairs=3, mirrored=True) == ''
+            assert await page.set('/leg', leg_pairs=3) == ''
             said = await page.heard('value', name='leg_pairs', value=3)
             assert await page.set('/leg', mirrored=True) == ''
             return first, said['drawn'], (await page.heard(
