@@ -112,9 +112,9 @@ def test_as_many_answers_as_brute_force_finds(ratio):
     turns = found.period()
     theta = np.linspace(-math.pi * turns, math.pi * turns, int(
         2000 * turns * max(1.0, abs(found.gear('crank2')[0]))) + 1)
-    gap = found.solve(theta, ('E',))['E'][:, 0] - 4.0321
+    gap = found.solve(theta, ('E',))['E'][:, 0] - 8.0321
     inside = np.isfinite(gap[1:] * gap[:-1])
-    assert np.sum(inside & (gap[1:] * gap[:-1] <= 0.0)) == len(found.input_for('E.x', 4.0321))
+    assert np.sum(inside & (gap[1:] * gap[:-1] <= 0.0)) == len(found.input_for('E.x', 8.0321))
 
 
 @pytest.mark.sample(4)
