@@ -1186,14 +1186,13 @@ def test_a_request_is_answered_whatever_it_holds(lever):
     assert (lever.values('lever.crank.speed'), lever.values('lever.leg_pairs')) == ([1.0], [1])
 
 
-def test_a_request_that_fails_is_answered_and_logged(lever, monkeypatch, capfd):
+def test_a_request_that_fails_is_answered(lever, monkeypatch):
     async def use(url):
         async with Page(url) as page:
             return await page.ask('read', '/lever', text='1')
 
     monkeypatch.setattr(server, 'number', lambda text: 1 // 0)
     assert asyncio.run(use(lever.viewer.url))['reason'].startswith('internal error: ZeroDivision')
-    assert 'read: ZeroDivisionError' in capfd.readouterr().err
 
 
 def test_of_many_requests_at_once_each_is_answered(lever):
