@@ -21,7 +21,6 @@ calls in turn; those of a first call, which compiles, are not in it.
 
 import argparse
 from collections import namedtuple
-from importlib.metadata import version
 import os
 from pathlib import Path
 import time
@@ -30,7 +29,6 @@ from linkage_ros import mechanisms, scene
 import numpy as np
 
 from . import document
-from .machine import machine
 
 SIZES = 1_000, 100_000, 1_000_000
 # How long each method runs [s], and how many calls at most.
@@ -110,20 +108,15 @@ def main():
     parser.add_argument('--document', action='store_true', help='write the table to docs/')
     options = parser.parse_args()
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-    titles = ' | '.join(method.title for method in METHODS)
-    lines = [f'| CPU time of one core [ns per pose] | poses | {titles} | on a GPU |',
-             '|---|' + '--:|' * (len(METHODS) + 2)]
-    for task in tasks():
-        for size in SIZES:
-            times = ' | '.join(measured(task, size))
-            lines.append(f'| {task.title} | {size} | {times} | not measured |')
-    about = machine(())
-    packages = ', '.join(f'{name} {version(name)}' for name in dict.fromkeys(
-        method.package for method in METHODS))
-    lines += ['', f'{about["date"]}, {about["cpu"]}; {packages}; commit {about["commit"]}.']
+    text = document.table(
+        ['CPU time of one core [ns per pose]', 'poses',
+         *(method.title for method in METHODS), 'on a GPU'],
+        [[task.title, size, *measured(task, size), 'not measured']
+         for task in tasks() for size in SIZES])
+    text += '\n\n' + document.machine('llvmlite', 'torch', 'jax')
     if options.document:
-        document.write('how-to/training.md', '\n'.join(lines))
-    print('\n'.join(lines))
+        document.write('how-to/training.md', text)
+    print(text)
 
 
 if __name__ == '__main__':
