@@ -186,6 +186,11 @@ def test_a_header_says_what_it_has(machines, name, single, times, inputs, joints
     assert {key: float(value) for key, value in (
         each.split(' = ') for each in lengths[2].split(', ') if '=' in each)} == pytest.approx(
             dict(machine.linkage.dimensions), rel=1e-8)
+    # What is computed of lengths has their names.
+    named = re.findall(r'const \w+ length_(\w+) = ([^f;]*)', code)
+    assert bool(named) == bool(machine.linkage.dimensions)
+    assert [float(value) for _, value in named] == pytest.approx(
+        [machine.linkage.dimensions[key] for key, _ in named], rel=1e-7)
     actuators = ', '.join(f'{name}_{each}' for each in inputs.split(', '))
     assert f'/* Actuators: {actuators}; joints: {joints}. */' in text
     assert f' * Input: {inputs}. Angles' in head and f'#ifndef {name.upper()}_LINKAGE_H\n' in text
@@ -453,6 +458,32 @@ int both(float crank, float *angle, float *back, float *servo)
         assert found[0].value == pytest.approx(
             float(machine.linkage.joint_angles(float(crank))['lever']), abs=1e-6)
         assert [each.value for each in found[1:]] == pytest.approx([crank, crank], abs=1e-5)
+
+
+@pytest.mark.parametrize('number, step', [('double', 1e-12), ('float', 2e-5)])
+def test_a_small_step_is_not_lost(machines, tmp_path, number, step):
+    machine = machines['slotted_lever']
+    worst = loaded(tmp_path, header.written(machine, (), number == 'float') + f"""
+double worst(void)
+{{
+    double most = 0;
+    int i;
+    slotted_lever_pose p;
+    slotted_lever_memory m;
+    linkage_side desired = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, found = desired;
+    int is_well = slotted_lever_begin(&m);
+    for (i = 0; i < 1000; i++) {{
+        const {number} crank = ({number})(0.3 + i * {step});
+        is_well = is_well && slotted_lever_solve(crank, &p);
+        desired.position[0] = p.angle_lever;
+        is_well = is_well && !slotted_lever_joints_to_actuators(&m, &desired, &found);
+        most = fmax(most, fabs((double)(found.position[0] - crank)));
+    }}
+    return is_well ? most : -1;
+}}
+""").worst
+    worst.restype = ctypes.c_double
+    assert 0.0 <= worst() <= step
 
 
 def test_a_scene_file_is_printed_as_c(capsys, monkeypatch):
