@@ -403,6 +403,30 @@ int found(double value, double near, double *crank) {{ return {called}(value, ne
                 wanted, abs=2e-8)
 
 
+@pytest.mark.parametrize('kind, key, factor, output', [
+    ('jansen', 'k', 0.8, 'G.x'), ('jansen', 'e', 1.25, 'G.y'), ('klann', 'i', 0.8, 'CF')])
+def test_a_search_finds_inputs_up_to_the_ends_of_the_reach(tmp_path, kind, key, factor, output):
+    length = factor * mechanisms.create(kind).dimensions[key]
+    machine, = scene.read({'mechanisms': ['m'], 'm.type': kind, f'm.dimensions.{key}': length}
+                          ).machines.values()
+    linkage, text = machine.linkage, header.written(machine, [output])
+    called, = re.findall(r'int (m_crank_for_\w+)', text)
+    invert = loaded(tmp_path, f"""{text}
+int found(double value, double near, double *crank) {{ return {called}(value, near, crank); }}
+""").found
+    parts = np.array([0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1])
+    for low, high in linkage.reach():
+        for crank in low + (high - low) * np.concatenate([parts, 1.0 - parts]):
+            # Between two floats there is no input that has the value exactly.
+            value = np.mean(linkage.joint_angles(
+                [crank, np.nextafter(crank, 0.5 * (low + high))], [output])[output])
+            for near in (crank, 0.5 * (low + high)):
+                found = ctypes.c_double()
+                assert invert(*map(ctypes.c_double, (value, near)), ctypes.byref(found)) == 1
+                again = linkage.joint_angles(min(max(found.value, low), high), [output])[output]
+                assert again == pytest.approx(value, abs=1e-7 * linkage.longest)
+
+
 @pytest.mark.slow
 def test_an_ankle_in_single_precision_is_that_of_python(tmp_path):
     machine, = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).machines.values()
