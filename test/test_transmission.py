@@ -387,6 +387,12 @@ def test_a_singular_pose_is_said(library, machines):
     assert status == 2 and abs(velocity) < 1e-6 and effort == held
     status, (position, velocity, _) = memory.send(1, expected(machine, [dead])[2], [1.0], [1.0])
     assert status == 2 and velocity == 0.0 and np.isfinite(position)
+    # So is a velocity that is more than a number can be.
+    boom = Memory(library, 'boom', 1)
+    own = expected(machines['boom'], states(machines['boom'], 1)[0])[2]
+    assert boom.send(1, own, [1.0])[0] == 0
+    status, (_, velocity, _) = boom.send(1, own, [1e308])
+    assert status == 2 and velocity == 0.0
 
 
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
