@@ -514,18 +514,23 @@ double worst(void)
 def test_what_is_hardly_beyond_an_extreme_is_out_of_reach(machines, tmp_path, number, beyond):
     machine = machines['slotted_lever']
     library = loaded(tmp_path, header.written(machine, (), number == 'float') + f"""
-int sent(double value)
+int sent(double before, double value)
 {{
     slotted_lever_memory m;
     linkage_side desired = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, found = desired;
+    desired.position[0] = ({number})before;
+    if (!slotted_lever_begin(&m) || slotted_lever_joints_to_actuators(&m, &desired, &found) & 1)
+        return -1;
     desired.position[0] = ({number})value;
-    return slotted_lever_begin(&m) ? slotted_lever_joints_to_actuators(&m, &desired, &found) : -1;
+    return slotted_lever_joints_to_actuators(&m, &desired, &found);
 }}
 """)
     angles = machine.linkage.joint_angles(np.linspace(-math.pi, math.pi, 100_001), ['lever'])
     for extreme, out in ((angles['lever'].min(), -beyond), (angles['lever'].max(), beyond)):
-        assert [library.sent(ctypes.c_double(extreme + part * out)) & 1
-                for part in (-10.0, 1000.0, 10.0, 1.0)] == [0, 1, 1, 1]
+        # There, too, where it is at the extreme already.
+        for before in (0.5 * extreme, extreme - 0.1 * out):
+            assert [library.sent(*map(ctypes.c_double, (before, extreme + part * out))) & 1
+                    for part in (-10.0, 1000.0, 10.0, 1.0)] == [0, 1, 1, 1]
 
 
 def test_a_scene_file_is_printed_as_c(capsys, monkeypatch):
