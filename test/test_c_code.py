@@ -186,6 +186,11 @@ def test_a_header_says_what_it_has(machines, name, single, times, inputs, joints
     assert {key: float(value) for key, value in (
         each.split(' = ') for each in lengths[2].split(', ') if '=' in each)} == pytest.approx(
             dict(machine.linkage.dimensions), rel=1e-8)
+    # What is computed of lengths has their names.
+    named = re.findall(r'const \w+ length_(\w+) = ([^f;]*)', code)
+    assert bool(named) == bool(machine.linkage.dimensions)
+    assert [float(value) for _, value in named] == pytest.approx(
+        [machine.linkage.dimensions[key] for key, _ in named], rel=1e-7)
     actuators = ', '.join(f'{name}_{each}' for each in inputs.split(', '))
     assert f'/* Actuators: {actuators}; joints: {joints}. */' in text
     assert f' * Input: {inputs}. Angles' in head and f'#ifndef {name.upper()}_LINKAGE_H\n' in text
@@ -398,6 +403,30 @@ int found(double value, double near, double *crank) {{ return {called}(value, ne
                 wanted, abs=2e-8)
 
 
+@pytest.mark.parametrize('kind, key, factor, output', [
+    ('jansen', 'k', 0.8, 'G.x'), ('jansen', 'e', 1.25, 'G.y'), ('klann', 'i', 0.8, 'CF')])
+def test_a_search_finds_inputs_up_to_the_ends_of_the_reach(tmp_path, kind, key, factor, output):
+    length = factor * mechanisms.create(kind).dimensions[key]
+    machine, = scene.read({'mechanisms': ['m'], 'm.type': kind, f'm.dimensions.{key}': length}
+                          ).machines.values()
+    linkage, text = machine.linkage, header.written(machine, [output])
+    called, = re.findall(r'int (m_crank_for_\w+)', text)
+    invert = loaded(tmp_path, f"""{text}
+int found(double value, double near, double *crank) {{ return {called}(value, near, crank); }}
+""").found
+    parts = np.array([0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1])
+    for low, high in linkage.reach():
+        for crank in low + (high - low) * np.concatenate([parts, 1.0 - parts]):
+            # Between two floats there is no input that has the value exactly.
+            value = np.mean(linkage.joint_angles(
+                [crank, np.nextafter(crank, 0.5 * (low + high))], [output])[output])
+            for near in (crank, 0.5 * (low + high)):
+                found = ctypes.c_double()
+                assert invert(*map(ctypes.c_double, (value, near)), ctypes.byref(found)) == 1
+                again = linkage.joint_angles(min(max(found.value, low), high), [output])[output]
+                assert again == pytest.approx(value, abs=1e-7 * linkage.longest)
+
+
 @pytest.mark.slow
 def test_an_ankle_in_single_precision_is_that_of_python(tmp_path):
     machine, = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).machines.values()
@@ -453,6 +482,55 @@ int both(float crank, float *angle, float *back, float *servo)
         assert found[0].value == pytest.approx(
             float(machine.linkage.joint_angles(float(crank))['lever']), abs=1e-6)
         assert [each.value for each in found[1:]] == pytest.approx([crank, crank], abs=1e-5)
+
+
+@pytest.mark.parametrize('number, step', [('double', 1e-12), ('float', 2e-5)])
+def test_a_small_step_is_not_lost(machines, tmp_path, number, step):
+    machine = machines['slotted_lever']
+    worst = loaded(tmp_path, header.written(machine, (), number == 'float') + f"""
+double worst(void)
+{{
+    double most = 0;
+    int i;
+    slotted_lever_pose p;
+    slotted_lever_memory m;
+    linkage_side desired = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, found = desired;
+    int is_well = slotted_lever_begin(&m);
+    for (i = 0; i < 1000; i++) {{
+        const {number} crank = ({number})(0.3 + i * {step});
+        is_well = is_well && slotted_lever_solve(crank, &p);
+        desired.position[0] = p.angle_lever;
+        is_well = is_well && !slotted_lever_joints_to_actuators(&m, &desired, &found);
+        most = fmax(most, fabs((double)(found.position[0] - crank)));
+    }}
+    return is_well ? most : -1;
+}}
+""").worst
+    worst.restype = ctypes.c_double
+    assert 0.0 <= worst() <= step
+
+
+@pytest.mark.parametrize('number, beyond', [('double', 1e-11), ('float', 5e-5)])
+def test_what_is_hardly_beyond_an_extreme_is_out_of_reach(machines, tmp_path, number, beyond):
+    machine = machines['slotted_lever']
+    library = loaded(tmp_path, header.written(machine, (), number == 'float') + f"""
+int sent(double before, double value)
+{{
+    slotted_lever_memory m;
+    linkage_side desired = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, found = desired;
+    desired.position[0] = ({number})before;
+    if (!slotted_lever_begin(&m) || slotted_lever_joints_to_actuators(&m, &desired, &found) & 1)
+        return -1;
+    desired.position[0] = ({number})value;
+    return slotted_lever_joints_to_actuators(&m, &desired, &found);
+}}
+""")
+    angles = machine.linkage.joint_angles(np.linspace(-math.pi, math.pi, 100_001), ['lever'])
+    for extreme, out in ((angles['lever'].min(), -beyond), (angles['lever'].max(), beyond)):
+        # There, too, where it is at the extreme already.
+        for before in (0.5 * extreme, extreme - 0.1 * out):
+            assert [library.sent(*map(ctypes.c_double, (before, extreme + part * out))) & 1
+                    for part in (-10.0, 1000.0, 10.0, 1.0)] == [0, 1, 1, 1]
 
 
 def test_a_scene_file_is_printed_as_c(capsys, monkeypatch):

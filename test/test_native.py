@@ -15,6 +15,7 @@ import math
 import subprocess
 import sys
 import threading
+import warnings
 
 from linkage_ros import mechanisms
 from linkage_ros.formula import expression, program
@@ -98,6 +99,14 @@ def test_every_bit_is_the_same(kind):
     assert np.array_equal(by_batch(linkage, thetas), one_by_one(linkage, thetas), equal_nan=True)
 
 
+@pytest.mark.parametrize('kind', TYPES)
+def test_joints_are_solved_at_any_float(kind):
+    linkage = mechanisms.create(kind)
+    for theta in angles(linkage).tolist():
+        places = np.reshape(linkage.function()(theta), (-1, 2))
+        assert np.array_equal([*linkage.solve(theta).values()], places, equal_nan=True)
+
+
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('kind', ['jansen', 'klann'])
 def test_so_it_is_for_the_legs_of_a_walker(kind, monkeypatch, code):
@@ -162,7 +171,10 @@ def test_what_cannot_be_compiled_is_done_in_plain_python(monkeypatch):
     wait_for_compilers()
     with pytest.warns(UserWarning, match='no machine code.*no such processor'):
         solution.solve([0.2])
-    solution.solve([0.3])
+    # It is told once, not for each message.
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        solution.solve([0.3])
     assert solution.rows[0] == pytest.approx(linkage.solve(0.3)['Refused'])
 
 
@@ -200,5 +212,5 @@ def test_a_chain_of_operations_may_be_as_long_as_one_likes():
     for _ in range(1000):
         end, value = 1.5 * expression.sine(end) + 0.25, 1.5 * math.sin(value) + 0.25
     pose = program.Program((end,)).bind({}, {})
-    assert pose(0.3) == (value,)
+    assert pose.at(0.3) == (value,)
     assert pose.over(np.full(100, 0.3)).ravel().tolist() == pytest.approx([value] * 100)

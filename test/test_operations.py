@@ -230,7 +230,7 @@ def test_the_derivative_is_what_differences_tend_to(name):
                                            for i, x in enumerate(exact))) for sign in (1, -1))
             true = float((ahead - behind) / (2 * h))
         if math.isfinite(true):
-            assert pose(*row)[0] == pytest.approx(true, rel=1e-12, abs=1e-14)
+            assert pose.at(*row)[0] == pytest.approx(true, rel=1e-12, abs=1e-14)
 
 
 @pytest.mark.parametrize('name', NAMES)

@@ -200,6 +200,33 @@ def test_what_is_beyond_the_stroke_is_out_of_reach(library, machines, name):
         assert memory.send(0, [inside])[0] & 1 == 0 and memory.send(0, [outside])[0] & 1 == 1
 
 
+def test_what_is_not_assembled_is_out_of_reach_whatever_is_commanded(tmp_path):
+    machine, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
+        'O ground 0 0', 'A crank O 1', 'Q ground 2 0', 'B dyad A Q 1.1 1 left',
+        'R ground 1 1.7', 'C dyad A R 1 1 left', 'S ground 1.9 0.3', 'D dyad A S 0.7 0.6 left']}
+        ).machines.values()
+    library = compiled(tmp_path, [machine], 'm_QB')
+    memory, angles = Memory(library, 'm', 1), np.linspace(-1.5, 2.5, 81)
+    assembled = [np.isfinite(list(machine.linkage.solve(angle).values())).all()
+                 for angle in angles]
+    assert [memory.send(0, [angle])[0] & 1 == 0 for angle in angles] == assembled
+    # The joint of the first bars is farther in reach, on both sides.
+    (low, high), = machine.first.reach
+    own = angles[np.isfinite(machine.linkage.joint_angles(angles, ['B.x'])['B.x'])]
+    assert own[0] < low - 0.1 and own[-1] > high + 0.1
+
+
+def test_a_first_pose_is_found_in_a_small_workspace(tmp_path):
+    machines = []
+    for name, turned in zip('mnop', (0.5, 2.0, 3.5, 5.0)):
+        # Two cranks that have to point at each other, within 0.3 rad: 0.7 % of all their poses.
+        machines += scene.read({'mechanisms': [name], f'{name}.type': 'custom', f'{name}.joints': [
+            'O ground 0 0', f'Q ground {4.0 * math.cos(turned)} {4.0 * math.sin(turned)}',
+            'A crank O 1', 'C crank Q 1', 'P dyad A C 1.05 1.05 left']}).machines.values()
+    library = compiled(tmp_path, machines)
+    assert [library[f'{machine.name}_started']() for machine in machines] == [1] * 4
+
+
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_names_are_those_of_the_scene(library, machines, name):
     machine, named = machines[name], library[f'{name}_named']
@@ -360,6 +387,12 @@ def test_a_singular_pose_is_said(library, machines):
     assert status == 2 and abs(velocity) < 1e-6 and effort == held
     status, (position, velocity, _) = memory.send(1, expected(machine, [dead])[2], [1.0], [1.0])
     assert status == 2 and velocity == 0.0 and np.isfinite(position)
+    # So is a velocity that is more than a number can be.
+    boom = Memory(library, 'boom', 1)
+    own = expected(machines['boom'], states(machines['boom'], 1)[0])[2]
+    assert boom.send(1, own, [1.0])[0] == 0
+    status, (_, velocity, _) = boom.send(1, own, [1e308])
+    assert status == 2 and velocity == 0.0
 
 
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
@@ -414,6 +447,7 @@ def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
     assert [each.name for each in joints(machines['boom'])] == ['boom_OB']
     assert [each.name for each in actuators(machines['lever'])] == ['servo']
     for names, said in ((['knee'], "leg has no joint 'knee'; allowed: leg_crank"),
+                        (['P.x', 'P.y'], "leg has no joint 'P.x'"),
                         (['leg_AP'], 'leg has 2 inputs'), (['leg_AP', 'leg_AP'], 'as many')):
         with pytest.raises(ValueError, match=said):
             joints(leg, names)
@@ -685,6 +719,7 @@ def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, sai
     folder = tmp_path / 'mine'
     folder.mkdir()
     (folder / 'notes.txt').write_text('keep')
+    (folder / 'package.xml').write_bytes(b'<package>\xff')
     assert transmission.main([str(ROOT / 'examples' / 'leg.yaml'),
                               *(text.format(folder) for text in arguments)]) == 1
     printed = capsys.readouterr().err

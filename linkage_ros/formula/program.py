@@ -267,12 +267,6 @@ class Pose:
 
         return self.variant.placing[names](*self.constants, quietly)
 
-    def __call__(self, *arguments: Any) -> Any:
-        """Return the outputs as floats, or over broadcast arrays."""
-        if not self.shape and set(map(type, arguments)) == {float}:
-            return self.at(*arguments)
-        return self.over(*arguments)
-
     def over(self, *arguments: Any) -> np.ndarray:
         """Return the outputs over broadcast arrays, shape (outputs, *shape)."""
         arrays = [np.asarray(a, float) for a in arguments]
