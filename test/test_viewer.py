@@ -513,6 +513,46 @@ def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
     assert running.values('lever.crank.start') == [servo]
 
 
+TWO_ARCS = {**RATE, 'mechanisms': ['bar'], 'bar.type': 'four_bar', 'bar.crank.start': 1.0,
+            **{f'bar.dimensions.{name}': length
+               for name, length in zip('abcd', (3.0, 2.0, 2.5, 3.0))}}
+
+
+@pytest.mark.parametrize('parameters', [LEVER, TWO_ARCS], ids=['whole', 'two arcs'])
+def test_an_input_goes_again_to_where_it_started_though_that_is_a_middle_or_an_end(
+        graph, show, parameters):
+    cranks = graph.listen(JointState, 'crank_states')
+    name, running = parameters['mechanisms'][0], show(parameters)
+    arcs = poses.arcs(scene.read(parameters).machines[name].first)
+
+    def away(value):
+        states = dict(zip(cranks[-1].name, cranks[-1].position)) if cranks else {}
+        return abs(math.remainder(states.get(f'{name}_crank', math.nan) - value, math.tau))
+
+    async def use(url):
+        async with Page(url) as page:
+            async def hold(value):
+                want = {'output': 'crank', 'value': value}
+                assert (await page.ask('pose', f'/{name}', want=want))['reason'] == ''
+
+            async def come_and_go(value):
+                await hold(value)
+                await browser.until(lambda: away(value) < 1e-9, value)
+                assert await page.set(f'/{name}', crank__speed=1.0) == ''
+                await browser.until(lambda: away(value) > 0.01)
+
+            await browser.until(lambda: any(
+                said['op'] == 'scene' and said['mechanisms'] for said in page.said))
+            for arc in arcs:
+                await come_and_go(sum(arc) / 2.0)
+                await come_and_go(sum(arc) / 2.0)
+            for end in (end for arc in arcs for end in arc):
+                await hold(end)
+                await hold(end)
+
+    asyncio.run(use(running.viewer.url))
+
+
 @pytest.mark.sample(1)
 @pytest.mark.parametrize('lengths, sign', [
     ((80.0, 150.0, 0.0), 1.0), ((80.0, 150.0, 25.0), -1.0), ((1.0, 150.0, 0.0), 1.0)])

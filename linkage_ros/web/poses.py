@@ -239,6 +239,12 @@ def arcs(drive: InputSettings) -> list[Arc]:
     return [drive.ends] if drive.ends else list(drive.reach)
 
 
+def next_to(drive: InputSettings, value: float) -> float:
+    """Return a neighbour of an input's value, in the same of its allowed intervals."""
+    low, high = min(arcs(drive), key=lambda arc: max(arc[0] - value, value - arc[1]))
+    return math.nextafter(value, low if value > low else high)
+
+
 def linkage_inputs(mechanism: SceneMechanism, values: Sequence[float]) -> Any:
     """Return inputs [rad or m], or their speeds, as an argument of the unscaled linkage."""
     return theta_of([value / mechanism.scale_of(name)

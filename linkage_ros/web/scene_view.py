@@ -223,7 +223,7 @@ class SceneView:
                 raise Refused(f'the {name} cannot be moved: no crank_driver is running')
             if value == start.value:
                 # An input moves only to a start that differs from the last one.
-                value = math.nextafter(value, sum(poses.arcs(drive)[0]) / 2.0)
+                value = poses.next_to(drive, value)
             values.update({f'{name}.start': value, f'{name}.speed': 0.0})
         await self.set(mechanism.key, values)
         until = self._bridge.loop.time() + SECONDS_TO_ARRIVE
