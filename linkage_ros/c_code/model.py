@@ -170,7 +170,8 @@ class Model:
         about = 'Tables of the inverse' if self._tag else 'Tables of the actuators and joints'
         return (f'/* {about}, see linkage_model. */\n{arcs}'
                 f'static const linkage_model {self._name} = {{\n'
-                f'    {len(self._sizes)}, {int(not self._tag)}, {self.machine.name}_at{self._tag},\n'
+                f'    {len(self._sizes)}, {int(not self._tag)}, '
+                f'{self.machine.name}_at{self._tag},\n'
                 f'    {{ {{ {sides[0]} }},\n      {{ {sides[1]} }} }},\n'
                 f'    {{ {inputs} }},\n    {{ {turns[0]}, {turns[1]} }},\n'
                 f'    {len(self._arcs)}, {f"{self._name}_arc" if arcs else 0}\n}};\n')
@@ -229,7 +230,7 @@ class Model:
             f'/* From positions to the inputs nearest to q. {how}, {poses} poses at most. */',
             f'static inline int {name}_from{tag}(const {number} *position, {number} *q, '
             'linkage_point *p)', '{', '    linkage_goal goal;',
-            f'    linkage_start start[{count}];',
+            f'    linkage_start start[{count + 1}];',
             f'    if (!linkage_aim(&{self._name}, {side}, position, q, &goal)) {{',
             '        return 0;', '    }',
             *([f'    {name}_modes{tag}(goal.to, start);'] if modes else []),

@@ -496,13 +496,13 @@ static inline int linkage_reach(const linkage_model *model, int side, const link
         && linkage_refine(model, side, goal->to, left, gap, x, p);
 }
 
-/* The inputs nearest to those of the goal, of the starts; what an axis counts is known. If no start
-   leads there, by Newton's method from the near ones. */
+/* The inputs nearest to those of the goal, of `count` starts; what an axis counts is known. If none
+   leads there, by Newton's method from the near ones, for which there is one more start. */
 static inline int linkage_choose(const linkage_model *model, int side, const linkage_goal *goal,
     int count, linkage_start *start, linkage_real *q, linkage_point *p)
 {
     linkage_real inside;
-    int i, k, is_last = 0;
+    int i, k;
     for (k = 0; k < count; k++) {
         for (i = 0; i < model->inputs; i++) {
             const linkage_axis *axis = &model->axis[side][i];
@@ -515,28 +515,29 @@ static inline int linkage_choose(const linkage_model *model, int side, const lin
             start[k].away = -1;
         }
     }
-    while (!is_last) {
+    for (i = 0; i < model->inputs; i++) {
+        start[count].q[i] = linkage_wrapped(goal->near[i] - goal->whole[i], model->input[i].turn);
+    }
+    start[count].away = LINKAGE_FAR;
+    for (;;) {
         linkage_start *nearest = 0;
-        for (k = 0; k < count; k++) {
+        linkage_real most;
+        for (k = 0; k <= count; k++) {
             if (start[k].away >= 0 && (!nearest || start[k].away < nearest->away)) {
                 nearest = &start[k];
             }
         }
         if (!nearest) {
-            is_last = 1;
-            nearest = start;
-            for (i = 0; i < model->inputs; i++) {
-                nearest->q[i] = linkage_wrapped(goal->near[i] - goal->whole[i], model->input[i].turn);
-            }
+            return 0;
         }
+        most = nearest == &start[count] ? LINKAGE_FAR : LINKAGE_OTHER;
         nearest->away = -1;
-        if (linkage_reach(model, side, goal, is_last ? LINKAGE_FAR : LINKAGE_OTHER, nearest->q, p)
+        if (linkage_reach(model, side, goal, most, nearest->q, p)
             && linkage_bring(model, side, goal, nearest->q, q) >= 0) {
             linkage_count_turns(model, nearest->q, q, p);
             return 1;
         }
     }
-    return 0;
 }
 
 /* Search a position in a piece of the reach, by Newton's method between brackets. */
