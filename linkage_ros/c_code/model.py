@@ -224,7 +224,8 @@ class Model:
                 modes, count = self._modes(tag, closed, self._own_modes(outputs, closed), axes)
             else:
                 return self._search(side, tag, axes)
-        poses = (count + 1) * (CLOSED + bool(self._arcs))
+        # A pose beyond an end of the reach is taken again inside, one without rates with them.
+        poses = (count + 1) * (CLOSED + bool(self._arcs) + bool(self._tag))
         self.poses = max(self.poses, poses)
         return modes + '\n'.join([
             f'/* From positions to the inputs nearest to q. {how}, {poses} poses at most. */',
