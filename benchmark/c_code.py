@@ -145,7 +145,7 @@ int main(void)
         linkage_point p;
         linkage_side a = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, j = a;
         linkage_sample(&{name}_model, k, q);
-        if (!{name}_at(q, &p)) continue;
+        if (!{name}_at(q, 1, &p)) continue;
         for (int i = 0; i < {n}; i++) {{
             a.position[i] = p.position[0][i];
             a.velocity[i] = a.effort[i] = 1;

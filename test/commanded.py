@@ -57,13 +57,13 @@ static void {name}_asked(long poses, long *counts)
         linkage_side measured = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }};
         linkage_side asked = measured, found = measured;
         linkage_sample(&{name}_model, i, q);
-        if (!{name}_at(q, &p))
+        if (!{name}_at(q, 1, &p))
             continue;
         for (k = 0; k < {n}; k++)
             beside[k] = q[k] + (i & 1 << k ? 1 : -1) * ({number})1e-3;
         for (side = 0; side < 2; side++) {{
             goal = p;
-            if (side && !{name}_at(beside, &goal))
+            if (side && !{name}_at(beside, 1, &goal))
                 continue;
             for (k = 0; k < {n}; k++)
                 measured.position[k] = p.position[0][k];

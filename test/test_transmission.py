@@ -27,7 +27,7 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-from c_libraries import loaded, ROS, shared, STAND_IN, STRICT
+from c_libraries import COMPILER, loaded, ROS, shared, STAND_IN, STRICT
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import command, header, transmission
 from linkage_ros.c_code.axes import actuators, joints
@@ -98,6 +98,28 @@ int {name}_sent(int side, const double *from, double *to)
     }}
     return status;
 }}
+"""
+
+# States all over the inputs' ranges, measured and commanded; returns how many are OK.
+WALK = """
+static long {name}_walked(long states)
+{
+    static {name}_memory m;
+    linkage_side from = { { 0 }, { 0 }, { 0 } }, to = from;
+    linkage_point p;
+    double q[LINKAGE_MAX_INPUTS] = { 0 };
+    long i, good = 0;
+    (void){name}_begin(&m);
+    for (i = 1; i <= states; i++) {
+        linkage_sample(&{name}_model, i, q);
+        if (!{name}_at(q, 1, &p))
+            continue;
+        memcpy(from.position, p.position[LINKAGE_ACTUATORS], sizeof from.position);
+        good += {name}_actuators_to_joints(&m, &from, &to) == LINKAGE_OK
+            && {name}_joints_to_actuators(&m, &to, &from) == LINKAGE_OK;
+    }
+    return good;
+}
 """
 
 
@@ -554,6 +576,29 @@ def proved(package, name, compiler, count, *flags):
 @pytest.mark.parametrize('compiler', COMPILERS)
 def test_a_transmission_is_proved(tmp_path, compiler):
     proved(written(tmp_path, ROOT / 'examples' / 'leg.yaml'), 'knee', compiler, 5000)
+
+
+@pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
+def test_sanitizers_find_nothing(machines, tmp_path):
+    # A lever with sweep and loads, and a leg of two inputs; all scenes are exhaustive.
+    def ran(name, text):
+        (tmp_path / f'{name}.c').write_text(text)
+        for command_line in ([COMPILER, '-std=c99', *SANITIZED, tmp_path / f'{name}.c', '-o',
+                              tmp_path / name, '-lm'], [tmp_path / name]):
+            ended = subprocess.run(command_line, capture_output=True, text=True)
+            if ended.returncode:
+                return None, ended.stderr[:2000]
+        return ended.stdout, ''
+
+    if ran('none', 'int main(void) { return 0; }\n')[0] is None:
+        pytest.skip('no program with sanitizers is linked or runs here')
+    names = ['lever', 'leg']
+    printed, error = ran('walk', '#include <stdio.h>\n' + header.printed(
+        [header.Request(machines[name]) for name in names]) + ''.join(
+        WALK.replace('{name}', name) for name in names) + 'int main(void)\n{\n' + ''.join(
+            f'    printf("%ld ", {name}_walked(2000));\n' for name in names) + '}\n')
+    assert printed is not None, error
+    assert min(map(int, printed.split())) > 500
 
 
 @pytest.mark.parametrize('compiler', COMPILERS)

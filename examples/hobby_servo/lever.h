@@ -3,7 +3,7 @@
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * It can be assembled in [-3.14159, 3.14159] rad.
- * A call takes at most 12 poses.
+ * A call takes at most 15 poses.
  * float: joints are off by up to 1e-07 of the longest bar at 2001 poses over the reach, without its outermost hundredth.
  */
 #ifndef LEVER_LINKAGE_H
@@ -51,8 +51,6 @@
 typedef float linkage_real;
 #define linkage_abs fabsf
 #define linkage_floor floorf
-#define linkage_max fmaxf
-#define linkage_min fminf
 #define linkage_sqrt sqrtf
 #define linkage_atan2 atan2f
 /* A Jacobian below this part of its size is singular: for velocities, and for Newton's method. */
@@ -72,8 +70,6 @@ typedef float linkage_real;
 typedef double linkage_real;
 #define linkage_abs fabs
 #define linkage_floor floor
-#define linkage_max fmax
-#define linkage_min fmin
 #define linkage_sqrt sqrt
 #define linkage_atan2 atan2
 #define LINKAGE_SINGULAR 1e-6
@@ -91,8 +87,6 @@ typedef double linkage_real;
 /* States that are tried for a first pose. */
 #define LINKAGE_SAMPLES 4096
 #define LINKAGE_NAN ((linkage_real)NAN)
-/* Farther than anything. */
-#define LINKAGE_FAR ((linkage_real)1e30)
 /* A closed form that misses by more than this belongs to another assembly [rad, sizes]. */
 #define LINKAGE_OTHER ((linkage_real)0.01)
 /* Half, in a form that both kinds of numbers have. */
@@ -102,12 +96,44 @@ typedef double linkage_real;
 #ifdef __GNUC__
 #define LINKAGE_FORMULA static inline __attribute__((always_inline))
 #define LINKAGE_PURE static __attribute__((const, noinline, unused))
+/* Farther than anything: where that is infinite, a compiler leaves out what asks for it. */
+#define LINKAGE_FAR ((linkage_real)INFINITY)
 #else
+#define LINKAGE_FAR ((linkage_real)1e30)
 #define LINKAGE_FORMULA static inline
 #define LINKAGE_PURE static inline
 #endif
 
-/* --- what formulas use --- */
+/* --- numbers --- */
+
+/* The larger and the smaller one, quicker than fmax and fmin; b is left out if it is NaN. */
+static inline linkage_real linkage_max(linkage_real a, linkage_real b)
+{
+    return b > a ? b : a;
+}
+
+static inline linkage_real linkage_min(linkage_real a, linkage_real b)
+{
+    return b < a ? b : a;
+}
+
+/* Whether x is more than half a turn, if there are turns. */
+LINKAGE_FORMULA int linkage_is_beyond(linkage_real x, linkage_real turn)
+{
+    return turn > 0 && linkage_abs(x) > turn / 2;
+}
+
+/* The whole turns nearest to x; a compiler divides where it compiles. */
+LINKAGE_FORMULA linkage_real linkage_turns(linkage_real x, linkage_real turn)
+{
+    return turn * linkage_floor(x * (1 / turn) + LINKAGE_HALF);
+}
+
+/* x without whole turns, if there are any. */
+LINKAGE_FORMULA linkage_real linkage_wrapped(linkage_real x, linkage_real turn)
+{
+    return linkage_is_beyond(x, turn) ? x - linkage_turns(x, turn) : x;
+}
 
 /* A limit that is missed by rounding counts as reached. */
 static inline linkage_real linkage_root(linkage_real x, linkage_real tolerance)
@@ -174,8 +200,10 @@ typedef struct {
 /* A linkage. Inputs q are in rad or in sizes. */
 typedef struct {
     int inputs;
-    /* The pose at inputs; 0 if it cannot be assembled. */
-    int (*at)(const linkage_real *q, linkage_point *p);
+    /* Whether the pose of an inverse is to have rates and loads. */
+    int is_rated;
+    /* The pose at inputs, with rates and loads or without; 0 if it cannot be assembled. */
+    int (*at)(const linkage_real *q, int is_rated, linkage_point *p);
     linkage_axis axis[2][LINKAGE_MAX_INPUTS];
     linkage_input input[LINKAGE_MAX_INPUTS];
     /* After how much of each input the actuators or the joints repeat, or 0. */
@@ -228,10 +256,7 @@ static inline linkage_real linkage_gap(const linkage_model *model, int side, con
     int i;
     for (i = 0; i < model->inputs; i++) {
         const linkage_axis *axis = &model->axis[side][i];
-        gap[i] = to[i] - p->position[side][i];
-        if (axis->turn > 0 && linkage_abs(gap[i]) > axis->turn / 2) {
-            gap[i] -= axis->turn * linkage_floor(gap[i] / axis->turn + LINKAGE_HALF);
-        }
+        gap[i] = linkage_wrapped(to[i] - p->position[side][i], axis->turn);
         most = linkage_max(most, linkage_abs(gap[i]) * axis->scale);
     }
     return most;
@@ -345,8 +370,8 @@ static inline int linkage_aim(const linkage_model *model, int side, const linkag
             const int k = axis->input;
             const linkage_real turn = model->input[k].turn;
             goal->near[k] = (position[i] - axis->zero) / axis->rate;
-            if (turn > 0) {
-                goal->whole[k] = turn * linkage_floor(goal->near[k] / turn + LINKAGE_HALF);
+            if (linkage_is_beyond(goal->near[k], turn)) {
+                goal->whole[k] = linkage_turns(goal->near[k], turn);
                 goal->to[i] -= axis->rate * goal->whole[k];
             }
         }
@@ -359,13 +384,8 @@ static inline int linkage_is_within(const linkage_model *model, linkage_real q, 
 {
     int i;
     for (i = 0; i < model->arcs; i++) {
-        const linkage_real turn = model->input[0].turn;
-        linkage_real gap = q - model->arc[i][0];
-        linkage_real over;
-        if (turn > 0) {
-            gap -= turn * linkage_floor(gap / turn + LINKAGE_HALF);
-        }
-        over = linkage_abs(gap) - model->arc[i][1];
+        const linkage_real gap = linkage_wrapped(q - model->arc[i][0], model->input[0].turn);
+        const linkage_real over = linkage_abs(gap) - model->arc[i][1];
         if (over <= LINKAGE_SLACK) {
             *inside = q;
             if (over > 0) {
@@ -386,27 +406,29 @@ static inline linkage_real linkage_bring(const linkage_model *model, int side,
     linkage_real away = 0;
     int i;
     for (i = 0; i < model->inputs; i++) {
-        const linkage_real *sweep = model->input[i].sweep;
+        const linkage_real low = model->input[i].sweep[0];
+        const linkage_real high = model->input[i].sweep[1];
         const linkage_real turn = model->turn[side][i];
-        linkage_real outside;
+        linkage_real near = goal->near[i];
+        if (side == LINKAGE_JOINTS) {
+            near = linkage_min(linkage_max(near, low), high);
+        }
         q[i] = x[i] + goal->whole[i];
-        if (turn > 0) {
-            linkage_real near = goal->near[i];
+        if (linkage_is_beyond(near - q[i], turn)) {
+            q[i] += linkage_turns(near - q[i], turn);
+        }
+        if (side == LINKAGE_JOINTS && q[i] < low) {
+            q[i] += turn;
+        } else if (side == LINKAGE_JOINTS && q[i] > high) {
+            q[i] -= turn;
+        }
+        if (q[i] < low || q[i] > high) {
             if (side == LINKAGE_JOINTS) {
-                near = linkage_min(linkage_max(near, sweep[0]), sweep[1]);
+                return -1;
             }
-            q[i] += turn * linkage_floor((near - q[i]) / turn + LINKAGE_HALF);
-            if (side == LINKAGE_JOINTS && q[i] < sweep[0]) {
-                q[i] += turn;
-            } else if (side == LINKAGE_JOINTS && q[i] > sweep[1]) {
-                q[i] -= turn;
-            }
+            away += 10 * linkage_max(low - q[i], q[i] - high);
         }
-        outside = linkage_max(sweep[0] - q[i], q[i] - sweep[1]);
-        if (side == LINKAGE_JOINTS && outside > 0) {
-            return -1;
-        }
-        away += linkage_abs(q[i] - goal->near[i]) + 10 * linkage_max(outside, 0);
+        away += linkage_abs(q[i] - goal->near[i]);
     }
     return isfinite(away) ? away : -1;
 }
@@ -426,21 +448,18 @@ static inline void linkage_count_turns(const linkage_model *model, const linkage
     }
 }
 
-/* Newton's method from a pose at inputs q to positions: each step comes nearer, and stays on its side
-   of singular poses. Returns 0, with any q, if it does not get there. */
+/* Newton's method from a rated pose at inputs q that misses positions by gaps, of which `left` is the
+   largest: each step comes nearer, and stays on its side of singular poses. Returns 0, with any q, if
+   it does not get there. */
 static inline int linkage_refine(const linkage_model *model, int side, const linkage_real *to,
-    linkage_real *q, linkage_point *p)
+    linkage_real left, linkage_real *gap, linkage_real *q, linkage_point *p)
 {
     linkage_point next;
-    linkage_real gap[LINKAGE_MAX_INPUTS], moved[LINKAGE_MAX_INPUTS];
+    linkage_real moved[LINKAGE_MAX_INPUTS];
     linkage_real x[LINKAGE_MAX_INPUTS], y[LINKAGE_MAX_INPUTS];
     linkage_real share = 1;
-    linkage_real left = linkage_gap(model, side, to, p, gap);
-    int i, step, sign;
-    if (left <= LINKAGE_ENOUGH) {
-        return 1;
-    }
-    sign = linkage_input_change(model, side, p, LINKAGE_LEAST, gap, x);
+    int sign = linkage_input_change(model, side, p, LINKAGE_LEAST, gap, x);
+    int i, step;
     for (step = 1; step < LINKAGE_CLOSED_POSES && sign != 0 && left > LINKAGE_ENOUGH; step++) {
         linkage_real now = left;
         linkage_real longest = LINKAGE_HALF;
@@ -451,7 +470,7 @@ static inline int linkage_refine(const linkage_model *model, int side, const lin
         for (i = 0; i < model->inputs; i++) {
             moved[i] = q[i] + share * LINKAGE_HALF / longest * x[i];
         }
-        if (model->at(moved, &next)) {
+        if (model->at(moved, 1, &next)) {
             now = linkage_gap(model, side, to, &next, gap);
         }
         if (now < left) {
@@ -480,21 +499,25 @@ static inline int linkage_reach(const linkage_model *model, int side, const link
     linkage_real most, linkage_real *x, linkage_point *p)
 {
     linkage_real gap[LINKAGE_MAX_INPUTS];
+    linkage_real left;
     /* A start may be beyond an end of the reach by rounding. */
-    if (!model->at(x, p)
-        && !(linkage_is_within(model, x[0], &x[0]) && model->at(x, p))) {
+    if (!model->at(x, model->is_rated, p)
+        && !(model->arcs > 0 && linkage_is_within(model, x[0], &x[0]) && model->at(x, model->is_rated, p))) {
         return 0;
     }
-    return linkage_gap(model, side, goal->to, p, gap) <= most
-        && linkage_refine(model, side, goal->to, x, p);
+    left = linkage_gap(model, side, goal->to, p, gap);
+    if (left <= LINKAGE_ENOUGH) {
+        return 1;
+    }
+    return left <= most && (model->is_rated || model->at(x, 1, p))
+        && linkage_refine(model, side, goal->to, left, gap, x, p);
 }
 
-/* The inputs nearest to those of the goal, of the starts; what an axis counts is known. If no start
-   leads there, by Newton's method from the near ones. */
+/* The inputs nearest to those of the goal, of `count` starts; what an axis counts is known. If none
+   leads there, by Newton's method from the near ones, for which there is one more start. */
 static inline int linkage_choose(const linkage_model *model, int side, const linkage_goal *goal,
     int count, linkage_start *start, linkage_real *q, linkage_point *p)
 {
-    linkage_real x[LINKAGE_MAX_INPUTS];
     linkage_real inside;
     int i, k;
     for (k = 0; k < count; k++) {
@@ -509,36 +532,29 @@ static inline int linkage_choose(const linkage_model *model, int side, const lin
             start[k].away = -1;
         }
     }
+    for (i = 0; i < model->inputs; i++) {
+        start[count].q[i] = linkage_wrapped(goal->near[i] - goal->whole[i], model->input[i].turn);
+    }
+    start[count].away = LINKAGE_FAR;
     for (;;) {
         linkage_start *nearest = 0;
-        for (k = 0; k < count; k++) {
+        linkage_real most;
+        for (k = 0; k <= count; k++) {
             if (start[k].away >= 0 && (!nearest || start[k].away < nearest->away)) {
                 nearest = &start[k];
             }
         }
         if (!nearest) {
-            break;
+            return 0;
         }
+        most = nearest == &start[count] ? LINKAGE_FAR : LINKAGE_OTHER;
         nearest->away = -1;
-        if (linkage_reach(model, side, goal, LINKAGE_OTHER, nearest->q, p)
+        if (linkage_reach(model, side, goal, most, nearest->q, p)
             && linkage_bring(model, side, goal, nearest->q, q) >= 0) {
             linkage_count_turns(model, nearest->q, q, p);
             return 1;
         }
     }
-    for (i = 0; i < model->inputs; i++) {
-        const linkage_real turn = model->input[i].turn;
-        x[i] = goal->near[i] - goal->whole[i];
-        if (turn > 0) {
-            x[i] -= turn * linkage_floor(x[i] / turn + LINKAGE_HALF);
-        }
-    }
-    if (linkage_reach(model, side, goal, LINKAGE_FAR, x, p)
-        && linkage_bring(model, side, goal, x, q) >= 0) {
-        linkage_count_turns(model, x, q, p);
-        return 1;
-    }
-    return 0;
 }
 
 /* Search a position in a piece of the reach, by Newton's method between brackets. */
@@ -546,7 +562,6 @@ static inline int linkage_search_piece(const linkage_model *model, int side,
     const linkage_piece *piece, linkage_real position, linkage_real near, linkage_real *x,
     linkage_point *p)
 {
-    const linkage_real turn = model->turn[side][0];
     const linkage_real range = piece->position[1] - piece->position[0];
     const linkage_real middle = (piece->q[0] + piece->q[1]) / 2;
     const linkage_real scale = model->axis[side][0].scale;
@@ -562,9 +577,7 @@ static inline int linkage_search_piece(const linkage_model *model, int side,
         return 0;
     }
     next = low + (high - low) * (LINKAGE_HALF + gap / range);
-    if (turn > 0) {
-        near -= turn * linkage_floor((near - middle) / turn + LINKAGE_HALF);
-    }
+    near = middle + linkage_wrapped(near - middle, model->turn[side][0]);
     if (inside <= LINKAGE_CLOSE) {
         next = next > middle ? high : low;
     } else if (near > low && near < high) {
@@ -574,7 +587,7 @@ static inline int linkage_search_piece(const linkage_model *model, int side,
         const linkage_real before = left;
         int is_at = 0;
         *x = next;
-        if (!model->at(x, p)) {
+        if (!model->at(x, 1, p)) {
             /* Beyond an end by rounding. */
             if (*x < middle) {
                 low = *x;
@@ -654,7 +667,7 @@ static inline int linkage_begin(const linkage_model *model, linkage_memory *m)
     }
     for (i = 0; i < LINKAGE_SAMPLES; i++) {
         linkage_sample(model, i, m->q[LINKAGE_JOINTS]);
-        if (model->at(m->q[LINKAGE_JOINTS], &m->point[LINKAGE_JOINTS])) {
+        if (model->at(m->q[LINKAGE_JOINTS], 1, &m->point[LINKAGE_JOINTS])) {
             return 1;
         }
     }
@@ -916,7 +929,7 @@ LINKAGE_FORMULA int lever_formulas(float crank, lever_pose *p, lever_pose *by_cr
     by_crank->L_x = (-((v95 * v63) * k61));
     by_crank->L_y = ((v95 * v56) * k61);
     by_crank->angle_lever = v95;
-    by_crank->slide_slide = (-(((((v15 * 0.5f) * v17) * 2.0f) * k37) / (2.0f * v88)));
+    by_crank->slide_slide = ((-((((v15 * 0.5f) * v17) * 2.0f) * k37)) / (2.0f * v88));
     return 1;
 }
 
@@ -950,7 +963,7 @@ typedef linkage_side lever_joints;
 typedef linkage_memory lever_memory;
 
 /* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be assembled. */
-static inline int lever_at(const float *q, linkage_point *p)
+static inline int lever_at(const float *q, int is_rated, linkage_point *p)
 {
     lever_pose s, by_crank;
     if (!lever_formulas(q[0], &s, &by_crank)) {
@@ -958,18 +971,20 @@ static inline int lever_at(const float *q, linkage_point *p)
     }
     p->position[0][0] = s.angle_crank;
     p->position[1][0] = s.angle_lever;
-    p->rate[0][0][0] = by_crank.angle_crank;
-    p->rate[1][0][0] = by_crank.angle_lever;
-    p->load[0] = 0.0f;
+    if (is_rated) {
+        p->rate[0][0][0] = by_crank.angle_crank;
+        p->rate[1][0][0] = by_crank.angle_lever;
+        p->load[0] = 0.0f;
+    }
     return isfinite(p->position[0][0] + p->position[1][0]);
 }
 
 /* Tables of the actuators and joints, see linkage_model. */
 static const linkage_model lever_model = {
-    1, lever_at,
+    1, 1, lever_at,
     { { { "lever_crank", 1.0f, 0.0f, 0, 1.0f, 0.0f } },
       { { "lever_lever", 1.0f, 6.2831855f, 0, 0.0f, 0.0f } } },
-    { { 6.2831855f, 0.0f, -3.1415927f, 6.2831855f, 0.41421357f, { -1e+30f, 1e+30f } } },
+    { { 6.2831855f, 0.0f, -3.1415927f, 6.2831855f, 0.41421357f, { -LINKAGE_FAR, LINKAGE_FAR } } },
     { { 0.0f }, { 6.2831855f } },
     0, 0
 };
@@ -978,7 +993,7 @@ static const linkage_model lever_model = {
 static inline int lever_from_actuators(const float *position, float *q, linkage_point *p)
 {
     linkage_goal goal;
-    linkage_start start[1] = { { { 0 }, 0 } };
+    linkage_start start[2];
     if (!linkage_aim(&lever_model, 0, position, q, &goal)) {
         return 0;
     }
@@ -1023,7 +1038,7 @@ static inline void lever_modes_joints(const float *position, linkage_start *star
 static inline int lever_from_joints(const float *position, float *q, linkage_point *p)
 {
     linkage_goal goal;
-    linkage_start start[2] = { { { 0 }, 0 } };
+    linkage_start start[3];
     if (!linkage_aim(&lever_model, 1, position, q, &goal)) {
         return 0;
     }
@@ -1052,24 +1067,26 @@ static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints 
 }
 
 /* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be assembled. */
-static inline int lever_at_angle_lever(const float *q, linkage_point *p)
+static inline int lever_at_angle_lever(const float *q, int is_rated, linkage_point *p)
 {
     lever_pose s, by_crank;
     if (!lever_formulas(q[0], &s, &by_crank)) {
         return 0;
     }
     p->position[1][0] = s.angle_lever;
-    p->rate[1][0][0] = by_crank.angle_lever;
-    p->load[0] = 0.0f;
+    if (is_rated) {
+        p->rate[1][0][0] = by_crank.angle_lever;
+        p->load[0] = 0.0f;
+    }
     return isfinite(p->position[1][0]);
 }
 
 /* Tables of the inverse, see linkage_model. */
 static const linkage_model lever_model_angle_lever = {
-    1, lever_at_angle_lever,
+    1, 0, lever_at_angle_lever,
     { { { 0, 0.0f, 0.0f, 0, 0.0f, 0.0f } },
       { { "lever", 1.0f, 6.2831855f, 0, 0.0f, 0.0f } } },
-    { { 6.2831855f, 0.0f, -3.1415927f, 6.2831855f, 0.41421357f, { -1e+30f, 1e+30f } } },
+    { { 6.2831855f, 0.0f, -3.1415927f, 6.2831855f, 0.41421357f, { -LINKAGE_FAR, LINKAGE_FAR } } },
     { { 6.2831855f }, { 6.2831855f } },
     0, 0
 };
@@ -1108,11 +1125,11 @@ static inline void lever_modes_angle_lever(const float *position, linkage_start 
     start[1].q[0] = linkage_angle((-(v49 - v54)), (v58 - v59));
 }
 
-/* From positions to the inputs nearest to q. In closed form, 12 poses at most. */
+/* From positions to the inputs nearest to q. In closed form, 15 poses at most. */
 static inline int lever_from_angle_lever(const float *position, float *q, linkage_point *p)
 {
     linkage_goal goal;
-    linkage_start start[2] = { { { 0 }, 0 } };
+    linkage_start start[3];
     if (!linkage_aim(&lever_model_angle_lever, 1, position, q, &goal)) {
         return 0;
     }

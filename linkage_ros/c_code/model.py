@@ -37,8 +37,6 @@ CLOSED, SEARCHED = 4, 64
 SAMPLES = 256
 # Inputs that are no further apart are the same [rad, sizes].
 ALIKE = 1e-6
-# Ends that an input has not [rad, sizes].
-FAR = 1e30
 
 
 class Model:
@@ -100,11 +98,13 @@ class Model:
             rates.append(f'p->load[{j}] = ' + (' + '.join(
                 code.times(f'{by}.{field}', -load * unit) for load, field in powers)
                 or code.literal(0.0)) + ';')
-        lines += [*rates, f'return isfinite({" + ".join(places)});']
+        lines += ['if (is_rated) {', *(f'    {line}' for line in rates), '}',
+                  f'return isfinite({" + ".join(places)});']
         return '\n'.join([
             '/* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be '
             'assembled. */',
-            f'static inline int {name}_at{self._tag}(const {code.number} *q, linkage_point *p)',
+            f'static inline int {name}_at{self._tag}(const {code.number} *q, int is_rated, '
+            'linkage_point *p)',
             '{',
             *indented(lines), '}', ''])
 
@@ -157,8 +157,8 @@ class Model:
         sides = [',\n          '.join(self._axis(axes, k) for k in range(len(axes))) or none
                  for axes in self.sides]
         inputs = ',\n      '.join(
-            '{ %s, { %s } }' % (', '.join(map(code.literal, row[:5])),
-                                ', '.join(map(code.literal, row[5:]))) for row in self._inputs())
+            '{ %s, { %s } }' % (', '.join(map(code.literal, row)), ', '.join(ends))
+            for *row, ends in self._inputs())
         turns = [code.row(self._turns(axes)) for axes in self.sides]
         arcs = ''
         if self._arcs:
@@ -170,7 +170,8 @@ class Model:
         about = 'Tables of the inverse' if self._tag else 'Tables of the actuators and joints'
         return (f'/* {about}, see linkage_model. */\n{arcs}'
                 f'static const linkage_model {self._name} = {{\n'
-                f'    {len(self._sizes)}, {self.machine.name}_at{self._tag},\n'
+                f'    {len(self._sizes)}, {int(not self._tag)}, '
+                f'{self.machine.name}_at{self._tag},\n'
                 f'    {{ {{ {sides[0]} }},\n      {{ {sides[1]} }} }},\n'
                 f'    {{ {inputs} }},\n    {{ {turns[0]}, {turns[1]} }},\n'
                 f'    {len(self._arcs)}, {f"{self._name}_arc" if arcs else 0}\n}};\n')
@@ -184,7 +185,7 @@ class Model:
             *map(code.literal, (each.factor * ratio * self._sizes[i],
                                 each.factor * offset + each.offset if ratio else 0.0))])
 
-    def _inputs(self) -> Iterator[Tuple[float, ...]]:
+    def _inputs(self) -> Iterator[tuple]:
         """Yield turn, start, range of samples, their step, and sweep of each input."""
         starts = start(self.machine)
         for i, (drive, input_) in enumerate(zip(self.machine.inputs.values(),
@@ -192,10 +193,10 @@ class Model:
             unit = input_.size * self.machine.scale_of(input_.name)
             low, high = (end / unit for end in drive.ends or max(
                 drive.reach, key=lambda arc: arc[1] - arc[0]))
-            ends = [end / unit for end in drive.ends] if drive.ends and not self._tag else (
-                -FAR, FAR)
+            ends = [self._code.literal(end / unit) for end in drive.ends
+                    ] if drive.ends and not self._tag else ['-LINKAGE_FAR', 'LINKAGE_FAR']
             yield (input_.turn if input_.wraps else 0.0, starts[i] / input_.size, low, high - low,
-                   math.sqrt((i + 1) ** 2 + 1.0) % 1.0, *ends)
+                   math.sqrt((i + 1) ** 2 + 1.0) % 1.0, ends)
 
     def _turns(self, axes: Sequence[Axis]) -> List[float]:
         """Return after how much of each input the positions of axes are the same, or 0."""
@@ -223,13 +224,14 @@ class Model:
                 modes, count = self._modes(tag, closed, self._own_modes(outputs, closed), axes)
             else:
                 return self._search(side, tag, axes)
-        poses = (count + 1) * (CLOSED + bool(self._arcs))
+        # A pose beyond an end of the reach is taken again inside, one without rates with them.
+        poses = (count + 1) * (CLOSED + bool(self._arcs) + bool(self._tag))
         self.poses = max(self.poses, poses)
         return modes + '\n'.join([
             f'/* From positions to the inputs nearest to q. {how}, {poses} poses at most. */',
             f'static inline int {name}_from{tag}(const {number} *position, {number} *q, '
             'linkage_point *p)', '{', '    linkage_goal goal;',
-            f'    linkage_start start[{count}] = {{ {{ {{ 0 }}, 0 }} }};',
+            f'    linkage_start start[{count + 1}];',
             f'    if (!linkage_aim(&{self._name}, {side}, position, q, &goal)) {{',
             '        return 0;', '    }',
             *([f'    {name}_modes{tag}(goal.to, start);'] if modes else []),

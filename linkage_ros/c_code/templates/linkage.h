@@ -34,8 +34,6 @@
 typedef float linkage_real;
 #define linkage_abs fabsf
 #define linkage_floor floorf
-#define linkage_max fmaxf
-#define linkage_min fminf
 #define linkage_sqrt sqrtf
 #define linkage_atan2 atan2f
 /* A Jacobian below this part of its size is singular: for velocities, and for Newton's method. */
@@ -55,8 +53,6 @@ typedef float linkage_real;
 typedef double linkage_real;
 #define linkage_abs fabs
 #define linkage_floor floor
-#define linkage_max fmax
-#define linkage_min fmin
 #define linkage_sqrt sqrt
 #define linkage_atan2 atan2
 #define LINKAGE_SINGULAR 1e-6
@@ -74,8 +70,6 @@ typedef double linkage_real;
 /* States that are tried for a first pose. */
 #define LINKAGE_SAMPLES 4096
 #define LINKAGE_NAN ((linkage_real)NAN)
-/* Farther than anything. */
-#define LINKAGE_FAR ((linkage_real)1e30)
 /* A closed form that misses by more than this belongs to another assembly [rad, sizes]. */
 #define LINKAGE_OTHER ((linkage_real)0.01)
 /* Half, in a form that both kinds of numbers have. */
@@ -85,12 +79,44 @@ typedef double linkage_real;
 #ifdef __GNUC__
 #define LINKAGE_FORMULA static inline __attribute__((always_inline))
 #define LINKAGE_PURE static __attribute__((const, noinline, unused))
+/* Farther than anything: where that is infinite, a compiler leaves out what asks for it. */
+#define LINKAGE_FAR ((linkage_real)INFINITY)
 #else
+#define LINKAGE_FAR ((linkage_real)1e30)
 #define LINKAGE_FORMULA static inline
 #define LINKAGE_PURE static inline
 #endif
 
-/* --- what formulas use --- */
+/* --- numbers --- */
+
+/* The larger and the smaller one, quicker than fmax and fmin; b is left out if it is NaN. */
+static inline linkage_real linkage_max(linkage_real a, linkage_real b)
+{
+    return b > a ? b : a;
+}
+
+static inline linkage_real linkage_min(linkage_real a, linkage_real b)
+{
+    return b < a ? b : a;
+}
+
+/* Whether x is more than half a turn, if there are turns. */
+LINKAGE_FORMULA int linkage_is_beyond(linkage_real x, linkage_real turn)
+{
+    return turn > 0 && linkage_abs(x) > turn / 2;
+}
+
+/* The whole turns nearest to x; a compiler divides where it compiles. */
+LINKAGE_FORMULA linkage_real linkage_turns(linkage_real x, linkage_real turn)
+{
+    return turn * linkage_floor(x * (1 / turn) + LINKAGE_HALF);
+}
+
+/* x without whole turns, if there are any. */
+LINKAGE_FORMULA linkage_real linkage_wrapped(linkage_real x, linkage_real turn)
+{
+    return linkage_is_beyond(x, turn) ? x - linkage_turns(x, turn) : x;
+}
 
 /* A limit that is missed by rounding counts as reached. */
 static inline linkage_real linkage_root(linkage_real x, linkage_real tolerance)
@@ -157,8 +183,10 @@ typedef struct {
 /* A linkage. Inputs q are in rad or in sizes. */
 typedef struct {
     int inputs;
-    /* The pose at inputs; 0 if it cannot be assembled. */
-    int (*at)(const linkage_real *q, linkage_point *p);
+    /* Whether the pose of an inverse is to have rates and loads. */
+    int is_rated;
+    /* The pose at inputs, with rates and loads or without; 0 if it cannot be assembled. */
+    int (*at)(const linkage_real *q, int is_rated, linkage_point *p);
     linkage_axis axis[2][LINKAGE_MAX_INPUTS];
     linkage_input input[LINKAGE_MAX_INPUTS];
     /* After how much of each input the actuators or the joints repeat, or 0. */
@@ -211,10 +239,7 @@ static inline linkage_real linkage_gap(const linkage_model *model, int side, con
     int i;
     for (i = 0; i < model->inputs; i++) {
         const linkage_axis *axis = &model->axis[side][i];
-        gap[i] = to[i] - p->position[side][i];
-        if (axis->turn > 0 && linkage_abs(gap[i]) > axis->turn / 2) {
-            gap[i] -= axis->turn * linkage_floor(gap[i] / axis->turn + LINKAGE_HALF);
-        }
+        gap[i] = linkage_wrapped(to[i] - p->position[side][i], axis->turn);
         most = linkage_max(most, linkage_abs(gap[i]) * axis->scale);
     }
     return most;
@@ -328,8 +353,8 @@ static inline int linkage_aim(const linkage_model *model, int side, const linkag
             const int k = axis->input;
             const linkage_real turn = model->input[k].turn;
             goal->near[k] = (position[i] - axis->zero) / axis->rate;
-            if (turn > 0) {
-                goal->whole[k] = turn * linkage_floor(goal->near[k] / turn + LINKAGE_HALF);
+            if (linkage_is_beyond(goal->near[k], turn)) {
+                goal->whole[k] = linkage_turns(goal->near[k], turn);
                 goal->to[i] -= axis->rate * goal->whole[k];
             }
         }
@@ -342,13 +367,8 @@ static inline int linkage_is_within(const linkage_model *model, linkage_real q, 
 {
     int i;
     for (i = 0; i < model->arcs; i++) {
-        const linkage_real turn = model->input[0].turn;
-        linkage_real gap = q - model->arc[i][0];
-        linkage_real over;
-        if (turn > 0) {
-            gap -= turn * linkage_floor(gap / turn + LINKAGE_HALF);
-        }
-        over = linkage_abs(gap) - model->arc[i][1];
+        const linkage_real gap = linkage_wrapped(q - model->arc[i][0], model->input[0].turn);
+        const linkage_real over = linkage_abs(gap) - model->arc[i][1];
         if (over <= LINKAGE_SLACK) {
             *inside = q;
             if (over > 0) {
@@ -369,27 +389,29 @@ static inline linkage_real linkage_bring(const linkage_model *model, int side,
     linkage_real away = 0;
     int i;
     for (i = 0; i < model->inputs; i++) {
-        const linkage_real *sweep = model->input[i].sweep;
+        const linkage_real low = model->input[i].sweep[0];
+        const linkage_real high = model->input[i].sweep[1];
         const linkage_real turn = model->turn[side][i];
-        linkage_real outside;
+        linkage_real near = goal->near[i];
+        if (side == LINKAGE_JOINTS) {
+            near = linkage_min(linkage_max(near, low), high);
+        }
         q[i] = x[i] + goal->whole[i];
-        if (turn > 0) {
-            linkage_real near = goal->near[i];
+        if (linkage_is_beyond(near - q[i], turn)) {
+            q[i] += linkage_turns(near - q[i], turn);
+        }
+        if (side == LINKAGE_JOINTS && q[i] < low) {
+            q[i] += turn;
+        } else if (side == LINKAGE_JOINTS && q[i] > high) {
+            q[i] -= turn;
+        }
+        if (q[i] < low || q[i] > high) {
             if (side == LINKAGE_JOINTS) {
-                near = linkage_min(linkage_max(near, sweep[0]), sweep[1]);
+                return -1;
             }
-            q[i] += turn * linkage_floor((near - q[i]) / turn + LINKAGE_HALF);
-            if (side == LINKAGE_JOINTS && q[i] < sweep[0]) {
-                q[i] += turn;
-            } else if (side == LINKAGE_JOINTS && q[i] > sweep[1]) {
-                q[i] -= turn;
-            }
+            away += 10 * linkage_max(low - q[i], q[i] - high);
         }
-        outside = linkage_max(sweep[0] - q[i], q[i] - sweep[1]);
-        if (side == LINKAGE_JOINTS && outside > 0) {
-            return -1;
-        }
-        away += linkage_abs(q[i] - goal->near[i]) + 10 * linkage_max(outside, 0);
+        away += linkage_abs(q[i] - goal->near[i]);
     }
     return isfinite(away) ? away : -1;
 }
@@ -409,21 +431,18 @@ static inline void linkage_count_turns(const linkage_model *model, const linkage
     }
 }
 
-/* Newton's method from a pose at inputs q to positions: each step comes nearer, and stays on its side
-   of singular poses. Returns 0, with any q, if it does not get there. */
+/* Newton's method from a rated pose at inputs q that misses positions by gaps, of which `left` is the
+   largest: each step comes nearer, and stays on its side of singular poses. Returns 0, with any q, if
+   it does not get there. */
 static inline int linkage_refine(const linkage_model *model, int side, const linkage_real *to,
-    linkage_real *q, linkage_point *p)
+    linkage_real left, linkage_real *gap, linkage_real *q, linkage_point *p)
 {
     linkage_point next;
-    linkage_real gap[LINKAGE_MAX_INPUTS], moved[LINKAGE_MAX_INPUTS];
+    linkage_real moved[LINKAGE_MAX_INPUTS];
     linkage_real x[LINKAGE_MAX_INPUTS], y[LINKAGE_MAX_INPUTS];
     linkage_real share = 1;
-    linkage_real left = linkage_gap(model, side, to, p, gap);
-    int i, step, sign;
-    if (left <= LINKAGE_ENOUGH) {
-        return 1;
-    }
-    sign = linkage_input_change(model, side, p, LINKAGE_LEAST, gap, x);
+    int sign = linkage_input_change(model, side, p, LINKAGE_LEAST, gap, x);
+    int i, step;
     for (step = 1; step < LINKAGE_CLOSED_POSES && sign != 0 && left > LINKAGE_ENOUGH; step++) {
         linkage_real now = left;
         linkage_real longest = LINKAGE_HALF;
@@ -434,7 +453,7 @@ static inline int linkage_refine(const linkage_model *model, int side, const lin
         for (i = 0; i < model->inputs; i++) {
             moved[i] = q[i] + share * LINKAGE_HALF / longest * x[i];
         }
-        if (model->at(moved, &next)) {
+        if (model->at(moved, 1, &next)) {
             now = linkage_gap(model, side, to, &next, gap);
         }
         if (now < left) {
@@ -463,21 +482,25 @@ static inline int linkage_reach(const linkage_model *model, int side, const link
     linkage_real most, linkage_real *x, linkage_point *p)
 {
     linkage_real gap[LINKAGE_MAX_INPUTS];
+    linkage_real left;
     /* A start may be beyond an end of the reach by rounding. */
-    if (!model->at(x, p)
-        && !(linkage_is_within(model, x[0], &x[0]) && model->at(x, p))) {
+    if (!model->at(x, model->is_rated, p)
+        && !(model->arcs > 0 && linkage_is_within(model, x[0], &x[0]) && model->at(x, model->is_rated, p))) {
         return 0;
     }
-    return linkage_gap(model, side, goal->to, p, gap) <= most
-        && linkage_refine(model, side, goal->to, x, p);
+    left = linkage_gap(model, side, goal->to, p, gap);
+    if (left <= LINKAGE_ENOUGH) {
+        return 1;
+    }
+    return left <= most && (model->is_rated || model->at(x, 1, p))
+        && linkage_refine(model, side, goal->to, left, gap, x, p);
 }
 
-/* The inputs nearest to those of the goal, of the starts; what an axis counts is known. If no start
-   leads there, by Newton's method from the near ones. */
+/* The inputs nearest to those of the goal, of `count` starts; what an axis counts is known. If none
+   leads there, by Newton's method from the near ones, for which there is one more start. */
 static inline int linkage_choose(const linkage_model *model, int side, const linkage_goal *goal,
     int count, linkage_start *start, linkage_real *q, linkage_point *p)
 {
-    linkage_real x[LINKAGE_MAX_INPUTS];
     linkage_real inside;
     int i, k;
     for (k = 0; k < count; k++) {
@@ -492,36 +515,29 @@ static inline int linkage_choose(const linkage_model *model, int side, const lin
             start[k].away = -1;
         }
     }
+    for (i = 0; i < model->inputs; i++) {
+        start[count].q[i] = linkage_wrapped(goal->near[i] - goal->whole[i], model->input[i].turn);
+    }
+    start[count].away = LINKAGE_FAR;
     for (;;) {
         linkage_start *nearest = 0;
-        for (k = 0; k < count; k++) {
+        linkage_real most;
+        for (k = 0; k <= count; k++) {
             if (start[k].away >= 0 && (!nearest || start[k].away < nearest->away)) {
                 nearest = &start[k];
             }
         }
         if (!nearest) {
-            break;
+            return 0;
         }
+        most = nearest == &start[count] ? LINKAGE_FAR : LINKAGE_OTHER;
         nearest->away = -1;
-        if (linkage_reach(model, side, goal, LINKAGE_OTHER, nearest->q, p)
+        if (linkage_reach(model, side, goal, most, nearest->q, p)
             && linkage_bring(model, side, goal, nearest->q, q) >= 0) {
             linkage_count_turns(model, nearest->q, q, p);
             return 1;
         }
     }
-    for (i = 0; i < model->inputs; i++) {
-        const linkage_real turn = model->input[i].turn;
-        x[i] = goal->near[i] - goal->whole[i];
-        if (turn > 0) {
-            x[i] -= turn * linkage_floor(x[i] / turn + LINKAGE_HALF);
-        }
-    }
-    if (linkage_reach(model, side, goal, LINKAGE_FAR, x, p)
-        && linkage_bring(model, side, goal, x, q) >= 0) {
-        linkage_count_turns(model, x, q, p);
-        return 1;
-    }
-    return 0;
 }
 
 /* Search a position in a piece of the reach, by Newton's method between brackets. */
@@ -529,7 +545,6 @@ static inline int linkage_search_piece(const linkage_model *model, int side,
     const linkage_piece *piece, linkage_real position, linkage_real near, linkage_real *x,
     linkage_point *p)
 {
-    const linkage_real turn = model->turn[side][0];
     const linkage_real range = piece->position[1] - piece->position[0];
     const linkage_real middle = (piece->q[0] + piece->q[1]) / 2;
     const linkage_real scale = model->axis[side][0].scale;
@@ -545,9 +560,7 @@ static inline int linkage_search_piece(const linkage_model *model, int side,
         return 0;
     }
     next = low + (high - low) * (LINKAGE_HALF + gap / range);
-    if (turn > 0) {
-        near -= turn * linkage_floor((near - middle) / turn + LINKAGE_HALF);
-    }
+    near = middle + linkage_wrapped(near - middle, model->turn[side][0]);
     if (inside <= LINKAGE_CLOSE) {
         next = next > middle ? high : low;
     } else if (near > low && near < high) {
@@ -557,7 +570,7 @@ static inline int linkage_search_piece(const linkage_model *model, int side,
         const linkage_real before = left;
         int is_at = 0;
         *x = next;
-        if (!model->at(x, p)) {
+        if (!model->at(x, 1, p)) {
             /* Beyond an end by rounding. */
             if (*x < middle) {
                 low = *x;
@@ -637,7 +650,7 @@ static inline int linkage_begin(const linkage_model *model, linkage_memory *m)
     }
     for (i = 0; i < LINKAGE_SAMPLES; i++) {
         linkage_sample(model, i, m->q[LINKAGE_JOINTS]);
-        if (model->at(m->q[LINKAGE_JOINTS], &m->point[LINKAGE_JOINTS])) {
+        if (model->at(m->q[LINKAGE_JOINTS], 1, &m->point[LINKAGE_JOINTS])) {
             return 1;
         }
     }

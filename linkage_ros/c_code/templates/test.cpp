@@ -39,7 +39,7 @@ int main()
     linkage_real q[Code::size], x[Code::size], gap[Code::size];
     linkage_point p;
     linkage_sample(&Code::model, state, q);
-    if (!Code::model.at(q, &p) ||
+    if (!Code::model.at(q, 1, &p) ||
       !linkage_input_change(&Code::model, LINKAGE_JOINTS, &p, 1e-3, p.load, x))
     {
       continue;
