@@ -56,8 +56,8 @@ USES = {
                            'out = to.effort[0];'}
 MAIN = """
 static const float given[][{n}] = {{ {given_rows} }}, found[][{n}] = {{ {found_rows} }};
-static linkage_memory memory;
-static linkage_side side, to;
+static lkr_memory memory;
+static lkr_side side, to;
 volatile float out;
 volatile int from;
 int main(void)
@@ -86,8 +86,8 @@ static unsigned long now(void)
 static void put(char c) {{ while (!(UCSR0A & (1 << UDRE0))) ; UDR0 = c; }}
 static void say(unsigned long n) {{ if (n > 9) say(n / 10); put('0' + n % 10); }}
 static const float given[][{n}] = {{ {given_rows} }}, found[][{n}] = {{ {found_rows} }};
-static linkage_memory memory;
-static linkage_side side, to;
+static lkr_memory memory;
+static lkr_side side, to;
 volatile float out;
 volatile int from;
 int main(void)
@@ -138,13 +138,13 @@ TIMES = NOW + """
 int main(void)
 {{
     static {name}_memory m;
-    linkage_side last = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, b;
+    lkr_side last = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, b;
     {name}_begin(&m);
     for (long k = 1; k <= {count}; k++) {{
         double q[{n}], best[2] = {{ 1e30, 1e30 }};
-        linkage_point p;
-        linkage_side a = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, j = a;
-        linkage_sample(&{name}_model, k, q);
+        lkr_point p;
+        lkr_side a = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, j = a;
+        lkr_sample(&{name}_model, k, q);
         if (!{name}_at(q, 1, &p)) continue;
         for (int i = 0; i < {n}; i++) {{
             a.position[i] = p.position[0][i];

@@ -53,10 +53,10 @@ static void {name}_asked(long poses, long *counts)
     START({name});
     for (i = 1; i <= poses; i++) {{
         {number} q[{n}], beside[{n}], gap[{n}], least;
-        linkage_point p, goal;
-        linkage_side measured = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }};
-        linkage_side asked = measured, found = measured;
-        linkage_sample(&{name}_model, i, q);
+        lkr_point p, goal;
+        lkr_side measured = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }};
+        lkr_side asked = measured, found = measured;
+        lkr_sample(&{name}_model, i, q);
         if (!{name}_at(q, 1, &p))
             continue;
         for (k = 0; k < {n}; k++)
@@ -76,9 +76,9 @@ static void {name}_asked(long poses, long *counts)
                 counts[3 * side + 1]++;
                 continue;
             }}
-            least = linkage_gap(&{name}_model, 0, found.position, &goal, gap);
-            if (least > slack && linkage_gap(&{name}_model, 0, found.position, &p, gap)
-                > slack + 2 * linkage_gap(&{name}_model, 0, goal.position[0], &p, beside))
+            least = lkr_gap(&{name}_model, 0, found.position, &goal, gap);
+            if (least > slack && lkr_gap(&{name}_model, 0, found.position, &p, gap)
+                > slack + 2 * lkr_gap(&{name}_model, 0, goal.position[0], &p, beside))
                 counts[3 * side + 2]++;
         }}
     }}
@@ -133,7 +133,7 @@ template <class Class, class Side> struct Robot
     return transmission.status();
   }
 };
-#define START(name) static Robot<name##_class, linkage_side> robot
+#define START(name) static Robot<name##_class, lkr_side> robot
 #define SEND(side, name, from, to) robot.send(side, from, to)
 """
 

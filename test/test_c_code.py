@@ -434,7 +434,7 @@ def test_an_ankle_in_single_precision_is_that_of_python(tmp_path):
 int pose(float right, float left, float *angle)
 {
     ankle_pose p;
-    linkage_side motors = { { right, left }, { 0 }, { 0 } }, joints, back;
+    lkr_side motors = { { right, left }, { 0 }, { 0 } }, joints, back;
     ankle_memory m;
     int is_whole = ankle_solve(right, left, &p) && ankle_begin(&m);
     angle[0] = p.angle_pitch;
@@ -494,7 +494,7 @@ double worst(void)
     int i;
     slotted_lever_pose p;
     slotted_lever_memory m;
-    linkage_side desired = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, found = desired;
+    lkr_side desired = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, found = desired;
     int is_well = slotted_lever_begin(&m);
     for (i = 0; i < 1000; i++) {{
         const {number} crank = ({number})(0.3 + i * {step});
@@ -517,7 +517,7 @@ def test_what_is_hardly_beyond_an_extreme_is_out_of_reach(machines, tmp_path, nu
 int sent(double before, double value)
 {{
     slotted_lever_memory m;
-    linkage_side desired = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, found = desired;
+    lkr_side desired = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, found = desired;
     desired.position[0] = ({number})before;
     if (!slotted_lever_begin(&m) || slotted_lever_joints_to_actuators(&m, &desired, &found) & 1)
         return -1;
@@ -552,11 +552,12 @@ def test_a_scene_file_is_printed_as_c(capsys, monkeypatch):
 @pytest.mark.parametrize('language', ['c', 'c++'])
 def test_any_names_of_a_scene_are_names_in_c(tmp_path, language):
     inputs = ['q', 'p', 'near', 'value', 'x0', 'new', 'for', 'sin', 'double', 'NAN', 'linux']
-    given = {'mechanisms': ['Arm', 'arm', 'ARM', 'rail', *(f'm{i}' for i in range(len(inputs)))],
-             'rail.type': 'custom', 'rail.joints': [
-                 'O ground 0 0', 'R ground 1 0', 'slide carriage O along R 0 2 called x',
-                 'Q ground 0 1', 'B dyad slide Q 0.9 0.6 left']}
-    for name in ('Arm', 'arm', 'ARM'):
+    given = {'mechanisms': [
+        'Arm', 'arm', 'ARM', 'linkage', 'rail', *(f'm{i}' for i in range(len(inputs)))],
+        'rail.type': 'custom', 'rail.joints': [
+            'O ground 0 0', 'R ground 1 0', 'slide carriage O along R 0 2 called x',
+            'Q ground 0 1', 'B dyad slide Q 0.9 0.6 left']}
+    for name in ('Arm', 'arm', 'ARM', 'linkage'):
         given.update({f'{name}.type': 'custom', f'{name}.joints': [
             'O ground 0 0', 'Q ground 1 0', 'Arm crank O 0.3', 'Tip dyad Arm Q 1 0.6 left']})
     for i, name in enumerate(inputs):
@@ -572,6 +573,12 @@ def test_any_names_of_a_scene_are_names_in_c(tmp_path, language):
                             '-Werror', '-Wno-unused-function', file],
                            capture_output=True, text=True)
     assert not ended.returncode, ended.stderr[:2000]
+
+
+def test_names_that_all_linkages_share_are_refused():
+    machine = scene.read({'mechanisms': ['lkr'], 'lkr.type': 'four_bar'}).machines['lkr']
+    with pytest.raises(ValueError, match='names that begin with lkr are those that'):
+        header.written(machine)
 
 
 LOADED = [['B=0 -9.81'], ['B=3 0', 'A=0 1', 'QB=0'], ['C=1 2', 'AB=-0.0', 'B=0 0']]

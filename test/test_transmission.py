@@ -79,7 +79,7 @@ int {name}_started(void) {{ return {name}_begin(&{name}_m); }}
 int {name}_sent(int side, const double *from, double *to)
 {{
     enum {{ N = {n} }};
-    linkage_side given, found;
+    lkr_side given, found;
     int i, status;
     for (i = 0; i < N; i++) {{
         given.position[i] = from[i];
@@ -105,18 +105,18 @@ WALK = """
 static long {name}_walked(long states)
 {
     static {name}_memory m;
-    linkage_side from = { { 0 }, { 0 }, { 0 } }, to = from;
-    linkage_point p;
-    double q[LINKAGE_MAX_INPUTS] = { 0 };
+    lkr_side from = { { 0 }, { 0 }, { 0 } }, to = from;
+    lkr_point p;
+    double q[LKR_MAX_INPUTS] = { 0 };
     long i, good = 0;
     (void){name}_begin(&m);
     for (i = 1; i <= states; i++) {
-        linkage_sample(&{name}_model, i, q);
+        lkr_sample(&{name}_model, i, q);
         if (!{name}_at(q, 1, &p))
             continue;
-        memcpy(from.position, p.position[LINKAGE_ACTUATORS], sizeof from.position);
-        good += {name}_actuators_to_joints(&m, &from, &to) == LINKAGE_OK
-            && {name}_joints_to_actuators(&m, &to, &from) == LINKAGE_OK;
+        memcpy(from.position, p.position[LKR_ACTUATORS], sizeof from.position);
+        good += {name}_actuators_to_joints(&m, &from, &to) == LKR_OK
+            && {name}_joints_to_actuators(&m, &to, &from) == LKR_OK;
     }
     return good;
 }
@@ -731,7 +731,7 @@ def test_a_package_names_what_the_scene_names(files, machines):
         assert f'robot_1_plugins::{name.title()}Code;' in proof
         own = files[f'src/{name}_linkage.h']
         assert '#include "linkage.h"\n' in own and 'linkage_ros: what' not in own
-        assert '#define LINKAGE_MAX_INPUTS 2\n' in own
+        assert '#define LKR_MAX_INPUTS 2\n' in own
     assert files['src/linkage.h'] == template('linkage.h')
 
 

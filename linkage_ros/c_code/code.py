@@ -59,10 +59,10 @@ class Code:
         self.linkage = linkage
         self.number, self.suffix = ('float', 'f') if single else ('double', '')
         self.literal = _literal(single)
-        templates = {operation: row.c.replace('{f}', self.suffix).replace('{name}', 'linkage')
+        templates = {operation: row.c.replace('{f}', self.suffix).replace('{name}', 'lkr')
                      for operation, row in OPERATIONS.items()}
         self._dialect = Dialect(
-            {**templates, 'atan2': 'linkage_angle({}, {})'}, {},
+            {**templates, 'atan2': 'lkr_angle({}, {})'}, {},
             lambda value: self.literal(IN_SINGLE.get(value, value) if single else value))
 
     def row(self, row: Iterable[float]) -> str:
@@ -183,7 +183,7 @@ def _literal(single: bool) -> Callable[[float], str]:
     """Return the function that writes a number in C."""
     def literal(value: float) -> str:
         if math.isnan(value):
-            return 'LINKAGE_NAN'
+            return 'LKR_NAN'
         if single:
             value = float(np.float32(value)) if abs(value) <= 3.4e38 else math.copysign(
                 math.inf, value)

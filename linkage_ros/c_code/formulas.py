@@ -101,7 +101,7 @@ class Formulas:
         return code.function(
             f'/* The pose, and its rates by {" and by ".join(self.inputs)}. Returns 0 if a limit '
             'is exceeded. */\n'
-            f'LINKAGE_FORMULA int {self.name}_formulas({self._parameters()}, {self.name}_pose *p, '
+            f'LKR_FORMULA int {self.name}_formulas({self._parameters()}, {self.name}_pose *p, '
             + ', '.join(f'{self.name}_pose *{by}' for by in self.by) + ')',
             self._linkage.bind(Program(outputs, len(inputs))),
             [code.times(given, 1.0 / self.unit(name))

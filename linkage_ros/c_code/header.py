@@ -89,6 +89,9 @@ class _Header:
     def __init__(self, request: Request, single: bool):
         self.machine, self.name = request.machine, request.machine.name
         self.linkage = linkage = request.machine.linkage
+        if self.name == 'lkr' or self.name.startswith('lkr_'):
+            raise ValueError(f'{self.name} cannot be the name of a mechanism in C: names that begin '
+                             'with lkr are those that all linkages share')
         outputs, n = [plain_text(output) for output in request.outputs], len(linkage.inputs)
         for output in outputs:
             linkage.check_output(output)
@@ -175,7 +178,7 @@ class _Header:
             f'   leaves {what} alone, where there is none. */',
             f'static inline int {self.name}_{what}_for{tag}({head})', '{',
             *indented([
-                f'{number} q[{n}];', 'linkage_point p;',
+                f'{number} q[{n}];', 'lkr_point p;',
                 *(f'q[{i}] = {code.times(each, 1.0 / units[i])};' for i, each in enumerate(near)),
                 f'if (!{self.name}_from{tag}({given}, q, &p)) {{', '    return 0;', '}',
                 *(f'{each} = {code.times(f"q[{i}]", units[i])};' for i, each in enumerate(made)),

@@ -104,7 +104,7 @@ class Model:
             '/* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be '
             'assembled. */',
             f'static inline int {name}_at{self._tag}(const {code.number} *q, int is_rated, '
-            'linkage_point *p)',
+            'lkr_point *p)',
             '{',
             *indented(lines), '}', ''])
 
@@ -116,7 +116,7 @@ class Model:
             f' + {code.literal(each.offset)};' if each.offset else ';')
         if each.wraps:
             turn = code.literal(math.tau)
-            yield f'{place} -= {turn} * linkage_floor({place} / {turn} + LINKAGE_HALF);'
+            yield f'{place} -= {turn} * lkr_floor({place} / {turn} + LKR_HALF);'
 
     def _rates(self, place: str, each: Axis, units: Sequence[float]) -> Iterator[str]:
         """Yield the statements for the rates of an axis by each input."""
@@ -137,7 +137,7 @@ class Model:
             '/* The joints that are not commanded, at inputs: positions, and rates by each. */',
             f'static inline void {self.machine.name}_passive(const {self._code.number} *q, '
             f'{self._code.number} *position,',
-            f'    {self._code.number} (*rate)[LINKAGE_MAX_INPUTS])', '{', *indented(lines), '}',
+            f'    {self._code.number} (*rate)[LKR_MAX_INPUTS])', '{', *indented(lines), '}',
             ''])
 
     def _call(self) -> Tuple[str, List[float]]:
@@ -168,8 +168,8 @@ class Model:
             arcs = (f'static const {number} {self._name}_arc[{len(self._arcs)}][2] = '
                     f'{{ {rows} }};\n')
         about = 'Tables of the inverse' if self._tag else 'Tables of the actuators and joints'
-        return (f'/* {about}, see linkage_model. */\n{arcs}'
-                f'static const linkage_model {self._name} = {{\n'
+        return (f'/* {about}, see lkr_model. */\n{arcs}'
+                f'static const lkr_model {self._name} = {{\n'
                 f'    {len(self._sizes)}, {int(not self._tag)}, '
                 f'{self.machine.name}_at{self._tag},\n'
                 f'    {{ {{ {sides[0]} }},\n      {{ {sides[1]} }} }},\n'
@@ -194,7 +194,7 @@ class Model:
             low, high = (end / unit for end in drive.ends or max(
                 drive.reach, key=lambda arc: arc[1] - arc[0]))
             ends = [self._code.literal(end / unit) for end in drive.ends
-                    ] if drive.ends and not self._tag else ['-LINKAGE_FAR', 'LINKAGE_FAR']
+                    ] if drive.ends and not self._tag else ['-LKR_FAR', 'LKR_FAR']
             yield (input_.turn if input_.wraps else 0.0, starts[i] / input_.size, low, high - low,
                    math.sqrt((i + 1) ** 2 + 1.0) % 1.0, ends)
 
@@ -230,12 +230,12 @@ class Model:
         return modes + '\n'.join([
             f'/* From positions to the inputs nearest to q. {how}, {poses} poses at most. */',
             f'static inline int {name}_from{tag}(const {number} *position, {number} *q, '
-            'linkage_point *p)', '{', '    linkage_goal goal;',
-            f'    linkage_start start[{count + 1}];',
-            f'    if (!linkage_aim(&{self._name}, {side}, position, q, &goal)) {{',
+            'lkr_point *p)', '{', '    lkr_goal goal;',
+            f'    lkr_start start[{count + 1}];',
+            f'    if (!lkr_aim(&{self._name}, {side}, position, q, &goal)) {{',
             '        return 0;', '    }',
             *([f'    {name}_modes{tag}(goal.to, start);'] if modes else []),
-            f'    return linkage_choose(&{self._name}, {side}, &goal, {count}, start, q, p);',
+            f'    return lkr_choose(&{self._name}, {side}, &goal, {count}, start, q, p);',
             '}', ''])
 
     def _search(self, side: int, tag: str, axes: Sequence[Axis]) -> str:
@@ -251,9 +251,9 @@ class Model:
             '/* From a position to the input nearest to q. By a search, '
             f'{poses} poses at most. */',
             f'static inline int {self.machine.name}_from{tag}(const {number} *position, '
-            f'{number} *q, linkage_point *p)', '{',
-            f'    static const linkage_piece piece[{len(rows)}] = {{\n{table}\n    }};',
-            f'    return linkage_search(&{self._name}, {side}, {len(rows)}, piece, position, q, '
+            f'{number} *q, lkr_point *p)', '{',
+            f'    static const lkr_piece piece[{len(rows)}] = {{\n{table}\n    }};',
+            f'    return lkr_search(&{self._name}, {side}, {len(rows)}, piece, position, q, '
             'p);', '}', ''])
 
     def _modes(self, tag: str, closed: InverseLinkage, modes: Sequence[Mode],
@@ -282,7 +282,7 @@ class Model:
             f'/* The inputs in each assembly mode of the inverse linkage, NAN where there is '
             f'none:\n{lines}*/\n'
             f'static inline void {self.machine.name}_modes{tag}(const {code.number} *position, '
-            'linkage_start *start)', self.linkage.bind(Program(
+            'lkr_start *start)', self.linkage.bind(Program(
                 [value for mode in modes for value in mode.inputs], len(values),
                 closed.arguments)), values, [block(*each) for each in enumerate(modes)]
             ) + '\n', len(modes) * len(turns)

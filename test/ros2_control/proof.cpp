@@ -26,7 +26,7 @@ namespace
 {
 using Code = NAMESPACE::JOINED(CLASS, Code);
 constexpr int n = static_cast<int>(Code::size);
-constexpr const linkage_model & model = Code::model;
+constexpr const lkr_model & model = Code::model;
 constexpr double nan_ = std::numeric_limits<double>::quiet_NaN();
 constexpr double unwritten = 0.123456789;
 constexpr double inf = std::numeric_limits<double>::infinity();
@@ -83,7 +83,7 @@ struct Robot
 /// What of a pose is needed: where both sides are, and how well each tells the inputs.
 struct Pose
 {
-  linkage_point point;
+  lkr_point point;
   bool placed, good;
 };
 
@@ -94,7 +94,7 @@ Pose pose(const double (&q)[n])
   made.placed = model.at(q, 1, &made.point) != 0;
   made.good = made.placed;
   for (int side = 0; side < 2; ++side) {
-    made.good = made.good && linkage_input_change(&model, side, &made.point, 1e-2, zero, x) != 0;
+    made.good = made.good && lkr_input_change(&model, side, &made.point, 1e-2, zero, x) != 0;
   }
   return made;
 }
@@ -102,12 +102,12 @@ Pose pose(const double (&q)[n])
 double apart(int side, int i, double one, double other)
 {
   double gap[n], to[n];
-  linkage_point p{};
+  lkr_point p{};
   for (int k = 0; k < n; ++k) {
     to[k] = p.position[side][k] = other;
   }
   to[i] = one;
-  (void)linkage_gap(&model, side, to, &p, gap);
+  (void)lkr_gap(&model, side, to, &p, gap);
   return std::fabs(gap[i]) / model.axis[side][i].scale;
 }
 
@@ -238,7 +238,7 @@ int main(int argc, char ** argv)
   may_allocate = false;
   long tried = 0;
   for (long i = 1; i <= states; ++i) {
-    linkage_sample(&model, i, q);
+    lkr_sample(&model, i, q);
     tried += there_and_back(robot, q, i);
   }
   check(2 * tried > states, "most states are singular", tried);

@@ -36,11 +36,11 @@ int main()
 
   int tried = 0;
   for (long state = 1; state <= 2000; ++state) {
-    linkage_real q[Code::size], x[Code::size], gap[Code::size];
-    linkage_point p;
-    linkage_sample(&Code::model, state, q);
+    lkr_real q[Code::size], x[Code::size], gap[Code::size];
+    lkr_point p;
+    lkr_sample(&Code::model, state, q);
     if (!Code::model.at(q, 1, &p) ||
-      !linkage_input_change(&Code::model, LINKAGE_JOINTS, &p, 1e-3, p.load, x))
+      !lkr_input_change(&Code::model, LKR_JOINTS, &p, 1e-3, p.load, x))
     {
       continue;
     }
@@ -49,7 +49,7 @@ int main()
     }
     transmission.actuator_to_joint();
     transmission.joint_to_actuator();
-    if (transmission.status() || !(linkage_gap(&Code::model, LINKAGE_ACTUATORS, actuator, &p, gap) <= 1e-9)) {
+    if (transmission.status() || !(lkr_gap(&Code::model, LKR_ACTUATORS, actuator, &p, gap) <= 1e-9)) {
       std::printf("state %ld does not come back\n", state);
       return 1;
     }

@@ -38,7 +38,7 @@ namespace @namespace@
 struct Axis { const char * name, * role; };
 
 /// Positions of joints that are not commanded, and their rates by each input, at inputs.
-using Passive = void(const double * q, double * position, double (*rate)[LINKAGE_MAX_INPUTS]);
+using Passive = void(const double * q, double * position, double (*rate)[LKR_MAX_INPUTS]);
 
 /// Logs why values are held, from a thread of its own: a control loop only sets bits.
 class HeldLog
@@ -191,9 +191,9 @@ public:
   bool have(std::size_t kind) const { return handles_[kind][0].has_value(); }
 
   /// Read values as the scene has them; those without a handle are 0.
-  linkage_side read() const
+  lkr_side read() const
   {
-    linkage_side values{};
+    lkr_side values{};
     for (std::size_t i = 0; i < size; ++i) {
       values.position[i] = (value(0, i) - offset_[i]) / factor_[i];
       values.velocity[i] = value(1, i) / factor_[i];
@@ -203,7 +203,7 @@ public:
   }
 
   /// Write what is finite.
-  void write(const linkage_side & values)
+  void write(const lkr_side & values)
   {
     for (std::size_t i = 0; i < size; ++i) {
       set(0, i, values.position[i] * factor_[i] + offset_[i]);
@@ -290,16 +290,16 @@ public:
   }
 
   /// Write states at the inputs of the newest measurement; they stand still if that is held.
-  void write(const linkage_memory & memory, const linkage_side & actuators, bool is_moving)
+  void write(const lkr_memory & memory, const lkr_side & actuators, bool is_moving)
   {
     if constexpr (size > 0) {
-      double position[size], rate[size][LINKAGE_MAX_INPUTS], x[LINKAGE_MAX_INPUTS];
-      if (count_ == 0 || !memory.is_known || memory.newer != LINKAGE_ACTUATORS) {
+      double position[size], rate[size][LKR_MAX_INPUTS], x[LKR_MAX_INPUTS];
+      if (count_ == 0 || !memory.is_known || memory.newer != LKR_ACTUATORS) {
         return;
       }
-      Code::at_passive(memory.q[LINKAGE_ACTUATORS], position, rate);
-      is_moving = is_moving && linkage_input_change(
-        &Code::model, LINKAGE_ACTUATORS, &memory.point[LINKAGE_ACTUATORS], LINKAGE_SINGULAR,
+      Code::at_passive(memory.q[LKR_ACTUATORS], position, rate);
+      is_moving = is_moving && lkr_input_change(
+        &Code::model, LKR_ACTUATORS, &memory.point[LKR_ACTUATORS], LKR_SINGULAR,
         actuators.velocity, x) != 0;
       for (std::size_t i = 0; i < size; ++i) {
         double velocity = 0.0;
@@ -364,7 +364,7 @@ public:
           (kind ? ", or none of them" : ": velocities and efforts depend on the pose"));
       }
     }
-    if (!linkage_begin(&Code::model, &memory_)) {
+    if (!lkr_begin(&Code::model, &memory_)) {
       refuse("it cannot be assembled");
     }
     log_.start(info_.name);
@@ -374,7 +374,7 @@ public:
   {
     auto found = unwritten();
     const auto given = actuators_.read();
-    status_ = linkage_to_joints(&Code::model, Code::from_actuators, &memory_, &given, &found);
+    status_ = lkr_to_joints(&Code::model, Code::from_actuators, &memory_, &given, &found);
     note(false);
     joints_.write(found);
     passive_.write(memory_, given, !(status_ & OUT_OF_REACH));
@@ -384,7 +384,7 @@ public:
   {
     auto found = unwritten();
     const auto given = joints_.read();
-    status_ = linkage_to_actuators(&Code::model, Code::from_joints, &memory_, &given, &found);
+    status_ = lkr_to_actuators(&Code::model, Code::from_joints, &memory_, &given, &found);
     note(true);
     actuators_.write(found);
   }
@@ -402,12 +402,12 @@ private:
   }
 
   /// Values that are not written unless they are set.
-  static linkage_side unwritten()
+  static lkr_side unwritten()
   {
-    linkage_side made;
-    std::fill_n(made.position, LINKAGE_MAX_INPUTS, LINKAGE_NAN);
-    std::fill_n(made.velocity, LINKAGE_MAX_INPUTS, LINKAGE_NAN);
-    std::fill_n(made.effort, LINKAGE_MAX_INPUTS, LINKAGE_NAN);
+    lkr_side made;
+    std::fill_n(made.position, LKR_MAX_INPUTS, LKR_NAN);
+    std::fill_n(made.velocity, LKR_MAX_INPUTS, LKR_NAN);
+    std::fill_n(made.effort, LKR_MAX_INPUTS, LKR_NAN);
     return made;
   }
 
@@ -420,7 +420,7 @@ private:
   }
 
   hardware_interface::TransmissionInfo info_;
-  linkage_memory memory_{};
+  lkr_memory memory_{};
   Handles<transmission_interface::ActuatorHandle, Code::size> actuators_;
   Handles<transmission_interface::JointHandle, Code::size> joints_;
   PassiveJoints<Code> passive_;
