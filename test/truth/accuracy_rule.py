@@ -393,6 +393,8 @@ def servo_rows(case, lever, angle, truth_at, top) -> List[Row]:
             near = float(mp.arg(exact.values['angle servo']))
             found = lever.servo_for('lever', float(angle), near)
             due = wanted if wanted == 'number' else _due_beyond(lever, angle, truth_at, found[0])
+            if abs(exact.values['rate servo']) * np.spacing(math.pi) > FARTHEST:
+                due = 'any'  # a jump: no crank's angle that is a float has the value
             exact.sensitivity['rate servo'], is_end = _rate_moved(
                 lever, *found, exact.sensitivity['rate servo'])
             if is_end:
