@@ -101,8 +101,9 @@ def checked(linkage, inverse, poses, sure=1e-4):
             continue
         answers = inverse.all(values)
         count += 1
+        # Of a period of very many turns, the inverse has that of the outputs.
         assert min((max(input_.apart(x, y) / input_.size for input_, x, y in zip(
-            linkage.inputs, answer.inputs, pose)) for answer in answers), default=9.0) < 1e-9, (
+            inverse.inputs, answer.inputs, pose)) for answer in answers), default=9.0) < 1e-9, (
             linkage, inverse.outputs, pose, answers)
         for answer in answers:
             reached = linkage.checked(inverse.outputs).at(*answer.inputs)

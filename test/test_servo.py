@@ -10,6 +10,7 @@
 
 """A lever's servo angle and reduction: one closed form, right to the last digits everywhere."""
 
+from functools import partial
 import math
 
 from linkage_ros import mechanisms
@@ -79,20 +80,11 @@ def truth_of(kind, linkage, angle, cut):
 
 def rows_of(kind, linkage, angles):
     """Return how right the servo angles and reductions are, each asked for as the nearest."""
-    rows, length = [], linkage.dimensions
+    length = linkage.dimensions
     case = Case('slotted_lever', length, angles, linkage.branches, kind)
     top = {'rate servo': length['a'] / length.get('b', length['a'])}
-    for angle in angles:
-        cuts = [truth_of(kind, linkage, angle, cut) for cut in (1, -1)]
-        due = [accuracy_rule.due_of(exact.closures.values()) for exact in cuts]
-        wanted = 'number' if 'number' in due else 'nan' if due == ['nan', 'nan'] else ''
-        for exact, state in zip(cuts, due):
-            if state == wanted:
-                near = float(mp.arg(exact.values['angle servo']))
-                found = linkage.servo_for('lever', float(angle), near)
-                rows += [accuracy_rule.row_of(case, angle, name, result, exact, wanted, top)
-                         for name, result in zip(('angle servo', 'rate servo'), found)]
-    return rows
+    return [row for angle in angles for row in accuracy_rule.servo_rows(
+        case, linkage, angle, partial(truth_of, kind, linkage), top)]
 
 
 @pytest.mark.sample(2)

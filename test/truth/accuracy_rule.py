@@ -25,6 +25,7 @@ Angles beyond a turn are charged half an ulp of pi only, as if they were exact: 
 reduce them without loss.
 """
 
+from functools import partial
 import math
 from typing import Dict, List, NamedTuple, Optional
 
@@ -41,6 +42,11 @@ SPEED_RULE = 60.0
 # Of a difference quotient in 80 digits.
 STEP = mp.mpf(10) ** -30
 UNIT = 2.0 ** -53
+# How far beyond an end's value the end is the answer [rad]; or as far as so many ulps of the input
+# move the output there, and no farther than the last.
+BEYOND, ULPS, FARTHEST = 1e-9, 64, 1e-6
+# How far inside it is the answer, too.
+ENDS = 1e-13
 
 _STEP = mp.mpf(10) ** -30
 
@@ -369,21 +375,84 @@ def measure_servo(lever, angles, label='') -> List[Row]:
 
     Each crank angle on the lever's half of the slot is asked for as the one nearest to the truth.
     """
-    rows = []
     half = lever.branches['L']
     case = Case(lever.type, lever.dimensions, angles, lever.branches, label)
-    for angle in angles:
-        cuts = [servo_truth(lever.dimensions, half, angle, cut) for cut in (1, -1)]
-        due = [due_of(exact.closures.values()) for exact in cuts]
-        wanted = 'number' if 'number' in due else 'nan' if due == ['nan', 'nan'] else ''
-        for exact, state in zip(cuts, due):
-            if state == wanted:
-                near = float(mp.arg(exact.values['angle servo']))
-                found, slope = lever.servo(float(angle), near=near)
-                top = {'rate servo': lever.dimensions['a'] / lever.dimensions['b']}
-                rows += [row_of(case, angle, 'angle servo', found, exact, wanted, {}),
-                         row_of(case, angle, 'rate servo', slope, exact, wanted, top)]
+    top = {'rate servo': lever.dimensions['a'] / lever.dimensions['b']}
+    return [row for angle in angles for row in servo_rows(
+        case, lever, angle, partial(servo_truth, lever.dimensions, half), top)]
+
+
+def servo_rows(case, lever, angle, truth_at, top) -> List[Row]:
+    """Return the rows of one lever angle; `truth_at` takes it and the cut."""
+    cuts = [truth_at(angle, cut) for cut in (1, -1)]
+    states = [due_of(exact.closures.values()) for exact in cuts]
+    wanted = 'number' if 'number' in states else 'nan' if states == ['nan', 'nan'] else ''
+    rows = []
+    for exact, state in zip(cuts, states):
+        if state == wanted:
+            near = float(mp.arg(exact.values['angle servo']))
+            found = lever.servo_for('lever', float(angle), near)
+            due = wanted if wanted == 'number' else _due_beyond(lever, angle, truth_at, found[0])
+            if abs(exact.values['rate servo']) * np.spacing(math.pi) > FARTHEST:
+                due = 'any'  # a jump: no crank's angle that is a float has the value
+            exact.sensitivity['rate servo'], is_end = _rate_moved(
+                lever, *found, exact.sensitivity['rate servo'])
+            if is_end:
+                # The answer next to an end of the crank is two ulps of pi inside.
+                exact.sensitivity['angle servo'] += 0.5 * np.spacing(math.pi)
+            judged = [row_of(case, angle, name, result, exact, due if name == 'angle servo'
+                             or not is_end else 'any', top)
+                      for name, result in zip(('angle servo', 'rate servo'), found)]
+            # Up to ENDS from the value of an end that end is the answer.
+            if not any(row.problem == 'rule' for row in judged) or not (
+                    _ends_beside(truth_at, angle) and _missed(lever, angle, found[0]) <= ENDS):
+                rows += judged
     return rows
+
+
+def _ends_beside(truth_at, angle):
+    """Return whether the reach ends up to twice ENDS from a lever angle."""
+    return any(['nan', 'nan'] == [due_of(truth_at(angle + step, cut).closures.values())
+                                  for cut in (1, -1)] for step in (-2.0 * ENDS, 2.0 * ENDS))
+
+
+def _missed(lever, angle, crank):
+    """Return how far the lever is from an angle [rad] at a crank's angle, with its rounding."""
+    reached = float(lever.joint_angles(crank)['lever'])
+    return abs(math.remainder(reached - angle, math.tau)) - 4.0 * np.spacing(abs(angle))
+
+
+def _rate_moved(lever, crank, rate, spread):
+    """
+    Return the sensitivity of a pose's rate, and whether an end of the crank is next to the pose.
+
+    The crank's angle is rounded, too. Where it is the end of the slot up to rounding, the rate is
+    infinite: the answer has that of a pose next to it.
+    """
+    around = crank + np.arange(-ULPS, ULPS + 1) * np.spacing(max(abs(crank), 1.0))
+    rates = lever.joint_rates(around)['lever']
+    known = rates[np.isfinite(rates)]
+    if len(known) < len(rates):
+        return spread, len(known) and known.min() <= rate <= known.max()
+    return spread + 0.5 * float(np.abs(np.diff(rates[ULPS - 1:ULPS + 2])).max()), False
+
+
+def _due_beyond(lever, angle, truth_at, found):
+    """
+    Return what is due at a lever angle beyond the reach, as `due_of` does.
+
+    Up to BEYOND from its end that end is the answer; or from as far as ULPS of the crank's angle
+    turn the lever there.
+    """
+    if math.isnan(found):
+        states = [due_of(truth_at(angle + step, cut).closures.values())
+                  for step in (-0.5 * BEYOND, 0.5 * BEYOND) for cut in (1, -1)]
+        return 'number' if 'number' in states else 'nan'
+    around = found + np.array([0, -ULPS, ULPS]) * np.spacing(max(abs(found), 1.0))
+    lever_angles = lever.joint_angles(around)['lever']
+    change = np.nanmax(np.abs(np.sin(lever_angles - lever_angles[0])))
+    missed = abs(math.remainder(lever_angles[0] - angle, math.tau))
+    return 'any' if missed <= 1.001 * max(BEYOND, min(change, FARTHEST)) else 'nan'
 
 
 def summary(rows, count=5):

@@ -38,7 +38,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import rods
-from .choice import choose, choose_arrays
+from .choice import choose, choose_arrays, choose_path
 from .expressions import chosen_of, modes_of, SINGLE
 from .follow import follow
 from .grid import blocks, Grid
@@ -424,22 +424,15 @@ class Inverse:
             As `nearest` does.
 
         """
-        problem, limits = self._problem, self._limits(ends)
+        limits = self._limits(ends)
         seed = None if near is None else self._finite(near, 'near')
         rows = [np.atleast_1d(row) for row in _broadcast(self._each(values))]
         if rows[0].ndim > 1:
             raise self._miscounted(values, 'values')
         if seed and (there := self._in_turns('path', rows, seed, limits)):
             return there
-        found, n = [], self._n
-        for each in self._all_arrays(rows).transpose(2, 0, 1).tolist():
-            solution = choose(problem, [(x[:n], x[n:]) for x in each if x[0] == x[0]], seed,
-                              limits)
-            found.append([*solution[0], *solution[1]])
-            if solution[0][0] == solution[0][0]:
-                seed = solution[0]
-        columns = np.array(found).reshape(-1, n + n * n).T
-        return tuple(columns[:n]), tuple(columns[n:])
+        found = choose_path(self._problem, self._all_arrays(rows), seed, limits)
+        return tuple(found[:self._n]), tuple(found[self._n:])
 
     def follow(self, values: ArrayLike, near: ArrayLike) -> Found:
         """
