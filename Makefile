@@ -1,4 +1,4 @@
-# Copyright 2026 linkage_ros contributors
+# SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
 # linkage_ros without an installed ROS: ROS 2 comes as wheels from the Python package index, in a

@@ -1,12 +1,5 @@
-# Copyright 2026 linkage_ros contributors
-#
-# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except
-# in compliance with the License. You may obtain a copy of the License at
-# http://www.apache.org/licenses/LICENSE-2.0
-# Unless required by applicable law or agreed to in writing, software distributed under the
-# License is distributed on an "AS IS" BASIS, WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either
-# express or implied. See the License for the specific language governing permissions and
-# limitations under the License.
+# SPDX-FileCopyrightText: 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
 
 """The package as colcon, pip and a reader of the changelog see it."""
 
@@ -71,19 +64,16 @@ def test_all_files_name_one_version(settings):
     assert f"\nversion: {version}\ndate-released: '{released[0][1]}'\n" in citation
 
 
-def test_every_source_begins_with_the_notice_that_ament_copyright_knows():
-    # As it reads files: comment marks and the way the lines are broken do not count.
+def test_every_source_begins_with_its_licence():
     folders = [path for path in ROOT.iterdir() if path.is_dir()
                and not path.name.startswith(('.', 'build', 'install', 'log'))]
     sources = [path for folder in (ROOT / '.ci', *folders) for path in folder.rglob('*')
-               if path.suffix in ('.py', '.c', '.cpp', '.hpp', '.h', '.cmake')] + [
-                   ROOT / 'setup.py']
-    heads = {path: ' '.join(re.findall(r'[^\s#/*]\S*', path.read_text()[:1000]))
+               if path.suffix in ('.py', '.c', '.cpp', '.hpp', '.h', '.cmake', '.js')
+               and path.parent.name != 'vendor'] + [ROOT / 'setup.py']
+    tags = 'FileCopyrightText: 2026 linkage_ros contributors', 'License-Identifier: Apache-2.0'
+    notice = ' '.join(f'SPDX-{tag}' for tag in tags)
+    heads = {path: ' '.join(re.findall(r'[^\s#/*]\S*', path.read_text()[:200]))
              for path in sources if not (path.parent / 'AMENT_IGNORE').exists()}
-    notice, = {head[:head.index(' limitations under the License.')] for head in heads.values()
-               if 'limitations under the License.' in head}
-    assert notice.startswith('Copyright 2026 linkage_ros contributors Licensed under the Apache')
-    assert notice.endswith('the specific language governing permissions and')
     assert len(heads) > 300 and not [
         path for path, head in heads.items() if not head.startswith(notice)]
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Copyright 2026 linkage_ros contributors
+# SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
 # Makes a virtual environment of lock files, or says in one sentence what is missing. What is not in

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Copyright 2026 linkage_ros contributors
+# SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
 # Writes wheels/lock/*.txt: what the requirement files ask for and all that this brings along, each

@@ -1,4 +1,4 @@
-// Copyright 2026 linkage_ros contributors
+// SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
 // Swings a slotted lever sinusoidally: a hobby servo turns the pin that moves it.

@@ -1,4 +1,4 @@
-// Copyright 2026 linkage_ros contributors
+// SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
 // A slider with a number, and a choice; a refused value springs back, with the reason.

@@ -1,4 +1,4 @@
-// Copyright 2026 linkage_ros contributors
+// SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
 // The page: passes the viewer's messages to picture and panel, and requests to the viewer.

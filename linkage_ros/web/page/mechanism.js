@@ -1,4 +1,4 @@
-// Copyright 2026 linkage_ros contributors
+// SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
 // A mechanism on the page: its description, its markers by topic, and its changes.

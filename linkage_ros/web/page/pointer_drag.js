@@ -1,4 +1,4 @@
-// Copyright 2026 linkage_ros contributors
+// SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
 // The pointer over the picture: drags joints, and finds the bar below it.
