@@ -164,7 +164,7 @@ class Solver:
     def _placed(self, values):
         """Return where the spots are, by leg; no other public function places them."""
         place, at_rest = self.machine.linkage.legs(self._spots, (), ()), [0.0] * len(values)
-        rows = [place(*values, *at_rest, *leg) for leg in self.assembly.legs.values()]
+        rows = [place.at(*values, *at_rest, *leg) for leg in self.assembly.legs.values()]
         return [dict(zip(self._spots, zip(row[::2], row[1::2]))) for row in rows]
 
 

@@ -117,7 +117,7 @@ def c_library(tmp_path_factory):
                 operands[0] = f'({operands[0]} < 0)'
             elif name in ('root', 'gated'):
                 operands[-1] = f'fabs{f}({operands[-1]})'
-            code = row.c.replace('{f}', f).replace('{name}', 'linkage').format(*operands)
+            code = row.c.replace('{f}', f).replace('{name}', 'lkr').format(*operands)
             text.append(f'void do_{name}(long size, const {kind} **x, {kind} *out) '
                         f'{{ long n; for (n = 0; n < size; n++) out[n] = {code}; }}')
         libraries[kind] = loaded(tmp_path_factory.mktemp('operations'), '\n'.join(text))
@@ -253,5 +253,5 @@ def test_all_back_ends_read_all_operands():
     for row in OPERATIONS.values():
         operands = [f'operand {i}' for i in range(arity(row.name))]
         for code in (row.python, row.array, row.c):
-            text = code.replace('{f}', '').replace('{name}', 'linkage').format(*operands)
+            text = code.replace('{f}', '').replace('{name}', 'lkr').format(*operands)
             assert all(operand in text for operand in operands)

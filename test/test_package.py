@@ -69,7 +69,7 @@ def test_every_source_begins_with_its_licence():
                and not path.name.startswith(('.', 'build', 'install', 'log'))]
     sources = [path for folder in (ROOT / '.ci', *folders) for path in folder.rglob('*')
                if path.suffix in ('.py', '.c', '.cpp', '.hpp', '.h', '.cmake', '.js')
-               and path.parent.name != 'vendor'] + [ROOT / 'setup.py']
+               and not {'vendor', '_build'} & {*path.parts}] + [ROOT / 'setup.py']
     tags = 'FileCopyrightText: 2026 linkage_ros contributors', 'License-Identifier: Apache-2.0'
     notice = ' '.join(f'SPDX-{tag}' for tag in tags)
     heads = {path: ' '.join(re.findall(r'[^\s#/*]\S*', path.read_text()[:200]))
