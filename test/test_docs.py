@@ -287,6 +287,7 @@ def test_the_files_of_a_journey_are_those_that_run(graph, heading):
     from linkage_ros.nodes.kinematics import Kinematics
     from rcl_interfaces.msg import ParameterEvent
     from sensor_msgs.msg import JointState
+    from std_msgs.msg import String
 
     page = (ROOT / 'docs' / 'design' / 'architecture.md').read_text()
     steps = re.findall(r'^\d\. .*(?:\n   .*)*', page.partition(f'## {heading}')[2].partition(
@@ -296,7 +297,8 @@ def test_the_files_of_a_journey_are_those_that_run(graph, heading):
     crank, heard = graph.crank(['m_crank']), graph.listen(JointState, 'm/joint_states')
     announced = graph.listen(ParameterEvent, ownership.TOPIC, ownership.LATCHED)
     # The last that the worker does at a start.
-    graph.until(lambda: announced)
+    described = graph.listen(String, 'robot_description', ownership.LATCHED)
+    graph.until(lambda: announced and described)
     for angle in (0.2, 0.3):
         crank([angle], heard)
     ran, room = set(), str(ROOT / 'linkage_ros') + '/'

@@ -188,7 +188,11 @@ def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
     zeros = {joint.name: joint.start if form is sdf else 0.0 for joint in joints}
     turns = {joint.name: joint.kind == 'hinge' for joint in joints}
     machines = scene.read(given).machines.values()
-    for thetas in drives(one, 7):
+    # A file has 15 digits: exactly at an end of the reach its linkage may not be assembled.
+    ends = np.ravel(one.first.reach) if len(one.inputs) == 1 else ()
+    for thetas in drives(one, 9):
+        if thetas[0] in ends:
+            continue
         wanted = {name: value - zeros[name] for name, value in posed(one, thetas)[0].items()}
         for joint, value in published(machines, wanted).items():
             if joint in wanted:

@@ -119,7 +119,8 @@ class Segments:
         outer cells have no width: those of values that are answered by the end of the segment.
         """
         theta, value, cells, sign = segment
-        rounded, ends = ONE * self._size, [0, -1]
+        # Values so near to an end of the segment are the end's.
+        near, ends = np.minimum((below, above), ONE * self._size), [0, -1]
         # At an end of the reach there is a pose also when whole turns are added.
         start, end = (x + side * 2.0 * math.ulp(max(abs(x), math.pi)) * (x in self._ends)
                       for x, side in zip(theta[ends].tolist(), (1.0, -1.0)))
@@ -129,7 +130,7 @@ class Segments:
         cells[:2] *= self._unit
         return (float(value[0] - below), float(value[-1] + above), sign,
                 np.array([start, *theta.clip(start, end), end]) * self._unit,
-                value.clip(value[0] + rounded, value[-1] - rounded), cells)
+                value.clip(value[0] + near[0], value[-1] - near[1]), cells)
 
     # --- candidates ---
 
@@ -337,7 +338,7 @@ class Segments:
             beside = x + np.copysign(ULPS * np.spacing(np.maximum(abs(x), 1.0)), other - x)
             change = np.abs(self._difference(self._curve(beside)[0] - sign * value))
             found.append(np.where(
-                goes_on, ONE * self._size + np.abs(self._difference(there - value)),
+                goes_on, self._rounding + np.abs(self._difference(there - value)),
                 np.fmin(np.fmax(change, CLOSE * self._size), SINGULAR * self._size)))
         return found
 
