@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import AbstractSet, Any, List, Optional, Tuple
+from typing import AbstractSet, Any, List, Optional, Sequence, Tuple
 
 import numpy as np
 from rclpy.duration import Duration
@@ -78,7 +78,7 @@ class MechanismTopics:
             # The last solution is that of earlier inputs.
             self.state = None
             return
-        state = self._solve(self._regular(self.model, in_scene))
+        state = self._solve(self._regular(self.model, topics, in_scene))
         if state.any_assembled and any(topics):
             self.model.publishers[state, topics].publish(self.stamp, state.solution.values)
 
@@ -86,14 +86,17 @@ class MechanismTopics:
         """Return the present state for the scene's joint states; None without assembled legs."""
         if None in self.inputs:
             return None
-        regular, state = self._regular(self.model, True), self.state
+        topics = self._joint_states.subscribed, self._markers.subscribed
+        regular, state = self._regular(self.model, topics, True), self.state
         if state is None or state.solution is not regular.solution:
             state = self._solve(regular)
         return state if state.any_assembled else None
 
-    def _regular(self, model: MechanismModel, in_scene: bool) -> AssemblyState:
-        return model.regular[in_scene or self._joint_states.has_subscribers,
-                             self._markers.has_subscribers, None not in self.speeds]
+    def _regular(self, model: MechanismModel, topics: Sequence[Any], in_scene: bool
+                 ) -> AssemblyState:
+        joint_states, markers = topics
+        return model.regular[in_scene or joint_states is not None, markers is not None,
+                             None not in self.speeds]
 
     def _solve(self, regular: AssemblyState) -> AssemblyState:
         """Solve at the present inputs; display or delete markers if the state has changed."""
@@ -117,7 +120,7 @@ class MechanismTopics:
         # This runs in the worker's thread, while subscribers may change.
         topics = self._joint_states.subscribed, self._markers.subscribed
         if before and None not in inputs and (in_scene or any(topics)):
-            regular = self._regular(model, in_scene)
+            regular = self._regular(model, topics, in_scene)
             regular.solution.solve(inputs, [0.0] * len(inputs))
             if any(topics):
                 # Building its messages takes longest.
