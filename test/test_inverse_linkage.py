@@ -459,3 +459,52 @@ def test_what_is_followed_has_the_value(seed):
                 gap = math.remainder(gap, math.tau) if linkage.is_angle(output) else gap
                 assert abs(gap) < 1e-6 * scale, (str(design), output, near, value)
                 count += 1
+
+
+@pytest.mark.parametrize('kind', [kind for kind in mechanisms.TYPES if kind != 'five_bar'])
+def test_next_to_the_seam_of_a_turn_a_solution_is_as_exact_as_elsewhere(kind):
+    linkage = mechanisms.create(kind)
+    first, = linkage.inputs
+    if not first.is_whole(linkage.reach()):
+        pytest.skip('it does not turn round')
+    seam = np.array([side * (math.pi - away) for side in (1, -1)
+                     for away in (0.0, 1e-15, 3e-15, 1e-14, 3e-14, 1e-13, 3e-13, 1e-12)])
+    checked = 0
+    for output in outputs_of(linkage):
+        scale = 1.0 if linkage.is_angle(output) else linkage.longest
+        values, rates = (linkage.joint_angles(seam, [output])[output],
+                         np.abs(linkage.joint_rates(seam, [output])[output]))
+        if (rates < 1e-2 * scale).any():
+            continue
+        # The rounding of the output and of the input.
+        room = 64 * 2.0 ** -53 * (scale / rates + math.pi)
+        arrays, _ = linkage.inverse(output).over(np.repeat(values, 40))
+        for i, (theta, value) in enumerate(zip(seam.tolist(), values.tolist())):
+            for found in linkage.input_for(output, value), arrays[0, 40 * i]:
+                away = np.abs(np.remainder(found - theta + math.pi, math.tau) - math.pi)
+                assert np.nanmin(away) <= room[i], (output, theta)
+        checked += 1
+    assert checked
+
+
+@pytest.mark.parametrize('limited', [False, True])
+@pytest.mark.parametrize('kind, outputs', [
+    ('four_bar', ('QB',)), ('jansen', ('G.x',)), ('slotted_lever', ('lever',)),
+    ('klann', ('F.y',)), ('five_bar', ('P.x', 'P.y'))])
+def test_a_path_is_the_nearest_of_one_value_after_the_other(kind, outputs, limited):
+    linkage, rng = mechanisms.create(kind), np.random.default_rng(3)
+    inverse, n = linkage.inverse(outputs), len(linkage.inputs)
+    # Steps of all sizes through several turns, and values that nothing reaches.
+    inputs = np.cumsum(rng.normal(0.0, 1.0, (n, 120)) * 10.0 ** rng.uniform(-3, 0.5, 120), axis=1)
+    values = np.array([*linkage.joint_angles(inputs if n > 1 else inputs[0], outputs).values()])
+    values[:, rng.random(120) < 0.1] += 3.0 * linkage.longest
+    ends = [(-2.0, 9.0)] * n if limited else None
+    seed = inputs[:, 0]
+    found, _ = inverse.path(list(values), near=seed, ends=ends)
+    reached = 0
+    for value, place in zip(values.T, np.transpose(found)):
+        expected, _ = inverse.nearest(value.tolist(), near=seed.tolist(), ends=ends)
+        np.testing.assert_allclose(place, expected, rtol=0.0, atol=1e-9)
+        if np.isfinite(expected).all():
+            seed, reached = np.array(expected), reached + 1
+    assert 20 < reached < 120
