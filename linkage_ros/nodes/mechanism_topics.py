@@ -73,7 +73,7 @@ class MechanismTopics:
 
     def publish(self, in_scene: bool) -> None:
         """Solve for the subscribers, and for the scene's joint states if `in_scene`; publish."""
-        topics = self._joint_states.subscribed, self._markers.subscribed
+        topics = self._subscribed()
         if None in self.inputs or not (in_scene or any(topics)):
             # The last solution is that of earlier inputs.
             self.state = None
@@ -86,11 +86,15 @@ class MechanismTopics:
         """Return the present state for the scene's joint states; None without assembled legs."""
         if None in self.inputs:
             return None
-        topics = self._joint_states.subscribed, self._markers.subscribed
+        topics = self._subscribed()
         regular, state = self._regular(self.model, topics, True), self.state
         if state is None or state.solution is not regular.solution:
             state = self._solve(regular)
         return state if state.any_assembled else None
+
+    def _subscribed(self) -> Tuple[Any, Any]:
+        """Return the publishers of joint states and markers, None where nobody subscribes."""
+        return self._joint_states.subscribed, self._markers.subscribed
 
     def _regular(self, model: MechanismModel, topics: Sequence[Any], in_scene: bool
                  ) -> AssemblyState:
@@ -118,7 +122,7 @@ class MechanismTopics:
             return before
         model = MechanismModel(mechanism, frame_id, prefix)
         # This runs in the worker's thread, while subscribers may change.
-        topics = self._joint_states.subscribed, self._markers.subscribed
+        topics = self._subscribed()
         if before and None not in inputs and (in_scene or any(topics)):
             regular = self._regular(model, topics, in_scene)
             regular.solution.solve(inputs, [0.0] * len(inputs))
