@@ -451,6 +451,7 @@ def test_the_sketch_has_the_header_of_its_scene(tmp_path):
     called = set(re.findall(r'\blever_\w+(?=\()', (sketch / 'hobby_servo.ino').read_text()))
     assert called and called <= set(re.findall(r'\blever_\w+', text))
     machine, = scene.load(str(sketch / 'lever.yaml')).machines.values()
+    assert text == header.written(machine, ['lever'], single=True) + '\n'
     library = loaded(tmp_path, text + """
 int both(float crank, float *angle, float *back, float *servo)
 {
@@ -546,11 +547,12 @@ def test_a_scene_file_is_printed_as_c(capsys, monkeypatch):
 def test_any_names_of_a_scene_are_names_in_c(tmp_path, language):
     inputs = ['q', 'p', 'near', 'value', 'x0', 'new', 'for', 'sin', 'double', 'NAN', 'linux']
     given = {'mechanisms': [
-        'Arm', 'arm', 'ARM', 'linkage', 'rail', *(f'm{i}' for i in range(len(inputs)))],
+        'Arm', 'arm', 'ARM', 'linkage', 'LKR', 'Lkr', 'rail',
+        *(f'm{i}' for i in range(len(inputs)))],
         'rail.type': 'custom', 'rail.joints': [
             'O ground 0 0', 'R ground 1 0', 'slide carriage O along R 0 2 called x',
             'Q ground 0 1', 'B dyad slide Q 0.9 0.6 left']}
-    for name in ('Arm', 'arm', 'ARM', 'linkage'):
+    for name in ('Arm', 'arm', 'ARM', 'linkage', 'LKR', 'Lkr'):
         given.update({f'{name}.type': 'custom', f'{name}.joints': [
             'O ground 0 0', 'Q ground 1 0', 'Arm crank O 0.3', 'Tip dyad Arm Q 1 0.6 left']})
     for i, name in enumerate(inputs):

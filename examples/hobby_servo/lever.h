@@ -53,7 +53,7 @@ typedef float lkr_real;
 #define LKR_ENOUGH 2e-6f
 #define LKR_CLOSE 4e-6f
 #define LKR_STEEPEST 1e3f
-/* An input may be beyond an end of the reach by SLACK; it is taken further inside by INSIDE. */
+/* An input may be beyond an end of the reach by SLACK; it is then moved inside by INSIDE. */
 #define LKR_SLACK 1e-5f
 #define LKR_INSIDE 2e-6f
 #else
@@ -359,7 +359,7 @@ static inline int lkr_aim(const lkr_model *model, int side, const lkr_real *posi
         }
         goal->to[i] = position[i];
         if (axis->rate != 0) {
-            /* It tells the input; whole turns are taken away, so that they cost no digits. */
+            /* It determines the input; whole turns are subtracted, so that they cost no digits. */
             const int k = axis->input;
             const lkr_real turn = model->input[k].turn;
             goal->near[k] = (position[i] - axis->zero) / axis->rate;
