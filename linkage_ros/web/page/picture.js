@@ -405,7 +405,7 @@ export class Picture {
           x: seen[i][0] + Math.cos(start + turn) * (ring * away + half - 5), y: seen[i][1] + Math.sin(start + turn) * ring * away, half, high: 8,
         }));
         const free = tried.filter(place => isClear(place, written));
-        // A name beside another's joint would be taken for that one's.
+        // A name beside another's joint would be read as that joint's.
         const place = free.find(at => seen.every(joint => apart(at, joint) >= apart(at, seen[i]))) ?? free[0];
         if (!place) return;
         written.push(place);
@@ -448,7 +448,7 @@ export class Picture {
       const x = this.isSeen(box.x, 0) ? this.inside({ x: box.x, y: 0, half, high: 0 }).x : box.x;
       const at = lines => ({ x, y: box.y + Math.sign(lines) * box.high + (lines - Math.sign(lines) / 2) * LINE, half, high: LINE / 2 });
       const below = Array.from({ length: 2 * boxes.length }, (_, line) => at(line + 1));
-      // A title on another mechanism would be taken for that one's.
+      // A title on another mechanism would be read as that mechanism's.
       const others = boxes.filter(other => other !== box);
       const place = [below[0], at(-1), below[1]].find(one => isFree(one) && isClear(one, others)) ?? below.find(isFree);
       if (!place) continue;
