@@ -43,8 +43,8 @@ for file; do files+=(-r "$file"); done
 install() {
   "$folder/bin/python" -m pip install -q --require-hashes --no-build-isolation "$@" >"$log" 2>&1
 }
-[ "$to_compile" ] && install -r "${0%/*}/lock/source.txt"
-install "${files[@]}" && exit
+# Of some there is only the source, on some versions of Python.
+install -r "${0%/*}/lock/source.txt" && install "${files[@]}" && exit
 if grep -qiE 'connection (broken|refused|reset)|new connection|name resolution|timed out|proxy' \
     "$log"; then
   stop "The Python package index cannot be reached: is there a network? (All of it: $log)"
