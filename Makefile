@@ -172,7 +172,8 @@ $(venv)/.tools: $(venv)/.installed $(tools)
 .venv-lint/.installed: private export about := what checks style and types.
 .venv-lock/.installed: private export about := what pins the rest.
 .venv-mutants/.installed: private export about := what puts bugs into the package.
-# A package of these comes as source.
+# A package of these comes as source, reuse for Python 3.11 and newer.
+.venv-lint/.installed: private from_source := --from-source
 .venv-mutants/.installed: private from_source := --to-compile
 .venv-bench/.installed .venv-docs/.installed .venv-lint/.installed .venv-lock/.installed .venv-mutants/.installed: \
 .venv-%/.installed: $(lock)/%.txt

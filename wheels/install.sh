@@ -5,10 +5,12 @@
 # Makes a virtual environment of lock files, or says in one sentence what is missing. What is not in
 # them, or has another hash there, is refused; nothing else is asked for, so nothing is resolved.
 #
-#   about='what it is' wheels/install.sh [--to-compile] PYTHON FOLDER LOCK...
+#   about='what it is' wheels/install.sh [--to-compile | --from-source] PYTHON FOLDER LOCK...
+#
+# Some come as source; --to-compile: with extensions in C.
 
-to_compile=
-if [ "$1" = --to-compile ]; then to_compile=yes; shift; fi
+source=
+case $1 in --to-compile | --from-source) source=$1; shift;; esac
 python=$1 folder=$2
 shift 2
 log=$folder/pip.log
@@ -25,7 +27,7 @@ holds '(3, 10) <= sys.version_info < (3, 15)' \
   || stop "$python is $("$python" -V 2>&1), but a $range is needed: name one with PYTHON=."
 "$python" -c 'import ensurepip, venv' 2>/dev/null \
   || stop "$python lacks venv: install python3-venv, or name another with PYTHON=."
-if [ "$to_compile" ]; then
+if [ "$source" = --to-compile ]; then
   holds 'os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h"))' \
     || stop "$python lacks its headers: install python3-dev, or name another with PYTHON=."
   for compiler in "${CC:-cc}" "${CXX:-c++}"; do
@@ -43,8 +45,8 @@ for file; do files+=(-r "$file"); done
 install() {
   "$folder/bin/python" -m pip install -q --require-hashes --no-build-isolation "$@" >"$log" 2>&1
 }
-# Of some there is only the source, on some versions of Python.
-install -r "${0%/*}/lock/source.txt" && install "${files[@]}" && exit
+[ "$source" ] && install -r "${0%/*}/lock/source.txt"
+install "${files[@]}" && exit
 if grep -qiE 'connection (broken|refused|reset)|new connection|name resolution|timed out|proxy' \
     "$log"; then
   stop "The Python package index cannot be reached: is there a network? (All of it: $log)"
