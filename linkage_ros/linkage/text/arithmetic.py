@@ -122,7 +122,7 @@ class Formula:
                     waiting.append('negative ' if token == '-' else token)
                 elif token in self.names:
                     self._steps.append(token)
-                elif token != 'pi' and not token[0] in '.0123456789':
+                elif token != 'pi' and token[0] not in '.0123456789':
                     raise LookupError
                 else:
                     self._add_constant(math.pi if token == 'pi' else float(token))
