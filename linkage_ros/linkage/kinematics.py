@@ -141,7 +141,8 @@ class Kinematics:
 
     def check(self) -> None:
         """Raise ValueError, with the joint line, if its dimensions are not allowed."""
-        joint_lines.check_numbers(self.design, self.dimensions)
+        if self.design.is_written:
+            joint_lines.check_numbers(self.design, self.dimensions)
         for line, amount, problem in self.structure.built.demands:
             size = self.value(amount)
             # A triangle that does not exist is NaN; a type of the catalogue then has no pose.
