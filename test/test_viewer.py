@@ -1070,7 +1070,7 @@ def test_a_saved_scene_names_all_that_defines_it_and_is_the_running_one(show, pa
     ('90deg', {'value': math.pi / 2.0, 'turns': True}),
     ('pi/2', {'value': math.pi / 2.0, 'turns': True}),
     ('2*(3+4)', {'value': 14.0, 'turns': False}),
-    ('1/0', 'divides by zero'), ('a+1', 'a is unknown'), ('__import__', 'not a number'),
+    ('1/0', 'must be 0 or between'), ('a+1', 'a is unknown'), ('__import__', 'not a number'),
     ('', 'not a number')])
 def test_arithmetic_is_read_by_the_library(lever, text, answer):
     async def use(url):
@@ -2186,7 +2186,7 @@ def test_a_number_can_be_written_with_a_point_or_a_comma(show, looked_at):
             await browser.until(lambda: seen.reason('lever', 'a'))
             said, start = await seen.reason('lever', 'a'), text[:20].replace(',', '.')
             assert said.startswith(f"Refused: '{start}")
-            assert 'is not a number' in said or 'is too large' in said
+            assert 'is not a number' in said or 'must be 0 or' in said
             assert await seen.number('lever', 'a') == 90.0
         await seen.write('lever', 'a', '')
         assert await seen.number('lever', 'a') == 90.0

@@ -9,7 +9,6 @@ from .geometry.builder import GROUND, Link
 from .geometry.spatial import IN_SINGLE
 from .inputs import Arc, Input, spread
 from .inverse import Answer, Inverse, InverseLinkage, Mode, Solution
-from .kinematics import check_bars
 from .mechanism import Mechanism
 from .motion.curves import ascending, extremes, sampled
 from .motion.reach import reachable_arcs
@@ -20,8 +19,8 @@ from .text.design import Design
 from .text.rod_lines import FORMS, WindowError
 from .tolerances import CLOSE, ROUNDING, TOLERANCE
 
-__all__ = ['Answer', 'Arc', 'ascending', 'bar_name', 'check_bars', 'checked_branches',
-           'checked_dimensions', 'CLOSE', 'Design', 'Dyads', 'extremes', 'FORMS', 'Formula',
+__all__ = ['Answer', 'Arc', 'ascending', 'bar_name', 'checked_branches', 'checked_dimensions',
+           'CLOSE', 'Design', 'Dyads', 'extremes', 'FORMS', 'Formula',
            'GROUND', 'Hinge', 'IN_SINGLE', 'Input', 'Inverse', 'InverseLinkage', 'joint_lines',
            'Leg', 'Link', 'LinkPoint', 'Mechanism', 'Mode', 'Motor', 'Pin', 'reachable_arcs',
            'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide', 'Solution', 'spread',

@@ -43,16 +43,6 @@ Inputs = Union[ArrayLike, Sequence[ArrayLike]]
 Names = Optional[Sequence[str]]
 
 
-def check_bars(linkage: Kinematics) -> None:
-    """Raise ValueError, with the joint line, for a bar of zero length."""
-    for (first, second), length in linkage.bar_lengths.items():
-        size = np.asarray(length)
-        if not np.all((size > 0.0) & np.isfinite(size)):
-            raise linkage.line_of(first, second).error(
-                f'the bar {first}-{second} must be longer than zero, got {length:g}'
-                if not size.ndim else f'the bar {first}-{second} must be longer than zero')
-
-
 def _hashable(names: Any) -> Any:
     """Return names as a tuple, but None or one name unchanged; raise ValueError if invalid."""
     try:
@@ -126,11 +116,6 @@ class Kinematics:
         """Return the last line that places one of some joints."""
         return [line for line in self.design.lines if set(joints) & set(line.names)][-1]
 
-    def triangles(self) -> dict:
-        """Return for each line of a rigid triangle whether the dimensions allow it."""
-        return {self.line_of(name): np.isfinite(self.value(height))
-                for name, height in self.structure.built.triangles.items()}
-
     def constants(self, expressions: Any) -> Any:
         """Return tuples of expressions of dimensions as tuples of their values."""
         if isinstance(expressions, Real):
@@ -138,10 +123,6 @@ class Kinematics:
         if not isinstance(expressions, tuple):
             return expressions
         return getattr(expressions, '_make', tuple)(map(self.constants, expressions))
-
-    def demands(self) -> list:
-        """Return quantities that dimensions must make positive: line, value, and the problem."""
-        return [self.constants(tuple(demand)) for demand in self.structure.built.demands]
 
     def windows(self) -> list:
         """Return the links on two hinges in a row with two rods, and their limits."""
@@ -160,10 +141,16 @@ class Kinematics:
 
     def check(self) -> None:
         """Raise ValueError, with the joint line, if its dimensions are not allowed."""
-        if check := self.design.check:
-            check(self.design.lines, self)
-        else:
-            check_bars(self)
+        if self.design.is_written:
+            joint_lines.check_numbers(self.design, self.dimensions)
+        for line, amount, problem in self.structure.built.demands:
+            size = self.value(amount)
+            # A triangle that does not exist is NaN; a type of the catalogue then has no pose.
+            exists = np.isfinite(size) | (np.isnan(size) & (not self.design.is_written))
+            if np.any(size <= 0.0) or not np.all(exists):
+                raise line.error(problem)
+        for window in self.windows():
+            window.check()
         for by, input_ in enumerate(self.inputs):
             for name in self.geared if input_.speed > FASTEST else ():
                 if abs(ratio := self.gear(name, by)[0]) > FASTEST:

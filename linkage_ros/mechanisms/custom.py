@@ -5,12 +5,10 @@
 
 from collections.abc import Mapping, Set
 from itertools import islice
-from typing import Any, Iterable, List, Optional, Tuple
-
-import numpy as np
+from typing import Any, Iterable, Optional, Tuple
 
 from ..cache import cached
-from ..linkage import check_bars, Design, joint_lines, Mechanism, rod_lines
+from ..linkage import Design, joint_lines, rod_lines
 from ..words import listed, meant, plain_text, quoted
 
 MOST_LINES = 2000
@@ -48,22 +46,7 @@ def design(type_: str, joints: Tuple[str, ...], tracer: Optional[str],
                          f'{meant(tracer, placed)}')
     signed = frozenset(name for name, length in used.items() if not length)
     return Design(type_, dict.fromkeys(used, 1.0), joints, tracer or placed[-1], signed,
-                  check if words is joint_lines else rod_lines.check, words is rod_lines)
-
-
-def check(lines: List[joint_lines.Line], linkage: Mechanism) -> None:
-    """Raise ValueError that names the line of an invalid number, bar, triangle or stroke."""
-    joint_lines.check_numbers(lines, linkage.dimensions)
-    check_bars(linkage)
-    tips = {link.name: link.tip for link in linkage.links}
-    for input_ in linkage.inputs:
-        if not np.all(np.less(input_.low, input_.high)):
-            raise linkage.line_of(tips[input_.name]).error(
-                f'the lower end of the {input_.name} must be less than its upper end')
-    for line, exists in linkage.triangles().items():
-        if not np.all(exists):
-            raise line.error('no triangle has these sides: each must be shorter than the '
-                             'other two together')
+                  words is rod_lines, is_written=True)
 
 
 def checked_design(type_: str, joints: Optional[Iterable[str]], tracer: Optional[str],

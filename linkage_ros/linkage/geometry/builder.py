@@ -113,7 +113,6 @@ class Builder:
         self.links: List[Link] = []
         self.bars: List[Bar] = []
         self.limits: List[planar.Limit] = []
-        self.triangles: Dict[str, Real] = {}
         self.frames: Dict[str, Dict[str, Complex]] = {}
         self.joint_values: Dict[str, Real] = {}
         self.directions: Dict[str, Complex] = {}
@@ -127,14 +126,20 @@ class Builder:
         self.yokes: Dict[str, str] = {}
         # The ground joints of the lines that what is added is mirrored in, one after the other.
         self.mirrors: Tuple[Tuple[str, ...], ...] = ()
-        # In space: demands on dimensions, and links that must have one pose at most.
+        # What dimensions must make positive: the line that is drawn, an amount, the problem.
+        self.drawn: Any = None
+        self.demands: List[Tuple[Any, Real, str]] = []
+        # In space: links that must have one pose at most.
         self.axes = 'xy'
-        self.demands: List[Any] = []
         self.windows: List[Any] = []
         self._vectors: Dict[Tuple[str, str], _Vector] = {}
         self._axes: Dict[str, _Vector] = {}
         self.driven: Dict[str, Tuple[Input, Real]] = {}
         self._kites: Dict[Tuple[str, str], planar.CrankArm] = {}
+
+    def require(self, amount: Real, problem: str) -> None:
+        """Refuse the line for dimensions with which an amount is not above zero."""
+        self.demands.append((self.drawn, amount, problem))
 
     @property
     def grounded(self) -> Tuple[str, ...]:
@@ -232,6 +237,9 @@ class Builder:
 
     def drive(self, input_: Input, geared: Optional[Gear]) -> Real:
         """Return the expression of an input [rad or m]: a new one, or a geared one."""
+        if not input_.turns:
+            self.require(real(input_.high - input_.low), f'the lower end of the {input_.name} '
+                         'must be less than its upper end')
         if geared is None:
             leaf = argument(len(self.inputs))
             self.inputs.append(input_)
@@ -300,8 +308,9 @@ class Builder:
         """Add the third corner of a rigid triangle on a bar; left of first -> second."""
         vector, base, link = self._side(first, second)
         corner = planar.triangle(base, to_first, to_second, side)
-        self.triangles[name] = corner.y
         self.limits.append(planar.Limit(abs(corner.y), real(0.0)))
+        self.require(1.0 + abs(corner.y), 'no triangle has these sides: each must be shorter '
+                     'than the other two together')
         self._add_to_link(name, first, second, corner, to_first)
         if link != GROUND:
             self._bar(second, name, vector * (corner - Complex(1.0, 0.0)), to_second, link)
@@ -581,5 +590,6 @@ class Builder:
              link: str) -> None:
         length = real(length)
         self.bars.append(Bar(first, second, length))
+        self.require(length, f'the bar {first}-{second} must be longer than zero')
         self._vectors[first, second] = _Vector(vector, length, link)
         self._vectors[second, first] = _Vector(-vector, length, link)

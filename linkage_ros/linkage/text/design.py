@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Callable, FrozenSet, List, Mapping, Optional, Tuple
+from typing import Any, FrozenSet, List, Mapping, Tuple
 
 from . import joint_lines, rod_lines
 
@@ -18,10 +18,10 @@ class Design:
     A type of mechanism: its name, default dimensions [m] and joint lines.
 
     The `tracer` is the joint of the locus; `signed` dimensions may be zero or
-    negative. `check` raises ValueError for a mechanism of this type with invalid dimensions;
-    by default every bar must have a length. Lines `in_space` are those
-    of `rod_lines`, with `inputs` as the given joints, by default the driven ones. `turned` are
-    whole turns, by input, from which its inputs are counted; see `Mechanism.turned`.
+    negative. Lines `in_space` are those of `rod_lines`, with `inputs` as the given joints, by
+    default the driven ones; `is_written` says that all lines are a user's, in which a triangle
+    must exist. `turned` are whole turns, by input, from which its inputs are counted; see
+    `Mechanism.turned`.
     """
 
     name: str
@@ -29,8 +29,8 @@ class Design:
     joints: Tuple[str, ...]
     tracer: str
     signed: FrozenSet[str] = frozenset()
-    check: Optional[Callable] = None
     in_space: bool = False
+    is_written: bool = False
     inputs: Tuple[str, ...] = ()
     turned: Tuple[Tuple[str, float], ...] = ()
 

@@ -353,17 +353,16 @@ def _check_number(line: Line, kind: str, number: Formula, dimensions: Mapping,
                          f'in degrees it is written {elided(degrees)}')
 
 
-def check_numbers(lines: Iterable[Line], dimensions: Mapping) -> None:
+def check_numbers(design: Any, dimensions: Mapping) -> None:
     """Raise ValueError that names the line of an invalid number, for dimensions or arrays."""
-    fixed = has_literal_lengths(lines)
-    if not fixed:
+    if not design.has_literal_lengths:
         # A unit that is a power of two changes no digit, and no product overflows or underflows.
         longest = max((np.max(np.abs(length)) for length in dimensions.values()), default=1.0)
         unit = 2.0 ** np.frexp(longest)[1]
         dimensions = {name: length / unit for name, length in dimensions.items()}
-    for line in lines:
+    for line in design.lines:
         for kind, number in line.numbers():
-            _check_number(line, kind, number, dimensions, fixed)
+            _check_number(line, kind, number, dimensions, design.has_literal_lengths)
 
 
 def branches(lines: Iterable[Line]) -> dict:
@@ -414,7 +413,7 @@ def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],
                  for word, values in options.items()}
         names = line.names if len(line.names) > 1 else line.names[0]
         try:
-            builder.mirrors = line.mirrors
+            builder.drawn, builder.mirrors = line, line.mirrors
             getattr(builder, line.word)(names, *plain, **named)
         except ConstructionError as error:
             raise line.error(error) from None

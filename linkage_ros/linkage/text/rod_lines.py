@@ -42,7 +42,7 @@ from typing import (
 
 import numpy as np
 
-from .joint_lines import check_numbers, formula, Line, parsed
+from .joint_lines import formula, Line, parsed
 from ..geometry.builder import Bar, Builder, GROUND, Link, Point
 from ..geometry.planar import Limit
 from ..geometry.spatial import (
@@ -108,6 +108,24 @@ class TwoRodLink(NamedTuple):
     inputs: Tuple[str, ...]
     limits: Tuple[Optional[Tuple[Real, ...]], ...]
     rods: Tuple[WindowRod, ...]
+
+    def check(self) -> None:
+        """Raise ValueError, with the largest window, unless one pose at most is proved."""
+        if any(np.ndim(part) for rod in self.rods for path in rod[:2] for vector in path
+               for part in vector):
+            raise self.lines[1].error('two rods on two hinges need one set of dimensions, not '
+                                      'arrays: the proof of their single pose takes numbers')
+        # Without limits, the largest window is searched up to a quarter turn to each side.
+        window = Window(self.rods, *zip(*(
+            ends or (-0.5 * math.pi, 0.5 * math.pi) for ends in self.limits)))
+        limited = all(self.limits)
+        if limited and window.is_proved():
+            return
+        largest, names = window.largest(), [line.names[0] for line in self.lines]
+        raise WindowError(
+            self.lines[1], _why_not(window, self.inputs, names) if limited
+            else 'both hinges need limits', dict(zip(names, zip(
+                largest.low.tolist(), largest.high.tolist()))) if largest else {})
 
 
 def parse(texts: Iterable[str]) -> List[Line]:
@@ -330,6 +348,7 @@ class _Drawing:
 
     def _drive(self, name: str) -> None:
         """Make an angle or a length an input."""
+        self._builder.drawn = self._assembly.lines[name]
         joint, ends = self._joints.get(name), self._numbers[name][6:]
         if joint and joint.line.word != 'slide':
             joint.turn = Turn.by(self._builder.drive(Input(name, ANGLE), None))
@@ -485,36 +504,6 @@ class _Drawing:
         if name in self._builder.points:
             raise self._assembly.lines[end.link].error(f'the name {name} is used by another point')
         self._builder.points[name] = Point(self._on_link(end, GROUND), end.link, self._span)
-
-
-def check(lines: List[Line], linkage: Any) -> None:
-    """Raise ValueError that names the line if dimensions are invalid."""
-    check_numbers(lines, linkage.dimensions)
-    for line, amount, problem in linkage.demands():
-        if not np.all(amount > 0.0):
-            raise line.error(problem)
-    for link in linkage.windows():
-        _check_window(link)
-
-
-def _check_window(link: TwoRodLink) -> None:
-    """Raise ValueError, with the largest window, unless one pose at most is proved."""
-    line = link.lines[1]
-    if any(np.ndim(part) for rod in link.rods for path in rod[:2] for vector in path
-           for part in vector):
-        raise line.error('two rods on two hinges need one set of dimensions, not arrays: the '
-                         'proof of their single pose takes numbers')
-    # Without limits, the largest window is searched up to a quarter turn to each side.
-    window = Window(link.rods, *zip(*(
-        each or (-0.5 * math.pi, 0.5 * math.pi) for each in link.limits)))
-    limited = all(link.limits)
-    if limited and window.is_proved():
-        return
-    largest = window.largest()
-    names = [each.names[0] for each in link.lines]
-    raise WindowError(line, _why_not(window, link.inputs, names) if limited
-                      else 'both hinges need limits', dict(zip(names, zip(
-                          largest.low.tolist(), largest.high.tolist()))) if largest else {})
 
 
 def _why_not(window: Window, inputs: Sequence[str], hinges: Sequence[str]) -> str:
