@@ -51,7 +51,7 @@ def test_integers_are_numbers(bars, arm):
 @pytest.mark.parametrize('shape', [(), (1,), (3, 2), (0,)])
 def test_results_have_the_shape_of_value_and_near(bars, shape):
     value, near = np.full(shape, 1.0), np.full(shape, 0.5)
-    assert np.shape(bars.input_for('QB', value)) == (*shape, 1)
+    assert np.shape(bars.input_for('QB', value)) == (*shape, 2 if value.size else 1)
     for found in (bars.input_for('QB', value, 0.5), bars.input_for('QB', 1.0, near),
                   *bars.servo_for('QB', value, near), *bars.servo_for('QB', value)):
         assert np.shape(found) == shape
