@@ -19,16 +19,7 @@ import numpy as np
 from .problem import InverseProblem
 from ..tolerances import CLOSE, SINGULAR, TOLERANCE
 from ...cache import Cache
-from ...formula.expression import (
-    argument,
-    gated,
-    nearest_integer,
-    Real,
-    real,
-    square,
-    square_root,
-    where,
-)
+from ...formula.expression import argument, gated, nearest_integer, Real, real, square_root, where
 from ...formula.program import Program
 
 Reals = Sequence[Real]
@@ -50,7 +41,7 @@ def ranked(problem: InverseProblem, inputs: Reals, rates: Reals, seed: Reals = (
                   for by, place in enumerate(places)]
     if seed:
         steps = ((x - y) / size for x, y, size in zip(places, seed, problem.sizes))
-        order.insert(0, square_root(sum(map(square, steps), real(0.0))))
+        order.insert(0, square_root(sum((step * step for step in steps), real(0.0))))
     elif problem.n == 1:
         order.insert(0, where(rates[0] < 0.0, 1.0, 0.0))
     return [order, places, rates]

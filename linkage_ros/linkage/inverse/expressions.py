@@ -20,14 +20,7 @@ from .linkage import InverseLinkage
 from .problem import InverseProblem
 from ..geometry.spatial import IN_SINGLE
 from ..tolerances import CLOSE
-from ...formula.expression import (
-    argument,
-    derivative,
-    gated,
-    nearest_integer,
-    Real,
-    substituted,
-)
+from ...formula.expression import argument, derivative, gated, nearest_integer, Real, substituted
 
 # A mode whose outputs are off by more than this [sizes] is no solution.
 OFF = 2.0 ** -20

@@ -11,16 +11,7 @@ of them the output has each value of its range once; docs/accuracy.md has the ru
 from __future__ import annotations
 
 import math
-from typing import (
-    Any,
-    Callable,
-    Iterator,
-    List,
-    NamedTuple,
-    Optional,
-    Sequence,
-    Tuple,
-)
+from typing import Any, Callable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
