@@ -29,7 +29,7 @@ def arm():
 @pytest.mark.parametrize('number', [float, np.float64, np.float32, np.array, lambda x: np.array(
     [x])[0]])
 def test_one_value_of_any_type_gives_floats(bars, number):
-    value, near = 0.75, 0.5
+    value, near = 1.0, 0.5
     inverse = bars.inverse('QB')
     for wanted, found in (
             (bars.servo_for('QB', value), bars.servo_for('QB', number(value))),
@@ -50,9 +50,9 @@ def test_integers_are_numbers(bars, arm):
 
 @pytest.mark.parametrize('shape', [(), (1,), (3, 2), (0,)])
 def test_results_have_the_shape_of_value_and_near(bars, shape):
-    value, near = np.full(shape, 0.75), np.full(shape, 0.5)
-    assert np.shape(bars.input_for('QB', value)) == (*shape, 1)
-    for found in (bars.input_for('QB', value, 0.5), bars.input_for('QB', 0.75, near),
+    value, near = np.full(shape, 1.0), np.full(shape, 0.5)
+    assert np.shape(bars.input_for('QB', value)) == (*shape, 2 if value.size else 1)
+    for found in (bars.input_for('QB', value, 0.5), bars.input_for('QB', 1.0, near),
                   *bars.servo_for('QB', value, near), *bars.servo_for('QB', value)):
         assert np.shape(found) == shape
         np.testing.assert_array_equal(found, np.full(shape, found.flat[0] if shape and value.size
@@ -180,14 +180,14 @@ def test_an_answer_prints_its_inputs_its_mode_and_its_margin(arm):
 
 @pytest.mark.parametrize('near', [None, 0.5])
 def test_a_call_by_name_adds_a_few_calls_to_the_inverse_below_it(bars, near):
-    given = [0.75] if near is None else [0.75, near]
+    given = [1.0] if near is None else [1.0, near]
     inverse = bars.inverse('QB')
     for below, call, most in (
             (lambda: inverse.nearest(*([x] for x in given)),
              lambda: bars.servo_for('QB', *given), 5),
-            (lambda: inverse.nearest(*([x] for x in given)) if near else inverse.all(0.75),
+            (lambda: inverse.nearest(*([x] for x in given)) if near else inverse.all(1.0),
              lambda: bars.input_for('QB', *given), 5),
-            (lambda: inverse.follow([0.75], [0.5]), lambda: bars.follow('QB', 0.75, 0.5), 5),
+            (lambda: inverse.follow([1.0], [0.5]), lambda: bars.follow('QB', 1.0, 0.5), 5),
             (lambda: bars.joint_rates(0.5, ('QB',)),
              lambda: bars.output_effort('QB', 0.5, 2.0), 10)):
         below(), call()

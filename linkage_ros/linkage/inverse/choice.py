@@ -1,195 +1,129 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The choice of one solution of an inverse, or none: next to given inputs, inside given ends."""
+"""
+The choice of one solution of an inverse, or none: next to given inputs, between given ends.
+
+The rule is written once, as expressions: `ranked` and `better`. Floats, arrays and the inverse as
+one formula (`expressions`) run the same code.
+"""
 
 from __future__ import annotations
 
+from itertools import chain, count
 import math
-from typing import Any, List, Optional, Sequence, Tuple
+from typing import Any, List, Sequence
 
 import numpy as np
 
-from .problem import Found, InverseProblem
+from .problem import InverseProblem
 from ..tolerances import CLOSE, SINGULAR, TOLERANCE
+from ...cache import Cache
+from ...formula.expression import argument, gated, nearest_integer, Real, real, square_root, where
+from ...formula.program import Program
 
-# For each input its two ends, () if it has none.
-Limits = Sequence[Sequence[float]]
-# Successive solutions of a path that are placed at once, from the first to the most.
-FIRST, MOST = 16, 8192
+Reals = Sequence[Real]
 
 
-def choose(problem: InverseProblem, solutions: Sequence[Found], seed: Optional[Sequence[float]],
-           limits: Limits) -> Found:
+def ranked(problem: InverseProblem, inputs: Reals, rates: Reals, seed: Reals = (),
+           ends: Sequence[Reals] = ()) -> List[Reals]:
     """
-    Return the chosen one of some solutions, NaN if there is none.
+    Return by what a solution is compared with others, its inputs as chosen, and its rates.
 
     It is the nearest to the inputs `seed`, whole turns included. Without `seed` it is, of one
     input, the least at which the output increases, else the least; of several, the one with the
     least first input. An input beyond an end by rounding of the outputs is at the end.
     """
-    return _chosen(problem, solutions, seed, limits)[1]
+    order = [x / size for x, size in zip(inputs, problem.sizes)]
+    places = [_nearest(x, y, turn) for x, y, turn in zip(inputs, seed, problem.turns)] or inputs
+    if any(ends):
+        places = [_inside(problem, by, place, rates, ends[by], not seed) if ends[by] else place
+                  for by, place in enumerate(places)]
+    if seed:
+        steps = ((x - y) / size for x, y, size in zip(places, seed, problem.sizes))
+        order.insert(0, square_root(sum((step * step for step in steps), real(0.0))))
+    elif problem.n == 1:
+        order.insert(0, where(rates[0] < 0.0, 1.0, 0.0))
+    return [order, places, rates]
 
 
-def _chosen(problem: InverseProblem, solutions: Sequence[Found],
-            seed: Optional[Sequence[float]], limits: Limits) -> Tuple[int, Found]:
-    """Return what `choose` does, and which of the solutions it is; -1 if there is none."""
-    best, sizes, n, limited = None, problem.sizes, problem.n, any(limits)
-    chosen: Tuple[int, Found] = -1, ((math.nan,) * n, (math.nan,) * (n * n))
-    for number, (inputs, rates) in enumerate(solutions):
-        places = inputs if seed is None else problem.nearest_equivalent(inputs, seed)
-        if limited:
-            places = tuple([_inside(problem, by, place, rates, ends, seed is None) if ends
-                            else place for by, (place, ends) in enumerate(zip(places, limits))])
-            if not math.isfinite(sum(places)):
-                continue
-        order = [rates[0] < 0.0 and n == 1, *[x / size for x, size in zip(inputs, sizes)]] \
-            if seed is None else [math.hypot(*[
-                (x - y) / size for x, y, size in zip(places, seed, sizes)])]
-        if best is None or _before(order, best):
-            best, chosen = order, (number, (places, rates))
-    return chosen
+def better(solution: Sequence[Reals], best: Sequence[Reals]) -> List[Reals]:
+    """Return the better one of two ranked solutions; numbers that differ by rounding are tied."""
+    (order, places, _), (best_order, best_places, _) = solution, best
+    *pairs, (first, second) = zip(order, best_order)
+    precedes = first < second - CLOSE
+    for first, second in reversed(pairs):
+        precedes = where(abs(first - second) <= CLOSE, precedes, first < second - CLOSE)
+    is_there, was_there = (abs(sum(x[1:], x[0])) < math.inf for x in (places, best_places))
+    chosen = where(was_there, where(is_there, precedes, is_there), is_there)
+    return [[where(chosen, x, y) for x, y in zip(*parts)] for parts in zip(solution, best)]
 
 
-def _before(order: Sequence[float], other: Sequence[float]) -> bool:
-    """Return whether numbers precede others in lexicographic order; rounding is a tie."""
-    for x, y in zip(order, other):
-        if abs(x - y) > CLOSE:
-            return x < y
-    return False
+def _nearest(x: Real, seed: Real, turn: float) -> Real:
+    return x if turn == math.inf else x + turn * nearest_integer((seed - x) / turn)
 
 
-def _inside(problem: InverseProblem, by: int, place: float, rates: Sequence[float],
-            ends: Sequence[float], first: bool) -> float:
+def _inside(problem: InverseProblem, by: int, place: Real, rates: Reals, ends: Reals,
+            first: bool) -> Real:
     """Return an input between two ends, after whole turns if needed; NaN if there is none."""
-    (lower, upper), turn = ends, problem.turns[by]
-    slack = _slack(problem, by, [abs(rate) for rate in rates], lower, upper)
+    (lower, upper), n, turn, size = ends, problem.n, problem.turns[by], problem.sizes[by]
+    # How far rounding of the outputs moves an input: next to an extreme, half of all digits.
+    slack = real(SINGULAR * size)
+    for rate, scale in zip(rates[n * by:n * by + n], problem.scales):
+        moved = TOLERANCE * math.pi * scale / (abs(rate) + 1e-300)
+        slack = where(moved < slack, moved, slack)
+    slack = slack + TOLERANCE * (4.0 * size + abs(lower) + abs(upper))
     low, high = lower - slack, upper + slack
-    if turn < math.inf and (first or not low <= place <= high):
-        place += turn * (math.ceil((low - place) / turn) if first or place < low else
-                         math.floor((high - place) / turn))
-    return min(max(place, lower), upper) if low <= place <= high else math.nan
+    if turn < math.inf:
+        up, down = _ceiling((low - place) / turn), -_ceiling((place - high) / turn)
+        place = place + turn * (up if first else where(
+            place < low, up, where(high < place, down, 0.0)))
+    inner = where(place < lower, lower, where(upper < place, upper, place))
+    return gated(gated(inner, place - low, 0.0), high - place, 0.0)
 
 
-def _slack(problem: InverseProblem, by: int, speeds: Sequence[Any], low: Any, high: Any) -> Any:
-    """Return how far rounding of the outputs moves an input; rates may be NaN."""
-    n, size = problem.n, problem.sizes[by]
-    # Next to an extreme, half of all digits.
-    far: Any = SINGULAR * size
-    for speed, scale in zip(speeds[n * by:n * by + n], problem.scales):
-        # The distance from which on the output changes by more than its rounding.
-        moved = TOLERANCE * math.pi * scale / (speed + 1e-300)
-        far = np.fmin(far, moved) if isinstance(moved, np.ndarray) else min(far, moved)
-    return far + TOLERANCE * (4.0 * size + abs(low) + abs(high))
+def _ceiling(x: Real) -> Real:
+    nearest = nearest_integer(x)
+    return where(nearest < x, nearest + 1.0, nearest)
 
 
-def _slacks(problem: InverseProblem, by: int, solutions: np.ndarray, ends: Sequence[float]
-            ) -> np.ndarray:
-    """Return what `_slack` does for columns of solutions."""
-    return np.asarray(_slack(problem, by, np.abs(solutions[:, problem.n:]).swapaxes(0, 1), *ends))
+class Choice:
+    """The choice of solutions, each its inputs and rates as floats or as arrays of one shape."""
 
+    def __init__(self, problem: InverseProblem):
+        self._problem = problem
+        self._codes = Cache(lambda key: self._code(*key))
 
-def choose_arrays(problem: InverseProblem, solutions: np.ndarray,
-                  seed: Optional[Sequence[np.ndarray]], limits: Limits) -> np.ndarray:
-    """Return what `choose` does for columns of solutions (solutions, inputs and rates, m)."""
-    n, solutions = problem.n, solutions.copy()
-    places, inputs, rates = solutions[:, :n], solutions[:, :n].copy(), solutions[:, n:]
-    for by, (x, turn, ends) in enumerate(zip(places.swapaxes(0, 1), problem.turns, limits)):
-        if seed is not None and turn < math.inf:
-            x += turn * np.rint((seed[by] - x) / turn)
-        if ends:
-            slack = _slacks(problem, by, solutions, ends)
-            low, high = ends[0] - slack, ends[1] + slack
-            if turn < math.inf:
-                up, down = np.ceil((low - x) / turn), np.floor((high - x) / turn)
-                x += turn * np.where((x < low) | (seed is None), up, np.where(x > high, down, 0.0))
-            x[:] = np.where((low <= x) & (x <= high), np.clip(x, ends[0], ends[1]), math.nan)
-    sizes = np.reshape(problem.sizes, (n, 1))
-    if seed is None:
-        orders: List[np.ndarray] = [*inputs.swapaxes(0, 1) / sizes[..., None]]
-        if n == 1:
-            orders.insert(0, np.where(rates[:, 0] < 0.0, 1.0, 0.0))
-    else:
-        orders = [np.sqrt((((places - np.stack(seed)) / sizes) ** 2).sum(axis=1))]
-    best = np.zeros(inputs.shape[2], int)
-    column, valid = np.arange(inputs.shape[2]), np.isfinite(places).all(axis=1)
-    for k in range(1, len(inputs)):
-        before, tied = np.zeros(len(column), bool), np.ones(len(column), bool)
-        for order in orders:
-            gap = order[k] - order[best, column]
-            before |= tied & (gap < -CLOSE)
-            tied &= np.abs(gap) <= CLOSE
-        best = np.where(valid[k] & (before | ~valid[best, column]), k, best)
-    return np.where(valid[best, column], solutions[best, :, column].T, math.nan)
+    def _code(self, follows: bool, limited: Sequence[bool]) -> Any:
+        """Return the code for the better one, and a state of no solution."""
+        problem, numbers = self._problem, map(argument, count())
 
+        def arguments(number: int) -> Reals:
+            return [x for _, x in zip(range(number), numbers)]
 
-def choose_path(problem: InverseProblem, solutions: np.ndarray, seed: Optional[Sequence[float]],
-                limits: Limits) -> np.ndarray:
-    """
-    Return what `choose` does for successive columns of solutions, as `choose_arrays` does.
+        n = problem.n
+        solution = arguments(n), arguments(n * n)
+        seed = arguments(n * follows)
+        state = ranked(problem, *solution, seed, [arguments(2 * each) for each in limited])
+        best = better(state, [arguments(len(part)) for part in state])
+        return problem.linkage.bind(Program([*chain(*best)], next(numbers).args[0])), [
+            math.nan] * sum(map(len, best))
 
-    Each is the nearest to the one before, which needs no choice where the input just goes on.
-    """
-    n, found = problem.n, np.full(solutions.shape[1:], math.nan)
-    inside = _may_be_inside(problem, solutions, limits)
-    places = np.flatnonzero(inside.any(axis=0))
-    solutions = np.where(inside[:, None], solutions, math.nan)[:, :, places]
-    following = _following(problem, solutions[:, :n])
-    at, most = 0, FIRST
-    while at < len(places):
-        known = np.flatnonzero(inside[:, places[at]])
-        number, chosen = _chosen(problem, [
-            (tuple(x[:n]), tuple(x[n:])) for x in solutions[known, :, at].tolist()], seed, limits)
-        if number < 0:
-            at += 1
-            continue
-        numbers = [known[number]]
-        for numbered in zip(*following[:, at:at + most - 1].tolist()):
-            numbers.append(numbered[numbers[-1]])
-        run = solutions[numbers, :, range(at, at + len(numbers))].T
-        run[:, 0] = *chosen[0], *chosen[1]
-        run = run[:, :_go_on(problem, run, limits)]
-        stop = at + run.shape[1]
-        found[:, places[at:stop]], seed = run, tuple(run[:n, -1].tolist())
-        most = min(2 * most, MOST) if stop - at == len(numbers) else FIRST
-        at = stop
-    return found
+    def of(self, solutions: Any, seed: Any, limits: Sequence[Sequence[float]]) -> Any:
+        """Return the chosen one of solutions, NaN if there is none; limits are () or two ends."""
+        code, best = self._codes[len(seed) > 0, tuple(map(bool, limits))]
+        better = code.searched if isinstance(solutions, np.ndarray) else code.at
+        given = *seed, *chain(*limits)
+        for solution in solutions:
+            best = better(*solution, *given, *best)
+        return best[-self._problem.n * (self._problem.n + 1):]
 
-
-def _may_be_inside(problem: InverseProblem, solutions: np.ndarray, limits: Limits) -> np.ndarray:
-    """Return which solutions there are, and after whole turns are between their ends."""
-    inside = np.isfinite(solutions[:, 0])
-    for by, (turn, ends) in enumerate(zip(problem.turns, limits)):
-        if ends:
-            x, slack = solutions[:, by], _slacks(problem, by, solutions, ends)
-            low, high = ends[0] - slack, ends[1] + slack
-            x = x + (turn * np.ceil((low - x) / turn) if turn < math.inf else 0.0)
-            inside &= (low <= x) & (x <= high)
-    return inside
-
-
-def _following(problem: InverseProblem, inputs: np.ndarray) -> np.ndarray:
-    """Return for inputs (solutions, inputs, m) which of the next ones are the nearest to each."""
-    following = np.zeros((len(inputs), max(inputs.shape[2] - 1, 0)), int)
-    for nearest, here in zip(following, inputs[..., :-1]):
-        least = np.full(len(nearest), math.inf)
-        for number, there in enumerate(inputs[..., 1:]):
-            far = np.sqrt(sum(problem.distance(by, x, y) ** 2
-                              for by, (x, y) in enumerate(zip(here, there))))
-            nearer = far < least - CLOSE
-            nearest[nearer], least[nearer] = number, far[nearer]
-    return following
-
-
-def _go_on(problem: InverseProblem, run: np.ndarray, limits: Limits) -> int:
-    """Add the whole turns to successive solutions; return after how many one leaves its ends."""
-    n, count = problem.n, run.shape[1]
-    for by, (row, turn, ends) in enumerate(zip(run[:n], problem.turns, limits)):
-        if turn < math.inf:
-            row[1:] += turn * np.cumsum(np.rint((row[:-1] - row[1:]) / turn))
-        if ends:
-            slack = _slack(problem, by, np.abs(run[n:]), *ends)
-            beyond = np.flatnonzero((row < ends[0] - slack) | (ends[1] + slack < row))
-            count = min([count, *beyond[:1].tolist()])
-            row.clip(*ends, out=row)
-    return count
+    def along(self, solutions: np.ndarray, seed: Sequence[float],
+              limits: Sequence[Sequence[float]]) -> np.ndarray:
+        """Return for columns of solutions the nearest one to that of the column before."""
+        found = np.full(solutions.shape[1:], math.nan)
+        for chosen, column in zip(found.T, np.moveaxis(solutions, 2, 0).tolist()):
+            chosen[:] = self.of([row for row in column if row[0] == row[0]], seed, limits)
+            if chosen[0] == chosen[0]:
+                seed = chosen[:self._problem.n].tolist()
+        return found

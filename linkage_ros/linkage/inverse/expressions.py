@@ -4,32 +4,23 @@
 """
 The inverse as expressions of the outputs: all modes in closed form, and the choice of one.
 
-They are what `modes`, `refine` and `choice` compute, for one formula without loops: a mode is a
-solution if the forward formula says so, and is not refined.
+They are what `modes` and `refine` compute, for one formula without loops: a mode is a solution if
+the forward formula says so, and is not refined.
 """
 
 from __future__ import annotations
 
+from functools import reduce
 from itertools import product
 import math
 from typing import List, Mapping, Sequence
 
+from .choice import better, ranked
 from .linkage import InverseLinkage
 from .problem import InverseProblem
 from ..geometry.spatial import IN_SINGLE
 from ..tolerances import CLOSE
-from ...formula.expression import (
-    argument,
-    derivative,
-    gated,
-    nearest_integer,
-    Real,
-    real,
-    square,
-    square_root,
-    substituted,
-    where,
-)
+from ...formula.expression import argument, derivative, gated, nearest_integer, Real, substituted
 
 # A mode whose outputs are off by more than this [sizes] is no solution.
 OFF = 2.0 ** -20
@@ -55,38 +46,11 @@ def modes_of(problem: InverseProblem, closed: InverseLinkage) -> List[Inputs]:
 
 
 def chosen_of(problem: InverseProblem, modes: Sequence[Inputs], follows: bool) -> Inputs:
-    """Return the inputs of one mode; see `choice.choose`. To follow, next to more arguments."""
-    (best, places), *others = [_ranked(problem, inputs, follows) for inputs in modes]
-    for order, found in others:
-        better = _precedes(order, best)
-        best, places = ([where(better, x, y) for x, y in zip(*pair)]
-                        for pair in ((order, best), (found, places)))
-    return places
-
-
-def _ranked(problem: InverseProblem, inputs: Inputs, follows: bool) -> Sequence[Inputs]:
-    """Return by what a mode is compared with others, and its inputs."""
-    n, order = problem.n, [x / size for x, size in zip(inputs, problem.sizes)]
-    if follows:
-        near = [argument(n + by) for by in range(n)]
-        steps = [_nearest(x - y, turn) for x, y, turn in zip(inputs, near, problem.turns)]
-        far = square_root(sum((square(step / size) for step, size in zip(
-            steps, problem.sizes)), real(0.0)))
-        return [far, *order], [x + step for x, step in zip(near, steps)]
-    if n == 1:
-        falls = derivative(inputs[0], {0: 1.0}, {}) < 0.0
-        order.insert(0, where(falls, 1.0, 0.0))
-    return order, inputs
-
-
-def _precedes(order: Inputs, best: Inputs) -> Real:
-    """Return whether one of two modes is the better one, and is there."""
-    *_, (first, second) = pairs = [*zip(order, best)]
-    is_there, was_there = (abs(x) < math.inf for x in (first, second))
-    precedes = first < second - CLOSE
-    for first, second in pairs[-2::-1]:
-        precedes = where(abs(first - second) <= CLOSE, precedes, first < second - CLOSE)
-    return where(was_there, where(is_there, precedes, is_there), is_there)
+    """Return the inputs of one mode; see `choice.ranked`. To follow, next to more arguments."""
+    seed = [argument(problem.n + by) for by in range(problem.n * follows)]
+    _, places, _ = reduce(lambda best, mode: better(mode, best), [
+        ranked(problem, inputs, [derivative(inputs[0], {0: 1.0}, {})], seed) for inputs in modes])
+    return [*places]
 
 
 def _nearest(gap: Real, turn: float) -> Real:

@@ -19,7 +19,7 @@ from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
-from .problem import Found, InverseProblem
+from .problem import InverseProblem, Row
 from .refine import refine
 from .segments import Segments
 from ..motion.curves import HALVINGS
@@ -29,12 +29,11 @@ LONGEST = 0.7
 
 
 def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
-           source: object) -> Optional[Found]:
+           source: object) -> Optional[Row]:
     """Return the solution, with the whole turns of `seed`, and its rates; None if none."""
     start = problem.forward.at(*seed)[:problem.n]
     if not all(map(math.isfinite, start)):
         return None
-    found: Optional[Found]
     if isinstance(source, Segments):
         input_ = problem.inputs[0]
         turns = input_.turns_of(seed[0])
@@ -47,11 +46,11 @@ def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[floa
         seed = (turns + passed + bracket[2],)
     else:
         found, seed = _followed(problem, values, seed, start)
-    return found and (problem.nearest_equivalent(found[0], seed), found[1])
+    return found and (*problem.nearest_equivalent(found, seed), *found[problem.n:])
 
 
 def _followed(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
-              start: Sequence[float]) -> Tuple[Optional[Found], Sequence[float]]:
+              start: Sequence[float]) -> Tuple[Optional[Row], Sequence[float]]:
     """Return the end of the motion, None if there is none, and inputs in its turn."""
     gaps = [math.remainder(now - value, turn) for now, value, turn in zip(
         start, values, problem.periods)]
@@ -60,10 +59,10 @@ def _followed(problem: InverseProblem, values: Sequence[float], seed: Sequence[f
         rest = max(left - part, 0.0)
         found = refine(problem, [x + rest * gap for x, gap in zip(values, gaps)], tuple(seed))
         # A fold is not passed, nor is the motion left for another one.
-        if found and _side(found[1]) == side and all(
+        if found and _side(found[problem.n:]) == side and all(
                 abs(x - y) <= LONGEST * size for x, y, size in zip(
-                    problem.nearest_equivalent(found[0], seed), seed, problem.sizes)):
-            seed, left = problem.nearest_equivalent(found[0], seed), rest
+                    problem.nearest_equivalent(found, seed), seed, problem.sizes)):
+            seed, left = problem.nearest_equivalent(found, seed), rest
             if not left:
                 return found, seed
             part = min(4.0 * part, left)

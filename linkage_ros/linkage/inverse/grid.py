@@ -20,9 +20,8 @@ from typing import Callable, Iterator, List, Sequence, Set, Tuple, Union
 import numpy as np
 
 from .follow import LONGEST
-from .problem import Found, InverseProblem
-from .refine import refine_inside
-from .segments import segments_of
+from .problem import InverseProblem, Row
+from .segments import Bracket, segments_of
 from ..formulas import Names
 from ..kinematics import Kinematics
 from ..motion.curves import HALVINGS
@@ -81,34 +80,24 @@ class Grid:
         if not self.is_held:
             self._check_independent()
 
-    def candidates(self, values: Sequence[float]) -> Iterator[Union[Found, Tuple[float, ...]]]:
-        """Yield inputs next to which the outputs may have some values, or solutions."""
-        start = [0.5 * (input_.low + input_.high) for input_ in self._inputs]
-        for place, by in self._held.items():
-            start[by] = values[place] / self._sizes[by]
-        found, target = np.array([start]), np.array(values)
+    def candidates(self, values: Sequence[float]) -> Iterator[Union[Bracket, Row]]:
+        """Yield inputs, or brackets of the first, at which the outputs may have some values."""
+        held = {by: values[place] for place, by in self._held.items()}
+        if self.is_held:
+            (place,), others = {*range(len(values))} - self._held.keys(), tuple(
+                held[by] for by in range(1, len(values)))
+            for bracket in segments_of(self._problem.linkage, self._problem.outputs[place],
+                                       others).candidates(values[place:place + 1]):
+                yield bracket._replace(place=place, others=others)
+            return
+        found = np.array([[held.get(by, 0.5 * (input_.low + input_.high)) / size for by, (
+            input_, size) in enumerate(zip(self._problem.linkage.inputs, self._sizes))]])
         for rows, columns in self._blocks:
-            if self.is_held and columns == [0]:
-                yield from self._on_segments(rows[0], values)
-                return
             if not self._held.keys() >= {*rows}:
                 found = np.concatenate([found[:0], *(
-                    self._solutions(q, target, rows, columns) for q in found)])
+                    self._solutions(q, np.array(values), rows, columns) for q in found)])
         for q in found * self._sizes:
             yield tuple(q.tolist())
-
-    def _on_segments(self, row: int, values: Sequence[float]) -> Iterator[Found]:
-        problem, held = self._problem, {by: values[place] for place, by in self._held.items()}
-        others, n = [held[by] for by in range(1, len(values))], len(values)
-
-        def at(x: float) -> Sequence[float]:
-            return problem.rated.at(x, *others)[row:row + n + 1:n]
-
-        for bracket in segments_of(problem.linkage, problem.outputs[row], others).candidates(
-                values[row:row + 1]):
-            if found := refine_inside(at, values[row], problem.periods[row], problem.scales[row],
-                                      problem.sizes[0], bracket):
-                yield (found[0], *others), tuple(problem.rated.at(found[0], *others)[n:])
 
     def _errors(self, q: np.ndarray, target: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return the errors of the outputs from their target, and the Jacobian, per row of q."""

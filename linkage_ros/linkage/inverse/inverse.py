@@ -13,31 +13,19 @@ from __future__ import annotations
 
 from functools import cached_property
 import math
-from typing import (
-    Any,
-    Callable,
-    cast,
-    Iterator,
-    List,
-    Mapping,
-    NamedTuple,
-    Optional,
-    Sequence,
-    Tuple,
-    Union,
-)
+from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import rods
-from .choice import choose, choose_arrays, choose_path
+from .choice import Choice
 from .expressions import chosen_of, modes_of, SINGLE
 from .follow import follow
 from .grid import blocks, Grid
 from .linkage import InverseLinkage, taken_apart
 from .modes import Modes
-from .problem import Found, InverseProblem
+from .problem import InverseProblem, Row
 from .refine import distinct, distinct_arrays, refine, refine_arrays
 from .segments import Segments, segments_of
 from ..kinematics import Kinematics
@@ -46,8 +34,8 @@ from ..tolerances import SINGULAR
 from ...formula.expression import Real
 from ...words import listed, plain_text, quoted
 
-# Arrays are solved in blocks that stay in a processor's cache, and few values as floats.
-BLOCK, FEW = 8192, 32
+# Few values are solved as floats.
+FEW = 32
 
 Ends = Optional[Sequence[Optional[Tuple[float, float]]]]
 
@@ -128,10 +116,11 @@ class Inverse:
         self.linkage, self.outputs, self._n = linkage, outputs, len(outputs)
         blocks(linkage, outputs)
         self._problem = InverseProblem(linkage, outputs)
+        self._choice = Choice(self._problem)
         self.inputs = self._problem.inputs
         self._is_part = any(each.is_part for each in self.inputs)
-        if self._n > 1 and not self.closed:
-            self._source = Grid(self._problem)  # raises ValueError for dependent outputs
+        if not self.is_quick:
+            assert self._source  # raises ValueError for dependent outputs
 
     @cached_property
     def closed(self) -> Optional[InverseLinkage]:
@@ -193,48 +182,27 @@ class Inverse:
             If there is not one value for each output, and one finite `near` for each input.
 
         """
-        if near is not None and (there := self._elsewhere(self._one_each(near, 'near'))):
-            inverse, start, own = there
-            return [Solution(tuple(np.add(each, start).tolist()), self) for each, _ in inverse.all(
-                np.subtract(self._one_each(values), own), np.subtract(
-                    self._one_each(near), start))]
-        found = [inputs for inputs, _ in self._all(self._one_each(values))]
-        if near is not None:
-            seed = self._finite(near, 'near')
+        seed = () if near is None else self._numbers(near, 'near', finite=True)
+        found = [row[:self._n] for row in self._all(self._numbers(values), seed)]
+        if seed:
             found = sorted(
                 (self._problem.nearest_equivalent(inputs, seed) for inputs in found),
                 key=lambda x: sum(((a - b) / size) ** 2 for a, b, size in zip(
                     x, seed, self._problem.sizes)))
         return [Solution(inputs, self) for inputs in found]
 
-    def _elsewhere(self, near: Sequence[float]
-                   ) -> Optional[Tuple[Inverse, Sequence[float], Sequence[float]]]:
+    def _around(self, near: Sequence[float]) -> Tuple[Inverse, np.ndarray, np.ndarray]:
         """
-        Return the inverse in the turns of some inputs, if it is not this one, and these turns.
+        Return the inverse in the turns of some inputs, and these turns.
 
-        These are the angles [rad] of each input, and of each output that is an input.
+        These are the angles [rad] of each input with zeros for its rates, and of each output.
         """
         turns = [float(input_.whole_turns(x)) if math.isfinite(x) else 0.0
-                 for input_, x in zip(self.inputs, near)]
-        if not any(turns):
-            return None
+                 for input_, x in zip(self.inputs, near or [0.0] * self._n)]
         start = {input_.name: math.tau * count for input_, count in zip(self.inputs, turns)}
-        return (inverse_of(self.linkage.turned(*turns), self.outputs), list(start.values()),
-                [start.get(name, 0.0) for name in self.outputs])
-
-    def _in_turns(self, method: str, values: Sequence[Any], near: Sequence[float],
-                  *limits: Sequence[Sequence[float]]) -> Optional[Tuple[Any, Any]]:
-        """Return what a method does in the turns of some inputs; None if those are these."""
-        there = self._is_part and self._elsewhere(near)
-        if not there:
-            return None
-        inverse, start, own = there
-        ends = [[tuple(end - turn for end in pair) or None for pair, turn in zip(each, start)]
-                for each in limits]
-        inputs, rates = getattr(inverse, method)(
-            [x - turn for x, turn in zip(values, own)],
-            [x - turn for x, turn in zip(near, start)], *ends)
-        return tuple(x + turn for x, turn in zip(inputs, start)), rates
+        return (inverse_of(self.linkage.turned(*turns), self.outputs) if any(turns) else self,
+                np.array([*start.values(), *[0.0] * self._n ** 2]),
+                np.array([start.get(name, 0.0) for name in self.outputs]))
 
     def over(self, *values: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
         """
@@ -248,72 +216,60 @@ class Inverse:
 
         """
         rows = _broadcast(self._each(values))
-        found = self._all_arrays(rows)
+        found = self._all_arrays(np.stack([row.ravel() for row in rows]))
         found = np.moveaxis(found, 0, -1).reshape(len(found[0]), *rows[0].shape, len(found))
         return found[:self._n], found[self._n:]
 
-    def _all(self, values: Sequence[float]) -> List[Found]:
+    def _all(self, values: Sequence[float], near: Sequence[float] = ()) -> List[Row]:
         """Return all solutions in order, none for values that are not finite."""
+        if near and self._is_part:
+            inverse, turned, own = self._around(near)
+            if inverse is not self:
+                return [tuple((turned + row).tolist()) for row in inverse._all(
+                    (values - own).tolist())]
         if not all(map(math.isfinite, values)):
             return []
         problem = self._problem
         values = problem.reduced(values)
-        found = [solution for candidate in self._source.candidates(values)
-                 if (solution := refine(problem, values, candidate))]
+        found = [row for candidate in self._source.candidates(values)
+                 if (row := refine(problem, values, candidate))]
         return distinct(problem, found) if len(found) > 1 else found
 
-    def _all_arrays(self, rows: Sequence[np.ndarray]) -> np.ndarray:
-        """Return all solutions in order (solutions, inputs and rates, m), padded with NaN."""
-        blocks = [*self._blocks(rows)]
-        most = max(map(len, blocks))
-        return np.concatenate([np.pad(block, ((0, most - len(block)), (0, 0), (0, 0)),
-                                      constant_values=math.nan) for block in blocks], axis=2)
+    def _all_arrays(self, values: np.ndarray) -> np.ndarray:
+        """
+        Return all solutions for values (outputs, m) in order, padded with NaN.
 
-    def _blocks(self, rows: Sequence[np.ndarray]) -> Iterator[np.ndarray]:
-        """Yield what `_all_arrays` returns in blocks, at least one."""
-        values = self._problem.reduced_arrays(np.stack([row.ravel() for row in rows]))
-        for k in range(0, max(values.shape[1], 1), BLOCK):
-            yield self._block(values[:, k:k + BLOCK])
-
-    def _block(self, values: np.ndarray) -> np.ndarray:
-        """Return all solutions for values (outputs, m), as `_all_arrays` does."""
+        Their shape is (solutions, inputs and rates, m), with one solution at least.
+        """
         problem, n, count = self._problem, self._n, values.shape[1]
         if count <= FEW or isinstance(self._source, Grid):
-            each = [self._all(column) for column in values.T.tolist()]
-            found = np.full((max(map(len, each), default=0) or 1, n + n * n, count), math.nan)
-            for k, solutions in enumerate(each):
-                for i, (inputs, rates) in enumerate(solutions):
-                    found[i, :, k] = *inputs, *rates
+            lists = [self._all(column) for column in values.T.tolist()]
+            found = np.full((max(map(len, lists), default=0) or 1, n + n * n, count), math.nan)
+            for k, solutions in enumerate(lists):
+                found[:len(solutions), :, k] = solutions or math.nan
             return found
+        values = problem.reduced_arrays(values)
         parts = self._source.candidate_arrays(values)
         found = np.full((len(parts) or 1, n + n * n, count), math.nan)
         if parts:
             places, candidates = zip(*parts)
             solved = refine_arrays(problem, values[:, np.concatenate(places)], np.concatenate(
                 candidates, axis=1))
-            filled = np.zeros(count, int)
-            for place in places:
-                found[filled[place], :, place] = solved[:, :len(place)].T
-                filled[place] += 1
-                solved = solved[:, len(place):]
-            found = found[:max(filled.max(initial=0), 1)]
+            for rows, place, part in zip(found, places, np.split(
+                    solved, np.cumsum([len(place) for place in places])[:-1], axis=1)):
+                rows[:, place] = part
         return distinct_arrays(problem, found)
 
     # --- arguments ---
 
-    def _one_each(self, values: Any, name: str = 'values') -> Tuple[float, ...]:
+    def _numbers(self, values: Any, name: str = 'values', finite: bool = False) -> Row:
         """Return one number for each output; raise ValueError if there are not as many."""
         found = self._each(values, name)
         if any(type(each) is not float and each.size != 1 for each in found):
             raise self._miscounted(values, name)
+        if finite and not np.isfinite(found).all():
+            raise ValueError(f'{name} must be finite, got {quoted(list(map(float, found)))}')
         return tuple([each if type(each) is float else each.item() for each in found])
-
-    def _finite(self, values: Any, name: str) -> Tuple[float, ...]:
-        """Return what `_one_each` does; raise ValueError also if one is not finite."""
-        found = self._one_each(values, name)
-        if not all(map(math.isfinite, found)):
-            raise ValueError(f'{name} must be finite, got {quoted(list(found))}')
-        return found
 
     def _each(self, values: Any, name: str = 'values') -> Tuple[Any, ...]:
         """Return a float or an array for each output; raise ValueError if they are not that."""
@@ -378,25 +334,22 @@ class Inverse:
             If there is not one value for each output, or ends are not finite and in order.
 
         """
-        limits, values = self._limits(ends), self._each(values)
-        near = None if near is None else self._each(near, 'near')
-        given = (*values, *(near or ()))
-        if set(map(type, given)) == {float}:
-            return near and self._in_turns('nearest', values, near, limits) or choose(
-                self._problem, self._all(values), near, limits)
-        rows = _broadcast(given)
-        shape, rows = rows[0].shape, [row.ravel() for row in rows]
-        if near and self._is_part:
-            alone = [self.nearest(column[:self._n], column[self._n:], ends)
-                     for column in np.stack(rows).T.tolist()]
-            return cast(Tuple[Any, Any], tuple(
-                tuple(np.reshape(part, (len(alone), -1)).T.reshape(-1, *shape))
-                for part in (zip(*alone) if alone else ([], []))))
-        chosen = np.concatenate([choose_arrays(self._problem, block, [
-            row[k * BLOCK:(k + 1) * BLOCK] for row in rows[self._n:]] or None, limits)
-            for k, block in enumerate(self._blocks(rows[:self._n]))], axis=1)
+        n, limits, values = self._n, self._limits(ends), self._each(values)
+        seed = () if near is None else self._each(near, 'near')
+        if {float} == {*map(type, values), *map(type, seed)}:
+            row = self._choice.of(self._all(values, seed), seed, limits)
+            return tuple(row[:n]), tuple(row[n:])
+        rows = _broadcast((*values, *seed))
+        shape, flat = rows[0].shape, np.stack([row.ravel() for row in rows])
+        if seed and self._is_part:
+            # Each has the solutions of its own turns.
+            chosen = np.reshape([
+                self._choice.of(self._all(column[:n], column[n:]), column[n:], limits)
+                for column in flat.T.tolist()], (-1, n + n * n)).T
+        else:
+            chosen = self._choice.of(self._all_arrays(flat[:n]), flat[n:], limits)
         found = [row.reshape(shape) for row in chosen]
-        return tuple(found[:self._n]), tuple(found[self._n:])
+        return tuple(found[:n]), tuple(found[n:])
 
     def path(self, values: Sequence[ArrayLike], near: Optional[ArrayLike] = None,
              ends: Ends = None) -> Tuple[Any, Any]:
@@ -418,16 +371,16 @@ class Inverse:
 
         """
         limits = self._limits(ends)
-        seed = None if near is None else self._finite(near, 'near')
+        seed: Row = () if near is None else self._numbers(near, 'near', finite=True)
         rows = [np.atleast_1d(row) for row in _broadcast(self._each(values))]
         if rows[0].ndim > 1:
             raise self._miscounted(values, 'values')
-        if seed and (there := self._in_turns('path', rows, seed, limits)):
-            return there
-        found = choose_path(self._problem, self._all_arrays(rows), seed, limits)
+        inverse, turned, own = self._around(seed)
+        solutions = inverse._all_arrays(rows - own[:, None]) + turned[:, None]
+        found = self._choice.along(solutions, seed, limits)
         return tuple(found[:self._n]), tuple(found[self._n:])
 
-    def follow(self, values: ArrayLike, near: ArrayLike) -> Found:
+    def follow(self, values: ArrayLike, near: ArrayLike) -> Tuple[Row, Row]:
         """
         Return the solution that is continuous from given inputs.
 
@@ -447,13 +400,14 @@ class Inverse:
             leaves the reach.
 
         """
-        values, near = self._one_each(values), self._one_each(near, 'near')
-        known = all(map(math.isfinite, (*values, *near)))
-        if known and (there := self._in_turns('follow', values, near)):
-            return there
-        return known and follow(self._problem, self._problem.reduced(values), near,
-                                self._source) or (
-            (math.nan,) * self._n, (math.nan,) * self._n ** 2)
+        values, near = self._numbers(values), self._numbers(near, 'near')
+        inverse, turned, own = self._around(near)
+        problem, row = inverse._problem, None
+        if all(map(math.isfinite, (*values, *near))):
+            row = follow(problem, problem.reduced((values - own).tolist()), (
+                near - turned[:self._n]).tolist(), inverse._source)
+        found = tuple((turned + (row or math.nan)).tolist())
+        return found[:self._n], found[self._n:]
 
     # --- arrays of other packages ---
 
@@ -511,7 +465,7 @@ class Inverse:
 
     def jacobian(self, inputs: ArrayLike) -> np.ndarray:
         """Return d outputs / d inputs at a pose (inputs,), shape (outputs, inputs)."""
-        rates = self._problem.rated.at(*self._one_each(inputs, 'inputs'))[self._n:]
+        rates = self._problem.rated.at(*self._numbers(inputs, 'inputs'))[self._n:]
         return np.reshape(rates, (self._n, self._n)).T
 
     def margin(self, inputs: ArrayLike) -> float:
@@ -524,7 +478,7 @@ class Inverse:
 
     def signs(self, inputs: Sequence[float]) -> Mapping[str, int]:
         """Return the working mode of a pose; see `Solution.signs`."""
-        linkage, inputs = self.linkage, self._one_each(inputs, 'inputs')
+        linkage, inputs = self.linkage, self._numbers(inputs, 'inputs')
         cranks = {link.name: link for link in linkage.links
                   if any(input_.turns and link.name == input_.name for input_ in linkage.inputs)}
         places, signs = linkage.solve(inputs if self._n > 1 else inputs[0]), {}

@@ -21,8 +21,8 @@ from ..kinematics import Kinematics
 from ..motion.curves import LEAST
 from ...formula.program import Pose
 
-# Inputs and rates of a solution.
-Found = Tuple[Tuple[float, ...], Tuple[float, ...]]
+# The inputs of a solution, then the rates of all outputs by the first input, by the second etc.
+Row = Tuple[float, ...]
 
 
 class InverseProblem:
@@ -105,7 +105,7 @@ class InverseProblem:
             row[far] = _within_period(row[far], turn)
         return values
 
-    def wrapped(self, inputs: Sequence[float]) -> Tuple[float, ...]:
+    def wrapped(self, inputs: Sequence[float]) -> Row:
         """Return inputs, angles within one period around zero, zero without sign."""
         return tuple([(x if 2.0 * abs(x) < turn else x - turn * math.floor(x / turn + 0.5))
                       if abs(x) > LEAST * size else 0.0
@@ -123,7 +123,7 @@ class InverseProblem:
                       else gap / self.sizes[by])
 
     def nearest_equivalent(self, inputs: Sequence[float], others: Sequence[float]
-                           ) -> Tuple[float, ...]:
+                           ) -> Row:
         """Return inputs plus the whole periods that bring them closest to others."""
         return tuple([x if turn == math.inf else x + turn * round((y - x) / turn)
                       for x, y, turn in zip(inputs, others, self.turns)])

@@ -12,11 +12,11 @@ the same on arrays. Where a bracket is known, Newton's method stays inside it.
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, List, Optional, Sequence, Tuple
+from typing import Any, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from .problem import Found, InverseProblem
+from .problem import InverseProblem, Row
 from .segments import Bracket, ULPS
 from ..motion.curves import HALVINGS
 from ..tolerances import ONE, SINGULAR
@@ -26,74 +26,75 @@ from ..tolerances import ONE, SINGULAR
 ROUNDED, ACCEPTED = 2.0 ** -52, ULPS * 2.0 ** -53
 # A larger error [sizes], or a longer step [rad, sizes], leads to another solution.
 FAR = 0.1
+# Steps of arrays: what is not refined then is refined one by one.
+STEPS = 3
+# Parts of a step.
+HALVES = [0.5 ** k for k in range(HALVINGS)]
+
+# The largest error of the outputs [sizes], the errors, the outputs and rates, and the inputs.
+Trial = Tuple[float, Sequence[float], Row, Row]
 
 
-def refine(problem: InverseProblem, values: Sequence[float], candidate: Sequence[Any]
-           ) -> Optional[Found]:
-    """
-    Return the solution at a candidate, with its rates; None if there is none.
-
-    A candidate is a `Bracket` of one input, values of several inputs, or a solution.
-    """
-    if isinstance(candidate[0], tuple):
-        return problem.wrapped(candidate[0]), candidate[1]
-    if problem.n == 1:
-        inside = refine_inside(problem.forward.at, values[0], problem.periods[0],
-                               problem.scales[0], problem.sizes[0], candidate)
-        return inside and (problem.wrapped(inside[:1]), inside[1:])
-    inputs, at, n, least, found = tuple(candidate), problem.forward.at, problem.n, math.inf, None
-    step: Sequence[float] = ()
-    if not math.isfinite(sum(at(*inputs)[:n])):
+def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Bracket, Row]
+           ) -> Optional[Row]:
+    """Return the solution at a candidate, its inputs and rates; None if there is none."""
+    if isinstance(candidate, Bracket):
+        return _refine_inside(problem, values, candidate)
+    best, n = _trial(problem, values, candidate), problem.n
+    if best[0] == math.inf:
         # Rounding may have led out of the reach.
-        near = ((*inputs[:by], inputs[by] + ulps * math.ulp(inputs[by]), *inputs[by + 1:])
-                for ulps in (2.0, -2.0, 16.0, -16.0) for by in range(n))
-        inputs = next((x for x in near if math.isfinite(sum(at(*x)[:n]))), inputs)
+        near = (_trial(problem, values, (
+            *candidate[:by], candidate[by] + ulps * math.ulp(candidate[by]), *candidate[by + 1:]))
+            for ulps in (2.0, -2.0, 16.0, -16.0) for by in range(n))
+        best = next((trial for trial in near if trial[0] < math.inf), best)
     for _ in range(HALVINGS):
-        row = at(*inputs)
-        gaps = [math.remainder(y - x, turn) if -math.inf < y < math.inf else math.nan
-                for y, x, turn in zip(row, values, problem.periods)]
-        error = max([abs(gap) / scale for gap, scale in zip(gaps, problem.scales)])
-        error += 0.0 * sum(gaps)  # NaN if one is
-        if found and error != error:
-            # The step leads out of the reach.
-            step = [0.5 * by for by in step]
-            inputs = tuple([x - by for x, by in zip(found[0], step)])
-            continue
-        if not error < least:
-            break
-        least, found = error, (inputs, row, gaps)
+        error, gaps, row, inputs = best
         if not ROUNDED < error <= FAR:
             break
         step = _step(problem, gaps, row)
         if not sum([abs(x) / size for x, size in zip(step, problem.sizes)]) <= FAR:
             break
-        inputs = tuple([x - by for x, by in zip(inputs, step)])
+        # A step that leads out of the reach is halved.
+        trials = (_trial(problem, values, tuple([
+            float(x - part * by) for x, by in zip(inputs, step)])) for part in HALVES)
+        trial = next((trial for trial in trials if trial[0] < math.inf), best)
+        if not trial[0] < error:
+            break
+        best = trial
+    error, *columns = best
     # Where rates are low, rounding is that of the outputs alone.
-    if not found or least > ACCEPTED and not (least <= SINGULAR and _errors(
-            problem, *(np.reshape(part, (-1, 1)) for part in (
-                found[2], found[1], found[0])))[0] <= ACCEPTED):
+    if error > ACCEPTED and not (error <= SINGULAR and _errors(
+            problem, *(np.reshape(part, (-1, 1)) for part in columns))[0] <= ACCEPTED):
         return None
-    return problem.wrapped(found[0]), found[1][n:]
+    return *problem.wrapped(best[3]), *best[2][n:]
 
 
-def refine_inside(at: Callable, value: float, period: float, scale: float, size: float,
-                  bracket: Bracket) -> Optional[Tuple[float, float]]:
-    """
-    Return the input in a bracket at which an output has a value, and the rate; None if none.
+def _trial(problem: InverseProblem, values: Sequence[float], inputs: Row) -> Trial:
+    """Return how far the outputs at some inputs are from their values, inf without a pose."""
+    row = problem.forward.at(*inputs)
+    if not math.isfinite(sum(row[:problem.n])):
+        return math.inf, (), row, inputs
+    gaps = [math.remainder(y - x, turn) for y, x, turn in zip(row, values, problem.periods)]
+    return max([abs(gap) / scale for gap, scale in zip(gaps, problem.scales)]), gaps, row, inputs
 
-    `at` returns the output and its rate. Newton's method stays inside the bracket.
-    """
-    low, high, x, sign = bracket
-    x, best, least = x if low <= x <= high else 0.5 * (low + high), (math.nan, math.nan), math.inf
+
+def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Bracket
+                   ) -> Optional[Row]:
+    """Return the solution in a bracket, which Newton's method does not leave; None if none."""
+    low, high, x, sign, place, others = bracket
+    n, value, at = problem.n, values[place], problem.rated.at
+    period, scale, size = problem.periods[place], problem.scales[place], problem.sizes[0]
+    x, least = x if low <= x <= high else 0.5 * (low + high), math.inf
+    best: Tuple[float, Row] = x, ()
     most = SINGULAR / ACCEPTED * scale
     for _ in range(HALVINGS):
-        output, rate = at(x)
-        gap = output - value
+        row = at(x, *others)
+        gap, rate = row[place] - value, row[place + n]
         if not -period <= 2.0 * gap <= period:
             gap = math.remainder(gap, period) if -math.inf < gap < math.inf else math.nan
         rounding = min(scale + abs(rate) * max(abs(x), size), most)
         if abs(gap) < least:
-            least, best = abs(gap), (x, rate)
+            least, best = abs(gap), (x, row)
             if least <= ROUNDED * rounding:
                 break
         elif least <= ACCEPTED * rounding:
@@ -107,24 +108,13 @@ def refine_inside(at: Callable, value: float, period: float, scale: float, size:
     # At a jump or in noise both sides enclose values that the output never has.
     if not least <= SINGULAR * scale:
         return None
-    x, rate = best
-    if not -math.inf < rate < math.inf:
-        # At an end of a segment, those of the nearest float that has rates.
-        near = (x + side * 2.0 ** k * math.ulp(x) for k in range(HALVINGS // 2)
+    x, row = best
+    if not -math.inf < row[place + n] < math.inf:
+        # At an end of a segment, rates are those of the nearest float that has them.
+        near = (at(x + side * 2.0 ** k * math.ulp(x), *others) for k in range(HALVINGS // 2)
                 for side in (1, -1))
-        rate = next(filter(math.isfinite, (at(y)[1] for y in near)), rate)
-    return x, rate
-
-
-def _step(problem: InverseProblem, gaps: Sequence[float], row: Sequence[float]) -> Sequence[float]:
-    """Return the step of Newton's method; NaN where the Jacobian is singular."""
-    n = problem.n
-    if n == 2:
-        a, b, c, d = row[2:]
-        det = a * d - b * c
-        return ((gaps[0] * d - gaps[1] * c) / det, (gaps[1] * a - gaps[0] * b) / det) if det else (
-            math.nan,)
-    return _step_arrays(problem, np.reshape(gaps, (n, 1)), np.reshape(row, (-1, 1)))[:, 0].tolist()
+        row = next((there for there in near if math.isfinite(there[place + n])), row)
+    return *problem.wrapped((x, *others)), *row[n:]
 
 
 def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.ndarray
@@ -134,38 +124,40 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
 
     The solutions have the shape (inputs and rates, m), NaN where there is none.
     """
-    n, inputs = problem.n, candidates
+    n, inputs = problem.n, candidates.copy()
     # What closed forms lose next to a singular pose; more is another assembly.
     far = math.inf if n == 1 else SINGULAR
+    if n == 1:
+        low, high, seed, _ = candidates
+        inputs = np.where((low <= seed) & (seed <= high), seed, 0.5 * (low + high))[None]
     with np.errstate(all='ignore'):
-        if n == 1:
-            # Estimates need a step; closed forms may be right.
-            low, high, seed, _ = candidates
-            inputs = np.where((low <= seed) & (seed <= high), seed, 0.5 * (low + high))[None]
-            rows = problem.over(*inputs)
-            inputs = np.fmin(np.fmax(
-                inputs - _step_arrays(problem, _gaps(problem, rows, values), rows), low), high)
         rows = problem.over(*inputs)
-        gaps = _gaps(problem, rows, values)
-        error = _errors(problem, gaps, rows, inputs)
-        again = np.flatnonzero((error > ROUNDED) & (error <= far))
-        x = inputs[:, again] - _step_arrays(problem, gaps[:, again], rows[:, again])
-        new = problem.over(*x)
-        less = _errors(problem, _gaps(problem, new, values[:, again]), new, x)
-        better, beyond = less < error[again], again[np.isnan(less)]
-        if n == 1:
-            better &= (low[again] <= x[0]) & (x[0] <= high[again])
-        again = again[better]
-        inputs[:, again], rows[:, again], error[again] = x[:, better], new[:, better], less[better]
-        # A part needs more steps, shorter ones at an end of the reach, or rates from beside it.
-        left = ~(error <= ACCEPTED) | ~np.isfinite(rows[1]) if n == 1 else ~(
-            (error <= ACCEPTED) | (error > far))
-        left[beyond] = True
+        error = _errors(problem, _gaps(problem, rows, values), rows, inputs)
+        again, left = np.flatnonzero((error > ROUNDED) & (error <= far)), ~(error <= ACCEPTED)
+        left &= ~(error > far)
+        for _ in range(STEPS if len(again) else 0):
+            x = inputs[:, again] - _step(
+                problem, _gaps(problem, rows[:, again], values[:, again]), rows[:, again])
+            if n == 1:
+                x = np.fmin(np.fmax(x, candidates[0, again]), candidates[1, again])
+            new = problem.over(*x)
+            less = _errors(problem, _gaps(problem, new, values[:, again]), new, x)
+            # Steps out of the reach are shortened one by one.
+            left[again[np.isnan(less)]] = True
+            better = less < error[again]
+            again = again[better]
+            inputs[:, again], rows[:, again] = x[:, better], new[:, better]
+            error[again] = less[better]
+            left[again] = ~(error[again] <= ACCEPTED)
+            again = again[error[again] > ROUNDED]
+        left |= ~np.isfinite(rows[n:]).all(axis=0)
     solutions = np.concatenate([problem.wrapped_arrays(inputs), rows[n:]])
     solutions[:, ~(error <= ACCEPTED)] = np.nan
     for k in np.flatnonzero(left).tolist():
-        found = refine(problem, values[:, k].tolist(), candidates[:, k].tolist())
-        solutions[:, k] = (*found[0], *found[1]) if found else math.nan
+        candidate = candidates[:, k].tolist()
+        row = refine(problem, values[:, k].tolist(),
+                     Bracket(*candidate) if n == 1 else tuple(candidate))
+        solutions[:, k] = row or math.nan
     return solutions
 
 
@@ -188,67 +180,61 @@ def _errors(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray,
         # Where a pose has no rates, they explain nothing.
         errors.append(np.abs(gap) / np.where(np.isnan(rounding), scale, np.minimum(
             rounding, scale * (SINGULAR / ACCEPTED))))
-    return np.max(errors, axis=0) if n > 1 else errors[0]
+    return np.max(errors, axis=0)
 
 
-def _step_arrays(problem: InverseProblem, gaps: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return what `_step` does for columns."""
+def _step(problem: InverseProblem, gaps: Any, rows: Any) -> Any:
+    """Return the step of Newton's method for numbers or columns; not finite if singular."""
     n = problem.n
     if n == 1:
         return gaps / rows[1]
     if n == 2:
         a, b, c, d = rows[2:]
-        return np.stack([gaps[0] * d - gaps[1] * c, gaps[1] * a - gaps[0] * b]) / (a * d - b * c)
-    jacobian = rows[n:].reshape(n, n, rows.shape[1]).T
-    with np.errstate(all='ignore'):
-        jacobian[~(np.abs(np.linalg.det(jacobian)) > 0.0)] = np.nan
-    return np.linalg.solve(jacobian, gaps.T[..., None])[..., 0].T
+        inverse = 1.0 / (a * d - b * c + 1e-300)
+        return [(gaps[0] * d - gaps[1] * c) * inverse, (gaps[1] * a - gaps[0] * b) * inverse]
+    jacobian = np.reshape(rows[n:], (n, n, -1)).T
+    jacobian[~(np.abs(np.linalg.det(jacobian)) > 0.0)] = np.nan
+    step = np.linalg.solve(jacobian, np.reshape(gaps, (n, -1)).T[..., None])
+    return step[..., 0].T.reshape(np.shape(gaps))
 
 
-def same(problem: InverseProblem, one: Found, other: Found) -> bool:
+def _same(problem: InverseProblem, one: Row, other: Row) -> bool:
     """
     Return whether two solutions are one.
 
     They are if they are as near as ONE, or if they are nearly as near as half of all digits and
     the rates say that the outputs differ by no more than ONE.
     """
-    for x, y, turn, size in zip(one[0], other[0], problem.turns, problem.sizes):
-        if SINGULAR * size < abs(x - y) < turn - SINGULAR * size:
-            return False
-    steps = [math.remainder(x - y, turn) for x, y, turn in zip(one[0], other[0], problem.turns)]
-    return max([abs(step) / size for step, size in zip(steps, problem.sizes)]) <= ONE or any(
-        all(abs(sum(rate * step for rate, step in zip(rates[i::problem.n], steps))) <= ONE * scale
-            for i, scale in enumerate(problem.scales)) for _, rates in (one, other))
+    n = problem.n
+    steps = [math.remainder(x - y, turn) for x, y, turn in zip(one, other, problem.turns)]
+    away = max([abs(step) / size for step, size in zip(steps, problem.sizes)])
+    return away <= ONE or away <= SINGULAR and any(
+        all(abs(sum(rate * step for rate, step in zip(row[n + i::n], steps))) <= ONE * scale
+            for i, scale in enumerate(problem.scales)) for row in (one, other))
 
 
-def distinct(problem: InverseProblem, solutions: Sequence[Found]) -> List[Found]:
+def distinct(problem: InverseProblem, solutions: Sequence[Row]) -> List[Row]:
     """Return solutions in order, one of those that are one."""
-    found: List[Found] = []
-    for solution in sorted(solutions):
+    distinct: List[Row] = []
+    for row in sorted(solutions):
         # Of one input only neighbours can be one, a turn apart too.
-        others = found if problem.n > 1 else found[-1:] + found[:1]
-        if not any(same(problem, solution, other) for other in others):
-            found.append(solution)
-    return found
+        others = distinct if problem.n > 1 else distinct[-1:] + distinct[:1]
+        if not any(_same(problem, row, other) for other in others):
+            distinct.append(row)
+    return distinct
 
 
 def distinct_arrays(problem: InverseProblem, solutions: np.ndarray) -> np.ndarray:
     """Return solutions (solutions, inputs and rates, m) in order, one of those that are one."""
-    n, solutions = problem.n, _ordered(problem, solutions)
+    n = problem.n
+    order = np.lexsort(solutions[:, :n].swapaxes(0, 1)[::-1], axis=0)
+    solutions = np.take_along_axis(solutions, order[:, None], 0)
     pairs = np.triu_indices(len(solutions), 1)
     apart = np.max([problem.distance(by, *(solutions[k, by] for k in pairs)) for by in range(n)],
                    axis=0)
     for k in np.flatnonzero((apart <= SINGULAR).any(axis=0)).tolist():
-        several = distinct(problem, [(tuple(x[:n]), tuple(x[n:]))
-                                     for x in solutions[:, :, k].tolist() if x[0] == x[0]])
+        rows = distinct(problem, [row for row in map(tuple, solutions[:, :, k].tolist())
+                                  if row[0] == row[0]])
         solutions[:, :, k] = math.nan
-        solutions[:len(several), :, k] = [(*inputs, *rates) for inputs, rates in several]
+        solutions[:len(rows), :, k] = rows
     return solutions[:max(int(np.isfinite(solutions[:, 0]).any(axis=1).sum()), 1)]
-
-
-def _ordered(problem: InverseProblem, solutions: np.ndarray) -> np.ndarray:
-    first = np.where(np.isnan(solutions[:, 0]), np.inf, solutions[:, 0])
-    if problem.n == 1 and (first[1:] >= first[:-1]).all():
-        return solutions
-    order = np.lexsort(solutions[:, :problem.n].swapaxes(0, 1)[::-1], axis=0)
-    return np.take_along_axis(solutions, order[:, None], 0)

@@ -11,16 +11,7 @@ of them the output has each value of its range once; docs/accuracy.md has the ru
 from __future__ import annotations
 
 import math
-from typing import (
-    Any,
-    Callable,
-    Iterator,
-    List,
-    NamedTuple,
-    Optional,
-    Sequence,
-    Tuple,
-)
+from typing import Any, Callable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -40,9 +31,20 @@ EXPLAINED, JUMP = 1e-4, 0.05
 MAX_SAMPLES = 10000
 
 
-# Two inputs [rad or m] between which an output has a value once, a first estimate, and the sign of
-# the rate. A special input has no width.
-Bracket = Sequence[float]
+class Bracket(NamedTuple):
+    """
+    Two values of the first input [rad or m] between which an output has a value once.
+
+    `seed` is an estimate, `sign` that of the output's rate, `place` the output's number, and
+    `others` are the values of the other inputs. The bracket of a special input has no width.
+    """
+
+    low: float
+    high: float
+    seed: float
+    sign: float
+    place: int = 0
+    others: Tuple[float, ...] = ()
 
 
 class Segment(NamedTuple):
@@ -51,10 +53,9 @@ class Segment(NamedTuple):
 
     Attributes
     ----------
-    theta, value : float array (samples,)
-        The input in its size, and the output times the sign of its rate; both ascend.
-    cells : float array (8, samples - 1)
-        For an estimate between two samples: see `_estimate`.
+    theta, value, speed : float array (samples,)
+        The input in its size, the output times the sign of its rate, and the rate's size. The
+        first two ascend.
     sign : float
         1.0 where the output rises, -1.0 where it falls.
 
@@ -62,7 +63,7 @@ class Segment(NamedTuple):
 
     theta: np.ndarray
     value: np.ndarray
-    cells: np.ndarray
+    speed: np.ndarray
     sign: float
 
 
@@ -115,22 +116,29 @@ class Segments:
         """
         Return what values need.
 
-        This is the range in which the segment has answers, its sign, and samples and cells. The
-        outer cells have no width: those of values that are answered by the end of the segment.
+        This is the range in which the segment has answers, its sign, samples, and what `_estimate`
+        needs between them. The outer cells have no width: they are those of values that are
+        answered by the end of the segment.
         """
-        theta, value, cells, sign = segment
+        theta, value, speed, sign = segment
+        least, greatest = float(value[0] - below), float(value[-1] + above)
         # Values so near to an end of the segment are the end's.
-        near, ends = np.minimum((below, above), ONE * self._size), [0, -1]
+        near = np.minimum((below, above), ONE * self._size)
         # At an end of the reach there is a pose also when whole turns are added.
         start, end = (x + side * 2.0 * math.ulp(max(abs(x), math.pi)) * (x in self._ends)
-                      for x, side in zip(theta[ends].tolist(), (1.0, -1.0)))
-        none, one = np.zeros(2), np.ones(2)
-        special = np.stack([(start, end), none, value[ends], one, one, none, none, none])
-        cells = np.column_stack([special[:, 0], cells, special[:, 1]])
-        cells[:2] *= self._unit
-        return (float(value[0] - below), float(value[-1] + above), sign,
-                np.array([start, *theta.clip(start, end), end]) * self._unit,
-                value.clip(value[0] + near[0], value[-1] - near[1]), cells)
+                      for x, side in zip(theta[[0, -1]].tolist(), (1.0, -1.0)))
+        theta = np.array([start, *theta.clip(start, end), end]) * self._unit
+        value = np.pad(value.clip(value[0] + near[0], value[-1] - near[1]), 1, 'edge')
+        width, change = np.diff(theta), np.diff(value)
+        # A parabola between two samples, from the one with the lower rate.
+        rate = np.pad(speed, 1) / self._unit
+        is_last = rate[:-1] > rate[1:]
+        slower, side = np.arange(len(width)) + is_last, np.where(is_last, -1.0, 1.0)
+        with np.errstate(invalid='ignore'):
+            slow = np.where(change > 0.0, np.fmin(rate[slower] * width, change).clip(1e-300), 1.0)
+        return (least, greatest, sign, theta, value[1:-1], np.stack([
+            theta[slower], side * width, value[slower], side, slow,
+            np.where(change > 0.0, change - slow, 0.0)]))
 
     # --- candidates ---
 
@@ -314,7 +322,7 @@ class Segments:
         found = value[places] + self._difference(
             np.where(np.isfinite(found), found, value[places]) - value[places])
         theta, value = np.insert(theta, places + 1, at), np.insert(value, places + 1, found)
-        rate = np.insert(rate, places + 1, 0.0)
+        speed = np.abs(np.insert(rate, places + 1, 0.0))
         cuts = [0, *(places + 1 + np.arange(len(places))).tolist(), len(theta) - 1]
         for first, last in zip(cuts, cuts[1:]):
             part = slice(first, last + 1)
@@ -322,9 +330,7 @@ class Segments:
             values = sign * value[part]
             # An extreme in noise has a value of its own.
             values[0] = values[:2].min()
-            values = np.maximum.accumulate(values)
-            yield Segment(theta[part], values, _cells(theta[part], values, sign * rate[part]),
-                          sign)
+            yield Segment(theta[part], np.maximum.accumulate(values), speed[part], sign)
 
     def _slack(self) -> List[np.ndarray]:
         """Return how far below and above each segment values are those of its ends."""
@@ -386,32 +392,15 @@ def _cut(arcs: Sequence[Arc], marks: Any) -> Iterator[Arc]:
         yield from zip([start, *inside], [*inside, end])
 
 
-def _cells(theta: np.ndarray, value: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """Return what `_estimate` needs between samples: a cubic from the end with the lower rate."""
-    width, change = np.diff(theta), np.diff(value)
-    slow, fast = rate[:-1], rate[1:]
-    start = ~(slow > fast)
-    with np.errstate(invalid='ignore'):
-        slow, fast = np.where(start, slow, fast) * width, np.where(start, fast, slow) * width
-    slow = np.where(slow < change, slow.clip(1e-300), change.clip(1e-300))
-    known = np.isfinite(fast)
-    bend = np.where(known, 3.0 * change - 2.0 * slow - np.where(known, fast, 0.0), change - slow)
-    return np.stack([
-        np.where(start, theta[:-1], theta[1:]), np.where(start, width, -width),
-        np.where(start, value[:-1], value[1:]), np.where(start, 1.0, -1.0), slow, change - slow,
-        bend, change - slow - bend])
-
-
-def _estimate(target: Any, start: Any, width: Any, value: Any, side: Any, slow: Any, curve: Any,
-              square: Any, cube: Any) -> Any:
-    """Return the input at a value: a parabola's, after one step of Newton's on the cubic."""
+def _estimate(target: Any, start: Any, width: Any, value: Any, side: Any, slow: Any, curve: Any
+              ) -> Any:
+    """Return the input at a value, by a parabola between two samples."""
     rest = side * (target - value)
-    part = 2.0 * rest / (slow + (slow * slow + 4.0 * curve * rest) ** 0.5)
-    error = part * (slow + part * (square + part * cube)) - rest
-    return start + width * (part - error / (slow + part * (2.0 * square + 3.0 * part * cube)))
+    return start + width * 2.0 * rest / (slow + (slow * slow + 4.0 * curve * rest) ** 0.5)
 
 
 def _bracket(target: float, row: Tuple) -> Bracket:
-    _, _, sign, theta, samples, cells = row
+    *_, sign, theta, samples, cells = row
     i = samples.searchsorted(target, 'right')
-    return (*theta[i:i + 2].tolist(), _estimate(target, *cells[:, i].tolist()), sign)
+    low, high = theta[i:i + 2].tolist()
+    return Bracket(low, high, _estimate(target, *cells[:, i].tolist()), sign)
