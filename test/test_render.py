@@ -663,3 +663,10 @@ def test_the_joints_of_a_plate_are_in_their_order_around_it():
         found = layers.around({k: corners[k] for k in order})
         first = found.index(0)
         assert found[first:] + found[:first] == [0, 1, 2, 3, 4]
+
+
+def test_a_floor_below_a_foot_that_hardly_moves_has_few_marks():
+    cell = machine('peaucellier')
+    picture = picture_of(cell, parts=DEFAULT | {'floor'})
+    floor = next(layer for layer in picture.panels[0].moving if isinstance(layer, layers.Floor))
+    assert floor.spacing > 0.009 * cell.linkage.longest
