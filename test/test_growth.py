@@ -97,8 +97,8 @@ def test_of_a_change_to_one_only_that_is_read_prepared_and_announced(graph, monk
     read, made = [], []
     read_mechanism, model = scene.read_mechanism, mechanism_topics.MechanismModel
 
-    def reading(name, given, old, strict):
-        machine = read_mechanism(name, given, old, strict)
+    def reading(name, given, old):
+        machine = read_mechanism(name, given, old)
         read.extend([name] if machine is not old else [])
         return machine
 

@@ -534,7 +534,7 @@ def bench():
     ({'jansen.dimensions.m': 'long'}, "jansen.dimensions.m must be .* not 'long'"),
     ({'jansen.dimensions.b': 4.2}, 'jansen.dimensions must let the jansen be assembled'),
     ({'jansen.dimensions.m': 14.0, 'jansen.dimensions.b': 4.2}, 'jansen.dimensions must let'),
-    ({'jansen.points': ['Z']}, 'jansen.points must name some of O, B'),
+    ({'jansen.points': ['Z']}, 'jansen.points must be .* some of O, B'),
     ({'jansen.pose': [1.0]}, 'jansen.pose must be .* six'),
     ({'jansen.branches.C': 2}, 'jansen.branches.C must be .* from -1 to 1'),
     ({'jansen.leg_pairs': 0}, 'jansen.leg_pairs must be .* from 1 to 50'),
@@ -808,11 +808,11 @@ def test_what_the_inputs_hold_against_loads_is_their_effort(graph):
             assert set(efforts.values()) == {0.0}
     assert graph.set(node, left__loads=[]).successful
     assert not turn([0.5, 0.3], one).effort
-    for wrong in (['B=3'], ['QB=1 2'], ['Z=1 2'], ['B=1 2', 'B=1 2'], ['B=nan 0']):
-        result = graph.set(node, left__loads=wrong)
-        assert not result.successful and 'left.loads must be texts such as' in result.reason
-    result = graph.set(node, left__loads=['B=1 2 3'])
-    assert not result.successful and 'a force must have the components x, y' in result.reason
+    for wrong, reason in (
+            ('Z=1 2', 'must be texts such as'), ('B=nan 0', 'must be texts such as'),
+            ('B=3', 'components x, y'), ('B=1 2 3', 'components x, y'), ('QB=1 2', 'one number')):
+        result = graph.set(node, left__loads=[wrong])
+        assert not result.successful and reason in result.reason
 
 
 def test_a_sign_and_a_zero_hold_where_some_legs_are_left_out(graph):

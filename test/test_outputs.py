@@ -142,7 +142,7 @@ def test_a_measured_value_stays_inside_the_sweep_that_is_set():
 
 
 @pytest.mark.parametrize('name, source, text', [
-    ('five_bar', 'P.y', 'five_bar.crank.measures must be empty: only a linkage with one input'),
+    ('five_bar', 'P.y', 'five_bar.crank.measures: only a linkage with one input'),
     ('four_bar', 'QX', "four_bar.crank.measures: four_bar has no output 'QX'; allowed: dis"),
     ('four_bar', 'distance(O,Q)', 'four_bar.crank.measures: distance(O,Q) of four_bar does not')])
 def test_a_source_that_cannot_be_is_refused(name, source, text):

@@ -35,7 +35,8 @@ REFUSED = set(r"""
 -9223372036854775809 !!str !!float !custom {} [0,1.5] [1.5,0] [1,true] [a,1] [[1]] [[1],[2]] [1,2
 *x &x - | @x `x %x #
 """.split()) | {
-    '!!float 5', '!custom 3', '- 5', '|-\n      5', '|\n      5', '[{a: 1}]', '{[1]: 2}', '? 3',
+    '!!str 5', '!!float 5', '!custom 3', '- 5', '>\n      text',
+    '|-\n      5', '|\n      5', '[{a: 1}]', '{[1]: 2}', '? 3',
     '{a: [1, 2.0]}', '[nan, 1.0]', '{b.c: {d: 1}, e: 2}', ''}
 # What every node has.
 OF_ROS = 'use_sim_time', 'start_type_description_service'

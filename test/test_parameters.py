@@ -222,7 +222,7 @@ def test_an_empty_list_in_a_parameter_file_or_argument_is_one_of_its_type(
 
 
 @pytest.mark.parametrize('name, allowed', [
-    ('mechanisms', 'a list of texts'), ('leg.points', 'name some of'), ('leg.pose', 'six of them'),
+    ('mechanisms', 'a list of texts'), ('leg.points', 'some of'), ('leg.pose', 'six of them'),
     ('leg.scale', 'a finite number'), ('leg.type', 'one of water_drop'), ('leg.own', 'allowed')])
 def test_where_no_list_may_be_empty_one_is_refused_in_words(graph, name, allowed):
     values = {'mechanisms': '[leg]', 'leg.type': 'jansen', name: '[]'}

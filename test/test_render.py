@@ -509,7 +509,7 @@ def test_an_svg_has_every_part_in_its_order_where_it_was_solved(tmp_path, size, 
     (['foreign.yaml', '--out', 'a.png'], "foreign.yaml must be YAML with '/**:'"),
     (['empty.yaml', '--out', 'a.png'], "empty.yaml must be YAML with '/**:'"),
     (['date.yaml', '--out', 'a.png'], 'such as /**, is expected in line 1'),
-    (['itself.yaml', '--out', 'a.png'], 'ROS does not support aliases in line 1'),
+    (['itself.yaml', '--out', 'a.png'], 'ROS does not support aliases and tags in line 1'),
     (['.', '--out', 'a.png'], '.: Is a directory'),
     (['jansen.yaml', '--out', 'a.bmp'], '--out must end in .png, .svg, .gif, .mp4, not a.bmp'),
     (['jansen.yaml'], '--out'),
@@ -663,3 +663,10 @@ def test_the_joints_of_a_plate_are_in_their_order_around_it():
         found = layers.around({k: corners[k] for k in order})
         first = found.index(0)
         assert found[first:] + found[:first] == [0, 1, 2, 3, 4]
+
+
+def test_a_floor_below_a_foot_that_hardly_moves_has_few_marks():
+    cell = machine('peaucellier')
+    picture = picture_of(cell, parts=DEFAULT | {'floor'})
+    floor = next(layer for layer in picture.panels[0].moving if isinstance(layer, layers.Floor))
+    assert floor.spacing > 0.009 * cell.linkage.longest

@@ -222,7 +222,8 @@ def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
     wanted = InverseRequest(scene.read(swept).machines['leg'], ('P.x', 'P.y'))
     assert wanted.answers((0.05, 0.15), (3.2, 0.0)) == []
     assert wanted.reason(0.05, 0.15) == (
-        'P.x, P.y at 0.05, 0.15 needs inputs outside crank.sweep [3, 3.5]')
+        'P.x, P.y at 0.05, 0.15 needs the crank at 1.74732 rad, crank2 at 1.58104 rad, outside '
+        'crank.sweep [3, 3.5]')
 
 
 @pytest.mark.parametrize('held', [0.5, 0.5 + math.tau, 0.5 - math.tau])

@@ -24,6 +24,7 @@ from ..robot_model import shapes
 
 FADED = 0.3  # turns after which a fading trace is gone
 STANCE = 0.06  # of a foot curve's height: below that the foot is on the ground
+MIN_STRIDE = 0.02  # of the longest bar: a foot that stands has marks, too
 CURVED = 20  # points: a line that has more is a curve
 STRAIGHT = 1e-9  # of a curve's length: largest deviation of a straight line
 WHITENED = 0.7  # how white the last of many pairs of legs is
@@ -46,7 +47,7 @@ class Trace:
         self._tracer = mechanism.linkage.points.index(mechanism.tracer)
         self.artists = []
         if kind in ('growing', 'fading'):
-            lines = LineCollection([], lw=3 * unit, color=LOCUS, zorder=2, animated=True)
+            lines = LineCollection([], lw=3 * unit, color=LOCUS, zorder=2)
             axes.add_collection(lines, autolim=False)
             self.artists = [lines]
         elif kind != 'none':
@@ -173,7 +174,7 @@ class Legs:
 
         def lines(name, colour, width, above, cap='round'):
             made[name] = LineCollection([], colors=colour, lw=width * unit, capstyle=cap,
-                                        zorder=zorder + above, animated=True)
+                                        zorder=zorder + above)
             axes.add_collection(made[name], autolim=False)
 
         def rimmed(name, colour, width, above, cap='round'):
@@ -182,12 +183,12 @@ class Legs:
 
         def dots(name, marker, size, above, **style):
             made[name], = axes.plot([], [], ls='', marker=marker, ms=size * unit,
-                                    zorder=zorder + above, animated=True, **style)
+                                    zorder=zorder + above, **style)
 
         dark = whiter(DARK, white)
         if 'links' in parts:
             made['plates'] = PolyCollection([], facecolors=whiter(BAR, 0.78 + 0.22 * white),
-                                            zorder=zorder, animated=True)
+                                            zorder=zorder)
             axes.add_collection(made['plates'], autolim=False)
             lines('bars', whiter(BAR, white), 5.5, 0.1)
             rimmed('slots', 'white', 13.5, 0.2)
@@ -236,11 +237,12 @@ class Floor:
         steps = np.diff(feet[:, :, 0], axis=0)[np.arange(len(lowest)), lowest]
         self._way = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
         # After a turn, marks are at the places of other marks; a single foot moves them back.
-        turn, stride = abs(self._way[-1]), np.ptp(self._way) or 1.0
+        turn = abs(self._way[-1])
+        stride = max(np.ptp(self._way), MIN_STRIDE * mechanism.scale * mechanism.linkage.longest)
         self.spacing = turn / self.MARKS if turn > 0.1 * stride else 0.5 * stride
         self._tracer = tracer
         self._axes = axes
-        style = {'color': FLOOR, 'zorder': 1, 'animated': True, 'capstyle': 'round'}
+        style = {'color': FLOOR, 'zorder': 1, 'capstyle': 'round'}
         self._line = LineCollection([], lw=3 * unit, **style)
         self._marks = LineCollection([], lw=2 * unit, **style)
         self.artists = [self._line, self._marks]
@@ -280,7 +282,7 @@ class Headline:
             fixed_lines += [' '] * rows
             self.artists = [axes.annotate(
                 '', (k % across / across, 1.0), (0, 6 + 1.2 * size * (rows - 1 - k // across)),
-                'axes fraction', 'offset points', fontsize=size, va='baseline', animated=True,
+                'axes fraction', 'offset points', fontsize=size, va='baseline',
                 in_layout=False) for k in range(count)]
         axes.set_title('\n'.join(fixed_lines), loc='left', fontsize=size)
 
@@ -338,7 +340,7 @@ class Names:
                        for name in mechanism.points]
         self.artists = [axes.annotate(
             name, (0.0, 0.0), (0.0, 0.0), textcoords='offset points', fontsize=size,
-            ha='center', va='center', zorder=100, animated=True, path_effects=HALO,
+            ha='center', va='center', zorder=100, path_effects=HALO,
             annotation_clip=False, in_layout=False) for name in mechanism.points]
 
     def settle(self, poses):

@@ -63,7 +63,6 @@ class Picture:
         for unused in axes[count:]:
             unused.remove()
         self.period = self.panels[0].cycle.period
-        self._still = None
 
     def arrange(self, times):
         """
@@ -98,12 +97,7 @@ class Picture:
     def at(self, turns):
         """Return the picture at a time [turns], shape (height, width, 3), 8 bits per colour."""
         self.show(turns)
-        if self._still is None:
-            self._canvas.draw()
-            self._still = self._canvas.copy_from_bbox(self.figure.bbox)
-        self._canvas.restore_region(self._still)
-        for panel in self.panels:
-            panel.draw()
+        self._canvas.draw()
         return np.array(self._canvas.buffer_rgba())[..., :3]
 
     def seconds(self, turns):
@@ -184,12 +178,6 @@ class Panel:
         self.pose = self.cycle.pose(turns)
         for layer in self.moving:
             layer.show(self.pose)
-
-    def draw(self):
-        """Draw the moving artists over the fixed ones."""
-        for layer in self.moving:
-            for artist in layer.artists:
-                self._axes.draw_artist(artist)
 
     def columns(self):
         """Return the names of the `values`."""

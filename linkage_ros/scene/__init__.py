@@ -11,10 +11,9 @@ raises an error that names the wrong parameter and its allowed values. Nodes dec
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 import re
-from typing import Any, Dict, Iterable, List, Optional, Tuple
+from typing import Any, Iterable, Mapping, Optional
 
 from .input_settings import FARTHEST, in_words, InputSettings, START
 from .joint_names import check_distinct
@@ -28,11 +27,17 @@ from .parameters import (
     OWNER,
     Parameter,
     plain,
-    refuse_unknown,
     SceneError,
     Values,
 )
-from .scene_mechanism import FRAME, FRAME_NAME, FRAME_RULE, read_mechanism, SceneMechanism
+from .scene_mechanism import (
+    FRAME,
+    FRAME_NAME,
+    FRAME_RULE,
+    is_distinct,
+    read_mechanism,
+    SceneMechanism,
+)
 from .. import mechanisms
 from ..words import plain_text, quoted
 
@@ -43,17 +48,18 @@ __all__ = ['changed', 'InputSettings', 'DRIVER', 'FARTHEST', 'Field', 'in_words'
 _NAME = re.compile(r'(?=.{1,64}$)[A-Za-z](_?[A-Za-z0-9])*')
 
 MECHANISMS = Field(
-    'string_array', 'Names of the mechanisms in the scene.', readers=ALL, read_only=True,
+    'string_array', 'Names of the mechanisms in the scene.', default=(*mechanisms.CATALOGUE,),
+    read_only=True, pattern=_NAME, holds=is_distinct,
     rule='at least one, each once, of up to 64 letters, digits and single underscores, '
-         'a letter first', pattern=_NAME)
-FRAME_ID = Field('string', 'Frame of the poses.', readers=(KINEMATICS,),
+         'a letter first')
+FRAME_ID = Field('string', 'Frame of the poses.', default='world', readers=(KINEMATICS,),
                  rule='1 to 100 characters that can be seen, the first a letter, digit or _',
                  pattern=re.compile(FRAME_NAME))
 FRAME_PREFIX = Field(
     'string', 'Prefix of the frames of markers and loci, as in robot_state_publisher.',
-    readers=(KINEMATICS,), rule=FRAME_RULE, pattern=FRAME)
-RATE = Field('double', 'Rate of crank messages [Hz]; 0: none.', 0.0, 1000.0, readers=(DRIVER,),
-             unit='Hz')
+    default='', readers=(KINEMATICS,), rule=FRAME_RULE, pattern=FRAME)
+RATE = Field('double', 'Rate of crank messages [Hz]; 0: none.', 0.0, 1000.0, default=50.0,
+             readers=(DRIVER,), unit='Hz')
 
 
 @dataclass(frozen=True)
@@ -65,15 +71,15 @@ class Scene:
     frame_prefix: str
     rate: float
     # Parameters that belong to no mechanism.
-    general: Tuple[Parameter, ...]
+    general: tuple[Parameter, ...]
 
     @property
-    def parameters(self) -> Tuple[Parameter, ...]:
+    def parameters(self) -> tuple[Parameter, ...]:
         """All parameters, the general ones first."""
         return (*self.general, *(parameter for mechanism in self.machines.values()
                                  for parameter in mechanism.parameters))
 
-    def changed_from(self, old: 'Scene') -> List[Parameter]:
+    def changed_from(self, old: 'Scene') -> list[Parameter]:
         """Return the parameters whose values differ from an older scene of the same mechanisms."""
         parts = [(self.general, old.general), *(
             (mechanism.parameters, old.machines[name].parameters)
@@ -84,20 +90,20 @@ class Scene:
 
 
 def load(path: str) -> Scene:
-    """Read a scene from a parameter file, as nodes without a namespace do; needs PyYAML."""
-    given = sections(path)
-    found = {node: overrides(given, f'/{node}') for node in ALL}
-    if not any(values is not None for values in found.values()):
+    """
+    Read a scene from a parameter file, as nodes without a namespace do; needs PyYAML.
+
+    Each parameter has the value that the file gives to the parameter's owner.
+    """
+    all_sections = sections(path)
+    by_node = {node: overrides(all_sections, f'/{node}') for node in (*ALL, OWNER)}
+    if not any(values is not None for values in by_node.values()):
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:'")
-    values = {node: part or {} for node, part in found.items()}
-    merged = {name: value for node in (*ALL, OWNER) for name, value in values[node].items()}
-    scene = read(merged)
-    if all(part == merged for part in values.values()):
-        return scene
-    # Each parameter has the value that the file gives to the parameter's owner.
+    values = {node: part or {} for node, part in by_node.items()}
+    scene = read({name: value for node in (*ALL, OWNER) for name, value in values[node].items()})
     return read({parameter.name: values[parameter.field.owner][parameter.name]
                  for parameter in scene.parameters
-                 if parameter.name in values[parameter.field.owner]})
+                 if parameter.name in values[parameter.field.owner]}, scene)
 
 
 def read(values: Mapping[str, Any], before: Optional[Scene] = None, strict: bool = True) -> Scene:
@@ -141,35 +147,35 @@ def changed(before: Scene, values: Mapping[str, Any], strict: bool = True) -> Sc
 
 def _read(parts: Mapping[str, Mapping[str, Any]], before: Optional[Scene], strict: bool) -> Scene:
     values = Values(parts.get('', {}))
-    names = values.take('mechanisms', MECHANISMS, (*mechanisms.CATALOGUE,))
-    if not names or len(set(names)) < len(names):
-        raise MECHANISMS.error('mechanisms', names)
-    frame_id = values.take('frame_id', FRAME_ID, 'world')
-    frame_prefix = values.take('frame_prefix', FRAME_PREFIX, '')
-    rate = values.take('rate', RATE, 50.0)
+    names, frame_id, frame_prefix, rate = (values.take(name, field) for name, field in (
+        ('mechanisms', MECHANISMS), ('frame_id', FRAME_ID), ('frame_prefix', FRAME_PREFIX),
+        ('rate', RATE)))
     known = before.machines if before else {}
-    machines = {name: read_mechanism(name, parts.get(name, {}), known.get(name), strict)
+    machines = {name: read_mechanism(name, parts.get(name, {}), known.get(name))
                 for name in names}
     joints = {name: mechanism.joints for name, mechanism in machines.items()}
     if joints != {name: mechanism.joints for name, mechanism in known.items()}:
         check_distinct(joints)
-    allowed = ['mechanisms', 'frame_id', 'frame_prefix', 'rate', *(f'{name}.*' for name in names)]
-    for unused in (values.unused(), *(part for name, part in parts.items()
-                                      if name and name not in machines)):
-        refuse_unknown(unused, allowed)
+    if strict:
+        for name, mechanism in machines.items():
+            mechanism.check_starts(known.get(name))
+    allowed = [*(parameter.name for parameter in values.parameters),
+               *(f'{name}.*' for name in names)]
+    for rest in (values, *(Values(parts[name]) for name in parts if name not in ('', *names))):
+        rest.refuse_unknown(allowed)
     return Scene(machines, frame_id, frame_prefix, rate, tuple(values.parameters))
 
 
-def _values(parameters: Iterable[Parameter]) -> Dict[str, Any]:
+def _values(parameters: Iterable[Parameter]) -> dict[str, Any]:
     return {parameter.name: parameter.value for parameter in parameters}
 
 
-def _by_mechanism(values: Any) -> Dict[str, Dict[str, Any]]:
+def _by_mechanism(values: Any) -> dict[str, dict[str, Any]]:
     """Return {mechanism: {full name: value}}, with '' as the mechanism of general parameters."""
     if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
         raise SceneError('a scene must map names of parameters to their values, not be '
                          f'{quoted(values)}')
-    parts: Dict[str, Dict[str, Any]] = {}
+    parts: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         mechanism, dot, _ = name.partition('.')
         parts.setdefault(mechanism if dot else '', {})[plain_text(name)] = value

@@ -5,21 +5,17 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Future
 import math
-from typing import Any, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
 from .input_settings import in_words, InputSettings
-from .scene_mechanism import SceneMechanism
-from ..formula.program import compile_in_background
+from .scene_mechanism import divided, SceneMechanism
 from ..linkage import Input, Solution
 from ..words import listed
 
 LEVER = 'lever'
-# A request with this many values starts the compilation of machine code for later requests.
-MANY = 256
 
 
 class Command(NamedTuple):
@@ -50,12 +46,12 @@ class Command(NamedTuple):
 class SceneAnswer(NamedTuple):
     """Inputs [rad or m] that give outputs their values, and the working mode; see `Solution`."""
 
-    inputs: Tuple[float, ...]
+    inputs: tuple[float, ...]
     mode: str
     is_singular: bool
 
 
-def present_inputs(mechanism: SceneMechanism, positions: Mapping[str, float]) -> List[float]:
+def present_inputs(mechanism: SceneMechanism, positions: Mapping[str, float]) -> list[float]:
     """Return the inputs [rad or m] at the last position of each source; inf if unknown."""
     known = [mechanism.from_source(settings, positions[settings.source], None, None)[0]
              if settings.source in positions else math.inf
@@ -93,37 +89,31 @@ class InverseRequest:
         self._inverse = mechanism.linkage.inverse(tuple(self.outputs))
         self.quantity = 'lever angles' if self.outputs == [LEVER] else \
             f'values of {listed(self.outputs)}'
-        self.sources = [settings.source for settings in self._settings]
         self.units = [settings.input.unit for settings in self._settings]
-        self._units = [mechanism.scale_of(name) for name in self.outputs]
-        self._scales = [mechanism.scale_of(name) for name in mechanism.inputs]
+        self._units, self._scales = [*map(mechanism.scale_of, self.outputs)], mechanism.scales
         self._actuators = [settings.actuator for settings in self._settings]
         # Factors of the linkage's rates: of each output by the first actuator, by the second, ...
         self._rate_units = [unit / scale * ratio
                             for scale, (ratio, _) in zip(self._scales, self._actuators)
                             for unit in self._units]
-        # The ends of the sweeps, without the scale.
-        self._ends = [settings.ends and (settings.ends[0] / scale, settings.ends[1] / scale)
-                      for settings, scale in zip(self._settings, self._scales)]
-        self._compilation: Optional[Future] = None
 
     @property
     def is_closed(self) -> bool:
         """Whether the answers are closed forms, so that none is searched."""
         return self._inverse.is_quick
 
-    def inputs_of(self, positions: Sequence[Any]) -> List[Any]:
+    def inputs_of(self, positions: Sequence[Any]) -> list[Any]:
         """Return the inputs [rad or m] at their actuators' positions."""
         return [ratio * position + offset
                 for (ratio, offset), position in zip(self._actuators, positions)]
 
-    def positions_of(self, inputs: Sequence[Any]) -> List[Any]:
+    def positions_of(self, inputs: Sequence[Any]) -> list[Any]:
         """Return the actuators' positions at inputs [rad or m]."""
         return [(input_ - offset) / ratio if offset or ratio != 1.0 else input_
                 for (ratio, offset), input_ in zip(self._actuators, inputs)]
 
     def positions(self, values: Sequence[Any], seed: Optional[Sequence[Any]] = None
-                  ) -> Tuple[List[Any], List[Any]]:
+                  ) -> tuple[list[Any], list[Any]]:
         """
         Return actuators' positions for values of the outputs, and the rates there.
 
@@ -141,28 +131,15 @@ class InverseRequest:
             by the second and so on; NaN where a value is unreachable.
 
         """
-        inverse, many = self._inverse, isinstance(values[0], np.ndarray)
-        has_seeds = seed is not None and np.size(seed[0]) == np.size(values[0])
-        values = [value / unit for value, unit in zip(values, self._units)]
-        if seed is not None:
-            seed = [input_ / scale for input_, scale in zip(self.inputs_of(seed), self._scales)]
-        if many and np.size(values[0]) >= MANY:
-            inverse = self._accelerated()
-        inputs, rates = (inverse.path if many and not has_seeds else inverse.nearest)(
-            values, seed, self._ends)
-        return self.positions_of(_times(inputs, self._scales)), _times(rates, self._rate_units)
-
-    def _accelerated(self) -> Any:
-        """Return the inverse in machine code once it is compiled; until then in Python."""
-        if self._compilation is None:
-            def make() -> Any:
-                inverse = self._mechanism.linkage.accelerated().inverse(tuple(self.outputs))
-                inverse.path([np.zeros(MANY)] * len(self.outputs))
-                return inverse
-
-            self._compilation = compile_in_background(make)
-        done = self._compilation.done() and not self._compilation.exception()
-        return self._compilation.result() if done else self._inverse
+        is_path = isinstance(values[0], np.ndarray) and (
+            seed is None or np.size(seed[0]) != np.size(values[0]))
+        solve = self._inverse.path if is_path else self._inverse.nearest
+        inputs, rates = solve(
+            divided(values, self._units),
+            None if seed is None else divided(self.inputs_of(seed), self._scales),
+            self._mechanism.ends)
+        return (self.positions_of(_times(inputs, self._scales)),
+                _times(rates, self._rate_units))
 
     def command(self, values: Sequence[float], speeds: Optional[Sequence[float]],
                 seed: Sequence[float], jumps: bool = False) -> Command:
@@ -180,49 +157,35 @@ class InverseRequest:
             a single input always may.
 
         """
-        unscaled = [value / unit for value, unit in zip(values, self._units)]
-        start = [input_ / scale for input_, scale in zip(seed, self._scales)]
-        solution, rates = self._inverse.follow(unscaled, start)
-        if not self._are_inside(solution):
-            solution, rates = self._inverse.nearest(unscaled, start, self._ends) \
-                if jumps or len(start) == 1 else ((math.nan,) * len(start), rates)
-        inputs = [input_ * scale for input_, scale in zip(solution, self._scales)]
+        inputs, rates = self._mechanism.follow(
+            self.outputs, values, seed, jumps or len(seed) == 1)
         return Command(inputs, self.positions_of(inputs),
                        self._speeds(speeds, rates) if speeds else ())
 
-    def _are_inside(self, inputs: Sequence[float]) -> bool:
-        return all(end[0] <= value <= end[1] if end else value == value
-                   for end, value in zip(self._ends, inputs))
-
-    def _speeds(self, speeds: Sequence[float], rates: Sequence[float]) -> List[float]:
-        """Return the actuators' speeds for speeds of the outputs, at the linkage's rates."""
+    def _speeds(self, speeds: Sequence[float], rates: Sequence[float]) -> list[float]:
+        """Return the actuators' speeds for speeds of the outputs, at rates by the inputs."""
         n = len(speeds)
-        if n == 1:
-            rate = rates[0] * (self._units[0] / self._scales[0]) * self._actuators[0][0]
-            return [speeds[0] / rate if rate else math.copysign(math.inf, speeds[0])
-                    if speeds[0] else 0.0]
-        jacobian = np.reshape(rates, (n, n)).T * np.divide.outer(self._units, self._scales)
         try:
-            inputs = np.linalg.solve(jacobian, speeds)
+            inputs = np.linalg.solve(np.reshape(rates, (n, n)).T, speeds)
             return (inputs / [ratio for ratio, _ in self._actuators]).tolist()
         except np.linalg.LinAlgError:
             return n * [math.inf if any(speeds) else 0.0]
 
     def answers(self, values: Sequence[float], seed: Optional[Sequence[float]] = None
-                ) -> List[SceneAnswer]:
+                ) -> list[SceneAnswer]:
         """
         Return all answers to one value of each output, as inputs [rad or m] of the scene.
 
         They are sorted by their distance from the inputs `seed` [rad or m], by default the start.
         """
         seed = [settings.start for settings in self._settings] if seed is None else seed
-        answers = self._inside(self._inverse.all(np.divide(values, self._units),
-                                                 np.divide(seed, self._scales)))
+        answers = self._inside(self._inverse.all(
+            divided(values, self._units), divided(seed, self._scales)))
         sizes = [settings.input.size for settings in self._settings]
         return sorted(answers, key=lambda answer: math.dist(
             np.divide(answer.inputs, sizes), np.divide(seed, sizes)))
 
-    def _inside(self, answers: Sequence[Solution]) -> List[SceneAnswer]:
+    def _inside(self, answers: Sequence[Solution]) -> list[SceneAnswer]:
         """Return those of the linkage's answers that lie inside the sweeps."""
         inside = []
         for answer in answers:
@@ -237,42 +200,38 @@ class InverseRequest:
         """Return in words why values are unreachable."""
         if not all(map(math.isfinite, values)):
             return 'a value must be finite'
-        answers = self._inverse.all([value / unit for value, unit in zip(values, self._units)])
-        if len(values) == 1:
-            return self._reason(values[0], answers)
-        what = f'{listed(self.outputs)} at {listed(f"{value:.6g}" for value in values)}'
+        answers = self._inverse.all(divided(values, self._units))
+        what = f'{listed(self.outputs)} at ' * (len(values) > 1) + listed(
+            f'{value:.6g}' for value in values)
         if self._inside(answers):
             return f'the way to {what} leads through a singular pose, out of the reach or a sweep'
-        if not answers or not any(settings.ends for settings in self._settings):
+        limited = [settings for settings in self._settings if settings.ends]
+        sweeps = ', '.join(f'{settings.input.name}.sweep {in_words(settings.arcs)}'
+                           for settings in limited)
+        if answers and limited:
+            middles = [0.5 * sum(settings.ends or (2.0 * settings.start,))
+                       for settings in self._settings]
+            inputs = min(([settings.input.beside(value * scale, middle)
+                           for settings, value, scale, middle in zip(
+                               self._settings, answer.inputs, self._scales, middles)]
+                          for answer in answers), key=lambda inputs: math.dist(inputs, middles))
+            needed = ', '.join(f'{settings.input.name} at {value:.6g} {settings.input.unit}'
+                               for settings, value in zip(self._settings, inputs))
+            return f'{what} needs the {needed}, outside {sweeps}'
+        if len(values) > 1:
             return f'{what} is outside the reach'
-        sweeps = (f'{settings.input.name}.sweep {in_words([settings.ends])}'
-                  for settings in self._settings if settings.ends)
-        return f'{what} needs inputs outside {listed(sweeps)}'
-
-    def _reason(self, value: float, answers: Sequence[Solution]) -> str:
-        """Return why a value of a single output is unreachable; `answers` are out of the sweep."""
-        settings, output, scale = self._settings[0], self.outputs[0], self._scales[0]
-        arcs, where = settings.reach, ''
-        if settings.ends:
-            low, high = settings.ends
-            where = f'{settings.input.name}.sweep {in_words([settings.ends])}'
-            if answers:
-                middle = 0.5 * (low + high)
-                nearest = min((settings.input.beside(answer.inputs[0] * scale, middle)
-                               for answer in answers), key=lambda input_: abs(input_ - middle))
-                return (f'{value:.6g} needs the {settings.input.name} at {nearest:.6g} '
-                        f'{self.units[0]}, outside {where}')
-            arcs = ((low, min(high, low + settings.input.turn) if settings.input.wraps else high),)
-        spans = self._mechanism.linkage.extremes(output, [
-            (low / scale, high / scale) for low, high in arcs])
-        reached = in_words((low * self._units[0], high * self._units[0])
-                           for (low, _), (high, _) in spans)
-        unit = 'rad' if self._mechanism.linkage.is_angle(output) else 'm'
-        return (f'{"the lever" if output == LEVER else output} reaches {reached} {unit}'
-                f'{where and " in "}{where}')
+        (unit,), (output,), (scale,) = self._units, self.outputs, self._scales
+        turn = self._settings[0].input.turn if self._settings[0].input.wraps else math.inf
+        linkage = self._mechanism.linkage
+        spans = linkage.extremes(output, [
+            (low / scale, min(high, low + turn) / scale) for low, high in self._settings[0].arcs])
+        reached = in_words((low * unit, high * unit) for (low, _), (high, _) in spans)
+        return (f'{"the lever" if output == LEVER else output} reaches {reached} '
+                f'{"rad" if linkage.is_angle(output) else "m"}'
+                + f' in {sweeps}' * bool(limited))
 
 
-def _times(values: Sequence[Any], factors: Sequence[float]) -> List[Any]:
+def _times(values: Sequence[Any], factors: Sequence[float]) -> list[Any]:
     return [value if factor == 1.0 else value * factor for value, factor in zip(values, factors)]
 
 

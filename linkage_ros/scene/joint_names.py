@@ -8,17 +8,17 @@ from __future__ import annotations
 import json
 import math
 import re
-from typing import Any, Dict, Iterable, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Iterable, Mapping, NamedTuple, Optional
 
 import numpy as np
 
-from .parameters import SceneError
-from ..words import elided, listed, meant
+from .parameters import read_lines, SceneError
 
 # A sign and a digit after a name begin an offset; a hyphen before a letter belongs to the name.
 _PLAIN = r'[A-Za-z_][\w./:]*(?:-[A-Za-z_][\w./:]*)*'
 # Other names are quoted as in JSON.
-_LINE = re.compile(rf'(\w+)=(-?)({_PLAIN}|"(?:[^"\\]|\\.)+")'
+_QUOTED = r'"(?:[^"\\\x00-\x1f]|\\["\\/bfnrt]|\\u[0-9a-fA-F]{4})+"'
+_LINE = re.compile(rf'(\w+)=(-?)({_PLAIN}|{_QUOTED})'
                    r'([+-](?:\d{1,99}\.?\d{0,99}|\.\d{1,99})(?:[eE][+-]?\d\d?)?)?', re.ASCII)
 
 
@@ -41,7 +41,7 @@ class JointName(NamedTuple):
         value = self.sign * position + self.offset
         return value - math.tau * np.round(value / math.tau) if self.wraps else value
 
-    def travel(self, ends: Tuple[float, float]) -> Optional[Tuple[float, float]]:
+    def travel(self, ends: tuple[float, float]) -> Optional[tuple[float, float]]:
         """Return limits of the published value from those of the position; None if it wraps."""
         low, high = sorted(self._replace(wraps=False).of(end) for end in ends)
         if not self.wraps:
@@ -52,7 +52,7 @@ class JointName(NamedTuple):
 
 
 def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable[str],
-                     only_named: bool) -> Dict[str, JointName]:
+                     only_named: bool) -> dict[str, JointName]:
     """
     Return the published names of all joints, by joint.
 
@@ -60,21 +60,16 @@ def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable
     are those of the parameter joint_names. `only_named` leaves the other joints unpublished.
     Raises SceneError if a line is malformed, or its joint is unknown or has another line.
     """
-    default = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
-               for joint in joints}
-    listed_names: Dict[str, JointName] = {}
-    for line in lines:
-        match = _LINE.fullmatch(line)
-        name = _unquoted(match[3]) if match else ''
-        if not match or not name or match[1] not in default or match[1] in listed_names:
-            raise SceneError(
-                f"{mechanism}.joint_names must be texts such as 'BC=left_shin' or "
-                f"'EF=-\"ankle-2\"+0.35', each for a different one of {listed(joints, 90)}, not "
-                f'{elided(line)!r}{meant(match and match[1], {*joints} - {*listed_names})}')
-        offset = float(match[4] or 0.0)
-        listed_names[match[1]] = JointName(
-            name, -1.0 if match[2] else 1.0, offset, wraps=joints[match[1]] and offset != 0.0)
-    return {**default, **listed_names}
+    names = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
+             for joint in joints}
+    for joint, match in read_lines(
+            f'{mechanism}.joint_names', lines, _LINE, joints,
+            "'BC=left_shin' or 'EF=-\"ankle-2\"+0.35'").items():
+        _, sign, name, figure = match.groups()
+        name, offset = json.loads(name) if name[0] == '"' else name, float(figure or 0.0)
+        names[joint] = JointName(name, -1.0 if sign else 1.0, offset,
+                                 wraps=joints[joint] and offset != 0.0)
+    return names
 
 
 def quoted_name(name: str) -> str:
@@ -83,16 +78,9 @@ def quoted_name(name: str) -> str:
     return name if plain else json.dumps(name, ensure_ascii=False)
 
 
-def _unquoted(text: str) -> str:
-    try:
-        return str(json.loads(text)) if text[0] == '"' else text
-    except ValueError:
-        return ''
-
-
 def check_distinct(names: Mapping[str, Mapping[str, JointName]]) -> None:
     """Raise SceneError if two joints of the scene are published by one name."""
-    owners: Dict[str, str] = {}
+    owners: dict[str, str] = {}
     for mechanism, joints in names.items():
         for joint, name in joints.items():
             full_name = f'{mechanism}.{joint}'

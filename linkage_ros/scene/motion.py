@@ -10,11 +10,13 @@ Only the result is rounded, so that errors do not accumulate.
 
 from __future__ import annotations
 
-from typing import Optional, Tuple
+from typing import Optional
 
 from . import InputSettings
 from ..linkage import Arc
 
+# Turns after which an input that never repeats is counted from zero again.
+MAX_PERIOD = 1e12
 STEPS, STEP = 1 << 160, 2.0 ** -160
 TURN = 62831853071795864769252867665590057683943387987502116 * STEPS // 10 ** 52
 
@@ -59,7 +61,7 @@ class Motion:
         self._phase = self._place(_steps(start))
         self._since = since
 
-    def at(self, now: int) -> Tuple[float, float]:
+    def at(self, now: int) -> tuple[float, float]:
         """Return value and speed at a time [ns]; a rotation's value is in [0, 2 pi period)."""
         travelled, ahead = self._fold((self._phase + self._rate * (now - self._since))
                                       % self._period)
@@ -74,7 +76,7 @@ class Motion:
     def of(cls, settings: InputSettings, since: int = 0) -> Motion:
         """Return the motion of an input, which is at its `start` at the time `since` [ns]."""
         return cls(settings.speed, settings.sweep, settings.start, since, settings.input.turns,
-                   settings.period)
+                   int(min(settings.input.period, MAX_PERIOD)))
 
     def changed(self, speed: float, sweep: Optional[Arc], now: int) -> Motion:
         """Return a motion with this speed and sweep from this one's value at `now` [ns]."""
@@ -97,7 +99,7 @@ class Motion:
     def _phase_at(self, now: int) -> int:
         return (self._phase + self._rate * (now - self._since)) % self._period
 
-    def _fold(self, phase: int) -> Tuple[int, bool]:
+    def _fold(self, phase: int) -> tuple[int, bool]:
         """Return how far the value at a phase is above the low end, and whether it rises there."""
         ahead = phase < self._width
         return (phase, ahead) if ahead else (2 * self._width - phase, ahead)

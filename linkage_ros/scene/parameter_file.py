@@ -11,32 +11,46 @@ rcl_yaml_param_parser (https://github.com/ros2/rcl). What it reads in a surprisi
 from __future__ import annotations
 
 from functools import reduce
-import math
 import re
 import sys
-from typing import Any, Dict, Iterator, Optional, Sequence, Tuple
+from typing import Any, Iterator, Optional, Sequence
 
 from .parameters import SceneError
-from ..cache import cached
 from ..optional import needs
 from ..words import elided, quoted
 
 KEY = 'ros__parameters'
-TEXT = 'tag:yaml.org,2002:str'
-BOOL, INTEGER, DOUBLE, UNCLEAR = '!bool', '!integer', '!double', '!unclear'
-# What unquoted text is; any other is a string. ROS reads what is unclear as a number, too.
-TYPES = {
-    BOOL: r'(y|Y|yes|Yes|YES|on|On|ON|true|True|TRUE'
-          r'|n|N|no|No|NO|off|Off|OFF|false|False|FALSE)\Z',
-    INTEGER: r'[+-]?(0|[1-9][0-9]*|0[xX][0-9a-fA-F]+)\Z',
-    DOUBLE: r'([+-]?(?!0[0-9]+\Z)([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?'
-            r'|[+-]?\.(inf|Inf|INF)|\.(nan|NaN|NAN))\Z',
-    UNCLEAR: r'(?ai:[+-]?(0[0-9]+|inf(inity)?|nan(\(\w*\))?'
-             r'|0x([0-9a-f]+\.?[0-9a-f]*|\.[0-9a-f]+)(p[+-]?[0-9]+)?))\Z'}
 _TOKEN = re.compile(r'\*\*?|[A-Za-z_]\w*', re.ASCII)
 
 # The values in a file, by the names of the nodes of each section.
-Sections = Dict[str, Dict[str, Any]]
+Sections = dict[str, dict[str, Any]]
+
+
+def _bool(text: str) -> bool:
+    return text.lower() in ('y', 'yes', 'on', 'true')
+
+
+def _integer(text: str) -> Optional[int]:
+    number = int(text, 0)
+    return number if -sys.maxsize - 1 <= number <= sys.maxsize else None
+
+
+def _double(text: str) -> Optional[float]:
+    text = text.lower()
+    number = float(text.replace('.inf', 'inf').replace('.nan', 'nan'))
+    is_rounded_away = not sys.float_info.min <= abs(number) <= sys.float_info.max
+    return None if is_rounded_away and re.search('[1-9]', text.partition('e')[0]) else number
+
+
+# Patterns of unquoted text, and how ROS reads it; any other is a string. What is unclear ROS reads
+# as a number, too.
+_READERS = [(re.compile(pattern), reader) for pattern, reader in (
+    (r'y|Y|yes|Yes|YES|on|On|ON|true|True|TRUE|n|N|no|No|NO|off|Off|OFF|false|False|FALSE', _bool),
+    (r'[+-]?(0|[1-9][0-9]*|0[xX][0-9a-fA-F]+)', _integer),
+    (r'[+-]?(?!0[0-9]+\Z)([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?'
+     r'|[+-]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)', _double),
+    (r'(?ai:[+-]?(0[0-9]+|inf(inity)?|nan(\(\w*\))?'
+     r'|0x([0-9a-f]+\.?[0-9a-f]*|\.[0-9a-f]+)(p[+-]?[0-9]+)?))', lambda _: None))]
 
 
 def sections(path: str) -> Sections:
@@ -44,26 +58,23 @@ def sections(path: str) -> Sections:
     with needs('yaml'):
         import yaml
 
-        loader = _loader(yaml)
-    found: Sections = {}
+        loader = getattr(yaml, 'CBaseLoader', yaml.BaseLoader)
     try:
         with open(path, 'rb') as file:
             text = file.read()
         for event in yaml.parse(text, Loader=loader):
-            if isinstance(event, yaml.AliasEvent):
-                raise ValueError(f'ROS does not support aliases{_line(event)}')
+            if isinstance(event, yaml.AliasEvent) or getattr(event, 'tag', None):
+                raise ValueError(f'ROS does not support aliases and tags{_line(event)}')
         root = yaml.compose(text, Loader=loader)
-        if root is not None and root.value:
-            _add_sections(found, root, ())
+        return _distinct(_sections(root, ())) if root is not None and root.value else {}
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         mark = getattr(error, 'problem_mark', None)
         problem = f'{getattr(error, "problem", "")}, line {mark.line + 1}' if mark else str(error)
         reason = elided(problem, 300)
         raise SceneError(f'{path} is not a valid ROS parameter file: {reason}') from None
-    return found
 
 
-def overrides(found: Sections, node: str) -> Optional[Dict[str, Any]]:
+def overrides(found: Sections, node: str) -> Optional[dict[str, Any]]:
     """
     Return the values for a node, by parameter name; later sections override earlier ones.
 
@@ -76,45 +87,41 @@ def overrides(found: Sections, node: str) -> Optional[Dict[str, Any]]:
 
 def is_text(text: str) -> bool:
     """Return whether unquoted text is a string."""
-    return not any(re.match(pattern, text) for pattern in TYPES.values())
+    return not any(pattern.fullmatch(text) for pattern, _ in _READERS)
 
 
-@cached(1)
-def _loader(yaml: Any) -> Any:
-    """Return a parser of YAML that marks each value with its type for ROS."""
-    class Loader(getattr(yaml, 'CBaseLoader', yaml.BaseLoader)):  # type: ignore[misc]
-        pass
+def _distinct(entries: Iterator[tuple[str, Any, Any]]) -> dict[str, Any]:
+    """Return values by name, from names, nodes and values; ValueError if a name is repeated."""
+    values: dict[str, Any] = {}
+    for name, node, value in entries:
+        if name in values:
+            raise ValueError(f'{quoted(name)} is given twice{_line(node)}')
+        values[name] = value
+    return values
 
-    for tag, pattern in TYPES.items():
-        Loader.add_implicit_resolver(tag, re.compile(pattern), None)
-    return Loader
 
-
-def _add_sections(found: Sections, node: Any, names: Tuple[str, ...]) -> None:
-    """Add the sections below the names of namespaces and nodes."""
+def _sections(node: Any, names: tuple[str, ...]) -> Iterator[tuple[str, Any, Any]]:
+    """Yield the sections below the names of namespaces and nodes."""
     for key, value in _items(node, f'{KEY} below the name of a node, such as /**, is expected'):
         if key == KEY:
-            _add_values(found.setdefault(_checked(names), {}), value, '')
+            yield _checked(names), value, _distinct(_values(value, ''))
         else:
-            _add_sections(found, value, (*names, key))
+            yield from _sections(value, (*names, key))
 
 
-def _add_values(values: Dict[str, Any], node: Any, prefix: str) -> None:
+def _values(node: Any, prefix: str) -> Iterator[tuple[str, Any, Any]]:
+    """Yield the values below the prefix of their names."""
     for key, value in _items(node, 'names with values are expected'):
-        name, is_mapping = prefix + key, value.id == 'mapping'
-        if is_mapping and prefix and '.' in key:
+        if value.id != 'mapping':
+            yield prefix + key, value, _value(value)
+            continue
+        if prefix and '.' in key:
             raise ValueError(f'ROS loses track of names below {quoted(key)}, which has a point'
                              f'{_line(value)}')
-        if is_mapping and name not in values:
-            _add_values(values, value, f'{name}.')
-            continue
-        new = None if is_mapping else _value(value)
-        if is_mapping or name in values and _kind(values[name]) != _kind(new):
-            raise ValueError(f'{quoted(name)} is given twice, with different types{_line(value)}')
-        values[name] = new
+        yield from _values(value, f'{prefix}{key}.')
 
 
-def _items(node: Any, reason: str) -> Iterator[Tuple[str, Any]]:
+def _items(node: Any, reason: str) -> Iterator[tuple[str, Any]]:
     """Yield the entries of a mapping; raise ValueError with a reason if it has none."""
     if node.id != 'mapping' or not node.value:
         raise ValueError(f'{reason}{_line(node)}')
@@ -122,10 +129,6 @@ def _items(node: Any, reason: str) -> Iterator[Tuple[str, Any]]:
         if key.id != 'scalar' or not key.value:
             raise ValueError(f'a name is expected{_line(key)}')
         yield key.value, value
-
-
-def _kind(value: Any) -> Any:
-    return (list, type(value[0])) if isinstance(value, list) else type(value)
 
 
 def _value(node: Any) -> Any:
@@ -139,28 +142,19 @@ def _value(node: Any) -> Any:
 
 
 def _scalar(node: Any) -> Any:
-    text, low = node.value, str(node.value).lower()
+    text = node.value
     if node.id != 'scalar':
         raise ValueError(f'a list must have no lists or names in it{_line(node)}')
     if node.style in ('"', "'"):
         return text
     if not text:
         raise ValueError(f'a value is missing{_line(node)}')
-    if node.tag == BOOL:
-        return low in ('y', 'yes', 'on', 'true')
-    if node.tag == INTEGER:
-        number = int(text, 16 if 'x' in low else 10)
-        if -sys.maxsize - 1 <= number <= sys.maxsize:
-            return number
-    elif node.tag == DOUBLE:
-        real = float(low.replace('.inf', 'inf').replace('.nan', 'nan'))
-        is_tiny = abs(real) < sys.float_info.min and re.search('[1-9]', low.partition('e')[0])
-        if math.isinf(real) == ('inf' in low) and not is_tiny:
-            return real
-    elif node.tag == TEXT and (node.style not in ('|', '>') or is_text(text.strip())):
-        return text
-    raise ValueError(f'{quoted(text)} is unclear or out of range{_line(node)}: write a decimal '
-                     'number, .inf, .nan, or text in quotes')
+    reader = next((reader for pattern, reader in _READERS if pattern.fullmatch(text)), str)
+    value = None if node.style else reader(text)
+    if value is None:
+        raise ValueError(f'{quoted(text)} is unclear or out of range{_line(node)}: write a '
+                         'decimal number, .inf, .nan, or text in quotes')
+    return value
 
 
 def _line(node: Any) -> str:

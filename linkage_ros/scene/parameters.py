@@ -6,11 +6,10 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 import math
 import re
-from typing import Any, Iterable, List, Optional, Tuple, Type
+from typing import Any, Callable, Collection, Iterable, Mapping, NamedTuple, Optional, Sequence
 
 from ..cache import cached
 from ..words import elided, listed, meant, MESSAGE, quoted
@@ -38,7 +37,7 @@ KINDS = {
 ROUNDED = 1e-6
 
 TEXT = re.compile(r'.{0,1000}', re.DOTALL)
-LONGEST_LIST = 10000
+MAX_ITEMS = 10000
 
 
 class SceneError(ValueError):
@@ -61,10 +60,16 @@ class Field:
         Description, with the unit in brackets, as {unit}.
     low, high : float, optional
         Ends of the allowed range; None: no range.
+    default : object
+        Value if none is given, unless that depends on other parameters.
     positive : bool
         Whether the value must be above zero.
     rule : str
         Further requirement, in words.
+    holds : callable, optional
+        Whether a value fulfils the rule.
+    choices : tuple of str
+        The only allowed texts; empty: any.
     pattern : re.Pattern
         Pattern that the whole of a text must match.
     readers : tuple of str
@@ -82,10 +87,13 @@ class Field:
     meaning: str
     low: Optional[float] = None
     high: Optional[float] = None
+    default: Any = None
     positive: bool = False
     rule: str = ''
+    holds: Optional[Callable[[Any], bool]] = None
+    choices: tuple[str, ...] = ()
     pattern: re.Pattern = TEXT
-    readers: Tuple[str, ...] = ()
+    readers: tuple[str, ...] = ALL
     read_only: bool = False
     unit: str = ''
     group: str = ''
@@ -117,20 +125,18 @@ class Field:
 
         `name` is the parameter's. An integer becomes a float where the kind requires it.
         """
-        several = self.kind.endswith('_array')
+        is_list = self.kind.endswith('_array')
         # rclpy represents an empty list as None.
-        value = () if several and value is None else plain(value)
-        if isinstance(value, tuple) != several:
-            raise self.error(name, value)
-        items = [self._converted(one) for one in (value if several else [value])]
-        if len(items) > LONGEST_LIST or not all(map(self._allows, items)):
-            raise self.error(name, value)
-        return tuple(items) if several else items[0]
-
-    def error(self, name: str, value: Any) -> SceneError:
-        """Return the error that parameter `name` must have an allowed value, not this one."""
+        value = () if is_list and value is None else plain(value)
+        if isinstance(value, tuple) == is_list:
+            items = tuple(map(self._converted, value if is_list else (value,)))
+            result = items if is_list else items[0]
+            if len(items) <= MAX_ITEMS and all(map(self._allows, items)) and (
+                    self.holds is None or self.holds(result)):
+                return result
         shown = list(value) if isinstance(value, tuple) else value
-        return SceneError(f'{elided(name, 100)} must be {self.allowed}, not {quoted(shown)}')
+        raise SceneError(f'{elided(name, 100)} must be {self.allowed}, not {quoted(shown)}'
+                         f'{meant(value, self.choices)}')
 
     def _converted(self, value: Any) -> Any:
         try:
@@ -139,14 +145,15 @@ class Field:
             return value
 
     @property
-    def _type(self) -> Type[Any]:
+    def _type(self) -> type[Any]:
         return KINDS[self.kind][0]
 
     def _allows(self, value: Any) -> bool:
         if type(value) is not self._type:
             return False
         if isinstance(value, str):
-            return bool(self.pattern.fullmatch(value))
+            return bool(self.pattern.fullmatch(value)) and (
+                not self.choices or value in self.choices)
         if isinstance(value, float) and not math.isfinite(value) or self.positive and value <= 0:
             return False
         if self.low is None or self.high is None:
@@ -156,45 +163,70 @@ class Field:
 
 
 @cached(2048)
-def _with(field: Field, *other: Tuple[str, Any]) -> Field:
+def _with(field: Field, *other: tuple[str, Any]) -> Field:
     """Return a cached copy with attributes replaced, which mechanisms of one type share."""
     return replace(field, **dict(other))
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """A parameter to declare: its full name, the Field that describes it, and its value."""
+class Parameter(NamedTuple):
+    """A parameter to declare: full name, Field, value, and the value if none were given."""
 
     name: str
     field: Field
     value: Any
+    default: Any = None
 
 
 class Values:
-    """Values by full parameter name; `take` validates one and adds it to `parameters`."""
+    """
+    Values by full parameter name; `take` validates one and adds it to `parameters`.
 
-    def __init__(self, values: Mapping[str, Any]):
-        self._unused = dict(values)
-        self.parameters: List[Parameter] = []
+    A parameter's full name is `prefix` and its key.
+    """
 
-    def unused(self, prefix: str = '') -> List[str]:
-        """Return the sorted names that begin with `prefix` and have not been taken."""
-        return sorted(name for name in self._unused if name.startswith(prefix))
+    def __init__(self, values: Mapping[str, Any], prefix: str = ''):
+        self._unused, self._prefix = dict(values), prefix
+        self.parameters: list[Parameter] = []
 
-    def take(self, name: str, field: Field, default: Any) -> Any:
+    def keys(self, prefix: str = '') -> list[str]:
+        """Return what follows a prefix in the sorted keys that have not been taken."""
+        start = self._prefix + prefix
+        return sorted(name[len(start):] for name in self._unused if name.startswith(start))
+
+    def take(self, key: str, field: Field, default: Any = None) -> Any:
         """Return a valid value, `default` if there is none; raise SceneError if it is invalid."""
-        value = field.checked(name, self._unused.pop(name)) if name in self._unused else default
-        self.parameters.append(Parameter(name, field, value))
+        name, default = self._prefix + key, field.default if default is None else default
+        value = field.checked(name, self._unused.pop(name, default))
+        self.parameters.append(Parameter(name, field, value, default))
         return value
 
+    def refuse_unknown(self, known: Sequence[str] = ()) -> None:
+        """Raise SceneError if a value is left that is no parameter of the scene or of rclpy."""
+        known = known or [parameter.name for parameter in self.parameters]
+        for name in sorted(self._unused):
+            if not _ROS.match(name):
+                names = [f'{name}.type'] * (f'{name}.*' in known) + [*known]
+                raise SceneError(f'{elided(name)} is not a parameter of the scene; allowed: '
+                                 f'{listed(names, 120)}{meant(name, names)}')
 
-def refuse_unknown(names: Iterable[str], known: List[str]) -> None:
-    """Raise SceneError unless all names are parameters of the scene or of rclpy."""
-    for name in names:
-        known = [f'{name}.type', *known] if f'{name}.*' in known else known
-        if not _ROS.match(name):
-            raise SceneError(f'{elided(name)} is not a parameter of the scene; allowed: '
-                             f'{listed(known, 120)}{meant(name, known)}')
+
+def read_lines(name: str, lines: Iterable[str], pattern: re.Pattern, names: Collection[str],
+               examples: str) -> dict[str, re.Match]:
+    """
+    Return the matches of lines KEY=... of a parameter, by key: one of `names`, each once.
+
+    SceneError quotes `examples` of lines for a line that is none.
+    """
+    matches: dict[str, re.Match] = {}
+    for line in lines:
+        match = pattern.fullmatch(line)
+        if not match or match[1] not in names or match[1] in matches:
+            raise SceneError(
+                f'{name} must be texts such as {examples}, each for a different one of '
+                f'{listed(names, 90)}, not {elided(line)!r}'
+                f'{meant(match and match[1], {*names} - {*matches})}')
+        matches[match[1]] = match
+    return matches
 
 
 def plain(value: Any) -> Any:

@@ -6,30 +6,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field as some
+from functools import cached_property
+from itertools import product
 import math
 import re
-from typing import Any, Dict, Mapping, Optional, Sequence, Tuple
+from typing import Any, Mapping, Optional, Sequence
 
-from .input_settings import InputSettings, read_settings
+from .input_settings import in_words, InputSettings, read_settings
 from .joint_names import JointName, read_joint_names
 from .legs import Assembly
 from .loads import Load, read_loads
 from .parameters import (
-    ALL,
     BRANCHES,
     DIMENSIONS,
     Field,
     INVERSE,
     KINEMATICS,
     Parameter,
-    refuse_unknown,
     SceneError,
     Values,
 )
 from .. import mechanisms
 from ..cache import cached
 from ..linkage import Arc, Design, Mechanism
-from ..words import listed, meant, quoted
+from ..words import listed
 
 IN_SPACE = 'a linkage in space: pictures and robot models are of linkages in a plane'
 TYPES = (*mechanisms.TYPES, *mechanisms.WRITTEN)
@@ -40,33 +40,44 @@ FRAME_NAME = (r'\w[^\x00-\x1f\x7f-\xa0\u200b-\u200f\u2028-\u202f\u2060-\u206f'
 FRAME = re.compile(f'({FRAME_NAME})?')
 FRAME_RULE = 'up to 100 characters that can be seen, the first a letter, digit or _'
 
-TYPE = Field('string', 'Type of the mechanism.', readers=ALL, read_only=True,
+
+def is_distinct(names: Sequence[str]) -> bool:
+    """Return whether there are names, each of them once."""
+    return 0 < len(names) == len(set(names))
+
+
+def _is_pose(numbers: Sequence[float]) -> bool:
+    return len(numbers) == 6
+
+
+TYPE = Field('string', 'Type of the mechanism.', read_only=True, choices=TYPES,
              rule=f'one of {", ".join(TYPES)}')
-JOINTS = Field('string_array', 'The linkage, one line per joint.', readers=ALL, read_only=True)
-TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', readers=ALL,
+JOINTS = Field('string_array', 'The linkage, one line per joint.', default=(), read_only=True)
+TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', default='',
                read_only=True)
-DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [{unit}].', readers=ALL,
-                  unit='m', group=DIMENSIONS)
-BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1, readers=ALL,
-               group=BRANCHES)
-SCALE = Field('double', 'Factor of every length.', positive=True, readers=ALL)
+DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [{unit}].', unit='m',
+                  group=DIMENSIONS)
+BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1, group=BRANCHES)
+SCALE = Field('double', 'Factor of every length.', default=1.0, positive=True)
 LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
-                  readers=(KINEMATICS,))
+                  default=1, readers=(KINEMATICS,))
 MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side; '
                  'default: with more than one pair.', readers=(KINEMATICS,))
-POINTS = Field('string_array', 'Joints that markers display.', readers=(KINEMATICS,))
+POINTS = Field('string_array', 'Joints that markers display.', readers=(KINEMATICS,),
+               holds=is_distinct, rule='each once')
 POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
-             'x, y, z [m], roll, pitch, yaw [rad].', rule='six of them', readers=(KINEMATICS,))
-OWN_FRAME_ID = Field('string', "Frame that its pose is in; empty: the scene's.",
+             'x, y, z [m], roll, pitch, yaw [rad].', default=(0.0,) * 6, readers=(KINEMATICS,),
+             rule='six of them', holds=_is_pose)
+OWN_FRAME_ID = Field('string', "Frame that its pose is in; empty: the scene's.", default='',
                      readers=(KINEMATICS,), rule=FRAME_RULE, pattern=FRAME)
 JOINT_NAMES = Field(
     'string_array', "The robot's own names of joints; a joint that is not listed keeps its name.",
-    readers=(KINEMATICS, INVERSE),
+    default=(), readers=(KINEMATICS, INVERSE),
     rule="such as 'BC=left_shin', or 'EF=-left_ankle+0.35' for 0.35 minus its position")
-ONLY_NAMED = Field('bool', 'Whether only the joints in joint_names are published.',
+ONLY_NAMED = Field('bool', 'Whether only the joints in joint_names are published.', default=False,
                    readers=(KINEMATICS,))
 LOADS = Field('string_array', "Loads that the inputs balance, in the linkage's plane.",
-              readers=(KINEMATICS, INVERSE),
+              default=(), readers=(KINEMATICS, INVERSE),
               rule="such as 'C=0 -9.81', a force [N] at a joint, or 'EF=2.5', a moment [N m]")
 
 
@@ -84,24 +95,35 @@ class SceneMechanism:
 
     name: str
     linkage: Mechanism
-    reach: Tuple[Arc, ...]
+    reach: tuple[Arc, ...]
     scale: float
     leg_pairs: int
     mirrored: bool
-    points: Tuple[str, ...]
-    pose: Tuple[float, ...]
+    points: tuple[str, ...]
+    pose: tuple[float, ...]
     inputs: Mapping[str, InputSettings]
     frame_id: str
     joints: Mapping[str, JointName]
     only_named: bool
     loads: Mapping[str, Load]
     values: Mapping[str, Any] = some(compare=False, repr=False)
-    parameters: Tuple[Parameter, ...] = some(compare=False, repr=False)
+    parameters: tuple[Parameter, ...] = some(compare=False, repr=False)
 
     def is_from(self, values: Mapping[str, Any]) -> bool:
         """Return whether it was read from the same objects, and so is unchanged."""
         return self.values is values or self.values.keys() == values.keys() and all(
             self.values[key] is value for key, value in values.items())
+
+    def check_starts(self, old: Optional[SceneMechanism]) -> None:
+        """Raise SceneError if a motion cannot start where a user wants; it may as in `old`."""
+        for name, settings in self.inputs.items() if self is not old else ():
+            before = old and old.inputs.get(name)
+            key, start, input_ = f'{self.name}.{name}.start', settings.start, settings.input
+            if not (key not in self.values or settings.sweep is None
+                    or before and (before.start, before.sweep) == (start, settings.sweep)
+                    or any(input_.holds(arc, start, start) for arc in settings.arcs)):
+                allowed = f'{"sweep" if settings.ends else "reach"} {in_words(settings.arcs)}'
+                raise SceneError(f'{key} must be inside the {allowed} {input_.unit}, not {start}')
 
     @property
     def in_space(self) -> bool:
@@ -117,24 +139,46 @@ class SceneMechanism:
         """Return the factor from the linkage to the scene: the scale for a length, else 1."""
         return 1.0 if self.linkage.is_angle(output) else self.scale
 
-    def measured(self, output: str, value: float, seed: float) -> Tuple[float, float]:
-        """
-        Return the input at which an output has a value [rad or m], and d output / d input.
+    @cached_property
+    def scales(self) -> list[float]:
+        """Return the factor of each input from the linkage to the scene."""
+        return [self.scale_of(name) for name in self.inputs]
 
-        Of several solutions it is the one that continues from the input `seed`, or else the
-        nearest. It is NaN if there is none in the reach and in the sweep that a user has set.
+    def follow(self, outputs: Sequence[str], values: Sequence[float], seed: Sequence[float],
+               jumps: bool = True) -> tuple[list[float], list[float]]:
         """
-        settings, unit = self.first, self.scale_of(output)
-        scale = self.scale_of(settings.input.name)
-        ends = settings.ends and (settings.ends[0] / scale, settings.ends[1] / scale)
-        inverse, values, seeds = self.linkage.inverse(output), (value / unit,), (seed / scale,)
-        (input_,), (rate,) = inverse.follow(values, seeds)
-        if not (ends[0] <= input_ <= ends[1] if ends else input_ == input_):
-            (input_,), (rate,) = inverse.nearest(values, seeds, (ends,))
-        return input_ * scale, rate * unit / scale
+        Return the inputs at which outputs have values [rad or m], and the rates of the outputs.
+
+        Of several solutions it is the one that continues from the inputs `seed`, or else, if they
+        may jump, the nearest. It is NaN if there is none in the reach and in the sweeps that a
+        user has set. The rates are those of each output by the first input, by the second, ...
+        """
+        units, scales = list(map(self.scale_of, outputs)), self.scales
+        inverse = self.linkage.inverse(tuple(outputs))
+        targets, seeds = divided(values, units), divided(seed, scales)
+        inputs: Sequence[float]
+        inputs, rates = inverse.follow(targets, seeds)
+        if not all(end[0] <= value <= end[1] if end else value == value
+                   for end, value in zip(self.ends, inputs)):
+            inputs, rates = inverse.nearest(targets, seeds, self.ends) if jumps else (
+                [math.nan] * len(seeds), rates)
+        return ([input_ * scale for input_, scale in zip(inputs, scales)],
+                [rate * unit / scale for rate, (scale, unit) in zip(
+                    rates, product(scales, units))])
+
+    @cached_property
+    def ends(self) -> list[Optional[Arc]]:
+        """Return the sweeps that a user has set, before scale; None: no limit but the reach."""
+        return [settings.ends and (settings.ends[0] / scale, settings.ends[1] / scale)
+                for settings, scale in zip(self.inputs.values(), self.scales)]
+
+    def measured(self, output: str, value: float, seed: float) -> tuple[float, float]:
+        """Return the only input by which an output has a value, and its rate; see `follow`."""
+        (input_,), (rate,) = self.follow([output], [value], [seed])
+        return input_, rate
 
     def from_source(self, settings: InputSettings, position: float, speed: Optional[float],
-                    seed: Optional[float]) -> Tuple[float, Optional[float]]:
+                    seed: Optional[float]) -> tuple[float, Optional[float]]:
         """
         Return an input and its speed, from those of its source joint [rad or m, per second].
 
@@ -151,7 +195,7 @@ class SceneMechanism:
         return input_, None if speed is None else speed / rate if rate else math.nan
 
     def to_source(self, settings: InputSettings, value: float, speed: float
-                  ) -> Tuple[float, float]:
+                  ) -> tuple[float, float]:
         """Return position and speed of an input's source joint, from those of the input."""
         if output := settings.measures:
             scale, unit = self.scale_of(settings.input.name), self.scale_of(output)
@@ -160,15 +204,14 @@ class SceneMechanism:
             speed = rate * speed
         return (value - settings.offset) / settings.ratio, speed / settings.ratio
 
-    def efforts(self, values: Sequence[float]) -> Tuple[float, ...]:
+    def efforts(self, values: Sequence[float]) -> tuple[float, ...]:
         """Return the inputs' efforts [N m or N] that balance the loads at inputs `values`."""
-        units = [self.scale_of(name) for name in self.inputs]
-        inputs = [value / unit for value, unit in zip(values, units)]
+        inputs = divided(values, self.scales)
         # The scale lengthens the lever arms of forces; moments do not depend on it.
         loads = {name: load if isinstance(load, float) else tuple(
             self.scale * part for part in load) for name, load in self.loads.items()}
         efforts = self.linkage.effort(inputs if len(inputs) > 1 else inputs[0], loads)
-        return tuple(float(effort) / unit for effort, unit in zip(efforts, units))
+        return tuple(divided(efforts.tolist(), self.scales))
 
     def assembly(self) -> Assembly:
         """Return the solver of all legs."""
@@ -180,44 +223,53 @@ class SceneMechanism:
         return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
 
 
-def read_mechanism(name: str, entries: Mapping[str, Any], old: Optional[SceneMechanism],
-                   strict: bool) -> SceneMechanism:
+def divided(values: Sequence[Any], units: Sequence[float]) -> list[Any]:
+    """Return values in units of their own."""
+    return [value / unit for value, unit in zip(values, units)]
+
+
+def read_mechanism(name: str, entries: Mapping[str, Any], old: Optional[SceneMechanism]
+                   ) -> SceneMechanism:
     """Read a mechanism from its values, or return `old` if they are unchanged."""
     if old and old.is_from(entries):
         return old
-    values = Values(entries)
-    type_ = values.take(f'{name}.type', TYPE, name)
-    if type_ not in TYPES:
-        raise SceneError(f'{name}.type must be {TYPE.rule}, not {quoted(type_)}'
-                         f'{meant(type_, TYPES)}')
-    linkage, reach = _linkage(name, type_, values)
-    scale = values.take(f'{name}.scale', SCALE, 1.0)
-    leg_pairs, mirrored = _legs(name, linkage, values)
-    points, pose = _points(name, linkage, values), _pose(name, values)
-    old_inputs = old.inputs if old else {}
-    inputs = {input_.name: read_settings(name, linkage, input_, reach, scale, values,
-                                         old_inputs.get(input_.name), strict)
+    values = Values(entries, f'{name}.')
+    take = values.take
+    linkage, reach = _linkage(name, take('type', TYPE, name), values)
+    scale, (leg_pairs, mirrored) = take('scale', SCALE), _legs(name, linkage, values)
+    points = take('points', POINTS.about(
+        rule=f'some of {listed(linkage.points)}, each once', choices=linkage.points),
+        linkage.points)
+    pose = take('pose', POSE)
+    inputs = {input_.name: read_settings(name, linkage, input_, reach, scale, values)
               for input_ in linkage.inputs}
-    frame_id = values.take(f'{name}.frame_id', OWN_FRAME_ID, '')
-    only_named = values.take(f'{name}.only_named', ONLY_NAMED, False)
+    frame_id, only_named = take('frame_id', OWN_FRAME_ID), take('only_named', ONLY_NAMED)
     assembly = Assembly(linkage, leg_pairs, mirrored, scale, reach)
     angles = [linkage.is_angle(joint) for joint in assembly.joints]
     joints = read_joint_names(
         name, {**dict.fromkeys(inputs, False),
                **dict(zip(assembly.all_joints, len(assembly.legs) * angles))},
-        values.take(f'{name}.joint_names', JOINT_NAMES, ()), only_named)
-    loads = read_loads(name, linkage, values.take(f'{name}.loads', LOADS, ()))
+        take('joint_names', JOINT_NAMES), only_named)
+    loads = read_loads(name, linkage, take('loads', LOADS))
     if loads and (leg_pairs > 1 or mirrored):
         raise SceneError(f'{name}.loads must be empty for more than one leg')
-    refuse_unknown(values.unused(), [parameter.name for parameter in values.parameters])
+    values.refuse_unknown()
     return SceneMechanism(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs,
                           frame_id, joints, only_named, loads, entries, tuple(values.parameters))
 
 
-def _linkage(name: str, type_: str, values: Values) -> Tuple[Mechanism, Tuple[Arc, ...]]:
-    design = _design(name, type_, values)
-    dimensions = _dimensions(name, design, values)
-    branches = _branches(name, design, values)
+def _linkage(name: str, type_: str, values: Values) -> tuple[Mechanism, tuple[Arc, ...]]:
+    try:
+        design = mechanisms.design(type_) if type_ in mechanisms.TYPES else mechanisms.design(
+            type_, values.take('joints', JOINTS), values.take('tracer', TRACER) or None,
+            values.keys('dimensions.'))
+    except ValueError as error:
+        raise SceneError(f'{name}.joints: {error}') from None
+    dimensions = {key: values.take(f'dimensions.{key}', DIMENSION.about(
+        key, type_, positive=key not in design.signed), value)
+        for key, value in design.dimensions.items()}
+    branches = {key: values.take(f'branches.{key}', BRANCH.about(key, type_), sign) or sign
+                for key, sign in design.branches.items()}
     try:
         linkage = _built(design, tuple(dimensions.items()), tuple(branches.items()))
         # The reach of one of several inputs depends on the others.
@@ -235,74 +287,25 @@ def _linkage(name: str, type_: str, values: Values) -> Tuple[Mechanism, Tuple[Ar
     return linkage, reach
 
 
-def _design(name: str, type_: str, values: Values) -> Design:
-    if type_ in mechanisms.TYPES:
-        return mechanisms.design(type_)
-    joints = values.take(f'{name}.joints', JOINTS, ())
-    tracer = values.take(f'{name}.tracer', TRACER, '')
-    start = f'{name}.dimensions.'
-    dimensions = [key[len(start):] for key in values.unused(start)]
-    try:
-        return mechanisms.design(type_, joints, tracer or None, dimensions)
-    except ValueError as error:
-        raise SceneError(f'{name}.joints: {error}') from None
-
-
-def _dimensions(name: str, design: Design, values: Values) -> Dict[str, float]:
-    chosen = {}
-    for key in design.dimensions:
-        field = DIMENSION.about(key, design.name, positive=key not in design.signed)
-        chosen[key] = values.take(f'{name}.dimensions.{key}', field, design.dimensions[key])
-    return chosen
-
-
-def _branches(name: str, design: Design, values: Values) -> Dict[str, int]:
-    chosen = {}
-    for key, sign in design.branches.items():
-        field = BRANCH.about(key, design.name)
-        chosen[key] = values.take(f'{name}.branches.{key}', field, sign) or sign
-    return chosen
-
-
 @cached(16, shared=True)
 def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
     """Build a linkage, or return an equal one that is cached or in use."""
-    lines: Dict[str, Any] = {} if design.name in mechanisms.TYPES else {
+    lines: dict[str, Any] = {} if design.name in mechanisms.TYPES else {
         'joints': design.joints, 'tracer': design.tracer}
     return mechanisms.create(design.name, branches=dict(branches), **lines, **dict(dimensions))
 
 
-def _legs(name: str, linkage: Mechanism, values: Values) -> Tuple[int, bool]:
-    able = _can_have_more_legs(linkage)
-    # A parameter of which no other value is allowed is read-only, and so has no slider.
-    pairs, mirrored = (field.about(read_only=not able) for field in (LEG_PAIRS, MIRRORED))
-    pairs = values.take(f'{name}.leg_pairs', pairs, 1)
-    mirrored = values.take(f'{name}.mirrored', mirrored, pairs > 1)
-    if (pairs > 1 or mirrored) and not able:
-        what, allowed = ('leg_pairs', '1') if pairs > 1 else ('mirrored', 'false')
-        raise SceneError(f'{name}.{what} must be {allowed}: only a linkage whose one crank '
-                         'turns about x = 0, its angle measured from +x, can have more legs')
-    return pairs, mirrored
-
-
-def _can_have_more_legs(linkage: Mechanism) -> bool:
+def _legs(name: str, linkage: Mechanism, values: Values) -> tuple[int, bool]:
     first, *others = linkage.inputs
-    if others or not first.turns or len(linkage.axes) > 2:
-        return False
-    crank = next(link for link in linkage.links if link.name == first.name)
-    return not crank.zero and linkage.solve(0.0, (crank.joint,))[crank.joint][0] == 0.0
-
-
-def _points(name: str, linkage: Mechanism, values: Values) -> Tuple[str, ...]:
-    points = values.take(f'{name}.points', POINTS, linkage.points)
-    if not points or len(set(points)) < len(points) or set(points) - set(linkage.points):
-        raise SceneError(f'{name}.points must name some of {listed(linkage.points)}, each '
-                         f'once, not {quoted(list(points))}')
-    return points
-
-
-def _pose(name: str, values: Values) -> Tuple[float, ...]:
-    pose = values.take(f'{name}.pose', POSE, (0.0,) * 6)
-    if len(pose) != 6:
-        raise POSE.error(f'{name}.pose', pose)
-    return pose
+    able = first.turns and not others and len(linkage.axes) == 2
+    if able:
+        crank = next(link for link in linkage.links if link.name == first.name)
+        able = not crank.zero and linkage.solve(0.0, (crank.joint,))[crank.joint][0] == 0.0
+    # A parameter of which no other value is allowed is read-only, and so has no slider.
+    pairs = values.take('leg_pairs', LEG_PAIRS.about(read_only=not able))
+    mirrored = values.take('mirrored', MIRRORED.about(read_only=not able), pairs > 1)
+    if (pairs > 1 or mirrored) and not able:
+        raise SceneError(f'{name}.leg_pairs must be 1 and mirrored false: only a linkage whose '
+                         'one crank turns about x = 0, its angle measured from +x, can have more '
+                         'legs')
+    return pairs, mirrored

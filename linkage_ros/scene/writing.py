@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import re
 from textwrap import indent
-from typing import Any, Dict, Mapping
+from typing import Any, Mapping, Optional
 
-from . import read, Scene, SceneError
-from .parameter_file import is_text, TEXT
+from . import read, Scene
+from .parameter_file import is_text
 from ..optional import needs
 
 
@@ -23,7 +23,7 @@ def in_yaml(values: Mapping[str, Any]) -> str:
         """Quotes texts that ROS would read as another type, such as y, nan and 1e5."""
 
     Dumper.add_representer(str, lambda dumper, text: dumper.represent_scalar(
-        TEXT, text, None if is_text(text) else "'"))
+        'tag:yaml.org,2002:str', text, None if is_text(text) else "'"))
     texts = ['/**:', '  ros__parameters:']
     for name, value in values.items():
         written = list(value) if isinstance(value, tuple) else value
@@ -37,29 +37,16 @@ def in_yaml(values: Mapping[str, Any]) -> str:
     return '\n'.join(texts) + '\n'
 
 
-# Matches no text.
-NOTHING = re.compile(r'(?!)')
-
-
-def without_defaults(scene: Scene, always: re.Pattern = NOTHING) -> Dict[str, Any]:
+def without_defaults(scene: Scene, always: Optional[re.Pattern] = None) -> dict[str, Any]:
     """
-    Return the values that differ from their defaults, by full parameter name.
+    Return the mechanisms and the values that differ from their defaults, by full parameter name.
 
     A value whose whole name matches `always` is included even if it is the default. Raises
     SceneError if nodes could not start with these values: an input starts outside its sweep or
     reach.
     """
-    values = {parameter.name: parameter.value for parameter in scene.parameters}
-    whole = dict(values)
-    for name in whole:
-        if always.fullmatch(name):
-            continue
-        fewer = {key: value for key, value in values.items() if key != name}
-        try:
-            same = read(fewer, scene, strict=False).parameters
-        except SceneError:
-            continue
-        if {parameter.name: parameter.value for parameter in same} == whole:
-            values = fewer
+    values = {parameter.name: parameter.value for parameter in scene.parameters
+              if parameter.value != parameter.default or parameter.name == 'mechanisms'
+              or always and always.fullmatch(parameter.name)}
     read(values)
     return values
