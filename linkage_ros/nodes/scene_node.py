@@ -67,7 +67,7 @@ class SceneNode(Node):
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         incidents = Incidents(self.get_logger(), lambda: not self.context.ok())
         self.guarded, self.report = incidents.guarded, incidents.report
-        self.worker = Worker(self, incidents.report)
+        self.worker = Worker(self, incidents.guarded)
         self._announcer: Optional[Announcer] = None
         self._adopted: Optional[scenes.Scene] = None
         # Numbers of requests to set parameters: answered, and waiting.

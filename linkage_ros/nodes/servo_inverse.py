@@ -68,13 +68,6 @@ class ServoInverse(scene_node.SceneNode):
         self._sources = frozenset(settings.source for mechanism in new.machines.values()
                                   for settings in mechanism.inputs.values())
 
-    def destroy_node(self) -> None:
-        """End the trajectories, and destroy the node."""
-        # A context that ends destroys nodes whose constructor has failed, too.
-        if hasattr(self, '_stream'):
-            self._stream.end()
-        super().destroy_node()
-
     def answer(self, request: Any, response: Any) -> Any:
         """Answer a request of `servo_inverse`; the response names an error, if any."""
         return self._filled(lambda: solve(
