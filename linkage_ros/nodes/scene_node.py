@@ -41,9 +41,9 @@ try:
 except ImportError:
     Executor, AWAITS = SingleThreadedExecutor, True
 
-# Longest wait for an event [s]: some builds of the EventsExecutor do not wait without a limit.
-# They loop at full load and ignore signals.
-MAX_WAIT_S = 1.0
+# Longest wait for an event [s], so that a signal is noticed. Some builds of the EventsExecutor do
+# not wait without a limit, either.
+MAX_WAIT_S = 0.25
 
 # Longest time for which the worker thread delays a message [s]. At shorter intervals, it would
 # interrupt the processing of messages, and more of them would be late.
@@ -292,8 +292,6 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
 def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
           incidents: Incidents) -> None:
     try:
-        # `Executor.wake` does not wake every kind of executor.
-        shutdown.wake = lambda: executor.create_task(lambda: None)
         shutdown.before_exit = partial(_delete_displayed, nodes)
         for node in nodes:
             executor.add_node(node)
