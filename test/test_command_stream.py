@@ -51,7 +51,6 @@ BUCKET = [f'digger_{output}' for output in ('H.x', 'H.y', 'angle(H,J)')]
 class Stream:
     """What is wanted goes to a node, and its commands are gathered."""
 
-    # Without a pause the messages would leave a thread that searches no time.
     PAUSE = 0.01
 
     def __init__(self, graph, parameters):
@@ -323,51 +322,18 @@ def test_of_several_inputs_what_cannot_be_had_is_held_and_said(graph, capfd):
 SEARCHED = ['digger_H.x', 'digger_J.y', 'digger_distance(P,J)']
 
 
-@pytest.fixture
-def searches(monkeypatch):
-    """Gather whether each search for a first command or a reason holds up the node's messages."""
-    gathered, command, reason = [], InverseRequest.command, InverseRequest.reason
-
-    def here():
-        gathered.append(threading.current_thread() is threading.main_thread())
-
-    def commanded(request, values, speeds, near, jumps):
-        if jumps and request.outputs[0] == 'H.x':
-            here()
-        return command(request, values, speeds, near, jumps)
-
-    def explained(request, *values):
-        here()
-        return reason(request, *values)
-
-    monkeypatch.setattr(InverseRequest, 'command', commanded)
-    monkeypatch.setattr(InverseRequest, 'reason', explained)
-    return gathered
-
-
-def test_a_first_command_is_searched_beside_the_messages(graph, searches):
+def test_without_a_closed_form_a_first_command_does_not_jump_and_no_message_waits_for_a_search(
+        graph, capfd, monkeypatch):
+    monkeypatch.setattr(InverseRequest, 'reason', None)
     stream = Stream(graph, SEVERAL)
-    arrays = graph.listen(Float64MultiArray, 'digger/commands')
-    far = [56.8, 137.9, 133.8]
     linkage = stream.node.scene.machines['digger'].linkage
-    wanted = linkage.function((), tuple(name.split('_')[1] for name in SEARCHED))(*far)
-    found = stream.want(SEARCHED, list(wanted))
-    assert [position for position, in found.values()] == pytest.approx(
-        [far[0] - 80.0, *far[1:]], rel=1e-9)
-    graph.until(lambda: arrays and arrays[-1].data.tolist() == [x for x, in found.values()])
-    assert searches == [False]
-
-
-def test_why_there_is_no_first_command_is_searched_seldom_and_beside_the_messages(
-        graph, searches, capfd, monkeypatch):
-    monkeypatch.setattr('linkage_ros.nodes.command_stream.SEARCH_PAUSE_RATIO', 1e9)
-    stream = Stream(graph, SEVERAL)
-    for _ in range(3):
-        assert stream.want(FOOT + SEARCHED, [*LINE[:2], 1e4, -150.0, 100.0]).keys() == {
-            'leg_crank', 'motor'}
-    graph.until(lambda: 'outside the reach' in capfd.readouterr().err)
-    stream.want(FOOT + SEARCHED, [*LINE[:2], 1e4, -150.0, 100.0])
-    assert searches == [False, False]
+    outputs = linkage.function((), tuple(name.split('_')[1] for name in SEARCHED))
+    near, far = [108.1, 132.1, 119.1], [56.8, 137.9, 133.8]
+    for inputs, moved in ((far, {}), (near, {'digger_cylinder': near[0] - 80.0})):
+        commands = stream.want(FOOT + SEARCHED, [*LINE[:2], *outputs(*inputs)])
+        assert {name: at for name, (at,) in commands.items() if name == 'digger_cylinder'} == (
+            pytest.approx(moved, rel=1e-9))
+    assert 'no motion leads there from the last inputs' in capfd.readouterr().err
 
 
 @pytest.fixture

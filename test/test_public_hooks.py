@@ -55,8 +55,7 @@ def replaced(tree):
     """Yield what is assigned to an attribute of others that is called as one of their methods."""
     for one in ast.walk(tree):
         if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store):
-            # `ShutdownHandler.wake` is ours.
-            if one.attr in METHODS and ast.unparse(one) != 'shutdown.wake':
+            if one.attr in METHODS:
                 if not isinstance(one.value, ast.Name) or one.value.id != 'self':
                     yield one
 

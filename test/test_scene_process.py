@@ -15,10 +15,9 @@ pytest.importorskip('linkage_interfaces')
 
 from linkage_interfaces.srv import ServoInverse as ServoInverseType  # noqa: E402
 from linkage_ros.nodes import scene_process  # noqa: E402
-from linkage_ros.nodes.crank_driver import CrankDriver, InProcessPublisher  # noqa: E402
+from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from rclpy.serialization import deserialize_message  # noqa: E402
 from ros_harness import Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 
@@ -29,19 +28,13 @@ LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever', 'lever.crank.sp
 @pytest.fixture
 def nodes(graph):
     """Start them as the process does."""
-    kinematics, inverse = graph.start(Kinematics, LEVER), graph.start(ServoInverse, LEVER)
-    return kinematics, inverse, graph.start(CrankDriver, LEVER, in_process=[kinematics, inverse])
+    return [graph.start(kind, LEVER) for kind in (Kinematics, ServoInverse, CrankDriver)]
 
 
 def told(message):
     """Return what a message says, and when."""
     stamp = message.header.stamp
     return (stamp.sec, stamp.nanosec), dict(zip(message.name, message.position))
-
-
-def names(taken):
-    """Return the names in some messages."""
-    return [list(deserialize_message(text, JointState).name) for text in taken]
 
 
 def lever_at(crank):
@@ -53,27 +46,6 @@ def is_true(message):
     """Tell whether the lever is where the crank in the same message puts it."""
     _, at = told(message)
     return at['lever_lever'] == pytest.approx(lever_at(at['lever_crank']), abs=1e-14)
-
-
-def test_what_nobody_else_hears_is_handed_over_without_the_wire(graph):
-    taken = []
-    own = graph.start(Kinematics, LEVER)
-    own.create_subscription(JointState, 'turned', taken.append, 10, raw=True)
-    publisher = InProcessPublisher(own, 'turned', [own])
-    assert publisher.has_subscribers
-    publisher.publish(JointState(name=['one']))
-    assert names(taken) == [['one']]
-    other = graph.listen(JointState, 'turned')
-
-    def heard():
-        publisher.publish(JointState(name=['two']))
-        return other
-
-    graph.until(heard)
-    for name in ('three', 'four'):
-        publisher.publish(JointState(name=[name]))
-    graph.until(lambda: list(other[-1].name) == names(taken)[-1] == ['four'])
-    assert names(taken).count(['three']) == 1
 
 
 def test_a_lever_moves_with_cranks_that_nobody_else_hears(graph, nodes):

@@ -3,7 +3,6 @@
 
 """The servo service: right answers, or the reason why there is none."""
 
-import array
 import cmath
 import math
 import threading
@@ -353,30 +352,17 @@ def test_one_servo_near_serves_any_number_of_values(graph):
     assert np.abs(np.diff(other)).max() < 0.5 and np.abs(other - working).min() > 0.5
 
 
-@pytest.mark.long
-def test_a_million_angles_are_answered(graph):
-    node = graph.start(ServoInverse)
-    wanted = array.array('d', np.linspace(-1.0, 1.0, 10 ** 6))
-    response = ask(node, wanted)
-    assert sum(response.reachable) == pytest.approx(10 ** 6 * LIMIT, abs=2)
-    assert 'and 437459 more' in response.message or len(response.message) < 300
-
-
-@pytest.mark.parametrize('count, longest, request_, text', [
-    (20_001, 0.0, {}, 'after 0 s only 10000 of the 20001 values in lever_angle are solved; give '
-                      'up to 10000 at once')])
-def test_an_answer_that_others_would_wait_for_is_refused(
-        graph, monkeypatch, count, longest, request_, text):
-    monkeypatch.setattr('linkage_ros.nodes.servo_inverse.MAX_CPU_TIME_S', longest)
-    response = ask(graph.start(ServoInverse), [0.1] * count, **request_)
-    assert not response.success and text in response.message
+def test_an_answer_that_others_would_wait_for_is_refused(graph):
+    response = ask(graph.start(ServoInverse), [0.1] * 10_001)
+    assert not response.success
+    assert response.message == 'lever_angle has 10001 values; give up to 10000 at once'
 
 
 @pytest.mark.parametrize('near', [[], [2.9], 'each'])
 def test_a_long_way_is_answered_as_in_one_piece(graph, near):
     node = graph.start(ServoInverse, {'mechanisms': ['slotted_lever']})
-    # In and out of the reach, at the ends of the blocks too; it comes near its ends.
-    values = 0.57 * np.sin(np.linspace(-1.6, 9.0, 35_000))
+    # In and out of the reach; it comes near its ends.
+    values = 0.57 * np.sin(np.linspace(-1.6, 9.0, 9_000))
     near = np.linspace(-3.0, 20.0, len(values)) if near == 'each' else np.array(near)
     response = ask(node, values.tolist(), near.tolist())
     inverse = InverseRequest(node.scene.machines['slotted_lever'], [''])

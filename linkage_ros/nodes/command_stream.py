@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from functools import partial
 import math
-import time
 from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Sequence
 
 from rclpy.duration import Duration
@@ -19,19 +18,14 @@ from . import joint_state_reader
 from .log import MAX_NAMES, Once, Throttle
 from .message_layout import NEVER, pack_time, unpack
 from .messages import joint_states
-from .publishers import PatchedPublisher, TrackedPublisher
-from .worker import Worker
-from ..cache import Cache
+from .publishers import TrackedPublisher
 from ..scene.inverse_request import Command, InverseRequest
 from ..scene.joint_names import JointName
 from ..scene.scene_mechanism import SceneMechanism
 from ..words import elided, listed
 
-# Pause after a search for a first command [s]; and at least as many times the search's duration.
-SEARCH_PAUSE_S, SEARCH_PAUSE_RATIO = 0.5, 9.0
-# Maximum numbers of cached publishers, and of points of a trajectory, which take the worker some
-# seconds.
-MAX_PUBLISHERS, MAX_POINTS = 100, 10_000
+# Maximum number of points of a trajectory, which take the worker some seconds.
+MAX_POINTS = 10_000
 
 
 class Target(NamedTuple):
@@ -66,10 +60,12 @@ class Target(NamedTuple):
         return [settings.actuator[0] * effort for settings, effort in zip(
             self.mechanism.inputs.values(), self.mechanism.efforts(command.inputs))]
 
-    def reason(self, positions: Sequence[float]) -> str:
-        """Explain why the positions in a message are out of reach."""
+    def reason(self, positions: Sequence[float], is_searched: bool) -> str:
+        """Explain why the positions in a message are out of reach; some reasons are searched."""
         values = ', '.join(f'{positions[index]:.6g}' for index in self.indices)
-        return f'{self.named} cannot be {values}: {self.request.reason(*self._values(positions))}'
+        reason = self.request.reason(*self._values(positions)) if is_searched else (
+            'no motion leads there from the last inputs; the service inputs_for searches for all')
+        return f'{self.named} cannot be {values}: {reason}'
 
     def _values(self, positions: Sequence[float]) -> list[float]:
         return [name.sign * (positions[index] - name.offset)
@@ -81,10 +77,9 @@ class CommandStream:
     Publishes `servo_commands`, `<mechanism>/commands` and `servo_trajectory`.
 
     Requests arrive on `wanted_states` and `wanted_trajectory`. Each solution continues the last
-    one; if an output is out of reach, its actuator holds the last valid command. Worker threads
-    solve a trajectory, which a newer one replaces, and what has to be searched for several inputs:
-    their first command, or why there is none. `present(mechanism)` returns the present inputs of a
-    SceneMechanism [rad or m], inf where they are unknown.
+    one; if an output is out of reach, its actuator holds the last valid command. The node's worker
+    solves a trajectory, which a newer one replaces. `present(mechanism)` returns the present
+    inputs of a SceneMechanism [rad or m], inf where they are unknown.
     """
 
     def __init__(self, node: Any, mechanisms: Iterable[str],
@@ -95,12 +90,9 @@ class CommandStream:
                         for name in mechanisms}
         self._trajectories = TrackedPublisher(node, JointTrajectory, 'servo_trajectory', 10)
         self._throttle, self._unknown = Throttle(self._logger), Once(MAX_NAMES)
-        self._searched = Throttle(self._logger)
         self._mechanisms: Mapping[str, SceneMechanism] = {}
         self._last: dict[str, Command] = {}
-        # From when on the next search for a mechanism may begin.
-        self._searches: dict[str, float] = {}
-        self._worker, self._searcher = Worker(node, node.report), Worker(node, node.report)
+        self._worker, self._newest = node.worker, JointTrajectory()
         joint_state_reader.subscribe(node, 'wanted_states', self._receive)
         node.create_subscription(JointTrajectory, 'wanted_trajectory', node.guarded(
             'wanted_trajectory', self._receive_trajectory), 10)
@@ -110,13 +102,8 @@ class CommandStream:
         # With several inputs, the changed geometry may have no pose that continues the last one.
         self._last = {name: last for name, last in self._last.items() if len(last.inputs) == 1
                       or self._mechanisms[name] is mechanisms[name]}
-        self._mechanisms, self._publishers = mechanisms, Cache(self._publisher, MAX_PUBLISHERS)
+        self._mechanisms = mechanisms
         self._reader = joint_state_reader.Reader(self._interpret)
-
-    def end(self) -> None:
-        """Cancel the trajectory and the search in progress."""
-        self._worker.end()
-        self._searcher.end()
 
     def _output(self, named: str) -> Optional[tuple[SceneMechanism, str, JointName]]:
         """Return the mechanism, output and published name for a name in messages, or None."""
@@ -179,7 +166,7 @@ class CommandStream:
         if stamp == NEVER:
             stamp = pack_time(self._clock.now().nanoseconds)
         commands = [(target, command) for target in targets if (command := self._command(
-            target, stamp, numbers, numbers[count:] if known else None))]
+            target, numbers, numbers[count:] if known else None))]
         if commands:
             self._send(stamp, commands)
 
@@ -191,73 +178,33 @@ class CommandStream:
                 for position, settings in zip(self._present(target.mechanism),
                                               target.mechanism.inputs.values())]
 
-    def _command(self, target: Target, stamp: bytes, positions: Sequence[float],
+    def _command(self, target: Target, positions: Sequence[float],
                  speeds: Optional[Sequence[float]]) -> Optional[Command]:
         """Return the command for a target or, out of reach, the last valid one, if any."""
         name, seed = target.mechanism.name, self._seed(target)
-        last, is_slow = self._last.get(name), len(seed) > 1 and not target.request.is_closed
-        # Only the first command, which continues no other, may jump.
-        command = target.command(positions, speeds, seed, jumps=not last and not is_slow)
+        last, is_quick = self._last.get(name), len(seed) == 1 or target.request.is_closed
+        # Only the first command, which continues no other, may jump; it is not searched.
+        command = target.command(positions, speeds, seed, jumps=not last and is_quick)
         if command.is_valid:
             self._last[name] = command
             return command
-        if not is_slow:
-            self._throttle.warn(target.named, lambda: f'wanted_states: {target.reason(positions)}')
-        elif time.monotonic() > self._searches.get(name, -math.inf):
-            self._searches[name] = math.inf
-            self._searcher.replace(f'the search for {name}', lambda: self._search(
-                target, stamp, positions, speeds, None if last else seed))
+        self._throttle.warn(
+            target.named, lambda: f'wanted_states: {target.reason(positions, is_quick)}')
         return last and last._replace(speeds=[0.0] * len(last.inputs))
 
-    def _search(self, target: Target, stamp: bytes, positions: Sequence[float],
-                speeds: Optional[Sequence[float]], seed: Optional[Sequence[float]]
-                ) -> Optional[Callable[[], None]]:
-        """Search the first command, next to `seed` if given; if there is none, say why."""
-        start = time.monotonic()
-        try:
-            if seed:
-                command = target.command(positions, speeds, seed, jumps=True)
-                if command.is_valid:
-                    return partial(self._begin, target, command, stamp)
-            self._searched.warn(target.named, lambda: f'wanted_states: {target.reason(positions)}')
-            return None
-        finally:
-            end = time.monotonic()
-            self._searches[target.mechanism.name] = end + max(
-                SEARCH_PAUSE_S, SEARCH_PAUSE_RATIO * (end - start))
-
-    def _begin(self, target: Target, command: Command, stamp: bytes) -> None:
-        """Publish a first command that has been searched, unless it is out of date."""
-        name = target.mechanism.name
-        if target.mechanism is self._mechanisms[name] and name not in self._last:
-            self._last[name] = command
-            self._send(stamp, [(target, command)])
-
     def _send(self, stamp: bytes, commands: Sequence[tuple[Target, Command]]) -> None:
-        names = tuple(name for target, _ in commands for name in target.actuators)
-        values = [position for _, command in commands for position in command.positions]
-        speeds = [speed for _, command in commands for speed in command.speeds or [math.nan]]
-        moving = all(map(math.isfinite, speeds))
         if self._commands.has_subscribers:
-            if any(target.mechanism.loads for target, _ in commands):
-                efforts = [effort for target, command in commands
-                           for effort in target.efforts(command)]
-                self._commands.publish(joint_states(
-                    unpack(stamp), names, values, speeds if moving else (),
-                    efforts if all(map(math.isfinite, efforts)) else ()))
-            else:
-                self._publishers[names, moving].publish(stamp, values + speeds * moving)
+            speeds = [speed for _, command in commands for speed in command.speeds or [math.nan]]
+            efforts = [effort for target, command in commands for effort in target.efforts(command)
+                       ] if any(target.mechanism.loads for target, _ in commands) else ()
+            self._commands.publish(joint_states(
+                unpack(stamp), [name for target, _ in commands for name in target.actuators],
+                [position for _, command in commands for position in command.positions],
+                *(rates if all(map(math.isfinite, rates)) else () for rates in (speeds, efforts))))
         for target, command in commands:
             publisher = self._arrays[target.mechanism.name]
             if publisher.has_subscribers:
                 publisher.publish(Float64MultiArray(data=command.positions))
-
-    def _publisher(self, key: tuple[tuple[str, ...], bool]) -> PatchedPublisher:
-        names, moving = key
-        n = len(names)
-        return PatchedPublisher(
-            [(self._commands.publisher, lambda stamp, values: joint_states(
-                stamp, names, values[:n], values[n:]))], (1 + moving) * n)
 
     def _receive_trajectory(self, message: JointTrajectory) -> None:
         if not self._trajectories.has_subscribers:
@@ -277,6 +224,7 @@ class CommandStream:
             return
         seeds = [self._seed(target) for target in targets]
         jumps = [target.mechanism.name not in self._last for target in targets]
+        self._newest = message
         self._worker.replace('wanted_trajectory', lambda: self._solve(
             message, targets, seeds, jumps))
 
@@ -295,7 +243,7 @@ class CommandStream:
                 if time_ < before:
                     raise ValueError(f'point {i} is at {time_ / 1e9:g} s, before '
                                      f'{before / 1e9:g} s: time_from_start must not decrease')
-                if not self._worker.is_newest('wanted_trajectory'):
+                if message is not self._newest or self._worker.has_ended:
                     return None
                 solved.points.append(_solved_point(
                     i, point, len(message.joint_names), targets, seeds, jumps))
@@ -319,7 +267,7 @@ def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence
         command = target.command(
             point.positions, list(point.velocities) or [0.0] * n, seeds[k], jumps[k])
         if not command.is_valid:
-            raise ValueError(f'point {i}: {target.reason(point.positions)}')
+            raise ValueError(f'point {i}: {target.reason(point.positions, True)}')
         if not all(map(math.isfinite, command.speeds)):
             raise ValueError(f'point {i}: the motion of {target.named} reverses there; its speed '
                              'must be zero')

@@ -6,10 +6,9 @@
 from __future__ import annotations
 
 from time import monotonic_ns, time_ns
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Tuple
 
 from rclpy.clock import Clock, ClockType
-from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from . import scene_node, shutdown
@@ -28,29 +27,26 @@ MAX_PERIOD_NS = 1e18
 
 
 class CrankDriver(scene_node.SceneNode):
-    """
-    Publishes the scene's source joints on `crank_states`, as functions of the node's time.
-
-    `in_process` are nodes of this process that subscribe to them; see InProcessPublisher.
-    """
+    """Publishes the scene's source joints on `crank_states`, as functions of the node's time."""
 
     # System time [ns], used unless `use_sim_time` is set.
     system_time = staticmethod(time_ns)
 
-    def __init__(self, in_process: Sequence[Any] = (), **kwargs: Any):
+    def __init__(self, **kwargs: Any):
         super().__init__(scene.DRIVER, **kwargs)
         self._motions: Dict[Tuple[str, str], Motion] = {}
         self._settings: Dict[Tuple[str, str], scene.InputSettings] = {}
         self._sent: List[Tuple[Tuple[str, str], scene.InputSettings]] = []
         self._now: Optional[int] = None
         self._steady = 0
-        self._publisher = InProcessPublisher(self, 'crank_states', in_process)
+        self._publisher = TrackedPublisher(self, JointState, 'crank_states', 10)
         sources = list(dict.fromkeys(
             settings.source for mechanism in self.scene.machines.values()
             for settings in mechanism.inputs.values()))
         n = len(sources)
-        self._message = PatchedPublisher([(self._publisher, lambda stamp, values: joint_states(
-            stamp, sources, values[:n], values[n:]))], 2 * n)
+        self._message = PatchedPublisher(
+            [(self._publisher.publisher, lambda stamp, values: joint_states(
+                stamp, sources, values[:n], values[n:]))], 2 * n)
         # After system time is set back, a timer on it would sleep until the old time returns.
         clock = self.get_clock()
         self._timer = self.create_timer(
@@ -115,36 +111,6 @@ class CrankDriver(scene_node.SceneNode):
         """Return the source joints and their rate, in words."""
         sources = [settings.source for settings in self._settings.values()]
         return f'moves {listed(sources, 200)} on crank_states at {self.scene.rate:g} Hz'
-
-
-class InProcessPublisher:
-    """
-    Publishes joint states directly to the callbacks of `nodes`, which run in this process.
-
-    While the topic `name` has other subscribers, too, the middleware delivers to all of them
-    instead, so that each message arrives once.
-    """
-
-    def __init__(self, node: Any, name: str, nodes: Sequence[Any]):
-        path = self.topic_name = node.resolve_topic_name(name)
-        self._subscriptions = [
-            subscription for other in nodes for subscription in other.subscriptions
-            if subscription.topic_name == path]
-        self._others = TrackedPublisher(node, JointState, name, 10, len(self._subscriptions))
-
-    @property
-    def has_subscribers(self) -> bool:
-        """Whether there are subscribers, in this process or elsewhere."""
-        return self._others.has_subscribers or bool(self._subscriptions)
-
-    def publish(self, message: Any) -> None:
-        """Publish a JointState, or its serialised bytes."""
-        if self._others.has_subscribers:
-            self._others.publish(message)
-            return
-        data = message if isinstance(message, bytes) else serialize_message(message)
-        for subscription in self._subscriptions:
-            subscription.callback(data)
 
 
 def main(args: Any = None) -> int:

@@ -13,7 +13,7 @@ from __future__ import annotations
 from array import array
 from contextlib import suppress
 from struct import error as StructError, Struct
-from typing import Any, Callable, Dict, List, Optional, Tuple
+from typing import Any, Callable, List, Optional, Tuple
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
@@ -66,25 +66,23 @@ class Reader:
 
     def __init__(self, interpret: Callable[[JointState], Any]):
         self._interpret = interpret
-        # The known senders, by the length of their messages.
-        self._senders: Dict[int, List[Sender]] = {}
+        self._senders: List[Sender] = []
         self._last: Optional[Sender] = None
 
     def sender(self, data: bytes) -> Sender:
         """Return the sender of a serialised message; raise Unreadable if it is no JointState."""
         if self._last is None or not self._last.has_sent(data):
-            number = int.from_bytes(data, 'little')
-            self._last = next((sender for sender in self._senders.get(len(data), ())
-                               if number & sender.mask == sender.same), None) or self._new(data)
+            known = (sender for sender in self._senders if sender.has_sent(data))
+            self._last = next(known, None) or self._new(data)
         return self._last
 
     def _new(self, data: bytes) -> Sender:
         message = deserialized(data, JointState)
         sender = Sender(data, message, self._interpret(message))
         if sender.size:
-            if sum(map(len, self._senders.values())) == MAX_SENDERS:
+            if len(self._senders) == MAX_SENDERS:
                 self._senders.clear()
-            self._senders.setdefault(sender.size, []).append(sender)
+            self._senders.append(sender)
         return sender
 
 
@@ -99,33 +97,27 @@ class Sender:
     size : int
         Length of its messages [bytes]; 0: places are unknown, so that it reads its first message
         only.
-    mask, same : int
-        Mask of the constant bytes, and their values, both as little-endian integers.
 
     """
 
     def __init__(self, data: bytes, message: JointState, routes: Any):
-        self.routes, self.size, self.mask, self.same = routes, 0, 0, 0
+        self.routes, self.size = routes, 0
         self._numbers: Optional[Numbers] = (
             pack(message.header.stamp), *message.position, *message.velocity)
         if len(data) <= MAX_LAYOUT_BYTES:
             with suppress(StructError):
-                self._set_layout(data)
-
-    def _set_layout(self, data: bytes) -> None:
-        mask, ((positions, count), (velocities, others), _) = _layout(data)
-        unpack = Struct(f'<{HEADER}x8s{positions - HEADER - 8}x{count}d'
-                        f'{velocities - positions - 8 * count}x{others}d').unpack_from
-        if _bits(unpack(data)) == _bits(self._numbers):
-            # Integers are the fastest to compare for messages this short.
-            self.size, self.mask = len(data), int.from_bytes(mask, 'little')
-            self.same = int.from_bytes(data, 'little') & self.mask
-            self._numbers, self._unpack = None, unpack
+                mask, places = _layout(data)
+                unpack = Struct(places).unpack_from
+                if _bits(unpack(data)) == _bits(self._numbers):
+                    # Integers are the fastest to compare for messages this short.
+                    self.size, self._mask = len(data), int.from_bytes(mask, 'little')
+                    self._same = int.from_bytes(data, 'little') & self._mask
+                    self._numbers, self._unpack = None, unpack
 
     def has_sent(self, data: bytes) -> bool:
         """Return whether a serialised message has this sender's known length and bytes."""
         return (len(data) == self.size > 0
-                and int.from_bytes(data, 'little') & self.mask == self.same)
+                and int.from_bytes(data, 'little') & self._mask == self._same)
 
     def read(self, data: bytes) -> Numbers:
         """
@@ -142,34 +134,38 @@ def _bits(numbers: Any) -> tuple:
     return numbers[0], array('d', numbers[1:]).tobytes()
 
 
-def _layout(data: bytes) -> Tuple[bytearray, List[Tuple[int, int]]]:
+def _layout(data: bytes) -> Tuple[bytearray, str]:
     """
     Return where the constant bytes and the numbers of a serialised JointState are.
 
-    That is a mask, 0 at stamp, numbers and padding, and place and count of positions, velocities
-    and efforts. Raises StructError if the message is not in little-endian CDR.
+    That is a mask, 0 at stamp, numbers and padding, and the format of stamp, positions and
+    velocities. Raises StructError if the message is not in little-endian CDR.
     """
+    if not data.startswith(LITTLE_ENDIAN):
+        raise StructError
     mask, place = bytearray(len(data)), HEADER + 8
     mask[:HEADER] = HEADER * b'\xff'
 
-    def skip(size: int, alignment: int, bits: bytes) -> int:
+    def count() -> int:
+        return int(COUNT.unpack_from(data, constant(COUNT.size, COUNT.size))[0])
+
+    def constant(size: int, alignment: int = 1) -> int:
         nonlocal place
         start = place + (HEADER - place) % alignment
         place = start + size
-        if data[:len(LITTLE_ENDIAN)] != LITTLE_ENDIAN or place > len(data):
+        if place > len(data):
             raise StructError
-        mask[start:place] = size * bits
+        mask[start:place] = size * b'\xff'
         return start
 
-    def count() -> int:
-        return int(COUNT.unpack_from(data, skip(COUNT.size, COUNT.size, b'\xff'))[0])
-
     # The frame, and the names.
-    skip(count(), 1, b'\xff')
+    constant(count())
     for _ in range(count()):
-        skip(count(), 1, b'\xff')
-    numbers = []
-    for _ in range(3):
-        size = count()
-        numbers.append((skip(8 * size, 8 if size else 1, b'\0'), size))
-    return mask, numbers
+        constant(count())
+    places, end = f'<{HEADER}x8s', HEADER + 8
+    for code, width in (('d', 1), ('d', 1), ('x', 8)):
+        number = count()
+        start = place + (HEADER - place) % 8 if number else place
+        places += f'{start - end}x{width * number}{code}'
+        place = end = start + 8 * number
+    return mask, places

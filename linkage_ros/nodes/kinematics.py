@@ -117,8 +117,10 @@ class Kinematics(scene_node.SceneNode):
             topics.adopt(models[topics.name])
         if not is_first:
             self._publish(changed)
-        self.worker.add(partial(self._latched, topics, models[topics.name]) for topics in changed)
-        self.worker.add([partial(self._robot, models)])
+        for topics in changed:
+            self.worker.append(f'latched messages of {topics.name}',
+                               partial(self._latched, topics, models[topics.name]))
+        self.worker.append('the robot_description of the scene', partial(self._robot, models))
 
     def _latched(self, topics: MechanismTopics, model: MechanismModel) -> Callable[[], None]:
         """Build a mechanism's latched messages; return a function to publish them."""

@@ -150,10 +150,19 @@ class MechanismModel:
 
     def _conversion(self, layout: Layout) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the arguments of `_convert`: factors, offsets, and indices of angles to wrap."""
-        none = np.zeros(len(self._signs))
-        return (_arranged(layout, 1.0, self._signs, self._signs),
-                _arranged(layout, 0.0, self._offsets, none),
-                np.flatnonzero(_arranged(layout, 0.0, self._wrapped, none)))
+        factors, offsets = np.ones(layout.size), np.zeros(layout.size)
+        places = positions, *_ = self._places(layout)
+        for indices in places:
+            factors[indices] = self._signs[:len(indices)]
+        offsets[positions] = self._offsets[:len(positions)]
+        return factors, offsets, positions[self._wrapped[:len(positions)]]
+
+    def _places(self, layout: Layout) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the indices of the joints' positions, velocities and efforts in a solution."""
+        indices, n = np.arange(layout.size), len(self.inputs)
+        rows, driven = layout.rows(indices), layout.driven(indices)
+        return (np.append(driven[:n], rows[:, layout.coordinates:layout.posed]),
+                np.append(driven[n:], rows[:, layout.posed:]), layout.effort(indices))
 
     def _publisher(self, key: Tuple[AssemblyState, Tuple[Any, Any]]) -> PatchedPublisher:
         state, topics = key
@@ -174,12 +183,10 @@ class MechanismModel:
         layout, n, legs = state.solution.layout, len(self.inputs), state.legs()
         chosen = self._published.copy()
         chosen[n:].reshape(layout.legs, -1)[np.isin(np.arange(layout.legs), legs, invert=True)] = 0
-        rows, driven = layout.rows(values), layout.driven(values)
-        positions = np.append(driven[:n], rows[:, layout.coordinates:layout.posed])
-        velocities = np.append(driven[n:], rows[:, layout.posed:])
-        efforts = np.append(layout.effort(values), np.zeros(len(positions) - layout.efforts))
-        return [self._names[chosen], positions[chosen],
-                velocities[chosen] if layout.speeds else velocities[:0], efforts[chosen]]
+        positions, velocities, efforts = self._places(layout)
+        balanced = np.append(values[efforts], np.zeros(len(positions) - layout.efforts))
+        return [self._names[chosen], values[positions[chosen]],
+                values[velocities[chosen] if layout.speeds else velocities], balanced[chosen]]
 
     def marker_message(self, state: AssemblyState, stamp: Any, values: np.ndarray) -> MarkerArray:
         """Build the markers of the assembled legs from a solution's values."""
@@ -216,18 +223,3 @@ def _shown(mechanism: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
     return points, {
         id_: [[index[point] for point in piece] for piece in several if index.keys() >= set(piece)]
         for id_, several in pieces.items()}
-
-
-def _arranged(layout: Layout, rest: float, joints: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Return an array in a solution's layout: `joints` and `rates` in their places, or `rest`."""
-    values, n = np.full(layout.size, rest), layout.inputs
-    rows, driven = layout.rows(values), layout.driven(values)
-    driven[:n] = joints[:n]
-    if layout.joints:
-        rows[:, layout.coordinates:layout.posed] = joints[n:].reshape(layout.legs, -1)
-    layout.effort(values)[:] = rates[:layout.efforts]
-    if layout.speeds:
-        driven[n:] = rates[:n]
-    if layout.velocities:
-        rows[:, layout.posed:] = rates[n:].reshape(layout.legs, -1)
-    return values

@@ -78,10 +78,9 @@ class SceneParameters:
 
     def set_together(self, messages: Sequence[ParameterMessage]) -> dict[int, SetParametersResult]:
         """
-        Set parameters that are valid by themselves in one change; return their results by index.
+        Set the parameters that are valid by themselves in one change; return results by index.
 
-        One by one would fail: a leg with some old and some new dimensions may not be assembled. If
-        the change is refused, there are no results.
+        One by one would fail: a leg with some old and some new dimensions may not be assembled.
         """
         valid = {}
         for i, message in enumerate(messages):
@@ -91,8 +90,7 @@ class SceneParameters:
                 valid[i] = parameter
         # Of a repeated name the last value counts.
         last = {parameter.name: parameter for parameter in valid.values()}
-        result = self._node.set_parameters_atomically([*last.values()])
-        return dict.fromkeys(valid, result) if result.successful else {}
+        return dict.fromkeys(valid, self._node.set_parameters_atomically([*last.values()]))
 
     def follow(self, values: Mapping[str, Any]) -> str:
         """Adopt values of parameters of another node; return the reason of a refusal, or ''."""

@@ -35,15 +35,15 @@ try:
     from rclpy.experimental import EventsExecutor as Executor
     from rclpy.impl.implementation_singleton import rclpy_implementation as implementation
 
-    # `Executor` is a function that makes one. Jazzy's awaits no callback of a service; it has no
-    # `create_future` either.
+    # `Executor` is a function that makes one. Jazzy's awaits no callback of a service, so there
+    # requests are answered as they come; it has no `create_future` either.
     AWAITS = hasattr(implementation.EventsExecutor, 'create_future')
 except ImportError:
     Executor, AWAITS = SingleThreadedExecutor, True
 
-# Longest wait for an event [s]: some builds of the EventsExecutor do not wait without a limit.
-# They loop at full load and ignore signals.
-MAX_WAIT_S = 1.0
+# Longest wait for an event [s], so that a signal is noticed. Some builds of the EventsExecutor do
+# not wait without a limit, either.
+MAX_WAIT_S = 0.25
 
 # Longest time for which the worker thread delays a message [s]. At shorter intervals, it would
 # interrupt the processing of messages, and more of them would be late.
@@ -67,7 +67,7 @@ class SceneNode(Node):
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         incidents = Incidents(self.get_logger(), lambda: not self.context.ok())
         self.guarded, self.report = incidents.guarded, incidents.report
-        self.worker = Worker(self, incidents.report)
+        self.worker = Worker(self, incidents.guarded)
         self._announcer: Optional[Announcer] = None
         self._adopted: Optional[scenes.Scene] = None
         # Numbers of requests to set parameters: answered, and waiting.
@@ -75,6 +75,10 @@ class SceneNode(Node):
         # The scene that was passed to the worker last.
         self._passed: Optional[scenes.Scene] = None
         self._parameters_of_scene = SceneParameters(self, name, self.check, self._changed)
+        # The Field of each parameter that the node owns, by name; whether it was started with any
+        # parameters of a scene.
+        self.fields: Mapping[str, scenes.Field] = self._parameters_of_scene.fields
+        self.is_given = self._parameters_of_scene.is_given
         self._role = name
         self._first_spin = self.create_timer(
             0.0, self.guarded('the first spin', self._start),
@@ -86,22 +90,13 @@ class SceneNode(Node):
         return self._parameters_of_scene.scene
 
     @property
-    def is_given(self) -> bool:
-        """Whether the node was started with any parameters of a scene."""
-        return self._parameters_of_scene.is_given
-
-    @property
-    def fields(self) -> Mapping[str, scenes.Field]:
-        """Return the Field of each parameter that the node owns, by name."""
-        return self._parameters_of_scene.fields
-
-    @property
     def is_settled(self) -> bool:
         """Whether the scene of the present parameters has been adopted."""
         return self._adopted is self.scene
 
     def begin(self) -> None:
         """Adopt the first scene; then announce the node's parameters, and follow the others."""
+        self._passed = self.scene
         self.check(self.scene)
         self._adopt(self.scene, self.prepare(self.scene))
         if self.fields:
@@ -140,11 +135,10 @@ class SceneNode(Node):
     def create_service(self, srv_type: Any, srv_name: str, callback: Callable, **kwargs: Any
                        ) -> Any:
         """Create a service; if its callback raises, the response is a failure with a reason."""
-        in_turn = {SetParameters: self._set_parameters, SetParametersAtomically:
-                   self._respond_in_turn}.get(srv_type)
-        respond = partial(in_turn or self._respond, callback)
-        if in_turn and not AWAITS:
-            respond = partial(_at_once, respond)
+        if srv_type is SetParameters:
+            callback = partial(self._set_parameters, callback)
+        is_in_turn = AWAITS and srv_type in (SetParameters, SetParametersAtomically)
+        respond = partial(self._respond_in_turn if is_in_turn else self._respond, callback)
         return super().create_service(srv_type, srv_name, respond, **kwargs)
 
     def delete_displayed(self) -> None:
@@ -179,38 +173,32 @@ class SceneNode(Node):
         self._pass_scene()
         return response
 
-    async def _set_parameters(self, callback: Callable, request: Any, response: Any) -> Any:
-        """Set valid parameters together or, if that is refused, each by `callback` of rclpy."""
-        results = {}
-        if len(request.parameters) > 1:
-            results = await self._respond_in_turn(
-                lambda *_: self._parameters_of_scene.set_together(request.parameters), None, {})
+    def _set_parameters(self, callback: Callable, request: Any, response: Any) -> Any:
+        """Set the values that are valid by themselves together, all others by rclpy."""
+        results = self._parameters_of_scene.set_together(request.parameters)
         for i, parameter in enumerate(request.parameters):
             if i not in results:
-                single = await self._respond_in_turn(
-                    callback, SetParameters.Request(parameters=[parameter]),
-                    SetParameters.Response())
-                results[i], = single.results
+                single = SetParameters.Request(parameters=[parameter])
+                results[i], = self._respond(callback, single, SetParameters.Response()).results
         response.results = [results[i] for i in range(len(results))]
         return response
 
     def _changed(self, changed: List[scenes.Parameter]) -> None:
-        """Prepare the newest scene, and announce the changed parameters."""
-        if type(self).prepare is SceneNode.prepare:
-            self._adopt(self.scene, self.scene)
+        """Pass the changed scene on, and announce the changed parameters."""
         self._pass_scene()
         if self._announcer:
             self._announcer.announce(changed)
 
     def _pass_scene(self) -> None:
-        """Pass a changed scene to the worker, unless waiting requests may change it again."""
-        if not (self._waiting or self.is_settled or self._passed is self.scene):
-            self._passed = self.scene
-            self.worker.replace('a changed scene', partial(self._prepared, self.scene))
-
-    def _prepared(self, new: scenes.Scene) -> Callable[[], None]:
-        """Prepare a scene; return a function that adopts it."""
-        return partial(self._adopt, new, self.prepare(new))
+        """Have the newest scene prepared and adopted, unless waiting requests may change it."""
+        new = self.scene
+        if not self._waiting and self._passed is not new:
+            self._passed = new
+            if type(self).prepare is SceneNode.prepare:
+                self._adopt(new, new)
+            else:
+                self.worker.replace('a changed scene', lambda: partial(
+                    self._adopt, new, self.prepare(new)))
 
     def _adopt(self, new: scenes.Scene, prepared: Any) -> None:
         self._adopted = new
@@ -236,16 +224,6 @@ class SceneNode(Node):
 def _turn() -> Generator[None, None, None]:
     """Wait until the executor has run all that is waiting."""
     yield
-
-
-def _at_once(respond: Callable, *arguments: Any) -> Any:
-    """Return what a coroutine returns that waits for turns of the executor only."""
-    coroutine = respond(*arguments)
-    while True:
-        try:
-            coroutine.send(None)
-        except StopIteration as end:
-            return end.value
 
 
 def _refused(response: Any, reason: str) -> Any:
@@ -314,8 +292,6 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
 def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
           incidents: Incidents) -> None:
     try:
-        # `Executor.wake` does not wake every kind of executor.
-        shutdown.wake = lambda: executor.create_task(lambda: None)
         shutdown.before_exit = partial(_delete_displayed, nodes)
         for node in nodes:
             executor.add_node(node)

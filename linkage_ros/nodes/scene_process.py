@@ -16,11 +16,9 @@ NAME = 'scene'
 
 def nodes() -> Iterator[SceneNode]:
     """Create the nodes, `kinematics` first: the others start with its values of parameters."""
-    kinematics = Kinematics()
-    yield kinematics
-    inverse = ServoInverse()
-    yield inverse
-    yield CrankDriver(in_process=[kinematics, inverse])
+    yield Kinematics()
+    yield ServoInverse()
+    yield CrankDriver()
 
 
 def main(args: Any = None) -> int:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from array import array
 from contextlib import suppress
 import math
-import time
 from typing import Any, Callable, Dict, List, Mapping, Sequence, Tuple
 
 import numpy as np
@@ -24,9 +23,8 @@ from ..robot_model import bodies
 from ..scene.inverse_request import InverseRequest, LEVER, present_inputs
 from ..words import elided, listed, meant, MESSAGE, quoted
 
-# Other callers and messages wait for an answer: the CPU time after which it is given up [s], seen
-# after a block of values.
-MAX_CPU_TIME_S, BLOCK_SIZE = 1.0, 10_000
+# Other callers and messages wait for an answer: the maximum number of values in a request.
+MAX_VALUES = 10_000
 # Maximum number of values, and of letters of allowed names, in a message.
 MAX_NAMED_VALUES, MAX_NAMES_LENGTH = 5, 150
 
@@ -67,13 +65,6 @@ class ServoInverse(scene_node.SceneNode):
         self._stream.adopt(new.machines)
         self._sources = frozenset(settings.source for mechanism in new.machines.values()
                                   for settings in mechanism.inputs.values())
-
-    def destroy_node(self) -> None:
-        """End the trajectories, and destroy the node."""
-        # A context that ends destroys nodes whose constructor has failed, too.
-        if hasattr(self, '_stream'):
-            self._stream.end()
-        super().destroy_node()
 
     def answer(self, request: Any, response: Any) -> Any:
         """Answer a request of `servo_inverse`; the response names an error, if any."""
@@ -138,6 +129,8 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     n = len(values)
     if not n:
         raise ValueError('lever_angle is empty; give at least one value')
+    if n > MAX_VALUES:
+        raise ValueError(f'lever_angle has {n} values; give up to {MAX_VALUES} at once')
     if len(seeds) not in (0, 1, n):
         raise ValueError(f'servo_near must be empty, have one angle, or one for each of the '
                          f'{n} in lever_angle, not {len(seeds)}')
@@ -146,40 +139,14 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     if seed and not np.all(np.abs(seed[0]) <= scene.FARTHEST):
         raise ValueError(f'servo_near must be finite and within {scene.FARTHEST:g} '
                          f'{inverse.units[0]} of zero')
-    if n > 1:
-        positions, rates = _many(inverse, np.array(values), seed and seed[0])
-        finite = np.isfinite(positions)
-        success = bool(finite.all())
-        response.servo_angle = array('d', positions.tobytes())
-        response.reduction = array('d', rates.tobytes())
-        reachable = [True] * n if success else finite.tolist()
-    else:
-        (positions,), (rates,) = inverse.positions([values[0]], seed)
-        success = math.isfinite(positions)
-        response.servo_angle, response.reduction = [positions], [rates]
-        reachable = [success]
-    response.success, response.reachable = success, reachable
-    if not success:
+    (positions,), (rates,) = inverse.positions([np.array(values) if n > 1 else values[0]], seed)
+    response.servo_angle = array('d', np.ravel(positions).tobytes())
+    response.reduction = array('d', np.ravel(rates).tobytes())
+    response.reachable = np.isfinite(np.ravel(positions)).tolist()
+    response.success = all(response.reachable)
+    if not response.success:
         response.message = elided(_unreachable(inverse, [
-            value for value, reached in zip(values, reachable) if not reached]), MESSAGE)
-
-
-def _many(inverse: InverseRequest, values: np.ndarray, seed: Any
-          ) -> Tuple[np.ndarray, np.ndarray]:
-    """Return positions and rates for many values; raise ValueError if that takes too long."""
-    has_seeds, start = np.size(seed) == len(values), time.thread_time()
-    positions, rates = np.empty((2, len(values)))
-    for at in range(0, len(values), BLOCK_SIZE):
-        if at and time.thread_time() > start + MAX_CPU_TIME_S:
-            raise ValueError(f'after {MAX_CPU_TIME_S:g} s only {at} of the {len(values)} values '
-                             f'in lever_angle are solved; give up to {at} at once')
-        block = slice(at, at + BLOCK_SIZE)
-        (positions[block],), (rates[block],) = inverse.positions(
-            [values[block]], None if seed is None else [seed[block] if has_seeds else seed])
-        solved = np.flatnonzero(np.isfinite(positions[block]))
-        if len(solved) and not has_seeds:
-            seed = positions[at + solved[-1]]
-    return positions, rates
+            value for value, reached in zip(values, response.reachable) if not reached]), MESSAGE)
 
 
 def solve_inputs_for(mechanism: scene.SceneMechanism, request: Any, response: Any) -> None:

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import sys
-from threading import Event, Thread
 from typing import Any, Callable
 
 # Time from a signal to the forced end of the process [s].
@@ -21,55 +19,46 @@ def run(main: Callable[[], int]) -> None:
     # Importing ROS is too slow for a signal to wait; ShutdownHandler replaces this meanwhile.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: os._exit(0))
-    code = main()
     # A compiling thread or much garbage would delay the end, and a second signal would change the
     # exit code.
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)
+    _exit(main())
 
 
 class ShutdownHandler:
     """
-    A context that handles SIGINT and SIGTERM in a thread, so that no callback is interrupted.
+    A context in which SIGINT and SIGTERM set `is_over`, and interrupt no callback.
 
-    The first signal sets `is_over` and calls `wake`, which is to stop rclpy's executor. If the
-    context is not left within TIMEOUT_S, `before_exit` is called, and the process ends with exit
-    code 0.
+    If the context is not left within TIMEOUT_S, `before_exit` is called, and the process ends with
+    exit code 0.
     """
 
     def __init__(self) -> None:
-        self.wake: Callable[[], Any] = lambda: None
         self.before_exit: Callable[[], Any] = lambda: None
         self.is_over = False
-        self._left = Event()
 
     def __enter__(self) -> ShutdownHandler:
-        self._received, self._sent = socket.socketpair()
-        self._sent.setblocking(False)
-        Thread(target=self._wait, name='linkage_ros signals', daemon=True).start()
-        signal.set_wakeup_fd(self._sent.fileno(), warn_on_full_buffer=False)
         # Python's default handler would raise KeyboardInterrupt in a callback.
-        self._before = {number: signal.signal(number, lambda *_: None)
-                        for number in (signal.SIGINT, signal.SIGTERM)}
+        self._before = {number: signal.signal(number, handler) for number, handler in (
+            (signal.SIGALRM, self._exit), (signal.SIGINT, self._receive),
+            (signal.SIGTERM, self._receive))}
         return self
 
     def __exit__(self, *_: Any) -> None:
-        signal.set_wakeup_fd(-1)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
         for number, handler in self._before.items():
             signal.signal(number, handler)
-        self._left.set()
-        self._sent.close()
 
-    def _wait(self) -> None:
-        # The socket stays open, because a further signal would print an error if it were closed.
-        with self._received:
-            if not self._received.recv(1):
-                return
+    def _receive(self, *_: Any) -> None:
+        if not self.is_over:
             self.is_over = True
-            self.wake()
-            if not self._left.wait(TIMEOUT_S):
-                self.before_exit()
-                sys.stdout.flush()
-                sys.stderr.flush()
-                os._exit(0)
+            signal.setitimer(signal.ITIMER_REAL, TIMEOUT_S)
+
+    def _exit(self, *_: Any) -> None:
+        self.before_exit()
+        _exit(0)
+
+
+def _exit(code: int) -> None:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
