@@ -72,7 +72,8 @@ class Show(contextlib.ExitStack):
 
     def __init__(self, graph, parameters, kinds=NODES, **kwargs):
         super().__init__()
-        self.graph, self.names = graph, parameters.get('mechanisms', ())
+        self.graph = graph
+        self.names = scene.read(parameters).machines if parameters else ()
         self.viewer = graph.start(Viewer, {'port': 0})
         self.nodes = [graph.start(kind, parameters, **kwargs) for kind in kinds]
         self._over = threading.Event()
