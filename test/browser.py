@@ -11,6 +11,8 @@ import json
 from pathlib import Path
 import shutil
 import subprocess
+import threading
+import time
 
 import aiohttp
 import numpy as np
@@ -28,21 +30,31 @@ def found():
     return next(filter(None, map(shutil.which, NAMES)), None)
 
 
-async def until(predicate, what=''):
-    """Wait until something holds; return what the predicate, or what it awaits, returned."""
-    async def held():
-        while True:
-            value = predicate()
-            if asyncio.iscoroutine(value):
-                value = await value
-            if value:
-                return value
-            await asyncio.sleep(0.005)
+_loop = asyncio.new_event_loop()
+threading.Thread(target=_loop.run_forever, name='browser', daemon=True).start()
+_tasks = set()
 
-    try:
-        return await asyncio.wait_for(held(), DEADLINE)
-    except asyncio.TimeoutError:
-        raise AssertionError(f'did not happen in time: {what or predicate}') from None
+
+def run(coroutine):
+    """Return the result of a coroutine, which is run in the thread of all of them."""
+    return asyncio.run_coroutine_threadsafe(coroutine, _loop).result(2 * DEADLINE)
+
+
+def task(coroutine):
+    """Start a coroutine from another one; return its task."""
+    started = asyncio.ensure_future(coroutine)
+    _tasks.add(started)
+    started.add_done_callback(_tasks.discard)
+    return started
+
+
+def until(predicate, what=''):
+    """Wait until something holds; return what the predicate returned."""
+    end = time.monotonic() + DEADLINE
+    while not (value := predicate()):
+        assert time.monotonic() < end, f'did not happen in time: {what or predicate}'
+        time.sleep(0.005)
+    return value
 
 
 class Browser:
@@ -66,33 +78,35 @@ class Browser:
         self.complaints = []
         self.requests = []
 
-    async def __aenter__(self):
+    def __enter__(self):
         self._process = subprocess.Popen(
             [found(), *FLAGS, f'--user-data-dir={self._profile}', 'about:blank'],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
-            await self._connect()
+            written = self._profile / 'DevToolsActivePort'
+            run(self._connect(until(lambda: written.exists() and written.read_text().split())[0]))
         except BaseException:
             self._end()
             raise
         return self
 
-    async def __aexit__(self, *_):
-        self._reading.cancel()
-        await self._session.close()
+    def __exit__(self, *_):
+        run(self._close())
         self._end()
 
-    async def _connect(self):
-        written = self._profile / 'DevToolsActivePort'
-        port = (await until(lambda: written.exists() and written.read_text().split()))[0]
+    async def _connect(self, port):
         self._session = aiohttp.ClientSession()
         async with self._session.get(f'http://127.0.0.1:{port}/json') as response:
-            page = next(one for one in await response.json() if one['type'] == 'page')
+            page = next(page for page in await response.json() if page['type'] == 'page')
         self._socket = await self._session.ws_connect(
             page['webSocketDebuggerUrl'], max_msg_size=0)
-        self._reading = asyncio.ensure_future(self._read())
+        self._reading = task(self._read())
         for domain in ('Page', 'Runtime', 'Log', 'Network'):
-            await self._do(f'{domain}.enable')
+            await self._request(f'{domain}.enable')
+
+    async def _close(self):
+        self._reading.cancel()
+        await self._session.close()
 
     def _end(self):
         self._process.terminate()
@@ -113,7 +127,10 @@ class Browser:
             elif said['method'] == 'Network.requestWillBeSent':
                 self.requests.append(said['params']['request']['url'])
 
-    async def _do(self, method, **params):
+    def _do(self, method, **params):
+        return run(self._request(method, **params))
+
+    async def _request(self, method, **params):
         number = next(self._numbers)
         answer = self._answers[number] = asyncio.get_running_loop().create_future()
         await self._socket.send_json({'id': number, 'method': method, 'params': params})
@@ -121,94 +138,94 @@ class Browser:
         assert 'result' in said, said
         return said['result']
 
-    async def open(self, url: str):
+    def open(self, url: str):
         """Go to a page."""
-        await self._do('Page.navigate', url=url)
-        await until(lambda: self.value('document.readyState === "complete"'), url)
+        self._do('Page.navigate', url=url)
+        until(lambda: self.value('document.readyState === "complete"'), url)
 
-    async def resize(self, width: int, height: int, scheme: str):
+    def resize(self, width: int, height: int, scheme: str):
         """Look as a screen of this size [pixels] does that prefers light or dark."""
-        await self._do('Emulation.setDeviceMetricsOverride', width=width, height=height,
+        self._do('Emulation.setDeviceMetricsOverride', width=width, height=height,
                        deviceScaleFactor=1, mobile=width < 600)
-        await self._do('Emulation.setEmulatedMedia', features=[
+        self._do('Emulation.setEmulatedMedia', features=[
             {'name': 'prefers-color-scheme', 'value': scheme}])
 
-    async def value(self, expression: str):
+    def value(self, expression: str):
         """Return the value of an expression in the page; wait for it if it is a promise."""
-        said = await self._do('Runtime.evaluate', expression=expression, awaitPromise=True,
+        said = self._do('Runtime.evaluate', expression=expression, awaitPromise=True,
                               returnByValue=True)
         assert 'exceptionDetails' not in said, said['exceptionDetails']
         return said['result'].get('value')
 
-    async def middle(self, expression: str):
+    def middle(self, expression: str):
         """Return the middle x, y and the width of an element, as the page's pixels."""
-        return await self.value(
+        return self.value(
             f'(() => {{ const {{x, y, width, height}} = ({expression}).getBoundingClientRect();'
             'return [x + width / 2, y + height / 2, width]; })()')
 
-    async def click(self, expression: str):
+    def click(self, expression: str):
         """Press and release the mouse on an element."""
-        x, y, _ = await self.middle(expression)
-        await self._mouse('mousePressed', x, y)
-        await self._mouse('mouseReleased', x, y)
+        x, y, _ = self.middle(expression)
+        self._mouse('mousePressed', x, y)
+        self._mouse('mouseReleased', x, y)
 
-    async def write(self, expression: str, text: str):
+    def write(self, expression: str, text: str):
         """Write a text in place of what an element says, key by key, and press Enter."""
-        async def reached():
-            await self.click(expression)
-            return await self.value(f'document.activeElement === ({expression})')
+        def reached():
+            self.click(expression)
+            return self.value(f'document.activeElement === ({expression})')
 
-        await self.value(f'({expression}).scrollIntoView()')
-        await until(reached, f'{expression} has the focus')
-        await self.value(f'({expression}).select()')
+        self.value(f'({expression}).scrollIntoView()')
+        until(reached, f'{expression} has the focus')
+        self.value(f'({expression}).select()')
         for key in (*text, '\r'):
-            await self._do('Input.dispatchKeyEvent', type='keyDown', text=key,
+            self._do('Input.dispatchKeyEvent', type='keyDown', text=key,
                            key={'\r': 'Enter'}.get(key, key))
-            await self._do('Input.dispatchKeyEvent', type='keyUp')
+            self._do('Input.dispatchKeyEvent', type='keyUp')
 
-    async def drag(self, *places):
+    def drag(self, *places):
         """Press the mouse at the first place, go to the others, release it at the last."""
-        await self._mouse('mousePressed', *places[0])
+        self._mouse('mousePressed', *places[0])
         for start, end in zip(places, places[1:]):
             for part in (0.25, 0.5, 0.75, 1.0):
-                await self._mouse('mouseMoved', *(
+                self._mouse('mouseMoved', *(
                     a + part * (b - a) for a, b in zip(start, end)))
-        await self._mouse('mouseReleased', *places[-1])
+        self._mouse('mouseReleased', *places[-1])
 
-    async def touch(self, *fingers):
+    def touch(self, *fingers):
         """Put fingers down, move those that are down, lift those that are not given."""
         kind = ('touchEnd' if len(fingers) < self._fingers else
                 'touchStart' if len(fingers) > self._fingers else 'touchMove')
         self._fingers = len(fingers)
-        await self._do('Input.dispatchTouchEvent', type=kind, touchPoints=[
+        self._do('Input.dispatchTouchEvent', type=kind, touchPoints=[
             {'x': x, 'y': y, 'id': number} for number, (x, y) in enumerate(fingers)])
 
-    async def move(self, x, y):
+    def move(self, x, y):
         """Go to a place with the mouse, no button pressed."""
-        await self._do('Input.dispatchMouseEvent', type='mouseMoved', x=x, y=y)
+        self._do('Input.dispatchMouseEvent', type='mouseMoved', x=x, y=y)
 
-    async def hover(self, expression: str):
+    def hover(self, expression: str):
         """Go to an element with the mouse, from beside it."""
-        await self.value(f'({expression}).scrollIntoView({{block: "nearest"}})')
-        x, y, _ = await self.middle(expression)
-        await self.move(1.0, 1.0)
-        await self.move(x, y)
+        self.value(f'({expression}).scrollIntoView({{block: "nearest"}})')
+        x, y, _ = self.middle(expression)
+        self.move(1.0, 1.0)
+        self.move(x, y)
 
-    async def press(self, key: str, shift: bool = False):
+    def press(self, key: str, shift: bool = False):
         """Press a key that writes nothing, with Shift or without."""
         for kind in ('keyDown', 'keyUp'):
-            await self._do('Input.dispatchKeyEvent', type=kind, key=key, code=key,
+            self._do('Input.dispatchKeyEvent', type=kind, key=key, code=key,
                            modifiers=8 * shift)
 
-    async def downloads(self, folder: Path):
+    def downloads(self, folder: Path):
         """Let what is downloaded go to a folder."""
-        await self._do('Browser.setDownloadBehavior', behavior='allow', downloadPath=str(folder))
+        self._do('Browser.setDownloadBehavior', behavior='allow', downloadPath=str(folder))
 
-    async def _mouse(self, kind, x, y):
-        await self._do('Input.dispatchMouseEvent', type=kind, x=x, y=y, button='left',
+    def _mouse(self, kind, x, y):
+        self._do('Input.dispatchMouseEvent', type=kind, x=x, y=y, button='left',
                        buttons=int(kind != 'mouseReleased'), clickCount=1)
 
-    async def picture(self) -> np.ndarray:
+    def picture(self) -> np.ndarray:
         """Return what is seen: red, green and blue, shape (height, width, 3)."""
-        data = (await self._do('Page.captureScreenshot', format='png'))['data']
+        data = (self._do('Page.captureScreenshot', format='png'))['data']
         return np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert('RGB'), int)

@@ -5,6 +5,7 @@
 
 import atexit
 from collections import defaultdict
+import contextlib
 import gc
 import math
 import os
@@ -80,3 +81,29 @@ def graph(monkeypatch):
     monkeypatch.setattr(log, 'THROTTLE_S', math.inf)
     with Graph() as one:
         yield one
+
+
+@pytest.fixture
+def show(graph):
+    """Return a function that starts a scene with a viewer."""
+    from viewer_harness import Show
+
+    with contextlib.ExitStack() as shows:
+        yield lambda *args, **kwargs: shows.enter_context(Show(graph, *args, **kwargs))
+
+
+@pytest.fixture(scope='session')
+def lever():
+    """Yield a running lever and drop that no test changes, with a page."""
+    from ros_harness import Graph
+    from viewer_harness import LEVER, Show
+
+    with Graph() as graph, Show(graph, LEVER) as running:
+        running.open_page = running.page()
+        yield running
+
+
+@pytest.fixture
+def page(lever):
+    """Return a page that knows the lever and the drop, and changes neither."""
+    return lever.open_page

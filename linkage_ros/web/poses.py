@@ -3,7 +3,6 @@
 
 """The page's requests to the library: requested poses, and ranges of dimensions."""
 
-from dataclasses import dataclass
 from itertools import combinations
 import math
 from typing import Any, Mapping, Optional, Sequence
@@ -14,7 +13,7 @@ from .nearest_pose import nearest_inputs
 from .settings import is_number, shown
 from ..linkage import Arc, Formula, Mechanism
 from ..robot_model.output_range import ground_frame
-from ..scene import in_words, InputSettings, Scene, SceneMechanism, slider
+from ..scene import InputSettings, Scene, SceneMechanism, slider
 from ..words import listed, quoted
 
 ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
@@ -32,25 +31,18 @@ class Refused(Exception):
     """A refused request; the text has the reason."""
 
 
-@dataclass(frozen=True)
-class Reach:
-    """The values that an input or output reaches [unit], and their entry for the page."""
-
-    name: str
-    arcs: tuple[Arc, ...]
-    unit: str
-
-    def __str__(self) -> str:
-        return f'{self.name} reaches {in_words(self.arcs)} {self.unit}'
+# A request's inputs, and what is reached if they do not meet it exactly: name of the input or
+# output, its `arcs` and their `unit`.
+Reached = tuple[list[float], Optional[dict[str, Any]]]
 
 
-def drawn(mechanism: SceneMechanism) -> dict[str, Any]:
+def drawn(mechanism: SceneMechanism, speeds: Mapping[str, float]) -> dict[str, Any]:
     """
     Describe what the page needs to know of a mechanism beside its parameters and markers.
 
     `points` are the joints of a leg in markers, `legs` the number of legs, `pairs` of those on one
     side. Each input has its unit, allowed `arcs` [rad or m], `turn` [rad] after which poses repeat
-    (None: never), and default speed. `sides` are the words for a branch of +1 and of -1.
+    (None: never), and speed when it plays. `sides` are the words for a branch of +1 and of -1.
     """
     return {
         'space': mechanism.in_space, 'points': mechanism.points, 'pairs': mechanism.leg_pairs,
@@ -58,7 +50,7 @@ def drawn(mechanism: SceneMechanism) -> dict[str, Any]:
         'sides': {name: mechanism.linkage.line_of(name).sides or SIGNS
                   for name in mechanism.linkage.branches},
         'inputs': {name: {
-            'unit': drive.input.unit, 'arcs': arcs(drive), 'speed': drive.default_speed,
+            'unit': drive.input.unit, 'arcs': arcs(drive), 'speed': speeds[name],
             'turn': drive.input.turn if drive.input.wraps else None}
             for name, drive in mechanism.inputs.items()}}
 
@@ -138,7 +130,7 @@ def number(text: str) -> dict[str, Any]:
 
 
 def reached(mechanism: SceneMechanism, present: Sequence[float],
-            want: Mapping[str, Any]) -> tuple[list[float], Optional[Reach]]:
+            want: Mapping[str, Any]) -> Reached:
     """
     Return the inputs [rad or m] for a request, or the nearest possible ones and what is reached.
 
@@ -175,7 +167,7 @@ def reached(mechanism: SceneMechanism, present: Sequence[float],
 
 
 def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
-              value: float) -> tuple[list[float], Optional[Reach]]:
+              value: float) -> Reached:
     drive, ends = mechanism.inputs[name], arcs(mechanism.inputs[name])
     near = min((min(max(float(drive.input.beside(value, (low + high) / 2.0)), low), high)
                 for low, high in ends), key=lambda end: drive.input.apart(end, value))
@@ -186,11 +178,11 @@ def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
     if not all(math.isfinite(part) for place in places.values() for part in place):
         raise Refused(f'{mechanism.name} cannot be assembled there')
     missed = not whole and drive.input.apart(near, value) > CLOSE * drive.input.size
-    return inputs, Reach(name, tuple(ends), drive.input.unit) if missed else None
+    return inputs, {'name': name, 'arcs': ends, 'unit': drive.input.unit} if missed else None
 
 
 def _output_at(mechanism: SceneMechanism, present: float, name: str,
-               value: float) -> tuple[list[float], Optional[Reach]]:
+               value: float) -> Reached:
     linkage, drive = mechanism.linkage, mechanism.first
     size, output_size = mechanism.scale_of(drive.input.name), mechanism.scale_of(name)
     ends = drive.ends and (drive.ends[0] / size, drive.ends[1] / size)
@@ -201,8 +193,9 @@ def _output_at(mechanism: SceneMechanism, present: float, name: str,
     turn = math.tau if linkage.is_angle(name) else math.inf
     _, nearest = min((abs(math.remainder(extreme - value / output_size, turn)), at)
                      for span in spans for extreme, at in span)
-    reach = tuple((low * output_size, high * output_size) for (low, _), (high, _) in spans)
-    return [nearest * size], Reach(name, reach, 'rad' if linkage.is_angle(name) else 'm')
+    return [nearest * size], {
+        'name': name, 'unit': 'rad' if linkage.is_angle(name) else 'm',
+        'arcs': [(low * output_size, high * output_size) for (low, _), (high, _) in spans]}
 
 
 def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, place: Any,
@@ -249,19 +242,23 @@ def theta_of(values: Sequence[Any]) -> Any:
     return values if len(values) > 1 else values[0]
 
 
+def travel(scene_: Scene, name: str) -> dict[str, Optional[Arc]]:
+    """Return the ends of the slider of each parameter of a mechanism, or None; this is slow."""
+    return {parameter.name[len(name) + 1:]: slider.ends(scene_, parameter)
+            for parameter in scene_.machines[name].parameters}
+
+
 def tunable(scene_: Scene, name: str) -> dict[str, Any]:
     """
-    Return the range of each dimension of a mechanism, and its dependent bars.
+    Return `travel` and `bars` of each dimension of a mechanism by its parameter.
 
-    `travel` holds [low, high] by parameter, `bars` pairs of joints, `fixed` the joints that do not
-    move.
+    These are the ends of its slider, and the pairs of joints that follow it. `fixed` are the
+    joints that do not move.
     """
-    mechanism = scene_.machines[name]
-    start = f'{name}.dimensions.'
-    travel = {parameter.name[len(name) + 1:]: slider.ends(scene_, parameter)
-              for parameter in mechanism.parameters if parameter.name.startswith(start)}
-    return {'travel': travel, 'fixed': list(ground_frame(mechanism.linkage)),
-            'bars': {key: _bars(mechanism.linkage, key.partition('.')[2]) for key in travel}}
+    linkage, ends = scene_.machines[name].linkage, travel(scene_, name)
+    names = {f'dimensions.{key}': key for key in linkage.dimensions}
+    return {'travel': {name: ends[name] for name in names}, 'fixed': list(ground_frame(linkage)),
+            'bars': {name: _bars(linkage, key) for name, key in names.items()}}
 
 
 def _bars(linkage: Mechanism, key: str) -> list[tuple[str, str]]:

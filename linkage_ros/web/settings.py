@@ -3,61 +3,47 @@
 
 """The parameters of the scene's nodes for the page's sliders."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 import math
 import sys
-from typing import Any, Mapping, Optional, Union
+from typing import Any, Optional
 
-from .. import scene
+from ..linkage import Arc
 from ..nodes.parameters import typed
+from ..scene import Parameter
 
-Ends = Optional[tuple[Union[int, float], Union[int, float]]]
 
-
-@dataclass
-class Setting:
+def described(parameter: Parameter, ends: Optional[Arc]) -> dict[str, Any]:
     """
-    A parameter on the page: its field, and the ends of its slider, if it has one.
+    Describe a parameter, whose slider has these ends, or which has none, for the page.
 
-    `full_name` begins with the mechanism; `node` owns it, and `values` are its values by full
-    name.
+    The page has a control for it in a `group`, or none if that is empty.
     """
+    field = parameter.field
+    low, high = ends or (None, None)
+    has_control = not field.read_only and (field.kind == 'bool' or low != high)
+    return {'name': name_in_mechanism(parameter), 'value': parameter.value,
+            'kind': field.kind, 'meaning': field.meaning, 'allowed': field.allowed,
+            'unit': field.unit, 'low': low, 'high': high,
+            'group': (field.group or 'more') if has_control else ''}
 
-    full_name: str
-    field: scene.Field
-    ends: Ends
-    node: str
-    values: Mapping[str, Any]
 
-    @property
-    def name(self) -> str:
-        """Return its name in the mechanism."""
-        return self.full_name.partition('.')[2]
+def name_in_mechanism(parameter: Parameter) -> str:
+    """Return the name of a parameter without its mechanism."""
+    return parameter.name.partition('.')[2]
 
-    @property
-    def value(self) -> Any:
-        """Return its value for JSON."""
-        value = self.values[self.full_name]
-        return list(map(shown, value)) if isinstance(value, tuple) else shown(value)
 
-    def described(self) -> dict[str, Any]:
-        """Return its description for the page, which has a control for it in a group, or none."""
-        low, high = self.ends or (None, None)
-        has_control = not self.field.read_only and (
-            self.field.kind == 'bool' or self.ends is not None and self.ends[0] < self.ends[1])
-        return {'name': self.name, 'value': self.value, 'kind': self.field.kind,
-                'meaning': self.field.meaning, 'allowed': self.field.allowed,
-                'unit': self.field.unit, 'low': low, 'high': high,
-                'group': (self.field.group or 'more') if has_control else ''}
+def message(parameter: Parameter, value: Any, node: str) -> Any:
+    """
+    Return a message that sets a parameter, of a node, to a value from JSON.
 
-    def parameter(self, value: Any) -> Any:
-        """Return a parameter message with a value from JSON; ValueError if it is not allowed."""
-        name = self.full_name
-        if self.field.kind not in ('double', 'integer', 'bool'):
-            raise ValueError(f'{name} is no number, and the page sets numbers only: use ros2 '
-                             f'param set {self.node} {name}')
-        return typed(scene.Parameter(
-            name, self.field, self.field.checked(name, value))).to_parameter_msg()
+    Raises ValueError if the value is not allowed.
+    """
+    name, field = parameter.name, parameter.field
+    if field.kind not in ('double', 'integer', 'bool'):
+        raise ValueError(f'{name} is no number, and the page sets numbers only: use ros2 '
+                         f'param set {node} {name}')
+    return typed(replace(parameter, value=field.checked(name, value))).to_parameter_msg()
 
 
 def is_number(value: Any) -> bool:

@@ -10,7 +10,6 @@ from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 
-from .bridge import Bridge
 from .scene_view import SceneView
 from .. import scene
 from ..nodes import scene_node, shutdown
@@ -60,13 +59,12 @@ class Viewer(Node):
                               integer_range=[IntegerRange(from_value=0, to_value=65535, step=1)])
         or_any = self._declared('or_any_port', False, 'Whether to listen at any free port where '
                                 'that one is taken.')
-        bridge = Bridge(self)
         try:
-            return server(SceneView(bridge), bridge, host, port)
+            return server(SceneView(self), host, port)
         except OSError as error:
             if not or_any or error.errno != EADDRINUSE:
                 raise
-            return server(SceneView(bridge), bridge, host, 0)
+            return server(SceneView(self), host, 0)
 
     def _declared(self, name: str, default: Any, description: str, **ranges: Any) -> Any:
         return self.declare_parameter(name, default, ParameterDescriptor(

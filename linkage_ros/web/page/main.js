@@ -112,7 +112,7 @@ connect({
       if (topic === 'markers' && mechanisms.has(key)) mechanisms.get(key).lastMarkers = performance.now();
     }
     panel.follow();
-    draw(() => tell({ op: 'drawn' }));
+    draw(() => tell('drawn'));
   },
 });
 

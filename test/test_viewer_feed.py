@@ -1,0 +1,134 @@
+# SPDX-FileCopyrightText: 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Frames: the markers that the page draws, from the bytes of any publisher."""
+
+import json
+import math
+import struct
+
+import numpy as np
+import pytest
+
+pytest.importorskip('aiohttp')
+pytest.importorskip('rclpy')
+
+from linkage_ros.web.feed import Feed  # noqa: E402
+from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
+from viewer_harness import framed, markers_of, parts, spoilt, walker  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+
+# As the middleware hands it over.
+FILLED = walker(9) + bytes(3)
+
+
+def frame_of(markers):
+    """Return the frame of some markers, part by part, as the page reads it."""
+    return [({'mechanism': '/leg', 'topic': 'markers', 'markers': [
+        {'kind': {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'locus', Marker.SPHERE_LIST:
+                  'joints', Marker.TRIANGLE_LIST: 'triangles'}[marker.type],
+         'frame': marker.header.frame_id, 'width': marker.scale.x, 'points': len(marker.points),
+         'pose': [*parts(marker.pose.position), *parts(marker.pose.orientation)],
+         'colour': parts(marker.color)} for marker in markers]}, [
+             [list(map(np.float32, parts(point))) for point in marker.points]
+             for marker in markers])]
+
+
+def read(feed_):
+    """Return the frame of a feed's newest message, part by part, as lists."""
+    return [(head, [part.tolist() for part in points]) for head, points in framed(feed_.frame())]
+
+
+def feed_of_a_leg():
+    """Return the feed of a leg's markers, which logs nothing."""
+    return Feed('/leg', '/leg/markers', MarkerArray, lambda text, subject: None)
+
+
+def test_a_frame_has_the_markers_of_the_newest_message():
+    topic = feed_of_a_leg()
+    assert topic.frame() == b''
+    for text in (walker(1), walker(2), walker(4, legs=1), walker(6, width=2.0),
+                 walker(7, frame='\N{BLACK STAR}'), FILLED, FILLED):
+        topic.newest = text
+        assert read(topic) == frame_of(markers_of(text))
+        assert topic.frame() is topic.frame()
+
+
+def test_of_a_message_what_is_deleted_or_no_line_joint_or_triangle_is_not_drawn():
+    topic = feed_of_a_leg()
+    message = deserialize_message(walker(1), MarkerArray)
+    bars, joints = message.markers
+    message.markers = [
+        Marker(type=Marker.LINE_LIST, action=Marker.DELETE), joints, Marker(type=Marker.CUBE),
+        bars, Marker(type=Marker.TRIANGLE_LIST),
+        Marker(type=Marker.LINE_STRIP, points=bars.points)]
+    topic.newest = serialize_message(message)
+    assert read(topic) == frame_of([joints, bars, *message.markers[4:]])
+    (head, _), = read(topic)
+    assert [marker['kind'] for marker in head['markers']] == [
+        'joints', 'lines', 'triangles', 'locus']
+
+
+def swapped(message):
+    """Return a message as a machine of the other byte order writes it."""
+    text, size = bytearray(b'\0\0\0\0'), {'boolean': 1, 'uint8': 1, 'int32': 4,
+                                          'uint32': 4, 'float': 4, 'double': 8}
+    form = {'boolean': '?', 'uint8': 'B', 'int32': 'i', 'uint32': 'I', 'float': 'f',
+            'double': 'd'}
+
+    def number(kind, value):
+        text.extend(bytes(-(len(text) - 4) % size[kind]))
+        text.extend(struct.pack('>' + form[kind], value))
+
+    def write(kind, value):
+        if kind.startswith('sequence<'):
+            number('uint32', len(value))
+            for one in value:
+                write(kind[len('sequence<'):-1], one)
+        elif kind == 'string':
+            number('uint32', len(value) + 1)
+            text.extend(value.encode() + b'\0')
+        elif kind in size:
+            number(kind, value)
+        else:
+            for name, inner in value.get_fields_and_field_types().items():
+                write(inner, getattr(value, name))
+
+    write('', message)
+    return bytes(text)
+
+
+def test_markers_in_the_other_byte_order_are_drawn_alike():
+    topic = feed_of_a_leg()
+    for text in (walker(1), walker(2)):
+        topic.newest = swapped(deserialize_message(text, MarkerArray))
+        assert topic.newest[4:] != text[4:]
+        assert read(topic) == frame_of(markers_of(text))
+
+
+def hostile(rng, text):
+    """Yield bytes that are no message, or one with other numbers than were written."""
+    yield from (b'', b'\0', b'\0\1\0', b'\0\1\0\0', b'\xff' * 64, text[:4] + b'\xff' * 500)
+    yield from (text[:size] for size in rng.integers(0, len(text) - 8, 20))
+    yield from (rng.bytes(size) for size in rng.integers(0, 2000, 20))
+    yield from (text[:4] + rng.bytes(size) for size in rng.integers(0, 2000, 20))
+    yield from (rng.bytes(4) + text[4:] for _ in range(20))
+    for _ in range(200):
+        places = bytearray(text)
+        for place in rng.integers(0, len(text), 3):
+            places[place] = rng.integers(256)
+        yield bytes(places)
+    for number in (math.nan, math.inf, -1e300):
+        yield from (spoilt(part, number) for part in range(4))
+
+
+@pytest.mark.slow
+def test_of_what_cannot_be_drawn_nothing_stays():
+    rng = np.random.default_rng(5)
+    topic = feed_of_a_leg()
+    for step, text in enumerate(hostile(rng, walker(0))):
+        for topic.newest in (text, walker(step)):
+            for head, points in framed(topic.frame()):
+                json.dumps(head, allow_nan=False)
+                assert all(np.isfinite(part).all() for part in points)
+        assert read(topic) == frame_of(markers_of(walker(step)))

@@ -1,0 +1,339 @@
+# SPDX-FileCopyrightText: 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the page is told of poses and curves: the functions behind its requests, without a node."""
+
+import csv
+import dataclasses
+import io
+import itertools
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+
+pytest.importorskip('aiohttp')
+pytest.importorskip('rclpy')
+
+from linkage_ros import mechanisms, scene  # noqa: E402
+from linkage_ros.web import curves, poses  # noqa: E402
+from viewer_harness import DOUBLE, example, EXAMPLES, machine_of  # noqa: E402
+
+
+@pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
+def test_the_page_is_told_what_it_draws_and_moves(path):
+    for name, machine in scene.load(str(path)).machines.items():
+        told = json.loads(json.dumps(poses.drawn(
+            machine, dict.fromkeys(machine.inputs, 2.5)), allow_nan=False))
+        legs = machine.assembly().legs
+        assert told['legs'] == len(legs) and told['pairs'] == sum(
+            leg.side > 0 for leg in legs.values())
+        assert told['space'] == (machine.linkage.type == 'rods')
+        assert told['points'] == list(machine.points)
+        assert told['sides'].keys() == machine.linkage.branches.keys()
+        default = scene.read({'mechanisms': [name], **{
+            key: value for key, value in machine.values.items() if not key.endswith('.speed')}})
+        assert told['inputs'].keys() == machine.inputs.keys()
+        for key, drive in default.machines[name].inputs.items():
+            assert told['inputs'][key]['speed'] == 2.5
+            assert drive.default_speed == drive.speed != 0.0
+            assert told['inputs'][key]['unit'] == ('rad' if drive.input.turns else 'm')
+            turn = told['inputs'][key]['turn']
+            assert (turn is not None) == drive.input.turns
+            start = [one.start for one in machine.inputs.values()]
+            other = [value + (turn or 0.0) * (one == key)
+                     for one, value in zip(machine.inputs, start)]
+            for joint, place in machine.linkage.solve(poses.theta_of(start)).items():
+                np.testing.assert_allclose(
+                    machine.linkage.solve(poses.theta_of(other))[joint], place, atol=1e-9)
+
+
+@pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
+def test_the_unit_of_a_parameter_is_that_of_its_description(path):
+    for one in scene.load(str(path)).parameters:
+        said = re.findall(r'\[(.*?)\]', one.field.meaning)
+        assert '{' not in one.field.meaning + one.field.unit
+        if one.field.kind == 'double':
+            assert one.field.unit == ''.join(said).replace('1', ''), one.name
+
+
+def test_a_bar_follows_a_dimension_that_can_only_become_shorter():
+    # Longer, A, B and C are no triangle.
+    bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'custom', 'bar.dimensions.p': 4.0,
+                      'bar.joints': ['O ground 0 0', 'Q ground 4 0', 'A crank O 1',
+                                     'B dyad A Q 3 3 left', 'C rigid A B p 1 left']})
+    assert poses.tunable(bar, 'bar')['bars'] == {'dimensions.p': [('A', 'C')]}
+
+
+@pytest.mark.parametrize('name', ['excavator', 'jansen', 'peaucellier', 'scissor_lift'])
+def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
+    machine, present = machine_of(name, **{
+        'excavator': DOUBLE, 'scissor_lift': {'scale': 2.0, 'carriage.start': 2.4}}.get(name, {}))
+    present = [1.02 * value for value in present]
+    heads, *rows = csv.reader(io.StringIO(curves.exported(machine, present, 'csv', 'world')))
+    table, linkage = np.array(rows, float).T, machine.linkage
+    input_, *others = linkage.inputs
+    outputs = {joint: 'rad' if linkage.is_angle(joint) else 'm' for joint in linkage.joints
+               if joint not in machine.inputs}
+    outputs.update((f'{point}.{axis}', 'm') for point in linkage.points
+                   if point not in linkage.grounded for axis in 'xy')
+    ratio = {'mm': '1', 'radrad': '1', 'radm': 'N·m/N', 'mrad': 'N/(N·m)'}
+    angles = {head.split()[2] for head in heads if head.startswith('transmission')}
+    assert heads == [f'{input_.name} [{input_.unit}]', *(
+        f'{kind} {output} [{unit}{per}]'
+        for kind, per in (('position', ''), ('velocity', '/s'), ('acceleration', '/s²'))
+        for output, unit in outputs.items()), *(
+        f'transmission angle {joint} [rad]' for joint in linkage.transmission_angles(
+            poses.theta_of([drive.start / machine.scale_of(key)
+                            for key, drive in machine.inputs.items()]))), *(
+        f'force ratio {output} [{ratio[unit + input_.unit]}]'
+        for output, unit in outputs.items())]
+    # Rounded, an end is outside the reach.
+    x = table[0, 1:-1]
+    own = [x / machine.scale_of(input_.name), *(
+        value / machine.scale_of(other.name) for other, value in zip(others, present[1:]))]
+    columns = dict(zip(heads, table[:, 1:-1]))
+    truth = linkage.joint_angles(poses.theta_of(own), list(outputs))
+    sharp = linkage.transmission_angles(poses.theta_of(own))
+    for joint in angles:
+        np.testing.assert_allclose(columns[f'transmission angle {joint} [rad]'], sharp[joint],
+                                   rtol=1e-9, atol=1e-9)
+    for output, unit in outputs.items():
+        position, speed, change = (columns[f'{kind} {output} [{unit}{per}]'] for kind, per in (
+            ('position', ''), ('velocity', '/s'), ('acceleration', '/s²')))
+        size = machine.scale_of(output)
+        np.testing.assert_allclose(position, size * truth[output], rtol=1e-9, atol=1e-9 * size)
+        inner = slice(60, -60)
+        for slope, values in ((speed, np.unwrap(position) if unit == 'rad' else position),
+                              (change, speed)):
+            np.testing.assert_allclose(np.gradient(values, x)[inner], slope[inner],
+                                       rtol=1e-2, atol=1e-9 * max(1.0, np.abs(position).max())
+                                       + 1e-2 * np.abs(slope[inner]).max())
+        known = np.isfinite(speed) & (np.abs(speed) > 1e-9 * np.abs(position).max())
+        force = columns[f'force ratio {output} [{ratio[unit + input_.unit]}]']
+        np.testing.assert_allclose(force[known] * speed[known], 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize('kind', ['velocity', 'acceleration'])
+@pytest.mark.parametrize('name', ['excavator', 'jansen', 'scissor_lift'])
+def test_arrows_are_how_the_joints_move_in_the_picture(name, kind):
+    machine, = scene.read(example(name)).machines.values()
+    starts = [drive.start for drive in machine.inputs.values()]
+    speeds = {name: 0.1 * (2 + i) for i, name in enumerate(machine.inputs)}
+
+    def places(time):
+        own = [(start + time * speed) / machine.scale_of(name)
+               for start, (name, speed) in zip(starts, speeds.items())]
+        solved = machine.linkage.solve(poses.theta_of(own))
+        return {joint: machine.scale * place for joint, place in solved.items()}
+
+    found, h = poses.arrows(machine, starts, kind, speeds), 1e-4
+    before, now, after = map(places, (-h, 0.0, h))
+    assert found.keys() == {'unit', 'at'}
+    assert found['unit'] == {'velocity': 'm/s', 'acceleration': 'm/s²'}[kind]
+    assert set(found['at']) == set(machine.linkage.points) - set(machine.linkage.grounded)
+    for joint, arrow in found['at'].items():
+        slope = ((after[joint] - before[joint]) / (2.0 * h) if kind == 'velocity' else
+                 (after[joint] - 2.0 * now[joint] + before[joint]) / h ** 2)
+        assert arrow == pytest.approx(slope, rel=1e-4, abs=1e-6)
+
+
+@pytest.mark.parametrize('name, input_, value, expected, reach', [
+    ('excavator', 'arm', 1.1, 1.1, None), ('twice', 'arm', 2.2, 2.2, None),
+    ('excavator', 'arm', 2.0, 1.5, (0.94, 1.5)),
+    ('excavator', 'boom', -2.0, 0.8, (0.8, 1.2)),
+    ('jansen', 'crank', 7.0, 7.0 - math.tau, None), ('jansen', 'crank', -3.0, -3.0, None),
+    ('peaucellier', 'crank', 1.0 - math.tau, 1.0, None),
+    ('peaucellier', 'crank', 2.0, 1.171371086914302, (-1.171371086914302, 1.171371086914302)),
+    ('scissor_lift', 'carriage', 0.1, 0.6, (0.6, 1.7))])
+def test_an_input_goes_where_it_is_wanted_or_as_near_as_it_gets(
+        name, input_, value, expected, reach):
+    machine, present = (machine_of('excavator', **DOUBLE) if name == 'twice'
+                        else machine_of(name))
+    found, missed = poses.reached(machine, present, {'output': input_, 'value': value})
+    assert dict(zip(machine.inputs, found)) == pytest.approx(
+        {**dict(zip(machine.inputs, present)), input_: expected}, rel=1e-15)
+    assert missed == (reach and {'name': input_, 'arcs': [reach],
+                                 'unit': machine.inputs[input_].input.unit})
+
+
+GEARED = {'mechanisms': ['gear'], 'gear.type': 'custom', 'gear.joints': [
+    'O ground 0 0', 'M crank O 0.01', 'A crank O 1 geared crank 1/5 0']}
+
+
+@pytest.mark.parametrize('value', [4.0, -15.7, 12.6])
+def test_a_geared_input_goes_where_it_is_wanted_in_all_of_its_period(value):
+    gear = scene.read(GEARED).machines['gear']
+    inputs, missed = poses.reached(gear, [0.0], {'output': 'crank', 'value': value})
+    assert (inputs, missed) == ([value], None)
+    # It can be set to start there.
+    assert scene.read({**GEARED, 'gear.crank.start': value}).machines['gear'].first.start == value
+    again, _ = poses.reached(gear, [0.0], {'output': 'crank', 'value': value + 10.0 * math.pi})
+    assert again == pytest.approx([value], abs=1e-12)
+
+
+def test_an_input_goes_to_the_nearest_of_two_arcs_and_not_where_nothing_can_be_assembled():
+    bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'four_bar', 'bar.crank.start': 1.0, **{
+        f'bar.dimensions.{name}': length for name, length in zip('abcd', (3.0, 2.0, 2.5, 3.0))}})
+    bar = bar.machines['bar']
+    (low, _), (_, high) = bar.first.reach
+    for value, expected in ((3.0, high), (-3.0, low), (3.5, low), (-0.5, None), (0.01, None)):
+        (found,), reach = poses.reached(bar, [1.0], {'output': 'crank', 'value': value})
+        ends = [abs(math.remainder(end - value, math.tau)) for arc in bar.first.reach
+                for end in arc]
+        inside = any(one <= value <= other for one, other in bar.first.reach)
+        assert (reach is None) == inside
+        assert abs(math.remainder(found - value, math.tau)) == pytest.approx(
+            0.0 if inside else min(ends), abs=1e-12)
+        assert expected is None or found == expected
+    five, = scene.read({'mechanisms': ['five_bar']}).machines.values()
+    with pytest.raises(poses.Refused, match='^five_bar cannot be assembled there$'):
+        poses.reached(five, [1.9, 1.24], {'output': 'crank2', 'value': -1.9})
+
+
+@pytest.mark.parametrize('name, changed, output, unit', [
+    ('jansen', {'scale': 0.01}, 'G.x', 'm'), ('jansen', {}, 'EF', 'rad'),
+    ('peaucellier', {'scale': 3.0}, 'C.y', 'm'), ('peaucellier', {}, 'PB', 'rad'),
+    ('scissor_lift', {'scale': 2.0, 'carriage.start': 2.4}, 'P.y', 'm')])
+def test_an_output_goes_where_it_is_wanted_or_to_the_end_of_its_reach(name, changed, output, unit):
+    machine, present = machine_of(name, **changed)
+    own, size = machine.scale_of(machine.first.input.name), machine.scale_of(output)
+
+    def at(inputs):
+        return size * machine.linkage.joint_angles(np.divide(inputs, own), [output])[output]
+
+    (low, high), = machine.first.reach
+    values = at(0.5 * (low + high - (high - low) * np.cos(np.linspace(0.0, math.pi, 20003)[1:-1])))
+    values = np.unwrap(values) if unit == 'rad' else values
+    ends = np.array([values.min(), values.max()])
+    for part in (0.2, 0.5, 0.9):
+        value = float(ends @ (1.0 - part, part))
+        found, reach = poses.reached(machine, present, {'output': output, 'value': value})
+        assert reach is None
+        assert math.remainder(at(found)[0] - value, math.tau if unit == 'rad' else math.inf) == (
+            pytest.approx(0.0, abs=1e-9))
+    for end, beyond in zip(ends.tolist(), (np.ptp(ends) * np.array([-0.2, 0.2])).tolist()):
+        found, reach = poses.reached(machine, present, {'output': output, 'value': end + beyond})
+        assert (reach['name'], reach['unit']) == (output, unit)
+        # Next to a dead point the last of the values is a little away from the end.
+        np.testing.assert_allclose(np.ravel(reach['arcs']), ends, atol=3e-4 * np.ptp(ends))
+        assert math.remainder(at(found)[0] - end, math.tau if unit == 'rad' else math.inf) == (
+            pytest.approx(0.0, abs=3e-4 * np.ptp(ends)))
+
+
+@pytest.mark.parametrize('leg', range(6))
+def test_a_joint_of_any_leg_goes_where_it_is_wanted_or_as_near_as_it_gets(leg):
+    walker = scene.read({'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.leg_pairs': 3,
+                         'walker.scale': 0.01}).machines['walker']
+
+    def foot(crank):
+        # A pair is behind the one before, and its right leg is the mirror image.
+        own = crank - leg // 2 * math.tau / 3
+        x, y = 0.01 * mechanisms.create('jansen').solve(
+            math.pi - own if leg % 2 else own, ('G',))['G'].T
+        return np.stack([-x if leg % 2 else x, y], -1)
+
+    for crank in (0.4, 2.0, -1.7):
+        want = {'joint': 'G', 'leg': leg, 'place': foot(np.array([crank]))[0].tolist()}
+        (found,), reach = poses.reached(walker, [crank + 0.2], want)
+        assert math.remainder(found - crank, math.tau) == pytest.approx(0.0, abs=1e-6)
+        assert reach is None
+    everywhere = foot(np.linspace(-math.pi, math.pi, 20001))
+    for place in ([0.1, -1.5], [-0.9, -0.2]):
+        (found,), _ = poses.reached(walker, [0.3], {'joint': 'G', 'leg': leg, 'place': place})
+        assert math.dist(foot(np.array([found]))[0], place) == pytest.approx(
+            np.linalg.norm(everywhere - place, axis=1).min(), rel=1e-6)
+
+
+def test_a_joint_moved_by_several_inputs_goes_where_it_is_wanted_within_their_ends():
+    digger, present = machine_of('excavator', **DOUBLE)
+    within = [drive.ends for drive in digger.inputs.values()]
+
+    def tip(inputs):
+        return 2.0 * digger.linkage.solve(np.divide(inputs, 2.0), ('T',))['T']
+
+    place = tip([2.1, 2.5, 2.0]).tolist()
+    found, reach = poses.reached(digger, present, {'joint': 'T', 'place': place})
+    assert tip(found).tolist() == pytest.approx(place, abs=1e-6) and reach is None
+    far = poses.reached(digger, present, {'joint': 'T', 'place': [99.0, 0.0]})[0]
+    assert all(low <= value <= high for value, (low, high) in zip(far, within))
+    assert tip(far)[0] > max(tip(corner)[0] for corner in itertools.product(*within)) - 1e-6
+
+
+def test_a_pose_of_several_inputs_is_described_whole():
+    digger, present = machine_of('excavator', **DOUBLE)
+    found, linkage = poses.described(digger, present), digger.linkage
+
+    def at(inputs):
+        angles = linkage.joint_angles(np.divide(inputs, 2.0), list(found['outputs']))
+        return {name: value * (1.0 if linkage.is_angle(name) else 2.0)
+                for name, value in angles.items()}
+
+    assert found.keys() == {'inputs', 'outputs'}
+    assert found['inputs'] == dict(zip(digger.inputs, present))
+    assert list(found['outputs']) == [
+        *(joint for joint in linkage.joints if joint not in digger.inputs), 'T.x', 'T.y']
+    truth, h = at(present), 1e-6
+    slopes = [[(at(np.add(present, step))[name] - at(np.subtract(present, step))[name]) / (2 * h)
+               for step in h * np.eye(3)] for name in truth]
+    for (name, about), slope in zip(found['outputs'].items(), slopes):
+        assert about == {'value': pytest.approx(float(truth[name])),
+                         'unit': 'rad' if linkage.is_angle(name) else 'm',
+                         'rates': pytest.approx(slope, rel=1e-6, abs=1e-8)}
+
+
+@pytest.mark.parametrize('scale', [1e-12, 1.0, 1e12])
+def test_an_output_is_what_it_is_however_small_and_rounding_is_zero(scale):
+    lift = example('scissor_lift')
+    del lift['lift.carriage.start']
+    machine = scene.read({**lift, 'lift.scale': scale}).machines['lift']
+    at = 1.2
+    outputs = poses.described(machine, [at * scale])['outputs']
+    truth = machine.linkage.solve(at, ('P',))['P'] * scale
+    assert [outputs[name]['value'] for name in ('P.x', 'P.y')] == pytest.approx(list(truth))
+    assert outputs['P.x']['rates'] == [0.0] and abs(outputs['P.y']['rates'][0]) > 0.1
+
+
+def test_arrows_of_force_are_the_loads_and_what_holds_them():
+    machine = scene.read({'mechanisms': ['lever'], 'lever.type': 'slotted_lever',
+                          'lever.loads': ['L=3 -4', 'lever=2']}).machines['lever']
+    found = poses.arrows(machine, [0.5], 'force', {'crank': 1.0})
+    effort, = machine.efforts([0.5])
+    assert found == {'unit': 'N', 'at': {'L': (3.0, -4.0)}, 'efforts': {'crank': [effort, 'N·m']}}
+    digger, = scene.read(example('excavator')).machines.values()
+    present = [drive.start for drive in digger.inputs.values()]
+    assert poses.arrows(digger, present, 'force', {}) == {'unit': 'N', 'at': {}, 'efforts': {}}
+    loaded = dataclasses.replace(digger, loads={'T': (0.0, -9.0)})
+    assert poses.arrows(loaded, present, 'force', {}) == {
+        'unit': 'N', 'at': {'T': (0.0, -9.0)}, 'efforts': {
+            name: [effort, 'N'] for name, effort in zip(digger.inputs, loaded.efforts(present))}}
+
+
+@pytest.mark.parametrize('name, output', [
+    ('excavator', 'T.y'), ('jansen', 'G.x'), ('peaucellier', 'PB'), ('peaucellier', 'C.y')])
+def test_a_position_is_drawn_as_it_bends_even_next_to_a_dead_point(name, output):
+    machine, = scene.read(example(name)).machines.values()
+    present = [drive.start for drive in machine.inputs.values()]
+    curve = curves.curve(machine, present, 'position', output)
+    x, y = np.array(curve['x']), np.array(curve['y'], float)
+    middle = 0.5 * (x[:-1] + x[1:])
+    sizes = [machine.scale_of(key) for key in machine.inputs]
+    inputs = [middle / sizes[0], *(value / size for value, size in zip(present[1:], sizes[1:]))]
+    truth = machine.scale_of(output) * machine.linkage.joint_angles(
+        inputs if len(inputs) > 1 else inputs[0], [output])[output]
+    assert abs(truth - 0.5 * (y[:-1] + y[1:])).max() < np.ptp(y) / 500.0
+
+
+def test_no_line_goes_through_a_pole():
+    machine = scene.read({'mechanisms': ['slotted_lever']}).machines['slotted_lever']
+    curve = curves.curve(machine, [0.3], 'force ratio', 'lever')
+    x, y = np.array(curve['x']), np.array(curve['y'], float)
+    turns = math.pi - math.acos(80.0 / 150.0)
+    gaps = x[np.isnan(y)].reshape(2, 3)
+    np.testing.assert_allclose(gaps[:, 1], [-turns, turns], atol=1e-3)
+    assert np.ptp(gaps, axis=1).max() < 0.02
+    assert (np.diff(x) >= 0.0).all()
+    # Wherever two neighbours are joined, the ratio is of one sign.
+    assert (y[:-1] * y[1:] < 0.0).sum() == 0

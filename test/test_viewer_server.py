@@ -1,0 +1,476 @@
+# SPDX-FileCopyrightText: 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The viewer's server: who may look, what it answers to anything, how it starts and ends."""
+
+import asyncio
+import contextlib
+import json
+import os
+import re
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+aiohttp = pytest.importorskip('aiohttp')
+pytest.importorskip('rclpy')
+pytest.importorskip('linkage_interfaces')
+
+import browser  # noqa: E402
+from browser import until  # noqa: E402
+from linkage_ros import palette, scene  # noqa: E402
+from linkage_ros.web import poses, server  # noqa: E402
+from linkage_ros.web.viewer import Viewer  # noqa: E402
+from ros_harness import Process  # noqa: E402
+from viewer_harness import LEG, needs_browser, PAGE, Page, resident, ROOT  # noqa: E402
+
+NONSENSE = [
+    '', '[]', 'null', '\x00', '{"op": 1}', '{"op": {}}', '["op"]', '[' * 60000, '{"a":' * 10000,
+    '9' * 60000, '{"op": "drag", "angle": ' + '[' * 3000 + ']' * 3000 + '}', b'\xff\xfe', b'{}']
+
+
+@pytest.mark.parametrize('text', NONSENSE, ids=range(len(NONSENSE)))
+def test_nonsense_is_answered(lever, text):
+    with Page(lever.url) as page:
+        page.send(text, aiohttp.WSMsgType.BINARY if isinstance(text, bytes) else
+                  aiohttp.WSMsgType.TEXT)
+        assert re.match('the request fails: |unknown request ',
+                        page.message('answer', id=None)['reason'])
+        assert 'unknown request' in page.ask('fly')['reason']
+
+
+REQUESTS = [
+    *(('set', {'values': {name: value}}, f'lever.{name} must be .*, not {shown}')
+      for name, value, shown in (
+        ('leg_pairs', '1e20', r'1e\+20'), ('leg_pairs', '1' + 20 * '0', '100000000000000000000'),
+        ('leg_pairs', 19 * '9', 19 * '9'), ('leg_pairs', '-1e400', '-inf'),
+        ('leg_pairs', 'true', 'True'), ('leg_pairs', '2.5', '2.5'),
+        ('dimensions.a', 400 * '9', '9'),
+        ('dimensions.a', '1e400', 'inf'), ('dimensions.a', 'NaN', 'nan'),
+        ('dimensions.a', '-Infinity', '-inf'), ('dimensions.a', '[[[1]]]', r'\[\[\[1\]\]\]'),
+        ('dimensions.a', '{"a": NaN}', '{.*}'), ('dimensions.a', 'null', 'None'),
+        ('dimensions.a', f'"{50000 * "x"}"', "'x*[.]{3}x*'$"))),
+    ('set', {'values': {'points': '["O"]'}}, 'lever.points is no number'),
+    ('set', {'values': {'crank.speed': '1e300'}}, '100'),
+    ('set', {'values': {'crank.start': 17 * '9'}}, '12.566'),
+    ('set', {'values': {50000 * 'x': '1'}}, "lever has no parameter 'x*[.]{3}x*'$"),
+    ('set', {'values': {'\\ud800': '1'}}, 'lever has no parameter'),
+    ('set', {'values': '3'}, 'the request fails'),
+    ('set', {'values': '[[[], 1]]'}, 'the request fails'),
+    ('set', {'values': '{}', 'mechanism': '{}'}, 'the request fails'),
+    ('set', {}, "the request fails: .*'values'"),
+    *(('pose', {'want': {'output': '"crank"', 'value': value}}, 'value must be a finite number')
+      for value in ('1e400', '-1e400', 'NaN', 400 * '9', 'true', '[1]', '"1"')),
+    ('pose', {'want': '{}'}, "the request fails: KeyError.'output'"),
+    ('pose', {'want': '3'}, 'the request fails'),
+    ('pose', {'want': {'output': '[]', 'value': '1'}}, 'the request fails'),
+    ('pose', {'want': {'joint': '[]', 'place': '[1, 2]'}}, 'joint must be'),
+    ('pose', {'want': {'joint': '"A"', 'up': '2'}}, 'the request fails'),
+    ('pose', {'mechanism': '[]'}, 'the request fails'),
+    ('tune', {'mechanism': '""'}, 'there is no'),
+    ('save', {'values': '7'}, 'the request fails'),
+    ('curve', {'kind': '"speed"'}, "kind must be one of position, .* not 'speed'"),
+    ('curve', {'output': '"Z.x"'}, "there is no position of 'Z.x'; there is of lever, "),
+    ('curve', {'colour': '1'}, 'the request fails'),
+    ('export', {'form': '"pdf"'}, "form must be csv, urdf or c, not 'pdf'"),
+    ('export', {}, "the request fails: .* 'form'"),
+    (50000 * 'x', {}, "unknown request 'x*[.]{3}x*'$"),
+    ('pose', {'arrows': '"torque"'},
+     '^the request fails: .*arrows must be one of velocity, acceleration, force, not '
+     "'torque'"),
+    ('pose', {'arrows': '"velocity"', 'speeds': '{"crank": 1}'}, '^the request fails: .*'),
+    ('set', {'values': {'crank.source': '"x"'}}, '^lever.crank.source is no number, and the page '
+     'sets numbers only: use ros2 param set /[a-z_]+ lever.crank.source$'),
+    ('set', {'values': {'mirrored': '1'}}, '^lever.mirrored must be true or false, not 1$'),
+    ('read', {}, "^the request fails: .*'text'"),
+]
+
+
+def test_a_request_is_answered_whatever_it_holds(lever, page):
+    def text(value):
+        return value if isinstance(value, str) else '{%s}' % ', '.join(
+            f'"{name}": {text(inner)}' for name, inner in value.items())
+
+    for number, (op, fields, reason) in enumerate(REQUESTS):
+        members = {'op': f'"{op}"', 'id': f'"{number}"',
+                   **({} if op == 'read' else {'mechanism': '"/lever"'}), **fields}
+        page.send('{%s}' % ', '.join(f'"{name}": {text(value)}'
+                                     for name, value in members.items()))
+        answer = page.message('answer', id=str(number))
+        assert re.search(reason, answer['reason']), (op[:20], reason, answer['reason'])
+        assert len(answer['reason']) < 300 and answer.keys() == {'op', 'id', 'reason'}
+    assert (lever.value('lever.crank.speed'), lever.value('lever.leg_pairs')) == (1.0, 1)
+
+
+def test_a_request_that_fails_is_answered_and_logged(page, monkeypatch, capfd):
+    monkeypatch.setattr(poses, 'number', lambda text: 1 // 0)
+    assert page.ask('read', text='1')['reason'].startswith('the request fails: ZeroDivision')
+
+
+def test_of_many_requests_at_once_each_is_answered(lever):
+    with Page(lever.url) as page:
+        for number in range(500):
+            page.send(json.dumps({'op': 'set', 'mechanism': '/lever', 'values': {}, 'id': number}))
+        assert {page.message('answer', id=number)['reason'] for number in range(500)} <= {
+            '', "there is no mechanism '/lever'; there are: "}
+
+
+@pytest.mark.parametrize('kind, data, code', [
+    (aiohttp.WSMsgType.TEXT, b'[' * 100000, 1009), (aiohttp.WSMsgType.TEXT, b'\xff\xfe', 1007),
+    (aiohttp.WSMsgType.CONTINUATION, b'', 1002), (3, b'', 1002)])
+def test_what_is_no_message_closes_the_connection(lever, kind, data, code):
+    with Page(lever.url) as page:
+        page.message('scene')
+        page.send(data, kind)
+        assert until(lambda: page.end)[0] == code
+
+
+class Deaf:
+    """A client that asks, and reads nothing."""
+
+    def __init__(self, url):
+        host, port = url[len('http://'):-1].split(':')
+        self._socket = socket.socket()
+        # So that little is read on its behalf.
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        self._socket.connect((host, int(port)))
+        self._host = f'Host: {host}:{port}\r\n'
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._socket.close()
+
+    def request(self, path):
+        """Return the bytes of a request for a file."""
+        return f'GET {path} HTTP/1.1\r\n{self._host}\r\n'.encode()
+
+    def upgrade(self):
+        """Make the connection a WebSocket."""
+        self._socket.sendall(self.request('/socket').replace(
+            b'\r\n\r\n', b'\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n'
+            b'Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n'))
+        assert b' 101 ' in self._socket.recv(64)
+
+    @staticmethod
+    def frame(data, kind=1):
+        """Return the bytes of a WebSocket frame."""
+        size = len(data)
+        head = bytes([0x80 | kind, 0x80 | min(size, 126)])
+        return head + (struct.pack('>H', size) if size > 125 else b'') + bytes(4) + data
+
+    def flood(self, data, goes_on):
+        """Send something as long as that holds; return whether it was let to the end."""
+        self._socket.settimeout(0.2)
+        left = data
+        while goes_on():
+            try:
+                left = left[self._socket.send(left):] or data
+            except TimeoutError:
+                pass
+            except OSError:
+                return False
+        return True
+
+
+FLOODS = {
+    'answers': Deaf.frame(b'{"op": "fly", "id": "' + b'x' * 60000 + b'"}'),
+    'refusals': Deaf.frame(b'[]') * 1000,
+    'settings': Deaf.frame(b'{"op": "set", "mechanism": "/leg", "values": '
+                           b'{"crank.speed": 1}, "id": 1}') * 100,
+    'pings': Deaf.frame(b'x' * 125, kind=9) * 500,
+    'drawn': Deaf.frame(b'{"op": "drawn"}') * 1000,
+    'files': None,
+}
+
+
+@pytest.mark.parametrize('what, seconds', [
+    pytest.param('answers', 0.5, marks=pytest.mark.slow),
+    *(pytest.param(what, 15.0, marks=pytest.mark.long) for what in FLOODS)])
+def test_a_client_that_does_not_read_costs_little_and_harms_nobody(show, what, seconds):
+    running = show({**LEG, 'leg.crank.speed': 1.0})
+    page = running.page()
+    until(lambda: page.pictures)
+    before, pictures = resident(), page.pictures
+    with Deaf(running.url) as deaf:
+        data = FLOODS[what] or deaf.request('/panel.js') * 100
+        if FLOODS[what]:
+            deaf.upgrade()
+        over = threading.Event()
+        flooding = threading.Thread(target=deaf.flood, args=(data, lambda: not over.is_set()))
+        flooding.start()
+        try:
+            time.sleep(seconds)
+            until(lambda: page.pictures > pictures + 5)
+            assert page.set('/leg', crank__speed=2.0) == ''
+        finally:
+            over.set()
+            flooding.join()
+        assert resident() - before < 30.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('last', [b'', b'nonsense'])
+def test_a_client_that_does_not_read_is_sent_home(show, monkeypatch, last):
+    monkeypatch.setattr(server, 'MAX_READ_S', 0.3)
+    with Deaf(show(LEG).url) as deaf:
+        deaf.upgrade()
+        end = time.monotonic() + browser.DEADLINE
+        assert not deaf.flood(FLOODS['answers'] + last, lambda: time.monotonic() < end)
+
+
+@pytest.mark.long
+def test_a_client_that_does_not_read_does_not_keep_the_viewer_from_ending(show):
+    running = show(LEG)
+    with Deaf(running.url) as deaf:
+        deaf.upgrade()
+        some = iter(range(20))
+        assert deaf.flood(FLOODS['answers'], lambda: next(some, None) is not None)
+        ending = threading.Thread(target=running.viewer.destroy_node, daemon=True)
+        ending.start()
+        ending.join(browser.DEADLINE)
+        assert not ending.is_alive()
+
+
+def test_what_is_no_request_is_refused_and_not_logged(lever, capfd):
+    with socket.create_connection(('127.0.0.1', lever.viewer._server.port)) as other:
+        other.sendall(b'\x16\x03\x01 is how https begins\r\n\r\n')
+        assert other.recv(100).startswith(b'HTTP/1.0 400')
+    assert 'Traceback' not in capfd.readouterr().err
+
+
+def answer(url, **headers):
+    """Return the status, the headers and the text of an answer."""
+    async def fetched():
+        async with aiohttp.ClientSession() as session:
+            async with session.get(url, headers=headers) as response:
+                return response.status, response.headers, await response.text()
+
+    return asyncio.run(fetched())
+
+
+def status(url, **headers):
+    """Return the status of an answer."""
+    return answer(url, **headers)[0]
+
+
+@pytest.mark.parametrize('name', ['', *sorted(
+    path.relative_to(PAGE).as_posix() for path in PAGE.rglob('*') if path.is_file())])
+def test_the_page_is_served_with_nothing_from_outside(lever, name):
+    code, headers, served = answer(lever.url + name)
+    assert code == 200
+    assert {key: value for key, value in headers.items()
+            if key not in ('Date', 'Server', 'Content-Length')} == {
+        'Content-Security-Policy':
+            "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+        'Cross-Origin-Resource-Policy': 'same-origin', 'Cache-Control': 'no-cache',
+        'Referrer-Policy': 'no-referrer', 'X-Content-Type-Options': 'nosniff',
+        'Connection': 'close', 'Content-Type': {
+            'html': 'text/html', 'css': 'text/css', 'js': 'text/javascript', 'svg':
+            'image/svg+xml'}.get((name or '.html').rpartition('.')[2], 'text/plain')
+        + '; charset=utf-8'}
+    text = (PAGE / (name or 'index.html')).read_text()
+    for colour, code in vars(palette).items():
+        text = re.sub(rf'\${colour.lower()}\b', code, text) if colour.isupper() else text
+    assert served == text
+    named = re.findall(r"""(?:src|href|from|url\()\s*=?\s*["']([^"']+)["']""", text)
+    assert all((PAGE / path).is_file() for path in named)
+    addresses = set(re.findall(r'https?://[^\s"\'`]+', text))
+    assert addresses <= {'http://www.apache.org/licenses/LICENSE-2.0',
+                         'http://www.w3.org/2000/svg', 'https://github.com/leeoniya/uPlot'}
+
+
+def test_the_page_is_as_small_as_the_docs_say():
+    said = re.search(r'\| ([0-9]+) kB, and ([0-9]+) kB with the first plot',
+                     (ROOT / 'docs' / 'design' / 'page.md').read_text())
+    for folder, kilobytes in zip((PAGE, PAGE / 'vendor'), said.groups()):
+        size = sum(file.stat().st_size for file in folder.iterdir()
+                   if file.suffix in ('.html', '.css', '.js', '.svg'))
+        assert size == pytest.approx(1000.0 * float(kilobytes), rel=0.1)
+
+
+@pytest.mark.parametrize('name', ['%2e%2e%2fserver.py', 'server.py', 'none.html', 'page/main.js'])
+def test_only_the_page_is_served(lever, name):
+    assert status(lever.url + name) == 404
+
+
+def test_a_refused_address_says_what_was_asked(lever):
+    assert [answer(lever.url + name, **headers)[2] for name, headers in (
+        ('none.html', {}), ('', {'Host': 'evil.example'}), ('', {'Origin': 'null'}))] == [
+        "There is no 'none.html'.\n", "'evil.example' is not a name of this server.\n",
+        "'null' is a foreign origin.\n"]
+
+
+@pytest.mark.parametrize('host, own', [
+    ('localhost:{port}', True), ('127.0.0.1:{port}', True), ('[::1]:{port}', True),
+    ('localhost', True), ('evil.example', False), ('evil.example:{port}', False),
+    ('localhost.evil.example', False), ('10.1.2.3:{port}', False), ('[', False), ('', False),
+    ('evil.example:80@localhost', False), ('[::1].evil.example', False)])
+def test_a_foreign_host_is_refused(lever, host, own):
+    host = host.format(port=lever.viewer._server.port)
+    assert status(lever.url, Host=host) == (200 if own else 403)
+
+
+@pytest.mark.parametrize('origin, own', [
+    *((origin, False) for origin in (
+        'http://evil.example', 'https://127.0.0.1', 'http://127.0.0.1:1', 'null', 'file://',
+        'http://localhost:{port}', 'http://127.0.0.1:{port}.evil.example', '')),
+    ('http://127.0.0.1:{port}', True)])
+def test_a_foreign_origin_is_refused(lever, origin, own):
+    page = Page(lever.url, headers={'Origin': origin.format(port=lever.viewer._server.port)})
+    with contextlib.nullcontext() if own else pytest.raises(
+            aiohttp.WSServerHandshakeError, match='403'), page:
+        page.message('scene')
+
+
+@pytest.mark.slow
+@needs_browser
+def test_a_foreign_page_is_not_let_in(lever, tmp_path):
+    with browser.Browser(tmp_path) as page:
+        page.open('about:blank')
+        assert page.value(
+            'new Promise(done => {'
+            f'  const socket = new WebSocket("{lever.url.replace("http", "ws")}socket");'
+            '  socket.onopen = () => done("open");'
+            '  socket.onerror = () => done("refused");'
+            '})') == 'refused'
+
+
+def test_the_viewer_describes_its_parameters(graph):
+    def known(viewer, *names):
+        abouts = [viewer.describe_parameter(name) for name in names]
+        return {name: (viewer.get_parameter(name).value, about.read_only, about.description, [
+            (ends.from_value, ends.to_value, ends.step) for ends in about.integer_range])
+            for name, about in zip(names, abouts)}
+
+    viewer = graph.start(Viewer, {'or_any_port': True})
+    assert known(viewer, 'host', 'port', 'or_any_port') == {
+        'host': ('127.0.0.1', True, 'Address to listen at; 127.0.0.1: for browsers on this '
+                 'machine alone. Whoever reaches it can move the scene.', []),
+        'port': (8020, True, 'Port to listen at; 0: any that is free.', [(0, 65535, 1)]),
+        'or_any_port': (True, True, 'Whether to listen at any free port where that one is taken.',
+                        [])}
+    graph.end(viewer)
+    assert graph.start(Viewer, {'port': 0}).get_parameter('or_any_port').value is False
+
+
+def test_where_a_port_is_taken_another_is_used_or_the_viewer_says_how(graph):
+    with socket.socket() as taken:
+        taken.bind(('127.0.0.1', 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        other = graph.start(Viewer, {'port': port, 'or_any_port': True})
+        assert status(other.url) == 200
+        # Ports below are for the administrator.
+        assert port != int(re.search(r':(\d+)/', other.url)[1]) >= 1024
+        with pytest.raises(scene.SceneError, match=(
+                '^the viewer cannot be started: .*in use; for another port use -p port:=8021, '
+                'with ros2 launch port:=8021, with make view PORT=8021; port 0 is any free one$')):
+            graph.start(Viewer, {'port': port})
+    with pytest.raises(scene.SceneError, match='^the viewer cannot be started: .*[^e]$'):
+        graph.start(Viewer, {'port': 0, 'host': '192.0.2.1', 'or_any_port': True})
+    graph.end(other)
+
+
+@pytest.mark.parametrize('host, shown, numbers', [
+    ('0.0.0.0', '127.0.0.1', True), ('', '127.0.0.1', True), ('localhost', 'localhost', False)])
+def test_a_viewer_answers_by_the_names_and_numbers_of_its_machine(graph, host, shown, numbers):
+    viewer = graph.start(Viewer, {'port': 0, 'host': host})
+    url = re.fullmatch(rf'http://{shown}:\d+/', viewer.url)[0]
+    assert [status(url, Host=name) == 200 for name in (
+        'evil.example', '10.1.2.3', socket.gethostname().upper(), 'LOCALHOST', '127.0.0.2')] == [
+        False, numbers, True, True, True]
+    graph.end(viewer)
+
+
+def test_a_viewer_that_ends_says_so_to_its_pages(show):
+    running = show({}, kinds=())
+    page = running.page()
+    running.graph.end(running.viewer)
+    assert until(lambda: page.end) == (1001, 'the viewer ended')
+
+
+@pytest.fixture
+def parameter_file(tmp_path):
+    """Return a function that writes the parameters of a viewer to a file."""
+    def write(**parameters):
+        file = tmp_path / 'scene.yaml'
+        file.write_text(json.dumps({'/**': {'ros__parameters': parameters}}))
+        return file
+
+    return write
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_viewer_while_somebody_looks(parameter_file, stop):
+    process = Process('viewer', parameter_file(port=0))
+    url = re.search(r'Look at (http:\S+)', process.line())[1]
+    with Page(url) as page:
+        page.message('scene')
+        process.interrupt(stop)
+        until(lambda: page.end)
+    code, printed = process.end()
+    assert code == 0 and 'Traceback' not in printed and 'rror' not in printed
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_make_view_says_where_to_look_and_ends_all_that_it_started(stop):
+    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)}
+    environment.pop('ROS_DOMAIN_ID', None)
+    process = subprocess.Popen(
+        [sys.executable, ROOT / 'demo' / 'view.py', ROOT / 'config' / 'jansen.yaml', '0'],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment)
+    try:
+        address, = re.findall(r'Look at (http:\S+)', next(
+            line for line in process.stdout if 'Look at' in line))
+        with Page(address) as page:
+            page.mechanisms('/jansen')
+        process.send_signal(stop)
+        # The output ends when the last of those who have it does.
+        printed, _ = process.communicate(timeout=browser.DEADLINE)
+        assert process.returncode == 0 and 'Traceback' not in printed
+    finally:
+        process.terminate()
+        process.wait(browser.DEADLINE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('arguments', [
+    ('view.py', ROOT / 'config' / 'jansen.yaml', '0'), ('demo.py',)], ids=lambda some: some[0])
+def test_make_view_and_make_demo_end_quietly_when_nobody_reads_what_they_print(arguments):
+    name, *others = arguments
+    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)}
+    process = subprocess.Popen(
+        [sys.executable, ROOT / 'demo' / name, *others], env=environment,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process.stdout.close()
+    said = process.stderr.read()
+    assert process.wait(browser.DEADLINE) == 0
+    assert [line for line in said.splitlines() if '[INFO]' not in line] == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize('parameters, arguments, named', [
+    ({'port': 'taken'}, (), 'address already in use.*make view PORT=8021'),
+    ({'port': 70000}, (), 'port'), ({'port': 'eighty'}, (), 'port'),
+    ({'port': 0, 'host': '192.0.2.1'}, (), '192.0.2.1'),
+    ({'port': 0}, ('--port', '8050'), "'--port'")])
+def test_a_viewer_that_cannot_listen_ends_in_one_sentence(
+        parameter_file, parameters, arguments, named):
+    with socket.socket() as taken:
+        taken.bind(('127.0.0.1', 0))
+        taken.listen()
+        if parameters['port'] == 'taken':
+            parameters = {'port': taken.getsockname()[1]}
+        code, printed = Process('viewer', parameter_file(**parameters), *arguments).end()
+    said, = (line for line in printed.splitlines() if '[FATAL]' in line)
+    assert code == 1 and 'Traceback' not in printed and re.search(named, said)
