@@ -3,7 +3,6 @@
 
 """The parameters of the scene's nodes for the page's sliders."""
 
-from dataclasses import replace
 import math
 import sys
 from typing import Any, Optional
@@ -43,7 +42,7 @@ def message(parameter: Parameter, value: Any, node: str) -> Any:
     if field.kind not in ('double', 'integer', 'bool'):
         raise ValueError(f'{name} is no number, and the page sets numbers only: use ros2 '
                          f'param set {node} {name}')
-    return typed(replace(parameter, value=field.checked(name, value))).to_parameter_msg()
+    return typed(parameter._replace(value=field.checked(name, value))).to_parameter_msg()
 
 
 def is_number(value: Any) -> bool:
