@@ -350,7 +350,7 @@ def test_each_of_many_sets_gets_its_own_answer(graph):
         assert result.successful or result.reason.startswith(f'{name} must')
     before = node.scene
     assert (before.machines['leg'].scale, before.frame_id) == (2.0, 'map')
-    for other in ('leg.points', ['Z']), ('leg.scale', 1300.0):
+    for other in ('leg.loads', ['Z=1 2']), ('leg.scale', 1300.0):
         results = client.set(('frame_id', 'odom'), ('leg.scale', -1.0), other)
         assert [r.successful for r in results] == [False] * 3 and node.scene is before
         assert [r.reason.partition(' must')[0] for r in results] == [

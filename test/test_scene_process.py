@@ -105,4 +105,4 @@ def test_one_name_for_all_is_refused(capfd):
 def test_a_bad_scene_ends_them_all_in_one_sentence(capfd):
     assert scene_process.main(['scene', '--ros-args', '-p', 'mechanisms:=[leg]']) == 1
     printed = capfd.readouterr().err
-    assert printed.count('[FATAL]') == 1 and 'leg.type must be one of' in printed
+    assert printed.count('[FATAL]') == 1 and 'leg.type must be a text' in printed

@@ -86,7 +86,7 @@ def test_the_nodes_own_ears_on_joint_states_are_nobody_who_listens(graph, work):
 
 
 def test_a_scene_with_plain_names_changes_no_number(graph, monkeypatch):
-    monkeypatch.setattr(mechanism_model, '_arranged', None)
+    monkeypatch.setattr(mechanism_model.MechanismModel, '_convert', None)
     graph.start(Kinematics)
     graph.crank(CRANKS)([0.1] * 4, graph.listen(JointState, 'jansen/joint_states'), [1.0] * 4)
 
