@@ -133,13 +133,6 @@ def test_shapes_broadcast(shapes, strict):
         assert np.array_equal(np.asarray(each), np.full(each.shape, value))
 
 
-def test_numbers_stand_beside_arrays(strict):
-    function = linkage('five_bar').function(xp=strict)
-    ones, two = strict.asarray([1.0, 1.1]), strict.asarray([2.0, 2.0])
-    for one, other in zip(function(ones, 2), function(ones, two)):
-        assert np.array_equal(np.asarray(one), np.asarray(other))
-
-
 @pytest.mark.filterwarnings('ignore:You are comparing')
 def test_what_cannot_be_is_refused_in_a_sentence(strict):
     arm, leg = linkage('five_bar'), linkage('jansen')
@@ -147,14 +140,12 @@ def test_what_cannot_be_is_refused_in_a_sentence(strict):
     good, single = strict.asarray([1.0]), strict.asarray([1.0], dtype=strict.float32)
     half = np.array([1.0], 'f2')
     for given in ((whole, whole), (good, single), (good, np.array([1.0])), (1.0, 2.0),
-                  (good, whole), (good, 'x'), (good, True)):
+                  (good, whole), (good, 2.0)):
         with pytest.raises(ValueError, match='all float64 or all float32'):
             function(*given)
     with pytest.raises(ValueError, match='got float16'):
         leg.function(xp=np)(half)
-    with pytest.raises(ValueError, match='must be a package of arrays'):
-        leg.function(xp='torch')
-    with pytest.raises(ValueError, match='2 arguments are needed, got 1'):
+    with pytest.raises(ValueError, match='needed: 2 arrays .* got array_api_strict.float64$'):
         function(good)
     with pytest.raises(ValueError, match='not for arrays'):
         leg.with_dimensions(m=np.array([14.0, 15.0])).function(xp=strict)
@@ -212,7 +203,8 @@ def test_every_output_has_the_library_s_choice(kind):
         values = mechanism.posed((), (output,)).searched(given)[0]
         values += math.tau * rng.integers(-2, 3, FEW) * mechanism.is_angle(output)
         for follows in (False, True):
-            found, = inverse.function(np, follows)(values, *[near] * follows)
+            with np.errstate(divide='raise', invalid='raise', over='raise'):
+                found, = inverse.function(np, follows)(values, *[near] * follows)
             expected_, = inverse.nearest((values,), (near,) if follows else None)[0]
             np.testing.assert_allclose(found, expected_, 0.0, 1e-6, err_msg=output)
         tried += 1
