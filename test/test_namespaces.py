@@ -320,7 +320,7 @@ def test_jax_has_the_values_and_the_rates(kind, jax):
 
 
 def jacobians(kind, given):
-    """Return d outputs / d inputs (poses, outputs, inputs), a unit matrix where it is not finite."""
+    """Return d outputs / d inputs (poses, outputs, inputs), and where it is finite; else 1."""
     outputs, n = INVERSES[kind], len(given)
     rates = linkage(kind).posed((), outputs, outputs).searched(*given)[n:]
     jacobian = rates.reshape(n, n, -1).transpose(2, 1, 0)
