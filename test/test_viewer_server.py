@@ -241,7 +241,7 @@ def test_a_client_that_does_not_read_does_not_keep_the_viewer_from_ending(show):
 
 
 def test_what_is_no_request_is_refused_and_not_logged(lever, capfd):
-    with socket.create_connection(('127.0.0.1', lever.viewer._server.port)) as other:
+    with socket.create_connection(('127.0.0.1', urlsplit(lever.url).port)) as other:
         other.sendall(b'\x16\x03\x01 is how https begins\r\n\r\n')
         assert other.recv(100).startswith(b'HTTP/1.0 400')
     assert 'Traceback' not in capfd.readouterr().err

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Sequence
+from typing import Callable, Dict, Iterable, List, NamedTuple, Sequence
 
 import numpy as np
 
 from .names import comment
 from ..formula.expression import Real, unknown
 from ..formula.operations import OPERATIONS
-from ..formula.program import Dialect, evaluate, Pose
+from ..formula.program import Dialect, evaluate, in_order, Pose
 from ..linkage import IN_SINGLE, Mechanism
 
 # Expressions that are true or false.
@@ -124,7 +124,7 @@ class Code:
         """Return an expression of dimensions as text, '' where it is long or has no dimension."""
         node, has_dimension = self._decided(node), False
         text: Dict[Real, str] = {}
-        for x in unknown(node, lambda x: [*map(self._decided, x.operands)], text):
+        for x in unknown([node], lambda x: [*map(self._decided, x.operands)], text):
             if x.operands:
                 parts = [text[self._decided(part)] for part in x.operands]
                 text[x] = _WRITTEN[x.op].format(*parts) if all(parts) else ''
@@ -136,10 +136,7 @@ class Code:
 
     def _in_float(self, node: Real, value: float) -> float:
         """Return the value of an expression of dimensions with the rounding of float."""
-        known: Dict[Real, Any] = {}
-        for x in unknown(node, lambda x: x.operands, known):
-            known[x] = None if x.value is None else IN_SINGLE.get(x.value)
-        known = {x: rounding for x, rounding in known.items() if rounding is not None}
+        known = {x: IN_SINGLE[x.value] for x in in_order([node]) if x.value in IN_SINGLE}
         return float(evaluate(node, self.linkage.lengths, known)) if known else value
 
 

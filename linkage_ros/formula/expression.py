@@ -342,9 +342,9 @@ def dot(p: Complex, q: Complex) -> Real:
     return p.x * q.x + p.y * q.y
 
 
-def unknown(node: Real, needed: Callable, known: dict) -> Iterator[Real]:
-    """Yield unknown operands of an expression before their users, and last the expression."""
-    waiting = [node]
+def unknown(nodes: Iterable[Real], needed: Callable, known: dict) -> Iterator[Real]:
+    """Yield unknown operands of expressions before their users, which become known meanwhile."""
+    waiting = [*nodes][::-1]
     while waiting:
         if waiting[-1] in known:
             waiting.pop()
@@ -366,7 +366,7 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
             return ()
         return x.rate.of if x.rate else x.operands
 
-    for x in unknown(node, needed, known):
+    for x in unknown([node], needed, known):
         if not x.varies or x.op in WITHOUT_RATE:
             known[x] = real(0.0)
         elif x.op == 'argument':
@@ -385,15 +385,13 @@ def substituted(outputs: Sequence[Real], replaced: Mapping[Any, Real]) -> List[R
     Arguments are replaced by their leaves or by their indices.
     """
     known: dict = dict(replaced)
-    for x in (x for output in outputs for x in unknown(
-            output, lambda x: x.operands if x.varies else (), known)):
-        if x.op == 'argument':
-            known[x] = replaced.get(x.args[0], x)
-        elif not x.varies:
-            known[x] = x
+    for x in unknown(outputs, lambda x: x.operands if x.varies else (), known):
+        if x.op == 'rated':
+            known[x] = known[x.args[0]]
+        elif x.varies and x.operands:
+            known[x] = Real(x.op, tuple(map(known.get, x.args)), positive=x.positive)
         else:
-            known[x] = known[x.args[0]] if x.op == 'rated' else Real(
-                x.op, tuple(known[arg] for arg in x.args), positive=x.positive)
+            known[x] = replaced.get(x.args[0], x) if x.varies else x
     return [known[x] for x in outputs]
 
 

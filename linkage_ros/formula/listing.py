@@ -36,16 +36,13 @@ class Listing:
         self._decided = decided
         self._numbers: Dict[tuple, int] = {}
         self._known: Dict[Real, int] = {}
-        self.outputs = [self._number(node) for node in outputs]
+        for x in unknown(outputs, self._needed, self._known):
+            self._known[x] = self._enter(x)
+        self.outputs = [self._known[x] for x in outputs]
         self._uses = self._count_uses()
         # The values of dimensions alone that varying operations use.
         self.constants = [n for n in self._uses if not self.entries[n][0].varies
                           and self.entries[n][0].op != 'constant']
-
-    def _number(self, node: Real) -> int:
-        for x in unknown(node, self._needed, self._known):
-            self._known[x] = self._enter(x)
-        return self._known[node]
 
     def _needed(self, node: Real) -> tuple:
         if node.op == 'where' and node.args[0] in self._decided:

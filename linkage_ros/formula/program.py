@@ -20,7 +20,6 @@ import math
 from operator import attrgetter
 import re
 from struct import Struct
-from types import MappingProxyType
 from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 import warnings
 from weakref import finalize
@@ -39,9 +38,6 @@ BLOCK_OF_POSES = 4096
 FEW_POSES = 32
 _NUMBERS, _NAMED, _OPERANDS = count(), re.compile(r'\bv\d+'), attrgetter('operands')
 
-_Step = Tuple[Real, Optional[Callable], Sequence[Real]]
-
-
 def compile_in_background(make: Callable[[], Any]) -> Future:
     """Run `make` in a thread of its own; return its future."""
     thread = ThreadPoolExecutor(1, 'linkage_ros compiler')
@@ -58,36 +54,29 @@ ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
 
 def evaluate(node: Real, dimensions: Mapping, known: dict) -> Any:
     """Evaluate an expression of dimensions alone; `known` is shared between calls."""
-    _evaluate_steps(map(_step, unknown(node, _OPERANDS, known)), dimensions, known)
+    _evaluate(unknown([node], _OPERANDS, known), dimensions, known)
     return known[node]
 
 
-def _step(node: Real) -> _Step:
-    """Return an expression of dimensions, its function (None for a leaf) and its operands."""
-    return node, OPERATIONS[node.op].numpy if node.operands else None, node.operands
-
-
-def _steps(nodes: Iterable[Real]) -> List[_Step]:
-    """Return expressions and their operands, each once, in an order of evaluation."""
-    known: Dict[Real, _Step] = {}
+def _evaluate(nodes: Iterable[Real], dimensions: Mapping, known: dict) -> None:
+    """Add the values of expressions to those known."""
     for node in nodes:
-        for x in unknown(node, _OPERANDS, known):
-            known[x] = _step(x)
-    return list(known.values())
-
-
-def _evaluate_steps(steps: Iterable[_Step], dimensions: Mapping, known: dict,
-                    numbers: Mapping[float, float] = MappingProxyType({})) -> None:
-    """Add the values of expressions to those known, with other `numbers` in place of some."""
-    for node, function, operands in steps:
         if node in known:
             continue
-        if function:
-            known[node] = function(*[known[x] for x in operands])[()]
+        if node.operands:
+            known[node] = OPERATIONS[node.op].numpy(*[known[x] for x in node.operands])[()]
         else:
             value, = node.args
-            value = dimensions[value] if node.op == 'dimension' else numbers.get(value, value)
-            known[node] = np.asarray(value, float)[()]
+            known[node] = np.asarray(
+                dimensions[value] if node.op == 'dimension' else value, float)[()]
+
+
+def in_order(nodes: Iterable[Real], needed: Callable = _OPERANDS) -> List[Real]:
+    """Return expressions and what they need, each once, in an order of evaluation."""
+    known: Dict[Real, None] = {}
+    for x in unknown(nodes, needed, known):
+        known[x] = None
+    return list(known)
 
 
 def _with_releases(lines: Sequence[Tuple[str, str]], outputs: Sequence[str]) -> List[str]:
@@ -143,7 +132,7 @@ class _Variant:
         self.listing = Listing(outputs, decided)
         self.arguments, self.outputs = arguments, len(outputs)
         self.constants = [self.listing.entries[n][0] for n in self.listing.constants]
-        self.steps = _steps(self.constants)
+        self.steps = in_order(self.constants)
         # The code for one pose that returns the outputs in pairs, by name.
         self.placing = Cache(partial(_python, self.listing, FLOATS, arguments))
 
@@ -185,24 +174,19 @@ class Program:
         self._outputs = tuple(substituted(outputs, replaced) if replaced else outputs)
         self._arguments = arguments
         self._conditions = _conditions(self._outputs)
-        self._deciding = _steps(self._conditions)
+        self._deciding = in_order(self._conditions)
         self._variants = Cache()
 
-    def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False,
-             numbers: Mapping[float, float] = MappingProxyType({})) -> Pose:
-        """
-        Return the outputs as functions of the arguments; dimensions are floats or arrays.
-
-        `numbers` take the place of constants, such as tolerances, in what depends on dimensions.
-        """
+    def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
+        """Return the outputs as functions of the arguments; dimensions are floats or arrays."""
         swept = any(np.ndim(v) for v in dimensions.values())
         with np.errstate(all='ignore'):
             if not swept:
-                _evaluate_steps(self._deciding, dimensions, known, numbers)
+                _evaluate(self._deciding, dimensions, known)
             decisions = () if swept else tuple(bool(known[c]) for c in self._conditions)
             variant = self._variants.get_or_make(decisions, lambda: _Variant(
                 self._outputs, dict(zip(self._conditions, decisions)), self._arguments))
-            _evaluate_steps(variant.steps, dimensions, known, numbers)
+            _evaluate(variant.steps, dimensions, known)
         constants = [known[c] for c in variant.constants]
         if not swept:
             constants = list(map(float, constants))
@@ -212,11 +196,8 @@ class Program:
 
 def _conditions(outputs: Iterable[Real]) -> list:
     """Return the conditions on dimensions alone that varying operations use."""
-    visited: Dict[Real, None] = {}
-    for output in outputs:
-        for node in unknown(output, lambda x: [a for a in x.operands if a.varies], visited):
-            visited[node] = None
-    return list(dict.fromkeys(node.args[0] for node in visited if node.varies
+    nodes = in_order(outputs, lambda x: [a for a in x.operands if a.varies])
+    return list(dict.fromkeys(node.args[0] for node in nodes if node.varies
                               and node.op == 'where' and not node.args[0].varies))
 
 

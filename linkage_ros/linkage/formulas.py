@@ -270,7 +270,7 @@ def _vanishes(rate: Real) -> bool:
     """Return whether an expression is zero wherever it has a value."""
     zero: Dict[Real, bool] = {}
     some = {'multiply': any, 'add': all, 'subtract': all}
-    for x in unknown(rate, lambda x: x.operands, zero):
+    for x in unknown([rate], lambda x: x.operands, zero):
         parts = [zero[part] for part in x.operands]
         if x.op in some:
             zero[x] = some[x.op](parts)

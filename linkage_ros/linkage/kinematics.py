@@ -350,17 +350,10 @@ class Kinematics:
         """
         if xp is None:
             return self.posed(points, joints, rates).at
-        return self.array_function(self.structure.parts(self._requested(points, joints, rates)),
-                                   len(self.inputs), xp)
-
-    def array_function(self, outputs: Sequence[Real], arguments: int, xp: Any,
-                       single: Mapping[float, float] = IN_SINGLE) -> Callable:
-        """Return some of its formulas as a function of arrays of a package; see `function`."""
-        if not hasattr(xp, 'float64'):
-            raise ValueError(f'xp must be a package of arrays, such as torch, got {quoted(xp)}')
-        if any(np.ndim(length) for length in self.dimensions.values()):
+        if any(map(np.ndim, self.dimensions.values())):
             raise ValueError('xp is for one set of dimensions, not for arrays')
-        return array_function(outputs, arguments, xp, self.lengths, single)
+        outputs = self.structure.parts(self._requested(points, joints, rates))
+        return array_function(outputs, len(self.inputs), xp, self.lengths, IN_SINGLE)
 
     def posed(self, points: Names = None, joints: Sequence[str] = (),
               rates: Sequence[str] = ()) -> Pose:

@@ -13,43 +13,50 @@ from __future__ import annotations
 from functools import reduce
 from itertools import product
 import math
-from typing import List, Mapping, Sequence
+from typing import List, Optional, Tuple
 
 from .choice import better, ranked
 from .linkage import InverseLinkage
 from .problem import InverseProblem
 from ..geometry.spatial import IN_SINGLE
 from ..tolerances import CLOSE
-from ...formula.expression import argument, derivative, gated, nearest_integer, Real, substituted
+from ...formula.expression import argument, gated, nearest_integer, Real, substituted
+from ...words import listed
 
 # A mode whose outputs are off by more than this [sizes] is no solution.
 OFF = 2.0 ** -20
 # What these constants are in single precision.
-SINGLE: Mapping[float, float] = {**IN_SINGLE, OFF: 2.0 ** -10, CLOSE: 2.0 ** -12}
+SINGLE = {**IN_SINGLE, OFF: 2.0 ** -10, CLOSE: 2.0 ** -12}
 
-Inputs = List[Real]
+Reals = List[Real]
 
 
-def modes_of(problem: InverseProblem, closed: InverseLinkage) -> List[Inputs]:
-    """Return the inputs in each assembly mode and its turns, NaN where it is no solution."""
-    values = [argument(i) for i in range(problem.n)]
-    forward = problem.linkage.structure.checked(problem.outputs)[:problem.n]
-    found = []
+def modes_of(problem: InverseProblem, closed: Optional[InverseLinkage]
+             ) -> List[Tuple[Reals, Reals]]:
+    """
+    Return the inputs in each assembly mode and its turns, NaN where it is no solution.
+
+    Beside them are the rates of each output by the first input, by the second and so on.
+    """
+    if not closed:
+        raise ValueError(f'from {listed(problem.outputs)} there is no closed form, only a search')
+    modes, forward = [], problem.linkage.structure.checked(problem.outputs)
     for mode, turns in product(closed.modes, product(*closed.turns)):
         inputs = substituted([x + turn for x, turn in zip(mode.inputs, turns)], closed.arguments)
-        outputs = substituted(forward, dict(enumerate(inputs)))
-        for output, value, turn, scale in zip(outputs, values, problem.periods, problem.scales):
-            room = OFF * scale - abs(_nearest(output - value, turn))
+        results = substituted(forward, dict(enumerate(inputs)))
+        for by, (turn, scale) in enumerate(zip(problem.periods, problem.scales)):
+            room = OFF * scale - abs(_nearest(results[by] - argument(by), turn))
             inputs = [gated(x, room, 0.0) for x in inputs]
-        found.append([_nearest(x, turn) for x, turn in zip(inputs, problem.turns)])
-    return found
+        modes.append(([_nearest(x, turn) for x, turn in zip(inputs, problem.turns)],
+                      results[problem.n:]))
+    return modes
 
 
-def chosen_of(problem: InverseProblem, modes: Sequence[Inputs], follows: bool) -> Inputs:
+def chosen_of(problem: InverseProblem, closed: Optional[InverseLinkage], follows: bool) -> Reals:
     """Return the inputs of one mode; see `choice.ranked`. To follow, next to more arguments."""
     seed = [argument(problem.n + by) for by in range(problem.n * follows)]
     _, places, _ = reduce(lambda best, mode: better(mode, best), [
-        ranked(problem, inputs, [derivative(inputs[0], {0: 1.0}, {})], seed) for inputs in modes])
+        ranked(problem, *mode, seed) for mode in modes_of(problem, closed)])
     return [*places]
 
 

@@ -31,7 +31,7 @@ from .segments import Segments, segments_of
 from ..kinematics import Kinematics
 from ..text.arguments import numbers
 from ..tolerances import SINGULAR
-from ...formula.expression import Real
+from ...formula.namespace import array_function
 from ...words import listed, plain_text, quoted
 
 # Few values are solved as floats.
@@ -436,8 +436,8 @@ class Inverse:
             If there is no closed form.
 
         """
-        outputs = chosen_of(self._problem, self._modes_as_expressions(), follows)
-        return self.linkage.array_function(outputs, (1 + follows) * self._n, xp, SINGLE)
+        outputs = chosen_of(self._problem, self.closed, follows)
+        return array_function(outputs, (1 + follows) * self._n, xp, self.linkage.lengths, SINGLE)
 
     def modes(self, xp: Any) -> Callable:
         """
@@ -446,20 +446,9 @@ class Inverse:
         It returns a tuple with a tuple for each assembly mode, in one order everywhere: an array
         for each input, NaN where the mode is no solution. See `function`.
         """
-        modes, n = self._modes_as_expressions(), self._n
-        flat = self.linkage.array_function([x for mode in modes for x in mode], n, xp, SINGLE)
-
-        def function(*values: Any) -> Tuple[Tuple[Any, ...], ...]:
-            found = flat(*values)
-            return tuple([found[k:k + n] for k in range(0, len(found), n)])
-
-        return function
-
-    def _modes_as_expressions(self) -> List[List[Real]]:
-        if not self.closed:
-            raise ValueError(f'{self.linkage.type} has no closed form from '
-                             f'{listed(self.outputs)}: only the values of numpy are searched')
-        return modes_of(self._problem, self.closed)
+        outputs = [x for inputs, _ in modes_of(self._problem, self.closed) for x in inputs]
+        flat = array_function(outputs, self._n, xp, self.linkage.lengths, SINGLE)
+        return lambda *values: tuple(zip(*self._n * [iter(flat(*values))]))
 
     # --- the working mode ---
 
