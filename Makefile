@@ -92,22 +92,21 @@ docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/ and 
 	@echo 'Documentation: docs/_build/html/index.html'
 
 .PHONY: test
-test: ready ## Run the tests, but for the long ones, and say what they cover
+test: ready ## Run the tests, but for the nightly ones, and say what they cover
 	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m slipcover --source linkage_ros \
-	  --json --out $(build)/coverage.json -m pytest -n 2 --dist worksteal -m 'not long'
+	  --json --out $(build)/coverage.json -m pytest -n 2 --dist worksteal -m 'not nightly'
 	@python .ci/coverage.py $(build)/coverage.json
 
 # What starts nodes runs alike without machine code.
 .PHONY: nodes
 nodes: ready ## Run the tests of the nodes alone; with PLAIN=1 where llvmlite is not installed
 	@$(if $(PLAIN),! python -c 'import llvmlite' 2>/dev/null)
-	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m 'not long' \
+	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m 'not nightly' \
 	  $$(grep -lE 'ros_harness|\(graph' test/test_*.py)
 
-# Hours; what is left without those that are marked exhaustive takes minutes.
-.PHONY: long
-long: ready ## Run the long tests; WHICH='long and not exhaustive' or WHICH=slow: in minutes
-	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m '$(or $(WHICH),long)'
+.PHONY: nightly
+nightly: ready ## Run the nightly tests: sweeps and long ways
+	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m nightly
 
 # Some minutes to an hour a room, and some minutes once for a state of the checkout.
 .PHONY: mutants

@@ -27,23 +27,16 @@ os.environ['ROS_DOMAIN_ID'] = str(_domain.id)
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Leave what is beyond the sample of a sweep to the slow tests, which are long."""
+    """Keep `all_but` of the cases of a sweep, evenly spread, out of the nightly tests."""
     sweeps = defaultdict(list)
     for item in items:
-        if item.get_closest_marker('sample') and not (
-                item.get_closest_marker('long') or item.get_closest_marker('slow')):
-            sweeps[item.nodeid.partition('[')[0]].append(item)
-    for cases in sweeps.values():
-        count, = cases[0].get_closest_marker('sample').args
-        chosen = {round(k * (len(cases) - 1) / max(count - 1, 1)) for k in range(count)}
-        for i, case in enumerate(cases):
-            if i not in chosen:
-                case.add_marker(pytest.mark.slow)
-    for item in items:
-        if item.get_closest_marker('slow'):
-            if item.get_closest_marker('exhaustive'):
-                raise pytest.UsageError(f'{item.nodeid} is slow and exhaustive')
-            item.add_marker(pytest.mark.long)
+        marks = [*item.iter_markers('nightly')]
+        if marks and all(mark.kwargs for mark in marks):
+            sweeps[item.nodeid.partition('[')[0], marks[0].kwargs['all_but']].append(item)
+    for (_, count), cases in sweeps.items():
+        for k in range(min(count, len(cases))):
+            case = cases[round(k * (len(cases) - 1) / max(count - 1, 1))]
+            case.own_markers = [mark for mark in case.own_markers if mark.name != 'nightly']
 
 
 def pytest_collection_finish():

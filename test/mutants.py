@@ -238,7 +238,7 @@ def measured(test_file):
     data = Path('coverage') / Path(test_file).stem
     environment = {**os.environ, 'COVERAGE_FILE': str(data.absolute())}
     output = subprocess.run(
-        [sys.executable, '-m', 'pytest', test_file, '-m', 'not long', '--cov',
+        [sys.executable, '-m', 'pytest', test_file, '-m', 'not nightly', '--cov',
          '--cov-context=test', '--cov-config=coverage.ini', '--cov-report=', '--durations=0',
          '-vv', '-rfE'],
         env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True).stdout
@@ -393,7 +393,7 @@ def tested(job):
             if 'ERROR: not found' in output:
                 # The bug has changed the names of tests.
                 files = {name.partition('::')[0] for name in names}
-                found, output = passed([*options, '-m', 'not long', *files], limit)
+                found, output = passed([*options, '-m', 'not nightly', *files], limit)
             if not found:
                 killer = re.search('^(?:FAILED|ERROR) (.*)$', output, re.M)
                 mutant['state'] = 'hung or crashed' if found is None else 'killed'

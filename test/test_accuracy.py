@@ -55,15 +55,15 @@ def check(rows):
     assert not broken(rows), summary(rows)
 
 
-@pytest.mark.sample(8)
-@pytest.mark.parametrize('near', [12, pytest.param(40, marks=pytest.mark.long)])
+@pytest.mark.nightly(all_but=8)
+@pytest.mark.parametrize('near', [12, pytest.param(40, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize('kind, dimensions, branches', CATALOGUE)
 def test_the_catalogue_is_right_to_the_last_digits(kind, dimensions, branches, near):
     mechanism = mechanisms.create(kind, branches=branches, **dimensions)
     check(measure(mechanism, awkward(mechanism, np.random.default_rng(1), 3, near)))
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('kind', KINDS)
 def test_random_and_degenerate_dimensions_are_right_too(kind):
     rows = []
@@ -72,7 +72,7 @@ def test_random_and_degenerate_dimensions_are_right_too(kind):
     check(rows)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('kind', KINDS)
 def test_velocities_and_joint_rates_are_right(kind):
     rows = []
@@ -81,7 +81,7 @@ def test_velocities_and_joint_rates_are_right(kind):
     check(rows)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('kind, dimensions, branches', [
     case for case in CATALOGUE if case[1] is hard_cases.CATALOGUE[case[0]][0]])
 def test_velocities_and_joint_rates_of_the_catalogue_are_right(kind, dimensions, branches):
@@ -89,7 +89,7 @@ def test_velocities_and_joint_rates_of_the_catalogue_are_right(kind, dimensions,
     check(measure(mechanism, awkward(mechanism, np.random.default_rng(4), 6)[::8], rates=True))
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('half', [1, -1])
 def test_the_inverse_of_the_lever_is_right_on_both_branches(half):
     rows = []
@@ -118,7 +118,7 @@ def test_any_inversor_at_any_angle_is_right(theta, r, a, b):
     check(measure(mechanisms.create('peaucellier', r=r, a=a, b=b), [theta]))
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('size', [1e-150, 1e150])
 def test_lengths_of_any_size_are_right(kind, size):

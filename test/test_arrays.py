@@ -77,7 +77,7 @@ def test_zeros_keep_their_signs_and_infinity_is_what_it_is_to_the_library():
     assert np.array_equal(np.signbit(found)[known], np.signbit(expected)[known])
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('kind', hard_cases.CATALOGUE)
 def test_places_angles_and_rates_are_as_exact_as_the_rule_wants(kind):
     linkage = mechanisms.create(kind).accelerated()
@@ -117,7 +117,7 @@ def test_a_pose_is_the_same_on_any_number_of_cores():
         os.sched_setaffinity(0, cores)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_process_that_is_forked_has_threads_of_its_own():
     code = f"""
 import os

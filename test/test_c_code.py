@@ -129,7 +129,7 @@ def test_poses_and_rates_are_those_of_python(library, machines, name, count=50):
     np.testing.assert_allclose(np.array(found), poses, rtol=1e-15, atol=0.0)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('name', ['jansen', 'slotted_lever'])
 def test_so_they_are_at_a_hundred_thousand_poses(library, machines, name):
     test_poses_and_rates_are_those_of_python(library, machines, name, 100_000)
@@ -236,7 +236,7 @@ def test_the_inverse_finds_the_nearest_input(library, machines, name, output):
         assert invert(given, ctypes.byref(found)) == 0 and found.value == 7.0
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('name, output', [
     ('four_bar', 'QB'), ('slotted_lever', 'lever'), ('jansen', 'BC'), ('whitworth', 'lever'),
     ('peaucellier', 'BC'), ('klann', 'CF')])
@@ -268,7 +268,7 @@ int poses(double value, double near)
     assert machine.linkage.inverse(output).closed is None or max(taken[:200]) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('name, output, call', [
     ('klann', 'CF', 'angle_CF'), ('jansen', 'G.x', 'G_x')])
 def test_a_search_misses_none_of_ten_thousand(machines, tmp_path, name, output, call):
@@ -331,7 +331,7 @@ int found(const double *value, const double *near, double *inputs)
 
 
 @pytest.mark.parametrize('name', ['slotted_lever', 'boom', pytest.param(
-    'jansen', marks=pytest.mark.slow)])
+    'jansen', marks=pytest.mark.nightly)])
 def test_single_precision_is_as_good_as_it_says(machines, tmp_path, name):
     machine = machines[name]
     library = compiled(tmp_path, [machine], single=True)
@@ -420,7 +420,7 @@ int found(double value, double near, double *crank) {{ return {called}(value, ne
                 assert again == pytest.approx(value, abs=1e-7 * linkage.longest)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_ankle_in_single_precision_is_that_of_python(tmp_path):
     machine, = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).machines.values()
     library = loaded(tmp_path, header.written(machine, single=True) + """
@@ -615,7 +615,7 @@ def test_loads_compile_without_a_warning(with_loads, tmp_path, number, compiler,
     assert not ended.returncode, ended.stderr[:2000]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(not shutil.which('clang-tidy') or not shutil.which('cppcheck'),
                     reason='clang-tidy or cppcheck is not installed')
 def test_linters_find_nothing():

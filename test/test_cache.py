@@ -129,7 +129,7 @@ def test_threads_hammer_it(shared):
     assert len(cache) <= 4
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_threads_ask_one_mechanism_for_more_than_it_caches():
     leg = mechanisms.create('jansen')
     outputs = [f'distance({p},{q})' for p, q in combinations(leg.points, 2)]
@@ -150,7 +150,7 @@ def test_threads_ask_one_mechanism_for_more_than_it_caches():
     at_once(*(lambda seed=seed: ask(seed) for seed in range(THREADS)))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_threads_are_the_first_to_ask_a_linkage_all_at_once():
     theta = np.linspace(-3.0, 3.0, 40)
     questions = [

@@ -42,7 +42,7 @@ def in_digits(place):
     return mpc(*map(float, place))
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('name', CASES)
 def test_a_case_keeps_every_length_to_the_last_digits(name):
     case, linkage, path = CASES[name], made(name), poses(name).tolist()
@@ -52,7 +52,7 @@ def test_a_case_keeps_every_length_to_the_last_digits(name):
             assert abs(in_digits(place) - exact[joint]) <= RULE * spread[joint], (inputs, joint)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.nightly(all_but=6)
 @pytest.mark.parametrize('name', CASES)
 def test_its_rates_by_each_input_are_those_of_its_bars(name):
     case, linkage = CASES[name], made(name)
@@ -74,7 +74,7 @@ def test_its_rates_by_each_input_are_those_of_its_bars(name):
                 assert turning[link.name] == (link.name == linkage.inputs[by].name)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.nightly(all_but=6)
 @pytest.mark.parametrize('name', CASES)
 def test_arrays_functions_and_machine_code_say_the_same(name):
     linkage, inputs = made(name), poses(name, 6).reshape(3, 2, -1)
@@ -91,7 +91,7 @@ def test_arrays_functions_and_machine_code_say_the_same(name):
         np.testing.assert_allclose(quick[joint], place, rtol=0.0, atol=1e-13 * linkage.longest)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.nightly(all_but=6)
 @pytest.mark.parametrize('power', [-600, -30, 40, 600])
 @pytest.mark.parametrize('name', CASES)
 def test_a_case_of_another_size_is_the_same_to_the_bit(name, power):
@@ -130,9 +130,10 @@ def test_a_dead_point_is_where_a_transmission_angle_is_flat(name):
         assert linkage.distance_to_dead_point(value, *held) == 0.0
 
 
-@pytest.mark.sample(5)
+@pytest.mark.nightly(all_but=5)
 @pytest.mark.parametrize('name', [
-    pytest.param(name, marks=pytest.mark.slow) if name == 'excavator' else name for name in CASES])
+    pytest.param(name, marks=pytest.mark.nightly) if name == 'excavator' else name
+    for name in CASES])
 def test_the_inverse_finds_the_first_input_from_where_every_joint_is(name):
     linkage, inputs = made(name), poses(name)[1].tolist()
     first, *held = inputs
@@ -332,7 +333,7 @@ GEARED = ('O ground 0 0', 'Q ground g 0', 'A crank O a', 'B crank Q b geared cra
           'P dyad A B e f left')
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('ratio', ['1/2', '1/3', '-1.7', '2', '-2', '3', '0'])
 def test_the_reach_of_geared_cranks_is_that_of_one_turn_of_the_first(ratio):
     rng = np.random.default_rng(len(ratio))

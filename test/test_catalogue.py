@@ -151,8 +151,8 @@ def test_a_file_that_is_no_mechanism_is_named(tmp_path, monkeypatch, text, said)
     assert said in str(refused.value)
 
 
-@pytest.mark.sample(3)
-@pytest.mark.parametrize('seeds', [1, pytest.param(5, marks=pytest.mark.long)])
+@pytest.mark.nightly(all_but=3)
+@pytest.mark.parametrize('seeds', [1, pytest.param(5, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize('kind', list(mechanisms.TYPES))
 def test_every_mechanism_holds_what_any_linkage_must(kind, seeds):
     design = Design(mechanisms.design(kind).joints, mechanisms.create(kind).dimensions, {})
@@ -161,7 +161,7 @@ def test_every_mechanism_holds_what_any_linkage_must(kind, seeds):
     assert not found, found[0]
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('kind', WIDER)
 def test_the_wider_catalogue_is_right_to_the_last_digits(kind):
     linkage = mechanisms.create(kind)
@@ -172,8 +172,8 @@ def test_the_wider_catalogue_is_right_to_the_last_digits(kind):
     assert rows and not broken(rows), summary(rows)
 
 
-@pytest.mark.sample(4)
-@pytest.mark.parametrize('count', [4, pytest.param(12, marks=pytest.mark.long)])
+@pytest.mark.nightly(all_but=4)
+@pytest.mark.parametrize('count', [4, pytest.param(12, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize('kind', WIDER)
 def test_other_dimensions_and_branches_are_right_too(kind, count):
     rng, rows = np.random.default_rng(3), []
@@ -346,7 +346,7 @@ def _curves():
         yield pytest.param(partial(_near_a_change_point, seed), id=f'near a change point {seed}')
 
 
-@pytest.mark.sample(5)
+@pytest.mark.nightly(all_but=5)
 @pytest.mark.parametrize('make', [*_curves()])
 def test_a_drawn_curve_is_within_a_five_hundredth_of_its_size(make):
     linkage = make()

@@ -224,7 +224,7 @@ def test_commands_move_the_picture(stream, graph):
 
 # --- in turn, and all round ---
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('type_, output, part', [
     ('four_bar', 'QB', 1.0), ('jansen', 'G.x', 1.0), ('slider_crank', 'block', 1.0),
     ('watt', 'P.y', 1.0), ('whitworth', 'lever', 3.0)])
@@ -297,7 +297,7 @@ def test_of_several_inputs_no_command_outlives_a_change_of_the_geometry(graph, c
     assert f'leg has 2 inputs: name 2 of its outputs, not {FOOT[0]}' in capfd.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_of_several_inputs_what_cannot_be_had_is_held_and_said(graph, capfd):
     stream = Stream(graph, SEVERAL)
     bucket = BUCKET, LINE[2:].tolist()
@@ -485,7 +485,7 @@ def test_a_newer_trajectory_ends_the_older_one(graph, plan, monkeypatch):
     assert len(solved) <= 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_trajectory_is_solved_beside_the_messages_and_a_newer_one_replaces_it(graph, plan):
     older = plan(['flap'], *(([flap(0.3)], []) for _ in range(10_000)))
     newer = plan(['flap'], ([flap(0.2)], []))

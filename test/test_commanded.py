@@ -13,12 +13,11 @@ import commanded
 from linkage_ros.c_code import header
 import numpy as np
 import pytest
-from sweeps import EXHAUSTIVE
 
 pytestmark = pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
 NEEDS = pytest.mark.skipif(not shutil.which('g++') or not ROS,
                            reason='g++ or rcutils is not installed')
-KINDS = ['double', 'float', pytest.param('transmission', marks=[NEEDS, pytest.mark.long])]
+KINDS = ['double', 'float', pytest.param('transmission', marks=[NEEDS, pytest.mark.nightly])]
 MISSES = [1, 2, 4, 5]
 
 
@@ -49,7 +48,7 @@ int inverted(double value, double near, double *input) {{ return {called}(value,
                 value, abs=1e-12)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('kind', KINDS)
 def test_the_catalogue(tmp_path, kind):
     cases = [*commanded.catalogue()]
@@ -58,9 +57,8 @@ def test_the_catalogue(tmp_path, kind):
 
 
 # Of single precision 1 in 10 000 may miss, next to a pose that two inputs share.
-@pytest.mark.parametrize('seeds', [
-    pytest.param(range(12), marks=pytest.mark.long), pytest.param(range(200), marks=EXHAUSTIVE)],
-    ids=['few', 'many'])
+@pytest.mark.nightly
+@pytest.mark.parametrize('seeds', [range(12), range(12, 40)], ids=['few', 'many'])
 @pytest.mark.parametrize('kind, most', [('double', 0.0), ('float', 1e-4), pytest.param(
     'transmission', 0.0, marks=NEEDS)])
 def test_random_linkages(tmp_path, kind, most, seeds):

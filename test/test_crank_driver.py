@@ -153,7 +153,7 @@ def test_a_new_dimension_keeps_the_crank_in_its_new_reach(graph):
     assert driver.at(3 * SECOND) == (0.25, 0.0)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('name, value, reason', [
     ('drop.crank.speed', 1000.0, 'drop.crank.speed .*100'),
     ('drop.crank.speed', True, 'drop.crank.speed must be'),
@@ -257,7 +257,7 @@ def test_system_time_that_is_set_makes_no_jump(graph, on_system_time, seconds):
         assert 0.0 <= (message.position[0] - before) % math.tau < 2.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_slow_driver_goes_on_after_system_time_is_set_back(graph):
     node = graph.start(OnSystemTime, {
         'mechanisms': ['drop'], 'drop.type': 'water_drop', 'rate': 0.8})

@@ -70,7 +70,7 @@ BAD = {
 }
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('text', BAD.values(), ids=BAD)
 def test_bytes_that_are_no_joint_states_are_passed_over_with_one_warning(graph, text):
     hand = Hand(graph)
@@ -83,7 +83,7 @@ def test_bytes_that_are_no_joint_states_are_passed_over_with_one_warning(graph, 
     assert len(hand.warnings('no JointState')) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_whatever_bytes_come_the_node_goes_on_and_publishes_finite_numbers(graph):
     hand = Hand(graph)
     random = np.random.default_rng(5)
@@ -110,7 +110,7 @@ def test_the_other_byte_order_is_understood(graph):
     assert (state.position[0], state.velocity[0]) == (0.25, 2.0)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
 def test_an_angle_that_is_no_number_is_said_once_and_never_published(graph, value):
     parameters = {'mechanisms': ['m'], 'm.type': 'custom', 'm.points': ['O', 'Q'], 'm.joints': [
@@ -125,7 +125,7 @@ def test_an_angle_that_is_no_number_is_said_once_and_never_published(graph, valu
     assert len(hand.warnings('cannot be assembled')) == 1
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('speed', [1e200, 1e308, math.inf, math.nan, 5e-324])
 def test_any_speed_is_handled_without_a_warning_of_numpy(graph, speed):
     hand = Hand(graph, 'm', {'mechanisms': ['m'], 'm.type': 'jansen', 'm.scale': 1e6,

@@ -31,7 +31,7 @@ def angles(linkage):
     return [theta * speed for speed in (1.0, 0.5)] if len(linkage.inputs) > 1 else theta
 
 
-@pytest.mark.sample(5)
+@pytest.mark.nightly(all_but=5)
 @pytest.mark.parametrize('kind', list(mechanisms.TYPES))
 def test_the_catalogue_written_out_gives_the_same_bits(kind):
     design, own = mechanisms.design(kind), mechanisms.create(kind)

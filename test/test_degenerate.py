@@ -72,7 +72,7 @@ def test_bars_that_are_alike_have_velocities_and_rates(kind):
                                        err_msg=name)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('kind', ALIKE)
 def test_bars_that_are_alike_can_be_asked_about_their_motion(kind):
     found = ALIKE[kind]
@@ -167,7 +167,7 @@ def test_what_hangs_on_a_joint_that_is_not_there_has_no_angle_either(last, lines
         assert (np.isnan(rates[link.name]) >= off).all(), link
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_long_chain_is_no_matter_of_recursion():
     chain = linkage(*FOUR_BAR[:3], 'B0 dyad A Q 3.5 3 left', *(
         f'B{i} dyad B{i - 1} Q 3 3 left' for i in range(1, 120)))
@@ -178,7 +178,7 @@ def test_a_long_chain_is_no_matter_of_recursion():
     assert chain.reach() == [(-math.pi, math.pi)]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_what_is_asked_again_and_again_does_not_pile_up():
     five_bar = mechanisms.create('five_bar')
 
@@ -385,7 +385,7 @@ def test_a_block_on_a_short_bar_of_a_kite_keeps_the_digits_of_its_slide():
     assert not any(row.problem for row in rows) and max(slides) < 4.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_reach_of_what_hangs_on_rounding_is_found_in_so_many_calls():
     # F is where A is: the mirror line F-A has a direction of rounding, and so has all behind it.
     lines = ('A ground -0.552 0', 'B ground 0 -0.4465', 'C ground 0 0',

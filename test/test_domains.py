@@ -81,14 +81,14 @@ def test_the_locks_are_those_of_the_domain_coordinator():
     assert coordinator.PORT_BASE == domains.FIRST_LOCK
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_two_runs_of_the_same_tests_do_not_disturb_each_other():
     pytest.importorskip('rclpy')
     environment = {key: value for key, value in os.environ.items()
                    if not re.match('PYTEST|ROS_DOMAIN_ID', key)}
     runs = [subprocess.Popen(
         [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider', 'test/test_kinematics.py',
-         '-m', 'not long'], cwd=ROOT, env=environment, text=True, stdout=subprocess.PIPE)
+         '-m', 'not nightly'], cwd=ROOT, env=environment, text=True, stdout=subprocess.PIPE)
         for _ in range(2)]
     said = [run.communicate(timeout=300)[0] for run in runs]
     assert [run.returncode for run in runs] == [0, 0], '\n'.join(said)

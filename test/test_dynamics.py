@@ -30,7 +30,7 @@ def one(values):
 
 # --- accelerations ---
 
-@pytest.mark.sample(5)
+@pytest.mark.nightly(all_but=5)
 @pytest.mark.parametrize('name', [*mechanisms.TYPES, 'boom', 'elbow'])
 def test_accelerations_keep_the_rule_of_accuracy(name):
     mechanism, rng = made(name), np.random.default_rng(4)

@@ -122,13 +122,13 @@ def test_a_four_bar_of_equal_bars_has_its_pose_where_it_is_folded():
     assert found.reach() == [(-math.pi, math.pi)] and found.dead_points() == [-math.pi, 0.0]
 
 
-@pytest.mark.sample(8)
+@pytest.mark.nightly(all_but=8)
 @pytest.mark.parametrize('word, size', [*itertools.product(FOLDED, SIZES)])
 def test_what_stands_on_an_arm_of_no_length_has_the_limit(word, size):
     assert not [*problems(folded(word, size))]
 
 
-@pytest.mark.sample(10)
+@pytest.mark.nightly(all_but=10)
 @pytest.mark.parametrize('seed', range(300))
 def test_random_linkages_of_equal_bars_have_limits_and_nothing_infinite(seed):
     assert not [*problems(equal_bars.design(np.random.default_rng(seed)))]
@@ -147,7 +147,7 @@ def catalogue(kind):
         yield Design(own.joints, found.dimensions, found.branches), found
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('kind', [kind for kind in mechanisms.TYPES
                                   if mechanisms.create(kind).axes == 'xy'])
 def test_the_catalogue_with_equal_bars_has_limits_and_nothing_infinite(kind):
@@ -171,7 +171,7 @@ def test_a_joint_that_would_jump_has_no_place_there(lines, where):
 
 
 @pytest.mark.skipif(not find_spec('llvmlite'), reason='llvmlite is not installed')
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('word', FOLDED)
 def test_machine_code_has_the_limits_too(word):
     found = made(folded(word, 0.3))

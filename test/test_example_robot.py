@@ -76,7 +76,7 @@ def told():
         return found
 
 
-@pytest.mark.sample(1)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('library', LIBRARIES)
 def test_the_loops_of_the_urdf_are_closed_at_every_pose(told, library):
     robot = library(URDF)
@@ -158,7 +158,7 @@ def test_the_motors_are_simulated_where_that_is_wanted(simulated, left_out):
             and node.condition and not node.condition.evaluate(context)} == left_out
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_the_picture_is_drawn_by_its_command(tmp_path, monkeypatch):
     pytest.importorskip('matplotlib')
     monkeypatch.setenv('MPLBACKEND', 'Agg')

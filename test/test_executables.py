@@ -44,13 +44,13 @@ def test_the_help_of_a_command_names_its_file_and_explains_each_of_its_options(
     assert len(options) > 3
 
 
-@pytest.mark.sample(1)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('name, stop', [
     ('crank_driver', signal.SIGINT), ('kinematics', signal.SIGTERM),
     ('servo_inverse', signal.SIGINT),
-    pytest.param('crank_driver', signal.SIGTERM, marks=pytest.mark.long),
-    pytest.param('kinematics', signal.SIGINT, marks=pytest.mark.long),
-    pytest.param('servo_inverse', signal.SIGTERM, marks=pytest.mark.long)])
+    pytest.param('crank_driver', signal.SIGTERM, marks=pytest.mark.nightly),
+    pytest.param('kinematics', signal.SIGINT, marks=pytest.mark.nightly),
+    pytest.param('servo_inverse', signal.SIGTERM, marks=pytest.mark.nightly)])
 def test_a_signal_ends_a_node_quietly(harness, name, stop):
     process = harness.Process(name, ROOT / 'config' / 'all.yaml')
     first = process.line()
@@ -73,7 +73,7 @@ def test_a_program_that_a_node_ran_in_gets_its_signals_back(harness):
     assert handlers() == before and signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_more_signals_than_one_end_a_node_as_quietly(harness, name, stop):
@@ -87,7 +87,7 @@ def test_more_signals_than_one_end_a_node_as_quietly(harness, name, stop):
     assert (code, 'Traceback' in printed, 'rror' in printed) == (0, False, False), printed
 
 
-@pytest.mark.sample(1)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_what_python_does_at_its_end_holds_up_no_node(harness, tmp_path, name):
     """However it is started: much garbage takes seconds, and a second signal may come then."""
@@ -121,7 +121,7 @@ sys.meta_path.insert(0, Slow())
 """
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_a_signal_ends_what_is_still_being_imported(harness, tmp_path, name, stop):
@@ -133,7 +133,7 @@ def test_a_signal_ends_what_is_still_being_imported(harness, tmp_path, name, sto
     assert process.end() == (0, '')
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_a_thread_that_computes_does_not_hold_up_the_end(harness, name):
     done = subprocess.run([sys.executable, '-c', textwrap.dedent(f"""
@@ -178,7 +178,7 @@ def test_arguments_that_there_are_not_end_in_one_sentence(harness, capfd, name, 
     assert one_sentence(capfd.readouterr().err, said)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_so_they_do_as_a_process(harness):
     name, (arguments, said) = NODES[0], ARGUMENTS[0]
     done = subprocess.run([sys.executable, '-m', harness.module(name), *arguments], cwd=ROOT,
@@ -186,7 +186,7 @@ def test_so_they_do_as_a_process(harness):
     assert done.returncode == 1 and one_sentence(done.stdout + done.stderr, said)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_signal_while_a_message_is_published_is_no_failure(harness):
     # A process of its own: where the machine is busy, the signal may end it amid the callback.
     done = subprocess.run([sys.executable, '-c', textwrap.dedent("""
@@ -211,7 +211,7 @@ def test_a_signal_while_a_message_is_published_is_no_failure(harness):
     assert done.returncode == 0 and 'Traceback' not in done.stderr
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('name, text, named', [
     ('kinematics', 'mechanisms: [leg]', 'leg.type must be one of water_drop, '),
     ('kinematics', 'mechanisms: []', 'mechanisms must be'),
@@ -250,7 +250,7 @@ def without(module, code):
                           cwd=ROOT, capture_output=True, text=True, timeout=60)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_library_works_where_there_is_no_ros():
     done = without('rclpy', """
         from linkage_ros import scene

@@ -304,7 +304,7 @@ def choices(line):
         r'(--(?:pose|driven|hold) [^.].*?)(?:, or by |\.?\n| or (?=--)|; |$)', line)]
 
 
-@pytest.mark.parametrize('count', [1, pytest.param(12, marks=pytest.mark.slow)])
+@pytest.mark.parametrize('count', [1, pytest.param(12, marks=pytest.mark.nightly)])
 def test_all_legs_that_are_undecided_are_asked_in_one_run(capsys, tmp_path, count):
     file = tmp_path / 'legs.urdf'
     file.write_text(legs(count))
@@ -457,7 +457,7 @@ def test_what_cannot_move_is_said_to_be_so_without_motors_too(capsys, tmp_path):
     assert 'it cannot move, as its joints hold each other' in refused(capsys, file)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_twelve_legs_of_a_strandbeest_come_back_from_its_sdf(tmp_path, capsys):
     config, file = ROBOTS.parents[1] / 'config' / 'strandbeest.yaml', tmp_path / 'legs.sdf'
     assert robot_model(['--format', 'sdf', str(config)]) == 0

@@ -68,7 +68,7 @@ def test_a_motor_is_known_in_the_turns_of_its_gear():
 
 
 @pytest.mark.parametrize('ratio', [
-    ratio if ratio in QUICK else pytest.param(ratio, marks=pytest.mark.slow)
+    ratio if ratio in QUICK else pytest.param(ratio, marks=pytest.mark.nightly)
     for ratio in ('1/3', *RATIOS)])
 def test_a_pose_is_answered_in_the_turn_in_which_it_is(ratio):
     found, size = two(ratio), 1.0 + abs(motor(ratio).gear('crank2')[0])
@@ -98,7 +98,7 @@ def test_a_fast_gear_loses_no_answer(ratio):
     assert found == pytest.approx(expected, abs=1e-12)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('ratio', ['7', '60.5', '180', '1000', '1/80', '0.31'])
 def test_as_many_answers_as_brute_force_finds(ratio):
     found = two(ratio)
@@ -110,9 +110,9 @@ def test_as_many_answers_as_brute_force_finds(ratio):
     assert np.sum(inside & (gap[1:] * gap[:-1] <= 0.0)) == len(found.input_for('E.x', 8.0321))
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('ratio', [
-    '1/3', '0.31', '1/80', pytest.param('1000', marks=pytest.mark.slow), 'sqrt(2)', '0.12345'])
+    '1/3', '0.31', '1/80', pytest.param('1000', marks=pytest.mark.nightly), 'sqrt(2)', '0.12345'])
 def test_the_reach_is_where_it_can_be_assembled(ratio):
     found = limited(ratio)
     first, = found.inputs

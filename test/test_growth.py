@@ -88,7 +88,7 @@ def test_a_scene_with_any_history_is_what_its_values_read_anew_make(history):
         made = new or made
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_of_a_change_to_one_only_that_is_read_prepared_and_announced(graph, monkeypatch):
     pytest.importorskip('rclpy')
     from linkage_ros.nodes import kinematics, mechanism_topics, ownership

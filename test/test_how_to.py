@@ -148,7 +148,7 @@ def test_the_first_ten_minutes(follow):
     assert Path('walker.png').stat().st_size > 10_000
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(not shutil.which('cc'), reason='there is no C compiler')
 def test_the_gripper_of_the_tutorial(follow):
     pytest.importorskip('matplotlib')
@@ -212,7 +212,7 @@ def test_a_flap_is_put_where_a_planner_wants_it(reader, follow):
     assert controlled.count_subscribers('/planner/joint_trajectory') == 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_ankle_on_two_rods(graph, follow):
     states = graph.listen(JointState, 'joint_states', 100)
     assert 'ankle_joints_to_actuators' in follow('how-to/ankle')
@@ -232,7 +232,7 @@ def test_an_ankle_on_two_rods(graph, follow):
         assert back['left'] == pytest.approx(joints['motor_left'], abs=1e-12)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_an_ankle_in_a_training_loop(follow, capsys):
     pytest.importorskip('torch', reason='torch is not installed')
     follow('how-to/training')
@@ -270,7 +270,7 @@ def test_two_robots_of_one_kind(graph, follow):
         assert marked[side][0].markers[0].header.frame_id == f'{side}/base'
 
 
-@pytest.mark.sample(1)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('library', LIBRARIES)
 def test_robots_of_each_format(graph, follow, library):
     pytest.importorskip('mujoco')
@@ -312,7 +312,7 @@ def check_finger(graph):
         assert eye == pytest.approx(0.05 + 0.04j * cmath.exp(-1j * finger), abs=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_scene_of_a_whole_robot(follow):
     follow('how-to/whole-robot')
     shown = scene.load('robot.yaml')
@@ -351,7 +351,7 @@ def test_ros2_control_moves_the_motors_of_the_scene(graph, follow):
     assert state.position[state.name.index('knee')] == pytest.approx(0.9, abs=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_is_typed_without_the_ros2_command_line_works_as_written():
     code, = (text for _, language, text in BLOCK.findall((DOCS / 'install.md').read_text())
              if language == 'python' and 'rclpy' in text)

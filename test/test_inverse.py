@@ -12,7 +12,7 @@ from truth import exact_poses
 from truth.accuracy_rule import case_of, truth
 from truth.exact_poses import HELD
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.nightly
 
 KINDS = list(mechanisms.TYPES)
 # Those with a reference of their own, beside the one that draws every joint line.

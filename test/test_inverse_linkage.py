@@ -11,7 +11,6 @@ import pickle
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
-from sweeps import EXHAUSTIVE
 from truth import linkage_checks, random_linkages
 
 FIVE_BAR = """\
@@ -42,7 +41,7 @@ def test_the_joint_lines_of_an_inverse_are_printed():
         'the inverse of jansen for G.x is searched')
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('kind, outputs', [
     ('four_bar', {'crank', 'AB', 'QB'}), ('jansen', {'crank', 'BC', 'AC', 'BE', 'AE', 'EF', 'DF'}),
     ('klann', {'crank', 'AD', 'BD'}), ('watt', {'crank', 'AB', 'QB'}),
@@ -54,7 +53,7 @@ def test_joint_angles_and_slides_come_apart(kind, outputs):
     assert closed >= outputs
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('kind', [kind for kind in mechanisms.TYPES if kind != 'five_bar'])
 def test_an_assembly_mode_is_a_linkage_that_has_the_pose(kind):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(2)
@@ -116,8 +115,8 @@ def checked(linkage, inverse, poses, sure=1e-4):
 
 
 @pytest.mark.parametrize('seeds', [
-    pytest.param(range(12), marks=pytest.mark.slow),
-    pytest.param(range(12, 400), marks=EXHAUSTIVE)])
+    pytest.param(range(12), marks=pytest.mark.nightly),
+    pytest.param(range(12, 60), marks=pytest.mark.nightly)])
 def test_of_random_linkages_no_answer_is_missed_and_none_invented(seeds):
     closed = count = 0
     for _, linkage, rng in linkage_checks.assembled(seeds):
@@ -140,7 +139,7 @@ def test_of_random_linkages_no_answer_is_missed_and_none_invented(seeds):
     assert closed > len(seeds) / 3 and count > len(seeds)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_outputs_tell_two_inputs_in_closed_form():
     linkage, rng = mechanisms.create('five_bar'), np.random.default_rng(1)
     for outputs in (('P.x', 'P.y'), ('P.x', 'crank'), ('crank2', 'P.y')):
@@ -149,7 +148,7 @@ def test_two_outputs_tell_two_inputs_in_closed_form():
         assert checked(linkage, inverse, rng.uniform(-math.pi, math.pi, (40, 2)).tolist()) > 10
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_input_that_comes_round_after_two_turns_is_answered_in_both():
     linkage = custom('O ground 0 0', 'Q ground 4 0', 'A crank O 1',
                      'D crank Q 2 geared crank 1/2 0', 'B dyad A D 2.2 2 left')
@@ -216,7 +215,7 @@ def test_an_output_that_only_rounding_moves_has_no_answers():
     assert low <= high
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('kind', mechanisms.TYPES)
 def test_a_value_alone_has_the_answers_that_it_has_in_an_array(kind):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(8)
@@ -240,7 +239,7 @@ def test_a_value_alone_has_the_answers_that_it_has_in_an_array(kind):
                     *alone[0], *alone[1]], rtol=1e-10, atol=1e-13)
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('seed', range(16))
 def test_next_to_equal_bars_and_at_ends_no_answer_is_lost(seed):
     rng = np.random.default_rng(seed)
@@ -272,7 +271,7 @@ def test_the_order_of_the_outputs_does_not_matter():
         answer.inputs for answer in arm.inputs_for(('P.x', 'P.y'), place)]
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('outputs', [*permutations(('P.x', 'A.y', 'AP', 'angle(A,P)'), 2)])
 def test_any_two_outputs_that_determine_two_inputs_tell_them(outputs):
     lift, inputs = custom(
@@ -432,7 +431,7 @@ def test_a_jump_at_the_end_of_a_turn_is_not_passed(near):
     assert math.isnan(found)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('seed', range(10))
 def test_what_is_followed_has_the_value(seed):
     rng, count = np.random.default_rng(seed), 0

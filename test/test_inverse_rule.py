@@ -17,7 +17,7 @@ def counts(found, *kinds):
             if key[1] not in ('questions', 'duplicates') and key[0] in kinds}
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('kind', [kind for kind in mechanisms.TYPES if kind != 'five_bar'])
 def test_of_the_catalogue_nothing_is_lost_or_invented(kind):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(5)
@@ -30,7 +30,7 @@ def test_of_the_catalogue_nothing_is_lost_or_invented(kind):
 
 
 @pytest.mark.parametrize('seeds', [
-    range(2, 8), pytest.param(range(8, 60), marks=pytest.mark.long)])
+    range(2, 8), pytest.param(range(8, 60), marks=pytest.mark.nightly)])
 def test_of_random_linkages_no_ordinary_solution_is_lost_or_invented(seeds):
     asked = 0
     for seed, linkage, rng in linkage_checks.assembled(seeds):

@@ -83,7 +83,7 @@ def distance(leg, bar):
     return math.dist(leg[bar[0]], leg[bar[1]])
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('name', LENGTHS)
 def test_links_keep_their_lengths_at_every_angle(graph, name):
     bench = Bench(graph, name, joints=False)
@@ -94,7 +94,7 @@ def test_links_keep_their_lengths_at_every_angle(graph, name):
             assert distance(leg, bar) == pytest.approx(length, abs=1e-12 * longest, rel=0.0)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('name', LENGTHS)
 def test_markers_are_one_list_of_links_and_one_of_joints(graph, name):
     links, joints = Bench(graph, name).links_and_joints_at(0.3)
@@ -133,7 +133,7 @@ def test_cranks_plates_and_the_ground_are_markers_of_their_own(graph):
     assert (standing[:, 1:, 1] < standing[:, :1, 1]).all()
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('theta', [0.0, math.pi, -math.pi / 2, 2.5 * math.pi, 400.0, -7.0])
 def test_the_drops_joint_b_mirrors_o_in_line_ac(graph, theta):
     drop, = Bench(graph, 'water_drop').legs_at(theta)
@@ -203,7 +203,7 @@ def walk(links, frames, angles, turn, side, ground):
     return found
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('name', [*(name for name in mechanisms.TYPES if len(
     mechanisms.create(name).inputs) == 1), 'walker'])
 def test_joint_angles_along_the_tree_lead_to_the_joints(graph, name):

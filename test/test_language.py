@@ -232,7 +232,7 @@ def arithmetic(rng, depth):
 
 
 @pytest.mark.parametrize('count', [
-    10, pytest.param(40, marks=pytest.mark.slow), pytest.param(400, marks=pytest.mark.long)])
+    10, pytest.param(40, marks=pytest.mark.nightly), pytest.param(400, marks=pytest.mark.nightly)])
 def test_arithmetic_is_what_python_makes_of_the_same_letters(count):
     rng, tried = random.Random(5), 0
     known = {**LENGTHS, 'pi': math.pi, 'sqrt': math.sqrt, 'max': max}
@@ -503,10 +503,10 @@ def refused(ask, text) -> bool:
 
 
 @pytest.mark.filterwarnings('error')
-@pytest.mark.sample(6)
+@pytest.mark.nightly(all_but=6)
 @pytest.mark.parametrize('role, every', [
     *((role, 2 if role in PARSED else 10) for role in (*ROLES, *OUTPUTS)),
-    *(pytest.param(role, 1, marks=pytest.mark.long) for role in (*ROLES, *OUTPUTS))])
+    *(pytest.param(role, 1, marks=pytest.mark.nightly) for role in (*ROLES, *OUTPUTS))])
 def test_a_hostile_text_is_refused_in_a_short_sentence(role, every):
     texts = TEXTS[::every]
     assert len(texts) >= 1000 // every
@@ -523,14 +523,14 @@ def test_the_lines_that_are_mutated_are_legal(line):
 
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('count, seed', [
-    (400, 1), pytest.param(60000, 2, marks=pytest.mark.long),
-    pytest.param(60000, 3, marks=pytest.mark.long)])
+    (400, 1), pytest.param(60000, 2, marks=pytest.mark.nightly),
+    pytest.param(60000, 3, marks=pytest.mark.nightly)])
 def test_a_line_with_slips_is_refused_or_makes_a_linkage(count, seed):
     outcomes = [refused(made, text) for text in mutations(count, seed)]
     assert 0.5 < sum(outcomes) / count < 0.98
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_passes_is_only_what_is_documented():
     number = re.compile(r'[0-9.eE]+|[+*/(),-]|max|sqrt|pi|deg|[gmbc]')
     for text in mutations(300, 4):

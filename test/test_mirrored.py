@@ -86,14 +86,14 @@ def check_images(lines, inputs, **dimensions):
             (name[:-1], place) for name, place in places.items() if name.endswith('m')))
 
 
-@pytest.mark.sample(6)
+@pytest.mark.nightly(all_but=6)
 @pytest.mark.parametrize('name', CASES)
 def test_a_case_has_its_image_in_a_line_askew(name):
     check_images(CASES[name].joints, np.linspace(*CASES[name].path, 5).tolist(),
                  **CASES[name].numbers)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('zero', ['', ' up', ' zero Z'])
 @pytest.mark.parametrize('ground', ['0.6 0', '0 0.6', '-0.48 0.36', '0.36 -0.48', '-0.6 0'])
 @pytest.mark.parametrize('line', ['B dyad A Q 0.6 0.2 left', 'B dyad A Q 0.9 0.5 right',

@@ -265,6 +265,6 @@ def test_random_linkages_come_back_from_mjcf(tmp_path):
     check_is_read(tmp_path, [3, 18])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_more_random_linkages_come_back_from_mjcf(tmp_path):
     check_is_read(tmp_path, range(18))

@@ -95,7 +95,7 @@ def same(found, expected):
             assert np.array_equal(one[name], values, equal_nan=True), name
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('kind', CLASSES)
 def test_text_of_any_class_is_a_name_and_later_callers_are_not_harmed(kind):
     known, last = fresh()
@@ -154,7 +154,7 @@ def test_a_traceback_shows_generated_code():
     assert 'def pose(x0):' in inspect.getsource(linkage.function())
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_text_of_code_is_gone_with_the_code():
     linkage, _ = fresh()
     file = linkage.function().__code__.co_filename

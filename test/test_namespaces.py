@@ -78,7 +78,7 @@ def other_device(strict):
     return strict.Device('device1' if int(np.__version__[0]) > 1 else 'CPU_DEVICE')
 
 
-@pytest.mark.sample(5)
+@pytest.mark.nightly(all_but=5)
 @pytest.mark.parametrize('kind', KINDS)
 def test_the_standard_is_enough_and_gives_the_bits_of_numpy(kind, strict):
     given, device = inputs(kind, FEW), other_device(strict)
@@ -91,7 +91,7 @@ def test_the_standard_is_enough_and_gives_the_bits_of_numpy(kind, strict):
     assert np.array_equal(home, rows, equal_nan=True) and np.isfinite(rows).any()
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('kind', KINDS)
 def test_nothing_on_the_way_is_nan(kind):
     given = inputs(kind, FEW)
@@ -186,7 +186,7 @@ def test_the_inverse_chooses_as_the_library_does(kind, follows, strict):
     assert np.isfinite(rows).any()
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('kind', ['geared', *(
     kind for kind in mechanisms.TYPES if kind not in ('jansen', 'five_bar'))])
 def test_every_output_has_the_library_s_choice(kind):
@@ -295,7 +295,7 @@ def moving(kind):
     return joints, given, rates.reshape(len(given), len(joints), MANY).swapaxes(0, 1)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('kind', KINDS)
 def test_torch_has_the_values_and_the_rates(kind, torch):
     given = inputs(kind, MANY)
@@ -307,7 +307,7 @@ def test_torch_has_the_values_and_the_rates(kind, torch):
     check_slopes(slopes_of_torch(torch, function, given), rates)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('kind', KINDS)
 def test_jax_has_the_values_and_the_rates(kind, jax):
     given = inputs(kind, MANY)
@@ -342,7 +342,7 @@ def moved_by_rounding(kind, given, inverses):
     return inputs_.T, slopes
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('package', ['torch', 'jax'])
 @pytest.mark.parametrize('kind', INVERSES)
 def test_both_have_the_inverse_and_its_rates(kind, package, request):
@@ -370,7 +370,7 @@ def test_both_have_the_inverse_and_its_rates(kind, package, request):
     assert (off > room).any(axis=(1, 2)).mean() < (0.012 if n == 1 else 0.003)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_torch_compiles_and_exports(torch):
     given = [torch.tensor(x) for x in inputs('five_bar', FEW)]
     function = linkage('five_bar').function(*requested('five_bar'), xp=torch)
@@ -384,7 +384,7 @@ def test_torch_compiles_and_exports(torch):
         check_values('five_bar', [x.numpy() for x in each(*given)], [x.numpy() for x in given])
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_parameter_shared_with_poses_that_are_not_there_learns(torch):
     function = linkage('five_bar').function(('P',), xp=torch)
     one, other = (torch.tensor(x) for x in inputs('five_bar', FEW))

@@ -84,7 +84,7 @@ def one_by_one(linkage, thetas):
     return np.array([linkage.function()(*given) for given in np.atleast_2d(thetas).T.tolist()])
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('kind', TYPES)
 def test_every_bit_is_the_same(kind):
     linkage = mechanisms.create(kind)
@@ -100,7 +100,7 @@ def test_joints_are_solved_at_any_float(kind):
         assert np.array_equal([*linkage.solve(theta).values()], places, equal_nan=True)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('kind', ['jansen', 'klann'])
 def test_so_it_is_for_the_legs_of_a_walker(kind, monkeypatch, code):
     design = mechanisms.design(kind)
@@ -178,7 +178,7 @@ def test_an_llvmlite_that_is_too_old_is_named(monkeypatch):
         importlib.reload(native)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('legs', [1, 2])
 def test_a_single_leg_is_solved_without_llvmlite_in_memory(legs):
     done = subprocess.run([sys.executable, '-c', f"""

@@ -15,7 +15,7 @@ CONFIG = Path(__file__).parents[1] / 'config'
 TURN = (-math.pi, math.pi)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('type_, joint, arcs', [
     ('jansen', 'G', [TURN]), ('jansen', 'C', [(0.5, 2.0)]), ('slotted_lever', 'L', [TURN]),
     ('peaucellier', 'C', None), ('water_drop', 'P', [(-1.0, 0.25)])])

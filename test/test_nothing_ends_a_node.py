@@ -31,7 +31,6 @@ from rclpy.publisher import Publisher  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from ros_harness import DEADLINE, Graph, Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
-from sweeps import EXHAUSTIVE
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
@@ -87,7 +86,7 @@ def test_after_a_slip_the_next_crank_message_is_answered(graph, slips, log, topi
     logged_once(graph, node, log, 'crank_states')
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('topic', ['m/locus', 'm/robot_description', 'robot_description',
                                    'scene_parameters'])
 def test_after_a_slip_of_the_worker_messages_are_answered(graph, slips, log, topic):
@@ -251,14 +250,14 @@ def many(tmp_path):
     return path
 
 
-@pytest.mark.sample(0)
+@pytest.mark.nightly(all_but=0)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('publishers', [
-    0, pytest.param(100, marks=EXHAUSTIVE), pytest.param(1500, marks=EXHAUSTIVE)])
+    0, pytest.param(100, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize('name', [
-    'kinematics', pytest.param('crank_driver', marks=EXHAUSTIVE),
-    pytest.param('servo_inverse', marks=EXHAUSTIVE),
-    pytest.param('scene', marks=EXHAUSTIVE)])
+    'kinematics', pytest.param('crank_driver', marks=pytest.mark.nightly),
+    pytest.param('servo_inverse', marks=pytest.mark.nightly),
+    pytest.param('scene', marks=pytest.mark.nightly)])
 def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name, publishers,
                                                           number):
     process = Process(name, many)
@@ -277,10 +276,10 @@ def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name,
             ends_quietly(process, number)
 
 
-@pytest.mark.sample(0)
+@pytest.mark.nightly(all_but=0)
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('name', [
-    'servo_inverse', pytest.param('scene', marks=EXHAUSTIVE)])
+    'servo_inverse', pytest.param('scene', marks=pytest.mark.nightly)])
 def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
     path = tmp_path / 'scene.yaml'
     path.write_text('/**:\n  ros__parameters:\n    mechanisms: [m]\n    m.type: five_bar\n')
@@ -306,7 +305,7 @@ def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
         ends_quietly(process, number)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('number', SIGNALS)
 def test_a_signal_ends_a_node_that_compiles(processes, number):
     # Only the legs of a walker are compiled.
@@ -334,7 +333,7 @@ node.set_parameters([Parameter('jansen.scale', value=2.0)])
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_script_ends_that_leaves_a_changed_scene_to_a_node_that_no_longer_spins():
     with Graph() as graph:
         subprocess.run([sys.executable, '-c', SCRIPT], timeout=DEADLINE, check=True, env={

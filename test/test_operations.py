@@ -155,7 +155,7 @@ def test_there_is_a_truth_for_each():
     assert all(name == row.name for name, row in OPERATIONS.items())
 
 
-@pytest.mark.sample(45)
+@pytest.mark.nightly(all_but=45)
 @pytest.mark.parametrize('back_end, column', [
     (by_floats, 0), (by_dimensions, 1), (by_arrays, 1), (by_loop, 0), (by_lanes, 2)],
     ids=lambda x: getattr(x, '__name__', ''))

@@ -141,7 +141,7 @@ def path(folder):
     return {'PYTHONPATH': os.pathsep.join([str(folder), os.environ.get('PYTHONPATH', '')])}
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('way', WAYS)
 @pytest.mark.parametrize('name', ['kinematics', 'scene'])
 def test_a_node_moves_without_machine_code_and_says_why_once(harness, tmp_path, name, way):
@@ -176,7 +176,7 @@ def test_a_node_moves_without_machine_code_and_says_why_once(harness, tmp_path, 
     assert len(said) == 1 and f'[{level}]' in said[0] and optional.INSTALL['llvmlite'] in said[0]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('as_module', [False, True])
 @pytest.mark.parametrize('way', ['missing', 'OSError', 'empty'])
 @pytest.mark.parametrize('package, name', [
@@ -192,7 +192,7 @@ def test_a_node_that_cannot_do_without_ends_in_one_sentence(
     assert len(said) == 1 and said[0].endswith(optional.INSTALL[package])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('name', ['crank_driver', 'kinematics'])
 def test_other_nodes_start_without_the_interfaces(harness, tmp_path, name):
     write(tmp_path, 'linkage_interfaces', 'missing')
@@ -202,7 +202,7 @@ def test_other_nodes_start_without_the_interfaces(harness, tmp_path, name):
     assert process.end()[0] == 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('package', ['matplotlib', 'mujoco'])
 def test_so_it_is_for_a_command_as_a_process(tmp_path, package):
     write(tmp_path, package, 'OSError')

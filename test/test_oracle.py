@@ -16,15 +16,14 @@ pytest.importorskip('rclpy')
 
 from oracle import Bench, everything, history, message, Mismatch, SCENES  # noqa: E402
 from ros_harness import Graph  # noqa: E402
-from sweeps import EXHAUSTIVE
 
 # Of each scene, with machine code and without: 26 histories in all, 286 and 10 000.
 SEEDS = [pytest.param(range(1), id='few'),
-         pytest.param(range(1, 12), id='some', marks=pytest.mark.slow),
-         pytest.param(range(12, 391), id='many', marks=EXHAUSTIVE)]
+         pytest.param(range(1, 12), id='some', marks=pytest.mark.nightly),
+         pytest.param(range(12, 60), id='many', marks=pytest.mark.nightly)]
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('name', SCENES)
 @pytest.mark.parametrize('seeds', SEEDS)
 def test_whatever_happens_the_node_publishes_what_the_library_says(name, seeds):
@@ -81,7 +80,7 @@ PAIR = {'mechanisms': ['a', 'b'], 'a.type': 'jansen', 'b.type': 'peaucellier'}
 END = 2.0 * math.acos(5.0 / 6.0)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('by', [
     message({'a_crank': 0.3}, [math.nan]), message({'a_crank': 0.3}, [math.inf]),
     message({'a_crank': 0.3}, [1e308]), message({'b_crank': END}, [1.0])],
@@ -109,7 +108,7 @@ def test_what_a_sensor_cannot_say_is_no_pose(graph, bad):
     assert bench.model.states['a'].values == [pytest.approx(0.54, abs=0.1)]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('seed', range(5))
 def test_what_leaves_its_reach_leaves_the_picture(graph, seed):
     parameters = {'mechanisms': ['b'], 'b.type': 'peaucellier'}
@@ -130,7 +129,7 @@ def test_the_reach_is_the_same_in_any_turn(graph, turn):
         *(message({'b_crank': angle}) for angle in angles)])
 
 
-@pytest.mark.sample(1)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('name', ['an excavator', 'a reach that ends',
                                   'more legs than are solved one by one'])
 def test_numbers_are_the_same_at_the_ends_of_the_reach_and_in_many_legs(graph, name):
@@ -151,17 +150,15 @@ REPLACED = {'missing': ('sitecustomize.py', "import sys\nsys.modules['llvmlite']
             'broken': ('llvmlite.py', "raise OSError('libllvmlite.so cannot be loaded')\n")}
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.skipif(WITHOUT in os.environ, reason='this is without')
 @pytest.mark.parametrize('replaced', REPLACED)
-@pytest.mark.parametrize('which', [
-    'not exhaustive', pytest.param('exhaustive', marks=pytest.mark.exhaustive)])
-def test_all_this_holds_without_llvmlite(tmp_path, which, replaced):
+def test_all_this_holds_without_llvmlite(tmp_path, replaced):
     name, text = REPLACED[replaced]
     (tmp_path / name).write_text(text)
     paths = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
     done = subprocess.run(
-        [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider', '-m', which,
+        [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider',
          '-W', 'ignore:no machine code', __file__],
         env={**os.environ, 'PYTHONPATH': paths, WITHOUT: '1'}, cwd=Path(__file__).parents[1],
         capture_output=True, text=True)

@@ -66,7 +66,7 @@ def test_what_is_no_output_is_refused_by_its_name(name):
 
 # --- following a measured value ---
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('type_, output', [
     ('four_bar', 'QB'), ('jansen', 'BC'), ('jansen', 'EF'), ('slotted_lever', 'lever'),
     ('water_drop', 'distance(A,C)'), ('jansen', 'angle(A,G)'), ('slider_crank', 'block')])
@@ -189,11 +189,11 @@ def followed(seeds):
     return count
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_outputs_of_random_linkages_are_followed_all_through_the_reach():
     assert followed(range(8)) > 1000
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_outputs_of_many_random_linkages_are_followed_all_through_the_reach():
     assert followed(range(100, 200)) > 10000

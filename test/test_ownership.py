@@ -290,7 +290,7 @@ def test_what_a_follower_refused_is_followed_with_the_value_that_it_waits_for(gr
     assert (of(service, e), of(service, b)) == (700.0, 170.0)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_second_node_of_the_same_name_is_noticed_once(graph, warned):
     graph.start(CrankDriver, LEVER)
     graph.start(CrankDriver, LEVER, namespace='other')
@@ -302,7 +302,7 @@ def test_a_second_node_of_the_same_name_is_noticed_once(graph, warned):
     assert all('there is another node /crank_driver' in text for text in warned)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_an_owner_that_was_killed_comes_back_with_its_file_and_is_followed(tmp_path):
     path = tmp_path / 'scene.yaml'
     path.write_text('/**:\n  ros__parameters:\n    mechanisms: [lever]\n'

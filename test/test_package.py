@@ -92,11 +92,13 @@ def test_the_workflow_runs_what_has_to_be_green():
     workflow = (ROOT / '.github/workflows/ci.yml').read_text()
     jobs = yaml.safe_load(workflow)['jobs']
     steps = [step['run'] for job in jobs.values() for step in job['steps'] if 'run' in step]
-    # Its alone: the nodes without llvmlite, the demo, and linters that are no Python packages.
-    assert jobs['namespaces']['if'] == "github.event_name == 'schedule'"
+    # Its alone: the nodes without llvmlite, the nightly tests, the demo, and linters that are no
+    # Python packages.
+    for job in ('namespaces', 'nightly'):
+        assert jobs[job]['if'] == "github.event_name == 'schedule'"
     assert set().union(*map(made, steps)) == made(without_comments(
-        (ROOT / '.ci/run').read_text())) | {'ready', 'nodes', 'demo', 'ctidy'}
-    for job in ('test', 'long'):
+        (ROOT / '.ci/run').read_text())) | {'ready', 'nodes', 'nightly', 'demo', 'ctidy'}
+    for job in ('test', 'nightly'):
         assert set(jobs[job]['strategy']['matrix']['distro']) == {
             file.stem for file in (ROOT / 'wheels').glob('*.txt')
             if 'ros-rclpy' in file.read_text()}
@@ -153,7 +155,7 @@ def test_all_that_make_installs_is_locked_with_hashes():
             for version in versions} <= locked
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('slip, complaint', [
     ('', ''), ('another', 'has another hash'), (None, 'Hashes are required')])
 def test_what_has_another_hash_or_none_is_not_installed(tmp_path, slip, complaint):
@@ -225,7 +227,7 @@ def copy(tmp_path):
     return folder
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_wheel_has_the_library_and_the_page_and_no_commands(copy, tmp_path):
     subprocess.run([sys.executable, '-m', 'pip', 'wheel', '-q', '--no-build-isolation',
                     '--no-deps', '-w', tmp_path, copy], check=True, timeout=120)
@@ -239,7 +241,7 @@ def test_a_wheel_has_the_library_and_the_page_and_no_commands(copy, tmp_path):
     assert not any(name.endswith('entry_points.txt') or 'scripts/' in name for name in names)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.skipif(not shutil.which('colcon'), reason='colcon is not installed')
 @pytest.mark.parametrize('layout', [
     '', '--merge-install', '--symlink-install',
@@ -309,11 +311,11 @@ def wrapped(folder, *lines):
 OLD = 'case "$*" in *version_info*) exit 1;; -V) echo Python 3.9.18; exit;; esac'
 
 
-@pytest.mark.sample(1)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
 @pytest.mark.parametrize('target', [
     'lint', 'docs', 'build',
-    *(pytest.param(target, marks=pytest.mark.long)
+    *(pytest.param(target, marks=pytest.mark.nightly)
       for target in ('pictures', 'demo', 'test', 'bench'))])
 def test_each_target_says_in_one_line_that_python_is_too_old(copy, tmp_path, target):
     python = wrapped(tmp_path, OLD)
@@ -330,7 +332,7 @@ def only_line(command, folder, environment):
     return said
 
 
-@pytest.mark.sample(1)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
 @pytest.mark.parametrize('lines, settings, complaint', [
     ([], {'PYTHON': 'nowhere'}, 'PYTHON=nowhere is no command'),
@@ -339,7 +341,7 @@ def only_line(command, folder, environment):
     ([], {'CXX': 'nowhere'}, 'The compiler nowhere is missing: install gcc and g++'),
     (['case "$*" in *Python.h*) exit 1; esac'], {}, 'lacks its headers: install python3-dev'),
     pytest.param([], {'PIP_INDEX_URL': 'http://127.0.0.1:9'},
-                 'The Python package index cannot be reached', marks=pytest.mark.long)])
+                 'The Python package index cannot be reached', marks=pytest.mark.nightly)])
 def test_the_build_says_in_one_line_what_is_missing(copy, tmp_path, lines, settings, complaint):
     usual = {'PYTHON': wrapped(tmp_path, *lines), 'PATH': os.environ['PATH'],
              'PIP_CONFIG_FILE': os.devnull, 'PIP_RETRIES': '1'}
@@ -354,7 +356,7 @@ def test_the_build_says_in_one_line_that_there_is_no_python(copy, tmp_path):
     assert 'No Python from 3.10 to 3.14 was found' in said
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
 def test_clean_leaves_what_git_keeps(copy):
     before = sorted(copy.rglob('*'))

@@ -63,7 +63,7 @@ def look(show, tmp_path):
 
 # --- the picture and the view ---
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_the_picture_moves_and_a_click_stops_it(look):
     running, seen = look({**LEVER, 'drop.crank.speed': 0.0, 'lever.crank.speed': 3.0}, 'lever')
     until(lambda: len(coloured(seen.canvas(), *BLUE)) > 1000)
@@ -74,7 +74,7 @@ def test_the_picture_moves_and_a_click_stops_it(look):
     until(seen.is_still)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_picture_of_what_is_far_off_is_drawn_and_left(look):
     # Its locus is as large as these markers.
     running, seen = look({**LEG, 'leg.scale': 0.01}, kinds=(Kinematics,))
@@ -93,7 +93,7 @@ def test_a_picture_of_what_is_far_off_is_drawn_and_left(look):
             until(is_drawn)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_the_picture_is_zoomed_shifted_and_turned_by_keys_and_mouse(look):
     _, seen = look({**STILL_LEVER, 'lever.crank.start': 1.0}, 'lever')
 
@@ -125,7 +125,7 @@ def test_the_picture_is_zoomed_shifted_and_turned_by_keys_and_mouse(look):
     assert seen.value('document.getElementById("whole").hidden')
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_picture_that_cannot_be_drawn_does_not_keep_the_next_one_from_being_drawn(look):
     _, seen = look(LEVER)
     seen.value("""(() => {
@@ -143,7 +143,7 @@ def test_a_picture_that_cannot_be_drawn_does_not_keep_the_next_one_from_being_dr
     seen.complaints.clear()
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_linkage_in_space_is_drawn_whole_and_says_what_the_page_does_not(look, tmp_path):
     _, seen = look({**example('ankle'), 'rate': 20.0})
 
@@ -170,7 +170,7 @@ def test_a_linkage_in_space_is_drawn_whole_and_says_what_the_page_does_not(look,
 
 # --- tuning ---
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_slider_sets_the_nodes_and_a_refusal_springs_back_and_is_forgotten(look):
     running, seen = look(LEVER, 'lever')
 
@@ -201,7 +201,7 @@ def test_a_slider_sets_the_nodes_and_a_refusal_springs_back_and_is_forgotten(loo
         until(lambda: seen.reason('lever', 'b') == '')
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_what_was_mistyped_is_said_though_an_earlier_number_is_granted_later(look):
     running, seen = look(LEVER, 'lever')
     field = f'{seen.row("lever", "a")}.querySelector("input[type=text]")'
@@ -214,7 +214,7 @@ def test_what_was_mistyped_is_said_though_an_earlier_number_is_granted_later(loo
     assert seen.reason('lever', 'a').startswith("Refused: '8x' is not a number")
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_number_can_be_written_with_a_point_or_a_comma(look):
     running, seen = look(LEVER, 'lever')
     for text, value in (('80,5', 80.5), ('81.25', 81.25), (',5e2', 50.0), ('2*(40+5)', 90.0)):
@@ -246,7 +246,7 @@ def test_a_number_can_be_written_with_a_point_or_a_comma(look):
     until(lambda: running.value('lever.dimensions.a') == 91.0)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_bar_and_its_slider_light_up_and_changes_are_undone_and_saved(look, tmp_path):
     running, seen = look(LEG)
 
@@ -289,7 +289,7 @@ def test_a_bar_and_its_slider_light_up_and_changes_are_undone_and_saved(look, tm
 
 # --- dragging ---
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_second_finger_neither_moves_the_joint_of_the_first_nor_takes_one(look):
     running, seen = look(STILL_LEVER, 'lever')
 
@@ -321,7 +321,7 @@ def test_a_second_finger_neither_moves_the_joint_of_the_first_nor_takes_one(look
     assert crank() == before
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_what_is_refused_is_said_where_one_looks_and_leaves_the_picture_free(look):
     running, seen = look(
         {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}, kinds=(Kinematics,))
@@ -347,7 +347,7 @@ def test_what_is_refused_is_said_where_one_looks_and_leaves_the_picture_free(loo
     until(lambda: reason() == "Refused: 'foo' is not a number: foo is unknown")
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_click_on_a_bar_goes_to_its_slider_and_a_drag_from_it_does_not(look):
     _, seen = look(STILL_LEVER, 'lever')
     tip, pivot = seen.upright_lever()
@@ -364,7 +364,7 @@ def test_a_click_on_a_bar_goes_to_its_slider_and_a_drag_from_it_does_not(look):
     until(is_there)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_joint_follows_the_mouse_and_stops_at_its_reach(look):
     running, seen = look(STILL_LEVER, 'lever')
     tip, pivot = seen.upright_lever()
@@ -386,7 +386,7 @@ def test_a_joint_follows_the_mouse_and_stops_at_its_reach(look):
     assert running.value('lever.crank.speed') == 0.0
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_an_input_is_moved_with_the_keys_by_steps_and_in_degrees(look):
     running, seen = look({**LEVER, 'lever.crank.speed': 1.5}, 'lever')
 
@@ -418,7 +418,7 @@ def test_an_input_is_moved_with_the_keys_by_steps_and_in_degrees(look):
 
 # --- plots, arrows, files ---
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_plot_follows_what_is_tuned_and_all_can_be_downloaded(look, tmp_path):
     given = {**LEG, 'leg.scale': 0.01, 'leg.leg_pairs': 2, 'leg.crank.speed': -2.0}
     running, seen = look(given)
@@ -476,7 +476,7 @@ def test_a_plot_follows_what_is_tuned_and_all_can_be_downloaded(look, tmp_path):
     assert (tmp_path / 'leg.h').read_text() == header.written(machine)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_plot_is_not_drawn_through_a_pole_and_fits_any_window(look):
     _, seen = look(LEG)
     section = seen.section('leg')
@@ -506,7 +506,7 @@ def test_a_plot_is_not_drawn_through_a_pole_and_fits_any_window(look):
         assert seen.value('document.fullscreenElement.scrollWidth') <= width
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_arrows_are_asked_for_wherever_their_mechanism_s_part_of_the_panel_is(look):
     _, seen = look(LEVER)
     seen.resize(1200, 200, 'light')
@@ -526,7 +526,7 @@ def test_arrows_are_asked_for_wherever_their_mechanism_s_part_of_the_panel_is(lo
 
 # --- connection ---
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_reload_and_another_viewer_keep_what_is_seen_and_a_lost_connection_is_said(look):
     running, seen = look({**LEVER, 'drop.scale': 0.1}, 'drop')
     url, play = running.url, f'{seen.section("drop")}.querySelector("button")'
@@ -563,7 +563,7 @@ def test_a_reload_and_another_viewer_keep_what_is_seen_and_a_lost_connection_is_
     seen.complaints.clear()
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_phone_may_reload_the_page_as_often_as_it_likes(look):
     running, seen = look({**example('all'), 'rate': 20.0})
     seen.resize(390, 844, 'light')
@@ -575,7 +575,7 @@ def test_a_phone_may_reload_the_page_as_often_as_it_likes(look):
 
 # --- layout ---
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_mechanisms_are_in_their_natural_order_and_those_of_one_name_told_apart(graph, look):
     for space in ('left', 'right'):
         for kind in (CrankDriver, Kinematics):
@@ -599,7 +599,7 @@ def test_mechanisms_are_in_their_natural_order_and_those_of_one_name_told_apart(
     seen.becomes(f'{titles} === "all,{shown},{shown}"')
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('path', sorted((ROOT / 'config').glob('*.yaml')), ids=lambda p: p.stem)
 def test_the_page_is_for_everybody(look, path):
     checker = pytest.importorskip('axe_core_python')
@@ -629,7 +629,7 @@ LONG = {'mechanisms': ['m' * 64], **{f'{"m" * 64}.{name}': value for name, value
 }.items()}}
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('scale', [1e-6, 1.0, 1e6])
 def test_nothing_is_cut_in_a_narrow_window_however_long(look, scale):
     name, = LONG['mechanisms']
@@ -655,7 +655,7 @@ def blank(lever, tmp_path_factory):
         yield page
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_number_has_room_in_its_field_and_all_the_digits_that_have(blank):
     values = [sign * value * 10.0 ** power for sign in (1.0, -1.0)
               for value in (1.0, 1.234567891, 9.99999999) for power in range(-300, 300)]
@@ -692,7 +692,7 @@ import('/picture.js').then(({ Picture }) => {
 })"""
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('width, height, fewest', [(1e5, 1e5, 16), (390, 380, 0)])
 def test_titles_are_written_beside_or_below_each_other_wherever_they_are(
         blank, width, height, fewest):
@@ -734,7 +734,7 @@ import('/picture.js').then(({ Picture }) => {
 })"""
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_names_of_joints_are_whole_apart_and_beside_their_own(blank):
     for joints, written in blank.value(NAMES):
         x, y, width = np.transpose(written)

@@ -142,7 +142,7 @@ def check(path, text):
     return True
 
 
-@pytest.mark.sample(12)
+@pytest.mark.nightly(all_but=12)
 @pytest.mark.parametrize('value', VALUES)
 def test_a_value_is_the_same_to_the_library_and_to_a_node(ros, tmp_path, value):
     accepted = check(tmp_path / 'file.yaml',
@@ -150,7 +150,7 @@ def test_a_value_is_the_same_to_the_library_and_to_a_node(ros, tmp_path, value):
     assert accepted == (value not in REFUSED)
 
 
-@pytest.mark.parametrize('first', [0, *(pytest.param(n, marks=pytest.mark.long)
+@pytest.mark.parametrize('first', [0, *(pytest.param(n, marks=pytest.mark.nightly)
                                         for n in range(100, 1200, 100))])
 def test_odd_files_are_the_same_to_the_library_and_to_a_node(ros, tmp_path, first):
     for seed in range(first, first + 100):
@@ -158,7 +158,7 @@ def test_odd_files_are_the_same_to_the_library_and_to_a_node(ros, tmp_path, firs
 
 
 @pytest.mark.parametrize('first', [0, *(
-    pytest.param(first, marks=pytest.mark.slow) for first in range(25, 200, 25))])
+    pytest.param(first, marks=pytest.mark.nightly) for first in range(25, 200, 25))])
 def test_ordinary_files_are_accepted_and_the_same(ros, tmp_path, first):
     for seed in range(first, first + 25):
         assert check(tmp_path / 'file.yaml', ordinary(np.random.default_rng(seed)))

@@ -122,7 +122,7 @@ def refuse_all(graph, kind, names):
     return len(names) * len(hostile)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('kind, least', [(CrankDriver, 40), (Kinematics, 150)])
 def test_no_value_of_any_kind_ends_a_node_or_spoils_a_parameter(graph, kind, least):
     def one_of_each(fields):
@@ -133,7 +133,7 @@ def test_no_value_of_any_kind_ends_a_node_or_spoils_a_parameter(graph, kind, lea
     assert refuse_all(graph, kind, one_of_each) > least
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('kind, least', [(CrankDriver, 80), (Kinematics, 1000)])
 def test_no_value_of_any_kind_spoils_any_parameter(graph, kind, least):
     assert refuse_all(graph, kind, list) > least

@@ -53,7 +53,7 @@ def answers(linkage):
     return b''.join(map(bits, values))
 
 
-@pytest.mark.sample(15)
+@pytest.mark.nightly(all_but=15)
 @pytest.mark.parametrize('way', WAYS)
 @pytest.mark.parametrize('name', LINKAGES)
 def test_a_copy_answers_the_same(name, way):
@@ -84,7 +84,7 @@ def test_a_copy_of_an_accelerated_one_is_accelerated():
                           quick.solve(theta)['G'])
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('file', sorted(CONFIG.glob('*.yaml')), ids=lambda file: file.stem)
 def test_scenes_and_what_is_in_them_can_be_sent(file):
     sent = scene.load(str(file))
@@ -96,7 +96,7 @@ def test_scenes_and_what_is_in_them_can_be_sent(file):
             assert (other.inputs, other.joints) == (machine.inputs, machine.joints)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_processes_that_share_nothing_answer_the_same():
     linkages = list(LINKAGES.values())
     with get_context('spawn').Pool(1) as pool:

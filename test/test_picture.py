@@ -132,9 +132,9 @@ def test_nothing_is_left_of_a_node_that_is_destroyed(graph):
     graph.until(lambda: not picture())
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('stop', [
-    signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
+    signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.nightly)])
 def test_nothing_is_left_of_a_process_that_is_told_to_end(tmp_path, stop):
     path = tmp_path / 'scene.yaml'
     path.write_text('/**:\n  ros__parameters:\n    mechanisms: [jansen]\n')
@@ -182,7 +182,7 @@ UNPUBLISHABLE = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('given, bad, named', UNPUBLISHABLE.values(), ids=UNPUBLISHABLE)
 def test_what_cannot_be_published_is_refused_and_what_was_there_goes_on(graph, given, bad, named):
     node = graph.start(Kinematics, {'mechanisms': ['jansen'], **given})

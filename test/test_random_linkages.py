@@ -59,13 +59,13 @@ def all_of_them(seed):
 
 
 @pytest.mark.parametrize('seeds', [
-    range(4), pytest.param(range(4, 10), marks=pytest.mark.slow)])
+    range(4), pytest.param(range(4, 10), marks=pytest.mark.nightly)])
 def test_random_linkages_hold(seeds):
     found = problems(seeds, a_few)
     assert not found, report(found)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('batch', range(LONG // BATCH))
 def test_a_thousand_random_linkages_hold(batch):
     first = 1000 + batch * BATCH
@@ -73,7 +73,7 @@ def test_a_thousand_random_linkages_hold(batch):
     assert not found, report(found)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('word', [*random_linkages.INPUTS, *random_linkages.WORDS])
 def test_linkages_of_each_word_hold(word):
     def has_word(seed):
@@ -136,7 +136,7 @@ def test_reach_and_dead_points_that_were_missed_once(seed):
 
 # --- that the check is a check ------------------------------------------------------------------
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_word_comes_up_and_a_third_is_degenerate():
     words, refused, count = Counter(), 0, 300
     for seed in range(count):

@@ -31,7 +31,7 @@ def told(mechanism, *more):
 
 @pytest.mark.parametrize('kind, count', [
     ('water_drop', 5), ('jansen', 10), ('peaucellier', 60), ('slotted_lever', 60),
-    *(pytest.param(kind, 300, marks=pytest.mark.long)
+    *(pytest.param(kind, 300, marks=pytest.mark.nightly)
       for kind in ('peaucellier', 'slotted_lever'))])
 def test_the_reach_is_what_brute_force_finds(kind, count):
     theta = np.linspace(-math.pi, math.pi, 1441)
@@ -44,7 +44,7 @@ def test_the_reach_is_what_brute_force_finds(kind, count):
 
 @pytest.mark.parametrize('kind, count', [
     ('water_drop', 5), ('jansen', 10), ('peaucellier', 40), ('slotted_lever', 40),
-    *(pytest.param(kind, 200, marks=pytest.mark.long)
+    *(pytest.param(kind, 200, marks=pytest.mark.nightly)
       for kind in ('peaucellier', 'slotted_lever'))])
 def test_a_pose_exists_exactly_inside_the_reach(kind, count):
     for mechanism in drawn(kind, 2, count):
@@ -60,7 +60,7 @@ def test_a_pose_exists_exactly_inside_the_reach(kind, count):
         assert (placed == held).all(), told(mechanism, theta[placed != held])
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('kind, count', [
     ('jansen', 25), ('peaucellier', 60), ('slotted_lever', 100)])
 def test_every_end_of_the_reach_is_a_limit_to_the_last_digits(kind, count):
@@ -109,8 +109,8 @@ def test_the_inversor_of_the_original_document_ends_at_its_published_angle():
     assert hi == -lo == pytest.approx(2 * math.acos(5 / 6), rel=1e-15)
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize('count', [25, pytest.param(300, marks=pytest.mark.long)])
+@pytest.mark.nightly(all_but=1)
+@pytest.mark.parametrize('count', [25, pytest.param(300, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize('half', [1, -1])
 def test_the_lever_reach_is_what_brute_force_finds(half, count):
     lever = np.linspace(-math.pi, math.pi, 1441)

@@ -80,7 +80,7 @@ def read(reader, text):
     return sender.routes, sender.read(text)
 
 
-@pytest.mark.sample(6)
+@pytest.mark.nightly(all_but=6)
 @pytest.mark.parametrize('names', [[], ['a'], ['a', 'bc'], ['leg_crank'] * 7])
 @pytest.mark.parametrize('velocities', [True, False])
 @pytest.mark.parametrize('effort', [True, False])
@@ -279,7 +279,7 @@ SEEDS = {
 }
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('seed', SEEDS)
 def test_mutated_messages_read_as_they_do_when_they_are_deserialised(reader, seed):
     random = np.random.default_rng(len(seed))

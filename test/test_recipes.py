@@ -59,7 +59,7 @@ def run(folder, command):
     return ended.stdout
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('title', ['A mechanism', 'A construction'])
 def test_a_recipe_can_be_followed_to_the_letter(tmp_path, title):
     copy = shutil.copytree(ROOT, tmp_path / 'copy', ignore=lambda _, names: [

@@ -62,7 +62,7 @@ def rows_of(file):
                 for row in csv.DictReader(lines)]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('row', TABLE, ids=[Path(row[2]).name for row in TABLE])
 def test_every_picture_of_the_table_is_drawn(row, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
@@ -74,7 +74,7 @@ def test_every_picture_of_the_table_is_drawn(row, tmp_path, monkeypatch):
         assert getattr(image, 'n_frames', 1) == (3 if few else 1)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('ending, args', [
     ('png', []), ('svg', []), ('gif', ['--frames', '4', '--trace', 'fading'])])
 def test_the_same_request_gives_the_same_bytes(tmp_path, ending, args):
@@ -141,7 +141,7 @@ def test_a_turn_is_drawn_in_the_time_it_takes(tmp_path):
     assert np.allclose(np.remainder(2.0 * np.array(times), math.tau), cranks, atol=1e-12)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_the_data_are_the_joints_as_solved_to_the_last_digit(tmp_path):
     data = tmp_path / 'joints.csv'
     rendered(tmp_path, '--frames', '4', '--size', '99x99', '--hide', 'axes,title',
@@ -170,7 +170,7 @@ def test_the_bars_in_the_data_are_as_long_as_in_the_original_document(tmp_path):
         assert math.dist(*ends) == pytest.approx(length, rel=1e-13)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('type_', list(mechanisms.TYPES))
 def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
     one = machine(type_)
@@ -185,7 +185,7 @@ def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
     assert np.all(pixels < (box.x1 - 15, box.y1 - 15))
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('args', [[], ['--show', 'dimensions'], ['--size', '600x460']])
 @pytest.mark.parametrize('config', ['all', 'slotted_lever', 'peaucellier', 'jansen'])
 def test_nothing_reaches_over_the_edge_of_a_picture(tmp_path, config, args):
@@ -195,7 +195,7 @@ def test_nothing_reaches_over_the_edge_of_a_picture(tmp_path, config, args):
     assert all((edge == 255).all() for edge in edges)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('type_, options', [
     ('slotted_lever', {}), ('jansen', {'leg_pairs': 2}), ('peaucellier', {})])
 def test_an_animation_shows_what_a_still_of_that_time_shows(tmp_path, type_, options):
@@ -269,7 +269,7 @@ def test_a_foot_stands_on_the_lowest_part_of_its_curve():
     assert np.hypot(*np.diff(standing, axis=0).T).max() < 2.0  # one piece
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_cylinder_is_drawn_from_base_to_rod_and_a_scribble_is_not():
     arm = scene.load(CONFIG / 'excavator.yaml').machines['excavator']
     picture = picture_of(arm)
@@ -363,7 +363,7 @@ def test_angles_and_ratio_of_a_slotted_lever_are_printed():
     assert texts_of(picture)[1:] == ['φ = 0.0°', 'φ/θ = –', f'dφ/dθ = {80 / 230:.3f}']
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('trace', TRACES)
 @pytest.mark.parametrize('type_', ['jansen', 'five_bar'])
 def test_every_trace_and_part_can_be_drawn(type_, trace):
@@ -566,7 +566,7 @@ def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
     assert set(tmp_path.iterdir()) == before
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_crank_that_stands_still_has_a_picture(tmp_path):
     file = tmp_path / 'still.yaml'
     file.write_text('/**: {ros__parameters: {mechanisms: [water_drop, jansen], '
@@ -574,7 +574,7 @@ def test_a_crank_that_stands_still_has_a_picture(tmp_path):
     assert main([str(file), '--out', str(tmp_path / 'a.png'), '--angle', '90']) == 0
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_an_angle_may_be_written_as_joint_lines_have_it(tmp_path):
     pictures = []
     for angle in ('60', '60deg', 'pi/3', '2*30'):
@@ -585,7 +585,7 @@ def test_an_angle_may_be_written_as_joint_lines_have_it(tmp_path):
     assert len(set(pictures)) == 1
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_no_ros_is_needed(tmp_path):
     code = ('import sys; sys.modules.update(dict.fromkeys(["rclpy", "ament_index_python"])); '
             'from linkage_ros.render import main; sys.exit(main(sys.argv[1:]))')
@@ -595,7 +595,7 @@ def test_no_ros_is_needed(tmp_path):
     assert out.read_text().lstrip().startswith('<?xml')
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_readings_are_written_beside_or_below_each_other():
     machines = [*scene.load(str(CONFIG / 'excavator.yaml')).machines.values(),
                 *scene.load(str(CONFIG / 'scissor_lift.yaml')).machines.values(),

@@ -43,10 +43,10 @@ def given(name):
             **SCENES[name]}
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('name, library', [
     *((name, Pinocchio) for name in SCENES), ('slotted_lever', Yourdfpy),
-    *(pytest.param(name, Yourdfpy, marks=pytest.mark.long) for name in SCENES)])
+    *(pytest.param(name, Yourdfpy, marks=pytest.mark.nightly) for name in SCENES)])
 def test_joint_states_put_the_robot_where_the_markers_are(graph, name, library):
     machine = graph.start(Kinematics, given(name)).scene.machines['m']
     descriptions = graph.listen(String, 'm/robot_description', LATCHED)
@@ -136,7 +136,7 @@ def test_a_new_dimension_makes_a_new_description(graph):
     assert ends == pytest.approx([2.0 * math.acos(5.0 / (2.0 * r)) for r in (3.0, 3.1)])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_command_prints_the_robot_of_a_scene():
     code, printed = Process('urdf', CATALOGUE).end()
     found = scene.load(str(CATALOGUE))
@@ -214,7 +214,7 @@ def test_what_is_not_understood_is_refused_in_one_line(capsys, arguments, compla
     assert printed.out == '' and printed.err.count('\n') == 1 and complaint in printed.err
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_scene_is_described_without_ros():
     code = ('import sys; sys.modules["rclpy"] = None; '
             'from linkage_ros.robot_model.command import main; sys.exit(main(sys.argv[1:]))')

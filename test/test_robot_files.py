@@ -24,7 +24,6 @@ from linkage_ros.robot_model.robot import posed, trees
 import numpy as np
 import pytest
 from robots import LIBRARIES
-from sweeps import EXHAUSTIVE
 from truth import random_linkages
 
 ROBOTS = Path(__file__).with_name('robot_files')
@@ -88,7 +87,7 @@ def test_mujoco_sees_the_loops_of_a_model_closed(imported, file):
         assert error(file, joints) < 1e-14
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_mujoco_sees_both_fingers_of_a_gripper_closed(imported):
     fingers = imported('gripper.xml').values()
     assert [finger.frame_id for finger in fingers] == ['palm', 'palm']
@@ -133,7 +132,7 @@ URDF = {
                         [('tail_a', 'tail_b'), ('level_a', 'level_b'), ('tool_a', 'tool_b')])}
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('library', LIBRARIES)
 @pytest.mark.parametrize('file', URDF)
 def test_the_joints_of_a_urdf_close_its_loops(imported, file, library):
@@ -149,7 +148,7 @@ def test_the_joints_of_a_urdf_close_its_loops(imported, file, library):
             assert places[first] == pytest.approx(places[second], abs=2e-15)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_input_swings_within_the_limits_of_its_joint_and_its_reach(imported, tmp_path):
     # The cylinder is as long as its pins are apart, plus its joint's position.
     file, limit = 'boom.urdf', 'lower="-0.3" upper="0.3"'
@@ -380,7 +379,7 @@ def test_a_motor_at_the_knee_drives_as_well(imported, tmp_path):
         assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_rack_drives_a_finger_and_a_motor_on_that_its_tip(imported):
     rack, tip = imported('rack.sdf').values()
     assert [rack.frame_id, tip.frame_id] == ['palm', 'finger']
@@ -504,7 +503,7 @@ def changed(text, rng):
     ) + text[high:]
 
 
-@pytest.mark.parametrize('count', [4, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.parametrize('count', [4, pytest.param(60, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize('ending', ['sdf', 'urdf', 'xml'])
 def test_whatever_is_in_a_file_it_is_read_or_refused_in_one_sentence(
         capsys, tmp_path, ending, count):
@@ -604,7 +603,7 @@ def test_rods_that_hold_each_other_are_named(capsys, tmp_path):
             in refused(capsys, file))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_finger_with_a_spring_is_not_driven(capsys, tmp_path):
     pytest.importorskip('mujoco')
     spring = written(tmp_path, 'gripper.xml', (
@@ -687,7 +686,7 @@ def test_a_joint_that_follows_another_is_geared_to_it(imported, tmp_path):
         assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_joints_that_an_equality_ties_together_are_geared(imported, tmp_path):
     pytest.importorskip('mujoco')
     both = written(tmp_path, 'gripper.xml', (
@@ -722,7 +721,7 @@ HALVES = """<mujoco><worldbody><body name="palm" euler="20 30 40">
   <actuator><position joint="motor"/></actuator></mujoco>"""
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('weld', ['relpose="0.32 0 0 0.8 0 0.6 0"',
                                   'relpose="0.2 0 0 1 0 0 0" anchor="-0.12 0 0.01"'])
 def test_halves_that_are_welded_apart_are_one_rod(imported, tmp_path, weld):
@@ -813,7 +812,7 @@ DIALECTS = {
         '<axis xyz="0 1 0"/></joint>', '')}
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('dialect', DIALECTS)
 def test_a_loop_is_closed_in_every_way_in_which_tools_write_it(imported, tmp_path, dialect):
     inside, loops = DIALECTS[dialect]
@@ -1060,7 +1059,7 @@ def test_where_both_sides_fit_a_pose_has_to_choose(imported, capsys, tmp_path):
     assert found[0] == pytest.approx(-found[1]) and found[1] > 0.1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_joint_that_is_held_moves_nothing(imported, tmp_path):
     pytest.importorskip('mujoco')
     spring = written(tmp_path, 'gripper.xml', (
@@ -1114,7 +1113,7 @@ def test_a_motor_between_two_moving_links_is_measured(imported, tmp_path):
         assert found == pytest.approx({'motor': -angle, 'shoulder': angle}, abs=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_loop_of_too_many_links_is_refused_at_once(capsys, tmp_path):
     file, count = tmp_path / 'chain.urdf', 3000
     links = ''.join(f'<link name="l{i}"/>' for i in range(count + 1))
@@ -1293,7 +1292,7 @@ def test_a_coupler_s_range_ends_where_the_crank_turns_back(bars, start):
     assert worst < 1e-9 and '; not beyond where its input turns back.\n' in said
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('kind', mechanisms.TYPES)
 def test_a_linkage_of_the_catalogue_comes_back_from_a_robot(kind):
     linkage = mechanisms.create(kind)
@@ -1418,22 +1417,22 @@ def check_dialects(folder, seeds):
     assert moved > len(seeds) // 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_random_linkages_come_back_in_any_dialect(tmp_path):
     pytest.importorskip('yaml')
     check_dialects(tmp_path, range(6))
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_more_random_linkages_come_back_in_any_dialect(tmp_path):
     pytest.importorskip('yaml')
     check_dialects(tmp_path, range(6, 40))
 
 
 # Slots and cylinders on one pair of joints; gears of gears; crossed bars on a block.
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('seeds', [
     [79, 84, 129, 179, 191, 301, 361, 531, 616, 643, 681, *range(20)],
-    pytest.param(range(20, 120), marks=EXHAUSTIVE)])
+    pytest.param(range(20, 40), marks=pytest.mark.nightly)])
 def test_random_linkages_come_back_from_robots(seeds):
     check_random_robots(seeds)

@@ -15,7 +15,6 @@ from linkage_ros.c_code import header
 from linkage_ros.linkage import FORMS, WindowError
 import numpy as np
 import pytest
-from sweeps import few_and_many
 from truth import rods
 from truth.hostile_texts import NUMBERS
 
@@ -87,9 +86,8 @@ def check_random_rods(seed, count):
     return assembled
 
 
-@pytest.mark.parametrize('seed, count', few_and_many([
-    (1, 10), pytest.param(1, 100, marks=pytest.mark.slow)], [
-    (100 + seed, 20000) for seed in range(10)]))
+@pytest.mark.parametrize('seed, count', [
+    (1, 10), pytest.param(101, 20000, marks=pytest.mark.nightly)])
 def test_a_rod_on_a_hinge_is_right_to_the_last_digits(seed, count):
     assert check_random_rods(seed, count) > 0.4 * count
 
@@ -147,16 +145,15 @@ def check_ankle(ankle, window, rng, poses, exact):
                 assert error <= RULE * given + np.spacing(abs(value))
 
 
-@pytest.mark.parametrize('seed, count, poses', few_and_many([
-    pytest.param(2, 3, 500, marks=pytest.mark.slow)], [
-    (1000 + seed, 10, 10000) for seed in range(20)]))
+@pytest.mark.parametrize('seed, count, poses', [(2, 3, 500), (1000, 10, 10000)])
+@pytest.mark.nightly
 def test_two_rods_find_every_pose_inside_the_limits(seed, count, poses):
     for ankle, window, rng in ankles(seed, count):
         check_ankle(ankle, window, rng, poses, exact=poses // 100)
 
 
 # Numbers of no robot: axes that lean from all others, far from the points that turn about them.
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('parts', [
     ([-0.92, -0.12, 0.56], [0.16, 0.5, 0.5], [0.72, -1.36, 1.26], [1.84, 2.15, 1.2],
      [[-1.45, -0.16, 0.21], [0.32, 0.85, -1.76]], [[-0.77, 1.42, -0.42], [-0.68, 0.64, 0.69]],
@@ -190,9 +187,8 @@ def check_assemblies(ankle, window, rng, count):
     return there.sum()
 
 
-@pytest.mark.parametrize('seed, count, poses', few_and_many([
-    pytest.param(3, 2, 500, marks=pytest.mark.slow)], [
-    (2000 + seed, 5, 10000) for seed in range(20)]))
+@pytest.mark.parametrize('seed, count, poses', [(3, 2, 500), (2000, 5, 10000)])
+@pytest.mark.nightly
 def test_no_pose_is_of_another_assembly(seed, count, poses):
     found = [check_assemblies(*each, poses) for each in ankles(seed, count)]
     assert sum(found) > 0.02 * count * poses
@@ -231,13 +227,13 @@ def check_windows(seed, count):
     return ambiguous
 
 
-@pytest.mark.parametrize('seed, count', few_and_many([(4, 3)], [
-    (3000 + seed, 75) for seed in range(20)]))
+@pytest.mark.parametrize('seed, count', [
+    (4, 3), pytest.param(3000, 75, marks=pytest.mark.nightly)])
 def test_limits_with_a_second_or_a_singular_pose_are_refused(seed, count):
     assert check_windows(seed, count) > 0.3 * count
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_of_limits_that_are_too_wide_the_largest_that_can_be_are_named():
     wide = [line.replace('-50deg 30deg', '-170deg 150deg') for line in G1]
     with pytest.raises(ValueError, match='there is a second pose in these limits: with right at '
@@ -535,14 +531,14 @@ int there_and_back_(const double *joints, double *actuators, double *again)
     return text, loaded(folder, '#include <string.h>\n' + text + calls)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_pose_in_c_has_no_loop_and_no_heap(compiled):
     pose_ = compiled[0][compiled[0].index('#endif /* LINKAGE'):compiled[0].index('ANKLE_OK')]
     assert 'ankle_solve' in pose_ and 'ankle_rates' in pose_ and not re.search(
         r'\b(for|while|do|goto|malloc)\b(?! it)', re.sub(r'/\*.*?\*/', '', pose_, flags=re.S))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_from_pitch_and_roll_to_motors_and_back_in_c(compiled, g1):
     turn = compiled[1].there_and_back_
     turn.argtypes = 3 * [ctypes.c_void_p]
@@ -555,7 +551,7 @@ def test_from_pitch_and_roll_to_motors_and_back_in_c(compiled, g1):
         np.testing.assert_allclose(back, values, atol=1e-12)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_c_is_python(compiled, g1):
     solve = compiled[1].pose_
     solve.argtypes = [ctypes.c_double, ctypes.c_double, ctypes.c_void_p]

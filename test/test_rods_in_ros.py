@@ -60,7 +60,7 @@ def test_markers_are_in_space(graph):
     np.testing.assert_allclose(lengths, list(linkage.bar_lengths.values()), atol=1e-15)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_stream_of_pitch_and_roll_becomes_commands_of_the_motors(graph, capfd):
     stream, linkage = Stream(graph, SCENE), mechanisms.create('rods', joints=G1)
     drawn = linkage.driven_by('pitch', 'roll')

@@ -226,7 +226,7 @@ def test_a_foot_without_one_end_is_said_to_have_none(tmp_path, capsys):
     assert 'Left out: the limits of pitch, from -inf to 0.15: it has no end there.' in said
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_without_limits_the_largest_are_taken_and_said(tmp_path, capsys):
     machine, said = imported(tmp_path, turning(4), None, capsys)
     assert 'these are the largest proved to have one pose at most: pitch from -' in said

@@ -59,7 +59,7 @@ def node(request, graph):
     return graph.start(kind, SCENES[scene])
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_every_number_has_a_meaning_a_unit_and_its_limits_with_whole_stops(node):
     found = list(numbers(node))
     assert sum(range_ is not None for _, _, range_ in found) > 4
@@ -79,7 +79,7 @@ def test_every_number_has_a_meaning_a_unit_and_its_limits_with_whole_stops(node)
         assert values[-1] == pytest.approx(range_.to_value, rel=1e-9), about.name
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_every_stop_is_accepted_or_the_linkage_forbids_it(node):
     accepted = 0
     for parameter, about, range_ in numbers(node):

@@ -56,7 +56,7 @@ def test_without_parameters_the_scene_is_the_catalogue():
     assert scene.read({}).rate == 50.0
 
 
-@pytest.mark.sample(4)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('file', sorted(glob(os.path.join(CONFIG, '*.yaml'))))
 def test_a_scene_is_written_as_the_few_values_that_tell_it(file, tmp_path):
     before = scene.load(file)
@@ -324,7 +324,7 @@ def test_a_crank_swings_in_the_arc_that_its_start_is_in():
     assert second[0] < crank.sweep[0] < middle < crank.sweep[1] < second[1]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('path', sorted(glob(os.path.join(CONFIG, '*.yaml'))))
 def test_every_scene_in_config_stands_above_the_floor(path):
     pytest.importorskip('yaml')
@@ -337,7 +337,7 @@ def test_every_scene_in_config_stands_above_the_floor(path):
             assert 0.0 < whole_motion(machine)[..., 1].min() < 0.2
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_the_mechanisms_of_the_scene_of_all_stand_apart():
     pytest.importorskip('yaml')
     boxes = []
@@ -387,7 +387,7 @@ def lengths(given):
                   if '.dimensions.' in p.name]
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('given', [*TYPES.values(), SMALL, SIGNED, SWEPT, {'jansen.scale': 5e-324},
                                    {'jansen.scale': 1e308}],
                          ids=[*TYPES, 'small', 'signed', 'swept', 'least', 'most'])
@@ -413,11 +413,11 @@ def test_the_sliders_of_ratio_and_offset_move_an_input(ratio):
     assert found['own.crank.offset'] == pytest.approx((-math.pi, math.pi), abs=0.1)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('given, stops', [
     *((given, 3) for given in (*map(TYPES.get, ('water_drop', 'peaucellier', 'slotted_lever')),
                                SMALL, SIGNED, SWEPT)),
-    *(pytest.param(given, 9, marks=pytest.mark.long) for given in TYPES.values())])
+    *(pytest.param(given, 9, marks=pytest.mark.nightly) for given in TYPES.values())])
 def test_nearly_all_of_a_sliders_travel_keeps_a_crank_turning(given, stops):
     made, sliders = lengths(given)
     fits = []

@@ -86,7 +86,7 @@ def test_a_change_of_the_geometry_reaches_all_three(graph, nodes):
         node.scene.machines['lever'].linkage.dimensions['a'] == 90.0 for node in others))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_them_quietly(number):
     process = Process('scene', CONFIG / 'all.yaml')

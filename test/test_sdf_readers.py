@@ -202,7 +202,7 @@ def test_links_are_where_they_were_before_they_were_written(tmp_path, seed):
     check_is_read(tmp_path, seed)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_many_robots_are_read_as_they_were(tmp_path):
     for seed in range(30, 1500):
         (tmp_path / str(seed)).mkdir()

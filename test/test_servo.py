@@ -80,8 +80,8 @@ def rows_of(kind, linkage, angles):
         case, linkage, angle, partial(truth_of, kind, linkage), top)]
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize('levers', [3, pytest.param(12, marks=pytest.mark.long)])
+@pytest.mark.nightly(all_but=2)
+@pytest.mark.parametrize('levers', [3, pytest.param(12, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize('kind', LEVERS)
 def test_servo_angles_and_reductions_of_any_lever_are_right(kind, levers):
     rows = []
@@ -91,7 +91,7 @@ def test_servo_angles_and_reductions_of_any_lever_are_right(kind, levers):
     assert not broken(rows), summary(rows)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('kind', LEVERS)
 def test_servo_angles_and_reductions_of_many_levers_are_right(kind):
     test_servo_angles_and_reductions_of_any_lever_are_right(kind, 250)
@@ -136,7 +136,7 @@ def test_an_answer_is_taken_between_the_ends_whole_turns_included(near, ends, an
 
 @pytest.mark.parametrize('kind, output', [
     ('slotted_lever', 'lever'), ('four_bar', 'QB'), ('slider_crank', 'block'),
-    pytest.param('jansen', 'G.x', marks=pytest.mark.slow)])
+    pytest.param('jansen', 'G.x', marks=pytest.mark.nightly)])
 def test_the_value_at_an_end_is_had_at_that_end(kind, output):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(5)
     joint, _, axis = output.rpartition('.')
@@ -153,7 +153,7 @@ def test_the_value_at_an_end_is_had_at_that_end(kind, output):
             assert ends[0] <= theta <= ends[1]
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('near', [None, 2.5])
 @pytest.mark.parametrize('ends', [None, (0.0, 6.0)])
 def test_machine_code_takes_the_answers_that_plain_python_takes(near, ends):
@@ -166,7 +166,7 @@ def test_machine_code_takes_the_answers_that_plain_python_takes(near, ends):
     np.testing.assert_allclose(found, alone, rtol=1e-12, atol=1e-15)
 
 
-@pytest.mark.sample(3)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('kind, outputs', [
     ('slotted_lever', ['lever']), ('jansen', ['DF']), ('four_bar', ['QB']),
     ('slider_crank', ['B.x']), ('five_bar', ['P.x', 'P.y'])])

@@ -448,7 +448,7 @@ def test_random_outputs_in_random_sweeps_are_had_or_cannot_be(graph, scenes=12, 
     assert sum(check_random_scene(graph, rng) for _ in range(scenes)) > scenes // 4
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('seed', range(2, 8))
 def test_many_random_outputs_in_random_sweeps_are_had_or_cannot_be(graph, seed):
     test_random_outputs_in_random_sweeps_are_had_or_cannot_be(graph, 80, seed)

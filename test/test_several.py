@@ -36,7 +36,7 @@ def made(name):
 
 
 @pytest.mark.parametrize('count', [
-    pytest.param(12, marks=pytest.mark.slow), pytest.param(80, marks=pytest.mark.long)])
+    pytest.param(12, marks=pytest.mark.nightly), pytest.param(80, marks=pytest.mark.nightly)])
 def test_a_five_bar_has_all_its_working_modes(count):
     rng, modes = np.random.default_rng(7), 0
     for _ in range(count):
@@ -51,7 +51,7 @@ def test_a_five_bar_has_all_its_working_modes(count):
 
 
 @pytest.mark.parametrize('name, outputs, truth', [
-    pytest.param('excavator', BUCKET, excavator, marks=pytest.mark.slow),
+    pytest.param('excavator', BUCKET, excavator, marks=pytest.mark.nightly),
     ('parallelogram arm', ('W.x', 'W.y'), arm)])
 def test_an_arm_has_both_elbows(name, outputs, truth):
     rng, (linkage, numbers) = np.random.default_rng(3), made(name)
@@ -104,9 +104,9 @@ def test_whole_turns_are_kept_and_a_singular_pose_is_not_passed():
     np.testing.assert_allclose(back, near, atol=1e-9)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('seed', [0, *(
-    pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 40))])
+    pytest.param(seed, marks=pytest.mark.nightly) for seed in range(1, 40))])
 @pytest.mark.parametrize('hung', ['zero O geared', 'zero Q geared', 'beside'])
 def test_an_input_that_is_held_is_held_in_its_own_turn(hung, seed):
     # A second crank is geared to the one that is held: a turn later it is elsewhere.
@@ -134,7 +134,7 @@ def test_an_input_that_is_held_is_held_in_its_own_turn(hung, seed):
         assert nearest == pytest.approx(theta, abs=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_dyads_beyond_the_ends_of_their_rockers_are_not_taken_for_the_other_sides():
     # A rocker turns back where its dyad stretches: next to that the other side is an answer, too.
     rng, beyond, found = np.random.default_rng(1), 3e-8, 0
@@ -162,7 +162,7 @@ def test_two_dyads_beyond_the_ends_of_their_rockers_are_not_taken_for_the_other_
     assert found > 60
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_outputs_of_few_inputs_are_solved_first():
     # Two levers side by side, and a bar between them that both move.
     linkage = mechanisms.create('custom', joints=(

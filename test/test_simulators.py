@@ -34,12 +34,13 @@ def simulated(name):
 
 
 def some_quick(names, quick):
-    return [pytest.param(name, marks=() if name in quick else pytest.mark.long) for name in names]
+    return [pytest.param(name, marks=() if name in quick else pytest.mark.nightly)
+            for name in names]
 
 
 def some_scenes(*quick):
-    return [pytest.param(path, marks=() if path.stem in quick else pytest.mark.long, id=path.stem)
-            for path in SCENES]
+    return [pytest.param(path, id=path.stem, marks=(
+        () if path.stem in quick else pytest.mark.nightly)) for path in SCENES]
 
 
 def model(machines, frame_id='world', **given):
@@ -96,7 +97,7 @@ class MuJoCo:
         assert not self.data.warning.number.any()
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('name', some_quick([*MACHINES, *OWN], KINDS))
 def test_mujoco_has_every_joint_where_it_is_and_every_loop_closed(name):
     one = simulated(name)
@@ -121,7 +122,7 @@ def test_gravity_tears_no_scene(file):
     assert max(robot.open() for _ in robot.run(1.0)) < 1e-5 * bar
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('name', [*MACHINES, *OWN])
 def test_gravity_tears_no_linkage(name):
     one = simulated(name)
@@ -169,7 +170,7 @@ def published(machines, motors):
     return found
 
 
-@pytest.mark.sample(2)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('form', [sdf, mjcf], ids=['sdf', 'mjcf'])
 @pytest.mark.parametrize('name', some_quick(
     sorted({*MACHINES, 'excavator', 'parallelogram arm', 'scissor lift', 'rack steering',

@@ -126,7 +126,7 @@ def test_efforts_of_the_catalogue_balance_all_loads(name):
     check(subject, rng, 2)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_efforts_of_random_linkages_balance_all_loads():
     rng, checked = np.random.default_rng(4), 0
     while checked < 12:

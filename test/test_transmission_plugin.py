@@ -568,7 +568,7 @@ def test_why_values_are_held_is_logged_once_per_reason(plugins, capfd):
     assert not capfd.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('compiler', COMPILERS)
 def test_a_status_is_reached_where_nothing_else_is_visible(tmp_path, compiler):
     plugins = Plugins(tmp_path, compiler, '-fvisibility=hidden')

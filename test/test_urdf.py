@@ -126,11 +126,11 @@ def limits(one):
             for name, end in ends.items()}
 
 
-@pytest.mark.sample(8)
+@pytest.mark.nightly(all_but=8)
 @pytest.mark.parametrize('name, library, count', [
     *((name, Pinocchio, 6) for name in (*MACHINES, *OWN)),
     *((name, Yourdfpy, 6) for name in ('jansen', 'slotted_lever', 'boxer engine')),
-    *(pytest.param(name, library, 41, marks=pytest.mark.long)
+    *(pytest.param(name, library, 41, marks=pytest.mark.nightly)
       for name in MACHINES for library in LIBRARIES)])
 def test_every_joint_is_met_and_every_loop_is_closed(name, library, count):
     one = {**MACHINES, **OWN}[name]()
@@ -152,7 +152,7 @@ MIRRORED = 'boxer engine', 'engine with zeros elsewhere', 'walker of 3 pairs'
 
 
 @pytest.mark.parametrize('name', [
-    pytest.param(name, marks=() if name in MIRRORED else pytest.mark.long)
+    pytest.param(name, marks=() if name in MIRRORED else pytest.mark.nightly)
     for name in MACHINES if not re.match('five.bar|boom and', name)])
 def test_limits_hold_every_position_and_hardly_more(name):
     one = MACHINES[name]()
@@ -287,7 +287,7 @@ def test_a_limit_leaves_a_millionth_to_spare(kind):
         assert high - angles[name].max() == pytest.approx(spare, rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('arguments', [
     ['robot_model'], ['robot_model', '--format', 'mjcf'], ['c_code', ROOT / 'config/all.yaml']],
     ids=str)

@@ -168,7 +168,7 @@ def test_announcements_that_make_no_sense_change_nothing(graph, show):
     assert answer['reason'] == '' and 'crank' in answer['inputs']
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_every_node_is_given_is_of_the_node_that_reads_it(show):
     running = show({**LEG, 'leg.crank.speed': 1.0, 'rate': 30.0})
     driver, = (node for node in running.nodes if isinstance(node, CrankDriver))
@@ -227,7 +227,7 @@ def test_an_input_goes_again_to_where_it_started_though_that_is_a_middle_or_an_e
         assert page.pose(f'/{name}', output='crank', value=value)['reason'] == ''
 
 
-@pytest.mark.sample(1)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('lengths, sign', [
     ((80.0, 150.0, 0.0), 1.0), ((80.0, 150.0, 25.0), -1.0), ((1.0, 150.0, 0.0), 1.0)])
 def test_a_lever_that_is_dragged_beyond_its_reach_goes_to_its_end(show, lengths, sign):
@@ -257,7 +257,7 @@ def test_what_cannot_be_brought_about_says_why(lever, page, key, want, reason):
     assert lever.value('lever.crank.speed') == 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_any_joint_of_any_leg_is_brought_where_it_can_be(show):
     page = show({**RATE, 'mechanisms': ['walker'], 'walker.type': 'jansen',
                  'walker.leg_pairs': 3, 'walker.scale': 0.01}).page()
@@ -270,7 +270,7 @@ def test_any_joint_of_any_leg_is_brought_where_it_can_be(show):
     assert math.remainder(crank - theta, math.tau) == pytest.approx(0.0, abs=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_is_saved_starts_the_tuned_scene_again(show, tmp_path):
     running = show({**LEVER, 'drop.pose': [0.0, 0.0, 0.5, 1.5, 0.0, 0.0]})
     page = running.page()
@@ -326,7 +326,7 @@ def test_what_is_saved_or_exported_is_the_mechanism_as_it_is(page):
         header.written(machine)]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('path', [path for path in EXAMPLES if path.parent.name == 'config'],
                          ids=lambda path: path.stem)
 def test_a_saved_scene_names_all_that_defines_it_and_is_the_running_one(show, path, tmp_path):
@@ -420,7 +420,7 @@ def test_where_an_input_is_that_nobody_has_named_is_not_guessed(graph, show):
     assert until(inputs)['crank'] == pytest.approx(2.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_a_sensor_cannot_be_at_is_nowhere_on_the_page(show):
     running = show({**example('scissor_lift'), 'rate': 0.0})
     lift = scene.read(example('scissor_lift')).machines['lift']
@@ -474,7 +474,7 @@ def test_a_node_that_does_not_answer_is_named(graph, show, monkeypatch):
     assert running.value('leg.scale') == 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_browser_that_has_not_drawn_is_sent_no_more(show):
     running = show({**LEG, 'leg.crank.speed': 1.0, 'rate': 200.0})
     markers = running.graph.listen(MarkerArray, 'leg/markers')
@@ -515,7 +515,7 @@ def test_messages_that_cannot_be_read_are_dropped_and_said_once(show, capfd):
     assert 'Traceback' not in log
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_nodes_that_end_and_come_again_are_drawn_again(graph, show):
     page = show({}, kinds=(CrankDriver,)).page()
     for parameters in (LEG, LEG, {**RATE, 'mechanisms': ['drop'], 'drop.type': 'water_drop'}):
@@ -527,7 +527,7 @@ def test_nodes_that_end_and_come_again_are_drawn_again(graph, show):
         page.mechanisms()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_nobody_is_listened_to_while_nobody_looks(show, monkeypatch):
     monkeypatch.setattr(scene_view, 'LINGER_S', 0.2)
     running = show(LEG)
@@ -543,7 +543,7 @@ def test_nobody_is_listened_to_while_nobody_looks(show, monkeypatch):
         until(lambda: node.count_subscribers('/leg/markers') == 0)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_pages_that_come_and_go_leave_nothing(show):
     running = show(LEG)
     before, at_rest = 0.0, running.entities()

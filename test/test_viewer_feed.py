@@ -122,7 +122,7 @@ def hostile(rng, text):
         yield from (spoilt(part, number) for part in range(4))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_of_what_cannot_be_drawn_nothing_stays():
     rng = np.random.default_rng(5)
     topic = feed_of_a_leg()

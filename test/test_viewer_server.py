@@ -193,8 +193,8 @@ FLOODS = {
 
 
 @pytest.mark.parametrize('what, seconds', [
-    pytest.param('answers', 0.5, marks=pytest.mark.slow),
-    *(pytest.param(what, 15.0, marks=pytest.mark.long) for what in FLOODS)])
+    pytest.param('answers', 0.5, marks=pytest.mark.nightly),
+    *(pytest.param(what, 15.0, marks=pytest.mark.nightly) for what in FLOODS)])
 def test_a_client_that_does_not_read_costs_little_and_harms_nobody(show, what, seconds):
     running = show({**LEG, 'leg.crank.speed': 1.0})
     page = running.page()
@@ -217,7 +217,7 @@ def test_a_client_that_does_not_read_costs_little_and_harms_nobody(show, what, s
         assert resident() - before < 30.0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('last', [b'', b'nonsense'])
 def test_a_client_that_does_not_read_is_sent_home(show, monkeypatch, last):
     monkeypatch.setattr(server, 'MAX_READ_S', 0.3)
@@ -227,7 +227,7 @@ def test_a_client_that_does_not_read_is_sent_home(show, monkeypatch, last):
         assert not deaf.flood(FLOODS['answers'] + last, lambda: time.monotonic() < end)
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_client_that_does_not_read_does_not_keep_the_viewer_from_ending(show):
     running = show(LEG)
     with Deaf(running.url) as deaf:
@@ -331,7 +331,7 @@ def test_a_foreign_origin_is_refused(lever, origin, own):
         page.message('scene')
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @needs_browser
 def test_a_foreign_page_is_not_let_in(lever, tmp_path):
     with browser.Browser(tmp_path) as page:
@@ -409,7 +409,7 @@ def parameter_file(tmp_path):
     return write
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_viewer_while_somebody_looks(parameter_file, stop):
     process = Process('viewer', parameter_file(port=0))
@@ -422,7 +422,7 @@ def test_a_signal_ends_the_viewer_while_somebody_looks(parameter_file, stop):
     assert code == 0 and 'Traceback' not in printed and 'rror' not in printed
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_make_view_says_where_to_look_and_ends_all_that_it_started(stop):
     environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)}
@@ -444,7 +444,7 @@ def test_make_view_says_where_to_look_and_ends_all_that_it_started(stop):
         process.wait(browser.DEADLINE)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize('arguments', [
     ('view.py', ROOT / 'config' / 'jansen.yaml', '0'), ('demo.py',)], ids=lambda some: some[0])
 def test_make_view_and_make_demo_end_quietly_when_nobody_reads_what_they_print(arguments):
@@ -459,7 +459,7 @@ def test_make_view_and_make_demo_end_quietly_when_nobody_reads_what_they_print(a
     assert [line for line in said.splitlines() if '[INFO]' not in line] == []
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.parametrize('parameters, arguments, named', [
     ({'port': 'taken'}, (), 'address already in use.*make view PORT=8021'),
     ({'port': 70000}, (), 'port'), ({'port': 'eighty'}, (), 'port'),

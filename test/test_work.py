@@ -200,7 +200,7 @@ def test_a_patched_message_reads_like_one_that_is_built(count):
                 serialize_message(build(stamp, values)), kind)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_bytes_between_fields_are_taken_for_no_value():
     # A middleware writes messages to memory that it does not clear: in gaps stands what was there.
     random = np.random.default_rng(0)
