@@ -149,6 +149,10 @@ def _fault(component: Component, pose: np.ndarray, motors: List[str], followers:
     loose, ways = component.loose(pose, motors + followers)
     if not loose:
         return ''
+    try:
+        _check_unfolded(component, pose, motors, DEAD_POINT)
+    except ValueError as error:
+        return str(error)
     stiff = [joint.name for joint in component.joints if joint.name in loose
              and joint.no_limits.endswith('no range')]
     more = component.chosen(ways, loose, stiff)
@@ -277,7 +281,6 @@ def nearest(component: Component, motors: List[str], followers: List[str]
                 break
     if questions:
         raise _choice(questions, 'the file has them open, and they close as well')
-    _check_unfolded(component, pose, still, DEAD_POINT)
     return pose, report
 
 
