@@ -19,8 +19,8 @@ from ..words import listed
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
 # Such loops are closed without a search, as far as they can be.
 NEAR = 1e-3
-# Number of random starts of a search for closed poses.
-STARTS = 24
+# Number of random starts of a search for closed poses, less where that many screws take long.
+STARTS, SCREWS = 96, 1400
 # Two poses are equally near if their distances differ by less than this factor and this [rad];
 # they are different if a joint differs by this [rad].
 ALIKE, ALIKE_LENGTH, DISTINCT = 1.2, 1e-3, 1e-3
@@ -286,7 +286,7 @@ def nearest(component: Component, motors: List[str], followers: List[str]
 
 def _searched(component: Component, fixed: np.ndarray, pull: float = 1e-2) -> np.ndarray:
     """Return poses of random starts, the first that of the file, closed as far as they can be."""
-    count = max(2, min(STARTS, 400_000 // max(len(fixed), 1) ** 2))
-    spread = np.linspace(0.0, 2.0, count)[:, None] * ~fixed * component.unit
+    count = min(STARTS, SCREWS // max(len(fixed), 1))
+    spread = np.linspace(0.0, math.pi, count)[:, None] * ~fixed * component.unit
     poses = spread * np.random.default_rng(0).uniform(-1.0, 1.0, (count, len(fixed)))
     return component.closed(component.closed(poses, fixed, 40, pull), fixed, 12)
