@@ -639,8 +639,8 @@ def test_bars_in_line_move_on_as_they_are_told(imported, capsys, side):
     file = ROBOTS / 'four_bar.urdf'
     line = refused(capsys, file, '--driven', 'motor', '--pose', *FLAT)
     motor, joint, *ends = re.search(
-        'bars lie in line where the file has them, and with (.*) (.*) is at (.*) as well as at '
-        '(.*): choose by --pose', line).groups()
+        r'bars lie in line where the file has them, and it moves on with (.*) (.*)=(.*) as '
+        r'with \2=(.*): choose by --pose', line).groups()
     machine, = imported(file, '--driven', 'motor', '--pose', *FLAT, motor,
                         f'{joint}={ends[side]}').values()
     robot = LIBRARIES[1](file.read_text())
@@ -984,19 +984,13 @@ def test_what_mujoco_does_not_find_is_named(capsys, tmp_path):
         assert f'four_bar.xml: {why}' in refused(capsys, file)
 
 
-def test_limits_of_a_motor_between_two_moving_links_bound_what_it_measures(imported, tmp_path):
-    # As in a parallelogram: the crank turns back as far as the elbow turns.
+@pytest.mark.parametrize('low, start', [(-0.5, 0.0), (0.2, 0.2)])
+def test_limits_of_a_motor_between_two_moving_links_are_its_sweep(imported, tmp_path, low, start):
     file = written(tmp_path, 'four_bar.urdf', (
-        '"elbow" type="continuous">', '"elbow" type="revolute"><limit lower="-0.5" upper="0.8"/>'))
+        '"elbow" type="continuous">', f'"elbow" type="revolute"><limit lower="{low}" upper="0.8"/>'
+    ))
     machine, = imported(file, '--driven', 'elbow').values()
-    drive = machine.first
-    assert drive.measures and 'Left out' not in printed(file, '--driven', 'elbow')
-    # The crank is at a quarter turn back where the motor is at zero.
-    assert drive.ends == pytest.approx((-0.5 * math.pi - 0.8, -0.5 * math.pi + 0.5))
-    inside, = imported(written(tmp_path, 'four_bar.urdf', (
-        '"elbow" type="continuous">', '"elbow" type="revolute"><limit lower="0.2" upper="0.8"/>')),
-        '--driven', 'elbow').values()
-    assert inside.first.start == pytest.approx(-0.5 * math.pi - 0.2)
+    assert machine.first.ends == pytest.approx((low, 0.8)) and machine.first.start == start
 
 
 def test_a_passive_joint_of_a_loop_is_no_input(imported, tmp_path):
@@ -1100,17 +1094,13 @@ def test_a_comment_of_another_format_makes_no_urdf(tmp_path):
     assert model.description(str(file)).startswith('<robot')
 
 
-def test_a_motor_between_two_moving_links_is_measured(imported, tmp_path):
+def test_a_motor_between_two_moving_links_drives_in_the_frame_of_one(imported):
     # As in a parallelogram: the elbow turns back as far as the shoulder turns.
     machine, = imported('four_bar.urdf', '--driven', 'elbow').values()
-    assert (machine.first.source, bool(machine.first.measures)) == ('elbow', True)
+    assert (machine.first.source, machine.frame_id) == ('elbow', 'crank')
     for angle in (-0.8, 0.3, 1.1):
-        value, _ = machine.measured(machine.first.measures, machine.first.ratio * angle
-                                    + machine.first.offset, machine.first.start)
-        angles = machine.linkage.joint_angles(value)
-        found = {called.name: float(called.of(angles[link]))
-                 for link, called in machine.joints.items() if called.published}
-        assert found == pytest.approx({'motor': -angle, 'shoulder': angle}, abs=1e-9)
+        assert published(machine, elbow=angle) == pytest.approx(
+            {'elbow': angle, 'motor': -angle, 'shoulder': angle}, abs=1e-9)
 
 
 @pytest.mark.nightly
@@ -1279,17 +1269,6 @@ def check_comes_back(linkage, values, robot, steps, zeros=None):
                 assert abs(apart) < 1e-9 * size, (link.name, step)
                 moved += 1
     return said, moved
-
-
-@pytest.mark.parametrize('bars, start', [
-    (('B ground 0.6 0', 'C crank A 0.7', 'D dyad C B 0.3 0.5 left'), -0.5),
-    (('B ground 0 0.63', 'C crank A 0.36', 'D dyad C B 0.86 0.44 left'), 0.5)])
-def test_a_coupler_s_range_ends_where_the_crank_turns_back(bars, start):
-    linkage = mechanisms.create('custom', joints=['A ground 0 0', *bars])
-    robot = robot_of(linkage, start)
-    robot.driven = ['CD']
-    (_, worst), = checked(said := '\n'.join(command.described(robot)[1]))
-    assert worst < 1e-9 and '; not beyond where its input turns back.\n' in said
 
 
 @pytest.mark.nightly(all_but=4)

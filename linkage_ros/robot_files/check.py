@@ -17,18 +17,16 @@ from typing import Any, Dict, List, Mapping, NamedTuple, Sequence, Set, Tuple
 
 import numpy as np
 
-from .spatial import Component, components, EXACT, Poses
+from .spatial import Component, components, EXACT
 from .. import scene
 from ..robot_model.robot import Robot, SLIDE
 
 # Number of paths of several motors, of poses on all paths, and of poses that a check needs.
-PATHS, POSES, FEWEST = 12, 240, 200
+PATHS, POSES, MIN_POSES = 12, 240, 200
 # A misfit of the file opens its loops by less than this factor times it.
 MISFIT = 10.0
 # A mechanism whose joints are farther off in the file's pose [rad, or of the size] is another.
 OTHER = 1e-3
-# A measured input turns back where it makes a larger step than this [rad, or of its size].
-TURN = 0.1
 # A loop that closes with a larger step of a joint [rad, or of the size] than this is another pose.
 LEAP = 0.35
 # Stiffness next to a change point, as a part of the largest.
@@ -63,23 +61,22 @@ class Walk(NamedTuple):
     """
     Positions along paths (paths, steps), and how far loops stand open there [m].
 
-    A gap is NaN where there is no pose. `joints` has the sources, too; `inputs` has the first
-    input of each mechanism. `good` tells where the loops are closed on all of the way.
+    A gap is NaN where there is no pose. `joints` has the sources, too; `poses` are those of each
+    step. `good` tells where the loops are closed on all of the way.
     """
 
     joints: Dict[str, np.ndarray]
-    inputs: Dict[str, np.ndarray]
     gaps: np.ndarray
-    poses: List[Poses]
+    poses: List[np.ndarray]
     good: np.ndarray
 
 
 def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str], ends: Ranges,
-             slack: float) -> Tuple[str, Ranges, Tuple[float, float]]:
+             slack: float) -> Tuple[str, Ranges]:
     """
     Put what a mechanism publishes into the loops of its robot; report on it.
 
-    Also return the ranges of its sources and of its first input in the poses that were checked.
+    Also return the ranges of its sources in the poses that were checked.
 
     Parameters
     ----------
@@ -97,7 +94,7 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
     Raises
     ------
     Difference
-        If the loops stand open, or if they are closed in fewer than FEWEST poses.
+        If the loops stand open, or if they are closed in fewer than MIN_POSES poses.
 
     """
     component = next(each for each in components(replace(robot, driven=[*driven]))
@@ -108,16 +105,16 @@ def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str],
     low, high = corners = np.array([*ends.values()]).T
     loops.enter(low, high)
     walk, beyond = loops.walk_to(corners if len(ends) == 1 else np.random.default_rng(1).uniform(
-        low, high, (PATHS, len(ends))), POSES, FEWEST)
-    if (count := walk.good.sum()) < FEWEST:
+        low, high, (PATHS, len(ends))), POSES, MIN_POSES)
+    if (count := walk.good.sum()) < MIN_POSES:
         raise Difference(f'it could not be checked in more than {count} poses')
-    ranges = {source: loops.range_of(walk.joints[source][walk.good], first)
-              for source, first in loops.start.items()}
+    ranges = {source: (float(min(values.min(), first)), float(max(values.max(), first)))
+              for source, first in loops.start.items()
+              for values in [walk.joints[source][walk.good]]}
     moved = ', '.join(f'{source} from {low:.4g} to {high:.4g}'
                       for source, (low, high) in ranges.items())
     return (f'Checked: {machine.name}: in {count} poses of the robot, {moved}, its loops stand '
-            f'open by {walk.gaps[walk.good].max():.0e} m at most{beyond}.', ranges,
-            loops.range_of(walk.inputs[machine.name][walk.good], loops.near[machine.name]))
+            f'open by {walk.gaps[walk.good].max():.0e} m at most{beyond}.'), ranges
 
 
 def whole(robot: Robot, machines: Mapping[str, scene.SceneMechanism], imported: Sequence[Imported]
@@ -128,25 +125,24 @@ def whole(robot: Robot, machines: Mapping[str, scene.SceneMechanism], imported: 
     All motors move at once towards both ends of the ranges in which their mechanisms were checked,
     less far where a loop that is left out ends.
     """
-    worst, count = 0.0, POSES // 2
-    reports: List[str] = []
+    worst, count, reports = 0.0, POSES // 2, []
     start = {drive.source: (drive.start - drive.offset) / drive.ratio
              for machine in machines.values() for drive in machine.inputs.values()}
     corners = {name: (value, value) for name, value in start.items()}
     for source in {source for each in imported for source in each.ranges}:
-        every = np.array([each.ranges[source] for each in imported if source in each.ranges])
-        low, high = corners[source] = max(every[:, 0]), min(every[:, 1])
+        lows, highs = zip(*(each.ranges[source] for each in imported if source in each.ranges))
+        low, high = corners[source] = max(lows), min(highs)
         start[source] = min(max(robot.positions[source], low), high)
-    known = published(machines)
     movers = {*robot.driven, *(source for each in imported for source in each.ranges)}
     for component in components(robot):
-        sources = {name: robot.source(name) for name in component.names & known}
+        sources = {name: robot.source(name)
+                   for name in component.positions.keys() & published(machines)}
         motors = {name: way for name, way in sources.items() if way[0] in movers}
         if len(motors) == len(sources):
             continue
         loops = _Loops(component, [*machines.values()], {
             name: way for name, way in motors.items() if way[0] in start}, start, max(
-            (each.slack for each in imported if each.ranges.keys() & component.names),
+            (each.slack for each in imported if each.ranges.keys() & component.positions),
             default=0.0))
         try:
             walk, _ = loops.walk_to(np.array([corners[name] for name in start]).T, POSES // 2,
@@ -171,13 +167,7 @@ class _Loops:
     """
     Loops that share joints, and what mechanisms publish of them.
 
-    Attributes
-    ----------
-    start : dict
-        The position of each source where walks start [rad or m].
-    near : dict
-        The first input of each mechanism there.
-
+    `start` has the position of each source where walks start [rad or m].
     """
 
     def __init__(self, component: Component, machines: Sequence[scene.SceneMechanism],
@@ -186,24 +176,16 @@ class _Loops:
         self._component, self._machines, self._motors = component, machines, motors
         self.start, self._slack = dict(start), MISFIT * slack
         self._allowed = (EXACT + self._slack) * component.size
-        self._poses, self._misfit = component.at_start(), component.errors(component.at_start())[0]
-        self.near = {machine.name: machine.first.start for machine in machines}
-        self.near.update((machine.name, float(machine.measured(
-            drive.measures, drive.ratio * start[drive.source] + drive.offset, drive.start)[0]))
-            for machine in machines if (drive := machine.first).measures)
-
-    @staticmethod
-    def range_of(values: np.ndarray, first: float) -> Tuple[float, float]:
-        """Return the smallest and the largest of values and a first one."""
-        return float(min(values.min(), first)), float(max(values.max(), first))
+        self._pose = component.at_start()
+        self._misfit = component.errors(self._pose)[0]
 
     def check_start(self) -> None:
         """Raise Difference if a joint is not where the file has it."""
-        found, _ = self._positions({
+        positions = self._positions({
             name: np.full((1, 1), value) for name, value in self.start.items()})
         for joint in self._component.joints:
-            if joint.name in found and joint.position is not None:
-                off = float(found[joint.name][0, 0]) - joint.position
+            if joint.name in positions and joint.position is not None:
+                off = float(positions[joint.name][0, 0]) - joint.position
                 off = off / self._component.size if joint.kind == SLIDE else math.remainder(
                     off, math.tau)
                 if abs(off) > OTHER + self._slack:
@@ -216,9 +198,7 @@ class _Loops:
         if (inside != [*self.start.values()]).any():
             walk = self._walk(inside[None], POSES)
             if walk.good.all():
-                self.start = dict(zip(self.start, inside.tolist()))
-                self.near = {name: float(values[0, -1]) for name, values in walk.inputs.items()}
-                self._poses = walk.poses[-1]
+                self.start, self._pose = dict(zip(self.start, inside.tolist())), walk.poses[-1]
 
     def walk_to(self, targets: np.ndarray, count: int, fewest: int) -> Tuple[Walk, str]:
         """
@@ -234,9 +214,10 @@ class _Loops:
             if not len(targets):
                 break
             walk = self._walk(targets, -(-count // len(targets)))
-            ended = [self._end(walk, path, step) for path, step in enumerate(
-                walk.good.sum(axis=1)) if not walk.good[path].all()]
-            beyond = f'; not beyond where its {ended[0]}' if ended else beyond
+            for path, step in enumerate(walk.good.sum(axis=1)):
+                if not walk.good[path].all():
+                    self._check_end(walk, path, step)
+                    beyond = '; not beyond where its loops end'
             if walk.good.sum() >= fewest:
                 break
             targets = start + (targets - start) * walk.good.mean(axis=1)[:, None]
@@ -248,43 +229,26 @@ class _Loops:
         way = np.arange(1, steps + 1) / max(steps, 1)
         sources = dict(zip(self.start, np.moveaxis(
             start + (targets - start)[:, None] * way[:, None], -1, 0)))
-        found, inputs = self._positions(sources)
-        gaps, poses = self._opened(found, (len(targets), steps))
-        return Walk({**sources, **found}, inputs, gaps, poses,
+        joints = self._positions(sources)
+        gaps, poses = self._opened(joints, (len(targets), steps))
+        return Walk({**sources, **joints}, gaps, poses,
                     np.logical_and.accumulate(gaps <= self._allowed, axis=1))
 
-    def _positions(self, sources: Mapping[str, np.ndarray]
-                   ) -> Tuple[Dict[str, np.ndarray], Dict[str, np.ndarray]]:
-        """
-        Return positions of the loops' joints along paths, and the first input of each mechanism.
-
-        A measured input continues from `near`; beyond a jump of it there is no pose.
-        """
-        found = {**sources, **{name: ratio * sources[source] + offset
-                               for name, (source, ratio, offset) in self._motors.items()}}
-        inputs = {}
+    def _positions(self, sources: Mapping[str, np.ndarray]) -> Dict[str, np.ndarray]:
+        """Return positions of the loops' joints along paths."""
+        positions = {**sources, **{name: ratio * sources[source] + offset
+                                   for name, (source, ratio, offset) in self._motors.items()}}
         for machine in self._machines:
-            values = [drive.ratio * found[drive.source] + drive.offset
+            values = [drive.ratio * positions[drive.source] + drive.offset
                       for drive in machine.inputs.values()]
-            drive, near = machine.first, self.near[machine.name]
-            jumps = np.zeros_like(values[0], bool)
-            if drive.measures:
-                for path in values[0]:
-                    last = near
-                    for i, value in enumerate(path):
-                        path[i] = machine.measured(drive.measures, value, last)[0]
-                        last = last if math.isnan(path[i]) else path[i]
-                before = np.column_stack([np.full(len(values[0]), near), values[0][:, :-1]])
-                jumps = ~(drive.input.apart(before, values[0]) < TURN * drive.input.size)
-            inputs[machine.name] = values[0]
             angles = machine.linkage.joint_angles(values if len(values) > 1 else values[0])
-            found.update((called.name, np.where(jumps, math.nan, called.of(angles[link])))
-                         for link, called in machine.joints.items() if called.published)
-        return {name: values for name, values in found.items()
-                if name in self._component.names}, inputs
+            positions.update((called.name, called.of(angles[link]))
+                             for link, called in machine.joints.items() if called.published)
+        return {name: values for name, values in positions.items()
+                if name in self._component.named.keys() | self._component.cut_names}
 
     def _opened(self, joints: Mapping[str, np.ndarray], shape: Tuple[int, int]
-                ) -> Tuple[np.ndarray, List[Poses]]:
+                ) -> Tuple[np.ndarray, List[np.ndarray]]:
         """
         Put positions of joints into the loops; return how far they stand open [m].
 
@@ -292,64 +256,47 @@ class _Loops:
         opens it by its error in angle times the loops' size. The poses are those of each step.
         """
         component = self._component
-        fixed = component.columns_of([*joints])
+        fixed = component.is_of([*joints])
         isnan = np.any([np.isnan(values) for values in joints.values()], axis=0)
-        poses, gaps, each = self._poses.some(np.zeros(shape[0], int)), np.empty(shape), []
-        free = np.zeros((shape[0], len(fixed)))
+        pose, gaps, poses = np.repeat(self._pose, shape[0], axis=0), np.empty(shape), []
         for k in range(shape[1]):
             here = {name: np.where(isnan[:, k], component.positions[name], values[:, k])
                     for name, values in joints.items()}
-            poses = component.stepped(poses, component.aimed(poses, free, {
-                name: values for name, values in here.items()
-                if name not in component.cut_names}))
-            poses = poses if fixed.all() else component.closed(poses, fixed)
-            gaps[:, k] = np.max(np.abs(component.errors(poses)[0] - self._misfit), axis=1)
-            read = component.read(poses)
+            pose = component.moved_to(pose, here)
+            pose = pose if fixed.all() else component.closed(pose, fixed)
+            gaps[:, k] = np.max(np.abs(component.errors(pose)[0] - self._misfit), axis=1)
+            read = component.read(pose)
             for name in here.keys() & component.cut_names:
                 off = here[name] - read[name]
                 gaps[:, k] = np.maximum(gaps[:, k], component.size * np.abs(
                     off - math.tau * np.round(off / math.tau)))
-            each.append(poses)
-        return np.where(isnan, math.nan, gaps), each
+            poses.append(pose)
+        return np.where(isnan, math.nan, gaps), poses
 
-    def _end(self, walk: Walk, path: int, step: int) -> str:
-        """Return why a path ends at a step; raise Difference if the robot can move on."""
-        for machine in self._machines:
-            drive, values = machine.first, walk.inputs[machine.name]
-            at = float(values[path, step - 1]) if step else self.near[machine.name]
-            if drive.measures and any(drive.input.apart(at, end) < TURN * drive.input.size
-                                      for arc in drive.reach for end in arc):
-                return 'input turns back'
-        gap = float(walk.gaps[path, step])
-        if not self._is_wrong(walk, path, step):
-            return 'loops end'
+    def _check_end(self, walk: Walk, path: int, step: int) -> None:
+        """
+        Raise Difference if joints are wrong at the end of a path: its loops do not end there.
+
+        They are wrong if they are all that closes the loops, or if the motors alone close them, by
+        a step from the last pose on the path. Past a change point a robot can continue in two
+        ways.
+        """
+        component, gap = self._component, float(walk.gaps[path, step])
+        poses = [self._pose, *(each[[path]] for each in walk.poses[:step])]
+        if math.isnan(gap) or not component.is_of([*walk.joints]).all():
+            motors = {name: walk.joints[name][path, [step]] for name in self._motors}
+            fixed = component.is_of([*motors])
+            new = component.closed(component.moved_to(poses[-1], motors), fixed, 40)
+            stiffness = component.stiffness(np.concatenate([*poses, new]), fixed)
+            if not (np.max(np.abs(component.errors(new)[0] - self._misfit)) < self._allowed
+                    and np.max(np.abs(component.away(new - poses[-1]))) < LEAP
+                    and np.min(stiffness) > CHANGE * np.max(stiffness)):
+                return
         raise Difference(self._at({
             source: walk.joints[source][path, step] for source in self.start
-            if source in self._component.names or len(self._machines) == 1}) + (
+            if source in component.positions or len(self._machines) == 1}) + (
             ' it has no pose, where the loops of the robot are closed' if math.isnan(gap) else
             f' its loops stand open by {gap:.2g} m'))
-
-    def _is_wrong(self, walk: Walk, path: int, step: int) -> bool:
-        """
-        Return whether joints are wrong at the end of a path, rather than loops that end there.
-
-        They are if they are all that closes the loops, or if the motors alone close them, by a
-        step from the last pose on the path. Past a change point a robot can continue in two ways.
-        """
-        component = self._component
-        here = [self._poses, *(each.some([path]) for each in walk.poses[:step])]
-        if not math.isnan(walk.gaps[path, step]) and component.columns_of(
-                [*component.names & walk.joints.keys()]).all():
-            return True
-        motors = {name: walk.joints[name][path, [step]] for name in self._motors}
-        last, fixed = here[-1], component.columns_of([*motors])
-        new = component.closed(component.stepped(last, component.aimed(
-            last, np.zeros((1, len(fixed))), motors)), fixed, 40)
-        leap = component.step_between(last, new) / component.unit
-        stiffness = component.stiffness(Poses(*map(np.concatenate, zip(*here, new))), fixed)
-        return bool(np.max(np.abs(component.errors(new)[0] - self._misfit)) < self._allowed
-                    and np.max(np.abs(leap)) < LEAP
-                    and np.min(stiffness) > CHANGE * np.max(stiffness))
 
     @staticmethod
     def _at(values: Mapping[str, float]) -> str:

@@ -57,10 +57,14 @@ class Loop(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Loops that share bars: ground and its frame, joints, why not planar, and planar parts."""
+    """
+    Loops that share bars: ground, joints, why not planar, and planar parts.
+
+    `links` has a link of the robot for each body: several may be one body.
+    """
 
     ground: str
-    frame_id: str
+    links: Dict[str, str]
     joints: List[Joint]
     why: str
     parts: List['Group']
@@ -110,14 +114,14 @@ def _blocks(robot: Robot, home: Mapping[str, str], joints: Sequence[Joint]) -> L
         chosen = [joint for joint in joints if joint in every]
         ground = min((body for joint in chosen for body in joint.bodies), key=ranks.__getitem__)
         names = {one.name for joint in chosen for one in joint.hinges}
-        frame_id = next((body for joint in robot.joints for body in joint.bodies
-                         if joint.name in names and home[body] == ground), ground)
+        links = {home[body]: body for joint in robot.joints[::-1] for body in joint.bodies[::-1]
+                 if joint.name in names}
         try:
             check_planar(ground, chosen)
             why = ''
         except ValueError as error:
             why = str(error)
-        groups.append(Group(ground, frame_id, chosen, why, []))
+        groups.append(Group(ground, links, chosen, why, []))
     return groups
 
 
@@ -196,7 +200,7 @@ def _lean(joint: Joint, normal: np.ndarray) -> float:
 
 def flat(robot: Robot, group: Group, drives: Sequence[str]) -> Loop:
     """Return loops in their plane; raise ValueError that names nonplanar parts."""
-    ground, frame_id, joints, *_ = group
+    ground, joints, frame_id = group.ground, group.joints, group.links[group.ground]
     hinges, lean = check_planar(ground, joints, drives)
     base = robot.frames[frame_id]
     normal = base[:3, :3].T @ hinges[0].axis

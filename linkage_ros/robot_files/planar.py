@@ -25,7 +25,7 @@ from ..robot_model.robot import Joint, Limits, NotDriven, plain, Robot, SLIDE
 from ..scene.joint_names import quoted_name
 
 # The most joints of which pairs are tried as motors.
-MANY = 30
+MAX_PAIRED = 30
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
 
 
@@ -39,8 +39,6 @@ class Drawing(Dyads):
         The inputs.
     driven : list of Joint
         The joints of the inputs.
-    measured : Joint, optional
-        The motor between two moving links that measures the input.
     limits : dict
         The limits of sources, if they have any.
 
@@ -49,7 +47,6 @@ class Drawing(Dyads):
     def __init__(self, robot: Robot, loop: loops.Loop, drives: Sequence[str]):
         self.loop, self._robot = loop, robot
         self.drives: List[Source] = []
-        self.measured: Optional[Joint] = None
         self.limits: Dict[str, Limits] = {}
         # Tips of triangles that are a dyad: they turn with a link of their own.
         self._tips: Set[str] = set()
@@ -76,11 +73,6 @@ class Drawing(Dyads):
         self.take_apart()
 
     @property
-    def moved_by(self) -> List[Joint]:
-        """Return the motors: the one between two moving links, if there is one."""
-        return [self.measured] if self.measured else self.driven
-
-    @property
     def allowed(self) -> float:
         """Return the allowed distance of a pose from the file's, of the size."""
         return max(ROUNDING, 30.0 * self.loop.gap / self.loop.size + self.loop.lean)
@@ -105,16 +97,14 @@ class Drawing(Dyads):
     @property
     def ends(self) -> Dict[str, Tuple[float, float]]:
         """Return the range of each source in a check [rad or m]."""
-        arounds = {drive.source: (math.pi if drive.name[:5] == 'crank' else 0.5 * self.loop.size)
-                   / abs(drive.ratio) for drive in self.drives}
-        found: Dict[str, Tuple[float, float]] = {}
-        for source, around in {self.measured.name: 0.5 * math.pi}.items() if self.measured \
-                else arounds.items():
-            start = self._robot.positions[source] or 0.0
-            low, high, _ = self.limits.get(source, (start - around, start + around, ()))
+        ends = {}
+        for drive in self.drives:
+            around = math.pi if drive.name[:5] == 'crank' else 0.5 * self.loop.size
+            around, start = around / abs(drive.ratio), self._robot.positions[drive.source]
+            low, high, _ = self.limits.get(drive.source, (start - around, start + around, ()))
             near = min(max(start, low), high)
-            found[source] = max(low, near - 2.0 * around), min(high, near + 2.0 * around)
-        return found
+            ends[drive.source] = max(low, near - 2.0 * around), min(high, near + 2.0 * around)
+        return ends
 
     @property
     def holders(self) -> List[Joint]:
@@ -231,7 +221,7 @@ def described(robot: Robot, group: loops.Group, others: Sequence[str]) -> check.
     Raises ValueError for loops that are no dyads, or whose poses are others than the robot's.
     """
     drawing = _drawn(robot, group)
-    name = plain(drawing.moved_by[0].name, 60)
+    name = plain(drawing.driven[0].name, 60)
     name = f'{name}_{len(others)}' if name in others else name
     loop, given = drawing.loop, {
         f'{name}.{key}': value for key, value in _parameters(drawing)}
@@ -239,20 +229,14 @@ def described(robot: Robot, group: loops.Group, others: Sequence[str]) -> check.
     if not any(called.published for called in machine.joints.values()):
         raise NotPlaced(drawing)
     reports = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
-    drawing.limits, more = robot.limits(drawing.moved_by)
-    reports += more
-    if not drawing.measured:
-        reports += sweeps.added(given, name, drawing.drives, drawing.limits, machine.inputs)
+    drawing.limits, more = robot.limits(drawing.driven)
+    reports += more + sweeps.added(given, name, drawing.drives, drawing.limits, machine.inputs)
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if drawing.apart(machine.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
     slack = loop.lean + loop.gap / loop.size
-    report, ranges, (low, high) = check.compared(
-        robot, machine, [joint.name for joint in drawing.moved_by], drawing.ends, slack)
-    if drawing.measured and drawing.limits:
-        own = f'{name}.{drawing.drives[0].name}'
-        given[f'{own}.sweep'] = [low, high]
-        given[f'{own}.start'] = min(max(given[f'{own}.start'], low), high)
+    report, ranges = check.compared(
+        robot, machine, [joint.name for joint in drawing.driven], drawing.ends, slack)
     reports += [report] + [loop.misfit] * bool(loop.misfit)
     reports += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle '
                 'depends.' for joint, gap in loop.across.items()]
@@ -263,29 +247,21 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
     """Return the lines of loops, with the inputs that place the most bodies."""
     names = [joint.name for joint in group.joints if joint.position is not None]
     motors = [name for name in names if name in robot.driven]
-    tries: List[Sequence[str]] = [motors, [name for name in names
-                                           if name in motors or name in robot.follows]]
+    tries: List[Tuple[Sequence[str], str]] = [(motors, group.ground), ([
+        name for name in names if name in motors or name in robot.follows], group.ground)]
     if not robot.driven:
-        tries += (pair for count in (1, 2)[:1 + (len(names) <= MANY)]
+        tries += ((pair, group.ground) for count in (1, 2)[:1 + (len(names) <= MAX_PAIRED)]
                   for pair in combinations(names, count))
+    # Angles between bodies are the same in the frame of a body that a motor moves.
+    tries += ((motors, body) for joint in group.joints if joint.name in motors
+              for body in joint.bodies if body != group.ground)
     drawings: List[Drawing] = []
-    for drives in tries:
-        loop = loops.flat(robot, group, drives)
+    for drives, ground in tries:
+        loop = loops.flat(robot, group._replace(ground=ground), drives)
         drawings.append(Drawing(robot, loop, drives))
         if not drawings[-1].left:
             break
     best = min(drawings, key=lambda drawing: len(drawing.left))
-    if best.left and len(motors) == 1 and all(
-            group.ground not in joint.bodies for joint in group.joints if joint.name == motors[0]):
-        # A link on the ground drives, and the motor between two moving links measures it.
-        for joint in group.joints:
-            if group.ground in joint.bodies and joint.position is not None:
-                other = Drawing(robot, loops.flat(robot, group, [joint.name]), [joint.name])
-                if (not other.left or other.freedom < 0) and [
-                        each.source for each in other.drives] == [joint.name]:
-                    other.measured = next(each for each in other.loop.joints
-                                          if each.name == motors[0])
-                    return other
     if not best.drives:
         raise NotPlaced(best) if best.left else NotDriven('no motor moves it')
     for i, line in enumerate(best.lines):
@@ -310,40 +286,24 @@ def _why(drawing: Drawing) -> str:
 
 
 def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
-    seen = [(joint, found) for joint in drawing.loop.pins
-            if joint not in drawing.moved_by and joint not in drawing.driven
-            and (found := drawing.measured_by(joint))]
-    measured = drawing.measured and drawing.measured_by(drawing.measured)
+    measured = [(joint, found) for joint in drawing.loop.pins if joint not in drawing.driven
+                and (found := drawing.measured_by(joint))]
     yield 'type', 'custom'
     yield 'joints', drawing.lines
     yield 'frame_id', drawing.loop.frame_id
     yield 'pose', [float(short(value)) for value in coordinates(drawing.loop.frame)]
     links = {link.name: link for link in drawing.linkage.links}
+    for drive in drawing.drives:
+        yield f'{drive.name}.source', drive.source
+        yield f'{drive.name}.ratio', drive.ratio
+        yield f'{drive.name}.offset', float(short(drive.offset))
+        yield f'{drive.name}.start', float(short(drive.value, 1e-15))
     names = []
-
-    def zero_of(joint: Joint, link: str, sign: float, angle: float) -> float:
+    for joint, (link, sign, angle) in measured:
         if links[link].kind != 'prismatic':
             angle = math.remainder(angle - float(np.asarray(links[link].zero)), math.tau)
-        return float(short(joint.start - sign * angle))
-
-    for drive in drawing.drives:
-        source, ratio, offset = drive.source, drive.ratio, float(short(drive.offset))
-        if measured and drawing.measured:
-            names.append(_line(drive.name, ratio, source, -ratio * offset))
-            link, ratio, angle = measured
-            source, offset = drawing.measured.name, -ratio * zero_of(
-                drawing.measured, link, ratio, angle)
-            yield f'{drive.name}.measures', link
-        yield f'{drive.name}.source', source
-        yield f'{drive.name}.ratio', ratio
-        yield f'{drive.name}.offset', offset
-        yield f'{drive.name}.start', float(short(drive.value, 1e-15))
-    names += [_line(found[0], found[1], joint.name, zero_of(joint, *found))
-              for joint, found in seen]
+        zero = float(short(joint.start - sign * angle))
+        names.append(f'{link}={"-" * (sign < 0.0)}{quoted_name(joint.name)}'
+                     + (f'{zero:+}' if zero else ''))
     yield 'joint_names', names
     yield 'only_named', True
-
-
-def _line(link: str, sign: float, name: str, zero: float) -> str:
-    """Return how a link is published, for joint_names."""
-    return f'{link}={"-" * (sign < 0.0)}{quoted_name(name)}' + (f'{zero:+}' if zero else '')

@@ -46,7 +46,7 @@ class Rods:
     """
 
     def __init__(self, robot: Robot, group: Group):
-        ground, self.frame_id = group.ground, group.frame_id
+        ground, self.frame_id = group.ground, group.links[group.ground]
         self._seen = np.linalg.inv(robot.frames[self.frame_id])
         self._driven = {*robot.driven}
         # The joint of each link, and its end of a line: its parent, its place and its axis.
@@ -239,7 +239,7 @@ def described(robot: Robot, group: Group, others: Sequence[str]) -> check.Import
         given[f'{name}.{link}.sweep'] = [float(short(end)) for end in sweep]
         given[f'{name}.{link}.start'] = min(max(found.zeros[link], sweep[0]), sweep[1])
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
-    report, ranges, _ = check.compared(
+    report, ranges = check.compared(
         robot, machine, [joint.name for joint in found.inputs.values()], ends, 0.0)
     return check.Imported(name, given, [*reports, report, *_corners(machine, found)], ranges,
                           still=found.still)

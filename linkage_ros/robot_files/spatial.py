@@ -7,6 +7,7 @@ Loops of a robot closed in space, by Newton's method: many poses at a time.
 Nothing here knows of planes or dyads. A pose is a displacement of each body from where the file
 has it: a product of screws along a tree of joints; joints that are not in the tree are equations
 (R. Murray, Z. Li, S. Sastry: A Mathematical Introduction to Robotic Manipulation, 1994, ch. 3).
+Poses are arrays of the screws' positions, relative to the file, a row a pose [rad or m].
 """
 
 from __future__ import annotations
@@ -21,11 +22,10 @@ from ..robot_model.places import displacements, screws
 from ..robot_model.robot import BALL, FIXED, FREE, HINGE, Joint, Robot, SLIDE, trees
 
 # The largest step of an iteration [rad, or of the size].
-STRIDE = 0.5
+MAX_STEP = 0.5
 # The last step [rad, or of the size]: steps square, so that the next would be rounding.
-STILL = 1e-8
-# The most bodies of one component.
-MOST = 150
+LAST_STEP = 1e-8
+MAX_BODIES = 150
 # Hinges nearer to each other [m] cross in a point.
 TOGETHER = 1e-6
 # Loops open by less, of their size, are closed.
@@ -33,11 +33,11 @@ CLOSED = 1e-10
 # Loops open by more, of their size, are so in the file or by a mistake, not by rounding.
 EXACT = 1e-9
 # Loops that are less stiff, of their size, are at a dead point.
-DEAD = 1e-6
+DEAD_POINT = 3e-4
 
 
-class Element(NamedTuple):
-    """A joint: rotation about an axis, motion along it, or the three rotations of a ball."""
+class Screw(NamedTuple):
+    """A rotation or a translation of a joint: of a ball three, of a free body six."""
 
     joint: Joint
     kind: str
@@ -47,44 +47,31 @@ class Element(NamedTuple):
     body: str
 
 
-class Poses(NamedTuple):
-    """Positions of the elements [rad or m], a row a pose, and the displacement by each."""
-
-    positions: np.ndarray
-    moved: np.ndarray
-
-    def some(self, which: Any) -> 'Poses':
-        """Return some of the poses."""
-        return Poses(self.positions[which], self.moved[which])
-
-
-def blocks(found: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
+def blocks(tree: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
            ) -> List[Tuple[Set[str], List[Joint]]]:
     """Return bodies and cuts of the loops of a tree; loops that share joints are together."""
-    lots: List[Tuple[Set[str], List[Joint]]] = []
+    groups: List[Tuple[Set[str], List[Joint]]] = []
     for cut in cuts:
-        ways: List[Set[str]] = []
+        cycle: Set[str] = set()
         for body in cut.bodies:
-            ways.append(set())
-            while body in found:
-                ways[-1].add(body)
-                body = found[body][0]
-        cycle = ways[0] ^ ways[1]
-        shared = [lot for lot in lots if lot[0] & cycle]
-        lots = [lot for lot in lots if lot not in shared]
-        lots.append((cycle.union(*(lot[0] for lot in shared)),
-                     [each for lot in shared for each in lot[1]] + [cut]))
-    return lots
+            while body in tree:
+                cycle ^= {body}
+                body = tree[body][0]
+        shared = [group for group in groups if group[0] & cycle]
+        groups = [group for group in groups if group not in shared]
+        groups.append((cycle.union(*(bodies for bodies, _ in shared)),
+                       [joint for _, joints in shared for joint in joints] + [cut]))
+    return groups
 
 
 def components(robot: Robot) -> Iterator['Component']:
     """Yield the loops of a robot; those that share joints are one component."""
-    found, cuts = trees(robot)
-    for bodies, own in blocks(found, cuts):
-        if len(bodies) > MOST:
+    tree, cuts = trees(robot)
+    for bodies, joints in blocks(tree, cuts):
+        if len(bodies) > MAX_BODIES:
             raise RequestError(f'{len(bodies)} bodies are in loops that share joints: no more '
-                               f'than {MOST} are closed at once')
-        yield Component(robot, found, bodies, own)
+                               f'than {MAX_BODIES} are closed at once')
+        yield Component(robot, tree, bodies, joints)
 
 
 class Component:
@@ -97,84 +84,75 @@ class Component:
         All joints of the loops.
     size : float
         The greatest distance of two joints in the file's pose [m].
+    unit : array
+        A radian, or the size, for each screw.
+    named : dict
+        The screw of each joint of the tree that has a position.
 
     """
 
-    def __init__(self, robot: Robot, found: Dict[str, Tuple[str, Joint]], bodies: Set[str],
+    def __init__(self, robot: Robot, tree: Dict[str, Tuple[str, Joint]], bodies: Set[str],
                  cuts: Sequence[Joint]):
-        self._elements: List[Element] = []
-        self._cuts = cuts
-        # The last element that moves each body.
-        self._on: Dict[str, int] = {}
-        for body in found:
-            if body in bodies:
-                self._add(found, body)
-        own = {found[body][1] for body in bodies} | {*cuts}
-        self.joints = [joint for joint in robot.joints if joint in own]
+        self._cuts, edges = cuts, {tree[body][1] for body in bodies} | {*cuts}
+        self.joints = [joint for joint in robot.joints if joint in edges]
         places = np.array([place for joint in self.joints for place in joint.places])
         self.size = float(np.max(np.linalg.norm(places - places[0], axis=1))) or 1.0
-        self._above = np.zeros((len(self._elements) + 1, len(self._elements)), bool)
-        for i, each in enumerate(self._elements):
-            self._above[i] = self._above[each.parent]
-            self._above[i, i] = True
-        joints = [each.joint for each in self._elements]
-        self._names = [joint.name for joint in joints]
-        self._named = np.array([joint.position is not None for joint in joints], bool)
-        self._starts = np.array([joint.start for joint in joints])
-        self._is_ball, self._slides = (np.array(
-            [each.kind == kind for each in self._elements], bool) for kind in (BALL, SLIDE))
-        counts = np.where(self._is_ball, 3, 1)
-        self._column = np.repeat(np.arange(len(counts)), counts)
-        self._first = np.cumsum([0, *counts])[:-1]
-        self._balls = self._first[self._is_ball, None] + np.arange(3)
-        self._are_balls = np.array([each.kind == BALL or any(
-            np.linalg.norm(each.place - other.place) < TOGETHER
-            and np.linalg.norm(np.cross(each.axis, other.axis)) > 0.1
-            for other in self._elements if HINGE == each.kind == other.kind)
-            for each in self._elements], bool)
-        self._places = np.array([each.place for each in self._elements]).reshape(-1, 3)
-        axes = np.array([self._elements[i].axis for i in self._column]).reshape(-1, 3)
-        axes[self._balls] = np.eye(3)
-        slides = self._slides[self._column]
-        self._screws = screws(axes, self._places[self._column], slides)
-        self._parents = np.array([self._elements[i].parent for i in self._column], int)
-        self.unit = np.where(slides, self.size, 1.0)
-        self._cut_ends = [[self._last(found, body) for body in cut.bodies] for cut in self._cuts]
-        self._equations()
+        self._screws: List[Screw] = []
+        # The last screw that moves each body.
+        last = {robot.root: -1}
+        for body, (base, joint) in tree.items():
+            last[body] = last[base]
+            if body in bodies:
+                for kind, axis in self._motions(joint, body):
+                    self._screws.append(Screw(joint, kind, joint.place(base), axis,
+                                              last[body], body))
+                    last[body] = len(self._screws) - 1
+        self._parents = np.array([screw.parent for screw in self._screws], int)
+        above = np.zeros((len(self._screws) + 1, len(self._screws)), bool)
+        for i, parent in enumerate(self._parents):
+            above[i] = above[parent]
+            above[i, i] = True
+        self.named = {screw.joint.name: i for i, screw in enumerate(self._screws)
+                      if screw.joint.position is not None}
+        self._is_named = np.isin(np.arange(len(above) - 1), [*self.named.values()])
+        self._starts = np.array([screw.joint.start for screw in self._screws])
+        self._slides = np.array([screw.kind == SLIDE for screw in self._screws], bool)
+        self._in_balls = np.array([any(
+            np.linalg.norm(screw.place - other.place) < TOGETHER
+            and np.linalg.norm(np.cross(screw.axis, other.axis)) > 0.1
+            for other in self._screws if HINGE == screw.kind == other.kind)
+            for screw in self._screws], bool)
+        axes, places = (np.array([getattr(screw, key) for screw in self._screws]).reshape(-1, 3)
+                        for key in ('axis', 'place'))
+        self._twists = screws(axes, places, self._slides)
+        self.unit = np.where(self._slides, self.size, 1.0)
+        self._set_equations(last, above)
 
-    def _last(self, found: Dict[str, Tuple[str, Joint]], body: str) -> int:
-        """Return the last element that moves a body."""
-        while body in found and body not in self._on:
-            body = found[body][0]
-        return self._on.get(body, -1)
+    def _motions(self, joint: Joint, body: str) -> List[Tuple[str, np.ndarray]]:
+        """Return kind and axis of the screws of a joint; far from a ball's singular poses."""
+        if joint.kind in (HINGE, SLIDE):
+            return [(joint.kind, joint.motion(body))]
+        axis = next((other.axis for other in self.joints if other.kind == HINGE), np.eye(3)[2])
+        turns = [(HINGE, way) for way in np.linalg.svd(axis[None])[2]]
+        return {BALL: turns, FREE: [*((SLIDE, way) for way in np.eye(3)), *turns]}.get(
+            joint.kind, [])
 
-    def _add(self, found: Dict[str, Tuple[str, Joint]], body: str) -> None:
-        """Add the elements that move a body; those of its base are there."""
-        base, joint = found[body]
-        parent, place, axis = self._last(found, base), joint.place(base), joint.motion(body)
-        parts = {kind: [(kind, axis)] for kind in (HINGE, SLIDE, BALL)}
-        parts[FREE] = [*((SLIDE, each) for each in np.eye(3)), (BALL, axis)]
-        for kind, way in parts.get(joint.kind, ()):
-            self._elements.append(Element(joint, kind, place, way, parent, body))
-            parent = len(self._elements) - 1
-        self._on[body] = parent
-
-    def _equations(self) -> None:
+    def _set_equations(self, last: Mapping[str, int], above: np.ndarray) -> None:
         """Set the points that coincide on both ends of each cut."""
+        self._cut_ends = [[last[body] for body in cut.bodies] for cut in self._cuts]
         ends, points = [], []
         for end, cut in zip(self._cut_ends, self._cuts):
             ways = [np.zeros((2, 3))]
             if cut.kind == HINGE:
-                one, other = cut.axes
-                ways.append(np.array([one, other if one @ other > 0.0 else -other]))
+                first, second = cut.axes
+                ways.append(np.array([first, second if first @ second > 0.0 else -second]))
             if cut.kind == FIXED:
                 ways += [np.array([turn[:, k] for turn in cut.turns]) for k in range(3)]
             points += [np.array(cut.places) + self.size * way for way in ways]
             ends += [end] * len(ways)
         self._ends = np.array(ends, int).reshape(-1, 2)
         self._points = np.concatenate([points, np.ones((len(ends), 2, 1))], axis=2)
-        above = self._above[self._ends][..., self._column]
-        self._signed = above * np.array([[1.0], [-1.0]])
+        self._signs = above[self._ends] * np.array([[1.0], [-1.0]])
 
     @property
     def positions(self) -> Dict[str, float]:
@@ -187,104 +165,64 @@ class Component:
         """Names of the hinges that close its loops, whose angles `read` returns."""
         return {cut.name for cut in self._cuts if cut.position is not None and cut.kind == HINGE}
 
-    @property
-    def names(self) -> Set[str]:
-        """Names of the joints whose positions `read` returns."""
-        return self.cut_names | {self._names[i] for i in np.flatnonzero(self._named)}
-
-    def at_start(self, count: int = 1) -> Poses:
+    def at_start(self, count: int = 1) -> np.ndarray:
         """Return the pose of the file, `count` times."""
-        return Poses(np.zeros((count, len(self._elements))),
-                     np.tile(np.eye(4), (count, len(self._elements), 1, 1)))
+        return np.zeros((count, len(self._screws)))
 
-    def columns_of(self, names: Sequence[str]) -> np.ndarray:
-        """Return which columns are of the joints that are named."""
-        return np.array([self._names[i] in names for i in self._column], bool)
+    def is_of(self, names: Sequence[str]) -> np.ndarray:
+        """Return which screws are of the joints that are named."""
+        return np.array([screw.joint.name in names for screw in self._screws], bool)
 
-    def most_moved(self, ways: np.ndarray) -> List[str]:
-        """Return the joint with a name that moves the most in some directions."""
-        sizes = np.linalg.norm(ways, axis=0) * self._named[self._column]
-        return [self._names[self._column[int(np.argmax(sizes))]]]
+    def moved_to(self, poses: np.ndarray, positions: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return poses with some joints at positions."""
+        poses = poses.copy()
+        for name in positions.keys() & self.named.keys():
+            poses[:, self.named[name]] = positions[name] - self._starts[self.named[name]]
+        return poses
 
     def towards_limits(self, names: Sequence[str], part: float) -> np.ndarray:
         """Return a step of joints by some part [rad, or of the size], within their limits."""
-        step = np.zeros(len(self._column))
-        for i in map(self._names.index, names):
-            low, high = self._elements[i].joint.range
-            column, start = self._first[i], self._starts[i]
-            change = part * self.unit[column]
+        step = self.at_start()
+        for i in map(self.named.__getitem__, names):
+            (low, high), start = self._screws[i].joint.range, self._starts[i]
+            change = part * self.unit[i]
             if not low <= start + change <= high:
                 change = abs(change) if start < low else -abs(change) if start > high else -change
-            step[column] = change
+            step[:, i] = change
         return step
 
-    def aimed(self, poses: Poses, step: np.ndarray, positions: Mapping[str, np.ndarray]
-              ) -> np.ndarray:
-        """Return a step of poses that leads some joints to positions."""
-        step = step.copy()
-        for name, values in positions.items():
-            i = self._names.index(name)
-            step[:, self._first[i]] = values - self._starts[i] - poses.positions[:, i]
-        return step
-
-    def step_between(self, one: Poses, other: Poses) -> np.ndarray:
-        """Return the difference of two poses in each column; balls have none."""
-        return (other.positions - one.positions)[:, self._column]
-
-    def stiffness(self, poses: Poses, fixed: np.ndarray) -> np.ndarray:
-        """Return the product of singular values of the loops in each pose: 0 at a dead point."""
-        slope = self.errors(poses, True)[1][:, :, ~fixed] / self.size
-        count = np.sum(~fixed) - self.nullity(fixed)
-        return np.prod(np.linalg.svd(slope, compute_uv=False)[:, :count], axis=1)
-
-    def nullity(self, fixed: np.ndarray) -> int:
-        """Return the degrees of freedom that the loops leave, in a random open pose."""
-        step = np.random.default_rng(2).uniform(-0.3, 0.3, (1, len(fixed)))
-        return len(self.free_ways(self.stepped(self.at_start(), step * self.unit), fixed))
-
-    def _frames(self, poses: Poses) -> np.ndarray:
-        """Return the displacement after each element; the last is that of the root."""
-        frames = np.empty((len(poses.positions), len(self._elements) + 1, 4, 4))
+    def _frames(self, poses: np.ndarray) -> np.ndarray:
+        """Return the displacement after each screw; the last is that of the root."""
+        moved = displacements(self._twists, poses, self._slides)
+        frames = np.empty((len(poses), len(self._screws) + 1, 4, 4))
         frames[:, -1] = np.eye(4)
-        for i, each in enumerate(self._elements):
-            np.matmul(frames[:, each.parent], poses.moved[:, i], out=frames[:, i])
+        for i, parent in enumerate(self._parents):
+            np.matmul(frames[:, parent], moved[:, i], out=frames[:, i])
         return frames
 
-    def stepped(self, poses: Poses, step: np.ndarray) -> Poses:
-        """Return poses with a step of the columns [rad or m] more."""
-        positions = poses.positions + np.where(self._is_ball, 0.0, step[:, self._first])
-        moved = displacements(self._screws[self._first], positions, self._slides)
-        if len(self._balls):
-            turn = step[:, self._balls]
-            angle = np.linalg.norm(turn, axis=-1)
-            axes = turn / np.where(angle, angle, 1.0)[..., None]
-            moved[:, self._is_ball] = displacements(
-                screws(axes, self._places[self._is_ball]), angle) @ poses.moved[:, self._is_ball]
-        return Poses(positions, moved)
-
-    def errors(self, poses: Poses, slopes: bool = False) -> Tuple[np.ndarray, np.ndarray]:
-        """Return the residuals of the loops in each pose [m], and their derivatives by columns."""
+    def errors(self, poses: np.ndarray, slopes: bool = False) -> Tuple[np.ndarray, np.ndarray]:
+        """Return the residuals of the loops in each pose [m], and their derivatives by screws."""
         frames = self._frames(poses)
         seen = (frames[:, self._ends] @ self._points[..., None])[..., 0]
         error = (seen[:, :, 0] - seen[:, :, 1])[..., :3].reshape(len(frames), -1)
         if not slopes:
             return error, np.zeros(0)
-        inverse = np.linalg.inv(frames)
-        twists = frames[:, self._parents] @ self._screws @ inverse[:, self._parents]
+        parents = frames[:, self._parents]
+        twists = parents @ self._twists @ np.linalg.inv(parents)
         rates = np.einsum('pcij,prsj->prsci', twists[..., :3, :], seen)
-        slope = np.einsum('prsci,rsc->pric', rates, self._signed)
+        slope = np.einsum('prsci,rsc->pric', rates, self._signs)
         return error, slope.reshape(*error.shape, -1) * self.unit
 
-    def closed(self, poses: Poses, fixed: np.ndarray, count: int = 12, pull: float = 0.0,
-               soft: float = 1e-14) -> Poses:
+    def closed(self, poses: np.ndarray, fixed: np.ndarray, count: int = 12, pull: float = 0.0,
+               soft: float = 1e-14) -> np.ndarray:
         """
         Return poses after so many steps of Newton's method, or fewer if they are closed.
 
-        The columns that are `fixed` do not move. `pull` draws poses to that of the file, by half
+        The screws that are `fixed` do not move. `pull` draws poses to that of the file, by half
         as much in each step. `soft` damps motions that the loops hardly resist. Both are parts of
         the loops' stiffness.
         """
-        free = ~fixed
+        free, poses = ~fixed, poses.copy()
         for i in range(count):
             error, slope = self.errors(poses, True)
             slope = slope[:, :, free]
@@ -293,142 +231,145 @@ class Component:
             weight = soft * np.einsum('pii->p', square)[:, None]
             if pull:
                 weight *= 1.0 + max(pull * 0.5 ** i, 1e-13) / soft
-                force += weight * (poses.positions[:, self._column] / self.unit)[:, free]
+                force += weight * (poses / self.unit)[:, free]
             square += (weight[:, :, None] + 1e-300) * np.eye(free.sum())
-            step = np.zeros((len(error), len(fixed)))
-            step[:, free] = -np.linalg.solve(square, force[..., None])[..., 0]
+            step = np.linalg.solve(square, force[..., None])[..., 0]
             far = np.max(np.abs(step), axis=1, initial=0.0)[:, None]
-            step *= np.minimum(1.0, STRIDE / np.maximum(far, STRIDE)) * self.unit
-            poses = self.stepped(poses, step)
-            if np.all(far < STILL):
+            step *= np.minimum(1.0, MAX_STEP / np.maximum(far, MAX_STEP))
+            poses[:, free] -= step * self.unit[free]
+            if np.all(far < LAST_STEP):
                 break
         return poses
 
-    def gap(self, poses: Poses, rows: Any = slice(None)) -> np.ndarray:
+    def gap(self, poses: np.ndarray, rows: Any = slice(None)) -> np.ndarray:
         """Return the largest residual in each pose, of all or of some rows, as a part of size."""
         return np.max(np.abs(self.errors(poses)[0][:, rows]), axis=1, initial=0.0) / self.size
 
-    def lots(self, fixed: np.ndarray) -> List[Tuple[np.ndarray, np.ndarray]]:
-        """Return columns and residuals of loops that share no joint but those that are fixed."""
-        moved = np.any(self._signed.sum(axis=1, keepdims=True), axis=1) & ~fixed
+    def independent(self, fixed: np.ndarray) -> List[Tuple[np.ndarray, np.ndarray]]:
+        """Return screws and residuals of loops that share no joint but those that are fixed."""
+        moved = np.any(self._signs.sum(axis=1, keepdims=True), axis=1) & ~fixed
         near = (moved @ moved.T) | np.all(self._ends[:, None] == self._ends, axis=2)
         while np.any((more := near @ near) != near):
             near = more
         return [(np.any(moved[rows], axis=0), np.repeat(rows, 3))
                 for rows in np.unique(near, axis=0)]
 
-    def elements_of(self, columns: np.ndarray) -> np.ndarray:
-        """Return which elements have some of the columns."""
-        return np.logical_or.reduceat(columns, self._first)
-
     def outside(self, part: float) -> Dict[str, float]:
         """Return positions inside their limits, by a part of the range, of joints outside."""
-        found = {}
-        for each in (each.joint for each in self._elements if each.joint.position is not None):
-            low, high = each.range
-            if not low <= each.start <= high:
-                aside = part * min(high - low, 1.0)
-                found[each.name] = low + aside if each.start < low else high - aside
-        return found
+        inside = {}
+        for name, i in self.named.items():
+            (low, high), start = self._screws[i].joint.range, self._starts[i]
+            if not low <= start <= high:
+                margin = part * min(high - low, 1.0)
+                inside[name] = low + margin if start < low else high - margin
+        return inside
 
-    def within(self, poses: Poses, elements: Any) -> np.ndarray:
-        """Return in which poses elements with names are inside the limits of their joints."""
-        found, at = np.ones(len(poses.positions), bool), self.read(poses)
-        for i in np.flatnonzero(self._named & elements):
-            low, high = self._elements[i].joint.range
-            found &= (low <= at[self._names[i]]) & (at[self._names[i]] <= high)
-        return found
+    def within(self, poses: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """Return in which poses joints are inside their limits, of some screws."""
+        positions, inside = self.read(poses), np.ones(len(poses), bool)
+        for name, i in self.named.items():
+            low, high = self._screws[i].joint.range
+            inside &= ~which[i] | (low <= positions[name]) & (positions[name] <= high)
+        return inside
 
     def chosen(self, ways: np.ndarray, names: Sequence[str], first: Sequence[str] = ()
                ) -> List[str]:
-        """Return joints that tell where all is, by their columns of the ways to move."""
-        own = [self._names[i] for i in self._column[self.columns_of(names)]]
-        found: List[int] = []
-        for i in sorted(range(len(own)), key=lambda i: own[i] not in first):
-            if np.linalg.matrix_rank(ways[:, [*found, i]], 1e-6) > len(found):
-                found.append(i)
-        return [own[i] for i in found]
+        """Return joints that tell where all is; ways to move have a column for each screw."""
+        found: List[str] = []
+        for name in sorted(names, key=lambda name: name not in first):
+            if np.linalg.matrix_rank(ways[:, self.is_of([*found, name])], 1e-6) > len(found):
+                found.append(name)
+        return found
 
-    def written(self, poses: Poses, elements: Any) -> Dict[str, str]:
-        """Return the positions of elements with names in the first pose."""
-        found = self.read(poses.some(np.arange(1)))
-        return {self._names[i]: f'{found[self._names[i]][0]:.6g}'
-                for i in np.flatnonzero(self._named & elements)}
+    def texts(self, pose: np.ndarray, which: Any) -> Dict[str, str]:
+        """Return the positions of some screws with names in a pose."""
+        positions = self.read(pose[None])
+        return {name: f'{positions[name][0]:.6g}' for name, i in self.named.items() if which[i]}
 
-    def moves(self, poses: Poses) -> Dict[str, np.ndarray]:
-        """Return the displacement of each body on its parent in the first pose."""
+    def moves(self, pose: np.ndarray) -> Dict[str, np.ndarray]:
+        """Return the displacement of each body on its parent in a pose."""
         moved: Dict[str, np.ndarray] = {}
-        for i, each in enumerate(self._elements):
-            moved[each.body] = moved.get(each.body, np.eye(4)) @ poses.moved[0, i]
+        for screw, each in zip(self._screws, displacements(self._twists, pose, self._slides)):
+            moved[screw.body] = moved.get(screw.body, np.eye(4)) @ each
         return moved
 
-    def away(self, positions: np.ndarray) -> np.ndarray:
+    def away(self, poses: np.ndarray) -> np.ndarray:
         """
-        Return how far joints are from where the file has them, each a column [rad, or of size].
+        Return how far screws are from where the file has them [rad, or of the size].
 
         Hinges that cross in a point, as a ball does, do not count: a rod's pose in a file is any.
         """
-        turned = positions - math.tau * np.round(positions / math.tau)
-        return np.where(self._slides, positions / self.size, turned) * ~self._are_balls
+        turned = poses - math.tau * np.round(poses / math.tau)
+        return np.where(self._slides, poses / self.size, turned) * ~self._in_balls
 
-    def free_ways(self, poses: Poses, fixed: np.ndarray, least: float = 3e-4) -> np.ndarray:
+    def free_ways(self, pose: np.ndarray, fixed: np.ndarray, least: float = DEAD_POINT
+                  ) -> np.ndarray:
         """
-        Return in which ways joints of the first pose can move, a row each, at least at first.
+        Return in which ways screws can move in a pose, a row each, at least at first.
 
         Loops that are less stiff than `least`, of their size, do not count.
         """
-        slope = self.errors(poses.some(np.arange(1)), True)[1][0][:, ~fixed]
+        slope = self.errors(pose[None], True)[1][0][:, ~fixed]
         _, values, ways = np.linalg.svd(slope)
         found = np.zeros((len(ways) - np.sum(values > least * self.size), len(fixed)))
         found[:, ~fixed] = ways[len(ways) - len(found):]
         return found
 
-    def free(self, ways: np.ndarray) -> np.ndarray:
-        """Return which elements move in some directions."""
-        return np.maximum.reduceat(np.linalg.norm(ways, axis=0), self._first) > 1e-6
+    def nullity(self, fixed: np.ndarray) -> int:
+        """Return the degrees of freedom that the loops leave, in a random open pose."""
+        pose = np.random.default_rng(2).uniform(-0.3, 0.3, len(fixed)) * self.unit
+        return len(self.free_ways(pose, fixed))
 
-    def loose(self, poses: Poses, motors: Sequence[str]) -> Tuple[List[str], int]:
-        """Return the joints that move while motors do not, and their degrees of freedom."""
-        ways = self.free_ways(poses, self.columns_of(motors))
+    def stiffness(self, poses: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+        """Return the product of singular values of the loops in each pose: 0 at a dead point."""
+        slope = self.errors(poses, True)[1][:, :, ~fixed] / self.size
+        count = np.sum(~fixed) - self.nullity(fixed)
+        return np.prod(np.linalg.svd(slope, compute_uv=False)[:, :count], axis=1)
+
+    def loose(self, pose: np.ndarray, motors: Sequence[str]) -> Tuple[List[str], np.ndarray]:
+        """Return the joints that move while motors do not, and the ways in which they do."""
         # The spin of a rod on balls does not count.
-        ways = ways * ~self._are_balls[self._column]
-        names = [self._names[i] for i in np.flatnonzero(self.free(ways) & self._named)]
-        return names, int(np.linalg.matrix_rank(ways, 1e-6)) if names else 0
+        ways = self.free_ways(pose, self.is_of(motors)) * ~self._in_balls
+        return [name for name, i in self.named.items() if is_free(ways)[i]], ways
 
-    def farthest_apart(self, two: Poses, determined: Any) -> Tuple[str, float, float]:
-        """Return the joint with the largest difference between two poses, and both positions."""
-        apart = np.abs(self.away(two.positions[:1] - two.positions[1:]))[0]
-        apart = apart * determined * self._named
+    def most_different(self, one: np.ndarray, other: np.ndarray, which: Any
+                       ) -> Tuple[str, float, float]:
+        """Return the joint with the largest difference of two poses, and its positions."""
+        apart = np.abs(self.away(one - other)) * which * self._is_named
         if not apart.any():
             return '', 0.0, 0.0
-        name = self._names[int(np.argmax(apart))]
-        first, second = self.read(two)[name]
+        name = self._screws[int(np.argmax(apart))].joint.name
+        first, second = self.read(np.array([one, other]))[name]
         return name, float(first), float(second)
 
-    def immobile(self, poses: Poses) -> List[str]:
-        """Return the joints with a name that cannot move near the first pose, closed."""
-        fixed = self.columns_of([])
-        rng = np.random.default_rng(3)
-        moved = np.zeros(len(self._elements), bool)
+    def immobile(self, pose: np.ndarray) -> List[str]:
+        """Return the joints with a name that cannot move near a closed pose."""
+        fixed, rng = self.is_of([]), np.random.default_rng(3)
+        moved = fixed.copy()
         for _ in range(3):
-            ways = self.free_ways(poses, fixed)
-            moved |= self.free(ways)
+            ways = self.free_ways(pose, fixed)
+            moved |= is_free(ways)
             step = ways.T @ rng.normal(size=len(ways))
             step *= 0.1 / max(np.max(np.abs(step), initial=0.0), 0.1)
-            poses = self.closed(self.stepped(poses, step[None] * self.unit), fixed)
-        return [self._names[i] for i in np.flatnonzero(self._named & ~moved)]
+            pose = self.closed((pose + step * self.unit)[None], fixed)[0]
+        return [name for name, i in self.named.items() if not moved[i]]
 
-    def read(self, poses: Poses) -> Dict[str, np.ndarray]:
+    def read(self, poses: np.ndarray) -> Dict[str, np.ndarray]:
         """Return the positions of named joints [rad or m], within half a turn of the file's."""
-        turns = math.tau * np.round(poses.positions / math.tau)
-        positions = self._starts + poses.positions - np.where(self._slides, 0.0, turns)
-        found = {self._names[i]: positions[:, i] for i in np.flatnonzero(self._named)}
+        turns = math.tau * np.round(poses / math.tau)
+        positions = self._starts + poses - np.where(self._slides, 0.0, turns)
+        found = {name: positions[:, i] for name, i in self.named.items()}
         frames = self._frames(poses)
         for cut, (first, second) in zip(self._cuts, self._cut_ends):
-            if cut.position is not None and cut.kind == HINGE:
+            if cut.name in self.cut_names:
                 turned = frames[:, first, :3, :3].swapaxes(1, 2) @ frames[:, second, :3, :3]
                 across = np.cross(cut.axis, np.eye(3)[np.argmin(np.abs(cut.axis))])
                 ahead = turned @ across
-                found[cut.name] = cut.position + np.arctan2(
+                found[cut.name] = cut.start + np.arctan2(
                     np.cross(across, ahead) @ cut.axis, ahead @ across)
         return found
+
+
+def is_free(ways: np.ndarray) -> np.ndarray:
+    """Return which screws move in some of the ways."""
+    return np.linalg.norm(ways, axis=0) > 1e-6
