@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from textwrap import wrap
 from typing import Callable, Iterable, List, Mapping, NamedTuple, Optional, Sequence
 
@@ -59,6 +60,8 @@ class Code:
         """Return a number in C."""
         if math.isnan(value):
             return 'LKR_NAN'
+        if abs(value) > (3.4e38 if self.single else sys.float_info.max):
+            return f'({"-" * (value < 0.0)}INFINITY)'
         if not self.single:
             return repr(float(value))
         # The shortest text of a float32, as Python writes it: versions of numpy differ.
