@@ -213,7 +213,7 @@ def test_a_signal_while_a_message_is_published_is_no_failure(harness):
 
 @pytest.mark.nightly
 @pytest.mark.parametrize('name, text, named', [
-    ('kinematics', 'mechanisms: [leg]', 'leg.type must be one of water_drop, '),
+    ('kinematics', 'mechanisms: [leg]', 'leg.type must be a text'),
     ('kinematics', 'mechanisms: []', 'mechanisms must be'),
     ('kinematics', 'jansen.dimensions.q: 1.0', 'jansen.dimensions.q is not a parameter'),
     ('kinematics', 'jansen.dimension.a: 1.0', 'jansen.dimension.a is not a parameter'),

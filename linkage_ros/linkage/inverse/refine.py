@@ -95,8 +95,6 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Br
         rounding = min(scale + abs(rate) * max(abs(x), size), most)
         if abs(gap) < least:
             least, best = abs(gap), (x, row)
-            if least <= ROUNDED * rounding:
-                break
         elif least <= ACCEPTED * rounding:
             break
         low, high = (x, high) if gap * sign < 0.0 else (low, x)
@@ -193,8 +191,9 @@ def _step(problem: InverseProblem, gaps: Any, rows: Any) -> Any:
         inverse = 1.0 / (a * d - b * c + 1e-300)
         return [(gaps[0] * d - gaps[1] * c) * inverse, (gaps[1] * a - gaps[0] * b) * inverse]
     jacobian = np.reshape(rows[n:], (n, n, -1)).T
-    jacobian[~(np.abs(np.linalg.det(jacobian)) > 0.0)] = np.nan
-    step = np.linalg.solve(jacobian, np.reshape(gaps, (n, -1)).T[..., None])
+    with np.errstate(all='ignore'):
+        jacobian[~(np.abs(np.linalg.det(jacobian)) > 0.0)] = np.nan
+        step = np.linalg.solve(jacobian, np.reshape(gaps, (n, -1)).T[..., None])
     return step[..., 0].T.reshape(np.shape(gaps))
 
 
