@@ -1412,6 +1412,6 @@ def test_more_random_linkages_come_back_in_any_dialect(tmp_path):
 @pytest.mark.nightly
 @pytest.mark.parametrize('seeds', [
     [79, 84, 129, 179, 191, 301, 361, 531, 616, 643, 681, *range(20)],
-    pytest.param(range(20, 40), marks=pytest.mark.nightly)])
+    pytest.param(range(20, 120), marks=pytest.mark.nightly)])
 def test_random_linkages_come_back_from_robots(seeds):
     check_random_robots(seeds)

@@ -66,6 +66,7 @@ SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 
 UNWRITTEN = 0.123456789
 CALLER = """
 static {name}_memory {name}_m;
+const char *{name}_named(int side, int i) {{ return {name}_model.axis[side][i].name; }}
 int {name}_started(void) {{ return {name}_begin(&{name}_m); }}
 int {name}_sent(int side, const double *from, double *to)
 {{
@@ -240,6 +241,17 @@ def test_a_first_pose_is_found_in_a_small_workspace(tmp_path):
     assert [library[f'{machine.name}_started']() for machine in machines] == [1] * 4
 
 
+@pytest.mark.parametrize('name', SCENE['mechanisms'])
+def test_names_are_those_of_the_scene(library, machines, name):
+    machine, named = machines[name], library[f'{name}_named']
+    named.restype = ctypes.c_char_p
+    sources = [drive.source for drive in machine.inputs.values()]
+    commanded = [{'lever': 'flap', 'int': 'while/1:x', 'leg': 'leg_crank'}.get(name), 'leg_AP']
+    assert [named(0, i).decode() for i in range(len(sources))] == sources
+    assert commanded[0] is None or [named(1, i).decode() for i in range(
+        len(sources))] == commanded[:len(sources)]
+
+
 def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, machines):
     machine, memory = machines['lever'], Memory(library, 'lever', 1)
     (inside, *_), (outside, *_) = (expected(machine, [angle])[2] for angle in (0.3, 0.45))
@@ -371,31 +383,22 @@ def test_what_is_missing_is_said(library, machines):
     status, (position, velocity, effort) = memory.send(1, joint, [math.inf], [nan])
     assert status == 4 and position == pytest.approx(actuator)
     assert velocity == UNWRITTEN and effort == UNWRITTEN
-    # Only a measured position is held.
-    _, (position, velocity, effort) = memory.send(0, actuator, [1.0], [2.0])
-    assert velocity != 0.0 != effort
+    # What is measured is held.
+    _, (position, _, effort) = memory.send(0, actuator, [1.0], [2.0])
     status, found = memory.send(0, [nan], [nan], [nan])
-    assert status == 4 and list(found.ravel()) == [position, 0.0, 0.0]
+    assert status == 4 and list(found.ravel()) == [position, 0.0, effort]
     # A velocity alone is that at the last pose.
     _, (_, velocity, _) = memory.send(0, actuator, [1.0])
     status, (_, again, _) = memory.send(0, [nan], [1.0])
     assert status == 4 and again == velocity != 0.0
 
 
-def test_a_first_effort_is_that_at_the_pose_commanded_with_it(library, machines):
-    joint = expected(machines['rocker'], [0.4])[2]
-    _, (actuator, _, effort) = Memory(library, 'rocker', 1).send(1, joint, [0.0], [2.0])
-    memory = Memory(library, 'rocker', 1)
-    assert memory.send(0, actuator)[0] == 0
-    assert effort == pytest.approx(memory.send(1, joint, [0.0], [2.0])[1][2]) != 0.0
-
-
 def test_a_singular_pose_is_said(library, machines):
     machine, memory = machines['rocker'], Memory(library, 'rocker', 1)
     dead = machine.linkage.extremes('QB')[0][0][1]
-    assert memory.send(0, [1.0], [1.0], [1.0])[1][2] != 0.0
+    _, (_, _, held) = memory.send(0, [1.0], [1.0], [1.0])
     status, (_, velocity, effort) = memory.send(0, [dead], [1.0], [2.0])
-    assert status == 2 and abs(velocity) < 1e-6 and effort == 0.0
+    assert status == 2 and abs(velocity) < 1e-6 and effort == held
     status, (position, velocity, _) = memory.send(1, expected(machine, [dead])[2], [1.0], [1.0])
     assert status == 2 and velocity == 0.0 and np.isfinite(position)
     # So is a velocity that is more than a number can be.

@@ -303,14 +303,16 @@ def test_effort_then_position(plugins):
     assert written[0] == UNWRITTEN and written[2] != UNWRITTEN
 
 
-def test_a_commanded_effort_is_0_at_a_singular_pose(plugins):
+def test_an_effort_is_not_held_over_a_pause(plugins):
     machine, component = plugins.machines['lift'], plugins.component('lift')
     (_, dead), *_ = machine.linkage.extremes('QB')[0]
     good, singular = (poses(machine, crank)[0] for crank in (0.5, dead))
     component.read(good)
-    status, (*_, effort) = component.write(effort=5.0)
-    assert not status & SINGULAR and effort != 0.0
+    _, (*_, held) = component.write(effort=5.0)
     component.read(singular)
+    status, (*_, effort) = component.write(effort=6.0)
+    assert status & SINGULAR and effort == held
+    component.write()
     status, (*_, effort) = component.write(effort=6.0)
     assert status & SINGULAR and effort == 0.0
 
