@@ -65,7 +65,8 @@ def difference(linkage, output, one, other):
 
 @pytest.mark.parametrize('kind', [kind for kind in REFERENCED
                                   if len(mechanisms.create(kind).inputs) == 1])
-def test_every_answer_is_right_to_the_last_digits(kind):
+@pytest.mark.parametrize('values', [2, 40], ids=['floats', 'arrays'])
+def test_every_answer_is_right_to_the_last_digits(kind, values):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(1)
     turning = [link for link in linkage.links if link.kind == 'revolute']
     case = case_of(linkage, [])
@@ -73,7 +74,7 @@ def test_every_answer_is_right_to_the_last_digits(kind):
     for output in outputs(linkage):
         if output in ('block',):  # the truth knows it as its joint's place
             continue
-        wanted = value_at(linkage, output, inside(linkage, rng, 2))
+        wanted = value_at(linkage, output, inside(linkage, rng, values))
         for value, answers in zip(wanted.tolist(), linkage.input_for(output, wanted)):
             for theta in answers[np.isfinite(answers)].tolist():
                 exact = truth(case, theta, turning)

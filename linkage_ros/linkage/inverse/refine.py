@@ -131,7 +131,7 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
     with np.errstate(all='ignore'):
         rows = problem.over(*inputs)
         error = _errors(problem, _gaps(problem, rows, values), rows, inputs)
-        again, left = np.flatnonzero((error > ROUNDED) & (error <= far)), ~(error <= ACCEPTED)
+        again, left = np.flatnonzero((error > 0.0) & (error <= far)), ~(error <= ACCEPTED)
         left &= ~(error > far)
         for _ in range(STEPS if len(again) else 0):
             x = inputs[:, again] - _step(
@@ -141,13 +141,12 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
             new = problem.over(*x)
             less = _errors(problem, _gaps(problem, new, values[:, again]), new, x)
             # Steps out of the reach are shortened one by one.
-            left[again[np.isnan(less)]] = True
+            left[again[np.isnan(less) & (error[again] > ROUNDED)]] = True
             better = less < error[again]
             again = again[better]
             inputs[:, again], rows[:, again] = x[:, better], new[:, better]
             error[again] = less[better]
             left[again] = ~(error[again] <= ACCEPTED)
-            again = again[error[again] > ROUNDED]
         left |= ~np.isfinite(rows[n:]).all(axis=0)
     solutions = np.concatenate([problem.wrapped_arrays(inputs), rows[n:]])
     solutions[:, ~(error <= ACCEPTED)] = np.nan
