@@ -38,14 +38,6 @@ BLOCK_OF_POSES = 4096
 FEW_POSES = 32
 _NUMBERS, _NAMED, _OPERANDS = count(), re.compile(r'\bv\d+'), attrgetter('operands')
 
-def compile_in_background(make: Callable[[], Any]) -> Future:
-    """Run `make` in a thread of its own; return its future."""
-    thread = ThreadPoolExecutor(1, 'linkage_ros compiler')
-    made = thread.submit(make)
-    thread.shutdown(wait=False)
-    return made
-
-
 FLOATS = Dialect({name: row.python for name, row in OPERATIONS.items()}, {
     name: value for name, value in vars(math).items() if not name.startswith('_')})
 ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
@@ -152,7 +144,10 @@ class _Variant:
                 from .llvm_code import Loop
             return Loop(*self.listing.operations())
 
-        return compile_in_background(make)
+        thread = ThreadPoolExecutor(1, 'linkage_ros compiler')
+        made = thread.submit(make)
+        thread.shutdown(wait=False)
+        return made
 
     @cached_property
     def arrays(self) -> Any:

@@ -35,7 +35,7 @@ def ranked(problem: InverseProblem, inputs: Reals, rates: Reals, seed: Reals = (
     least first input. An input beyond an end by rounding of the outputs is at the end.
     """
     order = [x / size for x, size in zip(inputs, problem.sizes)]
-    places = [_nearest(x, y, turn) for x, y, turn in zip(inputs, seed, problem.turns)] or inputs
+    places = [nearest(x, y, turn) for x, y, turn in zip(inputs, seed, problem.turns)] or inputs
     if any(ends):
         places = [_inside(problem, by, place, rates, ends[by], not seed) if ends[by] else place
                   for by, place in enumerate(places)]
@@ -59,7 +59,8 @@ def better(solution: Sequence[Reals], best: Sequence[Reals]) -> List[Reals]:
     return [[where(chosen, x, y) for x, y in zip(*parts)] for parts in zip(solution, best)]
 
 
-def _nearest(x: Real, seed: Real, turn: float) -> Real:
+def nearest(x: Real, seed: Real, turn: float) -> Real:
+    """Return a number that is periodic by a turn, next to a seed."""
     return x if turn == math.inf else x + turn * nearest_integer((seed - x) / turn)
 
 

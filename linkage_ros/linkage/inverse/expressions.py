@@ -12,15 +12,14 @@ from __future__ import annotations
 
 from functools import reduce
 from itertools import product
-import math
 from typing import List, Optional, Tuple
 
-from .choice import better, ranked
+from .choice import better, nearest, ranked
 from .linkage import InverseLinkage
 from .problem import InverseProblem
 from ..geometry.spatial import IN_SINGLE
 from ..tolerances import CLOSE
-from ...formula.expression import argument, gated, nearest_integer, Real, substituted
+from ...formula.expression import argument, gated, Real, real, substituted
 from ...words import listed
 
 # A mode whose outputs are off by more than this [sizes] is no solution.
@@ -45,9 +44,9 @@ def modes_of(problem: InverseProblem, closed: Optional[InverseLinkage]
         inputs = substituted([x + turn for x, turn in zip(mode.inputs, turns)], closed.arguments)
         results = substituted(forward, dict(enumerate(inputs)))
         for by, (turn, scale) in enumerate(zip(problem.periods, problem.scales)):
-            room = OFF * scale - abs(_nearest(results[by] - argument(by), turn))
+            room = OFF * scale - abs(nearest(results[by] - argument(by), real(0.0), turn))
             inputs = [gated(x, room, 0.0) for x in inputs]
-        modes.append(([_nearest(x, turn) for x, turn in zip(inputs, problem.turns)],
+        modes.append(([nearest(x, real(0.0), turn) for x, turn in zip(inputs, problem.turns)],
                       results[problem.n:]))
     return modes
 
@@ -58,8 +57,3 @@ def chosen_of(problem: InverseProblem, closed: Optional[InverseLinkage], follows
     _, places, _ = reduce(lambda best, mode: better(mode, best), [
         ranked(problem, *mode, seed) for mode in modes_of(problem, closed)])
     return [*places]
-
-
-def _nearest(gap: Real, turn: float) -> Real:
-    """Return a difference without whole turns."""
-    return gap - turn * nearest_integer(gap / turn) if turn < math.inf else gap
