@@ -126,7 +126,14 @@ template <class Class, class Side> struct Robot
     return transmission.status();
   }
 };
-#define START(name) static Robot<name##_class, lkr_side> robot
+#define START(name) \\
+  static std::unique_ptr<Robot<name##_class, lkr_side>> started; \\
+  try { started = std::make_unique<Robot<name##_class, lkr_side>>(); } \\
+  catch (const transmission_interface::Exception & refusal) { \\
+    if (std::string(refusal.what()).find("it cannot be assembled") == std::string::npos) throw; \\
+    return; \\
+  } \\
+  auto & robot = *started
 #define SEND(side, name, from, to) robot.send(side, from, to)
 """
 
