@@ -10,7 +10,7 @@ import weakref
 from hypothesis import given, settings, strategies as st
 from linkage_ros import scene
 from linkage_ros.linkage.motion import reach
-from linkage_ros.robot_model import output_range
+from linkage_ros.robot_model import bodies
 import pytest
 
 COUNT = 60
@@ -28,13 +28,13 @@ def linkages(a):
 
 def test_equal_linkages_are_one_and_their_reach_and_travels_are_found_once(monkeypatch):
     found = []
-    for module, name in ((reach, 'arcs'), (output_range, 'extremes')):
+    for module, name in ((reach, 'arcs'), (bodies, 'extremes')):
         find = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *args, name=name, find=find: (
             found.append(name) or find(*args)))
     first, *others = linkages(38.0625)
     assert all(other is first for other in others)
-    travels = [output_range.travels(one, one.reach()) for one in (first, *others)]
+    travels = [bodies.travels(one, one.reach()) for one in (first, *others)]
     assert found == ['arcs', 'extremes'] and travels[0] == travels[2]
     assert linkages(38.125)[0] is not first
 

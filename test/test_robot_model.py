@@ -15,8 +15,7 @@ from linkage_ros import command, scene
 from linkage_ros.robot_model import bodies, mjcf, places, rviz, sdf, urdf
 from linkage_ros.robot_model.assembled import assembled
 from linkage_ros.robot_model.command import main, show
-from linkage_ros.robot_model.output_range import ground_frame
-from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
+from linkage_ros.robot_model.shapes import BARREL, BLOCK, ground_frame, GUIDE, ROD, shapes
 import numpy as np
 import pytest
 from test_simulators import model, simulated, some_quick

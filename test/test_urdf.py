@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_model import urdf
-from linkage_ros.robot_model.output_range import common_reach, travels
+from linkage_ros.robot_model.bodies import travels
 from linkage_ros.scene.legs import Assembly
 import numpy as np
 import pytest

@@ -90,7 +90,7 @@ class Kinematics(scene_node.SceneNode):
             if mechanism.in_space:
                 continue
             if mechanism is not before:
-                bodies.check_range(mechanism)
+                bodies.size(mechanism)
             # Nothing else that has changed can invalidate a robot model, whose limits take long.
             alike = replace(mechanism, linkage=before.linkage, reach=before.reach,
                             inputs=before.inputs, pose=before.pose, points=before.points,

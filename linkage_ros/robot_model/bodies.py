@@ -21,8 +21,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import chain
 import math
 from typing import Any, Dict, Iterable, Iterator, List, Optional, Sequence
 from xml.etree.ElementTree import Element, SubElement
@@ -30,25 +28,28 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from . import shapes
-from .output_range import common_reach, ground_frame, Travel, travels
 from .pieces import BALL, BOX, Piece, Place, Point, ROD
 from .robot import Body, HINGE, Robot, SLIDE
 from .. import palette
-from ..linkage import GROUND, Link
+from ..linkage import Arc, extremes, GROUND, Leg, Link, Mechanism
 from ..scene import SceneError, SceneMechanism
-from ..scene.legs import Assembly
 from ..scene.scene_mechanism import IN_SPACE
 from ..words import listed
 
 # The colours of the markers: bars, driven bodies, guides and joints.
 COLOURS = {'bar': palette.BAR, 'driven': palette.DRIVEN, 'slot': palette.SLOT,
            'joint': palette.JOINT}
-
-# Fractions of the longest bar: radii of bars, joints and barrels, thickness of guides and blocks.
-BAR, JOINT, BARREL, GUIDE, BLOCK = 1 / 80, 1 / 40, 1 / 32, 1 / 80, 1 / 20
-
+# Of each kind of piece: shape, radius (of a box its thickness) as a fraction of the longest bar,
+# and colour; none: that of the link that moves it.
+LOOKS = {'bar': (ROD, 1 / 80, ''), shapes.ROD: (ROD, 1 / 80, 'bar'),
+         shapes.BARREL: (ROD, 1 / 32, ''), shapes.GUIDE: (BOX, 1 / 80, 'slot'),
+         shapes.BLOCK: (BOX, 1 / 20, ''), 'joint': (BALL, 1 / 40, 'joint')}
+# Thickness of bars as a fraction of the longest.
+WIDTH = 1 / 40
 # Range of sizes [m] that displays can draw in single precision.
 SMALLEST, LARGEST = 1e-30, 1e30
+# Margin at each end of a travel: [rad], for a slide as a fraction of the longest bar.
+SLACK = 1e-6
 
 
 @dataclass(eq=False)
@@ -66,17 +67,14 @@ class Part:
             yield Body(self.robot.root, self.base, self.pose)
         yield from self.robot.bodies()
 
-    @cached_property
-    def joints(self) -> List[str]:
-        """Return the names of all joints, including fixed ones."""
+    @property
+    def names(self) -> Dict[str, List[str]]:
+        """Return the names of its links, points among them, and those of all joints."""
         robot = self.robot
-        return [f'{robot.root}_fixed', *(f'{point.name}_fixed' for point in robot.points),
-                *(joint.name for joint in robot.joints)]
-
-    @cached_property
-    def links(self) -> List[str]:
-        """Return the names of the bodies and their points."""
-        return [*self.robot.frames, *(point.name for point in self.robot.points)]
+        points = [point.name for point in robot.points]
+        return {'link': [*robot.frames, *points], 'joint': [
+            *(f'{name}_fixed' for name in (robot.root, *points)),
+            *(joint.name for joint in robot.joints)]}
 
 
 @dataclass
@@ -100,16 +98,12 @@ class Model:
 
     def check_names(self, parameter: str) -> None:
         """Raise SceneError if two links or two joints have the same name."""
-        for tag, several in (('joint', [part.joints for part in self.parts]),
-                             ('link', [part.links for part in self.parts])):
-            names = set().union(*several)
-            if tag == 'link' and self.root in names:
-                raise SceneError('frame_id must differ from the links of the robot model, '
-                                 f'not be {self.root!r}')
-            if len(names) < sum(map(len, several)):
-                (name, _), = Counter(chain(*several)).most_common(1)
-                raise SceneError(f'{parameter} must have other names: the robot model would have '
-                                 f'two {tag}s {name}')
+        for tag, root in ('joint', []), ('link', [self.root]):
+            names = Counter(root + [name for part in self.parts for name in part.names[tag]])
+            (name, count), = names.most_common(1)
+            if count > 1:
+                raise SceneError(f'{parameter} or frame_id must be changed: the robot model '
+                                 f'would have two {tag}s {name}')
 
 
 def robot(machines: Iterable[SceneMechanism], frame_id: str,
@@ -133,188 +127,139 @@ def robot(machines: Iterable[SceneMechanism], frame_id: str,
         a size is out of range.
 
     """
-    return together([_robot(machine, machine.frame_id or frame_id, width) for machine in machines])
+    models = []
+    for machine in machines:
+        base = machine.frame_id or frame_id
+        part = Part(_Tree(machine, width).robot, base, machine.pose, machine)
+        models.append(Model(machine.name, base, [part]))
+        models[-1].check_names(f'{machine.name}.joints')
+    return together(models)
 
 
-def together(robots: Sequence[Model]) -> Model:
+def together(models: Sequence[Model]) -> Model:
     """
     Return robot models as one; raise SceneError if they do not form a tree.
 
     They must have the same root link, or the root of one must be a link of another.
     """
-    if len(robots) == 1:
-        return robots[0]
-    roots = {robot.root for robot in robots}
-    above = {name: robot.root for robot in robots for part in robot.parts
-             for name in roots.intersection(part.links)}
-    # From each root link those on which it is, up to the last.
-    lines = {robot.root: [robot.root] for robot in robots}
+    if len(models) == 1:
+        return models[0]
+    parts = [part for model in models for part in model.parts]
+    below = {link: part.base for part in parts for link in part.names['link']}
+    # From the base of each part the bases below it, up to the last.
+    lines = {part.base: [part.base] for part in parts}
     for line in lines.values():
-        while len(line) <= len(roots) and line[-1] in above:
-            line.append(above[line[-1]])
+        while len(line) <= len(lines) and line[-1] in below:
+            line.append(below[line[-1]])
     root, *more = tops = dict.fromkeys(line[-1] for line in lines.values())
-    if more or root in above:
+    if more or root in below:
         raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
                          f'link of another one of them, not {listed(tops, 120)}')
-    made = Model('linkages', root, [part for robot in sorted(
-        robots, key=lambda robot: len(lines[robot.root])) for part in robot.parts])
+    made = Model('linkages', root, sorted(parts, key=lambda part: len(lines[part.base])))
     made.check_names('mechanisms')
     return made
 
 
-def _robot(machine: SceneMechanism, frame_id: str, width: Optional[float]) -> Model:
-    part = Part(_Tree(machine, width).robot(), frame_id, machine.pose, machine)
-    made = Model(machine.name, frame_id, [part])
-    made.check_names(f'{machine.name}.joints')
-    _check_places(machine, _numbers(part))
-    return made
-
-
-def _numbers(part: Part) -> Iterator[float]:
-    yield from part.pose
-    for frame in part.robot.frames.values():
-        yield from frame[:3, 3]
-    for joint in part.robot.joints:
-        yield from joint.limits or ()
-    for point in part.robot.points:
-        yield from point.place
-
-
 def size(machine: SceneMechanism) -> float:
-    """Return the length of the longest bar [m]; raise SceneError if it is out of range."""
+    """Return the length of the longest bar [m]; raise SceneError for a place out of range."""
     length = machine.scale * float(machine.linkage.longest)
-    if not SMALLEST <= length <= LARGEST:
-        raise SceneError(
-            f'{machine.name}.scale and {machine.name}.dimensions must make the longest bar from '
-            f'{SMALLEST:g} to {LARGEST:g} m long, not {length:g}')
+    places = np.array([*shapes.ground_frame(machine.linkage).values()])
+    far = max(length, *map(abs, machine.pose), machine.scale * np.abs(places).max(initial=0.0),
+              *(abs(joint.offset) for joint in machine.joints.values()))
+    if not (SMALLEST <= length and far <= LARGEST):
+        name = machine.name
+        raise SceneError(f'{name}.pose, {name}.scale and {name}.dimensions must make the longest '
+                         f'bar {SMALLEST:g} m long or more, and keep everything within '
+                         f'{LARGEST:g} m: they are {length:g} and {far:g} m')
     return length
 
 
-def check_range(machine: SceneMechanism) -> None:
-    """Raise SceneError if the longest bar or the pose is out of range."""
-    size(machine)
-    _check_places(machine, machine.pose)
-
-
-def _check_places(machine: SceneMechanism, numbers: Iterable[float]) -> None:
-    for value in numbers:
-        if not abs(value) <= LARGEST:
-            raise SceneError(f'{machine.name}.pose, {machine.name}.scale and {machine.name}'
-                             f'.dimensions must keep everything within {LARGEST:g} m, not at '
-                             f'{value:g}')
-
-
 class _Tree:
-    """The bodies of a mechanism."""
+    """The bodies of a mechanism: ground, the root, crank and legs, in `robot`."""
 
     def __init__(self, machine: SceneMechanism, width: Optional[float]):
         if machine.in_space:
             raise SceneError(f'{machine.name} is {IN_SPACE}')
         length = size(machine)
-        self._thickness = length if width is None else 0.5 * width / BAR
-        self._machine, self._assembly = machine, machine.assembly()
-        self._links = machine.linkage.links
+        self._length = length if width is None else width / WIDTH
+        self._machine, legs = machine, machine.assembly().legs
         self._shapes = shapes.shapes(machine)
-        self._frames = {GROUND: ground_frame(machine.linkage), **machine.linkage.frames}
-        self._travels = {**travels(machine.linkage, machine.reach),
-                         **_input_travels(machine, self._assembly)}
-        self._shared = len(self._assembly.legs) > 1 and self._links[0]
-
-    def robot(self) -> Robot:
-        """Return ground, crank and legs; the ground is the root."""
-        ground = self._name('', GROUND)
-        self._robot = Robot(ground, {ground: np.eye(4)})
-        legs = self._assembly.legs
-        self._robot.pieces[ground] = [
-            piece for side in dict.fromkeys(leg.side for leg in legs.values())
-            for piece in self._sliding(side, GROUND)]
+        self._frames = {GROUND: shapes.ground_frame(machine.linkage), **machine.linkage.frames}
+        self._travels = {**_input_travels(machine), **{
+            name: (machine.scale_of(name) * low, machine.scale_of(name) * high)
+            for name, (low, high) in travels(machine.linkage, machine.reach).items()}}
+        ground = self._body('', GROUND)
+        self.robot = Robot(ground, {ground: np.eye(4)}, pieces={ground: []})
+        self._shared = machine.linkage.links[0] if len(legs) > 1 else None
         if self._shared:
-            self._with_hub(self._move('', 1.0, self._shared))
+            self._hang('', 1.0, self._shared)
+            self._add_hub(self._body('', self._shared.name))
         for prefix, leg in legs.items():
-            ends: Counter[str] = Counter()
-            self._robot.points += self._points(prefix, leg.side, GROUND, ground, ends)
-            for link in self._links:
-                name = self._name(prefix, link.name)
-                if link is self._shared:
-                    # The pins of a leg are fixed to the crank of all legs.
-                    self._robot.hang(name, self._name('', link.name),
-                                     (0.0, 0.0, 0.0, 0.0, 0.0, -leg.lag))
-                else:
-                    self._move(prefix, leg.side, link)
-                self._robot.pieces[name] = [*self._bars(leg.side, link.name),
-                                            *self._sliding(leg.side, link.name)]
-                points = [*self._points(prefix, leg.side, link.name, name, ends, link.joint)]
-                self._robot.points += points
-                if not points:
-                    self._with_hub(name)
-        return self._robot
+            self._add_leg(prefix, leg)
 
-    def _move(self, prefix: str, side: float, link: Link) -> str:
+    def _add_leg(self, prefix: str, leg: Leg) -> None:
+        robot, ends = self.robot, Counter[str]()
+        links = {link.name: link for link in self._machine.linkage.links}
+        for name, frame in self._frames.items():
+            body, link = self._body(prefix, name), links.get(name)
+            if link and link is self._shared:
+                # The pins of a leg are fixed to the crank of all legs.
+                robot.hang(body, self._body('', name), (0.0, 0.0, 0.0, 0.0, 0.0, -leg.lag))
+            elif link:
+                self._hang(prefix, leg.side, link)
+            pieces = robot.pieces.setdefault(body, [])
+            pieces += [piece for piece in self._pieces(leg.side, name) if piece not in pieces]
+            points = [point for point in frame if not link or point != link.joint]
+            for point in points:
+                ends[point] += 1
+                met = f'{self._machine.name}_{prefix}{point}'
+                cut = f'_cut{ends[point] - 1 if ends[point] > 2 else ""}' * (ends[point] > 1)
+                robot.points.append(Point(
+                    met + cut, body, self._place(leg.side, name, frame[point]),
+                    met if cut else '', LOOKS['joint'][1] * self._length))
+            if link and not points:
+                self._add_hub(body)
+
+    def _hang(self, prefix: str, side: float, link: Link) -> None:
         """Add a body that moves on its parent; in a mirrored leg the other way round."""
-        prismatic, mirrored = link.kind == 'prismatic', side < 0.0
-        zero = float(np.asarray(link.zero))
-        zero = math.pi - zero if mirrored and link.parent == GROUND else zero
-        travel = self._travels.get(link.name)
-        if travel and mirrored:
-            travel = -travel[1], -travel[0]
-        if travel and prismatic:
-            travel = self._machine.scale * travel[0], self._machine.scale * travel[1]
+        slides, zero = link.kind == 'prismatic', side * float(np.asarray(link.zero))
+        if side < 0.0 and link.parent == GROUND:
+            zero += math.pi
         x, y = self._place(side, link.parent, self._frames[link.parent][link.joint])
         called = self._machine.joints[prefix + link.name]
         # The link's position at a published value of zero.
         back = -called.sign * called.offset
-        if prismatic:
+        if slides:
             x, y = x + side * back * math.cos(zero), y + side * back * math.sin(zero)
-        else:
-            zero += back
-        name = self._name(prefix, link.name)
-        self._robot.hang(
-            name, self._name(prefix, link.parent), (x, y, 0.0, 0.0, 0.0, zero),
-            SLIDE if prismatic else HINGE,
-            (called.sign * side, 0.0, 0.0) if prismatic else (0.0, 0.0, called.sign),
-            called.travel(travel) if travel else None, called.name)
-        return name
+        travel = self._travels.get(link.name)
+        limits = travel and called.travel((side * travel[0], side * travel[1]))
+        self.robot.hang(
+            self._body(prefix, link.name), self._body(prefix, link.parent),
+            (x, y, 0.0, 0.0, 0.0, zero if slides else zero + back),
+            SLIDE if slides else HINGE,
+            (called.sign * side, 0.0, 0.0) if slides else (0.0, 0.0, called.sign),
+            limits, called.name)
 
-    def _bars(self, side: float, name: str) -> Iterator[Piece]:
-        """Yield the bars of a link as rods."""
-        for bar in self._machine.linkage.bars:
-            if self._frames[name].keys() >= {*bar}:
-                start, end = (self._place(side, name, self._frames[name][point]) for point in bar)
-                yield Piece(ROD, self._colour(name), BAR * self._thickness, start, end)
+    def _pieces(self, side: float, name: str) -> Iterator[Piece]:
+        """Yield the bars of a link, and the guides, blocks, barrels and rods on it."""
+        frame, bars = self._frames[name], self._machine.linkage.bars if name != GROUND else ()
+        drawn = [('bar', name, frame[start], frame[end]) for start, end in bars
+                 if start in frame and end in frame]
+        drawn += [(shape.kind, shape.slide.name, shape.start[1:], shape.end[1:])
+                  for shape in self._shapes if shape.start.link == name]
+        for kind, mover, *ends in drawn:
+            form, thickness, colour = LOOKS[kind]
+            start, end = (self._place(side, name, place) for place in ends)
+            if start != end:
+                yield Piece(form, colour or ('driven' if mover in self._machine.inputs else 'bar'),
+                            thickness * self._length, start, end)
 
-    def _colour(self, name: str) -> str:
-        return 'driven' if name in self._machine.inputs else 'bar'
-
-    def _sliding(self, side: float, name: str) -> Iterator[Piece]:
-        """Yield the guides, blocks, barrels and rods in them on a link."""
-        for shape in self._shapes:
-            if shape.start.link == name:
-                start, end = (self._place(side, name, spot[1:]) for spot in shape[2:])
-                drawn, thickness, colour = {
-                    shapes.GUIDE: (BOX, GUIDE, 'slot'), shapes.ROD: (ROD, BAR, 'bar'),
-                    shapes.BLOCK: (BOX, BLOCK, self._colour(shape.slide.name)),
-                    shapes.BARREL: (ROD, BARREL, self._colour(shape.slide.name))}[shape.kind]
-                if start != end:
-                    yield Piece(drawn, colour, thickness * self._thickness, start, end)
-
-    def _points(self, prefix: str, side: float, name: str, body: str, ends: Counter[str],
-                but: str = '') -> Iterator[Point]:
-        """Yield joints of a link, including those that it was cut off."""
-        for point, place in self._frames[name].items():
-            if point != but:
-                met = f'{self._machine.name}_{prefix}{point}'
-                ends[point] += 1
-                cut = f'_cut{ends[point] - 1 if ends[point] > 2 else ""}' * (ends[point] > 1)
-                yield Point(met + cut, body, self._place(side, name, place), met if cut else '',
-                            JOINT * self._thickness)
-
-    def _with_hub(self, body: str) -> None:
+    def _add_hub(self, body: str) -> None:
         """Add a visible hub with a weight to a body without joints."""
-        origin = (0.0, 0.0)
-        self._robot.pieces.setdefault(body, []).append(
-            Piece(BALL, 'joint', JOINT * self._thickness, origin, origin))
+        self.robot.pieces.setdefault(body, []).append(
+            Point('', body, (0.0, 0.0), '', LOOKS['joint'][1] * self._length).ball())
 
-    def _name(self, prefix: str, name: str) -> str:
+    def _body(self, prefix: str, name: str) -> str:
         return f'{self._machine.name}_{"" if name == GROUND else prefix}{name}_link'
 
     def _place(self, side: float, name: str, place: Sequence[float]) -> Place:
@@ -323,21 +268,54 @@ class _Tree:
         return (side * x, y) if name == GROUND else (x, side * y)
 
 
-def _input_travels(machine: SceneMechanism, assembly: Assembly) -> Dict[str, Optional[Travel]]:
-    """Return the outermost ends of each input's reach, unscaled; None: full rotation."""
-    found: Dict[str, Optional[Travel]] = {}
-    for input_ in machine.linkage.inputs:
-        single = len(machine.inputs) == 1
-        arcs = common_reach(assembly) if single else [(input_.low, input_.high)]
-        if not arcs or input_.is_whole(arcs):
-            found[input_.name] = None
-            continue
-        low, high = min(lo for lo, _ in arcs), max(hi for _, hi in arcs)
-        sweep = machine.inputs[input_.name].sweep if input_.turns else None
-        # A crank's angle is in the turn of its sweep.
-        turns = math.tau * math.floor((sweep[1] - low) / math.tau) if sweep else 0.0
-        found[input_.name] = low + turns, high + turns
-    return found
+def _input_travels(machine: SceneMechanism) -> Dict[str, Arc]:
+    """Return the outermost ends of each input's reach that is no full rotation."""
+    ends: Dict[str, Arc] = {}
+    if machine.first.input.turns and len(machine.assembly().legs) > 1:
+        return ends
+    for name, settings in machine.inputs.items():
+        arcs, sweep = settings.reach, settings.sweep
+        if not settings.input.is_whole(arcs):
+            low, high = min(low for low, _ in arcs), max(high for _, high in arcs)
+            # A crank's angle is in the turn of its sweep.
+            turns = math.tau * math.floor((sweep[1] - low) / math.tau) if (
+                sweep and settings.input.turns) else 0.0
+            ends[name] = low + turns, high + turns
+    return ends
+
+
+def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Arc]:
+    """
+    Return the travel of each joint except the inputs.
+
+    Parameters
+    ----------
+    linkage : Mechanism
+        The linkage.
+    reach : sequence of (float, float)
+        Arcs of its input [rad or m].
+
+    Returns
+    -------
+    dict
+        For joints the bounds (lo, hi) of their values in `joint_angles` [rad; a slide: m], wider
+        by SLACK; none for a joint that turns past +-pi. With several inputs, whose reach depends
+        on each other, it is empty.
+
+    """
+    inputs = {input_.name for input_ in linkage.inputs}
+    kinds = {link.name: link.kind for link in linkage.links if link.name not in inputs}
+    if len(inputs) > 1 or not kinds:
+        return {}
+    turning = np.array([kind != 'prismatic' for kind in kinds.values()])
+    ends = linkage.cache.get_or_make(('travels', *reach), lambda: np.array([extremes(
+        lambda theta: np.stack([*linkage.joint_angles(theta, [*kinds]).values()]), *arc, turning)
+        for arc in reach]))
+    slack = np.where(turning, SLACK, SLACK * float(linkage.longest))
+    lows, highs = ends[:, :, 0, 0].min(axis=0) - slack, ends[:, :, 1, 0].max(axis=0) + slack
+    return {name: (low, high) for name, turns, low, high in zip(
+        kinds, turning, lows.tolist(), highs.tolist())
+        if not turns or -math.pi < low < high <= math.pi}
 
 
 def numbers(*values: float) -> str:

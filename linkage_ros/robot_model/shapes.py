@@ -16,7 +16,6 @@ from typing import Any, Collection, Dict, Iterable, List, NamedTuple, Optional, 
 
 import numpy as np
 
-from .output_range import ground_frame
 from ..linkage import GROUND, Link, LinkPoint, Mechanism
 from ..scene import SceneMechanism
 
@@ -45,6 +44,13 @@ class Shape(NamedTuple):
     def is_fixed(self) -> bool:
         """Whether it is on the ground."""
         return self.start.link == GROUND
+
+
+def ground_frame(linkage: Mechanism) -> Dict[str, Tuple[float, ...]]:
+    """Return the places of the joints on the ground [m]."""
+    return linkage.cache.get_or_make('ground', lambda: {
+        name: tuple(place.ravel().tolist()) for name, place in linkage.solve(
+            [0.0] * len(linkage.inputs), linkage.grounded).items()})
 
 
 def shapes(machine: SceneMechanism) -> List[Shape]:

@@ -12,7 +12,7 @@ import numpy as np
 from .nearest_pose import nearest_inputs
 from .settings import is_number, shown
 from ..linkage import Arc, Formula, Mechanism
-from ..robot_model.output_range import ground_frame
+from ..robot_model.shapes import ground_frame
 from ..scene import InputSettings, Scene, SceneMechanism, slider
 from ..words import listed, quoted
 
