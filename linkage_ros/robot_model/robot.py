@@ -272,6 +272,11 @@ class Robot:
         if ratio:
             self.follows[name] = other, float(ratio), float(offset)
 
+    def changes(self, name: str) -> Tuple[str, float, float]:
+        """Return what a joint follows, with ratio and offset of their changes from this pose."""
+        other, ratio, offset = self.follows[name]
+        return other, ratio, offset + ratio * self.positions[other] - self.positions[name]
+
     @property
     def positions(self) -> Dict[str, float]:
         """Return the positions of all joints that have a name."""
