@@ -26,7 +26,7 @@ import sys
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_model import bodies, mjcf
-from linkage_ros.robot_model.assembled import assembled
+from linkage_ros.robot_model.bodies import assembled
 import numpy as np
 
 from . import document

@@ -16,7 +16,7 @@ from xml.sax.saxutils import quoteattr
 from linkage_ros import scene
 from linkage_ros.robot_files import command, readers
 from linkage_ros.robot_model import bodies, mjcf, sdf
-from linkage_ros.robot_model.assembled import assembled
+from linkage_ros.robot_model.bodies import assembled
 from linkage_ros.robot_model.robot import trees
 import numpy as np
 import pytest

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 from hypothesis import given, settings, strategies as st
 from linkage_ros import command, scene
 from linkage_ros.robot_model import bodies, mjcf, places, rviz, sdf, urdf
-from linkage_ros.robot_model.assembled import assembled
+from linkage_ros.robot_model.bodies import assembled
 from linkage_ros.robot_model.command import main, show
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, ground_frame, GUIDE, ROD, shapes
 import numpy as np

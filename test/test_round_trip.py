@@ -10,7 +10,7 @@ from pathlib import Path
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import model, readers
 from linkage_ros.robot_model import bodies, mjcf, sdf, urdf
-from linkage_ros.robot_model.assembled import assembled
+from linkage_ros.robot_model.bodies import assembled
 from linkage_ros.robot_model.pieces import BALL, Piece
 import numpy as np
 import pytest

@@ -9,7 +9,8 @@ from pathlib import Path
 from linkage_ros import scene
 from linkage_ros.robot_files import command as from_robot, readers
 from linkage_ros.robot_model import bodies, mjcf, sdf
-from linkage_ros.robot_model.assembled import assembled, weight
+from linkage_ros.robot_model.bodies import assembled
+from linkage_ros.robot_model.pieces import weight
 import numpy as np
 import pytest
 from test_urdf import drives, in_space, MACHINES, OWN, posed

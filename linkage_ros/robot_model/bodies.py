@@ -19,8 +19,8 @@ Legs of a walker have their prefix before link and point, and one crank for all 
 
 from __future__ import annotations
 
-from collections import Counter
-from dataclasses import dataclass
+from collections import Counter, defaultdict
+from dataclasses import dataclass, replace
 import math
 from typing import Any, Dict, Iterable, Iterator, List, Optional, Sequence
 from xml.etree.ElementTree import Element, SubElement
@@ -28,11 +28,12 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from . import shapes
-from .pieces import BALL, BOX, Piece, Place, Point, ROD
-from .robot import Body, HINGE, Robot, SLIDE
+from .pieces import BALL, BOX, Piece, Place, Point, ROD, weight
+from .robot import Body, HINGE, posed, Robot, SLIDE
 from .. import palette
 from ..linkage import Arc, extremes, GROUND, Leg, Link, Mechanism
 from ..scene import SceneError, SceneMechanism
+from ..scene.motion import Motion
 from ..scene.scene_mechanism import IN_SPACE
 from ..words import listed
 
@@ -48,6 +49,8 @@ LOOKS = {'bar': (ROD, 1 / 80, ''), shapes.ROD: (ROD, 1 / 80, 'bar'),
 WIDTH = 1 / 40
 # Range of sizes [m] that displays can draw in single precision.
 SMALLEST, LARGEST = 1e-30, 1e30
+# Density of aluminium [kg/m^3].
+DENSITY = 2700.0
 # Margin at each end of a travel: [rad], for a slide as a fraction of the longest bar.
 SLACK = 1e-6
 
@@ -59,7 +62,7 @@ class Part:
     robot: Robot
     base: str = ''
     pose: Sequence[float] = ()
-    machine: Optional[SceneMechanism] = None
+    machine: Any = None
 
     def bodies(self) -> Iterator[Body]:
         """Yield its bodies, parents first, with the root if it stands on a link."""
@@ -316,6 +319,77 @@ def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Arc]:
     return {name: (low, high) for name, turns, low, high in zip(
         kinds, turning, lows.tolist(), highs.tolist())
         if not turns or -math.pi < low < high <= math.pi}
+
+
+def assembled(model: Model, density: float = DENSITY) -> Model:
+    """
+    Return a robot model for simulators, with closed loops, masses, gears and motors.
+
+    All inputs are at their starts, so that every loop is closed at the beginning of a simulation;
+    raises SceneError if there is no pose.
+    """
+    points = {point.name: point for part in model.parts for point in part.robot.points}
+    parts = []
+    for part in model.parts:
+        base, pose = part.base, part.pose
+        if point := points.get(base):
+            (x, y), (u, v, *turned) = point.place, pose
+            base, pose = point.body, (u + x, v + y, *turned)
+        parts.append(replace(part, base=base, pose=pose, robot=_started(part, density)))
+    return replace(model, parts=parts, density=density)
+
+
+def _started(part: Part, density: float) -> Robot:
+    """Return the robot of a mechanism at the start of its inputs, with motors and gears."""
+    machine, joints = part.machine, part.machine.joints
+    assembly, linkage, inputs = machine.assembly(), machine.linkage, machine.inputs
+    values = {name: Motion.of(settings).at(0)[0] for name, settings in inputs.items()}
+    starts, rates = [*values.values()], defaultdict[str, Dict[str, float]](dict)
+    solution = assembly.solution((), assembly.joints, linkage.geared)
+    for driving in inputs:
+        solution.solve(starts, [float(name == driving) for name in inputs])
+        for prefix, row in zip(assembly.legs, solution.rows.tolist()):
+            values.update((prefix + name, value) for name, value in zip(assembly.joints, row))
+            for name, rate in zip(linkage.geared, row[len(assembly.joints):]):
+                rates[prefix + name][driving] = rate
+    if not np.isfinite([*values.values()]).all():
+        keys = ' and '.join(f'{machine.name}.{name}.start' for name in inputs)
+        raise SceneError(f'{keys} must be where {machine.name} can be assembled, not at '
+                         f'{", ".join(f"{start:g}" for start in starts)}')
+    positions = {joints[name].name: joints[name].of(value) for name, value in values.items()}
+    robot = replace(part.robot, points=[*part.robot.points], driven=[], servos={}, follows={})
+    robot = posed(robot, {name: positions[name] for name in robot.positions})
+    _add_slots(machine, robot)
+    mass = sum(weight(robot.solid(body), density).mass for body in [*robot.frames][1:])
+    tips = {link.name: link.tip for link in linkage.links}
+    for name in inputs:
+        joint, arm = joints[name], machine.scale * math.hypot(*linkage.frames[name][tips[name]])
+        robot.driven.append(joint.name)
+        robot.servos[joint.name] = mass, arm or size(machine)
+    sweeps = {joints[name].name: tuple(sorted(map(joints[name].of, settings.sweep)))
+              for name, settings in inputs.items() if settings.sweep}
+    robot.joints = [replace(joint, limits=sweeps.get(joint.name)) for joint in robot.joints]
+    for name, by in rates.items():
+        driving = max(by, key=lambda name: abs(by[name]))
+        geared, other = joints[name], joints[driving]
+        ratio = geared.sign * by[driving] * other.sign
+        robot.follow(geared.name, other.name, ratio,
+                     positions[geared.name] - ratio * positions[other.name])
+    return robot
+
+
+def _add_slots(machine: SceneMechanism, robot: Robot) -> None:
+    """Add the bodies in slots of yokes, which have no joint in the tree."""
+    points = {point.name: point for point in robot.points}
+    for prefix in machine.assembly().legs:
+        for link, pin in machine.linkage.yokes.items():
+            name, point = (f'{machine.name}_{prefix}{end}' for end in (link, pin))
+            place = robot.frames[points[point].body] @ (*points[point].place, 0.0, 1.0)
+            x, y = np.linalg.solve(robot.frames[f'{name}_link'], place)[:2].tolist()
+            robot.hang(f'{name}_slot_link', f'{name}_link', (x, y, 0.0, 0.0, 0.0, 0.5 * math.pi),
+                       SLIDE, (1.0, 0.0, 0.0), None, f'{name}_slot')
+            robot.points.append(Point(f'{name}_pin', f'{name}_slot_link', (0.0, 0.0), point,
+                                      points[point].radius))
 
 
 def numbers(*values: float) -> str:

@@ -7,7 +7,7 @@ import argparse
 from typing import List, Optional
 
 from . import bodies, mjcf, sdf, urdf
-from .assembled import assembled, DENSITY
+from .bodies import assembled, DENSITY
 from .. import command, scene
 
 NAME = 'urdf'
