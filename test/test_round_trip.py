@@ -11,7 +11,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import model, readers
 from linkage_ros.robot_model import bodies, mjcf, sdf, urdf
 from linkage_ros.robot_model.bodies import assembled
-from linkage_ros.robot_model.pieces import BALL, Piece
+from linkage_ros.robot_model.shapes import BALL, Piece
 import numpy as np
 import pytest
 from test_robot_files import random_urdf, ROBOTS

@@ -10,7 +10,7 @@ from linkage_ros import scene
 from linkage_ros.robot_files import command as from_robot, readers
 from linkage_ros.robot_model import bodies, mjcf, sdf
 from linkage_ros.robot_model.bodies import assembled
-from linkage_ros.robot_model.pieces import weight
+from linkage_ros.robot_model.shapes import weight
 import numpy as np
 import pytest
 from test_urdf import drives, in_space, MACHINES, OWN, posed
@@ -213,7 +213,7 @@ def test_bodies_weigh_what_mujoco_finds_their_shapes_to_weigh():
     for what in 'body_mass', 'body_ipos', 'body_inertia':
         assert getattr(given, what)[moving] == pytest.approx(getattr(shapes, what)[moving])
     wide = model([simulated('engine')], density=2000.0)
-    masses = [weight(each.parts[0].robot.solid('m_crank_link'), each.density).mass
+    masses = [weight(each.parts[0].robot.solid('m_crank_link'), each.density)[0]
               for each in (wide, built)]
     assert masses[0] == pytest.approx(2.0 * masses[1])
 

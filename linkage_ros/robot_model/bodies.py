@@ -28,8 +28,8 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from . import shapes
-from .pieces import BALL, BOX, Piece, Place, Point, ROD, weight
 from .robot import Body, HINGE, posed, Robot, SLIDE
+from .shapes import BALL, BOX, CYLINDER, Piece, Place, Point, weight
 from .. import palette
 from ..linkage import Arc, extremes, GROUND, Leg, Link, Mechanism
 from ..scene import SceneError, SceneMechanism
@@ -37,13 +37,14 @@ from ..scene.motion import Motion
 from ..scene.scene_mechanism import IN_SPACE
 from ..words import listed
 
-# The colours of the markers: bars, driven bodies, guides and joints.
-COLOURS = {'bar': palette.BAR, 'driven': palette.DRIVEN, 'slot': palette.SLOT,
-           'joint': palette.JOINT}
+# The colours of the markers, red, green, blue and opacity: bars, driven bodies, guides, joints.
+COLOURS = {name: (*palette.rgb(code), 1.0) for name, code in (
+    ('bar', palette.BAR), ('driven', palette.DRIVEN), ('slot', palette.SLOT),
+    ('joint', palette.JOINT))}
 # Of each kind of piece: shape, radius (of a box its thickness) as a fraction of the longest bar,
 # and colour; none: that of the link that moves it.
-LOOKS = {'bar': (ROD, 1 / 80, ''), shapes.ROD: (ROD, 1 / 80, 'bar'),
-         shapes.BARREL: (ROD, 1 / 32, ''), shapes.GUIDE: (BOX, 1 / 80, 'slot'),
+LOOKS = {'bar': (CYLINDER, 1 / 80, ''), shapes.ROD: (CYLINDER, 1 / 80, 'bar'),
+         shapes.BARREL: (CYLINDER, 1 / 32, ''), shapes.GUIDE: (BOX, 1 / 80, 'slot'),
          shapes.BLOCK: (BOX, 1 / 20, ''), 'joint': (BALL, 1 / 40, 'joint')}
 # Thickness of bars as a fraction of the longest.
 WIDTH = 1 / 40
@@ -360,7 +361,7 @@ def _started(part: Part, density: float) -> Robot:
     robot = replace(part.robot, points=[*part.robot.points], driven=[], servos={}, follows={})
     robot = posed(robot, {name: positions[name] for name in robot.positions})
     _add_slots(machine, robot)
-    mass = sum(weight(robot.solid(body), density).mass for body in [*robot.frames][1:])
+    mass = sum(weight(robot.solid(body), density)[0] for body in [*robot.frames][1:])
     tips = {link.name: link.tip for link in linkage.links}
     for name in inputs:
         joint, arm = joints[name], machine.scale * math.hypot(*linkage.frames[name][tips[name]])

@@ -18,9 +18,8 @@ from xml.etree.ElementTree import Element, indent, tostring
 import numpy as np
 
 from .bodies import add, COLOURS, Model, numbers
-from .pieces import BALL, BOX, ROD, weight
 from .robot import Body, HINGE, Joint, Robot
-from .. import palette
+from .shapes import BALL, BOX, CYLINDER, weight
 
 # Time step [s] for a linkage of a metre; smaller linkages oscillate faster.
 STEP = 1e-3
@@ -76,11 +75,11 @@ def _add_body(parent: Element, body: Body, robot: Robot, density: float) -> Elem
             moved.set('range', numbers(*np.clip(joint.limits, -FAR, FAR)))
     for piece in robot.solid(body.name):
         half, thickness = 0.5 * piece.length, piece.thickness
-        sizes = {ROD: (thickness, half), BOX: (half, 0.5 * thickness, 0.5 * thickness),
+        sizes = {CYLINDER: (thickness, half), BOX: (half, 0.5 * thickness, 0.5 * thickness),
                  BALL: (thickness,)}[piece.shape]
         add(made, 'geom', type=piece.shape, pos=numbers(*piece.pose[:3]),
             euler=numbers(*piece.pose[3:]), size=numbers(*sizes),
-            rgba=numbers(*palette.rgb(COLOURS[piece.colour]), 1.0))
+            rgba=numbers(*COLOURS[piece.colour]))
     for point in robot.points:
         if point.body == body.name:
             add(made, 'site', name=point.name, pos=numbers(*point.place, 0.0), group='4')

@@ -27,8 +27,8 @@ from typing import (
 
 import numpy as np
 
-from .pieces import Piece, Point
 from .places import at, coordinates, displacements, pose, screws
+from .shapes import Piece, Point
 from ..command import RequestError
 from ..words import listed, meant
 

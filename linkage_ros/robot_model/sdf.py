@@ -17,9 +17,8 @@ from typing import Sequence
 from xml.etree.ElementTree import Element, indent, tostring
 
 from .bodies import add, COLOURS, Model
-from .pieces import Piece, weight
 from .robot import Body, HINGE, Joint, Robot, SLIDE
-from .. import palette
+from .shapes import Piece, weight
 
 UNTURNED = 0.0, 0.0, 0.0
 
@@ -91,7 +90,7 @@ def _add_body(made: Element, model: Model, robot: Robot, body: Body, solid: Sequ
             add(shape, tag, *values)
         material = add(visual, 'material')
         for tag in 'ambient', 'diffuse':
-            add(material, tag, *palette.rgb(COLOURS[piece.colour]), 1.0)
+            add(material, tag, *COLOURS[piece.colour])
     if not (joint := body.joint):
         _add_joint(made, f'{body.name}_fixed', 'fixed', parent, body.name)
         return

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Shapes of a linkage for drawing: sliding parts, cranks, plates and marks of the ground.
+Shapes of a linkage for drawing, and visible pieces of bodies with their weight.
 
 Sliding parts are a cylinder's barrel and rod, a block, and the guide that it runs on. Each is a
 straight piece of one link, so it moves with that link in markers, pictures and models.
@@ -12,13 +12,15 @@ from __future__ import annotations
 
 import cmath
 from itertools import combinations
-from typing import Any, Collection, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
+import math
+from typing import Any, Collection, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
 from ..linkage import GROUND, Link, LinkPoint, Mechanism
 from ..scene import SceneMechanism
 
+# Kinds of sliding parts.
 GUIDE, BLOCK, BARREL, ROD = 'guide', 'block', 'barrel', 'rod'
 # Half the length of a block, and of a guide beyond its travel, as a fraction of the longest bar.
 HALF_BLOCK = 1 / 20
@@ -26,10 +28,13 @@ HALF_BLOCK = 1 / 20
 SHORT_BARREL, LONG_BARREL = 0.5, 0.9
 # Height of a ground joint's mark, as a fraction of the longest bar; half its width per height.
 MARK, HALF_MARK = 1 / 15, 0.6
-# A smaller area counts as zero, as a fraction of the longest bar squared.
-FLAT = 1e-9
+# A plate with a smaller area is not drawn, as a fraction of the longest bar squared.
+MIN_AREA = 1e-9
 # Number of poses that determine the travel of a slide.
 SAMPLES = 361
+# Names of visible shapes in all formats.
+CYLINDER, BOX, BALL = 'cylinder', 'box', 'sphere'
+Place = Tuple[float, float]
 
 
 class Shape(NamedTuple):
@@ -60,12 +65,37 @@ def shapes(machine: SceneMechanism) -> List[Shape]:
     if not slides:
         return []
     frames = {GROUND: ground_frame(linkage), **linkage.frames}
-    found: List[Shape] = []
-    for link, (low, high) in _travels(machine, slides):
-        pieces = (_cylinder(link, low, high) if (link.joint, link.tip) in linkage.cylinders
-                  else _block(link, low, high, frames, HALF_BLOCK * linkage.longest))
-        found += [Shape(kind, link, start, end) for kind, start, end in pieces]
-    return sorted(found, key=lambda shape: shape.kind != GUIDE)
+    count = max(round(SAMPLES ** (1.0 / len(machine.inputs))), 2)
+    lengths = linkage.joint_angles(input_values(machine, count), [link.name for link in slides])
+    guides, others = [], []
+    for link in slides:
+        values = lengths[link.name][np.isfinite(lengths[link.name])]
+        if not values.size:
+            continue
+        low, high = float(values.min()), float(values.max())
+        if (link.joint, link.tip) in linkage.cylinders:
+            # The barrel is as long as the stroke, within its limits.
+            barrel = min(max(high - low, SHORT_BARREL * low), LONG_BARREL * low)
+            others += [_shape(BARREL, link, link.parent, 0.0, barrel),
+                       _shape(ROD, link, link.name, barrel - high, 0.0)]
+            continue
+        half, tip = HALF_BLOCK * linkage.longest, complex(*frames[link.name][link.tip])
+        start, along = complex(*frames[link.parent][link.joint]), cmath.rect(1.0, float(np.asarray(link.zero)))
+        guides.append(_shape(GUIDE, link, link.parent, *(
+            start + along * (tip + end) for end in (low - half, high + half))))
+        others.append(_shape(BLOCK, link, link.name, tip - half, tip + half))
+    return guides + others
+
+
+def _shape(kind: str, slide: Link, link: str, *ends: complex) -> Shape:
+    return Shape(kind, slide, *(LinkPoint(link, end.real, end.imag) for end in ends))
+
+
+def input_values(machine: SceneMechanism, count: int) -> Any:
+    """Return values of the inputs through their ends or parts of their reach, before scale."""
+    values = [np.concatenate([np.linspace(*arc, count) for arc in settings.arcs])
+              / machine.scale_of(name) for name, settings in machine.inputs.items()]
+    return np.meshgrid(*values) if len(values) > 1 else values[0]
 
 
 def drawn(machine: SceneMechanism, names: Collection[str]) -> List[Shape]:
@@ -87,11 +117,8 @@ def plates(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, str, s
     return [corners for frame in linkage.frames.values()
             for corners in combinations([name for name in frame if name in names], 3)
             if bars.issuperset(map(frozenset, combinations(corners, 2)))
-            and _area(*(complex(*frame[name]) for name in corners)) > FLAT * linkage.longest ** 2]
-
-
-def _area(p: complex, q: complex, r: complex) -> float:
-    return abs(((q - p).conjugate() * (r - p)).imag) / 2.0
+            and abs(np.linalg.det([(*frame[name], 1.0) for name in corners]))
+            > 2.0 * MIN_AREA * linkage.longest ** 2]
 
 
 def marks(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, LinkPoint, LinkPoint]]:
@@ -103,39 +130,75 @@ def marks(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, LinkPoi
             for name, (x, y) in ground_frame(linkage).items() if name in names]
 
 
-def _cylinder(link: Link, low: float, high: float) -> Iterable[Tuple[str, LinkPoint, LinkPoint]]:
-    """Yield barrel and rod; the barrel is as long as the stroke, within its limits."""
-    barrel = min(max(high - low, SHORT_BARREL * low), LONG_BARREL * low)
-    yield BARREL, LinkPoint(link.parent, 0.0, 0.0), LinkPoint(link.parent, barrel, 0.0)
-    yield ROD, LinkPoint(link.name, barrel - high, 0.0), LinkPoint(link.name, 0.0, 0.0)
+class Piece(NamedTuple):
+    """A visible shape of a body, from start to end [m], with a radius or a box's sizes [m]."""
+
+    shape: str
+    colour: str
+    thickness: float
+    start: Place
+    end: Place
+
+    @property
+    def length(self) -> float:
+        """Its length [m]."""
+        return math.dist(self.start, self.end)
+
+    @property
+    def pose(self) -> Tuple[float, ...]:
+        """Its middle x, y, z [m], roll, pitch, yaw [rad]; pitch lays a cylinder's z along x."""
+        (x, y), (u, v) = self.start, self.end
+        return (0.5 * (x + u), 0.5 * (y + v), 0.0, 0.0,
+                0.5 * math.pi if self.shape == CYLINDER else 0.0, math.atan2(v - y, u - x))
+
+    @property
+    def sizes(self) -> Dict[str, Tuple[float, ...]]:
+        """Its sizes [m], by their names in URDF and SDF."""
+        if self.shape == BOX:
+            return {'size': (self.length, self.thickness, self.thickness)}
+        length = {'length': (self.length,)} if self.shape == CYLINDER else {}
+        return {'radius': (self.thickness,), **length}
+
+    @property
+    def solid(self) -> Tuple[float, float, float]:
+        """Its volume [m^3], and squares of radii of gyration about and across it [m^2]."""
+        thick, long = self.thickness ** 2, self.length ** 2 / 12.0
+        return {CYLINDER: (math.pi * thick * self.length, 0.5 * thick, 0.25 * thick + long),
+                BOX: (thick * self.length, thick / 6.0, thick / 12.0 + long),
+                BALL: (4.0 / 3.0 * math.pi * self.thickness ** 3, 0.4 * thick, 0.4 * thick)
+                }[self.shape]
 
 
-def _block(link: Any, low: float, high: float, frames: Dict[str, dict],
-           half: float) -> Iterable[Tuple[str, LinkPoint, LinkPoint]]:
-    """Yield the guide, on the parent link of a slide, and the block."""
-    x, y = frames[link.name][link.tip]
-    start, along = complex(*frames[link.parent][link.joint]), cmath.rect(1.0, link.zero)
-    first, last = (start + along * complex(x + end, y) for end in (low - half, high + half))
-    yield (GUIDE, LinkPoint(link.parent, first.real, first.imag),
-           LinkPoint(link.parent, last.real, last.imag))
-    yield BLOCK, LinkPoint(link.name, x - half, y), LinkPoint(link.name, x + half, y)
+class Point(NamedTuple):
+    """
+    A joint of a linkage on a body.
+
+    `meets` is the coinciding point on another body if a loop was cut here.
+    """
+
+    name: str
+    body: str
+    place: Place
+    meets: str
+    radius: float
+
+    def ball(self, place: Place = (0.0, 0.0)) -> Piece:
+        """Return its visible ball, at a place in its own frame or in another."""
+        return Piece(BALL, 'joint', self.radius, place, place)
 
 
-def _travels(machine: SceneMechanism,
-             slides: Sequence[Link]) -> Iterable[Tuple[Link, Tuple[float, float]]]:
-    """Yield how far each goes [m] while the inputs take all values that they may, before scale."""
-    count = max(round(SAMPLES ** (1.0 / len(machine.inputs))), 2)
-    found = machine.linkage.joint_angles(input_values(machine, count),
-                                         [link.name for link in slides])
-    for link in slides:
-        values = found[link.name][np.isfinite(found[link.name])]
-        if values.size:
-            yield link, (float(values.min()), float(values.max()))
+def weight(pieces: Sequence[Piece], density: float) -> Tuple[float, List[float], List[float]]:
+    """
+    Return the common weight of one or more pieces of a density [kg/m^3].
 
-
-def input_values(machine: SceneMechanism, count: int) -> Any:
-    """Return values of the inputs through their ends or parts of their reach, before scale."""
-    values = [np.concatenate([np.linspace(low, high, count) for low, high in (
-        [drive.ends] if drive.ends else drive.reach)]) / machine.scale_of(name)
-        for name, drive in machine.inputs.items()]
-    return np.meshgrid(*values) if len(values) > 1 else values[0]
+    It is a mass [kg], the centre of mass x, y [m], and the moments of inertia xx, yy, zz, xy about
+    it [kg m^2].
+    """
+    volumes, about, across = np.array([piece.solid for piece in pieces]).T
+    poses, masses = np.array([piece.pose for piece in pieces]), density * volumes
+    mass = masses.sum()
+    centre = masses @ poses[:, :2] / mass
+    (x, y), c, s = (poses[:, :2] - centre).T, np.cos(poses[:, 5]), np.sin(poses[:, 5])
+    moments = [about * c * c + across * s * s + y * y, about * s * s + across * c * c + x * x,
+               across + x * x + y * y, (about - across) * c * s - x * y]
+    return float(mass), centre.tolist(), [float(masses @ moment) for moment in moments]

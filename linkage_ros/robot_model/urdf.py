@@ -18,9 +18,8 @@ from xml.etree.ElementTree import Element, indent, tostring
 
 from . import bodies
 from .bodies import add, COLOURS, Model, numbers
-from .pieces import Piece
 from .robot import Body, HINGE
-from .. import palette
+from .shapes import Piece
 from ..scene import SceneMechanism
 
 # The end of a joint that has none [rad or m].
@@ -35,8 +34,8 @@ def describe(machines: Iterable[SceneMechanism], frame_id: str) -> str:
 def write(model: Model) -> str:
     """Return a robot model as URDF."""
     root = Element('robot', name=model.name)
-    for colour, code in COLOURS.items():
-        add(add(root, 'material', name=colour), 'color', rgba=numbers(*palette.rgb(code), 1.0))
+    for colour, rgba in COLOURS.items():
+        add(add(root, 'material', name=colour), 'color', rgba=numbers(*rgba))
     add(root, 'link', name=model.root)
     for part in model.parts:
         for body in part.bodies():
