@@ -33,11 +33,9 @@ def coordinates(matrix: np.ndarray) -> Tuple[float, ...]:
     """Return x, y, z [m], roll, pitch and yaw [rad] of a pose (4, 4)."""
     a, b = matrix[:2, 0]
     yaw = math.atan2(b, a) if math.hypot(a, b) > 1e-9 else 0.0
-    sin, cos = math.sin(yaw), math.cos(yaw)
-    ahead, aside = matrix[:2, 2], matrix[:2, 1]
-    return (*matrix[:3, 3].tolist(),
-            math.atan2(sin * ahead[0] - cos * ahead[1], cos * aside[1] - sin * aside[0]),
-            math.atan2(-matrix[2, 0], cos * a + sin * b), yaw)
+    left = pose(0.0, 0.0, 0.0, 0.0, 0.0, -yaw) @ matrix
+    return (*matrix[:3, 3].tolist(), math.atan2(-left[1, 2], left[1, 1]),
+            math.atan2(-left[2, 0], left[0, 0]), yaw)
 
 
 def screws(axes: np.ndarray, places: np.ndarray, slides: Any = False) -> np.ndarray:

@@ -12,18 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 import math
 import re
-from typing import (
-    Any,
-    Dict,
-    Iterable,
-    Iterator,
-    List,
-    Mapping,
-    NamedTuple,
-    Optional,
-    Sequence,
-    Tuple,
-)
+from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -54,7 +43,7 @@ class Limits(NamedTuple):
 
     low: float
     high: float
-    joints: Tuple[str, ...]
+    joints: tuple[str, ...]
 
     def text(self, joint: str) -> str:
         """Return the limits of a joint as text."""
@@ -88,15 +77,15 @@ class Joint:
 
     name: str
     kind: str
-    bodies: Tuple[str, str]
+    bodies: tuple[str, str]
     places: Any
     axes: Any
     position: Optional[float] = None
-    limits: Optional[Tuple[float, float]] = None
+    limits: Optional[tuple[float, float]] = None
     no_limits: str = ''
     turns: Any = (np.eye(3), np.eye(3))
     is_cut: bool = False
-    parts: Tuple['Joint', ...] = ()
+    parts: tuple[Joint, ...] = ()
 
     def other(self, body: str) -> str:
         """Return the body that it joins to one."""
@@ -121,28 +110,27 @@ class Joint:
         return self.position or 0.0
 
     @property
-    def range(self) -> Tuple[float, float]:
+    def range(self) -> tuple[float, float]:
         """Return its limits [rad or m], infinite ones without any."""
         return self.limits or (-math.inf, math.inf)
 
     @property
-    def chain(self) -> List[Tuple['Joint', float]]:
+    def chain(self) -> list[tuple[Joint, float]]:
         """
         Return the hinges of a ball from its first body to its second, if all have positions.
 
         With each its sign: 1 if its second body is nearer to that of the ball.
         """
-        found: List[Tuple[Joint, float]] = []
+        chain: list[tuple[Joint, float]] = []
         body, left = self.bodies[0], self.hinges if self.parts else []
-        if any(joint.position is None for joint in left):
-            return []
         while near := [joint for joint in left if body in joint.bodies]:
-            found.append((near[0], 1.0 if near[0].bodies[0] == body else -1.0))
-            body, left = near[0].other(body), [joint for joint in left if joint is not near[0]]
-        return found
+            hinge = near[0]
+            chain.append((hinge, 1.0 if hinge.bodies[0] == body else -1.0))
+            body, left = hinge.other(body), [joint for joint in left if joint is not hinge]
+        return [] if any(hinge.position is None for hinge, _ in chain) else chain
 
     @property
-    def hinges(self) -> List['Joint']:
+    def hinges(self) -> list[Joint]:
         """Return the hinges of a ball that is made of some, else the joint itself."""
         return [one for part in self.parts for one in part.hinges] or [self]
 
@@ -182,18 +170,18 @@ class Robot:
     """
 
     root: str
-    frames: Dict[str, np.ndarray] = field(default_factory=dict)
-    joints: List[Joint] = field(default_factory=list)
-    driven: List[str] = field(default_factory=list)
-    follows: Dict[str, Tuple[str, float, float]] = field(default_factory=dict)
-    held: Dict[str, float] = field(default_factory=dict)
-    pieces: Dict[str, List[Piece]] = field(default_factory=dict)
-    points: List[Point] = field(default_factory=list)
-    servos: Dict[str, Tuple[float, float]] = field(default_factory=dict)
+    frames: dict[str, np.ndarray] = field(default_factory=dict)
+    joints: list[Joint] = field(default_factory=list)
+    driven: list[str] = field(default_factory=list)
+    follows: dict[str, tuple[str, float, float]] = field(default_factory=dict)
+    held: dict[str, float] = field(default_factory=dict)
+    pieces: dict[str, list[Piece]] = field(default_factory=dict)
+    points: list[Point] = field(default_factory=list)
+    servos: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def hang(self, name: str, parent: str, place: Sequence[float], kind: str = FIXED,
              axis: Sequence[float] = (0.0, 0.0, 1.0),
-             limits: Optional[Tuple[float, float]] = None, joint: str = '') -> None:
+             limits: Optional[tuple[float, float]] = None, joint: str = '') -> None:
         """Add a body on another one, at x, y, z [m], roll, pitch, yaw [rad], by its joint at 0."""
         frame = self.frames[name] = self.frames[parent] @ pose(*place)
         self.joints.append(Joint(
@@ -201,12 +189,12 @@ class Robot:
             (frame[:3, :3] @ axis,) * 2, None if kind == FIXED else 0.0, limits, '',
             (frame[:3, :3],) * 2))
 
-    def solid(self, body: str) -> List[Piece]:
+    def solid(self, body: str) -> list[Piece]:
         """Return what is seen of a body and of its points."""
         return [*self.pieces.get(body, ()), *(
             point.ball(point.place) for point in self.points if point.body == body)]
 
-    def bodies(self) -> Iterator['Body']:
+    def bodies(self) -> Iterator[Body]:
         """Yield the bodies on the root, parents first; a joint is at the origin of its body."""
         span = max(float(np.max(np.abs(frame[:3, 3]))) for frame in self.frames.values())
         for name, (base, joint) in trees(self)[0].items():
@@ -222,7 +210,7 @@ class Robot:
             if is_apart or not moves:
                 yield Body(name, base, _seen(seen, frame, span))
 
-    def join(self, name: str, kind: str, bodies: Tuple[str, str], frame: np.ndarray,
+    def join(self, name: str, kind: str, bodies: tuple[str, str], frame: np.ndarray,
              axis: Any = (0.0, 0.0, 1.0), other: Optional[np.ndarray] = None,
              position: Optional[float] = None,
              limits: Sequence[Any] = (-math.inf, math.inf), second: Any = None) -> None:
@@ -236,32 +224,31 @@ class Robot:
                 raise RequestError(f'joint {name} is on {body!r}, which is no link')
         ends, no_limits = _limits(limits, kind.lower() == 'continuous')
         kind = KINDS.get(kind.lower(), kind.lower())
-        frames, ways = (frame, frame if other is None else other), [
-            axis, axis if second is None else second]
-        places = tuple(each[:3, 3] for each in frames)
+        frames = frame, frame if other is None else other
+        ways = axis, axis if second is None else second
+        turns, places = (tuple(each[:3, part] for each in frames) for part in (slice(3), 3))
         sizes = np.linalg.norm(ways, axis=1)
         if not np.all(np.abs((*places, *ways)) < FARTHEST):
             raise RequestError(f'joint {name} must be within {FARTHEST:g} m')
         if kind in (HINGE, SLIDE, UNIVERSAL) and not np.all(sizes > 0.0):
             raise RequestError(f'the axis of joint {name} has no length')
-        if kind == UNIVERSAL and second is None:
-            raise RequestError(f'joint {name} is universal and must have two axes')
-        if kind == UNIVERSAL:
-            # Two hinges with a cross between them.
-            cross = f'{name}/cross'
-            self.frames[cross] = frame
-            self.join(name, HINGE, (bodies[0], cross), frame, axis, None, position)
-            self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame, ways[1], other,
-                      position if other is None else None)
+        if kind != UNIVERSAL:
+            self.joints.append(Joint(
+                name, kind, bodies, places, tuple(
+                    turn @ way / (size or 1.0) for turn, way, size in zip(turns, ways, sizes)),
+                position if kind in (HINGE, SLIDE) else None, ends, no_limits, turns,
+                other is not None))
             return
-        turns = tuple(each[:3, :3] for each in frames)
-        self.joints.append(Joint(
-            name, kind, bodies, places,
-            tuple(turn @ way / (size or 1.0) for turn, way, size in zip(turns, ways, sizes)),
-            position if kind in (HINGE, SLIDE) else None, ends, no_limits, turns,
-            other is not None))
+        if second is None:
+            raise RequestError(f'joint {name} is universal and must have two axes')
+        # Two hinges with a cross between them.
+        cross = f'{name}/cross'
+        self.frames[cross] = frame
+        self.join(name, HINGE, (bodies[0], cross), frame, axis, None, position)
+        self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame, second, other,
+                  position if other is None else None)
 
-    def close(self, name: str, kind: str, bodies: Tuple[str, str], own: Sequence[np.ndarray],
+    def close(self, name: str, kind: str, bodies: tuple[str, str], own: Sequence[np.ndarray],
               axis: Any = (0.0, 0.0, 1.0), second: Any = None) -> None:
         """Close a loop by a joint, by its frame on each body as this has it; see `join`."""
         first, other = (self.frames[body] @ frame for body, frame in zip(bodies, own))
@@ -272,13 +259,13 @@ class Robot:
         if ratio:
             self.follows[name] = other, float(ratio), float(offset)
 
-    def changes(self, name: str) -> Tuple[str, float, float]:
+    def changes(self, name: str) -> tuple[str, float, float]:
         """Return what a joint follows, with ratio and offset of their changes from this pose."""
         other, ratio, offset = self.follows[name]
         return other, ratio, offset + ratio * self.positions[other] - self.positions[name]
 
     @property
-    def positions(self) -> Dict[str, float]:
+    def positions(self) -> dict[str, float]:
         """Return the positions of all joints that have a name."""
         return {joint.name: joint.position for joint in self.joints if joint.position is not None}
 
@@ -290,7 +277,7 @@ class Robot:
                                    f'{listed(self.positions, 200)}'
                                    f'{meant(name, self.positions)}')
 
-    def sources(self, name: str) -> List[Tuple[str, float, float]]:
+    def sources(self, name: str) -> list[tuple[str, float, float]]:
         """Return a joint and those that it depends on in turn, each with ratio and offset."""
         found, passed = [(name, 1.0, 0.0)], [*self.driven]
         while name in self.follows and name not in passed:
@@ -303,35 +290,32 @@ class Robot:
                                f'{meant(name, self.positions)}')
         return found
 
-    def source(self, name: str) -> Tuple[str, float, float]:
+    def source(self, name: str) -> tuple[str, float, float]:
         """Return the joint that another depends on, or itself, with ratio and offset."""
         return self.sources(name)[-1]
 
-    def limits(self, joints: Iterable[Joint]) -> Tuple[Dict[str, Limits], List[str]]:
+    def limits(self, joints: Iterable[Joint]) -> tuple[dict[str, Limits], list[str]]:
         """
         Return the limits of each source, and a report on those that do not count.
 
         They are those of joints and of all that these depend on.
         """
-        found: Dict[str, Limits] = {}
-        reports: Dict[str, str] = {}
+        limits: dict[str, Limits] = {}
+        reports: dict[str, str] = {}
         named = {joint.name: joint for joint in self.joints if joint.position is not None}
-        for joint in joints:
-            own = self.sources(joint.name)
-            source, ratio, offset = own[-1]
-            for name, factor, start in own:
-                if name not in named:
-                    continue
-                each = named[name]
-                if each.limits:
+        for sources in (self.sources(joint.name) for joint in joints):
+            source, ratio, offset = sources[-1]
+            for name, factor, start in sources:
+                joint = named.get(name)
+                if joint and joint.limits:
                     ends = sorted(factor / ratio * end + (start - offset) / ratio
-                                  for end in each.limits)
-                    low, high, names = found.get(source, (-math.inf, math.inf, ()))
-                    found[source] = Limits(max(low, ends[0]), min(high, ends[1]), (
-                        *names, *[name] * (name not in names)))
-                if each.no_limits:
-                    reports[name] = f'Left out: the limits of {name}, {each.no_limits}.'
-        return found, [*reports.values()]
+                                  for end in joint.limits)
+                    low, high, names = limits.get(source, (-math.inf, math.inf, ()))
+                    limits[source] = Limits(max(low, ends[0]), min(high, ends[1]),
+                                            tuple(dict.fromkeys((*names, name))))
+                elif joint and joint.no_limits:
+                    reports[name] = f'Left out: the limits of {name}, {joint.no_limits}.'
+        return limits, [*reports.values()]
 
 
 class Body(NamedTuple):
@@ -344,7 +328,7 @@ class Body(NamedTuple):
     axis: Sequence[float] = ()
 
 
-def _seen(base: np.ndarray, frame: np.ndarray, span: float) -> List[float]:
+def _seen(base: np.ndarray, frame: np.ndarray, span: float) -> list[float]:
     """Return the coordinates of a pose in another, without rounding of places up to `span` [m]."""
     turned = base[:3, :3].T
     *place, roll, pitch, yaw = coordinates(at(turned @ (frame[:3, 3] - base[:3, 3]),
@@ -354,7 +338,7 @@ def _seen(base: np.ndarray, frame: np.ndarray, span: float) -> List[float]:
 
 
 def _limits(limits: Sequence[Any], is_continuous: bool
-            ) -> Tuple[Optional[Tuple[float, float]], str]:
+            ) -> tuple[Optional[tuple[float, float]], str]:
     """Return the limits that count, None without any, and those that do not, with the reason."""
     low, high = (math.copysign(math.inf, end) if abs(end) >= FARTHEST else end
                  for end in map(float, limits))
@@ -366,40 +350,39 @@ def _limits(limits: Sequence[Any], is_continuous: bool
     return ((low, high), '') if low < high else (None, f'{text}: they are no range')
 
 
-def top(home: Dict[str, str], body: str) -> str:
+def top(home: dict[str, str], body: str) -> str:
     """Return the body that represents a set of joined bodies."""
     while home[body] != body:
         home[body] = body = home[home[body]]
     return body
 
 
-def trees(robot: Robot) -> Tuple[Dict[str, Tuple[str, Joint]], List[Joint]]:
+def trees(robot: Robot) -> tuple[dict[str, tuple[str, Joint]], list[Joint]]:
     """Return the parent and the joint of each body, and the joints that close loops."""
-    home = {body: body for body in robot.frames}
-    near: Dict[str, List[Tuple[str, Joint]]] = {body: [] for body in robot.frames}
-    cuts = []
+    home, cuts = {body: body for body in robot.frames}, []
+    near: dict[str, list[tuple[str, Joint]]] = {body: [] for body in robot.frames}
     for joint in sorted(robot.joints, key=lambda joint: (
             joint.is_cut, joint.name not in robot.driven, _TREE.get(joint.kind, 1))):
-        ends = [top(home, body) for body in joint.bodies]
-        if joint.is_cut or ends[0] == ends[1]:
+        first, second = (top(home, body) for body in joint.bodies)
+        if joint.is_cut or first == second:
             cuts.append(joint)
             continue
-        home[ends[1]] = ends[0]
+        home[second] = first
         for body, other in (joint.bodies, joint.bodies[::-1]):
             near[body].append((other, joint))
-    found: Dict[str, Tuple[str, Joint]] = {}
+    tree: dict[str, tuple[str, Joint]] = {}
     for start in (robot.root, *robot.frames):
-        if start != robot.root and start not in found:
+        if start != robot.root and start not in tree:
             # A body that only cuts connect.
             places = [robot.frames[start][:3, 3]] * 2
-            found[start] = robot.root, Joint('', FREE, (robot.root, start), places, places)
+            tree[start] = robot.root, Joint('', FREE, (robot.root, start), places, places)
         row = [start]
         for body in row:
-            for other, joint in near[body]:
-                if other != robot.root and other not in found:
-                    found[other] = body, joint
-                    row.append(other)
-    return found, cuts
+            joined = [(other, joint) for other, joint in near[body]
+                      if other != robot.root and other not in tree]
+            tree.update((other, (body, joint)) for other, joint in joined)
+            row += [other for other, _ in joined]
+    return tree, cuts
 
 
 def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[str, float]
@@ -407,17 +390,17 @@ def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[
     """Return a robot with some bodies displaced on their parents, and new positions of joints."""
     moved = {robot.root: np.eye(4)}
     for body, (base, _) in trees(robot)[0].items():
-        moved[body] = moved[base] @ moves[body] if body in moves else moved[base]
+        moved[body] = moved[base] @ moves.get(body, np.eye(4))
     joints = []
     for joint in robot.joints:
-        ends = [moved[body] for body in joint.bodies]
+        turned, shifted = zip(*((moved[body][:3, :3], moved[body][:3, 3])
+                                for body in joint.bodies))
         joints.append(replace(
-            joint, places=tuple(end[:3, :3] @ place + end[:3, 3]
-                                for end, place in zip(ends, joint.places)),
-            axes=tuple(end[:3, :3] @ axis for end, axis in zip(ends, joint.axes)),
-            turns=tuple(end[:3, :3] @ turn for end, turn in zip(ends, joint.turns)),
-            position=positions.get(joint.name, joint.position)
-            if joint.position is not None else None))
+            joint, places=tuple(map(np.add, map(np.matmul, turned, joint.places), shifted)),
+            axes=tuple(map(np.matmul, turned, joint.axes)),
+            turns=tuple(map(np.matmul, turned, joint.turns)),
+            position=None if joint.position is None else positions.get(
+                joint.name, joint.position)))
     return replace(robot, joints=joints, frames={
         body: moved[body] @ frame for body, frame in robot.frames.items()})
 

@@ -80,7 +80,8 @@ def shapes(machine: SceneMechanism) -> List[Shape]:
                        _shape(ROD, link, link.name, barrel - high, 0.0)]
             continue
         half, tip = HALF_BLOCK * linkage.longest, complex(*frames[link.name][link.tip])
-        start, along = complex(*frames[link.parent][link.joint]), cmath.rect(1.0, float(np.asarray(link.zero)))
+        start = complex(*frames[link.parent][link.joint])
+        along = cmath.rect(1.0, float(np.asarray(link.zero)))
         guides.append(_shape(GUIDE, link, link.parent, *(
             start + along * (tip + end) for end in (low - half, high + half))))
         others.append(_shape(BLOCK, link, link.name, tip - half, tip + half))
