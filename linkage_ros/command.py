@@ -4,6 +4,7 @@
 """Shared parts of the commands other than nodes, which report an error in one sentence."""
 
 import argparse
+import math
 import os
 import re
 import sys
@@ -83,3 +84,14 @@ def chosen(machines: Mapping[str, SceneMechanism], names: Sequence[str]) -> List
             raise RequestError(f'there is no mechanism {name!r}; allowed: {", ".join(machines)}'
                                f'{meant(name, machines)}')
     return [machines[name] for name in names or machines]
+
+
+def within(kind: Callable[[str], Any], low: float, high: float) -> Callable[[str], Any]:
+    """Return a reader of finite numbers of a kind from low to high."""
+    def read(text: str) -> Any:
+        value = kind(text)
+        if not (low <= value <= high and math.isfinite(value)):
+            raise argparse.ArgumentTypeError(f'must be from {low:g} to {high:g}, not {text}')
+        return value
+    read.__name__ = 'whole number' if kind is int else 'number'
+    return read

@@ -10,7 +10,7 @@ import shutil
 
 from . import parts
 from .. import scene
-from ..command import chosen, Parser, RequestError, run
+from ..command import chosen, Parser, RequestError, run, within
 from ..linkage import Formula
 from ..optional import needs
 from ..scene.scene_mechanism import IN_SPACE
@@ -174,17 +174,6 @@ def parser() -> Parser:
     moving.add_argument('--colours', metavar='N', type=within(int, 2, MOST_COLOURS),
                         help=f'colours of a .gif: fewer make it smaller (default: {MOST_COLOURS})')
     return made
-
-
-def within(kind, low, high):
-    """Return a reader of finite numbers of a kind from low to high."""
-    def read(text):
-        value = kind(text)
-        if not (low <= value <= high and math.isfinite(value)):
-            raise argparse.ArgumentTypeError(f'must be from {low:g} to {high:g}, not {text}')
-        return value
-    read.__name__ = 'whole number' if kind is int else 'number'
-    return read
 
 
 def degrees(text):

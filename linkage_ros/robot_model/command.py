@@ -3,8 +3,7 @@
 
 """Command that prints the robot model of a scene's mechanisms; it needs no ROS."""
 
-import argparse
-from typing import List, Optional
+from typing import Optional, Sequence
 
 from . import bodies, mjcf, sdf, urdf
 from .bodies import assembled, DENSITY
@@ -13,26 +12,24 @@ from .. import command, scene
 NAME = 'urdf'
 
 
-def main(args: Optional[List[str]] = None) -> int:
+def main(args: Optional[Sequence[str]] = None) -> int:
     """Print a robot model; return the exit code."""
     return command.run(NAME, show, args)
 
 
-def show(args: Optional[List[str]], given: Optional[scene.Scene] = None) -> None:
+def show(args: Optional[Sequence[str]], given_scene: Optional[scene.Scene] = None) -> None:
     """Print the model that a command line requests, of its scene or of the one from ROS."""
-    asked = parser().parse_args(args)
-    if given and asked.scene:
+    options = parser().parse_args(args)
+    if given_scene and options.scene:
         raise command.RequestError('give the scene either as SCENE or with --ros-args, not both')
-    found = given or (scene.load(asked.scene) if asked.scene else scene.read({}))
-    if asked.format == 'urdf' and asked.density:
+    shown = given_scene or (scene.load(options.scene) if options.scene else scene.read({}))
+    if options.format == 'urdf' and options.density:
         raise command.RequestError('--density is for sdf and mjcf only: the URDF has no masses')
-    robot = bodies.robot(command.chosen(found.machines, asked.mechanism), found.frame_id,
-                         asked.width)
-    if asked.format == 'urdf':
-        print(urdf.write(robot))
-    else:
-        writer = {'sdf': sdf, 'mjcf': mjcf}[asked.format]
-        print(writer.write(assembled(robot, asked.density or DENSITY)))
+    model = bodies.robot(command.chosen(shown.machines, options.mechanism), shown.frame_id,
+                         options.width)
+    if options.format != 'urdf':
+        model = assembled(model, options.density or DENSITY)
+    print({'urdf': urdf, 'sdf': sdf, 'mjcf': mjcf}[options.format].write(model))
 
 
 def parser() -> command.Parser:
@@ -41,6 +38,7 @@ def parser() -> command.Parser:
         NAME, description='Print the robot model of a scene.',
         epilog='`ros2 run linkage_ros urdf` also accepts the scene as a node does: '
                '--ros-args --params-file SCENE')
+    positive = command.within(float, bodies.SMALLEST, bodies.LARGEST)
     made.add_argument('scene', metavar='SCENE', nargs='?',
                       help="the scene's parameter file (default: the catalogue's linkages)")
     made.add_argument('--mechanism', nargs='+', default=[], metavar='NAME',
@@ -48,21 +46,10 @@ def parser() -> command.Parser:
     made.add_argument('--format', choices=('urdf', 'sdf', 'mjcf'), default='urdf',
                       help='a tree for robot_state_publisher, or closed loops for Gazebo or '
                            'MuJoCo (default: urdf)')
-    made.add_argument('--width', type=_positive, metavar='M',
+    made.add_argument('--width', type=positive, metavar='M',
                       help='thickness of a bar, with all other shapes in proportion (default: a '
                            '40th of the longest)')
-    made.add_argument('--density', type=_positive, metavar='KG/M3',
+    made.add_argument('--density', type=positive, metavar='KG/M3',
                       help='density of all bodies of sdf and mjcf '
                            f'(default: {DENSITY:g}, aluminium)')
     return made
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not bodies.SMALLEST <= value <= bodies.LARGEST:
-        raise argparse.ArgumentTypeError(
-            f'must be from {bodies.SMALLEST:g} to {bodies.LARGEST:g}, not {text}')
-    return value

@@ -19,7 +19,7 @@ import numpy as np
 
 from .bodies import add, COLOURS, Model, numbers
 from .robot import Body, HINGE, Joint, Robot
-from .shapes import BALL, BOX, CYLINDER, weight
+from .shapes import BALL, BOX, CYLINDER
 
 # Time step [s] for a linkage of a metre; smaller linkages oscillate faster.
 STEP = 1e-3
@@ -39,13 +39,12 @@ def write(model: Model) -> str:
     add(root, 'compiler', angle='radian', eulerseq='XYZ')
     add(root, 'option', timestep=numbers(step), integrator='implicitfast')
     usual = add(root, 'default')
-    add(usual, 'geom', contype='0', conaffinity='0')
+    add(usual, 'geom', contype='0', conaffinity='0', density=numbers(model.density))
     add(usual, 'equality', solref=numbers(2.0 * step, 1.0), solimp='0.9999 0.9999 1')
     elements = {model.root: add(root, 'worldbody')}
     for part in model.parts:
         for body in part.bodies():
-            elements[body.name] = _add_body(
-                elements[body.parent], body, part.robot, model.density)
+            elements[body.name] = _add_body(elements[body.parent], body, part.robot)
     equality, actuator = add(root, 'equality'), add(root, 'actuator')
     starts = []
     for robot in robots:
@@ -65,7 +64,7 @@ def write(model: Model) -> str:
     return tostring(root, encoding='unicode')
 
 
-def _add_body(parent: Element, body: Body, robot: Robot, density: float) -> Element:
+def _add_body(parent: Element, body: Body, robot: Robot) -> Element:
     made = add(parent, 'body', name=body.name, pos=numbers(*body.pose[:3]),
                euler=numbers(*body.pose[3:]))
     if joint := body.joint:
@@ -83,9 +82,6 @@ def _add_body(parent: Element, body: Body, robot: Robot, density: float) -> Elem
     for point in robot.points:
         if point.body == body.name:
             add(made, 'site', name=point.name, pos=numbers(*point.place, 0.0), group='4')
-    mass, centre, (xx, yy, zz, xy) = weight(robot.solid(body.name), density)
-    add(made, 'inertial', pos=numbers(*centre, 0.0), mass=numbers(mass),
-        fullinertia=numbers(xx, yy, zz, xy, 0.0, 0.0))
     return made
 
 

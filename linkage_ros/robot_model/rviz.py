@@ -6,7 +6,7 @@
 import copy
 import json
 import math
-from typing import Any, Dict, Iterable, Iterator, Mapping, Tuple
+from typing import Any, Iterable, Mapping
 
 import numpy as np
 
@@ -17,10 +17,10 @@ from ..scene import SceneMechanism
 GROUP = 'rviz_common/Group'
 NEEDS_TRANSFORMS = ('rviz_default_plugins/RobotModel', 'rviz_default_plugins/TF')
 # Distance of a camera with a view of 45 degrees that shows a ball of radius 1 with a margin.
-AWAY = 1.1 / math.sin(math.radians(22.5))
+DISTANCE = 1.1 / math.sin(math.radians(22.5))
 # Downward angle [rad] of the camera on an upright plane, and on a flat one.
-DOWN, STEEPEST = 0.15, 1.56
-# Values of one input by which it is found where a mechanism reaches; of several, their share.
+MIN_PITCH, MAX_PITCH = 0.15, 1.56
+# Number of poses by which it is determined where a mechanism reaches.
 SAMPLES = 25
 # A linkage in space is seen from the front, from the right and above, as on the viewer's page.
 OBLIQUE = np.array([0.576, -0.768, 0.28])
@@ -39,12 +39,15 @@ def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
     manager = made['Visualization Manager']
     displays = manager['Displays']
     places = [i for i, display in enumerate(displays) if display['Class'] == GROUP]
-    pattern = displays[places[0]]
-    displays[places[0]:places[-1] + 1] = [_renamed(pattern, name, namespace)
-                                          for name in machines]
+    text, topics = json.dumps(displays[places[0]]), f'/{namespace.strip("/")}/'.replace('//', '/')
+    groups = [json.loads(text.replace(f'"/{displays[places[0]]["Name"]}/', f'"{topics}{name}/'))
+              for name in machines]
+    for name, group in zip(machines, groups):
+        group['Name'] = name
+    displays[places[0]:places[-1] + 1] = groups
     manager['Global Options']['Fixed Frame'] = frame_id
-    made['Visualization Manager']['Views']['Current'].update(_camera(machines.values()))
-    for display in _all(displays):
+    manager['Views']['Current'].update(_camera(machines.values()))
+    for display in displays + [display for group in groups for display in group['Displays']]:
         if display['Class'] in NEEDS_TRANSFORMS:
             display['Enabled'] = display['Value'] = robot_model
         if 'TF Prefix' in display:
@@ -52,41 +55,28 @@ def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
     return made
 
 
-def _camera(machines: Iterable[SceneMechanism]) -> Dict[str, Any]:
+def _camera(machines: Iterable[SceneMechanism]) -> dict[str, Any]:
     """Return a camera that sees all places of the joints, square to the first one's plane."""
     clouds, normals = zip(*map(_seen, machines))
     places, normal = np.concatenate(clouds), normals[0]
     low, high = places.min(axis=0), places.max(axis=0)
-    x, y, z = (round(float(one), 2) + 0.0 for one in (low + high) / 2)
-    pitch = min(max(math.asin(max(-1.0, min(1.0, normal[2]))), DOWN), STEEPEST)
+    pitch = np.clip(math.asin(np.clip(normal[2], -1.0, 1.0)), MIN_PITCH, MAX_PITCH)
     # Seen from above, x is to the right.
     yaw = math.atan2(*normal[1::-1]) if math.hypot(*normal[:2]) > 0.1 else -math.pi / 2
-    return {'Distance': round(AWAY * float(np.linalg.norm(high - low)) / 2, 2) or 1.0,
-            'Focal Point': {'X': x, 'Y': y, 'Z': z}, 'Pitch': round(pitch, 6),
-            'Yaw': round(yaw % math.tau, 6)}
+    return {'Distance': round(DISTANCE * float(np.linalg.norm(high - low)) / 2, 2) or 1.0,
+            'Focal Point': {axis: round(float(middle), 2) + 0.0
+                            for axis, middle in zip('XYZ', (low + high) / 2)},
+            'Pitch': round(float(pitch), 6), 'Yaw': round(yaw % math.tau, 6)}
 
 
-def _seen(machine: SceneMechanism) -> Tuple[np.ndarray, np.ndarray]:
+def _seen(machine: SceneMechanism) -> tuple[np.ndarray, np.ndarray]:
     """Return points that a mechanism's joints come to [m], (n, 3), and the way to the camera."""
-    values = input_values(machine, -(-SAMPLES // len(machine.inputs)))
-    found = machine.linkage.solve(values, machine.points)
-    places = machine.scale * np.concatenate(
-        [place.reshape(-1, place.shape[-1]) for place in found.values()])
+    places = machine.scale * np.concatenate([
+        place.reshape(-1, place.shape[-1]) for place in machine.linkage.solve(
+            input_values(machine, SAMPLES), machine.points).values()])
     places = places[np.isfinite(places).all(axis=1)]
     if machine.mirrored:
         places = np.concatenate([places, places * (-1.0, 1.0)])
-    seen = pose(*machine.pose)
-    normal = OBLIQUE if machine.in_space else seen[:3, 2]
-    return places @ seen[:3, :places.shape[1]].T + seen[:3, 3], normal
-
-
-def _renamed(group: Mapping[str, Any], name: str, namespace: str) -> Dict[str, Any]:
-    start = f'/{namespace.strip("/")}/'.replace('//', '/')
-    text = json.dumps(group).replace(f'"/{group["Name"]}/', f'"{start}{name}/')
-    return {**json.loads(text), 'Name': name}
-
-
-def _all(displays: Iterable[dict]) -> Iterator[dict]:
-    for display in displays:
-        yield display
-        yield from _all(display.get('Displays', ()))
+    frame = pose(*machine.pose)
+    normal = OBLIQUE if machine.in_space else frame[:3, 2]
+    return places @ frame[:3, :places.shape[1]].T + frame[:3, 3], normal
