@@ -72,13 +72,9 @@ class Part:
         yield from self.robot.bodies()
 
     @property
-    def names(self) -> Dict[str, List[str]]:
-        """Return the names of its links, points among them, and those of all joints."""
-        robot = self.robot
-        points = [point.name for point in robot.points]
-        return {'link': [*robot.frames, *points], 'joint': [
-            *(f'{name}_fixed' for name in (robot.root, *points)),
-            *(joint.name for joint in robot.joints)]}
+    def links(self) -> List[str]:
+        """Return the names of its bodies and points."""
+        return [*self.robot.frames, *(point.name for point in self.robot.points)]
 
 
 @dataclass
@@ -100,15 +96,6 @@ class Model:
     parts: List[Part]
     density: float = 0.0
 
-    def check_names(self, parameter: str) -> None:
-        """Raise SceneError if two links or two joints have the same name."""
-        for tag, root in ('joint', []), ('link', [self.root]):
-            names = Counter(root + [name for part in self.parts for name in part.names[tag]])
-            (name, count), = names.most_common(1)
-            if count > 1:
-                raise SceneError(f'{parameter} or frame_id must be changed: the robot model '
-                                 f'would have two {tag}s {name}')
-
 
 def robot(machines: Iterable[SceneMechanism], frame_id: str,
           width: Optional[float] = None) -> Model:
@@ -127,8 +114,7 @@ def robot(machines: Iterable[SceneMechanism], frame_id: str,
     Raises
     ------
     SceneError
-        If two links or two joints would have the same name, the links would not form a tree, or
-        a size is out of range.
+        If the links would not form a tree, or the longest bar is out of range.
 
     """
     models = []
@@ -136,7 +122,6 @@ def robot(machines: Iterable[SceneMechanism], frame_id: str,
         base = machine.frame_id or frame_id
         part = Part(_Tree(machine, width).robot, base, machine.pose, machine)
         models.append(Model(machine.name, base, [part]))
-        models[-1].check_names(f'{machine.name}.joints')
     return together(models)
 
 
@@ -146,10 +131,8 @@ def together(models: Sequence[Model]) -> Model:
 
     They must have the same root link, or the root of one must be a link of another.
     """
-    if len(models) == 1:
-        return models[0]
     parts = [part for model in models for part in model.parts]
-    below = {link: part.base for part in parts for link in part.names['link']}
+    below = {link: part.base for part in parts for link in part.links}
     # From the base of each part the bases below it, up to the last.
     lines = {part.base: [part.base] for part in parts}
     for line in lines.values():
@@ -159,22 +142,17 @@ def together(models: Sequence[Model]) -> Model:
     if more or root in below:
         raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
                          f'link of another one of them, not {listed(tops, 120)}')
-    made = Model('linkages', root, sorted(parts, key=lambda part: len(lines[part.base])))
-    made.check_names('mechanisms')
-    return made
+    return Model('linkages' if len(models) > 1 else models[0].name, root,
+                 sorted(parts, key=lambda part: len(lines[part.base])))
 
 
 def size(machine: SceneMechanism) -> float:
-    """Return the length of the longest bar [m]; raise SceneError for a place out of range."""
+    """Return the length of the longest bar [m]; raise SceneError if it is out of range."""
     length = machine.scale * float(machine.linkage.longest)
-    places = np.array([*shapes.ground_frame(machine.linkage).values()])
-    far = max(length, *map(abs, machine.pose), machine.scale * np.abs(places).max(initial=0.0),
-              *(abs(joint.offset) for joint in machine.joints.values()))
-    if not (SMALLEST <= length and far <= LARGEST):
-        name = machine.name
-        raise SceneError(f'{name}.pose, {name}.scale and {name}.dimensions must make the longest '
-                         f'bar {SMALLEST:g} m long or more, and keep everything within '
-                         f'{LARGEST:g} m: they are {length:g} and {far:g} m')
+    if not SMALLEST <= length <= LARGEST:
+        raise SceneError(
+            f'{machine.name}.scale and {machine.name}.dimensions must make the longest bar from '
+            f'{SMALLEST:g} to {LARGEST:g} m long, not {length:g}')
     return length
 
 

@@ -20,8 +20,6 @@ NEEDS_TRANSFORMS = ('rviz_default_plugins/RobotModel', 'rviz_default_plugins/TF'
 DISTANCE = 1.1 / math.sin(math.radians(22.5))
 # Downward angle [rad] of the camera on an upright plane, and on a flat one.
 MIN_PITCH, MAX_PITCH = 0.15, 1.56
-# Number of poses by which it is determined where a mechanism reaches.
-SAMPLES = 25
 # A linkage in space is seen from the front, from the right and above, as on the viewer's page.
 OBLIQUE = np.array([0.576, -0.768, 0.28])
 
@@ -73,7 +71,7 @@ def _seen(machine: SceneMechanism) -> tuple[np.ndarray, np.ndarray]:
     """Return points that a mechanism's joints come to [m], (n, 3), and the way to the camera."""
     places = machine.scale * np.concatenate([
         place.reshape(-1, place.shape[-1]) for place in machine.linkage.solve(
-            input_values(machine, SAMPLES), machine.points).values()])
+            input_values(machine), machine.points).values()])
     places = places[np.isfinite(places).all(axis=1)]
     if machine.mirrored:
         places = np.concatenate([places, places * (-1.0, 1.0)])

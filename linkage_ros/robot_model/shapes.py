@@ -30,7 +30,7 @@ SHORT_BARREL, LONG_BARREL = 0.5, 0.9
 MARK, HALF_MARK = 1 / 15, 0.6
 # A plate with a smaller area is not drawn, as a fraction of the longest bar squared.
 MIN_AREA = 1e-9
-# Number of poses that determine the travel of a slide.
+# Number of poses that determine the travel of a slide, and what a camera sees.
 SAMPLES = 361
 # Names of visible shapes in all formats.
 CYLINDER, BOX, BALL = 'cylinder', 'box', 'sphere'
@@ -65,8 +65,7 @@ def shapes(machine: SceneMechanism) -> List[Shape]:
     if not slides:
         return []
     frames = {GROUND: ground_frame(linkage), **linkage.frames}
-    count = max(round(SAMPLES ** (1.0 / len(machine.inputs))), 2)
-    lengths = linkage.joint_angles(input_values(machine, count), [link.name for link in slides])
+    lengths = linkage.joint_angles(input_values(machine), [link.name for link in slides])
     guides, others = [], []
     for link in slides:
         values = lengths[link.name][np.isfinite(lengths[link.name])]
@@ -92,8 +91,9 @@ def _shape(kind: str, slide: Link, link: str, *ends: complex) -> Shape:
     return Shape(kind, slide, *(LinkPoint(link, end.real, end.imag) for end in ends))
 
 
-def input_values(machine: SceneMechanism, count: int) -> Any:
+def input_values(machine: SceneMechanism) -> Any:
     """Return values of the inputs through their ends or parts of their reach, before scale."""
+    count = max(round(SAMPLES ** (1.0 / len(machine.inputs))), 2)
     values = [np.concatenate([np.linspace(*arc, count) for arc in settings.arcs])
               / machine.scale_of(name) for name, settings in machine.inputs.items()]
     return np.meshgrid(*values) if len(values) > 1 else values[0]
