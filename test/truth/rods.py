@@ -9,6 +9,7 @@ A rod across one hinge is a cos + b sin = c, solved with an arc cosine, which ca
 that judges its digits alone; which assembly it is, the polynomial of degree eight tells.
 """
 
+from functools import partial
 import itertools
 import math
 from typing import NamedTuple
@@ -89,12 +90,16 @@ def angle(rod, side):
 
 def rate(rod, side):
     """Return d hinge / d motor on a side."""
-    psi, step = angle(rod, side), mpfr(STEP)
-    a, b, c = equation(rod)
-    later, before = (equation(rod._replace(angle=[rod.angle[0] + way])) for way in (step, -step))
-    by_motor = [(x - y) / (2 * step) for x, y in zip(later, before)]
+    psi, (a, b, _) = angle(rod, side), equation(rod)
+    by_motor, = slopes(lambda value: equation(rod._replace(angle=[value])), rod.angle, mpfr(STEP))
     cos, sin = gmpy2.cos(psi), gmpy2.sin(psi)
     return (by_motor[2] - by_motor[0] * cos - by_motor[1] * sin) / (b * cos - a * sin)
+
+
+def slopes(of, at, step):
+    """Return the derivatives of numbers by each argument, as difference quotients."""
+    return [[(x - y) / (2 * step) for x, y in zip(*(
+        of(*at[:i], at[i] + way, *at[i + 1:]) for way in (step, -step)))] for i in range(len(at))]
 
 
 def drawn_side(rod):
@@ -103,26 +108,22 @@ def drawn_side(rod):
     return 1 if dot(rod.hinge_axis, cross(foot, end)) >= 0 else -1
 
 
-def sensitivity(of, rod):
+def sensitivity(of, vectors, sizes):
     """
-    Return what half a last digit of each number, the largest of its vector, does to a value.
+    Return what half a last digit of each number, the largest of its vector, does to values.
 
-    Like joints in a plane, both ends as seen from the hinge are rounded once more.
+    `of` returns them, or None, from vectors; as large as `sizes` are these at last rounded.
     """
-    total = mpfr(0)
-    for name, vector, size in zip(Rod._fields, rod, [*rod[:8], *seen(rod)]):
-        half = np.spacing(max(abs(float(x)) for x in size)) / 2
-        for i, part in enumerate(vector):
-            step = mpfr(half) * STEP
-            ends = []
-            for way in (step, -step):
-                moved = list(vector)
-                moved[i] = part + way
-                ends.append(of(rod._replace(**{name: moved})))
+    totals = 0
+    for i, (vector, size) in enumerate(zip(vectors, sizes)):
+        half = float(np.spacing(max(abs(float(x)) for x in size)) / 2) if vector else 0.0
+        for k in range(len(vector or ())):
+            ends = [of([*vectors[:i], [*vector[:k], vector[k] + way, *vector[k + 1:]],
+                        *vectors[i + 1:]]) for way in (mpfr(half) * STEP, -mpfr(half) * STEP)]
             if None in ends:
-                return mpfr('inf')
-            total += abs(ends[0] - ends[1]) / (2 * STEP)
-    return total
+                return [mpfr('inf')]
+            totals += np.array([abs(x - y) / (2 * STEP) for x, y in zip(*ends)])
+    return totals
 
 
 class Ankle(NamedTuple):
@@ -241,15 +242,11 @@ def assemblies(ankle, motors):
     turns = np.exp(2j * np.pi * np.arange(16) / 16)
 
     def parts(roll):
-        ways = []
-        for i, value in enumerate(motors):
-            zero, quarter = (np.stack(np.broadcast_arrays(*gaps(
-                ankle, [value[:, None]] * 2, pitch, roll)))[i] for pitch in (0.0, 0.5 * np.pi))
-            half = np.stack(np.broadcast_arrays(*gaps(
-                ankle, [value[:, None]] * 2, np.pi, roll)))[i]
-            c = 0.5 * (zero + half)
-            ways.append((zero - c, quarter - c, c))
-        return ways
+        zero, quarter, half = (np.stack(np.broadcast_arrays(*gaps(
+            ankle, [value[:, None] for value in motors], pitch, roll)))
+            for pitch in (0.0, 0.5 * np.pi, np.pi))
+        c = 0.5 * (zero + half)
+        return zip(zero - c, quarter - c, c)
 
     (a1, b1, c1), (a2, b2, c2) = parts(np.angle(turns)[None])
     values = (b1 * c2 - b2 * c1) ** 2 + (c1 * a2 - c2 * a1) ** 2 - (a1 * b2 - a2 * b1) ** 2
@@ -269,20 +266,13 @@ def assemblies(ankle, motors):
 
 
 def _refined(ankle, motors, pitch, roll):
-    motors = [value[:, None] for value in motors]
-    step = 1e-7
+    residuals = partial(gaps, ankle, [value[:, None] for value in motors])
     with np.errstate(all='ignore'):
         for _ in range(20):
-            f = gaps(ankle, motors, pitch, roll)
-            fp, fr = ([(x - y) / (2 * step) for x, y in zip(
-                gaps(ankle, motors, pitch + dp, roll + dr),
-                gaps(ankle, motors, pitch - dp, roll - dr))] for dp, dr in (
-                    (step, 0.0), (0.0, step)))
-            det = fp[0] * fr[1] - fp[1] * fr[0]
-            moves = ((f[0] * fr[1] - f[1] * fr[0]) / det, (fp[0] * f[1] - fp[1] * f[0]) / det)
-            pitch, roll = pitch - np.clip(moves[0], -0.5, 0.5), roll - np.clip(moves[1], -0.5, 0.5)
+            moves = _solved(slopes(residuals, (pitch, roll), 1e-7), residuals(pitch, roll))
+            pitch, roll = (x - np.clip(move, -0.5, 0.5) for x, move in zip((pitch, roll), moves))
         scale = max(np.abs(np.array([*ankle.pivots, *ankle.ends])).max(), 1e-3) ** 2
-        kept = np.maximum(*map(np.abs, gaps(ankle, motors, pitch, roll))) < 1e-11 * scale
+        kept = np.maximum(*map(np.abs, residuals(pitch, roll))) < 1e-11 * scale
     turn = 2.0 * np.pi
     return [np.where(kept, x - turn * np.round(x / turn), np.nan) for x in (pitch, roll)]
 
@@ -313,53 +303,26 @@ def exact_gaps(ankle, motors, pitch, roll):
     return found
 
 
-def _exact(ankle):
-    def of(part):
-        return None if part is None else [of(x) for x in part] if isinstance(part, list) \
-            else mpfr(part)
-
-    return Ankle(*map(of, ankle))
-
-
 def pose_error(ankle, motors, pitch, roll):
     """Return both angles' errors, and what half a last digit of each number does to them."""
-    ankle = _exact(ankle)
-    motors, start = [mpfr(x) for x in motors], (mpfr(pitch), mpfr(roll))
-    p, r = start
-    step = mpfr(STEP)
+    vectors = [None if vector is None else list(map(mpfr, vector)) for vector in (
+        *ankle[:4], *(vector for pair in ankle[4:8] for vector in pair),
+        *([x] for x in (*ankle.lengths, *motors)))]
+    # The length of a cylinder is an input.
+    vectors[12:14] = [axis and length for axis, length in zip(ankle.motor_axes, vectors[12:14])]
+    start = p, r = mpfr(pitch), mpfr(roll)
+
+    def gaps_of(vectors, p, r):
+        pairs = [vectors[i:i + 2] for i in range(4, 12, 2)]
+        return exact_gaps(Ankle(*vectors[:4], *pairs, [x and x[0] for x in vectors[12:14]]),
+                          [x for x, in vectors[14:]], p, r)
+
     for _ in range(4):
-        f = exact_gaps(ankle, motors, p, r)
-        columns = [[(x - y) / (2 * step) for x, y in zip(
-            exact_gaps(ankle, motors, p + dp, r + dr), exact_gaps(ankle, motors, p - dp, r - dr))]
-            for dp, dr in ((step, 0), (0, step))]
-        moved = _solved(columns, f)
+        columns = slopes(partial(gaps_of, vectors), (p, r), mpfr(STEP))
+        moved = _solved(columns, gaps_of(vectors, p, r))
         p, r = p - moved[0], r - moved[1]
-    errors = [abs(float(start[0] - p)), abs(float(start[1] - r))]
-    totals = [0.0, 0.0]
-    for name, part in zip(Ankle._fields, ankle[:-1]):
-        vectors = [(None, part)] if name in Ankle._fields[:4] else list(enumerate(part))
-        for i, vector in vectors:
-            if vector is None:
-                continue
-            half = float(np.spacing(max(abs(float(x)) for x in vector)) / 2)
-            for k in range(3):
-                ends = []
-                for way in (step, -step):
-                    moved = list(vector)
-                    moved[k] += way
-                    changed = moved if i is None else [*part[:i], moved, *part[i + 1:]]
-                    ends.append(exact_gaps(ankle._replace(**{name: changed}), motors, p, r))
-                _add(totals, columns, [(x - y) / (2 * step) for x, y in zip(*ends)], half)
-    for i, value in enumerate(motors):
-        ends = [exact_gaps(ankle, [*motors[:i], value + way, *motors[i + 1:]], p, r)
-                for way in (step, -step)]
-        _add(totals, columns, [(x - y) / (2 * step) for x, y in zip(*ends)],
-             float(np.spacing(abs(float(value))) / 2))
-        if ankle.motor_axes[i] is not None:
-            change = [mpfr(0), mpfr(0)]
-            change[i] = -ankle.lengths[i]
-            _add(totals, columns, change, float(np.spacing(float(ankle.lengths[i])) / 2))
-    return errors, totals
+    return [abs(float(x - y)) for x, y in zip(start, (p, r))], sensitivity(
+        lambda vectors: _solved(columns, gaps_of(vectors, p, r)), vectors, vectors)
 
 
 def _solved(columns, f):
@@ -368,26 +331,27 @@ def _solved(columns, f):
     return (f[0] * d - f[1] * b) / det, (a * f[1] - c * f[0]) / det
 
 
-def _add(totals, columns, change, half):
-    for k, moved in enumerate(_solved(columns, change)):
-        totals[k] += abs(float(moved)) * half
-
-
-def measured(case, side=None):
+def measured(case):
     """
     Return the true angle of a rod's hinge and its rate, each with its sensitivity.
 
     None where the rod does not reach; the rate is None next to a dead point.
     """
-    side = drawn_side(case) if side is None else side
-    true = angle(case, side)
-    if true is None:
+    side = drawn_side(case)
+
+    def with_sensitivity(of):
+        def values(vectors):
+            value = of(Rod(*vectors), side)
+            return None if value is None else [value]
+
+        # Like joints in a plane, both ends as seen from the hinge are rounded once more.
+        return of(case, side), sensitivity(values, [*map(list, case)], [*case[:8], *seen(case)])[0]
+
+    if angle(case, side) is None:
         return None, None
     a, b, c = equation(case)
-    found = true, sensitivity(lambda x: angle(x, side), case)
-    if abs(abs(c) / gmpy2.hypot(a, b) - 1) < 1e-6:
-        return found, None
-    return found, (rate(case, side), sensitivity(lambda x: rate(x, side), case))
+    is_dead = abs(abs(c) / gmpy2.hypot(a, b) - 1) < 1e-6
+    return with_sensitivity(angle), None if is_dead else with_sensitivity(rate)
 
 
 def apart(angle_, other):
@@ -462,25 +426,21 @@ def motor_values(ankle, which, pitch, roll):
 
 def determinants(ankle, motors, pitch, roll):
     """Return the determinant of the derivatives of `gaps` by both angles, in float64."""
-    step = 1e-6
-    (a, c), (b, d) = ([(x - y) / (2 * step) for x, y in zip(
-        gaps(ankle, motors, pitch + dp, roll + dr), gaps(ankle, motors, pitch - dp, roll - dr))]
-        for dp, dr in ((step, 0.0), (0.0, step)))
+    (a, c), (b, d) = slopes(partial(gaps, ankle, motors), (pitch, roll), 1e-6)
     return a * d - b * c
 
 
 def are_drawn(ankle, motors, pitch, roll):
     """Return whether all cranks are on their drawn sides, by difference quotients."""
-    step, good = 1e-6, np.ones(np.shape(pitch), bool)
-    drawn = [0.0 if axis else length for axis, length in zip(ankle.motor_axes, ankle.lengths)]
-    for i in (0, 1):
-        slopes = []
-        for values, pose in (motors, (pitch, roll)), (drawn, (0.0, 0.0)):
-            later, before = (gaps(ankle, [x + way * (j == i) for j, x in enumerate(values)],
-                                  *pose)[i] for way in (step, -step))
-            slopes.append(later - before)
-        good &= slopes[0] * slopes[1] > 0.0
-    return good
+    drawn_values = [0.0 if axis else length
+                    for axis, length in zip(ankle.motor_axes, ankle.lengths)]
+
+    def sides(values, pose):
+        by_motors = slopes(lambda *values: gaps(ankle, values, *pose), (*values,), 1e-6)
+        return by_motors[0][0], by_motors[1][1]
+
+    return np.all([x * y > 0.0 for x, y in zip(
+        sides(motors, (pitch, roll)), sides(drawn_values, (0.0, 0.0)))], axis=0)
 
 
 def is_ambiguous(ankle, low, high, count=11):
