@@ -73,19 +73,13 @@ class Read(SimpleNamespace):
         Of each joint kind, parent, child and axis.
     points : dict
         Of each point its link and its place in space.
-    weights : dict
-        Of each link that has one mass, and centre and inertia, both in space.
+    masses : dict
+        Of each link that has one.
 
     """
 
     def __init__(self):
-        super().__init__(poses={}, seen={}, joints={}, points={}, weights={})
-
-    def weigh(self, name, mass, place, xx, yy, zz, *others):
-        xy, xz, yz = others or (0.0, 0.0, 0.0)
-        pose = self.poses[name]
-        about = pose[:3, :3] @ [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] @ pose[:3, :3].T
-        self.weights[name] = mass, (pose @ [*place, 1.0])[:3], about
+        super().__init__(poses={}, seen={}, joints={}, points={}, masses={})
 
     def check(self, other):
         """Check that another file has the same links, joints and points."""
@@ -169,11 +163,7 @@ def read_sdf(text):
                 shape.tag, ambient, [value for size in shape for value in numbers(size.text)],
                 found.poses[name] @ turned(*numbers(visual.findtext('pose')))))
         if (inertial := link.find('inertial')) is not None:
-            *place, roll, pitch, yaw = numbers(inertial.findtext('pose'))
-            assert not (roll or pitch or yaw)
-            found.weigh(name, float(inertial.findtext('mass')), place,
-                        *(float(inertial.findtext(f'inertia/i{way}'))
-                          for way in ('xx', 'yy', 'zz', 'xy')), 0.0, 0.0)
+            found.masses[name] = float(inertial.findtext('mass'))
     for frame in root.findall('frame'):
         link = frame.get('attached_to')
         place = (found.poses[link] @ turned(*numbers(frame.findtext('pose'))))[:3, 3]
@@ -187,7 +177,7 @@ def read_sdf(text):
         else:
             pins.setdefault(said[2], {})[joint.get('name')] = said
     return found, root, {name: (joints, *(vars(found)[what].pop(name)
-                                          for what in ('poses', 'seen', 'weights')))
+                                          for what in ('poses', 'seen', 'masses')))
                          for name, joints in pins.items()}
 
 
@@ -222,32 +212,6 @@ def read_mjcf(text):
 
     read(root.find('worldbody'), 'world', np.eye(4))
     return found, root, positions
-
-
-def weight_of(rows, density):
-    """Return mass, centre and inertia of visuals in space, by the formulas of textbooks."""
-    parts = []
-    for shape, *_, r, x, y, z, u, v, w in rows:
-        start, end = np.array([x, y, z]), np.array([u, v, w])
-        long = math.dist(start, end)
-        along = (end - start) / long if long else np.zeros(3)
-        volume, own, across = [
-            (4 / 3 * math.pi * r ** 3, 2 / 5 * r ** 2, 2 / 5 * r ** 2),
-            (math.pi * r ** 2 * long, r ** 2 / 2, r ** 2 / 4 + long ** 2 / 12),
-            (r ** 2 * long, r ** 2 / 6, (r ** 2 + long ** 2) / 12)][int(shape)]
-        about = across * np.eye(3) + (own - across) * np.outer(along, along)
-        parts.append((density * volume, (start + end) / 2, about))
-    mass = sum(part for part, _, _ in parts)
-    centre = sum(part * place for part, place, _ in parts) / mass
-    return mass, centre, sum(part * (about + np.dot(place - centre, place - centre) * np.eye(3)
-                                     - np.outer(place - centre, place - centre))
-                             for part, place, about in parts)
-
-
-def check_weight(found, wanted):
-    for one, other in zip(found, wanted):
-        size = np.abs(other).max()
-        assert np.array(one) / size == pytest.approx(np.array(other) / size, abs=1e-4)
 
 
 def scene_seen(one, thetas, width):
@@ -316,7 +280,7 @@ def test_three_formats_say_what_the_scene_has(name):
     (loops, simulator, at), (gazebo, root, pins) = read_mjcf(texts[0]), read_sdf(texts[1])
     loops.check(gazebo)
     ratios = gears(one, starts)
-    moving = sum(mass for name, (mass, *_) in gazebo.weights.items() if name != 'm_ground_link')
+    moving = sum(mass for name, mass in gazebo.masses.items() if name != 'm_ground_link')
     check_mjcf(one, loops, simulator, starts, places, ratios, 9.81 * moving)
     check_sdf(one, gazebo, root, pins, starts, ratios, width)
     # What runs in a yoke's slot hangs on the yoke, with a pin where the point in the slot is.
@@ -333,9 +297,7 @@ def test_three_formats_say_what_the_scene_has(name):
             assert loops.poses.pop(on)[:3, 3] == pytest.approx(place) and at.pop(slot) == 0.0
     loops.check(tree)
     assert at == pytest.approx(positions)
-    assert gazebo.weights.keys() == wanted.keys()
-    for link, weight in gazebo.weights.items():
-        check_weight(weight, weight_of(wanted[link], DENSITY))
+    assert gazebo.masses.keys() == wanted.keys()
 
 
 def check_mjcf(one, loops, root, starts, places, ratios, weight):
@@ -381,15 +343,14 @@ def check_sdf(one, found, root, pins, starts, ratios, width):
     assert root.get('name') == 'm'
     closed, plugins = cuts(one, found), []
     for cut, met in closed.items():
-        joints, pose, ball, (mass, centre, about) = pins.pop(f'{cut}_pin')
+        joints, pose, ball, mass = pins.pop(f'{cut}_pin')
         (link, place), (other, _) = found.points[cut], found.points[met]
         assert joints == {f'{cut}_hinge': ('revolute', link, f'{cut}_pin', [0.0, 0.0, 1.0]),
                           f'{cut}_closed': ('fixed', other, f'{cut}_pin', None)}
         assert pose[:3, :3] == pytest.approx(found.poses[link][:3, :3])
         assert pose[:3, 3] == pytest.approx(place)
-        wanted = [row('sphere', GREY, width, place, place)]
-        check_seen({cut: ball}, {cut: wanted})
-        check_weight((mass, centre, about), weight_of(wanted, DENSITY))
+        check_seen({cut: ball}, {cut: [row('sphere', GREY, width, place, place)]})
+        assert mass == pytest.approx(DENSITY * 4.0 / 3.0 * math.pi * width ** 3)
         plugins.append(('detachable-joint', 'DetachableJoint', {
             'parent_link': other, 'child_model': '__model__', 'child_link': f'{cut}_pin'}))
     assert not pins
@@ -458,7 +419,7 @@ def test_a_hand_on_an_arm_is_the_same_in_three_formats(link):
     loops.check(gazebo)
     loops.check(read_urdf(urdf.describe(machines, 'world'), positions))
     assert at == pytest.approx(positions)
-    assert gazebo.weights.keys() == loops.poses.keys()
+    assert gazebo.masses.keys() == loops.poses.keys()
     assert root.get('model') == robot.get('name') == 'linkages'
     assert len(root.find('actuator')) == 2 and len(root.find('equality')) == 2
 

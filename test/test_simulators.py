@@ -5,12 +5,12 @@
 
 import math
 from pathlib import Path
+from xml.etree import ElementTree
 
 from linkage_ros import scene
 from linkage_ros.robot_files import command as from_robot, readers
 from linkage_ros.robot_model import bodies, mjcf, sdf
 from linkage_ros.robot_model.bodies import assembled
-from linkage_ros.robot_model.shapes import weight
 import numpy as np
 import pytest
 from test_urdf import drives, in_space, MACHINES, OWN, posed
@@ -204,16 +204,24 @@ def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
                 assert apart == pytest.approx(0.0, abs=1e-7), (joint, thetas)
 
 
-def test_bodies_weigh_what_mujoco_finds_their_shapes_to_weigh():
-    built = model([simulated('engine')], density=1000.0)
-    found, robot = MuJoCo(mjcf.write(built)).model, built.parts[0].robot
+@pytest.mark.parametrize('name', ['engine', 'boom and arm'])
+def test_bodies_weigh_in_an_sdf_what_mujoco_finds_their_shapes_to_weigh(name):
+    built = model([simulated(name)], density=1000.0)
+    robot = MuJoCo(mjcf.write(built))
+    links = {link.get('name'): link.find('inertial')
+             for link in ElementTree.fromstring(sdf.write(built)).iter('link')}
     for body in built.parts[0].bodies():
-        mass, centre, (xx, yy, zz, xy) = weight(robot.solid(body.name), 1000.0)
-        there = found.body(body.name)
-        assert there.mass == pytest.approx(mass)
-        assert there.ipos == pytest.approx([*centre, 0.0], abs=1e-12)
-        assert sorted(there.inertia) == pytest.approx(
-            sorted([*np.linalg.eigvalsh([[xx, xy], [xy, yy]]), zz]))
+        there, link = robot.model.body(body.name), links[body.name]
+        xx, yy, zz, xy = (float(link.findtext(f'inertia/i{way}'))
+                          for way in ('xx', 'yy', 'zz', 'xy'))
+        assert there.mass == pytest.approx(float(link.findtext('mass')))
+        assert [*there.ipos, 0.0, 0.0, 0.0] == pytest.approx(
+            np.array(link.findtext('pose').split(), float), abs=1e-12)
+        axes = np.zeros(9)
+        robot.library.mju_quat2Mat(axes, there.iquat)
+        axes = axes.reshape(3, 3)
+        assert axes @ np.diag(there.inertia) @ axes.T == pytest.approx(
+            np.array([[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, zz]]), abs=1e-9 * zz)
 
 
 def test_a_start_out_of_reach_is_refused():
