@@ -68,8 +68,6 @@ def show(args: Optional[List[str]]) -> None:
     if wrong := [line for line in reports if WRONG in line]:
         raise command.RequestError(f'{len(wrong)} mechanisms are left out, as they differ from '
                                    'the robot or could not be compared with it')
-    if wrong := [line for line in reports if line.startswith(check.OPEN)]:
-        raise command.RequestError(f'{len(wrong)} loops of the whole robot stand open')
 
 
 def _launch(asked: Any, still: Mapping[str, float]) -> str:
@@ -89,61 +87,66 @@ def described(robot: Robot, given_pose: Collection[str] = ()
     Also return the positions of joints in loops that stay. Joints of a given pose do not move to
     start inside their limits.
     """
-    given: Dict[str, Any] = {'mechanisms': []}
     closed = closing.closed(robot, given_pose)
     robot, reports = closed.robot, closed.report
     imported: List[check.Imported] = []
-
-    def add(made: check.Imported) -> None:
-        imported.append(made)
-        given['mechanisms'].append(made.name)
-        given.update(made.parameters)
-        reports.extend(made.reports)
-
-    for group in loops.groups(robot, closed.immobile):
+    for group in loops.groups(robot):
         open_one, fault = (_first(reasons, group.joints) for reasons in (
             closed.open_loops, closed.faults))
-        left = group.joints
-        for part in (group.parts if group.why else [group]) if not open_one else ():
+        joints = group.joints
+        for part in group.parts if not open_one else ():
             try:
-                add(planar.described(robot, part, given['mechanisms']))
+                imported.append(planar.described(robot, part, imported))
             except (ArithmeticError, ValueError) as error:
                 if group.why:
                     continue
-                reason = f'{WRONG}: {error}' if isinstance(error, check.Difference) else (
-                    _why(error, fault, part.joints, robot))
-                bodies = error.bodies if isinstance(error, planar.NotPlaced) else _bodies(left)
-                reports.append(f'Left out: {listed(bodies, 200)}: {reason}.')
-            done = {joint.name for joint in part.joints}
-            left = [joint for joint in left if joint.name not in done]
-        if not left:
+                bodies = error.bodies if isinstance(error, planar.NotPlaced) else _bodies(joints)
+                reports.append(_left_out(bodies, _why(error, fault, joints, robot)))
+            joints = [joint for joint in joints if joint.name not in {
+                placed.name for placed in part.joints}]
+        if not joints:
             continue
         try:
             if open_one:
                 raise ValueError(open_one)
-            add(rods.described(robot, group._replace(joints=left), given['mechanisms']))
+            imported.append(rods.described(robot, group._replace(joints=joints), imported))
         except (ArithmeticError, ValueError) as error:
-            why = _why(error, fault, left, robot)
+            why = _why(error, fault, joints, robot)
             why = f'as rods in space: {why}' if group.why and why is error else why
-            reports.append(f'Left out: {listed(_bodies(left), 200)}: '
-                           + f'{group.why}; ' * bool(group.why) + f'{why}.')
-    if not given['mechanisms']:
+            reports.append(_left_out(_bodies(joints), f'{group.why}; ' * bool(group.why) + str(
+                why)))
+    return _checked(robot, imported, reports, closed.immobile)
+
+
+def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str],
+             immobile: Collection[str]) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
+    """Return what is described, without mechanisms that differ from the robot."""
+    if not imported:
         raise command.RequestError(' '.join(reports) or 'no joint of this robot closes a loop')
+    given: Dict[str, Any] = {'mechanisms': [made.name for made in imported]}
+    for made in imported:
+        given.update(made.parameters)
     machines = scene.read(given).machines
-    tree = {joint.name for _, joint in trees(robot)[0].values()}
-    stay = {*closed.immobile, *(name for made in imported for name in made.still)}
+    tree = {joint.name: joint for _, joint in trees(robot)[0].values()}
+    stay = {*immobile, *(name for made in imported for name in made.still)}
     still = {name: value for name, value in robot.positions.items()
-             if name in tree & stay - check.published(machines)}
+             if name in tree.keys() & stay - check.published(machines)}
     rest, lost = model.others(robot, machines, still)
     if rest:
         machines = scene.read({**given, **rest, 'mechanisms': [*machines, model.OTHERS]}).machines
+    checks, wrong = check.compared(robot, machines, imported)
+    if wrong:
+        return _checked(robot, [made for made in imported if made.name not in wrong], [
+            *reports, *(f'Left out: {name}: {WRONG}: {why}.' for name, why in wrong.items())],
+            immobile)
+    reports = [*reports, *(report for made in imported for report in made.reports), *checks]
     if lost:
         reports.append(model.not_published(lost))
-    if free := [joint.name for _, joint in trees(robot)[0].values()
-                if joint.name and joint.kind not in (HINGE, SLIDE, FIXED)]:
+    if free := [name for name, joint in tree.items()
+                if name and joint.kind not in (HINGE, SLIDE, FIXED)]:
         reports.append(f'Not published: {", ".join(free)}: a ball or a free joint has no one '
                        'position. The model of the robot has them fixed where the file has them.')
-    return given, [*reports, *check.whole(robot, machines, imported)], still
+    return given, reports, still
 
 
 def _values(texts: Sequence[str]) -> Dict[str, float]:
@@ -168,6 +171,10 @@ def _why(error: Exception, fault: str, joints: Sequence[Joint], robot: Robot) ->
     """Return an error, or the fault of motors that do not determine the pose, if that is why."""
     is_driven = any(joint.name in robot.driven for joint in joints)
     return fault if fault and (is_driven or isinstance(error, NotDriven)) else error
+
+
+def _left_out(bodies: Sequence[str], why: object) -> str:
+    return f'Left out: {listed(bodies, 200)}: {why}.'
 
 
 def _bodies(joints: Sequence[Joint]) -> List[str]:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -70,36 +70,26 @@ class Group(NamedTuple):
     parts: List['Group']
 
 
-def groups(robot: Robot, immobile: Collection[str] = ()) -> List[Group]:
-    """
-    Return the loops of a robot, with the planar parts of those that are not planar.
-
-    Joints that are `immobile` count as rigid where only they are not planar.
-    """
-    home = _merged(robot, {body: body for body in robot.frames}, [
-        joint for joint in robot.joints if joint.kind == FIXED])
-    found = _blocks(robot, home, _with_balls(robot, _on(home, robot.joints)))
-    return [group if not group.why else group._replace(parts=_parts(robot, home, group, immobile))
-            for group in found]
+def groups(robot: Robot) -> List[Group]:
+    """Return the loops of a robot, with their planar parts."""
+    home = _merged(robot)
+    joints = [replace(joint, bodies=(home[joint.bodies[0]], home[joint.bodies[1]]))
+              for joint in robot.joints]
+    joints = [joint for joint in joints if len({*joint.bodies}) == 2]
+    return [group._replace(parts=_parts(robot, home, group) if group.why else [group])
+            for group in _blocks(robot, home, _with_balls(robot, joints))]
 
 
-def _parts(robot: Robot, home: Dict[str, str], group: Group, immobile: Collection[str]
-           ) -> List[Group]:
+def _parts(robot: Robot, home: Mapping[str, str], group: Group) -> List[Group]:
     """Return the planar parts of loops that are not planar as a whole."""
-    names = {joint.name for joint in group.joints if joint.position is not None}
-    if names & {*robot.driven} <= {*immobile}:
-        immobile = ()
     parts: List[Group] = []
+    left = group.joints
     for joint in sorted(group.joints, key=lambda joint: joint.name not in robot.driven):
-        if joint.kind != HINGE or any(joint.name == one.name for part in parts
-                                      for one in part.joints):
-            continue
-        left = [one for one in group.joints if not any(one in part.joints for part in parts)]
-        rigid = [one for one in left if one.name in immobile and _lean(one, joint.axis) > ASKEW]
-        here = _merged(robot, home, rigid)
-        parts += [part for part in _blocks(robot, here, _on(here, [
-            one for one in left if one.kind in FLAT and _lean(one, joint.axis) < ASKEW]))
-            if not part.why]
+        if joint.kind == HINGE and joint in left:
+            parts += [part for part in _blocks(robot, home, [
+                other for other in left if other.kind in FLAT and _lean(other, joint.axis) < ASKEW
+                ]) if not part.why]
+            left = [other for other in left if not any(other in part.joints for part in parts)]
     return parts
 
 
@@ -125,21 +115,15 @@ def _blocks(robot: Robot, home: Mapping[str, str], joints: Sequence[Joint]) -> L
     return groups
 
 
-def _merged(robot: Robot, home: Mapping[str, str], rigid: Sequence[Joint]) -> Dict[str, str]:
-    """Return the merged body of each body; the root keeps its name."""
-    home = dict(home)
-    for joint in rigid:
-        first, second = sorted((top(home, body) for body in joint.bodies), key=top(
-            home, robot.root).__ne__)
-        home[second] = first
+def _merged(robot: Robot) -> Dict[str, str]:
+    """Return for each body the one that fixed joints make of several; the root keeps its name."""
+    home = {body: body for body in robot.frames}
+    for joint in robot.joints:
+        if joint.kind == FIXED:
+            first, second = sorted((top(home, body) for body in joint.bodies), key=top(
+                home, robot.root).__ne__)
+            home[second] = first
     return {body: top(home, body) for body in home}
-
-
-def _on(home: Mapping[str, str], joints: Sequence[Joint]) -> List[Joint]:
-    """Return joints between merged bodies."""
-    moved = [replace(joint, bodies=(home[joint.bodies[0]], home[joint.bodies[1]]))
-             for joint in joints]
-    return [joint for joint in moved if len({*joint.bodies}) == 2]
 
 
 def _with_balls(robot: Robot, joints: List[Joint]) -> List[Joint]:

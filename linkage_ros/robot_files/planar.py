@@ -214,15 +214,15 @@ class NotPlaced(NotDriven):
         self.bodies = drawing.left
 
 
-def described(robot: Robot, group: loops.Group, others: Sequence[str]) -> check.Imported:
+def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
+              ) -> check.Imported:
     """
     Return a mechanism.
 
-    Raises ValueError for loops that are no dyads, or whose poses are others than the robot's.
+    Raises ValueError for loops that are no dyads, or whose pose is another than the robot's.
     """
     drawing = _drawn(robot, group)
-    name = plain(drawing.driven[0].name, 60)
-    name = f'{name}_{len(others)}' if name in others else name
+    name = check.name_beside(others, plain(drawing.driven[0].name, 60))
     loop, given = drawing.loop, {
         f'{name}.{key}': value for key, value in _parameters(drawing)}
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
@@ -234,13 +234,11 @@ def described(robot: Robot, group: loops.Group, others: Sequence[str]) -> check.
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if drawing.apart(machine.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
-    slack = loop.lean + loop.gap / loop.size
-    report, ranges = check.compared(
-        robot, machine, [joint.name for joint in drawing.driven], drawing.ends, slack)
-    reports += [report] + [loop.misfit] * bool(loop.misfit)
+    reports += [loop.misfit] * bool(loop.misfit)
     reports += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle '
                 'depends.' for joint, gap in loop.across.items()]
-    return check.Imported(name, given, reports, ranges, slack, loop.still)
+    return check.Imported(name, given, reports, [joint.name for joint in drawing.driven],
+                          drawing.ends, loop.lean + loop.gap / loop.size, loop.still)
 
 
 def _drawn(robot: Robot, group: loops.Group) -> Drawing:

@@ -214,18 +214,13 @@ def _on_bodies(joints: Sequence[Joint]) -> Dict[str, List[Joint]]:
             for joint in joints for body in joint.bodies}
 
 
-def described(robot: Robot, group: Group, others: Sequence[str]) -> check.Imported:
-    """
-    Return a mechanism.
-
-    Raises ValueError for loops that rods cannot be, or whose poses are others than the robot's.
-    """
+def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> check.Imported:
+    """Return a mechanism; raise ValueError for loops that rods cannot be."""
     found = Rods(robot, group)
     if not found.inputs:
         raise NotDriven('not driven: its motors must be named by --driven')
     lines, reports = _lines(found)
-    name = f'{next(iter(found.inputs))}_rods'
-    name = f'{name}_{len(others)}' if name in others else name
+    name = check.name_beside(others, f'{next(iter(found.inputs))}_rods')
     given = {f'{name}.{key}': value for key, value in found.parameters(lines)}
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     limits, more = robot.limits(found.inputs.values())
@@ -239,10 +234,9 @@ def described(robot: Robot, group: Group, others: Sequence[str]) -> check.Import
         given[f'{name}.{link}.sweep'] = [float(short(end)) for end in sweep]
         given[f'{name}.{link}.start'] = min(max(found.zeros[link], sweep[0]), sweep[1])
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
-    report, ranges = check.compared(
-        robot, machine, [joint.name for joint in found.inputs.values()], ends, 0.0)
-    return check.Imported(name, given, [*reports, report, *_corners(machine, found)], ranges,
-                          still=found.still)
+    return check.Imported(
+        name, given, [*reports, *_corners(machine, found)],
+        [joint.name for joint in found.inputs.values()], ends, still=found.still)
 
 
 def _lines(found: Rods) -> Tuple[List[str], List[str]]:
