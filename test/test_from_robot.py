@@ -395,8 +395,8 @@ def test_a_loop_that_closes_in_one_pose_alone_is_named(capsys, tmp_path):
     file.write_text(FOLDED.format('continuous').replace(
         '<origin xyz="0.3 0 0"/>', '<origin xyz="0.7 0 0"/>').replace(
         'link="rocker" xyz="0.2', 'link="rocker" xyz="-0.2'))
-    assert ('its loops end where the file has motor, and no other pose is found: lengths or '
-            'places in the file are wrong.\n') in refused(capsys, file)
+    assert ('its loops end where the file has motor: choose another pose by --pose, or mend '
+            'lengths or places in the file.\n') in refused(capsys, file)
 
 
 def test_a_joint_without_a_range_is_the_one_to_hold(capsys, tmp_path):

@@ -115,11 +115,11 @@ def described(robot: Robot, given_pose: Collection[str] = ()
             why = f'as rods in space: {why}' if group.why and why is error else why
             reports.append(_left_out(_bodies(joints), f'{group.why}; ' * bool(group.why) + str(
                 why)))
-    return _checked(robot, imported, reports, closed.immobile)
+    return _checked(robot, imported, reports)
 
 
-def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str],
-             immobile: Collection[str]) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
+def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str]
+             ) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
     """Return what is described, without mechanisms that differ from the robot."""
     if not imported:
         raise command.RequestError(' '.join(reports) or 'no joint of this robot closes a loop')
@@ -128,7 +128,7 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
         given.update(made.parameters)
     machines = scene.read(given).machines
     tree = {joint.name: joint for _, joint in trees(robot)[0].values()}
-    stay = {*immobile, *(name for made in imported for name in made.still)}
+    stay = {name for made in imported for name in made.still}
     still = {name: value for name, value in robot.positions.items()
              if name in tree.keys() & stay - check.published(machines)}
     rest, lost = model.others(robot, machines, still)
@@ -137,8 +137,7 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
     checks, wrong = check.compared(robot, machines, imported)
     if wrong:
         return _checked(robot, [made for made in imported if made.name not in wrong], [
-            *reports, *(f'Left out: {name}: {WRONG}: {why}.' for name, why in wrong.items())],
-            immobile)
+            *reports, *(f'Left out: {name}: {WRONG}: {why}.' for name, why in wrong.items())])
     reports = [*reports, *(report for made in imported for report in made.reports), *checks]
     if lost:
         reports.append(model.not_published(lost))
