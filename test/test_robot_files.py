@@ -172,7 +172,7 @@ LIMITS = [
      'from 1.2 to -1.2: they are no range'),
     ('four_bar.urdf', LIMIT, 'lower="nan" upper="1"', None, 'from nan to 1: they are no range'),
     ('four_bar.urdf', LIMIT, 'lower="-1e7" upper="1"', None,
-     'from -1e+07 to 1: its reach has no end there'),
+     'from -1e+07 to 1: its loops do not reach them'),
     ('four_bar.urdf', 'name="motor" type="revolute"', 'name="motor" type="continuous"', None,
      'from -1.2 to 1.2: it is continuous'),
     ('boom.urdf', 'lower="-0.3" upper="0.3"', 'upper="0.2"', (0.0, 0.2), ''),
@@ -180,10 +180,10 @@ LIMITS = [
     ('boom.urdf', 'lower="-0.3" upper="0.3"', 'lower="5" upper="9"', None,
      'from 5 to 9: its loops do not reach them'),
     ('four_bar.sdf', SDF_AXIS, SDF_LIMIT.format(''), None,
-     'from -0.4 to inf: its reach has no end there'),
+     'from -0.4 to inf: its loops do not reach them'),
     ('four_bar.sdf', SDF_AXIS, SDF_LIMIT.format('<upper>1</upper>'), (-0.4, 1.0), ''),
     ('four_bar.xml', MOTOR, MOTOR.replace('/>', ' range="-inf 40" limited="true"/>'), None,
-     'from -inf to 0.6981: its reach has no end there'),
+     'from -inf to 0.6981: its loops do not reach them'),
     ('four_bar.xml', MOTOR, MOTOR.replace('/>', ' range="-40 40"/>'),
      (math.radians(-40.0), math.radians(40.0)), '')]
 
@@ -233,7 +233,7 @@ def test_limits_of_a_joint_are_those_of_all_that_it_follows(
     machine, = imported(file).values()
     drive = machine.first
     assert drive.source == 'servo'
-    assert ('the limits of motor, servo, servo from 5 to 2.6: they leave no range' in printed(
+    assert ('motor, servo, servo from 5 to 2.6: its loops do not reach them' in printed(
         file)) == (ends is None)
     assert (drive.ends and sorted((end - drive.offset) / drive.ratio for end in drive.ends)) == (
         ends and pytest.approx(ends))

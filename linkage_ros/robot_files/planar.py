@@ -12,21 +12,31 @@ from __future__ import annotations
 from cmath import phase
 from itertools import combinations
 import math
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Set, Tuple
 
 import numpy as np
 
-from . import check, loops, sweeps
-from .sweeps import Source
+from . import check, loops
 from .. import mechanisms, scene
 from ..linkage import bar_name, Dyads, Hinge, Mechanism, Motor, Pin, ROUNDING, short, Slide
 from ..robot_model.places import coordinates
 from ..robot_model.robot import Joint, Limits, NotDriven, plain, Robot, SLIDE
+from ..scene import FARTHEST
 from ..scene.joint_names import quoted_name
 
 # The most joints of which pairs are tried as motors.
 MAX_PAIRED = 30
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
+
+
+class Source(NamedTuple):
+    """An input: ratio * position + offset of its source."""
+
+    name: str
+    source: str
+    ratio: float
+    offset: float
+    value: float
 
 
 class Drawing(Dyads):
@@ -230,7 +240,16 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
         raise NotPlaced(drawing)
     reports = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
     drawing.limits, more = robot.limits(drawing.driven)
-    reports += more + sweeps.added(given, name, drawing.drives, drawing.limits, machine.inputs)
+    reports += more
+    for drive in drawing.drives:
+        if limits := drawing.limits.pop(drive.source, None):
+            try:
+                sweep = _sweep(drive, limits, machine.inputs[drive.name])
+                given[f'{name}.{drive.name}.sweep'] = [*sweep]
+                given[f'{name}.{drive.name}.start'] = min(max(drive.value, sweep[0]), sweep[1])
+                drawing.limits[drive.source] = limits
+            except ValueError as why:
+                reports.append(f'Left out: the limits of {limits.text(drive.source)}: {why}.')
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if drawing.apart(machine.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
@@ -239,6 +258,22 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
                 'depends.' for joint, gap in loop.across.items()]
     return check.Imported(name, given, reports, [joint.name for joint in drawing.driven],
                           drawing.ends, loop.lean + loop.gap / loop.size, loop.still)
+
+
+def _sweep(drive: Source, limits: Limits, settings: scene.InputSettings) -> Tuple[float, float]:
+    """Return the limits of an input within its reach; raise ValueError if it has no such ends."""
+    low, high = (float(short(end, 1e-15)) if abs(end) < FARTHEST else math.copysign(math.inf, end)
+                 for end in (drive.ratio * end + drive.offset
+                             for end in limits[:2][::1 if drive.ratio > 0.0 else -1]))
+    for start, end in () if settings.input.is_whole(settings.reach) else settings.reach:
+        turns = math.tau * math.floor((drive.value - start) / math.tau) * settings.input.turns
+        if start + turns <= drive.value <= end + turns:
+            # An end that is a dead point is not quite reached.
+            edge = ROUNDING * (end - start)
+            low, high = max(low, start + turns + edge), min(high, end + turns - edge)
+    if not low + 1e-6 * settings.input.size < high < low + math.inf:
+        raise ValueError('its loops do not reach them')
+    return low, high
 
 
 def _drawn(robot: Robot, group: loops.Group) -> Drawing:
