@@ -80,7 +80,7 @@ def turning(seed):
 def test_an_ankle_is_imported_with_the_limits_of_its_file(tmp_path, capsys, seed):
     ankle, half = turning(seed), np.array([0.15, 0.12])
     machine, said = imported(tmp_path, ankle, (-half, half), capsys)
-    assert 'in 240 poses of the robot' in said and said.count('Motors: with ') == 4
+    assert 'in 240 poses of the robot' in said
     assert 'Limits' not in said
     names = {called.name for called in machine.joints.values() if called.published}
     assert names == {'pitch', 'roll'} and machine.frame_id == 'shin'
