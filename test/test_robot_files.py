@@ -297,7 +297,6 @@ def test_a_scene_is_held_against_its_robot_over_the_range_of_its_motor(tmp_path,
         '<link2 link="rocker" xyz="0 0 0.2"/>', f'<link2 link="rocker" xyz="{place}"/>')))
     (count, worst), = checked(text)
     assert count >= 200 and worst < 1e-12 and 'motor from -1.2 to 1.2' in text
-    assert ('# wrist has its ends 0.01 m apart along its axis' in text) == ('0.01' in place)
 
 
 @pytest.mark.parametrize('old, new, why', [

@@ -17,6 +17,7 @@ from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Se
 import numpy as np
 
 from . import check, loops
+from .spatial import EXACT
 from .. import mechanisms, scene
 from ..linkage import bar_name, Dyads, Hinge, Mechanism, Motor, Pin, ROUNDING, short, Slide
 from ..robot_model.places import coordinates
@@ -253,11 +254,12 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if drawing.apart(machine.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
-    reports += [loop.misfit] * bool(loop.misfit)
-    reports += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle '
-                'depends.' for joint, gap in loop.across.items()]
+    slack = loop.lean + loop.gap / loop.size
+    if slack > EXACT:
+        reports.append(f'Warning: the file is not exact: axes lean by {loop.lean:.2g} rad, and '
+                       f'loops stay open by {loop.gap:.2g} m; so is what is published.')
     return check.Imported(name, given, reports, [joint.name for joint in drawing.driven],
-                          drawing.ends, loop.lean + loop.gap / loop.size, loop.still)
+                          drawing.ends, slack, loop.still)
 
 
 def _sweep(drive: Source, limits: Limits, settings: scene.InputSettings) -> Tuple[float, float]:
@@ -323,7 +325,7 @@ def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
                 and (found := drawing.measured_by(joint))]
     yield 'type', 'custom'
     yield 'joints', drawing.lines
-    yield 'frame_id', drawing.loop.frame_id
+    yield 'frame_id', drawing.loop.ground
     yield 'pose', [float(short(value)) for value in coordinates(drawing.loop.frame)]
     links = {link.name: link for link in drawing.linkage.links}
     for drive in drawing.drives:

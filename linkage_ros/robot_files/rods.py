@@ -45,8 +45,8 @@ class Rods:
     """
 
     def __init__(self, robot: Robot, group: Group):
-        ground, self.frame_id = group.ground, group.links[group.ground]
-        self._seen = np.linalg.inv(robot.frames[self.frame_id])
+        ground = self.frame_id = group.ground
+        self._seen = np.linalg.inv(robot.frames[ground])
         self._driven = {*robot.driven}
         # The joint of each link, and its end of a line: its parent, its place and its axis.
         self.links: Dict[str, Joint] = {}
