@@ -100,8 +100,7 @@ def described(robot: Robot, given_pose: Collection[str] = ()
             except (ArithmeticError, ValueError) as error:
                 if group.why:
                     continue
-                bodies = error.bodies if isinstance(error, planar.NotPlaced) else _bodies(joints)
-                reports.append(_left_out(bodies, _why(error, fault, joints, robot)))
+                reports.append(_left_out(joints, _why(error, fault, joints, robot)))
             joints = [joint for joint in joints if joint.name not in {
                 placed.name for placed in part.joints}]
         if not joints:
@@ -113,8 +112,7 @@ def described(robot: Robot, given_pose: Collection[str] = ()
         except (ArithmeticError, ValueError) as error:
             why = _why(error, fault, joints, robot)
             why = f'as rods in space: {why}' if group.why and why is error else why
-            reports.append(_left_out(_bodies(joints), f'{group.why}; ' * bool(group.why) + str(
-                why)))
+            reports.append(_left_out(joints, f'{group.why}; ' * bool(group.why) + str(why)))
     return _checked(robot, imported, reports)
 
 
@@ -172,9 +170,6 @@ def _why(error: Exception, fault: str, joints: Sequence[Joint], robot: Robot) ->
     return fault if fault and (is_driven or isinstance(error, NotDriven)) else error
 
 
-def _left_out(bodies: Sequence[str], why: object) -> str:
+def _left_out(joints: Sequence[Joint], why: object) -> str:
+    bodies = dict.fromkeys(body for joint in joints for body in joint.bodies)
     return f'Left out: {listed(bodies, 200)}: {why}.'
-
-
-def _bodies(joints: Sequence[Joint]) -> List[str]:
-    return [*dict.fromkeys(body for joint in joints for body in joint.bodies)]
