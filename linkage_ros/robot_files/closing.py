@@ -13,7 +13,7 @@ from typing import Any, Collection, Dict, List, Mapping, NamedTuple, Sequence, T
 import numpy as np
 
 from .spatial import CLOSED, Component, components, DEAD_POINT, is_free
-from ..robot_model.robot import displaced, FIXED, posed, Robot, trees
+from ..robot_model.robot import displaced, FIXED, NotDriven, posed, Robot, trees
 from ..words import listed
 
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
@@ -43,30 +43,19 @@ def held(robot: Robot, values: Mapping[str, float]) -> Robot:
 
 class Closed(NamedTuple):
     """
-    A robot with its loops closed.
+    A robot with its loops closed, and a report on what had to move.
 
-    Attributes
-    ----------
-    report : list of str
-        Which motors had to move.
-    open_loops : dict
-        For each joint whose loops cannot be closed, or cannot move, the reason.
-    faults : dict
-        For each joint whose loops the motors do not determine, the reason.
-
+    `faults` has for joints why their loops cannot be closed or cannot move; or, as NotDriven, why
+    the motors do not determine them.
     """
 
     robot: Robot
     report: List[str]
-    open_loops: Dict[str, str]
-    faults: Dict[str, str]
+    faults: Dict[str, ValueError]
 
 
-class Question(NamedTuple):
-    """Two closed poses of which one has to be chosen: a joint in both, and what to type."""
-
-    text: str
-    choices: Sequence[Mapping[str, str]]
+# Two closed poses of which one has to be chosen: a text, and positions to type for each.
+Question = Tuple[str, Mapping[str, str], Mapping[str, str]]
 
 
 def closed(robot: Robot, given: Collection[str] = ()) -> Closed:
@@ -77,7 +66,7 @@ def closed(robot: Robot, given: Collection[str] = ()) -> Closed:
     whose positions are given.
     """
     made = _closed(robot)
-    if not made.open_loops and not made.faults:
+    if not made.faults:
         return made
     inside = {}
     for _, joint in trees(robot)[0].values():
@@ -87,7 +76,7 @@ def closed(robot: Robot, given: Collection[str] = ()) -> Closed:
             margin = INSIDE * min(high - low, 1.0)
             inside[joint.name] = low + margin if joint.position < low else high - margin
     other = _closed(posed(robot, inside))
-    if len(other.open_loops) + len(other.faults) >= len(made.open_loops) + len(made.faults):
+    if len(other.faults) >= len(made.faults):
         return made
     where = ', '.join(f'{name} at {value:.4g}' for name, value in inside.items())
     return other._replace(report=[
@@ -100,7 +89,7 @@ def _closed(robot: Robot) -> Closed:
                           for _, joint in trees(robot)[0].values()
                           if (name := joint.name) in robot.follows and joint.position is not None
                           for source, ratio, offset in [robot.source(name)]})
-    made = Closed(robot, [], {}, {})
+    made = Closed(robot, [], {})
     moves: Dict[str, np.ndarray] = {}
     positions: Dict[str, float] = {}
     for component in components(robot):
@@ -108,17 +97,14 @@ def _closed(robot: Robot) -> Closed:
                              for names in (robot.driven, robot.follows))
         try:
             pose, report = nearest(component, motors, followers)
+            made.report.extend([report] * bool(report))
+            moves.update(component.moves(pose))
+            positions.update((name, float(value[0]))
+                             for name, value in component.read(pose[None]).items())
             if component.gap(pose[None])[0] < CLOSED:
-                _check_moves(component, pose)
-                if fault := _fault(component, pose, motors, followers):
-                    made.faults.update((joint.name, fault) for joint in component.joints)
+                _check_driven(component, pose, motors, followers)
         except ValueError as error:
-            made.open_loops.update((joint.name, str(error)) for joint in component.joints)
-            continue
-        moves.update(component.moves(pose))
-        positions.update((name, float(value[0]))
-                         for name, value in component.read(pose[None]).items())
-        made.report.extend([report] * bool(report))
+            made.faults.update((joint.name, error) for joint in component.joints)
     return made._replace(robot=displaced(robot, moves, positions))
 
 
@@ -128,53 +114,50 @@ def option(word: str, values: Mapping[str, str]) -> str:
                                    for name, value in values.items())
 
 
-def _check_moves(component: Component, pose: np.ndarray) -> None:
-    """Raise ValueError if loops cannot move, with the joint that may be wrong."""
+def _check_driven(component: Component, pose: np.ndarray, motors: List[str], followers: List[str]
+                  ) -> None:
+    """Raise ValueError if loops cannot move; NotDriven if their motors do not determine a pose."""
     if not component.loose(pose, [])[0]:
         fixed = [joint.name for joint in component.joints if joint.kind == FIXED and joint.is_cut]
         raise ValueError('it cannot move, as its joints hold each other' + (
             f': {listed(fixed)} makes one body of two, where a pin has the type 3d'
             if fixed else ''))
-
-
-def _fault(component: Component, pose: np.ndarray, motors: List[str], followers: List[str]) -> str:
-    """Return why motors and their followers do not determine a pose; empty if they do."""
     ways = component.free_ways(pose, component.is_of([]))
     count = len(chosen := component.chosen(ways, motors))
     if count < len(motors):
-        return (f'{listed(motors)} drive it, and hold each other, as {count} of them tell where '
-                f'all is: name these by --driven, as in --driven {shlex.join(chosen)}')
+        raise NotDriven(
+            f'{listed(motors)} drive it, and hold each other, as {count} of them tell where all '
+            f'is: name these by --driven, as in --driven {shlex.join(chosen)}')
     loose, ways = component.loose(pose, motors + followers)
     if not loose:
-        return ''
-    try:
-        _check_unfolded(component, pose, motors, DEAD_POINT)
-    except ValueError as error:
-        return str(error)
+        return
+    _check_unfolded(component, pose, motors, DEAD_POINT)
     stiff = [joint.name for joint in component.joints if joint.name in loose
              and joint.no_limits.endswith('no range')]
     more = component.chosen(ways, loose, stiff)
-    why = f'; the limits of {listed(stiff)} leave no range' if stiff else ''
     at = component.texts(pose, component.is_of(more))
-    return (f'not driven: {len(more)} of {listed(loose)} must be moved, named by --driven, or '
-            f'held, named by --hold, as in --driven {shlex.join([*motors, *more])} or '
-            + option('hold', {name: at[name] for name in more}) + why)
+    raise NotDriven(
+        f'not driven: {len(more)} of {listed(loose)} must be moved, named by --driven, or held, '
+        f'named by --hold, as in --driven {shlex.join([*motors, *more])} or '
+        + option('hold', {name: at[name] for name in more})
+        + f'; the limits of {listed(stiff)} leave no range' * bool(stiff))
 
 
 def _choice(questions: Sequence[Question], why: str) -> ValueError:
     """Return the error of all that has to be chosen, with what to type."""
-    sides = [{name: value for each in questions for name, value in each.choices[side].items()}
-             for side in (0, 1)]
-    return ValueError(f'{why} {", and ".join(each.text for each in questions)}: choose by ' + (
-        ', or by '.join(option('pose', side) for side in sides)))
+    texts, *sides = zip(*questions)
+    return ValueError(f'{why} {", and ".join(texts)}: choose by ' + ', or by '.join(option(
+        'pose', {name: value for side in each for name, value in side.items()})
+        for each in sides))
 
 
 def _question(component: Component, poses: np.ndarray, which: np.ndarray, where: str = ''
               ) -> List[Question]:
     """Return the choice of two poses by the joint that differs most, if they are different."""
     name, first, second = component.most_different(poses[0], poses[1], which)
-    return [Question(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', [
-        component.texts(pose, which) for pose in poses])] * (abs(first - second) > DISTINCT)
+    one, other = (component.texts(pose, which) for pose in poses)
+    return [(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', one, other)] * (
+        abs(first - second) > DISTINCT)
 
 
 def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], least: float

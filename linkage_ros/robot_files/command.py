@@ -19,7 +19,6 @@ from ..robot_model.robot import (
     FARTHEST,
     FIXED,
     HINGE,
-    Joint,
     NotDriven,
     posed,
     Robot,
@@ -91,28 +90,30 @@ def described(robot: Robot, given_pose: Collection[str] = ()
     robot, reports = closed.robot, closed.report
     imported: List[check.Imported] = []
     for group in loops.groups(robot):
-        open_one, fault = (_first(reasons, group.joints) for reasons in (
-            closed.open_loops, closed.faults))
+        fault = next((closed.faults[joint.name] for joint in group.joints
+                      if joint.name in closed.faults), None)
         joints = group.joints
-        for part in group.parts if not open_one else ():
-            try:
-                imported.append(planar.described(robot, part, imported))
-            except (ArithmeticError, ValueError) as error:
-                if group.why:
-                    continue
-                reports.append(_left_out(joints, _why(error, fault, joints, robot)))
-            joints = [joint for joint in joints if joint.name not in {
-                placed.name for placed in part.joints}]
-        if not joints:
-            continue
         try:
-            if open_one:
-                raise ValueError(open_one)
-            imported.append(rods.described(robot, group._replace(joints=joints), imported))
+            if fault and not isinstance(fault, NotDriven):
+                raise fault
+            for part in group.parts:
+                try:
+                    imported.append(planar.described(robot, part, imported))
+                except (ArithmeticError, ValueError):
+                    if not group.why:
+                        raise
+                    continue
+                placed = {joint.name for joint in part.joints}
+                joints = [joint for joint in joints if joint.name not in placed]
+            if joints:
+                imported.append(rods.described(robot, group._replace(joints=joints), imported))
         except (ArithmeticError, ValueError) as error:
-            why = _why(error, fault, joints, robot)
-            why = f'as rods in space: {why}' if group.why and why is error else why
-            reports.append(_left_out(joints, f'{group.why}; ' * bool(group.why) + str(why)))
+            is_driven = any(joint.name in robot.driven for joint in joints)
+            why = fault if fault and (is_driven or isinstance(error, NotDriven)) else error
+            in_space = f'{group.why}; ' + 'as rods in space: ' * (why is not fault)
+            bodies = dict.fromkeys(body for joint in joints for body in joint.bodies)
+            reports.append(f'Left out: {listed(bodies, 200)}: '
+                           f'{in_space * bool(group.why)}{why}.')
     return _checked(robot, imported, reports)
 
 
@@ -158,18 +159,3 @@ def _values(texts: Sequence[str]) -> Dict[str, float]:
         if not name or not abs(found[name]) < FARTHEST:
             raise command.RequestError(f'{each!r} must be JOINT=VALUE, its value in rad or m')
     return found
-
-
-def _first(reasons: Mapping[str, str], joints: Sequence[Joint]) -> str:
-    return next((reasons[joint.name] for joint in joints if joint.name in reasons), '')
-
-
-def _why(error: Exception, fault: str, joints: Sequence[Joint], robot: Robot) -> object:
-    """Return an error, or the fault of motors that do not determine the pose, if that is why."""
-    is_driven = any(joint.name in robot.driven for joint in joints)
-    return fault if fault and (is_driven or isinstance(error, NotDriven)) else error
-
-
-def _left_out(joints: Sequence[Joint], why: object) -> str:
-    bodies = dict.fromkeys(body for joint in joints for body in joint.bodies)
-    return f'Left out: {listed(bodies, 200)}: {why}.'
