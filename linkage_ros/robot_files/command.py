@@ -15,16 +15,7 @@ import numpy as np
 from . import check, closing, loops, model, planar, readers, rods
 from .. import command, scene
 from ..linkage import short
-from ..robot_model.robot import (
-    FARTHEST,
-    FIXED,
-    HINGE,
-    NotDriven,
-    posed,
-    Robot,
-    SLIDE,
-    trees,
-)
+from ..robot_model.robot import FARTHEST, FIXED, HINGE, NotDriven, posed, Robot, SLIDE, trees
 from ..scene.writing import in_yaml
 from ..words import elided, listed, sentence
 
