@@ -13,7 +13,6 @@ import math
 from xml.sax.saxutils import quoteattr
 
 from linkage_ros.robot_files import readers
-from linkage_ros.robot_model.robot import posed
 import numpy as np
 import pytest
 
@@ -67,8 +66,8 @@ class Writer:
 
     """
 
-    def __init__(self, rng, version, folder):
-        self.rng, self.folder = rng, folder
+    def __init__(self, rng, version):
+        self.rng = rng
         self.numbers = count()
         self.links, self.axes, self.places, self.bodies, self.follows = {}, {}, {}, {}, {}
         text = self.model('', 'robot', frame(rng), version, 2, np.eye(4))
@@ -115,10 +114,7 @@ class Writer:
         if depth and number >= (1, 7):
             child = f'inner {next(self.numbers)}'
             there = frame(rng)
-            if rng.random() < 0.5:
-                parts.append(self.included(inner, child, there, at, here, number))
-            else:
-                parts.append(self.model(inner, child, there, version, depth - 1, at, here))
+            parts.append(self.model(inner, child, there, version, depth - 1, at, here))
             links += [link[len(whole('')):] for link in self.links
                       if link.startswith(whole(child))]
             here.update({link: self.links[whole(link)] for link in links})
@@ -127,18 +123,6 @@ class Writer:
                                  links if depth == 2 else links[1:]):
             parts.append(self.joint(whole, parent, child, at, here, number))
         return f'<model name="{name}">{"".join(parts)}</model>'
-
-    def included(self, scope, name, at, base, here, number):
-        """Return an include of a model in a file of another version."""
-        other = VERSIONS[self.rng.integers(len(VERSIONS))]
-        folder = self.folder / f'model_{name.split()[1]}'
-        folder.mkdir()
-        # What the file says of its own pose is what the include says instead.
-        text = self.model(scope, name, at, other, 0, frame(self.rng))
-        uri = ['model://', '', 'file://'][self.rng.integers(3)] + folder.name
-        (folder / 'model.sdf').write_text(f'<sdf version="{other}">{text}</sdf>')
-        return (f'<include><uri>{uri}</uri><name>{name}</name>'
-                f'{self.pose(at, base, number, here)}</include>')
 
     def joint(self, whole, parent, child, at, here, number):
         """Return a joint of any pose, axis and way to say it."""
@@ -177,7 +161,7 @@ class Writer:
 def check_is_read(folder, seed):
     """Check that a robot is read as it was before it was written."""
     rng = np.random.default_rng(seed)
-    made = Writer(rng, VERSIONS[seed % len(VERSIONS)], folder)
+    made = Writer(rng, VERSIONS[seed % len(VERSIONS)])
     file = folder / 'robot.sdf'
     file.write_text(made.text)
     robot = readers.read(str(file))
@@ -207,57 +191,3 @@ def test_many_robots_are_read_as_they_were(tmp_path):
     for seed in range(30, 1500):
         (tmp_path / str(seed)).mkdir()
         check_is_read(tmp_path / str(seed), seed)
-
-
-def turn(robot, name, body, base):
-    """Return how a body is turned as seen from another, from where the file has both."""
-    here = posed(robot, name).frames
-    was = np.linalg.inv(robot.frames[base]) @ robot.frames[body]
-    return (np.linalg.inv(here[base]) @ here[body])[:3, :3] @ was[:3, :3].T
-
-
-def angle_about(axis, turned):
-    """Return by how much a matrix turns about an axis."""
-    skew = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0],
-                     turned[1, 0] - turned[0, 1]])
-    return math.atan2(0.5 * axis @ skew, 0.5 * (np.trace(turned) - 1.0))
-
-
-@pytest.mark.parametrize('seed', range(8))
-def test_a_gearbox_turns_its_bodies_as_the_specification_says(tmp_path, seed):
-    # theta_2 = -gearbox_ratio theta_1, both from the reference body, about axis and axis2.
-    rng, file = np.random.default_rng(seed), tmp_path / 'gear.sdf'
-    signs, ratio = rng.choice([-1, 1], 4), rng.uniform(0.2, 3.0)
-    ends = [('carrier', 'sun'), ('carrier', 'planet')]
-    joints = ''.join(
-        f'<joint name="{name}" type="revolute"><parent>{pair[0]}</parent><child>{pair[1]}</child>'
-        f'<axis><xyz>0 0 {sign}</xyz></axis></joint>'
-        for name, pair, sign in zip('ab', (pair[::rng.choice([-1, 1])] for pair in ends), signs))
-    file.write_text(
-        '<sdf version="1.9"><model name="m"><link name="carrier"/><link name="sun"/>'
-        f'<link name="planet"><pose>1 0 0 0 0 0</pose></link>{joints}'
-        '<joint name="g" type="gearbox"><parent>sun</parent><child>planet</child>'
-        f'<gearbox_ratio>{ratio}</gearbox_ratio><gearbox_reference_body>carrier'
-        f'</gearbox_reference_body><axis><xyz>0 0 {signs[2]}</xyz></axis>'
-        f'<axis2><xyz>0 0 {signs[3]}</xyz></axis2></joint></model></sdf>')
-    robot = readers.read(str(file))
-    (follower, (leader, factor, offset)), = robot.follows.items()
-    positions = {leader: 0.4, follower: factor * 0.4 + offset}
-    one, two = (angle_about(np.array([0.0, 0.0, sign]), turn(robot, positions, body, 'carrier'))
-                for sign, body in zip(signs[2:], ('sun', 'planet')))
-    assert math.remainder(two + ratio * one, math.tau) == pytest.approx(0.0, abs=1e-12)
-    assert len(robot.joints) == 2
-
-
-def test_a_merged_include_and_a_placement_frame_are_refused(tmp_path):
-    text = ('<sdf version="1.9"><model name="m"><link name="a"/><joint name="j" type="revolute">'
-            '<parent>world</parent><child>a</child></joint>{}</model></sdf>')
-    file = tmp_path / 'robot.sdf'
-    for part, why in (
-            ('<include merge="true"><uri>other</uri></include>', 'write it in its place'),
-            ('<include><uri>nowhere</uri></include>', "includes 'nowhere', which is not"),
-            ('<model name="n" placement_frame="b"><link name="b"/></model>',
-             'has a placement_frame, which is not read')):
-        file.write_text(text.format(part))
-        with pytest.raises(readers.RequestError, match=why):
-            readers.read(str(file))

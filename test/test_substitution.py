@@ -60,14 +60,15 @@ def with_length(given, rng):
 KINDS = with_sign, with_offset, with_side, with_length
 
 
-def is_found(robot, machine, values, driven, ends, slack):
+def is_found(robot, machine, values, made):
     """Tell whether the check finds a fault; what changes no position is none."""
-    name = machine.name
+    name, ends = machine.name, made.ends
     try:
         wrong = scene.read({'mechanisms': [name], **{
             f'{name}.{key}': value for key, value in values.items()}}).machines[name]
-        check.compared(robot, wrong, driven, ends, slack)
-    except (check.Difference, scene.SceneError):
+        if check.compared(robot, {name: wrong}, [made])[1]:
+            return True
+    except scene.SceneError:
         return True
     parts = [[drive.ratio * np.linspace(*ends[drive.source], 9) + drive.offset
               for drive in machine.inputs.values()]] * 2
@@ -97,14 +98,14 @@ def faults(robot, seed):
     rng, given = np.random.default_rng(seed), {}
     with patch.object(check, 'compared', wraps=check.compared) as spy, suppress(RequestError):
         given = described(robot)[0] if robot else {}
-    for call in spy.call_args_list:
-        robot, machine, driven, ends, slack = call.args
-        ends = {name: (max(low, robot.positions[name] - 0.1), min(
-            high, robot.positions[name] + 0.1)) for name, (low, high) in ends.items()}
+    for robot, machines, made in ((*call.args[:2], made) for call in spy.call_args_list
+                                  for made in call.args[2] if made.name in given['mechanisms']):
+        machine = machines[made.name]
+        made = made._replace(ends={
+            name: (max(low, robot.positions[name] - 0.1), min(high, robot.positions[name] + 0.1))
+            for name, (low, high) in made.ends.items()})
         own = {key.partition('.')[2]: value for key, value in given.items()
                if key.startswith(f'{machine.name}.')}
-        if not own:
-            continue
         for _ in range(FAULTS):
             values = {key: value[:] if isinstance(value, list) else value
                       for key, value in own.items()}
@@ -112,7 +113,7 @@ def faults(robot, seed):
             with suppress(IndexError):
                 kind(values, rng)
                 yield (seed, kind.__name__, values['joints'], values['joint_names']), is_found(
-                    robot, machine, values, driven, ends, slack)
+                    robot, machine, values, made)
 
 
 @pytest.mark.parametrize('seeds', [

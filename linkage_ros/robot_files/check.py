@@ -6,7 +6,7 @@ Check by substitution: what is published, put into the robot's own joints, close
 
 Joints without a published position, such as the balls of rods, close the loops as well as they
 can. So mechanisms are wrong where the loops stand open, or where they have no pose and the robot
-has. One mechanism and the scene of a whole robot are checked in the same way.
+has. Loops that share joints are checked together, with all that the scene publishes of them.
 """
 
 from __future__ import annotations
@@ -31,8 +31,6 @@ OTHER = 1e-3
 LEAP = 0.35
 # Stiffness next to a change point, as a part of the largest.
 CHANGE = 0.25
-# The report on loops of a whole robot that stand open.
-OPEN = 'Open:'
 
 Ranges = Dict[str, Tuple[float, float]]
 
@@ -45,16 +43,23 @@ class Imported(NamedTuple):
     """
     A mechanism's name, its parameters and its report.
 
-    Also the ranges of sources in which it was checked, the misfit of the file, of the size, and
-    hinges of balls that may stay where they are.
+    Also the joints that move it, its sources or what follows them, between which positions each
+    source moves [rad or m], the misfit of the file, of the size, and hinges of balls that may stay
+    where they are.
     """
 
     name: str
     parameters: Dict[str, Any]
     reports: List[str]
-    ranges: Ranges
+    driven: Sequence[str]
+    ends: Ranges
     slack: float = 0.0
     still: Sequence[str] = ()
+
+
+def name_beside(others: Sequence[Imported], name: str) -> str:
+    """Return a name that no other mechanism has."""
+    return f'{name}_{len(others)}' if name in [made.name for made in others] else name
 
 
 class Walk(NamedTuple):
@@ -71,89 +76,24 @@ class Walk(NamedTuple):
     good: np.ndarray
 
 
-def compared(robot: Robot, machine: scene.SceneMechanism, driven: Sequence[str], ends: Ranges,
-             slack: float) -> Tuple[str, Ranges]:
+def compared(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
+             imported: Sequence[Imported]) -> Tuple[List[str], Dict[str, str]]:
     """
-    Put what a mechanism publishes into the loops of its robot; report on it.
+    Put what a scene publishes into the loops of its robot, which is in a closed pose.
 
-    Also return the ranges of its sources in the poses that were checked.
-
-    Parameters
-    ----------
-    robot : Robot
-        In a pose in which its loops are closed.
-    machine : SceneMechanism
-        The mechanism.
-    driven : sequence of str
-        The joints that move it, its sources or what follows them.
-    ends : dict
-        Between which positions each source moves [rad or m].
-    slack : float
-        The misfit of the file, of the size.
-
-    Raises
-    ------
-    Difference
-        If the loops stand open, or if they are closed in fewer than MIN_POSES poses.
-
+    Return the report on loops that stay closed, and for each mechanism of others the reason.
     """
-    component = next(each for each in components(replace(robot, driven=[*driven]))
-                     if {*driven} & {joint.name for joint in each.joints})
-    loops = _Loops(component, [machine], {name: robot.source(name) for name in driven},
-                   {source: robot.positions[source] for source in ends}, slack)
-    loops.check_start()
-    low, high = corners = np.array([*ends.values()]).T
-    loops.enter(low, high)
-    walk, beyond = loops.walk_to(corners if len(ends) == 1 else np.random.default_rng(1).uniform(
-        low, high, (PATHS, len(ends))), POSES, MIN_POSES)
-    if (count := walk.good.sum()) < MIN_POSES:
-        raise Difference(f'it could not be checked in more than {count} poses')
-    ranges = {source: (float(min(values.min(), first)), float(max(values.max(), first)))
-              for source, first in loops.start.items()
-              for values in [walk.joints[source][walk.good]]}
-    moved = ', '.join(f'{source} from {low:.4g} to {high:.4g}'
-                      for source, (low, high) in ranges.items())
-    return (f'Checked: {machine.name}: in {count} poses of the robot, {moved}, its loops stand '
-            f'open by {walk.gaps[walk.good].max():.0e} m at most{beyond}.'), ranges
-
-
-def whole(robot: Robot, machines: Mapping[str, scene.SceneMechanism], imported: Sequence[Imported]
-          ) -> List[str]:
-    """
-    Put what all mechanisms of a scene publish into all loops of a robot, and report on them.
-
-    All motors move at once towards both ends of the ranges in which their mechanisms were checked,
-    less far where a loop that is left out ends.
-    """
-    worst, count, reports = 0.0, POSES // 2, []
-    start = {drive.source: (drive.start - drive.offset) / drive.ratio
-             for machine in machines.values() for drive in machine.inputs.values()}
-    corners = {name: (value, value) for name, value in start.items()}
-    for source in {source for each in imported for source in each.ranges}:
-        lows, highs = zip(*(each.ranges[source] for each in imported if source in each.ranges))
-        low, high = corners[source] = max(lows), min(highs)
-        start[source] = min(max(robot.positions[source], low), high)
-    movers = {*robot.driven, *(source for each in imported for source in each.ranges)}
-    for component in components(robot):
-        sources = {name: robot.source(name)
-                   for name in component.positions.keys() & published(machines)}
-        motors = {name: way for name, way in sources.items() if way[0] in movers}
-        if len(motors) == len(sources):
-            continue
-        loops = _Loops(component, [*machines.values()], {
-            name: way for name, way in motors.items() if way[0] in start}, start, max(
-            (each.slack for each in imported if each.ranges.keys() & component.positions),
-            default=0.0))
-        try:
-            walk, _ = loops.walk_to(np.array([corners[name] for name in start]).T, POSES // 2,
-                                    POSES // 4)
-        except Difference as error:
-            reports.append(f'{OPEN} the loops of {", ".join(sorted(sources))}: {error}.')
-            continue
-        worst = max(worst, float(np.max(walk.gaps, where=walk.good, initial=0.0)))
-        count = min(count, int(walk.good.sum()))
-    return [f'Checked: the whole robot: in {count} poses, its loops stand open by {worst:.0e} m '
-            'at most.', *reports]
+    reports: List[str] = []
+    wrong: Dict[str, str] = {}
+    for component in components(replace(robot, driven=[*robot.driven, *(
+            name for made in imported for name in made.driven)])):
+        parts = [made for made in imported if {*made.driven} & component.positions.keys()]
+        if parts:
+            try:
+                reports.append(_Loops(robot, component, machines, parts).report())
+            except Difference as error:
+                wrong.update((made.name, str(error)) for made in parts)
+    return reports, wrong
 
 
 def published(machines: Mapping[str, scene.SceneMechanism]) -> Set[str]:
@@ -164,70 +104,94 @@ def published(machines: Mapping[str, scene.SceneMechanism]) -> Set[str]:
 
 
 class _Loops:
-    """
-    Loops that share joints, and what mechanisms publish of them.
+    """Loops that share joints, and what mechanisms publish of them."""
 
-    `start` has the position of each source where walks start [rad or m].
-    """
-
-    def __init__(self, component: Component, machines: Sequence[scene.SceneMechanism],
-                 motors: Mapping[str, Tuple[str, float, float]], start: Mapping[str, float],
-                 slack: float):
-        self._component, self._machines, self._motors = component, machines, motors
-        self.start, self._slack = dict(start), MISFIT * slack
+    def __init__(self, robot: Robot, component: Component,
+                 machines: Mapping[str, scene.SceneMechanism], parts: Sequence[Imported]):
+        self._component, self._parts = component, parts
+        self._machines = [machine for name, machine in machines.items()
+                          if published({name: machine}) & component.positions.keys()]
+        self._motors = {name: robot.source(name) for made in parts for name in made.driven}
+        # Where each source starts, and between which positions it moves.
+        self._start = {drive.source: robot.positions.get(
+            drive.source, (drive.start - drive.offset) / drive.ratio)
+            for machine in self._machines for drive in machine.inputs.values()}
+        self._ends: Ranges = {}
+        for source, ends in (item for made in parts for item in made.ends.items()):
+            low, high = self._ends.get(source, ends)
+            self._ends[source] = max(low, ends[0]), min(high, ends[1])
+        self._slack = MISFIT * max(made.slack for made in parts)
         self._allowed = (EXACT + self._slack) * component.size
         self._pose = component.at_start()
         self._misfit = component.errors(self._pose)[0]
 
-    def check_start(self) -> None:
+    def report(self) -> str:
+        """Return the report; raise Difference if loops are open, or in fewer than MIN_POSES."""
+        self._check_start()
+        low, high = corners = np.array([
+            self._ends.get(source, (value,) * 2) for source, value in self._start.items()]).T
+        self._enter(low, high)
+        walk, beyond = self._walk_to(corners if len(self._ends) == 1 else np.random.default_rng(
+            1).uniform(low, high, (PATHS, len(low))))
+        if (count := walk.good.sum()) < MIN_POSES:
+            raise Difference(f'it could not be checked in more than {count} poses')
+        moved = ', '.join(f'{source} from {min(values.min(), first):.4g} to '
+                          f'{max(values.max(), first):.4g}' for source in self._ends
+                          for first, values in [(self._start[source],
+                                                 walk.joints[source][walk.good])])
+        return (f'Checked: {", ".join(made.name for made in self._parts)}: in {count} poses of '
+                f'the robot, {moved}, its loops stand open by {walk.gaps[walk.good].max():.0e} m '
+                f'at most{beyond}.')
+
+    def _check_start(self) -> None:
         """Raise Difference if a joint is not where the file has it."""
         positions = self._positions({
-            name: np.full((1, 1), value) for name, value in self.start.items()})
+            name: np.full((1, 1), value) for name, value in self._start.items()})
         for joint in self._component.joints:
             if joint.name in positions and joint.position is not None:
                 off = float(positions[joint.name][0, 0]) - joint.position
                 off = off / self._component.size if joint.kind == SLIDE else math.remainder(
                     off, math.tau)
                 if abs(off) > OTHER + self._slack:
-                    raise Difference(f'{self._at(self.start)} {joint.name} is off by '
+                    raise Difference(f'{self._at(self._start)} {joint.name} is off by '
                                      f'{abs(off):.2g}')
 
-    def enter(self, low: np.ndarray, high: np.ndarray) -> None:
+    def _enter(self, low: np.ndarray, high: np.ndarray) -> None:
         """Let walks start inside ranges of the sources, if there is a way from the file's pose."""
-        inside = np.clip([*self.start.values()], low, high)
-        if (inside != [*self.start.values()]).any():
+        inside = np.clip([*self._start.values()], low, high)
+        if (inside != [*self._start.values()]).any():
             walk = self._walk(inside[None], POSES)
             if walk.good.all():
-                self.start, self._pose = dict(zip(self.start, inside.tolist())), walk.poses[-1]
+                self._start, self._pose = dict(zip(self._start, inside.tolist())), walk.poses[-1]
 
-    def walk_to(self, targets: np.ndarray, count: int, fewest: int) -> Tuple[Walk, str]:
+    def _walk_to(self, targets: np.ndarray) -> Tuple[Walk, str]:
         """
         Return a walk of the sources to targets, a row each, and why it ends before, if it does.
 
         The way is shorter where too few of its poses are closed. Raises Difference if the loops
         stand open, or have no pose where the robot has one.
         """
-        start, beyond = np.array([*self.start.values()]), ''
+        start, beyond = np.array([*self._start.values()]), ''
         walk = self._walk(start[None], 0)
         for _ in range(3):
             targets = targets[np.max(np.abs(targets - start), axis=1) > 1e-9]
             if not len(targets):
                 break
-            walk = self._walk(targets, -(-count // len(targets)))
+            walk = self._walk(targets, -(-POSES // len(targets)))
             for path, step in enumerate(walk.good.sum(axis=1)):
                 if not walk.good[path].all():
                     self._check_end(walk, path, step)
                     beyond = '; not beyond where its loops end'
-            if walk.good.sum() >= fewest:
+            if walk.good.sum() >= MIN_POSES:
                 break
             targets = start + (targets - start) * walk.good.mean(axis=1)[:, None]
         return walk, beyond
 
     def _walk(self, targets: np.ndarray, steps: int) -> Walk:
         """Return what is published on straight paths of the sources, and how it opens loops."""
-        start = np.array([*self.start.values()])
+        start = np.array([*self._start.values()])
         way = np.arange(1, steps + 1) / max(steps, 1)
-        sources = dict(zip(self.start, np.moveaxis(
+        sources = dict(zip(self._start, np.moveaxis(
             start + (targets - start)[:, None] * way[:, None], -1, 0)))
         joints = self._positions(sources)
         gaps, poses = self._opened(joints, (len(targets), steps))
@@ -292,13 +256,10 @@ class _Loops:
                     and np.max(np.abs(component.away(new - poses[-1]))) < LEAP
                     and np.min(stiffness) > CHANGE * np.max(stiffness)):
                 return
-        raise Difference(self._at({
-            source: walk.joints[source][path, step] for source in self.start
-            if source in component.positions or len(self._machines) == 1}) + (
+        raise Difference(self._at({name: values[path, step] for name, values in
+                                   walk.joints.items()}) + (
             ' it has no pose, where the loops of the robot are closed' if math.isnan(gap) else
             f' its loops stand open by {gap:.2g} m'))
 
-    @staticmethod
-    def _at(values: Mapping[str, float]) -> str:
-        return 'with ' + ', '.join(
-            f'{source} at {value:.4g}' for source, value in values.items())
+    def _at(self, values: Mapping[str, float]) -> str:
+        return 'with ' + ', '.join(f'{source} at {values[source]:.4g}' for source in self._ends)

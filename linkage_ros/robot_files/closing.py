@@ -13,7 +13,7 @@ from typing import Any, Collection, Dict, List, Mapping, NamedTuple, Sequence, T
 import numpy as np
 
 from .spatial import CLOSED, Component, components, DEAD_POINT, is_free
-from ..robot_model.robot import displaced, FIXED, posed, Robot, trees
+from ..robot_model.robot import displaced, FIXED, NotDriven, posed, Robot, trees
 from ..words import listed
 
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
@@ -43,33 +43,19 @@ def held(robot: Robot, values: Mapping[str, float]) -> Robot:
 
 class Closed(NamedTuple):
     """
-    A robot with its loops closed.
+    A robot with its loops closed, and a report on what had to move.
 
-    Attributes
-    ----------
-    report : list of str
-        Which motors had to move.
-    open_loops : dict
-        For each joint whose loops cannot be closed, or cannot move, the reason.
-    immobile : list of str
-        Joints that cannot move.
-    faults : dict
-        For each joint whose loops the motors do not determine, the reason.
-
+    `faults` has for joints why their loops cannot be closed or cannot move; or, as NotDriven, why
+    the motors do not determine them.
     """
 
     robot: Robot
     report: List[str]
-    open_loops: Dict[str, str]
-    immobile: List[str]
-    faults: Dict[str, str]
+    faults: Dict[str, ValueError]
 
 
-class Question(NamedTuple):
-    """Two closed poses of which one has to be chosen: a joint in both, and what to type."""
-
-    text: str
-    choices: Sequence[Mapping[str, str]]
+# Two closed poses of which one has to be chosen: a text, and positions to type for each.
+Question = Tuple[str, Mapping[str, str], Mapping[str, str]]
 
 
 def closed(robot: Robot, given: Collection[str] = ()) -> Closed:
@@ -79,51 +65,47 @@ def closed(robot: Robot, given: Collection[str] = ()) -> Closed:
     If that does not determine a pose, joints outside their limits start inside them, but for those
     whose positions are given.
     """
-    made, outside = _closed(robot)
-    outside = {name: value for name, value in outside.items() if name not in given}
-    if outside:
-        other, _ = _closed(posed(robot, outside))
-        if len(other.open_loops) + len(other.faults) < len(made.open_loops) + len(made.faults):
-            where = ', '.join(f'{name} at {value:.4g}' for name, value in outside.items())
-            return other._replace(report=[
-                f'Started inside the limits of the file: {where}.', *other.report])
-    return made
+    made = _closed(robot)
+    if not made.faults:
+        return made
+    inside = {}
+    for _, joint in trees(robot)[0].values():
+        low, high = joint.range
+        if joint.position is not None and joint.name not in given \
+                and not low <= joint.position <= high:
+            margin = INSIDE * min(high - low, 1.0)
+            inside[joint.name] = low + margin if joint.position < low else high - margin
+    other = _closed(posed(robot, inside))
+    if len(other.faults) >= len(made.faults):
+        return made
+    where = ', '.join(f'{name} at {value:.4g}' for name, value in inside.items())
+    return other._replace(report=[
+        f'Started inside the limits of the file: {where}.', *other.report])
 
 
-def _closed(robot: Robot) -> Tuple[Closed, Dict[str, float]]:
-    """Return a robot with its loops closed, and starts inside limits where that failed."""
+def _closed(robot: Robot) -> Closed:
     # Dependent joints are where the others say.
     robot = posed(robot, {name: ratio * robot.positions[source] + offset
                           for _, joint in trees(robot)[0].values()
                           if (name := joint.name) in robot.follows and joint.position is not None
                           for source, ratio, offset in [robot.source(name)]})
-    made = Closed(robot, [], {}, [], {})
+    made = Closed(robot, [], {})
     moves: Dict[str, np.ndarray] = {}
     positions: Dict[str, float] = {}
-    outside: Dict[str, float] = {}
     for component in components(robot):
         motors, followers = ([name for name in component.positions if name in names]
                              for names in (robot.driven, robot.follows))
         try:
             pose, report = nearest(component, motors, followers)
+            made.report.extend([report] * bool(report))
+            moves.update(component.moves(pose))
+            positions.update((name, float(value[0]))
+                             for name, value in component.read(pose[None]).items())
+            if component.gap(pose[None])[0] < CLOSED:
+                _check_driven(component, pose, motors, followers)
         except ValueError as error:
-            made.open_loops.update((joint.name, str(error)) for joint in component.joints)
-            outside.update(component.outside(INSIDE))
-            continue
-        if component.gap(pose[None])[0] < CLOSED:
-            still = component.immobile(pose)
-            made.immobile.extend(still)
-            is_rigid = {*component.positions} <= {*still}
-            if fault := _rigid(component) if is_rigid else _fault(
-                    component, pose, motors, followers):
-                (made.open_loops if is_rigid else made.faults).update(
-                    (joint.name, fault) for joint in component.joints)
-                outside.update(component.outside(INSIDE))
-        moves.update(component.moves(pose))
-        positions.update((name, float(value[0]))
-                         for name, value in component.read(pose[None]).items())
-        made.report.extend([report] * bool(report))
-    return made._replace(robot=displaced(robot, moves, positions)), outside
+            made.faults.update((joint.name, error) for joint in component.joints)
+    return made._replace(robot=displaced(robot, moves, positions))
 
 
 def option(word: str, values: Mapping[str, str]) -> str:
@@ -132,51 +114,50 @@ def option(word: str, values: Mapping[str, str]) -> str:
                                    for name, value in values.items())
 
 
-def _rigid(component: Component) -> str:
-    """Return that loops cannot move, and what joint may be wrong."""
-    fixed = [joint.name for joint in component.joints if joint.kind == FIXED and joint.is_cut]
-    return 'it cannot move, as its joints hold each other' + (
-        f': {listed(fixed)} makes one body of two, where a pin has the type 3d' if fixed else '')
-
-
-def _fault(component: Component, pose: np.ndarray, motors: List[str], followers: List[str]) -> str:
-    """Return why motors and their followers do not determine a pose; empty if they do."""
+def _check_driven(component: Component, pose: np.ndarray, motors: List[str], followers: List[str]
+                  ) -> None:
+    """Raise ValueError if loops cannot move; NotDriven if their motors do not determine a pose."""
+    if not component.loose(pose, [])[0]:
+        fixed = [joint.name for joint in component.joints if joint.kind == FIXED and joint.is_cut]
+        raise ValueError('it cannot move, as its joints hold each other' + (
+            f': {listed(fixed)} makes one body of two, where a pin has the type 3d'
+            if fixed else ''))
     ways = component.free_ways(pose, component.is_of([]))
     count = len(chosen := component.chosen(ways, motors))
     if count < len(motors):
-        return (f'{listed(motors)} drive it, and hold each other, as {count} of them tell where '
-                f'all is: name these by --driven, as in --driven {shlex.join(chosen)}')
+        raise NotDriven(
+            f'{listed(motors)} drive it, and hold each other, as {count} of them tell where all '
+            f'is: name these by --driven, as in --driven {shlex.join(chosen)}')
     loose, ways = component.loose(pose, motors + followers)
     if not loose:
-        return ''
-    try:
-        _check_unfolded(component, pose, motors, DEAD_POINT)
-    except ValueError as error:
-        return str(error)
+        return
+    _check_unfolded(component, pose, motors, DEAD_POINT)
     stiff = [joint.name for joint in component.joints if joint.name in loose
              and joint.no_limits.endswith('no range')]
     more = component.chosen(ways, loose, stiff)
-    why = f'; the limits of {listed(stiff)} leave no range' if stiff else ''
     at = component.texts(pose, component.is_of(more))
-    return (f'not driven: {len(more)} of {listed(loose)} must be moved, named by --driven, or '
-            f'held, named by --hold, as in --driven {shlex.join([*motors, *more])} or '
-            + option('hold', {name: at[name] for name in more}) + why)
+    raise NotDriven(
+        f'not driven: {len(more)} of {listed(loose)} must be moved, named by --driven, or held, '
+        f'named by --hold, as in --driven {shlex.join([*motors, *more])} or '
+        + option('hold', {name: at[name] for name in more})
+        + f'; the limits of {listed(stiff)} leave no range' * bool(stiff))
 
 
 def _choice(questions: Sequence[Question], why: str) -> ValueError:
     """Return the error of all that has to be chosen, with what to type."""
-    sides = [{name: value for each in questions for name, value in each.choices[side].items()}
-             for side in (0, 1)]
-    return ValueError(f'{why} {", and ".join(each.text for each in questions)}: choose by ' + (
-        ', or by '.join(option('pose', side) for side in sides)))
+    texts, *sides = zip(*questions)
+    return ValueError(f'{why} {", and ".join(texts)}: choose by ' + ', or by '.join(option(
+        'pose', {name: value for side in each for name, value in side.items()})
+        for each in sides))
 
 
 def _question(component: Component, poses: np.ndarray, which: np.ndarray, where: str = ''
               ) -> List[Question]:
     """Return the choice of two poses by the joint that differs most, if they are different."""
     name, first, second = component.most_different(poses[0], poses[1], which)
-    return [Question(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', [
-        component.texts(pose, which) for pose in poses])] * (abs(first - second) > DISTINCT)
+    one, other = (component.texts(pose, which) for pose in poses)
+    return [(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', one, other)] * (
+        abs(first - second) > DISTINCT)
 
 
 def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], least: float
@@ -193,10 +174,8 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], l
     for which, rows in component.independent(fixed):
         ways = component.free_ways(pose, fixed | ~which, least)
         for way in ways if len(ways) > component.nullity(fixed | ~which) else ():
-            aside = ASIDE * component.unit * way
-            back = component.closed(pose + aside[None], fixed, 40)
-            if np.max(np.abs(component.away(back - pose))) < 0.3 * ASIDE:
-                questions += _folded(component, pose, motors, 3.0 * aside, rows)
+            questions += _folded(component, pose, motors, 3.0 * ASIDE * component.unit * way,
+                                 rows)
     if questions:
         raise _choice(questions, 'bars lie in line where the file has them, and it moves on')
 
@@ -205,9 +184,9 @@ def _folded(component: Component, pose: np.ndarray, motors: List[str], aside: np
             rows: Any) -> List[Question]:
     """Return the choice of neighbouring poses of a dead point, if there are two."""
     fixed, is_end = component.is_of(motors), True
-    for ahead in (ASIDE, -ASIDE):
-        poses = component.closed(pose + component.towards_limits(motors, ahead) + np.array(
-            [aside, -aside]), fixed, 40)
+    steps = [pose + ahead * component.unit * fixed for ahead in (ASIDE, -ASIDE)]
+    for step in sorted(steps, key=lambda step: not component.within(step[None], fixed)[0]):
+        poses = component.closed(step + np.array([aside, -aside]), fixed, 40)
         if np.max(component.gap(poses, rows)) < CLOSED:
             is_end = False
             if question := _question(component, poses, (aside != 0.0) | fixed, ''.join(
@@ -215,21 +194,9 @@ def _folded(component: Component, pose: np.ndarray, motors: List[str], aside: np
                         poses[0], fixed).items())):
                 return question
     if is_end:
-        raise ValueError(f'its loops end where the file has {listed(motors)}'
-                         + _elsewhere(component, motors))
+        raise ValueError(f'its loops end where the file has {listed(motors)}: choose another '
+                         'pose by --pose, or mend lengths or places in the file')
     return []
-
-
-def _elsewhere(component: Component, motors: List[str]) -> str:
-    """Return the option of the stiffest of other closed poses, inside limits if there are any."""
-    poses = _searched(component, component.is_of([]), 0.0)
-    every = ~component.is_of([])
-    stiff = component.stiffness(poses, component.is_of(motors)) * (
-        np.max(np.abs(component.away(poses)), axis=1) > DISTINCT) * (
-        component.gap(poses) < CLOSED) * np.where(component.within(poses, every), 1.0, 1e-6)
-    best = component.texts(poses[int(np.argmax(stiff))], every)
-    return f': choose another pose by {option("pose", best)}' \
-        if stiff.any() else ', and no other pose is found: lengths or places in the file are wrong'
 
 
 def nearest(component: Component, motors: List[str], followers: List[str]

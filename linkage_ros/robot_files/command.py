@@ -15,17 +15,7 @@ import numpy as np
 from . import check, closing, loops, model, planar, readers, rods
 from .. import command, scene
 from ..linkage import short
-from ..robot_model.robot import (
-    FARTHEST,
-    FIXED,
-    HINGE,
-    Joint,
-    NotDriven,
-    posed,
-    Robot,
-    SLIDE,
-    trees,
-)
+from ..robot_model.robot import FARTHEST, FIXED, HINGE, NotDriven, posed, Robot, SLIDE, trees
 from ..scene.writing import in_yaml
 from ..words import elided, listed, sentence
 
@@ -68,8 +58,6 @@ def show(args: Optional[List[str]]) -> None:
     if wrong := [line for line in reports if WRONG in line]:
         raise command.RequestError(f'{len(wrong)} mechanisms are left out, as they differ from '
                                    'the robot or could not be compared with it')
-    if wrong := [line for line in reports if line.startswith(check.OPEN)]:
-        raise command.RequestError(f'{len(wrong)} loops of the whole robot stand open')
 
 
 def _launch(asked: Any, still: Mapping[str, float]) -> str:
@@ -89,61 +77,65 @@ def described(robot: Robot, given_pose: Collection[str] = ()
     Also return the positions of joints in loops that stay. Joints of a given pose do not move to
     start inside their limits.
     """
-    given: Dict[str, Any] = {'mechanisms': []}
     closed = closing.closed(robot, given_pose)
     robot, reports = closed.robot, closed.report
     imported: List[check.Imported] = []
-
-    def add(made: check.Imported) -> None:
-        imported.append(made)
-        given['mechanisms'].append(made.name)
-        given.update(made.parameters)
-        reports.extend(made.reports)
-
-    for group in loops.groups(robot, closed.immobile):
-        open_one, fault = (_first(reasons, group.joints) for reasons in (
-            closed.open_loops, closed.faults))
-        left = group.joints
-        for part in (group.parts if group.why else [group]) if not open_one else ():
-            try:
-                add(planar.described(robot, part, given['mechanisms']))
-            except (ArithmeticError, ValueError) as error:
-                if group.why:
-                    continue
-                reason = f'{WRONG}: {error}' if isinstance(error, check.Difference) else (
-                    _why(error, fault, part.joints, robot))
-                bodies = error.bodies if isinstance(error, planar.NotPlaced) else _bodies(left)
-                reports.append(f'Left out: {listed(bodies, 200)}: {reason}.')
-            done = {joint.name for joint in part.joints}
-            left = [joint for joint in left if joint.name not in done]
-        if not left:
-            continue
+    for group in loops.groups(robot):
+        fault = next((closed.faults[joint.name] for joint in group.joints
+                      if joint.name in closed.faults), None)
+        joints = group.joints
         try:
-            if open_one:
-                raise ValueError(open_one)
-            add(rods.described(robot, group._replace(joints=left), given['mechanisms']))
+            if fault and not isinstance(fault, NotDriven):
+                raise fault
+            for part in group.parts:
+                try:
+                    imported.append(planar.described(robot, part, imported))
+                except (ArithmeticError, ValueError):
+                    if not group.why:
+                        raise
+                    continue
+                placed = {joint.name for joint in part.joints}
+                joints = [joint for joint in joints if joint.name not in placed]
+            if joints:
+                imported.append(rods.described(robot, group._replace(joints=joints), imported))
         except (ArithmeticError, ValueError) as error:
-            why = _why(error, fault, left, robot)
-            why = f'as rods in space: {why}' if group.why and why is error else why
-            reports.append(f'Left out: {listed(_bodies(left), 200)}: '
-                           + f'{group.why}; ' * bool(group.why) + f'{why}.')
-    if not given['mechanisms']:
+            is_driven = any(joint.name in robot.driven for joint in joints)
+            why = fault if fault and (is_driven or isinstance(error, NotDriven)) else error
+            in_space = f'{group.why}; ' + 'as rods in space: ' * (why is not fault)
+            bodies = dict.fromkeys(body for joint in joints for body in joint.bodies)
+            reports.append(f'Left out: {listed(bodies, 200)}: '
+                           f'{in_space * bool(group.why)}{why}.')
+    return _checked(robot, imported, reports)
+
+
+def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str]
+             ) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
+    """Return what is described, without mechanisms that differ from the robot."""
+    if not imported:
         raise command.RequestError(' '.join(reports) or 'no joint of this robot closes a loop')
+    given: Dict[str, Any] = {'mechanisms': [made.name for made in imported]}
+    for made in imported:
+        given.update(made.parameters)
     machines = scene.read(given).machines
-    tree = {joint.name for _, joint in trees(robot)[0].values()}
-    stay = {*closed.immobile, *(name for made in imported for name in made.still)}
+    tree = {joint.name: joint for _, joint in trees(robot)[0].values()}
+    stay = {name for made in imported for name in made.still}
     still = {name: value for name, value in robot.positions.items()
-             if name in tree & stay - check.published(machines)}
+             if name in tree.keys() & stay - check.published(machines)}
     rest, lost = model.others(robot, machines, still)
     if rest:
         machines = scene.read({**given, **rest, 'mechanisms': [*machines, model.OTHERS]}).machines
+    checks, wrong = check.compared(robot, machines, imported)
+    if wrong:
+        return _checked(robot, [made for made in imported if made.name not in wrong], [
+            *reports, *(f'Left out: {name}: {WRONG}: {why}.' for name, why in wrong.items())])
+    reports = [*reports, *(report for made in imported for report in made.reports), *checks]
     if lost:
         reports.append(model.not_published(lost))
-    if free := [joint.name for _, joint in trees(robot)[0].values()
-                if joint.name and joint.kind not in (HINGE, SLIDE, FIXED)]:
+    if free := [name for name, joint in tree.items()
+                if name and joint.kind not in (HINGE, SLIDE, FIXED)]:
         reports.append(f'Not published: {", ".join(free)}: a ball or a free joint has no one '
                        'position. The model of the robot has them fixed where the file has them.')
-    return given, [*reports, *check.whole(robot, machines, imported)], still
+    return given, reports, still
 
 
 def _values(texts: Sequence[str]) -> Dict[str, float]:
@@ -158,17 +150,3 @@ def _values(texts: Sequence[str]) -> Dict[str, float]:
         if not name or not abs(found[name]) < FARTHEST:
             raise command.RequestError(f'{each!r} must be JOINT=VALUE, its value in rad or m')
     return found
-
-
-def _first(reasons: Mapping[str, str], joints: Sequence[Joint]) -> str:
-    return next((reasons[joint.name] for joint in joints if joint.name in reasons), '')
-
-
-def _why(error: Exception, fault: str, joints: Sequence[Joint], robot: Robot) -> object:
-    """Return an error, or the fault of motors that do not determine the pose, if that is why."""
-    is_driven = any(joint.name in robot.driven for joint in joints)
-    return fault if fault and (is_driven or isinstance(error, NotDriven)) else error
-
-
-def _bodies(joints: Sequence[Joint]) -> List[str]:
-    return [*dict.fromkeys(body for joint in joints for body in joint.bodies)]

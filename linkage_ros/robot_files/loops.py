@@ -6,11 +6,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
+from typing import Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .spatial import blocks, EXACT, TOGETHER
+from .spatial import blocks, TOGETHER
 from ..linkage import ROUNDING
 from ..robot_model.robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE, top, trees
 
@@ -23,32 +23,22 @@ ASKEW, OPEN = 1e-3, 1e-4
 
 class Loop(NamedTuple):
     """
-    A linkage in its plane, whose pose on the link `frame_id` is `frame`.
+    A linkage in its plane, whose pose on the link `ground` is `frame`.
 
     Places of joints are complex [m], and so are the axes of slides; the axis of a hinge is 1 or
     -1. `size` is the largest distance of two joints [m], `gap` the distance that cannot be closed
-    [m], `lean` the inclination of axes [rad], and `across` has the distances of joints' ends
-    normal to the plane [m]. `pins` are the hinges and slides with a position, those of balls in
-    the plane included, and `still` the other hinges of these balls.
+    [m], and `lean` the inclination of axes [rad]. `pins` are the hinges and slides with a
+    position, those of balls in the plane included, and `still` the other hinges of these balls.
     """
 
     ground: str
-    frame_id: str
     frame: np.ndarray
     joints: List[Joint]
     size: float
     gap: float
     lean: float
-    across: Dict[str, float]
     pins: List[Joint]
     still: List[str]
-
-    @property
-    def misfit(self) -> str:
-        """Return the report on what cannot be closed exactly; empty if it is rounding."""
-        return '' if max(self.lean, self.gap / self.size) < EXACT else (
-            f'Warning: the file is not exact: axes lean by {self.lean:.2g} rad, and loops stay '
-            f'open by {self.gap:.2g} m; so is what is published.')
 
     @property
     def near(self) -> float:
@@ -57,93 +47,67 @@ class Loop(NamedTuple):
 
 
 class Group(NamedTuple):
-    """
-    Loops that share bars: ground, joints, why not planar, and planar parts.
-
-    `links` has a link of the robot for each body: several may be one body.
-    """
+    """Loops that share bars: ground, joints, why not planar, and planar parts."""
 
     ground: str
-    links: Dict[str, str]
     joints: List[Joint]
     why: str
     parts: List['Group']
 
 
-def groups(robot: Robot, immobile: Collection[str] = ()) -> List[Group]:
-    """
-    Return the loops of a robot, with the planar parts of those that are not planar.
+def groups(robot: Robot) -> List[Group]:
+    """Return the loops of a robot, with their planar parts; bodies fixed to others are one."""
+    home = {body: body for body in robot.frames}
+    for joint in robot.joints:
+        if joint.kind == FIXED:
+            first, second = (top(home, body) for body in joint.bodies)
+            home[second] = first
+    # Several bodies that are one have the name of the first that a joint moves.
+    names = {top(home, body): body for joint in robot.joints[::-1] if joint.kind != FIXED
+             for body in joint.bodies[::-1]}
+    home = {body: names.get(top(home, body), top(home, body)) for body in home}
+    joints = [replace(joint, bodies=(home[joint.bodies[0]], home[joint.bodies[1]]))
+              for joint in robot.joints]
+    robot = replace(robot, root=home[robot.root], joints=[
+        joint for joint in joints if len({*joint.bodies}) == 2], frames={
+        body: robot.frames[body] for body in home.values()})
+    return [group._replace(parts=_parts(robot, group) if group.why else [group])
+            for group in _blocks(robot, _with_balls(robot))]
 
-    Joints that are `immobile` count as rigid where only they are not planar.
-    """
-    home = _merged(robot, {body: body for body in robot.frames}, [
-        joint for joint in robot.joints if joint.kind == FIXED])
-    found = _blocks(robot, home, _with_balls(robot, _on(home, robot.joints)))
-    return [group if not group.why else group._replace(parts=_parts(robot, home, group, immobile))
-            for group in found]
 
-
-def _parts(robot: Robot, home: Dict[str, str], group: Group, immobile: Collection[str]
-           ) -> List[Group]:
+def _parts(robot: Robot, group: Group) -> List[Group]:
     """Return the planar parts of loops that are not planar as a whole."""
-    names = {joint.name for joint in group.joints if joint.position is not None}
-    if names & {*robot.driven} <= {*immobile}:
-        immobile = ()
     parts: List[Group] = []
+    left = group.joints
     for joint in sorted(group.joints, key=lambda joint: joint.name not in robot.driven):
-        if joint.kind != HINGE or any(joint.name == one.name for part in parts
-                                      for one in part.joints):
-            continue
-        left = [one for one in group.joints if not any(one in part.joints for part in parts)]
-        rigid = [one for one in left if one.name in immobile and _lean(one, joint.axis) > ASKEW]
-        here = _merged(robot, home, rigid)
-        parts += [part for part in _blocks(robot, here, _on(here, [
-            one for one in left if one.kind in FLAT and _lean(one, joint.axis) < ASKEW]))
-            if not part.why]
+        if joint.kind == HINGE and joint in left:
+            parts += [part for part in _blocks(robot, [
+                other for other in left if other.kind in FLAT and _lean(other, joint.axis) < ASKEW
+                ]) if not part.why]
+            left = [other for other in left if not any(other in part.joints for part in parts)]
     return parts
 
 
-def _blocks(robot: Robot, home: Mapping[str, str], joints: Sequence[Joint]) -> List[Group]:
-    """Return the loops of merged bodies, those that share bars together."""
-    found, cuts = trees(replace(robot, root=home[robot.root], joints=[*joints], frames={
-        body: robot.frames[body] for body in home.values()}))
-    ranks = {body: i for i, body in enumerate((home[robot.root], *found))}
+def _blocks(robot: Robot, joints: List[Joint]) -> List[Group]:
+    """Return the loops of some joints, those that share bars together."""
+    tree, cuts = trees(replace(robot, joints=joints))
     groups = []
-    for block, own in blocks(found, cuts):
-        every = {found[body][1] for body in block} | {*own}
-        chosen = [joint for joint in joints if joint in every]
-        ground = min((body for joint in chosen for body in joint.bodies), key=ranks.__getitem__)
-        names = {one.name for joint in chosen for one in joint.hinges}
-        links = {home[body]: body for joint in robot.joints[::-1] for body in joint.bodies[::-1]
-                 if joint.name in names}
+    for block, closing in blocks(tree, cuts):
+        edges = {tree[body][1] for body in block} | {*closing}
+        # The parent of the first body is nearest to the root.
+        ground = next(base for body, (base, _) in tree.items() if body in block)
+        group = Group(ground, [joint for joint in joints if joint in edges], '', [])
         try:
-            check_planar(ground, chosen)
-            why = ''
+            check_planar(ground, group.joints)
         except ValueError as error:
-            why = str(error)
-        groups.append(Group(ground, links, chosen, why, []))
+            group = group._replace(why=str(error))
+        groups.append(group)
     return groups
 
 
-def _merged(robot: Robot, home: Mapping[str, str], rigid: Sequence[Joint]) -> Dict[str, str]:
-    """Return the merged body of each body; the root keeps its name."""
-    home = dict(home)
-    for joint in rigid:
-        first, second = sorted((top(home, body) for body in joint.bodies), key=top(
-            home, robot.root).__ne__)
-        home[second] = first
-    return {body: top(home, body) for body in home}
-
-
-def _on(home: Mapping[str, str], joints: Sequence[Joint]) -> List[Joint]:
-    """Return joints between merged bodies."""
-    moved = [replace(joint, bodies=(home[joint.bodies[0]], home[joint.bodies[1]]))
-             for joint in joints]
-    return [joint for joint in moved if len({*joint.bodies}) == 2]
-
-
-def _with_balls(robot: Robot, joints: List[Joint]) -> List[Joint]:
-    """Return joints with a ball in place of two or three hinges that cross in a point."""
+def _with_balls(robot: Robot) -> List[Joint]:
+    """Return the joints with a ball in place of two or three hinges that cross in a point."""
+    joints = robot.joints
     on: Dict[str, List[Joint]] = {}
     for joint in joints:
         for body in joint.bodies:
@@ -200,9 +164,9 @@ def _lean(joint: Joint, normal: np.ndarray) -> float:
 
 def flat(robot: Robot, group: Group, drives: Sequence[str]) -> Loop:
     """Return loops in their plane; raise ValueError that names nonplanar parts."""
-    ground, joints, frame_id = group.ground, group.joints, group.links[group.ground]
+    ground, joints = group.ground, group.joints
     hinges, lean = check_planar(ground, joints, drives)
-    base = robot.frames[frame_id]
+    base = robot.frames[ground]
     normal = base[:3, :3].T @ hinges[0].axis
     right = np.eye(3)[int(abs(normal[0]) > 0.9)]
     right = (right - right @ normal * normal) / np.linalg.norm(np.cross(right, normal))
@@ -211,15 +175,13 @@ def flat(robot: Robot, group: Group, drives: Sequence[str]) -> Loop:
     origin = next((joint for joint in hinges if ground in joint.bodies), hinges[0])
     frame[:3, 3] = base[:3, :3].T @ (origin.places[0] - base[:3, 3])
     seen = np.linalg.inv(base @ frame)
-    found, across = [], {}
+    found = []
     for joint in joints:
-        first, second = (seen @ [*place, 1.0] for place in joint.places)
-        if abs(first[2] - second[2]) > TOGETHER * 1e-3:
-            across[joint.name] = abs(first[2] - second[2])
+        first, second = ((seen @ [*place, 1.0])[:2] for place in joint.places)
         axis = seen[:3, :3] @ joint.axis
         way = complex(*axis[:2])
         found.append(replace(
-            joint, places=(complex(*first[:2]), complex(*second[:2])),
+            joint, places=(complex(*first), complex(*second)),
             axes=[way / abs(way) if joint.kind == SLIDE else float(np.sign(axis[2]))] * 2))
     places = [place for joint in found for place in joint.places]
     size = max(abs(place - other) for place in places for other in places)
@@ -246,8 +208,7 @@ def flat(robot: Robot, group: Group, drives: Sequence[str]) -> Loop:
                                     axes=[sign * float(np.sign(hinge.axis @ up))] * 2))
                 still += [one.name for one, _ in joint.chain if one is not hinge]
                 break
-    return Loop(ground, frame_id, frame, found, size, gap, lean if lean > 1e-12 else 0.0,
-                across, pins, still)
+    return Loop(ground, frame, found, size, gap, lean, pins, still)
 
 
 def _check_rods(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> None:

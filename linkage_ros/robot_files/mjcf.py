@@ -8,24 +8,13 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from mujoco import (
-    mj_kinematics,
-    MjData,
-    MjSpec,
-    mjtEq,
-    mjtGeom,
-    mjtJoint,
-    mjtObj,
-    mjtTrn,
-    mjtWrap,
-    set_mju_user_warning,
-)
+import mujoco
 import numpy as np
 
 from .elements import turned_by
 from ..command import RequestError
 from ..robot_model.places import at
-from ..robot_model.robot import BALL, FIXED, HINGE, Robot, SLIDE
+from ..robot_model.robot import BALL, FIXED, Robot
 
 # What MuJoCo says of a file, and the sentence for it.
 _ERRORS = [
@@ -37,9 +26,9 @@ _ERRORS = [
 def read(path: str) -> Robot:
     """Return the robot in a file, in the pose of its first keyframe, or at its zero."""
     model = _compiled(path)
-    data = MjData(model)
+    data = mujoco.MjData(model)
     data.qpos[:] = model.key_qpos[0] if model.nkey else model.qpos0
-    mj_kinematics(model, data)
+    mujoco.mj_kinematics(model, data)
     bodies = [model.body(i).name or f'body{i}' for i in range(model.nbody)]
     names = [model.joint(i).name or f'joint{i}' for i in range(model.njnt)]
     robot = Robot(bodies[0], {body: at(data.xpos[i], data.xmat[i].reshape(3, 3))
@@ -53,39 +42,37 @@ def read(path: str) -> Robot:
             # Several joints of one body have bodies without a name between them.
             below = body if j == joints[-1] else f'{body}/{names[j]}'
             robot.frames.setdefault(below, robot.frames[body])
-            kind = mjtJoint(model.jnt_type[j]).name[6:].lower()
-            one = kind in (HINGE, SLIDE)
-            robot.join(names[j], kind, (above, below), at(data.xanchor[j]),
-                       data.xaxis[j] if one else (0.0, 0.0, 1.0), None,
-                       float(data.qpos[model.jnt_qposadr[j]]) if one else None,
+            robot.join(names[j], mujoco.mjtJoint(model.jnt_type[j]).name[6:].lower(),
+                       (above, below), at(data.xanchor[j]), data.xaxis[j], None,
+                       float(data.qpos[model.jnt_qposadr[j]]),
                        model.jnt_range[j].tolist() if model.jnt_limited[j] else (-np.inf, np.inf))
             above = below
     for i in np.flatnonzero(model.eq_active0).tolist():
         _tie(robot, model, i, bodies, names)
     for way, target in zip(model.actuator_trntype, model.actuator_trnid[:, 0]):
-        kind = mjtTrn(way).name[6:].lower()
+        kind = mujoco.mjtTrn(way).name[6:].lower()
         wraps = model.tendon_adr[target] + np.arange(model.tendon_num[target]) \
             if kind == 'tendon' else ()
         robot.driven += [names[target]] * (kind in ('joint', 'jointinparent')) + [
             names[model.wrap_objid[i]] for i in wraps
-            if mjtWrap(model.wrap_type[i]) == mjtWrap.mjWRAP_JOINT]
+            if mujoco.mjtWrap(model.wrap_type[i]) == mujoco.mjtWrap.mjWRAP_JOINT]
     return robot
 
 
 def _compiled(path: str) -> Any:
     """Return a model without meshes, whose files may be missing."""
     # Warnings, which MuJoCo writes to a file, concern dynamics.
-    set_mju_user_warning(lambda text: None)
+    mujoco.set_mju_user_warning(lambda text: None)
     try:
-        spec = MjSpec.from_file(path)
+        spec = mujoco.MjSpec.from_file(path)
     except ValueError as error:
         for pattern, why in _ERRORS:
             if found := re.search(pattern, str(error)):
                 raise RequestError(why.format(found[1])) from None
         raise
     for geom in spec.geoms:
-        if geom.type in (mjtGeom.mjGEOM_MESH, mjtGeom.mjGEOM_HFIELD, mjtGeom.mjGEOM_SDF):
-            geom.type, geom.meshname, geom.hfieldname = mjtGeom.mjGEOM_SPHERE, '', ''
+        if geom.meshname or geom.hfieldname:
+            geom.type, geom.meshname, geom.hfieldname = mujoco.mjtGeom.mjGEOM_SPHERE, '', ''
             geom.size = [0.01, 0.0, 0.0]
         geom.material = ''
     for part in (*spec.meshes, *spec.hfields, *spec.skins, *spec.materials, *spec.textures):
@@ -96,7 +83,7 @@ def _compiled(path: str) -> Any:
 
 def _tie(robot: Robot, model: Any, i: int, bodies: Any, names: Any) -> None:
     """Add the constraint of an equality between two bodies or joints."""
-    kind, given = mjtEq(model.eq_type[i]).name[5:].lower(), model.eq_data[i]
+    kind, given = mujoco.mjtEq(model.eq_type[i]).name[5:].lower(), model.eq_data[i]
     ends = [model.eq_obj1id[i], model.eq_obj2id[i]]
     if kind == 'joint' and ends[1] < 0:
         robot.held[names[ends[0]]] = float(given[0] + model.qpos0[model.jnt_qposadr[ends[0]]])
@@ -105,7 +92,7 @@ def _tie(robot: Robot, model: Any, i: int, bodies: Any, names: Any) -> None:
         robot.follow(names[ends[0]], names[ends[1]], given[1], given[0] + one - given[1] * other)
     if kind in ('connect', 'weld'):
         welds = kind == 'weld'
-        if mjtObj(model.eq_objtype[i]) == mjtObj.mjOBJ_SITE:
+        if mujoco.mjtObj(model.eq_objtype[i]) == mujoco.mjtObj.mjOBJ_SITE:
             frames = [at(model.site_pos[end], turned_by(model.site_quat[end])) for end in ends]
             ends = model.site_bodyid[ends]
         else:

@@ -12,21 +12,32 @@ from __future__ import annotations
 from cmath import phase
 from itertools import combinations
 import math
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Set, Tuple
 
 import numpy as np
 
-from . import check, loops, sweeps
-from .sweeps import Source
+from . import check, loops
+from .spatial import EXACT
 from .. import mechanisms, scene
 from ..linkage import bar_name, Dyads, Hinge, Mechanism, Motor, Pin, ROUNDING, short, Slide
 from ..robot_model.places import coordinates
 from ..robot_model.robot import Joint, Limits, NotDriven, plain, Robot, SLIDE
+from ..scene import FARTHEST
 from ..scene.joint_names import quoted_name
 
 # The most joints of which pairs are tried as motors.
 MAX_PAIRED = 30
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
+
+
+class Source(NamedTuple):
+    """An input: ratio * position + offset of its source."""
+
+    name: str
+    source: str
+    ratio: float
+    offset: float
+    value: float
 
 
 class Drawing(Dyads):
@@ -39,15 +50,12 @@ class Drawing(Dyads):
         The inputs.
     driven : list of Joint
         The joints of the inputs.
-    limits : dict
-        The limits of sources, if they have any.
 
     """
 
     def __init__(self, robot: Robot, loop: loops.Loop, drives: Sequence[str]):
         self.loop, self._robot = loop, robot
         self.drives: List[Source] = []
-        self.limits: Dict[str, Limits] = {}
         # Tips of triangles that are a dyad: they turn with a link of their own.
         self._tips: Set[str] = set()
         self.driven = [joint for joint in loop.joints if joint.name in drives]
@@ -93,29 +101,6 @@ class Drawing(Dyads):
         places = linkage.solve(values if len(values) > 1 else values[0])
         return float(np.max([abs(complex(*places[name]) - place) for name, place in self.places
                              if name in (names or places)])) / self.loop.size
-
-    @property
-    def ends(self) -> Dict[str, Tuple[float, float]]:
-        """Return the range of each source in a check [rad or m]."""
-        ends = {}
-        for drive in self.drives:
-            around = math.pi if drive.name[:5] == 'crank' else 0.5 * self.loop.size
-            around, start = around / abs(drive.ratio), self._robot.positions[drive.source]
-            low, high, _ = self.limits.get(drive.source, (start - around, start + around, ()))
-            near = min(max(start, low), high)
-            ends[drive.source] = max(low, near - 2.0 * around), min(high, near + 2.0 * around)
-        return ends
-
-    @property
-    def holders(self) -> List[Joint]:
-        """Return the joints of bodies that are left."""
-        return [joint for joint in self.loop.joints if {*joint.bodies} & {*self.left}]
-
-    @property
-    def freedom(self) -> int:
-        """Return the degrees of freedom of the bodies that are left."""
-        return 3 * len(self.left) - 2 * len(self.holders) - sum(
-            joint in self.driven for joint in self.holders)
 
     def measured_by(self, joint: Joint) -> Optional[Tuple[str, float, float]]:
         """Return the link whose angle is a joint's position, with sign and position, if any."""
@@ -206,41 +191,64 @@ class Drawing(Dyads):
         return None
 
 
-class NotPlaced(NotDriven):
-    """Why bodies are not placed."""
-
-    def __init__(self, drawing: Drawing):
-        super().__init__(_why(drawing))
-        self.bodies = drawing.left
-
-
-def described(robot: Robot, group: loops.Group, others: Sequence[str]) -> check.Imported:
+def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
+              ) -> check.Imported:
     """
     Return a mechanism.
 
-    Raises ValueError for loops that are no dyads, or whose poses are others than the robot's.
+    Raises ValueError for loops that are no dyads, or whose pose is another than the robot's.
     """
     drawing = _drawn(robot, group)
-    name = plain(drawing.driven[0].name, 60)
-    name = f'{name}_{len(others)}' if name in others else name
+    name = check.name_beside(others, plain(drawing.driven[0].name, 60))
     loop, given = drawing.loop, {
         f'{name}.{key}': value for key, value in _parameters(drawing)}
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if not any(called.published for called in machine.joints.values()):
-        raise NotPlaced(drawing)
-    reports = [f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.'] if drawing.left else []
-    drawing.limits, more = robot.limits(drawing.driven)
-    reports += more + sweeps.added(given, name, drawing.drives, drawing.limits, machine.inputs)
+        raise NotDriven(_why(drawing))
+    limits, reports = robot.limits(drawing.driven)
+    if drawing.left:
+        reports.append(f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.')
+    ends = {}
+    for drive in drawing.drives:
+        around = math.pi if drive.name[:5] == 'crank' else 0.5 * loop.size
+        low, high = drive.value - around, drive.value + around
+        if drive.source in limits:
+            try:
+                low, high = sweep = _sweep(drive, limits[drive.source], machine.inputs[drive.name])
+                given[f'{name}.{drive.name}.sweep'] = [*sweep]
+                given[f'{name}.{drive.name}.start'] = min(max(drive.value, low), high)
+            except ValueError as error:
+                reports.append('Left out: the limits of '
+                               f'{limits[drive.source].text(drive.source)}: {error}.')
+        start = min(max(drive.value, low), high)
+        low, high = sorted((end - drive.offset) / drive.ratio for end in (
+            max(low, start - 2.0 * around), min(high, start + 2.0 * around)))
+        ends[drive.source] = low, high
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if drawing.apart(machine.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
     slack = loop.lean + loop.gap / loop.size
-    report, ranges = check.compared(
-        robot, machine, [joint.name for joint in drawing.driven], drawing.ends, slack)
-    reports += [report] + [loop.misfit] * bool(loop.misfit)
-    reports += [f'{joint} has its ends {gap:.2g} m apart along its axis, on which no angle '
-                'depends.' for joint, gap in loop.across.items()]
-    return check.Imported(name, given, reports, ranges, slack, loop.still)
+    if slack > EXACT:
+        reports.append(f'Warning: the file is not exact: axes lean by {loop.lean:.2g} rad, and '
+                       f'loops stay open by {loop.gap:.2g} m; so is what is published.')
+    return check.Imported(name, given, reports, [joint.name for joint in drawing.driven], ends,
+                          slack, loop.still)
+
+
+def _sweep(drive: Source, limits: Limits, settings: scene.InputSettings) -> Tuple[float, float]:
+    """Return the limits of an input within its reach; raise ValueError if it has no such ends."""
+    low, high = (float(short(end, 1e-15)) if abs(end) < FARTHEST else math.copysign(math.inf, end)
+                 for end in (drive.ratio * end + drive.offset
+                             for end in limits[:2][::1 if drive.ratio > 0.0 else -1]))
+    for start, end in () if settings.input.is_whole(settings.reach) else settings.reach:
+        turns = math.tau * math.floor((drive.value - start) / math.tau) * settings.input.turns
+        if start + turns <= drive.value <= end + turns:
+            # An end that is a dead point is not quite reached.
+            edge = ROUNDING * (end - start)
+            low, high = max(low, start + turns + edge), min(high, end + turns - edge)
+    if not low + 1e-6 * settings.input.size < high < low + math.inf:
+        raise ValueError('its loops do not reach them')
+    return low, high
 
 
 def _drawn(robot: Robot, group: loops.Group) -> Drawing:
@@ -263,7 +271,7 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
             break
     best = min(drawings, key=lambda drawing: len(drawing.left))
     if not best.drives:
-        raise NotPlaced(best) if best.left else NotDriven('no motor moves it')
+        raise NotDriven(_why(best) if best.left else 'no motor moves it')
     for i, line in enumerate(best.lines):
         # At a change point the side in this pose may be the wrong one.
         name, *_, side = line.split()
@@ -274,15 +282,18 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
 
 def _why(drawing: Drawing) -> str:
     """Return why bodies are left."""
-    free, held = drawing.freedom, drawing.holders
-    names = ', '.join(joint.name for joint in held if joint.position is not None)
-    between = [joint.name for joint in held if joint in drawing.driven
+    holders = [joint for joint in drawing.loop.joints if {*joint.bodies} & {*drawing.left}]
+    freedom = 3 * len(drawing.left) - 2 * len(holders) - sum(
+        joint in drawing.driven for joint in holders)
+    between = [joint.name for joint in holders if joint in drawing.driven
                and {*joint.bodies} <= {*drawing.left}]
-    if between and free <= 0:
+    if between and freedom <= 0:
         return f'not of dyads, as {", ".join(between)} drives between two of them'
-    return f'held more than once by {names}' if free < 0 else (
-        'not of dyads: all of them hold each other, as on a platform on three bars (an Assur '
-        'group of class III or higher)')
+    if freedom < 0:
+        return 'held more than once by ' + ', '.join(
+            joint.name for joint in holders if joint.position is not None)
+    return (f'not of dyads: {", ".join(drawing.left)} hold each other, as on a platform on three '
+            'bars (an Assur group of class III or higher)')
 
 
 def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
@@ -290,7 +301,7 @@ def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
                 and (found := drawing.measured_by(joint))]
     yield 'type', 'custom'
     yield 'joints', drawing.lines
-    yield 'frame_id', drawing.loop.frame_id
+    yield 'frame_id', drawing.loop.ground
     yield 'pose', [float(short(value)) for value in coordinates(drawing.loop.frame)]
     links = {link.name: link for link in drawing.linkage.links}
     for drive in drawing.drives:

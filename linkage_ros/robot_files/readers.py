@@ -29,7 +29,7 @@ def read(path: str, loops: Optional[str] = None) -> Robot:
                 from . import mjcf
             robot = mjcf.read(path)
         elif root.tag == 'sdf':
-            robot = sdf.read(path, root)
+            robot = sdf.read(root)
         else:
             reader = urdf.Reader(root)
             robot = reader.robot
@@ -67,9 +67,6 @@ def _loops(path: str) -> Mapping[str, Any]:
         from yaml import safe_load, YAMLError
     try:
         with open(path, encoding='utf-8') as file:
-            found = safe_load(file)
+            return safe_load(file)
     except (YAMLError, UnicodeDecodeError) as error:
         raise RequestError(f'{path} is no YAML: {error}') from None
-    if not isinstance(found, dict) or not {*urdf.LOOPS} & found.keys():
-        raise RequestError(f'{path} must have one of {": ".join(urdf.LOOPS)}:')
-    return found

@@ -12,9 +12,8 @@ pose that the robot has.
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 import math
-from typing import Any, Dict, Iterator, List, Mapping, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, Iterator, List, Mapping, Sequence, Set, Tuple
 
 import numpy as np
 
@@ -46,8 +45,8 @@ class Rods:
     """
 
     def __init__(self, robot: Robot, group: Group):
-        ground, self.frame_id = group.ground, group.links[group.ground]
-        self._seen = np.linalg.inv(robot.frames[self.frame_id])
+        ground = self.frame_id = group.ground
+        self._seen = np.linalg.inv(robot.frames[ground])
         self._driven = {*robot.driven}
         # The joint of each link, and its end of a line: its parent, its place and its axis.
         self.links: Dict[str, Joint] = {}
@@ -168,29 +167,18 @@ class Rods:
 
     def lines(self, limits: Mapping[str, Tuple[float, float]] = {}) -> List[str]:
         """Return the lines, with limits for some other than the file's."""
-        found = []
+        lines = []
         for name, joint in self.links.items():
+            within = ''
+            if name not in {*self.inputs, *self.universals}:
+                # Relative to the pose of the robot.
+                low, high = limits.get(name) or (end - joint.start for end in joint.range)
+                widest = math.inf if joint.kind == SLIDE else _ANY
+                if -widest < low < high < widest:
+                    within = f' within {short(low)} {short(high)}'
             word = 'motor' if name in self.inputs else joint.kind
-            ends = None if word == 'motor' or name in self.universals else limits.get(
-                name, self._limits(joint))
-            found.append(f'{name} {word} {self._ends[name]}' + (
-                f' within {short(ends[0])} {short(ends[1])}' if ends else ''))
-        return found + self.rods
-
-    @staticmethod
-    def _limits(joint: Joint) -> Optional[Tuple[float, float]]:
-        """Return a joint's limits relative to its position; None without limits."""
-        if joint.limits is None or joint.position is None:
-            return None
-        low, high = (end - joint.position for end in joint.limits)
-        widest = math.inf if joint.kind == SLIDE else _ANY
-        return (low, high) if -widest < low < high < widest else None
-
-    @staticmethod
-    def one_sided(joint: Joint) -> str:
-        """Return a joint's limits if one of them is infinite, and that it needs both; else ''."""
-        low, high = joint.limits or (0.0, 0.0)
-        return f'from {low:.4g} to {high:.4g}: it has no end there' * math.isinf(high - low)
+            lines.append(f'{name} {word} {self._ends[name]}{within}')
+        return lines + self.rods
 
     def parameters(self, lines: Sequence[str]) -> Iterator[Tuple[str, Any]]:
         """Yield the parameters of its mechanism."""
@@ -214,60 +202,48 @@ def _on_bodies(joints: Sequence[Joint]) -> Dict[str, List[Joint]]:
             for joint in joints for body in joint.bodies}
 
 
-def described(robot: Robot, group: Group, others: Sequence[str]) -> check.Imported:
-    """
-    Return a mechanism.
-
-    Raises ValueError for loops that rods cannot be, or whose poses are others than the robot's.
-    """
-    found = Rods(robot, group)
-    if not found.inputs:
+def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> check.Imported:
+    """Return a mechanism; raise ValueError for loops that rods cannot be."""
+    made = Rods(robot, group)
+    if not made.inputs:
         raise NotDriven('not driven: its motors must be named by --driven')
-    lines, reports = _lines(found)
-    name = f'{next(iter(found.inputs))}_rods'
-    name = f'{name}_{len(others)}' if name in others else name
-    given = {f'{name}.{key}': value for key, value in found.parameters(lines)}
-    machine = scene.read({'mechanisms': [name], **given}).machines[name]
-    limits, more = robot.limits(found.inputs.values())
-    reports += more + [
-        f'Left out: the limits of {joint.name}, {why}.' for link, joint in found.links.items()
-        if link not in {*found.inputs, *found.universals}
-        and (why := joint.no_limits or found.one_sided(joint))]
-    ends = _ranges(machine, found, limits)
-    for link, joint in found.inputs.items():
-        sweep = [end + machine.inputs[link].offset for end in ends[joint.name]]
-        given[f'{name}.{link}.sweep'] = [float(short(end)) for end in sweep]
-        given[f'{name}.{link}.start'] = min(max(found.zeros[link], sweep[0]), sweep[1])
-    machine = scene.read({'mechanisms': [name], **given}).machines[name]
-    report, ranges = check.compared(
-        robot, machine, [joint.name for joint in found.inputs.values()], ends, 0.0)
-    return check.Imported(name, given, [*reports, report, *_corners(machine, found)], ranges,
-                          still=found.still)
-
-
-def _lines(found: Rods) -> Tuple[List[str], List[str]]:
-    """Return lines with limits that allow one pose, and a report if they are not the file's."""
-    lines = found.lines()
+    limits, reports = robot.limits(made.inputs.values())
+    lines = made.lines()
     try:
         mechanisms.create('rods', joints=lines)
-        return lines, []
     except WindowError as error:
         if not error.limits:
             raise
+        lines = made.lines(error.limits)
         ranges = ', '.join(f'{name} from {low + zero:.4g} to {high + zero:.4g}'
                            for name, (low, high) in error.limits.items()
-                           for zero in [found.links[name].start])
+                           for zero in [made.links[name].start])
         angles = ' (angles from the pose of the file)' * (' at ' in error.problem)
-        return found.lines(limits=error.limits), [
-            f'Limits: {error.problem}{angles}; these are the largest proved to have one pose at '
-            f'most: {ranges}.']
+        reports.append(f'Limits: {error.problem}{angles}; these are the largest proved to have '
+                       f'one pose at most: {ranges}.')
+    for link, joint in made.links.items():
+        low, high = joint.range
+        why = joint.no_limits or f'from {low:.4g} to {high:.4g}: it has no end there' * bool(
+            joint.limits and math.isinf(high - low))
+        if why and link not in {*made.inputs, *made.universals}:
+            reports.append(f'Left out: the limits of {joint.name}, {why}.')
+    name = check.name_beside(others, f'{next(iter(made.inputs))}_rods')
+    given = {f'{name}.{key}': value for key, value in made.parameters(lines)}
+    machine = scene.read({'mechanisms': [name], **given}).machines[name]
+    ends = _ranges(machine, made, limits)
+    for link, joint in made.inputs.items():
+        low, high = (end + machine.inputs[link].offset for end in ends[joint.name])
+        given[f'{name}.{link}.sweep'] = [float(short(low)), float(short(high))]
+        given[f'{name}.{link}.start'] = min(max(made.zeros[link], low), high)
+    return check.Imported(name, given, reports, [joint.name for joint in made.inputs.values()],
+                          ends, still=made.still)
 
 
-def _ranges(machine: scene.SceneMechanism, found: Rods, limits: Mapping[str, Limits]
+def _ranges(machine: scene.SceneMechanism, made: Rods, limits: Mapping[str, Limits]
             ) -> Dict[str, Tuple[float, float]]:
     """Return the motors' limits, made smaller until every pose in them exists."""
     places = [(joint.name, drive.start - drive.offset, drive.offset)
-              for joint, drive in zip(found.inputs.values(), machine.inputs.values())]
+              for joint, drive in zip(made.inputs.values(), machine.inputs.values())]
     low, high = np.array([limits.get(name, (-math.inf, math.inf))[:2] for name, *_ in places]).T
     start, zero = np.array([place[1:] for place in places]).T
     start = np.clip(start, low, high)
@@ -280,20 +256,3 @@ def _ranges(machine: scene.SceneMechanism, found: Rods, limits: Mapping[str, Lim
         if np.isfinite(list(angles.values())).all():
             break
     return {name: each for (name, *_), each in zip(places, zip(*map(np.ndarray.tolist, ends)))}
-
-
-def _corners(machine: scene.SceneMechanism, found: Rods) -> Iterator[str]:
-    """Yield the motors' positions at the corners of the hinges' limits."""
-    for held in machine.linkage.windows():
-        names = [line.names[0] for line in held.lines]
-        inverse = machine.linkage.driven_by(*names)
-        zeros = [found.links[name].start for name in names]
-        for corner in product(*held.limits):
-            motors = inverse.joint_angles(corner, [*found.inputs])
-            where = ', '.join(f'{found.links[name].name} at {value + zero:.4g}'
-                              for name, value, zero in zip(names, corner, zeros))
-            there = ', '.join(
-                f'{joint.name} at {motors[name] - machine.inputs[name].offset:.4g}'
-                if math.isfinite(motors[name]) else f'{joint.name} does not reach'
-                for name, joint in found.inputs.items())
-            yield f'Motors: with {where}: {there}.'

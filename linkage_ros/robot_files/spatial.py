@@ -180,17 +180,6 @@ class Component:
             poses[:, self.named[name]] = positions[name] - self._starts[self.named[name]]
         return poses
 
-    def towards_limits(self, names: Sequence[str], part: float) -> np.ndarray:
-        """Return a step of joints by some part [rad, or of the size], within their limits."""
-        step = self.at_start()
-        for i in map(self.named.__getitem__, names):
-            (low, high), start = self._screws[i].joint.range, self._starts[i]
-            change = part * self.unit[i]
-            if not low <= start + change <= high:
-                change = abs(change) if start < low else -abs(change) if start > high else -change
-            step[:, i] = change
-        return step
-
     def _frames(self, poses: np.ndarray) -> np.ndarray:
         """Return the displacement after each screw; the last is that of the root."""
         moved = displacements(self._twists, poses, self._slides)
@@ -253,16 +242,6 @@ class Component:
             near = more
         return [(np.any(moved[rows], axis=0), np.repeat(rows, 3))
                 for rows in np.unique(near, axis=0)]
-
-    def outside(self, part: float) -> Dict[str, float]:
-        """Return positions inside their limits, by a part of the range, of joints outside."""
-        inside = {}
-        for name, i in self.named.items():
-            (low, high), start = self._screws[i].joint.range, self._starts[i]
-            if not low <= start <= high:
-                margin = part * min(high - low, 1.0)
-                inside[name] = low + margin if start < low else high - margin
-        return inside
 
     def within(self, poses: np.ndarray, which: np.ndarray) -> np.ndarray:
         """Return in which poses joints are inside their limits, of some screws."""
@@ -341,18 +320,6 @@ class Component:
         name = self._screws[int(np.argmax(apart))].joint.name
         first, second = self.read(np.array([one, other]))[name]
         return name, float(first), float(second)
-
-    def immobile(self, pose: np.ndarray) -> List[str]:
-        """Return the joints with a name that cannot move near a closed pose."""
-        fixed, rng = self.is_of([]), np.random.default_rng(3)
-        moved = fixed.copy()
-        for _ in range(3):
-            ways = self.free_ways(pose, fixed)
-            moved |= is_free(ways)
-            step = ways.T @ rng.normal(size=len(ways))
-            step *= 0.1 / max(np.max(np.abs(step), initial=0.0), 0.1)
-            pose = self.closed((pose + step * self.unit)[None], fixed)[0]
-        return [name for name, i in self.named.items() if not moved[i]]
 
     def read(self, poses: np.ndarray) -> Dict[str, np.ndarray]:
         """Return the positions of named joints [rad or m], within half a turn of the file's."""

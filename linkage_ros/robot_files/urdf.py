@@ -4,16 +4,17 @@
 """
 Robots in URDF, with the ways in which tools write the loops that it has no word for.
 
-Sources: https://wiki.ros.org/urdf/XML; RigidBodyDynamics.jl, Isaac Sim and Drake (`loop_joint`,
-`drake:`); URDF+ of generalized_rbda (`loop`); Gazebo's tutorial on kinematic loops (`gazebo`);
-onshape-to-robot's documentation (`closing_`); example-parallel-robots (`closed_loop`);
+Sources: https://wiki.ros.org/urdf/XML; RigidBodyDynamics.jl and Isaac Sim (`loop_joint`); URDF+ of
+generalized_rbda (`loop`); Gazebo's tutorial on kinematic loops (`gazebo`); onshape-to-robot's
+documentation (`closing_`); example-parallel-robots (`closed_loop`);
 solidworks_urdf_exporter2 (`closures`); Robonex (`pin_loops`, `ball_loops`).
 """
 
 from __future__ import annotations
 
+from graphlib import TopologicalSorter
 import re
-from typing import Any, Dict, Iterable, List, Mapping, Sequence, Tuple
+from typing import Any, Mapping, Sequence, Tuple
 
 import numpy as np
 
@@ -23,15 +24,10 @@ from ..robot_model.places import at, pose
 from ..robot_model.robot import BALL, FIXED, HINGE, KINDS, Robot, UNIVERSAL
 from ..words import listed, meant, quoted
 
-_ENDS = ('name', 'parent', 'child', 'parent_xyz', 'child_xyz', 'axis')
-# The kinds of loops in a loops file, and the keys of each loop.
-LOOPS = {'closures': ('link_a', 'link_b', 'point', 'axis'), 'closed_loop': (),
-         'pin_loops': _ENDS, 'ball_loops': _ENDS}
-# All its keys; the last two have no effect.
-_KEYS = (*LOOPS, 'type', 'joint_name', 'joint_type', 'independent', 'name_mot', 'dependent',
-         'ball_limit_deg')
+# The keys of a file of loops; the last two have no effect.
+_KEYS = ('closures', 'closed_loop', 'pin_loops', 'ball_loops', 'type', 'joint_name',
+         'joint_type', 'independent', 'name_mot', 'dependent', 'ball_limit_deg')
 _CLOSING = re.compile(r'(?P<name>.*closing_.+)_1')
-_NOWHERE = np.eye(4)
 
 
 class Reader:
@@ -51,33 +47,18 @@ class Reader:
         joints = once((attribute(joint, 'child', 'link'), joint)
                       for joint in root.findall('joint'))
         bases = {child: attribute(joint, 'parent', 'link') for child, joint in joints.items()}
-        names = {**links, **{base: None for base in bases.values() if base == 'world'}}
-        below: Dict[str, List[str]] = {name: [] for name in names}
-        for child, joint in joints.items():
-            for end in (bases[child], child):
-                if end not in names:
-                    raise RequestError(f'joint {joint.get("name")} is on {end!r}, which is no '
-                                       'link')
-            below[bases[child]].append(child)
-        # The ground of Drake, which hangs on nothing and has no joints.
-        row = [link for link in names if link not in joints and (link != 'world' or below[link])]
-        if len(row) != 1:
-            raise RequestError(f'a URDF has one root link, not {len(row)}')
-        robot = self.robot = Robot(row[0], {row[0]: np.eye(4)})
-        for link in row:
-            for child in below[link]:
-                robot.frames[child] = robot.frames[link] @ origin(joints[child].find('origin'))
-            row += below[link]
-        if lost := [link for link in names if link not in robot.frames and link in joints]:
-            raise RequestError(f'{lost[0]} hangs on itself')
-        # The link of each frame, and its pose on the link.
-        self._frames = {link: (link, _NOWHERE) for link in robot.frames}
-        self._frames.update((frame.get('name', ''), (frame.get('link', ''), origin(frame)))
-                            for frame in root.findall('frame'))
-        self._children = {joint.get('name', ''): child for child, joint in joints.items()}
-        if 'world' in names and 'world' not in robot.frames:
-            robot.frames['world'] = robot.frames[row[0]]
-            robot.join('', FIXED, (row[0], 'world'), robot.frames['world'])
+        roots = [link for link in links if link not in joints]
+        if len(roots) != 1:
+            raise RequestError(f'a URDF has one root link, not {len(roots)}')
+        robot = self.robot = Robot(roots[0], {roots[0]: np.eye(4)})
+        for link in TopologicalSorter({link: [base] for link, base in bases.items()}
+                                      ).static_order():
+            if link in joints and link in links:
+                robot.frames[link] = robot.frames[bases[link]] @ origin(
+                    joints[link].find('origin'))
+        # Joints stand for their children.
+        self._links = {**{joint.get('name', ''): child for child, joint in joints.items()},
+                       **{link: link for link in robot.frames}}
         for child, joint in joints.items():
             self._tree_joint(joint, (bases[child], child))
         self._of_elements()
@@ -102,11 +83,10 @@ class Reader:
             ratio, start = numbers(f'{mimic.get("multiplier", 1)} {mimic.get("offset", 0)}', 2)
             self.robot.follow(name, mimic.get('joint', ''), ratio, start)
 
-    def _pair(self, name: str, kind: str, frames: Tuple[str, str], *axes: Any) -> None:
-        """Close a loop by two frames, each by its name or that of a link or a joint."""
-        (one, start), (other, end) = (
-            self._frames.get(frame) or self._frames[self._children[frame]] for frame in frames)
-        self.robot.close(name, kind, (one, other), (start, end), *axes)
+    def _pair(self, name: str, kind: str, ends: Sequence[str], *axes: Any) -> None:
+        """Close a loop by the frames of two links, each by its name or that of its joint."""
+        one, other = (self._links[end] for end in ends)
+        self.robot.close(name, kind, (one, other), [np.eye(4)] * 2, *axes)
 
     def _of_elements(self) -> None:
         """Add the loops that elements of the URDF close."""
@@ -122,31 +102,16 @@ class Reader:
                     (parts[0].attrib['link'], parts[1].attrib['link']),
                     [origin(part if part.find('origin') is None else part.find('origin'))
                      for part in parts], numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
-        for cut in self._root.findall('ball_constraint'):
-            one, other = (attribute(cut, f'ball_constraint_body_{end}', 'name') for end in 'AB')
-            self.robot.close(f'{one}={other}', BALL, (one, other), [
-                at(numbers(attribute(cut, f'ball_constraint_p_{end}', 'value', '0 0 0')))
-                for end in ('AP', 'BQ')])
-        for cut in self._root.findall('linear_bushing_rpy'):
-            one, other = (attribute(cut, f'bushing_frame{end}', 'name') for end in 'AC')
-            stiff = numbers(attribute(cut, 'bushing_torque_stiffness', 'value', '0 0 0'))
-            self._pair(f'{one}={other}', FIXED if stiff.all() else BALL, (one, other))
 
     def _of_frames(self) -> None:
-        """Add the loops that frames called closing_NAME_1 and closing_NAME_2 close."""
-        for name in self._frames:
-            match = _CLOSING.fullmatch(name)
-            if not match or (other := f'{match["name"]}_2') not in self._frames:
-                continue
-            ends, axes = (name, other), []
-            if {f'{end}_z' for end in ends} <= self._frames.keys():
-                axes = [np.linalg.solve(*map(self._place, (end, f'{end}_z')))[:3, 3]
-                        for end in ends]
-            self._pair(match['name'], HINGE if axes else BALL, ends, *axes)
-
-    def _place(self, frame: str) -> np.ndarray:
-        link, own = self._frames[frame]
-        return self.robot.frames[link] @ own
+        """Add the loops that links called closing_NAME_1 and closing_NAME_2 close."""
+        frames = self.robot.frames
+        for match in filter(None, map(_CLOSING.fullmatch, [*frames])):
+            ends = match[0], f'{match["name"]}_2'
+            if ends[1] in frames:
+                axes = [np.linalg.solve(frames[end], frames[f'{end}_z'])[:3, 3] for end in ends
+                        if f'{end}_z' in frames]
+                self._pair(match['name'], HINGE if len(axes) == 2 else BALL, ends, *axes)
 
     def _of_gazebo(self) -> None:
         """Add the joints that Gazebo adds to the model."""
@@ -158,32 +123,30 @@ class Reader:
             axis = numbers(text(cut, 'axis/xyz') or attribute(cut, 'axis', 'xyz', '0 0 1'))
             if text(cut, 'axis/use_parent_model_frame') in ('1', 'true'):
                 axis = frame[:3, :3].T @ axis
-            kind = cut.get('type', '')
-            second = numbers(text(cut, 'axis2/xyz', '0 0 1')) if KINDS.get(
-                kind, kind) == UNIVERSAL else None
-            self.robot.join(cut.get('name', ''), kind, (one, other), frame, axis, second=second)
+            second = text(cut, 'axis2/xyz')
+            self.robot.join(cut.get('name', ''), cut.get('type', ''), (one, other), frame, axis,
+                            second=numbers(second) if second else None)
         weld(self.robot, self._root.findall('gazebo/plugin'))
 
     def of_file(self, loops: Mapping[str, Any]) -> None:
         """Add the loops of another file; raise RequestError for a key that is not known."""
-        _check_keys('the file', loops, _KEYS)
-        for key, allowed in LOOPS.items():
-            for i, cut in enumerate(loops.get(key, ()) if allowed else ()):
-                _check_keys(f'{key}[{i}]', cut, allowed)
+        for key in loops:
+            if key not in _KEYS:
+                raise RequestError(f'there is no key {quoted(key)}; allowed: '
+                                   f'{listed(_KEYS, 200)}{meant(key, _KEYS)}')
         for i, cut in enumerate(loops.get('closures', ())):
             point = at(numbers(cut['point']))
             self.robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), point,
                             numbers(cut['axis']), point)
         types = loops.get('type', ())
-        for i, (first, second) in enumerate(loops.get('closed_loop', ())):
-            self._pair(f'{first}={second}', str(types[i] if i < len(types) else FIXED),
-                       (first, second))
+        for i, ends in enumerate(loops.get('closed_loop', ())):
+            self._pair('='.join(ends), str(types[i] if i < len(types) else FIXED), ends)
         for key, kind in (('pin_loops', HINGE), ('ball_loops', BALL)):
             for i, cut in enumerate(loops.get(key, ())):
                 self.robot.close(
                     str(cut.get('name', f'{key}[{i}]')), kind, (cut['parent'], cut['child']),
-                    [at(numbers(cut.get(f'{end}_xyz', '0 0 0'))) for end in ('parent', 'child')],
-                    numbers(cut.get('axis', '0 0 1')))
+                    [at(numbers(cut[f'{end}_xyz'])) for end in ('parent', 'child')],
+                    numbers(cut['axis'] if kind == HINGE else '0 0 1'))
         for name, kind in zip(loops.get('joint_name', ()), loops.get('joint_type', ())):
             self._change(name, str(kind).upper())
         # Its motors are those of the closed robot, transmissions those of the open tree.
@@ -192,10 +155,7 @@ class Reader:
 
     def _change(self, name: str, kind: str) -> None:
         """Change the type of a joint of the tree; the axes of `UJOINT_XY` are in its frame."""
-        joint = next((joint for joint in self.robot.joints if joint.name == name), None)
-        if joint is None:
-            names = [joint.name for joint in self.robot.joints]
-            raise RequestError(f'there is no joint {name!r} to be made {kind}{meant(name, names)}')
+        joint = {joint.name: joint for joint in self.robot.joints}[name]
         if kind.startswith('UJOINT'):
             self.robot.joints.remove(joint)
             first, second = (np.eye(3)['XYZ'.index(way)] for way in kind[-2:])
@@ -208,10 +168,3 @@ class Reader:
                 self.robot.held[name], joint.kind = joint.position, HINGE
             else:
                 joint.position, joint.limits, joint.no_limits = None, None, ''
-
-
-def _check_keys(where: str, given: Iterable[Any], allowed: Sequence[str]) -> None:
-    for key in given:
-        if key not in allowed:
-            raise RequestError(f'{where} has no key {quoted(key)}; allowed: '
-                               f'{listed(allowed, 200)}{meant(key, allowed)}')
