@@ -383,11 +383,11 @@ def test_a_part_is_seen_unless_it_is_hidden(part):
     {'crank__speed': 2.0}, {'crank__speed': -3.0, 'crank__start': 1.0},
     {'crank__sweep': [-0.5, 1.0]}, {'crank__sweep': [-0.5, 1.0], 'crank__speed': -1.0}])
 def test_the_crank_is_where_it_was_asked_to_be(crank):
-    wheel = Cycle(machine('four_bar', **crank)).first
+    cycle = Cycle(machine('four_bar', **crank))
     for angle in np.linspace(-0.49, 0.99, 17):
-        assert math.remainder(wheel.value(wheel.turns_to(angle)) - angle,
+        assert math.remainder(cycle.pose(cycle.turns_to(angle)).inputs[0] - angle,
                               math.tau) == pytest.approx(0.0, abs=1e-12)
-        assert wheel.turns_to(angle + math.tau) == pytest.approx(wheel.turns_to(angle))
+        assert cycle.turns_to(angle + math.tau) == pytest.approx(cycle.turns_to(angle))
 
 
 @pytest.mark.parametrize('speeds, count, ratios', [
@@ -670,3 +670,14 @@ def test_a_floor_below_a_foot_that_hardly_moves_has_few_marks():
     picture = picture_of(cell, parts=DEFAULT | {'floor'})
     floor = next(layer for layer in picture.panels[0].moving if isinstance(layer, layers.Floor))
     assert floor.spacing > 0.009 * cell.linkage.longest
+
+
+def test_a_crank_that_a_fraction_is_geared_to_is_drawn_until_all_comes_round():
+    gears, = scene.read({'mechanisms': ['gears'], 'gears.type': 'custom', 'gears.joints': [
+        'O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'B crank Q 1 geared crank 1.5 0',
+        ]}).machines.values()
+    cycle = Cycle(gears)
+    assert cycle.turns == 2
+    tip = cycle.pose(1.25).places[0, gears.linkage.points.index('B')] - (3.0, 0.0)
+    wanted = 1.5 * 1.25 * math.tau
+    assert tip == pytest.approx([math.cos(wanted), math.sin(wanted)], abs=1e-12)
