@@ -38,6 +38,8 @@ class Cycle:
         Time [s] of a turn of the first input; infinite if it stands still.
     turns : int
         Turns of the first input until all inputs are at their starts, or MAX_TURNS.
+    slides : list of (Shape, list of int)
+        The sliding parts, and the indices of their ends after those of the joints.
     prefixes : tuple of str
         Prefixes of the names of each leg's joints.
     course : float array (turns * SAMPLES + 1, legs, joints, 2)
@@ -48,8 +50,10 @@ class Cycle:
 
     def __init__(self, mechanism: SceneMechanism):
         assembly = mechanism.assembly()
-        sliding = drawn(mechanism, mechanism.points)
-        self._solution = assembly.solution((*mechanism.linkage.points, *(
+        sliding, joints = drawn(mechanism, mechanism.points), mechanism.linkage.points
+        self.slides = [(shape, [len(joints) + 2 * k, len(joints) + 2 * k + 1])
+                       for k, shape in enumerate(sliding)]
+        self._solution = assembly.solution((*joints, *(
             end for shape in sliding for end in (shape.start, shape.end))))
         self._first = mechanism.first
         motions = [Motion.of(settings) for settings in mechanism.inputs.values()]
