@@ -188,7 +188,6 @@ def test_a_scene_counts_lengths_in_metres_scaled():
 
 
 @pytest.mark.parametrize('name, value, text', [
-    ('cylinder.start', 9.0, r'boom.cylinder.start must be inside the reach \[.*\] m, not 9'),
     ('cylinder.sweep', [0.1, 1.0], r'boom.cylinder.sweep must be inside the reach \[.*\] m'),
     ('cylinder.sweep', [1.0, 1.0], 'boom.cylinder.sweep must be .* lower end'),
     ('cylinder.speed', 1e3, 'boom.cylinder.speed must be .* from -100 to 100'),

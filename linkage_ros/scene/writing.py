@@ -9,7 +9,7 @@ import re
 from textwrap import indent
 from typing import Any, Mapping, Optional
 
-from . import read, Scene
+from . import Scene
 from .parameter_file import is_text
 from ..optional import needs
 
@@ -41,12 +41,8 @@ def without_defaults(scene: Scene, always: Optional[re.Pattern] = None) -> dict[
     """
     Return the mechanisms and the values that differ from their defaults, by full parameter name.
 
-    A value whose whole name matches `always` is included even if it is the default. Raises
-    SceneError if nodes could not start with these values: an input starts outside its sweep or
-    reach.
+    A value whose whole name matches `always` is included even if it is the default.
     """
-    values = {parameter.name: parameter.value for parameter in scene.parameters
+    return {parameter.name: parameter.value for parameter in scene.parameters
               if parameter.value != parameter.default or parameter.name == 'mechanisms'
               or always and always.fullmatch(parameter.name)}
-    read(values)
-    return values
