@@ -15,9 +15,11 @@ from typing import Any, List, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 
-from .drawn_curve import drawn
 from ..formula.program import Batch, Pose
-from ..linkage import Leg, LinkPoint, Mechanism
+from ..linkage import Leg, LinkPoint, Mechanism, sampled
+
+# Even samples of a locus: no corner is seen, unless bars fold flat but for some 1e-5 of them.
+LOCUS_SAMPLES = 1081
 
 
 class Layout(NamedTuple):
@@ -171,5 +173,5 @@ class Assembly:
         if len(self.linkage.inputs) > 1:
             return np.empty((0, 2))
         low, high = max(self.reach, key=lambda arc: arc[1] - arc[0])
-        return self._scale * drawn(
-            lambda theta: self.linkage.solve(theta, (name,))[name], low, high)
+        places = self.linkage.solve(sampled(low, high, LOCUS_SAMPLES), (name,))[name]
+        return self._scale * places[np.isfinite(places).all(axis=1)]
