@@ -357,5 +357,5 @@ def test_a_drawn_curve_has_no_visible_corners(make):
     true = 0.01 * true[np.isfinite(true)]
     size = max(np.ptp(true.real), np.ptp(true.imag))
     # Where bars fold flat but for a billionth of them, a corner may be cut.
-    part = 60 if linkage.type == 'four_bar' else 500
-    assert len(drawn) < 1200 and _from_line(true, drawn).max() < size / part
+    part = 60 if linkage.type == 'four_bar' else 400
+    assert len(drawn) < 900 and _from_line(true, drawn).max() < size / part

@@ -327,7 +327,7 @@ class Names:
                      [pivots, pivots - self._pivot]]
         for line in self._axes.lines:
             if len(line.get_xdata()) > CURVED:
-                curve = self._points(line.get_xydata())[None, ::12]
+                curve = self._points(line.get_xydata())[None, ::9]
                 obstacles.append([curve[:, :-1], curve[:, 1:]])
         for text, index, distance, wider in zip(
                 self.artists, self._index, self._distances, self._wider):

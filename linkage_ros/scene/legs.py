@@ -19,7 +19,7 @@ from ..formula.program import Batch, Pose
 from ..linkage import Leg, LinkPoint, Mechanism, sampled
 
 # Even samples of a locus: no corner is seen, unless bars fold flat but for some 1e-5 of them.
-LOCUS_SAMPLES = 1081
+LOCUS_SAMPLES = 721
 
 
 class Layout(NamedTuple):
