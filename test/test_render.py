@@ -631,17 +631,6 @@ def test_names_are_around_their_joints_however_long():
             == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize('rows', [1, 3])
-def test_names_see_how_far_they_are_from_the_nearest_line(rows):
-    rng = np.random.default_rng(rows)
-    points, starts, ends = (rng.normal(size=(*shape, 2)) @ (1, 1j)
-                            for shape in ((3, 7), (rows, 5), (rows, 5)))
-    ends[:, 0] = starts[:, 0]
-    along = starts[..., None] + np.linspace(0.0, 1.0, 2001) * (ends - starts)[..., None]
-    nearest = np.abs(points[:, :, None] - along.reshape(rows, 1, -1)).min(axis=2)
-    np.testing.assert_allclose(layers.clearance(points, starts, ends), nearest, atol=2e-3)
-
-
 def test_a_larger_picture_has_wider_lines_and_all_have_equal_margins():
     machine, = scene.read({'mechanisms': ['jansen']}).machines.values()
     small, large = (Picture([machine], (size, size), 'whole', frozenset(PARTS)).figure

@@ -321,25 +321,24 @@ class Names:
     def settle(self, poses):
         """Choose each name's place beside its joint, for poses of shape (n, legs, joints, 2)."""
         joints = self._points(poses[:, 0])
-        pivots = joints[:, self._fixed]
-        # Fixed and moving lines, as their starts and ends.
-        obstacles = [np.moveaxis(joints[:, self._bars], -1, 0), [joints, joints],
-                     [pivots, pivots - self._pivot]]
-        for line in self._axes.lines:
-            if len(line.get_xdata()) > CURVED:
-                curve = self._points(line.get_xydata())[None, ::9]
-                obstacles.append([curve[:, :-1], curve[:, 1:]])
+        start, end = np.moveaxis(joints[:, self._bars], -1, 0)
+        curves = [self._points(line.get_xydata()[::9]) for line in self._axes.lines
+                  if len(line.get_xdata()) > CURVED]
+        # All that a name keeps clear of, as points.
+        drawn = np.hstack([joints, joints[:, self._fixed] - self._pivot, *(
+            start + part * (end - start) for part in np.linspace(0.0, 1.0, 13)), *(
+            np.broadcast_to(curve, (len(joints), len(curve))) for curve in curves)])
         for text, index, distance, wider in zip(
                 self.artists, self._index, self._distances, self._wider):
             offsets = distance * self.DIRECTIONS + wider * self.DIRECTIONS.real
             tried = joints[:, [index]] + offsets
-            room = np.min([clearance(tried + end, *lines) for lines in obstacles
+            room = np.min([abs(tried[..., None] + end - drawn[:, None]).min(axis=2)
                            for end in {-wider, 0.0, wider}], axis=0)
             room = np.nan_to_num(np.minimum(room, distance))
             best = offsets[room.mean(axis=0).argmax()]
             text.set_position((best.real, best.imag))
-            name, half = joints[:, [index]] + best, 0.5 * distance + wider
-            obstacles.append([name - half, name + half])
+            half = (0.5 * distance + wider) * np.linspace(-1.0, 1.0, 5)
+            drawn = np.hstack([drawn, joints[:, [index]] + best + half])
 
     def _points(self, places):
         """Return places [m] on paper [points], as complex numbers."""
@@ -350,12 +349,3 @@ class Names:
         """Move the names with their joints."""
         for text, index in zip(self.artists, self._index):
             text.xy = tuple(pose.places[0, index])
-
-
-def clearance(points, starts, ends):
-    """Return the distances of points (n, m) to the nearest lines (n or 1, k), all complex."""
-    along = (ends - starts)[:, None]
-    from_start = points[:, :, None] - starts[:, None]
-    squared = np.abs(along) ** 2
-    part = (from_start * np.conj(along)).real / np.where(squared > 0.0, squared, 1.0)
-    return np.abs(from_start - np.clip(part, 0.0, 1.0) * along).min(axis=2)

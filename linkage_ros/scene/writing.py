@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import re
-from textwrap import indent
 from typing import Any, Mapping, Optional
 
 from . import Scene
@@ -24,17 +23,12 @@ def in_yaml(values: Mapping[str, Any]) -> str:
 
     Dumper.add_representer(str, lambda dumper, text: dumper.represent_scalar(
         'tag:yaml.org,2002:str', text, None if is_text(text) else "'"))
-    texts = ['/**:', '  ros__parameters:']
-    for name, value in values.items():
-        written = list(value) if isinstance(value, tuple) else value
-        if written == []:
-            # rcl cannot read an empty list, which is the default anyway.
-            continue
-        numbers = isinstance(written, list) and not any(isinstance(one, str) for one in written)
-        text = dump({name: written}, Dumper=Dumper, width=1000,
-                    default_flow_style=numbers and None)
-        texts.append(indent(text.rstrip(), '    '))
-    return '\n'.join(texts) + '\n'
+    Dumper.add_representer(list, lambda dumper, items: dumper.represent_sequence(
+        'tag:yaml.org,2002:seq', items, flow_style=not isinstance(items[0], str)))
+    # rcl cannot read an empty list, which is the default anyway.
+    lists = {name: list(value) if isinstance(value, tuple) else value
+             for name, value in values.items() if value not in ((), [])}
+    return dump({'/**': {'ros__parameters': lists}}, Dumper=Dumper, width=1000, sort_keys=False)
 
 
 def without_defaults(scene: Scene, always: Optional[re.Pattern] = None) -> dict[str, Any]:
