@@ -348,7 +348,7 @@ def test_the_mechanisms_of_the_scene_of_all_stand_apart():
     ('/**: 3', 'ros__parameters below the name of a node, .* is expected in line 1'),
     ('ros__parameters: {rate: 5.0}', 'ros__parameters must be below the name of a node'),
     ('/**:\n  ros__parameters: {rate: }', 'a value is missing in line 2'),
-    ('/**: {', 'not a valid ROS parameter file: did not find expected .*line 2, '),
+    ('/**: {', 'not a valid ROS parameter file: .*did not find expected .*line 2, '),
     ('[1]', 'ros__parameters below the name of a node, .* is expected in line 1'),
     ('/**:\n  ros__parameters:\n    rate: 1.0\n    rate: fast',
      "'?rate'? is given twice in line 4"),
