@@ -267,7 +267,7 @@ class Model:
         given = {**self._given, **{name: scene.plain(v) for name, v in values.items()}}
         before = self._signatures()
         try:
-            self._take(scene.read(given, strict=False))
+            self._take(scene.read(given))
         except scene.SceneError as error:
             return str(error), set()
         self._given = given

@@ -179,11 +179,8 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'jansen.crank.sweep': [1.0, 1.0]}, 'jansen.crank.sweep must be'),
     ({'jansen.crank.sweep': [1e16, 1e16 + 8.0]}, r'jansen.crank.sweep must be .* within 1e\+06'),
     ({'jansen.crank.sweep': [-1e300, 1e300]}, r'jansen.crank.sweep must be .* within 1e\+06'),
-    ({'jansen.crank.sweep': [1.0, 2.0], 'jansen.crank.start': 0.5},
-     r'jansen.crank.start must be inside the sweep \[1, 2\]'),
     ({'peaucellier.crank.sweep': [-1.2, 1.0]},
      r'peaucellier.crank.sweep must be inside the reach \[-1.17137, 1.17137\] rad'),
-    ({'peaucellier.crank.start': 2.0}, r'peaucellier.crank.start must be inside the reach \[-1.1'),
     ({'rate': -1.0}, 'rate must be .* from 0 to 1000'),
     ({'rate': 1001}, 'rate must be .* from 0 to 1000'),
     ({'rate': 10 ** 5000}, 'rate must be .* from 0 to 1000'),
@@ -289,15 +286,12 @@ def test_a_value_of_another_type_that_counts_as_equal_is_read():
         scene.read({'jansen.scale': True}, before)
 
 
-def test_a_crank_that_has_left_its_start_follows_a_sweep_that_does_not_hold_it():
-    given = {'jansen.crank.sweep': [0.0, 1.0], 'jansen.crank.start': 0.5}
-    moved = {**given, 'jansen.crank.sweep': [2.0, 3.0]}
-    with pytest.raises(scene.SceneError, match='jansen.crank.start must be inside the sweep'):
-        scene.read(moved, scene.read(given))
-    after = scene.read(moved, scene.read(given), strict=False)
-    assert after.machines['jansen'].first.sweep == (2.0, 3.0)
-    faster = scene.read({**moved, 'jansen.crank.speed': 2.0}, after)
-    assert faster.machines['jansen'].first.speed == 2.0
+@pytest.mark.parametrize('given, start', [
+    ({'mechanisms': ['jansen'], 'jansen.crank.sweep': [2.0, 3.0], 'jansen.crank.start': 0.5}, 2.0),
+    ({**CELL, 'cell.crank.start': 1.5}, 0.98 * 1.171371)])
+def test_a_start_outside_the_sweep_or_the_reach_is_the_nearer_end(given, start):
+    machine, = scene.read(given).machines.values()
+    assert Motion.of(machine.first).at(0)[0] == pytest.approx(start, rel=1e-6)
 
 
 def test_parameters_of_the_client_library_are_none_of_the_scenes_business():
@@ -354,7 +348,7 @@ def test_the_mechanisms_of_the_scene_of_all_stand_apart():
     ('/**: 3', 'ros__parameters below the name of a node, .* is expected in line 1'),
     ('ros__parameters: {rate: 5.0}', 'ros__parameters must be below the name of a node'),
     ('/**:\n  ros__parameters: {rate: }', 'a value is missing in line 2'),
-    ('/**: {', 'not a valid ROS parameter file: did not find expected .*, line [12]$'),
+    ('/**: {', 'not a valid ROS parameter file: .*did not find expected .*line 2, '),
     ('[1]', 'ros__parameters below the name of a node, .* is expected in line 1'),
     ('/**:\n  ros__parameters:\n    rate: 1.0\n    rate: fast',
      "'?rate'? is given twice in line 4"),
@@ -391,16 +385,13 @@ def lengths(given):
 @pytest.mark.parametrize('given', [*TYPES.values(), SMALL, SIGNED, SWEPT, {'jansen.scale': 5e-324},
                                    {'jansen.scale': 1e308}],
                          ids=[*TYPES, 'small', 'signed', 'swept', 'least', 'most'])
-def test_the_ends_of_every_slider_are_whole_stops(given):
-    """A slider of rqt_reconfigure has stops at whole multiples of a hundredth of its range."""
+def test_every_slider_has_its_value_between_finite_ends(given):
     made = scene.read(given)
     numbers = [p for p in made.parameters if p.field.kind == 'double']
     for parameter in numbers:
         low, high = slider.ends(made, parameter)
-        stop = (high - low) / 100.0
         assert low < high and low <= parameter.value <= high or 'scale' in parameter.name
-        for end in (low, high):
-            assert math.isclose(round(end / stop) * stop, end, rel_tol=1e-6, abs_tol=1e-12)
+        assert math.isfinite(low) and math.isfinite(high)
     assert len(numbers) > 3
 
 
@@ -549,8 +540,6 @@ def test_scenes_of_the_same_values_are_equal_however_they_are_written():
      'can be solved for an output, and own has 2'),
     ({'own.cylinder.sweep': [0.4, 1.0]},
      'own.cylinder.sweep must be inside the reach [0.5, 2.5] m, not [0.4, 1.0]'),
-    ({'own.cylinder.start': 3.0},
-     'own.cylinder.start must be inside the reach [0.5, 2.5] m, not 3.0'),
     ({'own.cylinder.sweep': [1.0, 1.0]}, 'own.cylinder.sweep must be a list of finite '
      'numbers, the lower end and the higher end, within 1e+06 of zero, or none, not '
      '[1.0, 1.0]'),

@@ -20,7 +20,7 @@ from .. import scene
 from ..cache import Cache
 from ..linkage import LinkPoint
 from ..robot_model import bodies, shapes, urdf
-from ..scene.legs import Layout, Solution
+from ..scene.legs import Solution
 
 # Cached publishers: a walker's legs may leave their reach one by one, each with another message.
 MAX_PUBLISHERS = 128
@@ -47,7 +47,7 @@ class AssemblyState(NamedTuple):
 
     def legs(self) -> np.ndarray:
         """Return the indices of the assembled legs."""
-        count = self.solution.layout.legs
+        count = len(self.solution.rows)
         return np.arange(count) if self.assembled is None else np.flatnonzero(
             np.frombuffer(self.assembled, bool))
 
@@ -105,8 +105,8 @@ class MechanismModel:
         solution = self.assembly.solution(
             self._points if markers else (), names, names if joints and moving else None,
             len(self.inputs) if self.mechanism.loads else 0)
-        return AssemblyState(
-            solution, None, solution.layout.speeds > 0, solution.layout.efforts > 0)
+        return AssemblyState(solution, None, solution.parts['speeds'].size > 0,
+                             solution.parts['efforts'].size > 0)
 
     def solve(self, regular: AssemblyState, inputs: Sequence[float],
               speeds: Sequence[Optional[float]]) -> AssemblyState:
@@ -115,30 +115,30 @@ class MechanismModel:
 
         `inputs` are positions [rad or m]; the speeds [per second] may be None without velocities.
         """
-        layout, values = regular.solution.layout, regular.solution.values
-        is_finite = regular.solution.solve(inputs, speeds)
-        if layout.efforts:
+        solution = regular.solution
+        is_finite = solution.solve(inputs, speeds)
+        if regular.has_efforts:
             efforts = self.mechanism.efforts(inputs)
-            layout.effort(values)[:] = efforts
+            solution.parts['efforts'] = efforts
             is_finite = is_finite and all(map(math.isfinite, efforts))
         if not self._is_plain:
-            self._convert(values, *self._conversions[layout])
+            self._convert(solution.values, *self._conversions[solution.layout])
         within = self.assembly.within_reach(inputs[0]) if self.assembly.is_limited else ()
         return regular if is_finite and all(within) else self._check_assembly(regular, within)
 
     def _check_assembly(self, regular: AssemblyState, within: Sequence[bool]) -> AssemblyState:
         """Return the state of solved values; `within` are the legs in reach, () if all are."""
-        solution, layout = regular.solution, regular.solution.layout
-        driven = layout.driven(solution.values)
-        assembled = np.isfinite(solution.rows[:, :layout.posed]).all(axis=1)
-        assembled &= bool(np.isfinite(driven[:layout.inputs]).all())
+        solution, parts = regular.solution, regular.solution.parts
+        rows = parts['rows']
+        assembled = np.isfinite(np.hstack([rows['coordinates'], rows['angles']])).all(axis=1)
+        assembled &= bool(np.isfinite(parts['inputs']).all())
         if within:
             assembled &= within
-        rates = np.append(solution.rows[assembled, layout.posed:], driven[layout.inputs:])
+        rates = np.append(rows['rates'][assembled], parts['speeds'])
         return AssemblyState(
             solution, None if assembled.all() else assembled.tobytes(),
             regular.has_velocities and bool(np.isfinite(rates).all()),
-            regular.has_efforts and bool(np.isfinite(layout.effort(solution.values)).all()))
+            regular.has_efforts and bool(np.isfinite(parts['efforts']).all()))
 
     def _convert(self, values: np.ndarray, factors: np.ndarray, offsets: np.ndarray,
                  wrapped: np.ndarray) -> None:
@@ -148,28 +148,29 @@ class MechanismModel:
             values += offsets
             values[wrapped] -= math.tau * np.round(values[wrapped] / math.tau)
 
-    def _conversion(self, layout: Layout) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _conversion(self, layout: np.dtype) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the arguments of `_convert`: factors, offsets, and indices of angles to wrap."""
-        factors, offsets = np.ones(layout.size), np.zeros(layout.size)
         places = positions, *_ = self._places(layout)
+        factors, offsets = np.ones(layout.itemsize // 8), np.zeros(layout.itemsize // 8)
         for indices in places:
             factors[indices] = self._signs[:len(indices)]
         offsets[positions] = self._offsets[:len(positions)]
         return factors, offsets, positions[self._wrapped[:len(positions)]]
 
-    def _places(self, layout: Layout) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _places(self, layout: np.dtype) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the indices of the joints' positions, velocities and efforts in a solution."""
-        indices, n = np.arange(layout.size), len(self.inputs)
-        rows, driven = layout.rows(indices), layout.driven(indices)
-        return (np.append(driven[:n], rows[:, layout.coordinates:layout.posed]),
-                np.append(driven[n:], rows[:, layout.posed:]), layout.effort(indices))
+        parts: Any = np.arange(layout.itemsize // 8, dtype=float).view(layout)[0]
+        places = (np.append(parts['inputs'], parts['rows']['angles']),
+                  np.append(parts['speeds'], parts['rows']['rates']), parts['efforts'])
+        positions, velocities, efforts = (part.astype(int) for part in places)
+        return positions, velocities, efforts
 
     def _publisher(self, key: Tuple[AssemblyState, Tuple[Any, Any]]) -> PatchedPublisher:
         state, topics = key
         builders = self.joint_message, self.marker_message
         return PatchedPublisher(
             [(topic, partial(build, state)) for topic, build in zip(topics, builders) if topic],
-            state.solution.layout.size)
+            state.solution.values.size)
 
     def joint_message(self, state: AssemblyState, stamp: Any, values: np.ndarray) -> JointState:
         """Build the joint states of the assembled legs from a solution's values."""
@@ -180,18 +181,19 @@ class MechanismModel:
 
     def joints(self, state: AssemblyState, values: np.ndarray) -> List[np.ndarray]:
         """Return published joints: names, positions, velocities (empty if unsolved), efforts."""
-        layout, n, legs = state.solution.layout, len(self.inputs), state.legs()
+        n, count, legs = len(self.inputs), len(state.solution.rows), state.legs()
         chosen = self._published.copy()
-        chosen[n:].reshape(layout.legs, -1)[np.isin(np.arange(layout.legs), legs, invert=True)] = 0
-        positions, velocities, efforts = self._places(layout)
-        balanced = np.append(values[efforts], np.zeros(len(positions) - layout.efforts))
+        chosen[n:].reshape(count, -1)[np.isin(np.arange(count), legs, invert=True)] = 0
+        positions, velocities, efforts = self._places(state.solution.layout)
+        balanced = np.append(values[efforts], np.zeros(len(positions) - len(efforts)))
         return [self._names[chosen], values[positions[chosen]],
-                values[velocities[chosen] if layout.speeds else velocities], balanced[chosen]]
+                values[velocities[chosen] if velocities.size else velocities], balanced[chosen]]
 
     def marker_message(self, state: AssemblyState, stamp: Any, values: np.ndarray) -> MarkerArray:
         """Build the markers of the assembled legs from a solution's values."""
-        layout, legs = state.solution.layout, state.legs()
-        places = layout.rows(values)[legs, :layout.coordinates].reshape(
+        parts: Any = values.view(state.solution.layout)[0]
+        legs = state.legs()
+        places = parts['rows']['coordinates'][legs].reshape(
             len(legs), -1, len(self.mechanism.linkage.axes))
         # Left and right legs alternate. The first leg of each side draws the ground of that side.
         _, grounded = np.unique(legs % (1 + self.mechanism.mirrored), return_index=True)

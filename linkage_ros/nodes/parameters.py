@@ -62,8 +62,6 @@ class SceneParameters:
         self.fields = {parameter.name: parameter.field for parameter in owned}
         self.followed = {parameter.name: parameter.field for parameter in self.scene.parameters
                          if role in parameter.field.readers and parameter.name not in self.fields}
-        # An input that has left its start is not checked to be in its sweep.
-        self._is_strict = role in scenes.START.readers
         of_scene = values.keys() & {parameter.name for parameter in self.scene.parameters}
         self.is_given = bool(of_scene)
         # A parameter is declared by its owner alone.
@@ -95,7 +93,7 @@ class SceneParameters:
     def follow(self, values: Mapping[str, Any]) -> str:
         """Adopt values of parameters of another node; return the reason of a refusal, or ''."""
         try:
-            self._adopt(self._changed_scene(values, strict=False))
+            self._adopt(self._changed_scene(values))
         except scenes.SceneError as error:
             return str(error)
         return ''
@@ -134,7 +132,7 @@ class SceneParameters:
         try:
             values = {parameter.name: self._checked(parameter) for parameter in parameters
                       if parameter.name in self.fields}
-            self._next = self._changed_scene(values, self._is_strict)
+            self._next = self._changed_scene(values)
         except scenes.SceneError as error:
             self._refusal = str(error)
             return parameters
@@ -152,11 +150,11 @@ class SceneParameters:
         node = self._node.get_fully_qualified_name()
         return f'{elided(name)} is not a parameter of {node}{owner}'
 
-    def _changed_scene(self, values: Mapping[str, Any], strict: bool) -> scenes.Scene:
+    def _changed_scene(self, values: Mapping[str, Any]) -> scenes.Scene:
         """Return the scene with changed values; raise SceneError if it is refused."""
         if not values:
             return self.scene
-        changed = scenes.changed(self.scene, values, strict)
+        changed = scenes.changed(self.scene, values)
         self._check(changed)
         return changed
 

@@ -60,18 +60,18 @@ class SceneJointStates:
 
     def _publisher(self, parts: Parts) -> PatchedPublisher:
         return PatchedPublisher([(self._joint_states.publisher, partial(self._build, parts))],
-                                sum(state.solution.layout.size for _, state in parts))
+                                sum(state.solution.values.size for _, state in parts))
 
     def _build(self, parts: Parts, stamp: Any, values: np.ndarray) -> JointState:
         """Build the message from the consecutive values of the solutions."""
-        ends = np.cumsum([state.solution.layout.size for _, state in parts])
+        ends = np.cumsum([state.solution.values.size for _, state in parts])
         names, positions, velocities, efforts = map(np.concatenate, zip(
             *(model.joints(state, part)
               for (model, state), part in zip(parts, np.split(values, ends)))))
         chosen = [name not in self._omitted for name in names]
         moving = all(state.has_velocities for _, state in parts)
         loaded = {state.has_efforts for _, state in parts
-                  if state.solution.layout.efforts} == {True}
+                  if state.solution.parts['efforts'].size} == {True}
         return joint_states(
             stamp, names[chosen].tolist(), positions[chosen], velocities[chosen] if moving else (),
             efforts[chosen] if loaded else ())

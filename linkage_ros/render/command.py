@@ -115,16 +115,16 @@ def write(arguments, picture, times):
 def moments(arguments, picture):
     """Return the times to draw [turns of the first input]."""
     first = picture.panels[0]
-    wheel = first.cycle.first
+    input_ = first.mechanism.first.input
     if not arguments.moving:
         if arguments.angle is None:
             return [0.0]
-        if not wheel.input.turns:
+        if not input_.turns:
             raise RequestError(f'--angle is for a crank: {first.mechanism.name} is driven by a '
                                'length; it is drawn at its start')
-        return [wheel.turns_to(math.radians(arguments.angle))]
+        return [first.cycle.turns_to(math.radians(arguments.angle))]
     if not math.isfinite(picture.period):
-        raise RequestError(f'{first.mechanism.name}.{wheel.input.name}.speed is 0: nothing moves')
+        raise RequestError(f'{first.mechanism.name}.{input_.name}.speed is 0: nothing moves')
     turns = arguments.turns or 1.0
     frames = arguments.frames or max(round(turns * picture.period * (arguments.fps or FPS)), 1)
     if frames > MOST_FRAMES:

@@ -32,6 +32,14 @@ WHITENED = 0.7  # how white the last of many pairs of legs is
 HALO = [withStroke(linewidth=3, foreground='white')]
 PIVOT_SIZE = 13  # points, from its top to its bottom
 PIVOT = Path([(0.0, 0.0), (-0.6, -1.0), (0.6, -1.0), (0.0, 0.0)], closed=True)
+# Lines in drawing order: colour, width, cap, and how much wider the rim is.
+LINES = {'bars': (BAR, 5.5, 'round', 0.0), 'slots': ('white', 13.5, 'round', 3.5),
+         'rods': (DARK, 4.0, 'round', 0.0), 'cranks': (DRIVEN, 5.5, 'round', 0.0),
+         'bodies': (TRACK, 9.0, 'projecting', 3.5), 'driven': (DRIVEN, 9.0, 'projecting', 3.5)}
+# Marks: shape, size, colours of the inside and the edge, width of the edge, place in the order.
+DOTS = {'pivots': (PIVOT, 2.0 * PIVOT_SIZE, EARTH, EARTH, 1.0, 0.05),
+        'joints': ('o', 9.0, 'white', DARK, 2.2, 0.8),
+        'tracer': ('o', 11.0, LOCUS, DARK, 1.6, 0.9)}
 
 
 def whiter(colour, part: float):
@@ -100,17 +108,10 @@ def guides(axes, mechanism, cycle, unit):
     line = straight(cycle.locus(mechanism))
     if line is not None:
         axes.axline(*line, **dashed)
-    for shape, ends in sliding(mechanism):
+    for shape, ends in cycle.slides:
         if shape.kind == shapes.GUIDE and shape.is_fixed:
             for track in cycle.course[0, :1 + mechanism.mirrored, ends]:
                 axes.plot(*track.T, color=TRACK, lw=8 * unit, zorder=1, solid_capstyle='round')
-
-
-def sliding(mechanism):
-    """Return the slides, and the indices of their ends after those of the joints."""
-    first = len(mechanism.linkage.points)
-    return [(shape, [first + 2 * k, first + 2 * k + 1])
-            for k, shape in enumerate(shapes.drawn(mechanism, mechanism.points))]
 
 
 def straight(curve):
@@ -136,88 +137,73 @@ class Legs:
     """The links and joints; each pair of legs is paler than the one before."""
 
     def __init__(self, axes, mechanism, cycle, parts, unit):
-        linkage = mechanism.linkage
-        index = {name: linkage.points.index(name) for name in mechanism.points}
-        turning = shapes.cranks(linkage)
-        bars = [bar for bar in linkage.bars if bar not in turning]
-        lines = {kind: [[index[p], index[q]] for p, q in ends if {p, q} <= set(index)]
-                 for kind, ends in (
-                     ('bars', bars), ('rods', linkage.cylinders), ('cranks', turning))}
-        inputs = {input_.name for input_ in linkage.inputs}
-        lines.update(slots=[], bodies=[], driven=[])
-        for shape, ends in sliding(mechanism):
-            if shape.kind != shapes.GUIDE:
-                lines['driven' if shape.slide.name in inputs else 'bodies'].append(ends)
-            elif not shape.is_fixed:
-                lines['slots'].append(ends)
-        # The indices of their ends.
-        self._lines = {kind: np.array(ends, int).reshape(-1, 2) for kind, ends in lines.items()}
-        self._plates = [[index[name] for name in around(frame)]
-                        for frame in linkage.frames.values()
-                        if len(frame) > 2 and set(frame) <= set(index)]
-        self._joints = np.array(list(index.values()))
-        self._tracer = linkage.points.index(mechanism.tracer)
-        self._fixed = fixed(cycle.course)[self._joints]
-        self.legs = []
+        linkage, shown = mechanism.linkage, set(mechanism.points)
+        joints = np.array([linkage.points.index(name) for name in mechanism.points])
+        plates = [around(frame) for frame in linkage.frames.values() if len(frame) > 2]
+        # The indices of all that is drawn of a leg, by part.
+        self._indices = {
+            **lines_of(mechanism, cycle), 'joints': joints,
+            'pivots': joints[fixed(cycle.course)[joints]],
+            'tracer': [linkage.points.index(mechanism.tracer)],
+            'plates': [[linkage.points.index(name) for name in plate]
+                       for plate in plates if shown.issuperset(plate)]}
         sides = 1 + mechanism.mirrored
         thin = unit * (1.0 if len(cycle.prefixes) == 1 else 0.7)
-        for leg in reversed(range(len(cycle.prefixes))):
-            white = WHITENED * (leg // sides) / mechanism.leg_pairs
-            self.legs.append((leg, self._artists(axes, parts, white, thin)))
-        self.artists = sorted((artist for _, artists in self.legs for artist in artists.values()),
-                              key=lambda artist: artist.get_zorder())
-
-    def _artists(self, axes, parts, white, unit):
-        """Return the artists of one leg by part."""
-        zorder = 10 + 10 * (1.0 - white)
-        made = {}
-
-        def lines(name, colour, width, above, cap='round'):
-            made[name] = LineCollection([], colors=colour, lw=width * unit, capstyle=cap,
-                                        zorder=zorder + above)
-            axes.add_collection(made[name], autolim=False)
-
-        def rimmed(name, colour, width, above, cap='round'):
-            lines(f'{name}_rims', dark, width + 3.5, above, cap)
-            lines(name, colour, width, above + 0.01, cap)
-
-        def dots(name, marker, size, above, **style):
-            made[name], = axes.plot([], [], ls='', marker=marker, ms=size * unit,
-                                    zorder=zorder + above, **style)
-
-        dark = whiter(DARK, white)
-        if 'links' in parts:
-            made['plates'] = PolyCollection([], facecolors=whiter(BAR, 0.78 + 0.22 * white),
-                                            zorder=zorder)
-            axes.add_collection(made['plates'], autolim=False)
-            lines('bars', whiter(BAR, white), 5.5, 0.1)
-            rimmed('slots', 'white', 13.5, 0.2)
-            lines('rods', dark, 4, 0.3)
-            lines('cranks', whiter(DRIVEN, white), 5.5, 0.32)
-            rimmed('bodies', whiter(TRACK, white), 9, 0.34, 'projecting')
-            rimmed('driven', whiter(DRIVEN, white), 9, 0.36, 'projecting')
-        if 'joints' in parts:
-            dots('pivots', PIVOT, 2 * PIVOT_SIZE, 0.05, mfc=EARTH, mec=EARTH)
-            dots('joints', 'o', 9, 0.4, mfc='white', mec=dark, mew=2.2 * unit)
-            dots('tracer', 'o', 11, 0.5, mfc=whiter(LOCUS, white), mec=dark, mew=1.6 * unit)
-        return made
+        self.legs = [(leg, artists(
+            axes, parts, WHITENED * (leg // sides) / mechanism.leg_pairs, thin))
+            for leg in reversed(range(len(cycle.prefixes)))]
 
     def show(self, pose):
         """Move the legs."""
-        for leg, artists in self.legs:
-            self._show_leg(artists, pose.places[leg])
+        for leg, parts in self.legs:
+            places = pose.places[leg]
+            for part, artist in parts.items():
+                indices = self._indices[part]
+                if part == 'plates':
+                    artist.set_verts([places[plate] for plate in indices])
+                elif part in LINES:
+                    artist.set_segments(places[indices])
+                else:
+                    artist.set_data(*places[indices].T)
 
-    def _show_leg(self, artists, places):
-        if 'bars' in artists:
-            artists['plates'].set_verts([places[plate] for plate in self._plates])
-            for name, ends in self._lines.items():
-                for part in artists.keys() & {name, f'{name}_rims'}:
-                    artists[part].set_segments(places[ends])
-        if 'joints' in artists:
-            joints = places[self._joints]
-            artists['pivots'].set_data(*joints[self._fixed].T)
-            artists['joints'].set_data(*joints.T)
-            artists['tracer'].set_data(*places[[self._tracer]].T)
+
+def lines_of(mechanism, cycle):
+    """Return the indices of the ends of a leg's lines, by part."""
+    linkage, shown = mechanism.linkage, set(mechanism.points)
+    cranks = shapes.cranks(linkage)
+    lines: dict[str, list] = {part: [] for part in LINES}
+    for part, bars in (('cranks', cranks), ('rods', linkage.cylinders),
+                       ('bars', [bar for bar in linkage.bars if bar not in cranks])):
+        lines[part] = [[linkage.points.index(name) for name in bar]
+                       for bar in bars if shown.issuperset(bar)]
+    for shape, ends in cycle.slides:
+        part = 'slots' if shape.kind == shapes.GUIDE else (
+            'driven' if shape.slide.name in mechanism.inputs else 'bodies')
+        if part != 'slots' or not shape.is_fixed:
+            lines[part].append(ends)
+    return {part: np.array(ends, int).reshape(-1, 2) for part, ends in lines.items()}
+
+
+def artists(axes, parts, white, unit):
+    """Return the artists of one leg by part."""
+    made: dict = {}
+    zorder = 10.0 + 10.0 * (1.0 - white)
+    if 'links' in parts:
+        made['plates'] = PolyCollection([], facecolors=whiter(BAR, 0.78 + 0.22 * white),
+                                        zorder=zorder)
+        for place, (part, (colour, width, cap, rim)) in enumerate(LINES.items(), start=1):
+            made[part] = LineCollection(
+                [], colors=whiter(colour, white), lw=width * unit, capstyle=cap,
+                zorder=zorder + 0.1 * place, path_effects=rim and [withStroke(
+                    linewidth=(width + rim) * unit, foreground=whiter(DARK, white))])
+        for collection in made.values():
+            axes.add_collection(collection, autolim=False)
+    if 'joints' in parts:
+        for part, (marker, size, colour, edge, width, above) in DOTS.items():
+            made[part], = axes.plot(
+                [], [], ls='', marker=marker, ms=size * unit, mfc=whiter(colour, white),
+                mec=whiter(edge, white), mew=width * unit, zorder=zorder + above)
+    return made
 
 
 def fixed(course):
@@ -266,30 +252,23 @@ class Headline:
     """Above the axes: the name, the dimensions, the inputs, and a lever's angle."""
 
     def __init__(self, axes, mechanism, parts, unit, single):
-        self._linkage = mechanism.linkage
-        self._short = not single or unit < 0.6
-        size = 5 + 10 * unit if single else 11.5
-        fixed_lines = [] if single else [mechanism.name.replace('_', ' ')]
+        self._linkage, self._has_readings = mechanism.linkage, 'title' in parts
+        self._is_short = not single or unit < 0.6
+        self._fixed_lines = [] if single else [mechanism.name.replace('_', ' ')]
         if 'dimensions' in parts:
             sizes = self._linkage.dimensions.items()
             words = ',  '.join(f'{name}\u00a0=\u00a0{value:g}' for name, value in sizes)
-            fixed_lines += textwrap.wrap(words, 60 if single else 28)
-        self.artists = []
-        if 'title' in parts:
-            count = len(readings(self._linkage, [1.0] * len(mechanism.inputs), self._short))
-            across = min(count, 4 - 2 * self._short)
-            rows = math.ceil(count / across)
-            fixed_lines += [' '] * rows
-            self.artists = [axes.annotate(
-                '', (k % across / across, 1.0), (0, 6 + 1.2 * size * (rows - 1 - k // across)),
-                'axes fraction', 'offset points', fontsize=size, va='baseline',
-                in_layout=False) for k in range(count)]
-        axes.set_title('\n'.join(fixed_lines), loc='left', fontsize=size)
+            self._fixed_lines += textwrap.wrap(words, 60 if single else 28)
+        self.text = axes.set_title('', loc='left', fontsize=5 + 10 * unit if single else 11.5)
 
     def show(self, pose):
         """Update the text."""
-        for text, reading in zip(self.artists, readings(self._linkage, pose.inputs, self._short)):
-            text.set_text(reading)
+        texts = readings(self._linkage, pose.inputs, self._is_short) if self._has_readings else []
+        columns = 2 if self._is_short else 4
+        # Spaces as wide as a digit: a reading hardly moves those after it.
+        rows = ['  '.join(text.ljust(11, '\u2007') for text in texts[k:k + columns])
+                for k in range(0, len(texts), columns)]
+        self.text.set_text('\n'.join([*self._fixed_lines, *rows]))
 
 
 def readings(linkage, inputs, short=False):
@@ -328,60 +307,45 @@ class Names:
         self._index = [linkage.points.index(name) for name in mechanism.points]
         lines = *linkage.bars, *((link.joint, link.tip) for link in linkage.links)
         self._bars = np.array([[linkage.points.index(name) for name in line] for line in lines])
-        self._fixed = np.flatnonzero(fixed(cycle.course))
-        self._pivot = PIVOT_SIZE * unit * axes.figure.dpi / 72
+        self._fixed, self._pivot = np.flatnonzero(fixed(cycle.course)), 1j * PIVOT_SIZE * unit
         in_slots = {link.tip for link in linkage.links if link.kind == 'prismatic'}
-        distance = axes.figure.dpi / 72 * (5 + 8 * unit)
-        self._distances = [distance * (1.4 if name in in_slots else 1.0)
+        # Distance from the joint [points], and half of what the name is wider than one letter.
+        self._distances = [(5 + 8 * unit) * (1.4 if name in in_slots else 1.0)
                            for name in mechanism.points]
-        size = 8 + 6 * unit
-        # Half of the difference between the widths of a name and of one letter [pixels].
-        self._wider = [0.25 * size * (len(name) - 1) * axes.figure.dpi / 72
-                       for name in mechanism.points]
+        self._wider = [0.25 * (8 + 6 * unit) * (len(name) - 1) for name in mechanism.points]
         self.artists = [axes.annotate(
-            name, (0.0, 0.0), (0.0, 0.0), textcoords='offset points', fontsize=size,
+            name, (0.0, 0.0), (0.0, 0.0), textcoords='offset points', fontsize=8 + 6 * unit,
             ha='center', va='center', zorder=100, path_effects=HALO,
             annotation_clip=False, in_layout=False) for name in mechanism.points]
 
     def settle(self, poses):
         """Choose each name's place beside its joint, for poses of shape (n, legs, joints, 2)."""
-        joints = self._pixels(poses[:, 0])
-        obstacles = [
-            [joints[:, self._bars[:, 0]], joints[:, self._bars[:, 1]]], [joints, joints],
-            [joints[:, self._fixed], joints[:, self._fixed] - 1j * self._pivot], *self._curves()]
+        joints = self._points(poses[:, 0])
+        start, end = np.moveaxis(joints[:, self._bars], -1, 0)
+        curves = [self._points(line.get_xydata()[::9]) for line in self._axes.lines
+                  if len(line.get_xdata()) > CURVED]
+        # All that a name keeps clear of, as points.
+        drawn = np.hstack([joints, joints[:, self._fixed] - self._pivot, *(
+            start + part * (end - start) for part in np.linspace(0.0, 1.0, 13)), *(
+            np.broadcast_to(curve, (len(joints), len(curve))) for curve in curves)])
         for text, index, distance, wider in zip(
                 self.artists, self._index, self._distances, self._wider):
             offsets = distance * self.DIRECTIONS + wider * self.DIRECTIONS.real
             tried = joints[:, [index]] + offsets
-            room = np.min([clearance(tried + end, *lines) for lines in obstacles
+            room = np.min([abs(tried[..., None] + end - drawn[:, None]).min(axis=2)
                            for end in {-wider, 0.0, wider}], axis=0)
             room = np.nan_to_num(np.minimum(room, distance))
             best = offsets[room.mean(axis=0).argmax()]
-            text.set_position(np.array([best.real, best.imag]) * 72 / self._axes.figure.dpi)
-            name, half = joints[:, [index]] + best, 0.5 * distance + wider
-            obstacles.append([name - half, name + half])
+            text.set_position((best.real, best.imag))
+            half = (0.5 * distance + wider) * np.linspace(-1.0, 1.0, 5)
+            drawn = np.hstack([drawn, joints[:, [index]] + best + half])
 
-    def _curves(self):
-        """Yield the fixed lines, as starts and ends of their segments [pixels]."""
-        for line in self._axes.lines:
-            if len(line.get_xdata()) > CURVED:
-                curve = self._pixels(line.get_xydata())[None, ::5]
-                yield curve[:, :-1], curve[:, 1:]
-
-    def _pixels(self, places):
-        pixels = self._axes.transData.transform(places.reshape(-1, 2)) @ (1, 1j)
-        return pixels.reshape(places.shape[:-1])
+    def _points(self, places):
+        """Return places [m] on paper [points], as complex numbers."""
+        points = self._axes.transData.transform(places.reshape(-1, 2)) @ (1, 1j)
+        return points.reshape(places.shape[:-1]) * 72 / self._axes.figure.dpi
 
     def show(self, pose):
         """Move the names with their joints."""
         for text, index in zip(self.artists, self._index):
             text.xy = tuple(pose.places[0, index])
-
-
-def clearance(points, starts, ends):
-    """Return the distances of points (n, m) to the nearest lines (n or 1, k), all complex."""
-    along = (ends - starts)[:, None]
-    from_start = points[:, :, None] - starts[:, None]
-    squared = np.abs(along) ** 2
-    part = (from_start * np.conj(along)).real / np.where(squared > 0.0, squared, 1.0)
-    return np.abs(from_start - np.clip(part, 0.0, 1.0) * along).min(axis=2)

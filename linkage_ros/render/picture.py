@@ -42,7 +42,7 @@ class Picture:
         Some of parts.PARTS.
     motions : sequence, optional
         The motion of each mechanism, by default its Cycle: objects with a cycle's `period`,
-        `prefixes`, `course`, `pose`, `curve` and `locus`.
+        `slides`, `prefixes`, `course`, `pose`, `curve` and `locus`.
 
     """
 

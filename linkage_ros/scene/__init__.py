@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import re
 from typing import Any, Iterable, Mapping, Optional
 
-from .input_settings import FARTHEST, in_words, InputSettings, START
+from .input_settings import FARTHEST, in_words, InputSettings
 from .joint_names import check_distinct
 from .parameter_file import overrides, sections
 from .parameters import (
@@ -43,7 +43,7 @@ from ..words import plain_text, quoted
 
 __all__ = ['changed', 'InputSettings', 'DRIVER', 'FARTHEST', 'Field', 'in_words', 'INVERSE',
            'KINEMATICS', 'load', 'SceneMechanism', 'OWNER', 'Parameter', 'plain', 'read', 'Scene',
-           'SceneError', 'START']
+           'SceneError']
 
 _NAME = re.compile(r'(?=.{1,64}$)[A-Za-z](_?[A-Za-z0-9])*')
 
@@ -106,7 +106,7 @@ def load(path: str) -> Scene:
                  if parameter.name in values[parameter.field.owner]}, scene)
 
 
-def read(values: Mapping[str, Any], before: Optional[Scene] = None, strict: bool = True) -> Scene:
+def read(values: Mapping[str, Any], before: Optional[Scene] = None) -> Scene:
     """
     Read a scene from parameter values; raise SceneError if one is unknown or not allowed.
 
@@ -116,24 +116,21 @@ def read(values: Mapping[str, Any], before: Optional[Scene] = None, strict: bool
         Values by full parameter name.
     before : Scene, optional
         The previous scene, whose mechanisms are reused if their values are unchanged.
-    strict : bool
-        Whether an input's start must be in its sweep or reach. False for a scene that is running:
-        its inputs have left their starts, so sweep and reach may change regardless of these.
 
     """
     parts = _by_mechanism(values)
     if 'mechanisms' not in parts.get('', {}):
         for name, scale in mechanisms.CATALOGUE.items():
             parts[name] = {f'{name}.scale': scale, **parts.get(name, {})}
-    return _read(parts, before, strict)
+    return _read(parts, before)
 
 
-def changed(before: Scene, values: Mapping[str, Any], strict: bool = True) -> Scene:
+def changed(before: Scene, values: Mapping[str, Any]) -> Scene:
     """
     Return the scene `before` with some other values, by full parameter name.
 
     All other parameters keep their values, defaults, too. Mechanisms without a changed value are
-    reused. `strict` and SceneError are those of `read`.
+    reused. Raises SceneError as `read` does.
     """
     parts = {'': _values(before.general),
              **{name: mechanism.values for name, mechanism in before.machines.items()}}
@@ -142,10 +139,10 @@ def changed(before: Scene, values: Mapping[str, Any], strict: bool = True) -> Sc
         present = _values(mechanism.parameters) if mechanism else parts.get(name, {})
         if not part.items() <= present.items():
             parts[name] = {**present, **part}
-    return _read(parts, before, strict)
+    return _read(parts, before)
 
 
-def _read(parts: Mapping[str, Mapping[str, Any]], before: Optional[Scene], strict: bool) -> Scene:
+def _read(parts: Mapping[str, Mapping[str, Any]], before: Optional[Scene]) -> Scene:
     values = Values(parts.get('', {}))
     names, frame_id, frame_prefix, rate = (values.take(name, field) for name, field in (
         ('mechanisms', MECHANISMS), ('frame_id', FRAME_ID), ('frame_prefix', FRAME_PREFIX),
@@ -156,9 +153,6 @@ def _read(parts: Mapping[str, Mapping[str, Any]], before: Optional[Scene], stric
     joints = {name: mechanism.joints for name, mechanism in machines.items()}
     if joints != {name: mechanism.joints for name, mechanism in known.items()}:
         check_distinct(joints)
-    if strict:
-        for name, mechanism in machines.items():
-            mechanism.check_starts(known.get(name))
     allowed = [*(parameter.name for parameter in values.parameters),
                *(f'{name}.*' for name in names)]
     for rest in (values, *(Values(parts[name]) for name in parts if name not in ('', *names))):

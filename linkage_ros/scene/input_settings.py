@@ -61,7 +61,7 @@ class InputSettings:
     speed, default_speed : float
         Speed of the motion [rad/s or m/s]; the default is 1 rad/s, or three seconds for a stroke.
     start : float
-        Initial value of the motion.
+        Initial value of the motion; outside the sweep, this begins at its nearer end.
     sweep : (float, float), optional
         Interval in which the motion oscillates; None: it is a full rotation.
     ends : (float, float), optional

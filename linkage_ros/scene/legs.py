@@ -11,73 +11,48 @@ leg at pi - (theta - 2 pi j/N), on the same crank pin.
 from contextlib import suppress
 import math
 from struct import Struct
-from typing import Any, List, NamedTuple, Optional, Sequence, Union
+from typing import Any, List, Optional, Sequence, Union
 
 import numpy as np
 
-from .drawn_curve import drawn
 from ..formula.program import Batch, Pose
-from ..linkage import Leg, LinkPoint, Mechanism
+from ..linkage import Leg, LinkPoint, Mechanism, sampled
 
-
-class Layout(NamedTuple):
-    """
-    Order of the numbers of a solution: a row for each leg, then the inputs.
-
-    A row has coordinates, joint angles and joint velocities. The inputs have values, speeds if
-    velocities are requested, and room for efforts.
-    """
-
-    legs: int
-    inputs: int
-    coordinates: int
-    joints: int
-    velocities: int
-    speeds: int
-    efforts: int = 0
-
-    @property
-    def posed(self) -> int:
-        """Return the number of a row's values without velocities."""
-        return self.coordinates + self.joints
-
-    @property
-    def size(self) -> int:
-        """Total number of values."""
-        return self._rows_end() + self.inputs + self.speeds + self.efforts
-
-    def rows(self, values: np.ndarray) -> np.ndarray:
-        """Return the rows, one for each leg."""
-        return values[:self._rows_end()].reshape(self.legs, self.posed + self.velocities)
-
-    def driven(self, values: np.ndarray) -> np.ndarray:
-        """Return the inputs' values and, if velocities are requested, their speeds."""
-        return values[self._rows_end():len(values) - self.efforts]
-
-    def effort(self, values: np.ndarray) -> np.ndarray:
-        """Return the efforts of the inputs, which the user of a solution sets."""
-        return values[len(values) - self.efforts:]
-
-    def _rows_end(self) -> int:
-        return self.legs * (self.posed + self.velocities)
+# Even samples of a locus: no corner is seen, unless bars fold flat but for some 1e-5 of them.
+LOCUS_SAMPLES = 721
 
 
 class Solution:
     """
-    A solver of all legs, and the numbers of its last solution: `values`, in a `Layout`.
+    A solver of all legs, and the numbers of its last solution: `values`, or `parts` of them.
 
     `function` is the result of `Mechanism.legs`. Several legs are solved by machine code, where
     llvmlite works and as soon as the code is compiled; otherwise by plain Python, which
     returns the same bits.
+
+    Attributes
+    ----------
+    layout : numpy.dtype
+        The parts: for each leg a row of coordinates, joint angles and joint velocities; then the
+        inputs, their speeds if velocities are requested, and room for their efforts.
+
     """
 
-    def __init__(self, layout: Layout, legs: Sequence[Leg], function: Pose):
-        self.layout, self.values = layout, np.zeros(layout.size)
-        self.rows, self._function = layout.rows(self.values), function.at
-        self._at_rest = layout.inputs * (0.0,)
+    def __init__(self, legs: Sequence[Leg], function: Pose, inputs: int,
+                 sizes: Sequence[int], speeds: int, efforts: int):
+        parts = [(part, float, (size,)) for part, size in zip(
+            ('coordinates', 'angles', 'rates'), sizes)]
+        self.layout = np.dtype([
+            ('rows', parts, (len(legs),)), ('inputs', float, (inputs,)),
+            ('speeds', float, (speeds,)), ('efforts', float, (efforts,))])
+        self.values = np.zeros(self.layout.itemsize // 8)
+        self.parts: Any = self.values.view(self.layout)[0]
+        self.rows = self.values[:len(legs) * sum(sizes)].reshape(len(legs), -1)
+        self._function, self._has_speeds = function.at, speeds > 0
+        self._at_rest = inputs * (0.0,)
         # Packing is faster than assignment to an array.
         row: Any = Struct(f'{self.rows.shape[1]}d')
-        driven: Any = Struct(f'{layout.inputs + layout.speeds}d')
+        driven: Any = Struct(f'{inputs + speeds}d')
         self._pack_row, self._pack_driven = row.pack_into, driven.pack_into
         # Each leg, with the place of its row [bytes].
         self._legs = [(i * row.size, leg) for i, leg in enumerate(legs)]
@@ -85,7 +60,7 @@ class Solution:
         if len(legs) > 1:
             with suppress(ImportError):
                 self._batch = function.batch(self.rows)
-                self._batch.arguments[2 * layout.inputs:].T[:] = legs
+                self._batch.arguments[2 * inputs:].T[:] = legs
 
     def solve(self, inputs: Sequence[float], speeds: Sequence[Any] = ()) -> bool:
         """
@@ -93,8 +68,8 @@ class Solution:
 
         Return True if all numbers are finite; if they are huge, it may return False, too.
         """
-        driven = (*inputs, *speeds) if self.layout.speeds else (*inputs,)
-        arguments = driven if self.layout.speeds else (*inputs, *self._at_rest)
+        driven = (*inputs, *speeds) if self._has_speeds else (*inputs,)
+        arguments = driven if self._has_speeds else (*inputs, *self._at_rest)
         total = sum(driven)
         self._pack_driven(self.values, self.rows.nbytes, *driven)
         if self._batch and self._batch.solve(arguments):
@@ -147,12 +122,11 @@ class Assembly:
 
         Its values have room for `efforts` efforts.
         """
-        inputs, moving = len(self.linkage.inputs), rates is not None
+        inputs, speeds = len(self.linkage.inputs), 0 if rates is None else len(self.linkage.inputs)
         rates = tuple(rates or ())
-        layout = Layout(len(self.legs), inputs, len(self.linkage.axes) * len(points), len(joints),
-                        len(rates), inputs if moving else 0, efforts)
-        return Solution(layout, [*self.legs.values()], self.linkage.legs(
-            tuple(points), tuple(joints), rates))
+        sizes = len(self.linkage.axes) * len(points), len(joints), len(rates)
+        return Solution([*self.legs.values()], self.linkage.legs(
+            tuple(points), tuple(joints), rates), inputs, sizes, speeds, efforts)
 
     def within_reach(self, value: float) -> List[bool]:
         """Return which legs can be assembled at a value [rad or m] of the input, by its reach."""
@@ -171,5 +145,5 @@ class Assembly:
         if len(self.linkage.inputs) > 1:
             return np.empty((0, 2))
         low, high = max(self.reach, key=lambda arc: arc[1] - arc[0])
-        return self._scale * drawn(
-            lambda theta: self.linkage.solve(theta, (name,))[name], low, high)
+        places = self.linkage.solve(sampled(low, high, LOCUS_SAMPLES), (name,))[name]
+        return self._scale * places[np.isfinite(places).all(axis=1)]

@@ -10,6 +10,7 @@ Only the result is rounded, so that errors do not accumulate.
 
 from __future__ import annotations
 
+import math
 from typing import Optional
 
 from . import InputSettings
@@ -21,9 +22,10 @@ STEPS, STEP = 1 << 160, 2.0 ** -160
 TURN = 62831853071795864769252867665590057683943387987502116 * STEPS // 10 ** 52
 
 
-def _steps(value: float, per: int = 1) -> int:
+def _steps(value: float, unit: int = STEPS, per: int = 1) -> int:
+    """Return the steps of a value in some units of `unit` steps."""
     numerator, denominator = float(value).as_integer_ratio()
-    return numerator * STEPS // (denominator * per)
+    return numerator * unit // (denominator * per)
 
 
 class Motion:
@@ -52,7 +54,7 @@ class Motion:
     def __init__(self, speed: float, sweep: Optional[Arc] = None, start: float = 0.0,
                  since: int = 0, turns: bool = True, period: int = 1):
         self._speed = speed
-        self._rate = _steps(speed, per=10 ** 9)
+        self._rate, self._forward = _steps(speed, per=10 ** 9), -1 if speed < 0 else 1
         self._sweep = sweep
         self._turns, self._round = turns, period * TURN
         self._low, high = (0, self._round) if sweep is None else map(_steps, sweep)
@@ -60,11 +62,38 @@ class Motion:
         self._period = self._round if sweep is None else 2 * self._width or 1
         self._phase = self._place(_steps(start))
         self._since = since
+        # A turn of a rotation, or once there and back.
+        self._turn = TURN if sweep is None else self._period
+
+    @property
+    def turn(self) -> float:
+        """Return the time [s] of a turn, or of once there and back; inf if it stands still."""
+        return self._turn * STEP / abs(self._speed) if self._speed else math.inf
 
     def at(self, now: int) -> tuple[float, float]:
         """Return value and speed at a time [ns]; a rotation's value is in [0, 2 pi period)."""
-        travelled, ahead = self._fold((self._phase + self._rate * (now - self._since))
-                                      % self._period)
+        return self._value(self._phase_at(now))
+
+    def after(self, turns: float) -> float:
+        """Return the value some turns after the start, also if the speed is 0."""
+        return self._value(self._phase + self._forward * _steps(turns, self._turn))[0]
+
+    def is_repeated(self, turns: float) -> bool:
+        """Return whether it is at its start again after some turns."""
+        periods = turns * self._turn / self._period
+        return math.isclose(periods, round(periods))
+
+    def turns_to(self, value: float) -> float:
+        """Return the turns from the start to a value [rad or m]; NaN if it is never reached."""
+        place = self._near(_steps(value))
+        if self._sweep is not None and not 0 <= place <= self._width:
+            return math.nan
+        places = (place,) if self._sweep is None else (place, -place)
+        return min(self._forward * (place - self._phase) % self._period
+                   for place in places) / self._turn
+
+    def _value(self, phase: int) -> tuple[float, float]:
+        travelled, ahead = self._fold(phase % self._period)
         # Multiplication by a power of two is exact.
         angle = float(self._low + travelled) * STEP
         if self._sweep is None and angle >= self._end:
@@ -104,12 +133,17 @@ class Motion:
         ahead = phase < self._width
         return (phase, ahead) if ahead else (2 * self._width - phase, ahead)
 
+    def _near(self, angle: int) -> int:
+        """Return how far an angle is above the low end, in the turn nearest to the sweep."""
+        place, turn = angle - self._low, self._round
+        if self._sweep is None:
+            return place % turn
+        if self._turns and not 0 <= place <= self._width:
+            ahead = (turn - self._width) // 2
+            place = (place + ahead) % turn - ahead
+        return place
+
     def _place(self, angle: int) -> int:
         """Return the phase at which the rising value is `angle`, or nearest to it."""
-        if self._sweep is None:
-            return angle % self._round
-        half = self._width // 2
-        if self._turns and not 0 <= angle - self._low <= self._width:
-            middle, turn = self._low + half, self._round
-            angle = (angle - middle + turn // 2) % turn - turn // 2 + middle
-        return min(max(angle - self._low, 0), self._width)
+        place = self._near(angle)
+        return place if self._sweep is None else min(max(place, 0), self._width)

@@ -12,12 +12,11 @@ from __future__ import annotations
 
 from functools import reduce
 import re
-import sys
 from typing import Any, Iterator, Optional, Sequence
 
 from .parameters import SceneError
 from ..optional import needs
-from ..words import elided, quoted
+from ..words import quoted
 
 KEY = 'ros__parameters'
 _TOKEN = re.compile(r'\*\*?|[A-Za-z_]\w*', re.ASCII)
@@ -26,29 +25,15 @@ _TOKEN = re.compile(r'\*\*?|[A-Za-z_]\w*', re.ASCII)
 Sections = dict[str, dict[str, Any]]
 
 
-def _bool(text: str) -> bool:
-    return text.lower() in ('y', 'yes', 'on', 'true')
-
-
-def _integer(text: str) -> Optional[int]:
-    number = int(text, 0)
-    return number if -sys.maxsize - 1 <= number <= sys.maxsize else None
-
-
-def _double(text: str) -> Optional[float]:
-    text = text.lower()
-    number = float(text.replace('.inf', 'inf').replace('.nan', 'nan'))
-    is_rounded_away = not sys.float_info.min <= abs(number) <= sys.float_info.max
-    return None if is_rounded_away and re.search('[1-9]', text.partition('e')[0]) else number
-
-
 # Patterns of unquoted text, and how ROS reads it; any other is a string. What is unclear ROS reads
 # as a number, too.
 _READERS = [(re.compile(pattern), reader) for pattern, reader in (
-    (r'y|Y|yes|Yes|YES|on|On|ON|true|True|TRUE|n|N|no|No|NO|off|Off|OFF|false|False|FALSE', _bool),
-    (r'[+-]?(0|[1-9][0-9]*|0[xX][0-9a-fA-F]+)', _integer),
+    (r'y|Y|yes|Yes|YES|on|On|ON|true|True|TRUE|n|N|no|No|NO|off|Off|OFF|false|False|FALSE',
+     lambda text: text.lower() in ('y', 'yes', 'on', 'true')),
+    (r'[+-]?(0|[1-9][0-9]*|0[xX][0-9a-fA-F]+)', lambda text: int(text, 0)),
     (r'[+-]?(?!0[0-9]+\Z)([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?'
-     r'|[+-]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)', _double),
+     r'|[+-]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)',
+     lambda text: float(re.sub(r'\.(?=[IiNn])', '', text))),
     (r'(?ai:[+-]?(0[0-9]+|inf(inity)?|nan(\(\w*\))?'
      r'|0x([0-9a-f]+\.?[0-9a-f]*|\.[0-9a-f]+)(p[+-]?[0-9]+)?))', lambda _: None))]
 
@@ -68,9 +53,7 @@ def sections(path: str) -> Sections:
         root = yaml.compose(text, Loader=loader)
         return _distinct(_sections(root, ())) if root is not None and root.value else {}
     except (yaml.YAMLError, RecursionError, ValueError) as error:
-        mark = getattr(error, 'problem_mark', None)
-        problem = f'{getattr(error, "problem", "")}, line {mark.line + 1}' if mark else str(error)
-        reason = elided(problem, 300)
+        reason = ' '.join(str(error).split())
         raise SceneError(f'{path} is not a valid ROS parameter file: {reason}') from None
 
 

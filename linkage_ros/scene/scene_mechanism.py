@@ -12,7 +12,7 @@ import math
 import re
 from typing import Any, Mapping, Optional, Sequence
 
-from .input_settings import in_words, InputSettings, read_settings
+from .input_settings import InputSettings, read_settings
 from .joint_names import JointName, read_joint_names
 from .legs import Assembly
 from .loads import Load, read_loads
@@ -113,17 +113,6 @@ class SceneMechanism:
         """Return whether it was read from the same objects, and so is unchanged."""
         return self.values is values or self.values.keys() == values.keys() and all(
             self.values[key] is value for key, value in values.items())
-
-    def check_starts(self, old: Optional[SceneMechanism]) -> None:
-        """Raise SceneError if a motion cannot start where a user wants; it may as in `old`."""
-        for name, settings in self.inputs.items() if self is not old else ():
-            before = old and old.inputs.get(name)
-            key, start, input_ = f'{self.name}.{name}.start', settings.start, settings.input
-            if not (key not in self.values or settings.sweep is None
-                    or before and (before.start, before.sweep) == (start, settings.sweep)
-                    or any(input_.holds(arc, start, start) for arc in settings.arcs)):
-                allowed = f'{"sweep" if settings.ends else "reach"} {in_words(settings.arcs)}'
-                raise SceneError(f'{key} must be inside the {allowed} {input_.unit}, not {start}')
 
     @property
     def in_space(self) -> bool:

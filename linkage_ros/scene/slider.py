@@ -4,14 +4,13 @@
 """
 Useful ranges for the page's sliders of parameters; values beyond them are allowed, too.
 
-The ends are multiples of a hundredth of the range, so that they are round numbers. No ROS is
-needed.
+No ROS is needed.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Optional, Tuple
+from typing import Optional
 
 import numpy as np
 
@@ -20,18 +19,16 @@ from .parameters import Parameter
 from ..cache import cached
 from ..linkage import Arc, Mechanism
 
-# Steps of a slider, and the smallest step as a fraction of the value.
-STEPS, FINEST = 100, 1e-5
 # Smallest and largest change of a dimension that is tried, as fractions of it, or of the longest
-# bar if it is 0; and the number of changes tried at a time.
-LEAST, MOST, TRIED = 1e-4, 9.0, 48
+# bar if it is 0; and the number of changes tried.
+MIN_CHANGE, MAX_CHANGE, CHANGES = 1e-4, 9.0, 200
 # Largest end of a range.
-LARGEST = 1e300
+MAX_END = 1e300
 # Values tried of a single input, and of each of several.
 ANGLES, FEW_ANGLES = 91, 13
 
 
-def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
+def ends(scene: Scene, parameter: Parameter) -> Optional[Arc]:
     """Return the lower and upper end of a parameter's slider; None if it has no slider."""
     field, value = parameter.field, parameter.value
     if field.low is not None and field.high is not None:
@@ -43,13 +40,13 @@ def ends(scene: Scene, parameter: Parameter) -> Optional[Tuple[float, float]]:
     if mechanism and what == 'dimensions':
         return _dimension_ends(mechanism.linkage, key, field.positive, _required_range(mechanism))
     if mechanism and what in mechanism.inputs and key == 'start':
-        reach = mechanism.inputs[what].reach
-        ends = [value, *(end for arc in reach for end in arc)]
-        return _in_whole_steps(value, min(ends), max(ends))
-    if mechanism and key == 'offset':
+        tried = [value, *(end for arc in mechanism.inputs[what].reach for end in arc)]
+    elif mechanism and key == 'offset':
         half = math.pi * mechanism.inputs[what].input.size
-        return _in_whole_steps(value, value - half, value + half)
-    return _in_whole_steps(value, *sorted((0.1 * value, 10.1 * value)))
+        tried = [value - half, value + half]
+    else:
+        tried = [0.1 * value, 10.1 * value]
+    return max(min(tried), -MAX_END), min(max(tried), MAX_END)
 
 
 def _required_range(mechanism: SceneMechanism) -> Optional[Arc]:
@@ -62,29 +59,15 @@ def _required_range(mechanism: SceneMechanism) -> Optional[Arc]:
 
 @cached(16)
 def _dimension_ends(linkage: Mechanism, key: str, positive: bool, required: Optional[Arc]) -> Arc:
-    """Return the slider's ends for a dimension; between them the linkage can be assembled."""
+    """Return the slider's ends for a dimension: up to them, all tried can be assembled."""
     value = float(linkage.dimensions[key])
     size = abs(value) or float(linkage.longest)
-    low, high = (_farthest(linkage, key, value, sign * size, required, positive)
-                 for sign in (-1.0, 1.0))
-    return _in_whole_steps(value, low, high)
-
-
-def _farthest(linkage: Mechanism, key: str, value: float, size: float, required: Optional[Arc],
-              positive: bool) -> float:
-    """Return the farthest value on one side: up to it, all values tried can be assembled."""
-    most = 0.9 * abs(size) if positive and size < 0.0 else MOST * abs(size)
-    steps = np.geomspace(LEAST * abs(size), most, TRIED) * math.copysign(1.0, size)
-    good, bad = 0.0, None
-    for _ in range(2):
-        able = _are_assembled(linkage, key, value + steps, required)
-        if able.all():
-            good = steps[-1]
-            break
-        first = int(np.argmin(able))
-        good, bad = steps[first - 1] if first else good, steps[first]
-        steps = np.linspace(good, bad, TRIED)[1:]
-    return float(value + good)
+    ends = []
+    for farthest in (-0.9 if positive else -MAX_CHANGE, MAX_CHANGE):
+        changes = np.geomspace(math.copysign(MIN_CHANGE, farthest), farthest, CHANGES) * size
+        able = _are_assembled(linkage, key, value + changes, required)
+        ends.append(value + float(np.append(0.0, changes)[np.append(able, False).argmin()]))
+    return ends[0], ends[1]
 
 
 def _are_assembled(linkage: Mechanism, key: str, values: np.ndarray,
@@ -97,23 +80,14 @@ def _are_assembled(linkage: Mechanism, key: str, values: np.ndarray,
     try:
         tried = linkage.with_dimensions(**{key: values[:, None]})
     except ValueError:
-        if len(values) == 1:
-            return np.array([False])
-        return np.concatenate([_are_assembled(linkage, key, values[i:i + 1], required)
-                               for i in range(len(values))])
-    many = ANGLES if len(linkage.inputs) == 1 else FEW_ANGLES
-    samples = [np.linspace(low, high, many) for low, high in (
-        required or (input_.low, input_.high) for input_ in linkage.inputs)]
-    theta = [grid.ravel() for grid in np.meshgrid(*samples)] if len(samples) > 1 else samples[0]
+        half = len(values) // 2
+        return np.concatenate([_are_assembled(linkage, key, part, required) for part in (
+            values[:half], values[half:])]) if half else np.array([False])
+    count = ANGLES if len(linkage.inputs) == 1 else FEW_ANGLES
+    ranges = [required or (input_.low, input_.high) for input_ in linkage.inputs]
+    theta = [grid.ravel() for grid in np.meshgrid(
+        *(np.linspace(low, high, count) for low, high in ranges))]
     placed = np.ones((len(values), 1), dtype=bool)
-    for places in tried.solve(theta).values():
+    for places in tried.solve(theta if len(theta) > 1 else theta[0]).values():
         placed = placed & np.isfinite(places).all(axis=-1)
     return np.all(placed, axis=1) if required else np.any(placed, axis=1)
-
-
-def _in_whole_steps(value: float, low: float, high: float) -> Arc:
-    """Round the ends of a range to multiples of its step, so that the value lies between them."""
-    low, value, high = (min(max(x, -LARGEST), LARGEST) for x in (low, value, high))
-    step = max((high - low) / (STEPS + 1), FINEST * abs(value), 1.0 / LARGEST)
-    first = min(math.ceil(low / step), math.floor(value / step))
-    return first * step, (first + STEPS) * step

@@ -6,10 +6,9 @@
 from __future__ import annotations
 
 import re
-from textwrap import indent
 from typing import Any, Mapping, Optional
 
-from . import read, Scene
+from . import Scene
 from .parameter_file import is_text
 from ..optional import needs
 
@@ -24,29 +23,20 @@ def in_yaml(values: Mapping[str, Any]) -> str:
 
     Dumper.add_representer(str, lambda dumper, text: dumper.represent_scalar(
         'tag:yaml.org,2002:str', text, None if is_text(text) else "'"))
-    texts = ['/**:', '  ros__parameters:']
-    for name, value in values.items():
-        written = list(value) if isinstance(value, tuple) else value
-        if written == []:
-            # rcl cannot read an empty list, which is the default anyway.
-            continue
-        numbers = isinstance(written, list) and not any(isinstance(one, str) for one in written)
-        text = dump({name: written}, Dumper=Dumper, width=1000,
-                    default_flow_style=numbers and None)
-        texts.append(indent(text.rstrip(), '    '))
-    return '\n'.join(texts) + '\n'
+    Dumper.add_representer(list, lambda dumper, items: dumper.represent_sequence(
+        'tag:yaml.org,2002:seq', items, flow_style=not isinstance(items[0], str)))
+    # rcl cannot read an empty list, which is the default anyway.
+    lists = {name: list(value) if isinstance(value, tuple) else value
+             for name, value in values.items() if value not in ((), [])}
+    return dump({'/**': {'ros__parameters': lists}}, Dumper=Dumper, width=1000, sort_keys=False)
 
 
 def without_defaults(scene: Scene, always: Optional[re.Pattern] = None) -> dict[str, Any]:
     """
     Return the mechanisms and the values that differ from their defaults, by full parameter name.
 
-    A value whose whole name matches `always` is included even if it is the default. Raises
-    SceneError if nodes could not start with these values: an input starts outside its sweep or
-    reach.
+    A value whose whole name matches `always` is included even if it is the default.
     """
-    values = {parameter.name: parameter.value for parameter in scene.parameters
+    return {parameter.name: parameter.value for parameter in scene.parameters
               if parameter.value != parameter.default or parameter.name == 'mechanisms'
               or always and always.fullmatch(parameter.name)}
-    read(values)
-    return values

@@ -235,7 +235,7 @@ class SceneView:
         # An input that was stopped is saved with the speed that it had.
         speeds = {name: speed for name, speed in self._speeds[owner].items() if name in names}
         return {'text': await self._aside(lambda: writing.in_yaml(writing.without_defaults(
-            scene.changed(whole, speeds, strict=False), DEFINES)))}
+            scene.changed(whole, speeds), DEFINES)))}
 
     async def read(self, text: str) -> Answer:
         """Return the result of `poses.number`."""
@@ -398,13 +398,12 @@ class SceneView:
         values = self._announced.get(owner, {})
         if 'mechanisms' not in values:
             raise scene.SceneError(f'{owner} announces no mechanisms')
-        before = self._scenes.get(owner) or scene.read(values, strict=False)
+        before = self._scenes.get(owner) or scene.read(values)
         nodes = {parameter.name: node for node in (*self._announced, owner)
                  if node in self._graph and _space(node) == _space(owner)
                  for parameter in before.parameters if parameter.name in self._announced[node]}
         whole = self._scenes[owner] = scene.read(
-            {name: self._announced[node][name] for name, node in nodes.items()}, before,
-            strict=False)
+            {name: self._announced[node][name] for name, node in nodes.items()}, before)
         self._speeds[owner].update(
             (parameter.name, parameter.value) for parameter in whole.parameters
             if parameter.field.group == 'speeds' and parameter.value)
