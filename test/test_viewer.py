@@ -25,7 +25,7 @@ from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
 from linkage_ros.scene import slider  # noqa: E402
-from linkage_ros.web import curves, poses, scene_view  # noqa: E402
+from linkage_ros.web import curves, scene_view  # noqa: E402
 from linkage_ros.web.scene_view import LATCHED  # noqa: E402
 from rcl_interfaces.msg import (  # noqa: E402
     Parameter as ParameterMessage,
@@ -86,20 +86,19 @@ def test_every_setting_is_described_as_the_scene_has_it(page):
     assert settings == {parameter.name: {
         'name': name, 'value': list(value) if isinstance(value, tuple) else value,
         'kind': field.kind, 'meaning': field.meaning, 'allowed': field.allowed,
-        'unit': field.unit, 'low': low, 'high': high, 'group': groups.get(name, '')}
+        'unit': field.unit, 'group': groups.get(name, '')}
         for parameter in whole.parameters if '.' in parameter.name
         for name, field, value in [(
-            parameter.name.partition('.')[2], parameter.field, parameter.value)]
-        for low, high in [slider.ends(whole, parameter) or (None, None)]}
+            parameter.name.partition('.')[2], parameter.field, parameter.value)]}
 
 
 def test_a_page_is_told_of_legs_that_are_added(show):
     page = show(LEG).page()
     first = page.mechanisms('/leg')['/leg']
     assert page.set('/leg', leg_pairs=3) == ''
-    more = page.message('value', name='leg_pairs', value=3)['drawn']
+    more = page.setting('/leg', 'leg_pairs', 3)
     assert page.set('/leg', mirrored=True) == ''
-    both = page.message('value', name='mirrored', value=True)['drawn']
+    both = page.setting('/leg', 'mirrored', True)
     assert [(told['legs'], told['pairs']) for told in (first, more, both)] == [
         (1, 1), (3, 3), (6, 3)]
 
@@ -108,12 +107,12 @@ def test_a_slider_sets_the_node_that_owns_the_parameter_and_others_changes_are_s
     running = show(LEVER)
     page = running.page()
     assert page.set('/lever', dimensions__b=160) == page.set('/lever', crank__speed=-2.5) == ''
-    page.message('value', mechanism='/lever', name='dimensions.b', value=160.0)
-    page.message('value', mechanism='/lever', name='crank.speed', value=-2.5)
+    page.setting('/lever', 'dimensions.b', 160.0)
+    page.setting('/lever', 'crank.speed', -2.5)
     assert running.value('lever.dimensions.b') == 160.0
     assert running.value('lever.crank.speed') == -2.5
     running.set('drop.crank.speed', 3.25)
-    page.message('value', mechanism='/drop', name='crank.speed', value=3.25)
+    page.setting('/drop', 'crank.speed', 3.25)
 
 
 @pytest.mark.parametrize('values, reason', [
@@ -160,9 +159,9 @@ def test_announcements_that_make_no_sense_change_nothing(graph, show):
             publisher.publish(ParameterEvent(node=node, new_parameters=values))
     publisher.publish(ParameterEvent(node='/crank_driver', changed_parameters=[
         Parameter('lever.crank.speed', value=3.25).to_parameter_msg()]))
-    page.message('value', mechanism='/lever', name='crank.speed', value=3.25)
+    page.setting('/lever', 'crank.speed', 3.25)
     assert page.set('/lever', dimensions__b=152.0) == ''
-    page.message('value', mechanism='/lever', name='dimensions.b', value=152.0)
+    page.setting('/lever', 'dimensions.b', 152.0)
     json.dumps(page.messages, allow_nan=False)
     answer = page.pose('/lever')
     assert answer['reason'] == '' and 'crank' in answer['inputs']
@@ -212,7 +211,7 @@ def test_an_input_goes_again_to_where_it_started_though_that_is_a_middle_or_an_e
         graph, show, parameters):
     cranks = graph.listen(JointState, 'crank_states')
     name, page = parameters['mechanisms'][0], show(parameters).page()
-    arcs = poses.arcs(scene.read(parameters).machines[name].first)
+    arcs = scene.read(parameters).machines[name].first.arcs
 
     def away(value):
         states = dict(zip(cranks[-1].name, cranks[-1].position)) if cranks else {}
@@ -275,13 +274,13 @@ def test_what_is_saved_starts_the_tuned_scene_again(show, tmp_path):
     running = show({**LEVER, 'drop.pose': [0.0, 0.0, 0.5, 1.5, 0.0, 0.0]})
     page = running.page()
     assert page.set('/lever', **{'dimensions.a': 81.25, 'scale': 0.01}) == ''
-    page.message('value', mechanism='/lever', name='scale', value=0.01)
+    page.setting('/lever', 'scale', 0.01)
     assert page.set('/lever', crank__speed=2.0) == ''
-    page.message('value', mechanism='/lever', name='crank.speed', value=2.0)
+    page.setting('/lever', 'crank.speed', 2.0)
     page.pose('/lever', output='crank', value=0.75)
-    stopped = page.message('value', mechanism='/lever', name='crank.speed', value=0.0)
-    assert stopped['drawn']['inputs']['crank']['speed'] == 2.0
-    page.message('value', mechanism='/lever', name='crank.start', value=0.75)
+    stopped = page.setting('/lever', 'crank.speed', 0.0)
+    assert stopped['inputs']['crank']['speed'] == 2.0
+    page.setting('/lever', 'crank.start', 0.75)
     # Whoever opens the page again finds it stopped, and what it had before.
     again = running.page()
     lever = again.mechanisms('/lever', '/drop')['/lever']
@@ -304,13 +303,12 @@ def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(page):
             ('drop', 'OC', {'a': 'OC OA AB AP BP CB'.split()})):
         answer = page.ask('tune', mechanism=f'/{name}')
         ends = {parameter.name.partition('.')[2]: slider.ends(whole, parameter)
-                for parameter in whole.machines[name].parameters
-                if '.dimensions.' in parameter.name}
+                for parameter in whole.machines[name].parameters}
         assert {**answer, 'id': 0} == {
             'op': 'answer', 'id': 0, 'reason': '', 'fixed': list(fixed),
             'bars': {f'dimensions.{key}': [list(pair) for pair in pairs]
                      for key, pairs in bars.items()},
-            'travel': {key: list(pair) for key, pair in ends.items()}}
+            'travel': {key: pair and list(pair) for key, pair in ends.items()}}
 
 
 def test_what_is_saved_or_exported_is_the_mechanism_as_it_is(page):
@@ -458,7 +456,7 @@ def test_an_input_that_is_moved_is_there_while_messages_may_be_older(graph, show
     assert after(math.inf) == 1.75
     monkeypatch.setattr(scene_view, 'MAX_MOVE_S', 0.0)
     assert [crank(output='crank', value=2.5), crank()] == [2.5, 1.75]
-    page.message('value', name='crank.start', value=2.5)
+    page.setting('/leg', 'crank.start', 2.5)
     # A start moves an input only if it is another than before.
     assert crank(output='crank', value=2.5) == 2.5
     assert running.value('leg.crank.start') == math.nextafter(2.5, 0.0)

@@ -20,9 +20,9 @@ from typing import Any, Callable
 from aiohttp import web, WSCloseCode
 
 from .feed import Feed
-from .poses import Refused
 from .scene_view import SceneView
 from .. import palette
+from ..scene import SceneError
 from ..words import elided, quoted
 
 Message = dict[str, Any]
@@ -183,6 +183,7 @@ class Client:
 
     def tell(self, key: Any, message: Message) -> None:
         """Send a message; it replaces a waiting one with the same key."""
+        self._texts.pop(key, None)
         self._texts[key] = message
         self._news.set()
 
@@ -237,9 +238,9 @@ class Client:
                 request = dict(json.loads(text))
                 number, op = request.pop('id', None), request.pop('op', None)
                 if op not in REQUESTS:
-                    raise Refused(f'unknown request {quoted(op)}')
+                    raise SceneError(f'unknown request {quoted(op)}')
                 answer = await getattr(self._view, op)(**request)
-            except Refused as reason:
+            except SceneError as reason:
                 answer = {'reason': str(reason)}
             except Exception as error:
                 # Without an answer the browser would wait forever.

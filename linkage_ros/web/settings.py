@@ -5,26 +5,25 @@
 
 import math
 import sys
-from typing import Any, Optional
+from typing import Any
 
-from ..linkage import Arc
 from ..nodes.parameters import typed
-from ..scene import Parameter
+from ..scene import Parameter, SceneError
+
+NUMBERS = 'double', 'integer', 'bool'
 
 
-def described(parameter: Parameter, ends: Optional[Arc]) -> dict[str, Any]:
+def described(parameter: Parameter) -> dict[str, Any]:
     """
-    Describe a parameter, whose slider has these ends, or which has none, for the page.
+    Describe a parameter for the page.
 
     The page has a control for it in a `group`, or none if that is empty.
     """
     field = parameter.field
-    low, high = ends or (None, None)
-    has_control = not field.read_only and (field.kind == 'bool' or low != high)
+    has_control = not field.read_only and field.kind in NUMBERS
     return {'name': name_in_mechanism(parameter), 'value': parameter.value,
             'kind': field.kind, 'meaning': field.meaning, 'allowed': field.allowed,
-            'unit': field.unit, 'low': low, 'high': high,
-            'group': (field.group or 'more') if has_control else ''}
+            'unit': field.unit, 'group': (field.group or 'more') if has_control else ''}
 
 
 def name_in_mechanism(parameter: Parameter) -> str:
@@ -36,11 +35,11 @@ def message(parameter: Parameter, value: Any, node: str) -> Any:
     """
     Return a message that sets a parameter, of a node, to a value from JSON.
 
-    Raises ValueError if the value is not allowed.
+    Raises SceneError if the value is not allowed.
     """
     name, field = parameter.name, parameter.field
-    if field.kind not in ('double', 'integer', 'bool'):
-        raise ValueError(f'{name} is no number, and the page sets numbers only: use ros2 '
+    if field.kind not in NUMBERS:
+        raise SceneError(f'{name} is no number, and the page sets numbers only: use ros2 '
                          f'param set {node} {name}')
     return typed(parameter._replace(value=field.checked(name, value))).to_parameter_msg()
 

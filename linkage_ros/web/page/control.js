@@ -77,10 +77,10 @@ export class Reason {
 export class Slider {
   constructor({ label, title, unit, low, high, kind, group, value, digits = 6, times = () => 1 }, request) {
     const isWhole = kind === 'integer';
-    const scale = low === -high && group !== 'starts' && !isWhole ? FINE_ABOUT_ZERO : EVEN;
-    Object.assign(this, { unit, low, high, isWhole, scale, digits, times, accepted: value, held: false, gesture: {} });
+    const isEven = isWhole || group === 'starts';
+    Object.assign(this, { unit, isWhole, isEven, digits, times, accepted: value, held: false, gesture: {} });
     const id = nextId();
-    this.range = element('input', { type: 'range', id, step: 1, min: isWhole ? low : 0, max: isWhole ? high : STOPS });
+    this.range = element('input', { type: 'range', id, step: 1, max: STOPS });
     this.number = element('input', { type: 'text', autocomplete: 'off', ariaLabel: label });
     this.reason = new Reason(`${id}r`);
     for (const input of [this.range, this.number]) input.setAttribute('aria-describedby', `${id}r`);
@@ -97,16 +97,15 @@ export class Slider {
     this.range.onchange = () => this.release();
     this.number.onfocus = () => { this.held = true; };
     this.number.onblur = () => this.release();
-    this.number.oninput = () => { this.mistyped = false; this.explain(); };
+    this.number.oninput = () => this.explain();
     this.number.onchange = () => {
       this.type(this.number.value.trim());
       this.number.blur();
     };
-    this.render();
+    this.bound(low, high);
   }
 
   offer(value) {
-    this.mistyped = false;
     this.offered = value;
     this.requests.offer([value, this.gesture]);
   }
@@ -124,7 +123,6 @@ export class Slider {
   async type(text) {
     if (!text) return;
     const { value, reason } = await read(text, this.unit, this.factor);
-    this.mistyped = !!reason;
     if (reason) this.explain(`Refused: ${reason}`);
     else this.offer(value);
   }
@@ -140,10 +138,18 @@ export class Slider {
   settle(requested, { value = requested, reason, inputs }) {
     const refused = reason && !inputs;
     if (!refused) this.accepted = value;
-    const [low, high, wanted] = [this.low, this.high, requested].map(each => this.shortened(each));
+    const [wanted, low, high] = [requested, this.low, this.high].map(each => this.shortened(each));
     const unit = this.unitShown.textContent;
-    if (!this.mistyped) this.explain(refused ? `Refused: ${wanted} ${unit}; the slider goes from ${low} to ${high} ${unit}. ${reason}` : reason, refused);
+    this.explain(refused ? `Refused: ${wanted} ${unit}; the slider goes from ${low} to ${high} ${unit}. ${this.translated(reason)}` : reason, refused);
     if (!this.held && !this.requests.waiting) this.render();
+  }
+
+  /** A node's rule with its numbers and its unit as they are displayed. */
+  translated(reason) {
+    if (this.factor === 1) return reason;
+    return reason.replace(/ must .*/s, rule => rule
+      .replace(/(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)?(?!\w)/g, number => this.shortened(Number(number)))
+      .replace(`] ${this.unit},`, `] ${this.unitShown.textContent},`));
   }
 
   explain(words, refused) {
@@ -157,9 +163,11 @@ export class Slider {
     if (!this.requests.busy) this.render();
   }
 
-  /** Set the ends of the range. */
+  /** Set the ends of the range; without them nothing can be slid. */
   bound(low, high) {
-    [this.low, this.high] = [low, high];
+    Object.assign(this, { low, high, scale: low === -high && !this.isEven ? FINE_ABOUT_ZERO : EVEN });
+    if (this.isWhole) put(this.range, { min: low, max: high });
+    this.range.disabled = !(low < high);
     if (!this.held) this.render();
   }
 
@@ -213,4 +221,6 @@ export class Choice {
   }
 
   render() {}
+
+  bound() {}
 }

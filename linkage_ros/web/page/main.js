@@ -86,15 +86,12 @@ connect({
     show(mechanisms.has(stored.shown) || !mechanisms.size ? stored.shown : '');
   },
 
-  value({ mechanism: key, name, value, drawn }) {
-    const mechanism = mechanisms.get(key);
-    const setting = mechanism?.settings.get(name);
-    if (!setting) return;
-    setting.value = value;
-    Object.assign(mechanism, drawn);
-    panel.sections.get(key)?.update(name, value);
-    if (typeof value !== 'number') show(shown);
-    if (setting.group !== 'speeds' && setting.group !== 'starts') picture.refit(key);
+  mechanism(description) {
+    const { key } = description;
+    const changed = mechanisms.get(key)?.describe(description) ?? [];
+    for (const setting of changed) panel.sections.get(key)?.update(setting);
+    if (changed.some(({ kind }) => kind !== 'double')) show(shown);
+    if (changed.some(({ group }) => group !== 'speeds' && group !== 'starts')) picture.refit(key);
   },
 
   /** Frames, each the length of a header, the header, and the points of its markers. */

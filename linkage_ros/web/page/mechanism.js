@@ -18,14 +18,18 @@ export class Mechanism {
     /** Values to set for undo, one step a gesture, and the first value of each tuned parameter. */
     this.steps = [];
     this.first = new Map();
+    this.settings = new Map();
   }
 
-  describe(description) {
+  /** Adopt a description; return the settings that it changes. */
+  describe({ settings, ...description }) {
     Object.assign(this, description);
-    this.settings = new Map(this.settings.map(setting => [setting.name, setting]));
+    const changed = settings.filter(({ name, value }) => String(value) !== String(this.value(name)));
+    this.settings = new Map(settings.map(setting => [setting.name, setting]));
     for (const { name, value } of TUNED.flatMap(group => this.group(group))) {
       if (!this.first.has(name)) this.first.set(name, value);
     }
+    return changed;
   }
 
   /** Request something of the mechanism; return the answer. */

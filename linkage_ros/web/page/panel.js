@@ -46,10 +46,10 @@ class Section {
     return bottom > 0 && top < window.innerHeight;
   }
 
-  update(name, value) {
-    this.tuning.update(name, value);
+  update(setting) {
+    this.tuning.update(setting);
     this.motion.renderPlay();
-    this.plot.update(name);
+    this.plot.update(setting);
   }
 }
 
@@ -77,7 +77,7 @@ export class Panel {
       this.place.replaceChildren(...sections.map(section => section.element));
     }
     for (const section of sections) {
-      for (const { name, value } of section.mechanism.settings.values()) section.update(name, value);
+      for (const setting of section.mechanism.settings.values()) section.update(setting);
     }
   }
 

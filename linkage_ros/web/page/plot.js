@@ -107,8 +107,7 @@ export class Plot {
   }
 
   /** Update the plot after a change of a parameter. */
-  update(name) {
-    const { group } = this.mechanism.settings.get(name);
+  update({ group }) {
     if (group === 'speeds') this.render();
     else if (group !== 'starts') this.refresh();
   }

@@ -111,12 +111,12 @@ export class Tuning {
       if (tunable.reason) return;
       this.mechanism.tunable = tunable;
       for (const [name, ends] of Object.entries(tunable.travel)) {
-        if (ends && ends[0] < ends[1]) this.controls.get(name)?.bound(...ends);
+        if (ends) this.controls.get(name)?.bound(...ends);
       }
     }, RESTED);
   }
 
-  update(name, value) {
+  update({ name, value }) {
     this.controls.get(name)?.update(value);
     if (name === 'scale') this.render();
     if (!this.mechanism.first.has(name)) return;
