@@ -119,9 +119,7 @@ def test_a_slider_sets_the_node_that_owns_the_parameter_and_others_changes_are_s
     ({'dimensions__b': -150.0}, r'lever\.dimensions\.b .*-150'),
     ({'dimensions__b': 'long'}, 'lever.dimensions.b must be a finite number'),
     ({'dimensions__b': True}, 'lever.dimensions.b must be a finite number'),
-    ({'dimensions__q': 1.0}, "lever has no parameter 'dimensions.q'"),
-    ({'type': 'jansen'}, 'lever.type is no number, .*: use ros2 param set .*lever.type'),
-    ({'points': ['L']}, 'lever.points is no number'),
+    ({'type': 'jansen'}, 'read-only parameter: lever.type'),
     ({'dimensions__a': 10.0, 'dimensions__e': 700.0}, 'be assembled'),
     ({'branches__L': 5}, r'lever\.branches\.L'),
 ])
@@ -247,9 +245,7 @@ def test_a_lever_that_is_dragged_beyond_its_reach_goes_to_its_end(show, lengths,
 @pytest.mark.parametrize('key, want, reason', [
     ('/gone', {}, "no mechanism '/gone'; there are: /lever, /drop"),
     ('/drop', {'output': 'lever', 'value': 0.1}, "no output 'lever'"),
-    ('/drop', {'joint': 'X', 'place': [0.0, 0.0]}, "joint must be one of .*, not 'X'"),
-    ('/drop', {'joint': 'P', 'place': [0.0, 0.0], 'leg': 1}, 'leg must be a whole number below 1'),
-    ('/drop', {'joint': 'P', 'place': [0.0]}, 'place must be two finite numbers'),
+    ('/drop', {'joint': 'X', 'place': [0.0, 0.0]}, "water_drop has no point 'X'; allowed: O, C, "),
 ])
 def test_what_cannot_be_brought_about_says_why(lever, page, key, want, reason):
     assert re.search(reason, page.pose(key, **want)['reason'])

@@ -9,13 +9,11 @@ from typing import Any, Optional, Sequence
 import numpy as np
 
 from .nearest_pose import theta_of
-from .poses import linkage_inputs
-from .settings import shown
+from .poses import linkage_inputs, shown
 from ..c_code import header
 from ..linkage import ascending, sampled
 from ..robot_model import urdf
 from ..scene import SceneError, SceneMechanism
-from ..words import listed, meant, quoted
 
 SAMPLES = 361
 KINDS = POSITION, VELOCITY, ACCELERATION, TRANSMISSION, FORCE = (
@@ -107,14 +105,9 @@ def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSIT
     `dead` are the dead points, `ends` the other ends of the reach; y grows with the `power` of the
     input's speed.
     """
-    if kind not in KINDS:
-        raise ValueError(f'kind must be one of {", ".join(KINDS)}, not {quoted(kind)}')
     sweep = Sweep(mechanism, present, dense_ends=True)
     names = sweep.names(kind)
     output = names[0] if names and output is None else output or ''
-    if not (output in names or kind != TRANSMISSION and sweep.linkage.has_output(output)):
-        raise SceneError(f'there is no {kind} of {quoted(output)}; there is of {listed(names)}'
-                      f'{meant(output, names)}')
     x, y, unit = sweep.values, sweep.of(kind, (output,))[output], sweep.unit(kind, output)
     # No line is drawn through a pole.
     after = np.searchsorted(x, sweep.dead[(x[0] < sweep.dead) & (sweep.dead < x[-1])])
@@ -136,8 +129,6 @@ def exported(mechanism: SceneMechanism, present: Sequence[float], form: str, fra
         return urdf.describe([mechanism], mechanism.frame_id or frame_id)
     if form == 'c':
         return header.written(mechanism)
-    if form != 'csv':
-        raise ValueError(f'form must be csv, urdf or c, not {quoted(form)}')
     sweep, text = Sweep(mechanism, present), io.StringIO()
     columns = {f'{sweep.input.name} [{sweep.input.unit}]': sweep.values, **{
         f'{kind} {name} [{sweep.unit(kind, name) or 1}]': values for kind in KINDS

@@ -10,16 +10,17 @@ from typing import Any, Mapping, Optional, Sequence
 import numpy as np
 
 from .nearest_pose import nearest_inputs, theta_of
-from .settings import is_number, name_in_mechanism, shown
 from ..linkage import Formula, Mechanism
 from ..robot_model.output_range import ground_frame
-from ..scene import InputSettings, Scene, SceneError, SceneMechanism, slider
+from ..scene import InputSettings, Parameter, Scene, SceneError, SceneMechanism, slider
 from ..scene.scene_mechanism import divided
 from ..words import listed, quoted
 
 ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
 _, ACCELERATION, FORCE = ARROWS
 SIGNS = '+1', '−1'
+# Kinds of parameters with a control.
+CONTROLLED = 'double', 'integer', 'bool'
 # Change of a dimension that detects dependent bars, as a fraction of the longest bar.
 NUDGE = 1e-6
 # Tolerance of an input at its end.
@@ -31,6 +32,29 @@ ROUNDING = 1e-12
 # A request's inputs, and what is reached if they do not meet it exactly: name of the input or
 # output, its `arcs` and their `unit`.
 Reached = tuple[list[float], Optional[dict[str, Any]]]
+
+
+def shown(value: Any) -> Any:
+    """Return a value for JSON: None for a number that is not finite."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def name_in_mechanism(parameter: Parameter) -> str:
+    """Return the name of a parameter without its mechanism."""
+    return parameter.name.partition('.')[2]
+
+
+def setting(parameter: Parameter) -> dict[str, Any]:
+    """
+    Describe a parameter for the page.
+
+    The page has a control for it in a `group`, or none if that is empty.
+    """
+    field = parameter.field
+    has_control = not field.read_only and field.kind in CONTROLLED
+    return {'name': name_in_mechanism(parameter), 'value': parameter.value,
+            'kind': field.kind, 'meaning': field.meaning, 'allowed': field.allowed,
+            'unit': field.unit, 'group': (field.group or 'more') if has_control else ''}
 
 
 def drawn(mechanism: SceneMechanism, speeds: Mapping[str, float]) -> dict[str, Any]:
@@ -92,8 +116,6 @@ def arrows(mechanism: SceneMechanism, present: Sequence[float], kind: str,
     Speeds [rad/s or m/s] are by input. Forces are the loads; `efforts` by input [N m or N] balance
     them.
     """
-    if kind not in ARROWS:
-        raise ValueError(f'arrows must be one of {", ".join(ARROWS)}, not {quoted(kind)}')
     if kind == FORCE:
         efforts = mechanism.efforts(present) if mechanism.loads else ()
         return {'unit': 'N', 'at': {
@@ -115,14 +137,11 @@ def arrows(mechanism: SceneMechanism, present: Sequence[float], kind: str,
 
 def number(text: str) -> dict[str, Any]:
     """Return the `value` of arithmetic such as pi/2, and whether it is in rad (`turns`)."""
-    try:
-        # A number may have a decimal comma; arithmetic has commas in parentheses only.
-        formula = Formula(text if '(' in text else text.replace(',', '.'))
-        if formula.names:
-            raise SceneError(f'{quoted(text)} is not a number: {listed(formula.names)} is unknown')
-        value = float(formula.value({}))
-    except ValueError as error:
-        raise SceneError(str(error)) from None
+    # A number may have a decimal comma; arithmetic has commas in parentheses only.
+    formula = Formula(text if '(' in text else text.replace(',', '.'))
+    if formula.names:
+        raise SceneError(f'{quoted(text)} is not a number: {listed(formula.names)} is unknown')
+    value = float(formula.value({}))
     return {'value': value, 'turns': bool({'pi', 'deg'} & formula.words.keys())}
 
 
@@ -143,23 +162,15 @@ def reached(mechanism: SceneMechanism, present: Sequence[float],
 
     Raises
     ------
-    SceneError
-        If the output does not exist, or has no solution.
-    KeyError, TypeError, ValueError
-        If the request is malformed.
+    ValueError
+        If the output or the joint does not exist, or has no solution.
 
     """
     if 'joint' in want:
         return _joint_at(mechanism, present, **want), None
     name, value = want['output'], want['value']
-    if not is_number(value):
-        raise ValueError(f'value must be a finite number, not {quoted(value)}')
     if name in mechanism.inputs:
         return _input_at(mechanism, present, name, value)
-    if not mechanism.linkage.has_output(name):
-        raise SceneError(f'{mechanism.name} has no output {quoted(name)}')
-    if len(mechanism.inputs) > 1:
-        raise SceneError(f'only a linkage with one input can be solved for {quoted(name)}')
     return _output_at(mechanism, present, name, value)
 
 
@@ -196,16 +207,8 @@ def _output_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
 
 def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, place: Any,
               leg: int = 0) -> list[float]:
-    if not (isinstance(place, list) and len(place) == 2 and all(map(is_number, place))):
-        raise ValueError(f'place must be two finite numbers, not {quoted(place)}')
-    legs = list(mechanism.assembly().legs.values())
-    if type(leg) is not int or not 0 <= leg < len(legs):
-        raise ValueError(f'leg must be a whole number below {len(legs)}, not {quoted(leg)}')
-    if joint not in mechanism.linkage.points:
-        raise ValueError(f'joint must be one of {listed(mechanism.linkage.points)}, '
-                         f'not {quoted(joint)}')
     # The inputs of this leg and back: for a single leg, those of the linkage in the scene's size.
-    lag, start, side, _ = legs[leg]
+    lag, start, side, _ = list(mechanism.assembly().legs.values())[leg]
     sizes = mechanism.scales
     inputs = nearest_inputs(
         mechanism.linkage, joint,

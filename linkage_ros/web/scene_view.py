@@ -23,11 +23,12 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
-from . import curves, poses, settings
+from . import curves, poses
 from .feed import Feed
 from .. import scene
 from ..nodes import ownership
 from ..nodes.log import Throttle
+from ..nodes.parameters import typed
 from ..scene import SceneError, SceneMechanism, writing
 from ..words import quoted
 
@@ -151,17 +152,15 @@ class SceneView:
         """
         async with self._setting:
             shown = self._find(mechanism)
-            parameters = {settings.name_in_mechanism(parameter): parameter
+            parameters = {poses.name_in_mechanism(parameter): parameter
                           for parameter in self._settings(shown)}
             requests: dict[str, list[Any]] = defaultdict(list)
-            for name, value in dict(values).items():
-                if name not in parameters:
-                    raise SceneError(f'{shown.name} has no parameter {quoted(name)}')
-                node = shown.nodes[parameters[name].name]
-                requests[node].append(settings.message(parameters[name], value, node))
+            for key, value in values.items():
+                parameter = parameters[key]
+                checked = parameter.field.checked(parameter.name, value)
+                requests[shown.nodes[parameter.name]].append(
+                    typed(parameter._replace(value=checked)).to_parameter_msg())
             for node, messages in requests.items():
-                if f'{node}/{SETTER}' not in self._entities:
-                    raise SceneError(f'{node} is gone')
                 response = await self._call(
                     self._entities[f'{node}/{SETTER}'],
                     SetParametersAtomically.Request(parameters=messages))
@@ -305,7 +304,7 @@ class SceneView:
         """Describe what the page needs of a mechanism beside its markers."""
         machine = self._scenes[shown.owner].machines[shown.name]
         return {'key': shown.key, 'name': shown.name, 'curves': curves.plots(machine),
-                'settings': list(map(settings.described, self._settings(shown))),
+                'settings': list(map(poses.setting, self._settings(shown))),
                 **poses.drawn(machine, self._playing(shown.owner, machine))}
 
     def _playing(self, owner: str, machine: SceneMechanism) -> dict[str, float]:

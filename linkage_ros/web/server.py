@@ -22,7 +22,6 @@ from aiohttp import web, WSCloseCode
 from .feed import Feed
 from .scene_view import SceneView
 from .. import palette
-from ..scene import SceneError
 from ..words import elided, quoted
 
 Message = dict[str, Any]
@@ -48,7 +47,7 @@ DRAWN = '"drawn"'
 REQUESTS = 'set', 'pose', 'tune', 'curve', 'export', 'save', 'read'
 # Size of a request; requests that wait; time in which a browser reads a message, and closes.
 MAX_BYTES, MAX_WAITING, MAX_READ_S, MAX_CLOSE_S = 1 << 16, 64, 10.0, 1.0
-MAX_REASON = 200
+MAX_REASON = 299
 
 
 class Server:
@@ -238,13 +237,13 @@ class Client:
                 request = dict(json.loads(text))
                 number, op = request.pop('id', None), request.pop('op', None)
                 if op not in REQUESTS:
-                    raise SceneError(f'unknown request {quoted(op)}')
+                    raise ValueError(f'unknown request {quoted(op)}')
                 answer = await getattr(self._view, op)(**request)
-            except SceneError as reason:
-                answer = {'reason': str(reason)}
+            except ValueError as reason:
+                answer = {'reason': elided(str(reason), MAX_REASON)}
             except Exception as error:
                 # Without an answer the browser would wait forever.
-                answer = {'reason': f'the request fails: {elided(repr(error), MAX_REASON)}'}
+                answer = {'reason': f'the request fails: {elided(repr(error), 200)}'}
                 self._view.warn(answer['reason'])
             await self._send_message({'op': 'answer', 'reason': '', **answer, 'id': number})
 
