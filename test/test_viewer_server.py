@@ -60,7 +60,7 @@ REQUESTS = [
     *(('set', f'"values": {values}', 'the request fails') for values in (
         f'{{"{50000 * "x"}": 1}}', '{"\\ud800": 1}', '3', '[[[], 1]]')),
     ('set', '"values": {}, "mechanism": {}', 'the request fails'),
-    ('set', '"a": 1', "the request fails: .*'values'"),
+    ('set', '"a": 1', 'the request fails'),
     *(('pose', f'"want": {want}', '.') for want in (
         '{"output": "crank", "value": 1e400}', '{"output": "crank", "value": NaN}',
         '{"output": "crank", "value": [1]}', '{"output": "crank", "value": "1"}', '{}', '3',

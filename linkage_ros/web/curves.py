@@ -20,8 +20,6 @@ KINDS = POSITION, VELOCITY, ACCELERATION, TRANSMISSION, FORCE = (
     'position', 'velocity', 'acceleration', 'transmission angle', 'force ratio')
 # By quantity: the power of the input's speed with which it grows, and what that adds to its unit.
 POWERS, PER = {VELOCITY: 1, ACCELERATION: 2}, {VELOCITY: '/s', ACCELERATION: '/s²'}
-# An end of the reach this near to a dead point [rad, or of the stroke] is that dead point.
-SAME = 1e-9
 # Units of the force ratio, by the units of output and input.
 FORCES = {('rad', 'm'): 'N·m/N', ('m', 'rad'): 'N/(N·m)'}
 
@@ -52,10 +50,8 @@ class Sweep:
         self._inputs, self._speeds, self._still = map(theta_of, (
             [values, *others], [1.0 / self._size, *still], [0.0, *still]))
         self.values, self.dead = values * self._size, np.multiply(dead, self._size)
-        # The ends of the reach that are no dead points; a full rotation has none.
-        self.ends = [] if is_whole else [
-            end for end in np.multiply(np.ravel(reach), self._size).tolist()
-            if (self.input.apart(end, self.dead) > SAME * self.input.size).all()]
+        # A full rotation has no ends.
+        self.ends = np.multiply([] if is_whole else np.ravel(reach), self._size)
 
     def names(self, kind: str) -> list[str]:
         """Return the joints with a transmission angle, or the outputs."""
@@ -97,17 +93,20 @@ def plots(mechanism: SceneMechanism) -> dict[str, str]:
         kind: 'joint' if kind == TRANSMISSION else 'output' for kind in KINDS}
 
 
+@np.errstate(invalid='ignore')
 def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSITION,
           output: Optional[str] = None) -> dict[str, Any]:
     """
     Return one of KINDS over the first input: x and y in `units`, y None where it has none.
 
-    `dead` are the dead points, `ends` the other ends of the reach; y grows with the `power` of the
+    `dead` are the dead points, `ends` those of the reach; y grows with the `power` of the
     input's speed.
     """
     sweep = Sweep(mechanism, present, dense_ends=True)
     names = sweep.names(kind)
     output = names[0] if names and output is None else output or ''
+    if kind != TRANSMISSION:
+        sweep.linkage.check_there(output)
     x, y, unit = sweep.values, sweep.of(kind, (output,))[output], sweep.unit(kind, output)
     # No line is drawn through a pole.
     after = np.searchsorted(x, sweep.dead[(x[0] < sweep.dead) & (sweep.dead < x[-1])])
@@ -120,7 +119,8 @@ def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSIT
         y[known] = np.unwrap(y[known])
     return {'input': sweep.input.name, 'output': output, 'names': names,
             'units': [sweep.input.unit, unit], 'power': POWERS.get(kind, 0), 'x': x.tolist(),
-            'y': list(map(shown, y.tolist())), 'ends': sweep.ends, 'dead': sweep.dead.tolist()}
+            'y': list(map(shown, y.tolist())),
+            'ends': sweep.ends.tolist(), 'dead': sweep.dead.tolist()}
 
 
 def exported(mechanism: SceneMechanism, present: Sequence[float], form: str, frame_id: str) -> str:

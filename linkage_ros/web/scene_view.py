@@ -8,11 +8,10 @@ from __future__ import annotations
 import asyncio
 from collections import defaultdict
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 import math
 import re
-from typing import Any, Callable, Mapping, Optional, Sequence
+from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence
 
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import SetParametersAtomically
@@ -48,20 +47,17 @@ NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-@dataclass
-class ShownMechanism:
+class ShownMechanism(NamedTuple):
     """
     A mechanism on the page: prefix of its topics, node, and topics of its inputs.
 
-    `nodes` has the node that announces a parameter, by full name; `sent` is the description that
-    the pages have.
+    `nodes` has the node that announces a parameter, by full name.
     """
 
     key: str
     owner: str
     sources: Sequence[str]
     nodes: Mapping[str, str]
-    sent: Optional[Answer] = None
 
     @property
     def name(self) -> str:
@@ -94,7 +90,6 @@ class SceneView:
         self.loop: asyncio.AbstractEventLoop
         self._node = node
         self._throttle = Throttle(node.get_logger())
-        self._setting = asyncio.Lock()
         # The topic on which a node announces its parameters, and those of its inputs.
         self._graph: dict[str, tuple[str, list[str]]] = {}
         self._is_stale = True
@@ -150,23 +145,22 @@ class SceneView:
             With the node's reason.
 
         """
-        async with self._setting:
-            shown = self._find(mechanism)
-            parameters = {poses.name_in_mechanism(parameter): parameter
-                          for parameter in self._settings(shown)}
-            requests: dict[str, list[Any]] = defaultdict(list)
-            for key, value in values.items():
-                parameter = parameters[key]
-                checked = parameter.field.checked(parameter.name, value)
-                requests[shown.nodes[parameter.name]].append(
-                    typed(parameter._replace(value=checked)).to_parameter_msg())
-            for node, messages in requests.items():
-                response = await self._call(
-                    self._entities[f'{node}/{SETTER}'],
-                    SetParametersAtomically.Request(parameters=messages))
-                if not response.result.successful:
-                    raise SceneError(response.result.reason or f'{node} gives no reason')
-            self._moved.pop(mechanism, None)
+        shown = self._find(mechanism)
+        parameters = {poses.name_in_mechanism(parameter): parameter
+                      for parameter in self._settings(shown)}
+        requests: dict[str, list[Any]] = defaultdict(list)
+        for key, value in values.items():
+            parameter = parameters[key]
+            checked = parameter.field.checked(parameter.name, value)
+            requests[shown.nodes[parameter.name]].append(
+                typed(parameter._replace(value=checked)).to_parameter_msg())
+        for node, messages in requests.items():
+            response = await self._call(
+                self._entities[f'{node}/{SETTER}'],
+                SetParametersAtomically.Request(parameters=messages))
+            if not response.result.successful:
+                raise SceneError(response.result.reason or f'{node} gives no reason')
+        self._moved.pop(mechanism, None)
         return {}
 
     async def pose(self, mechanism: str, want: Optional[Mapping[str, Any]] = None,
@@ -263,9 +257,6 @@ class SceneView:
     def _state(self, shown: ShownMechanism) -> tuple[SceneMechanism, list[float]]:
         """Return a mechanism and its last received inputs [rad or m], or their starts."""
         machine = self._scenes[shown.owner].machines[shown.name]
-        if machine.in_space:
-            raise SceneError(f'{machine.name} is a linkage in space: the page draws and tunes it, '
-                          'and moves, plots and describes linkages in a plane')
         inputs, until = self._moved.get(shown.key, ([], 0.0))
         if self.loop.time() < until:
             return machine, inputs
@@ -287,10 +278,8 @@ class SceneView:
         return self._mechanisms[key]
 
     def _show(self, client: Any) -> None:
-        for shown in self._mechanisms.values():
-            shown.sent = self._described(shown)
-        client.tell('scene', {'op': 'scene', 'mechanisms': [
-            shown.sent for shown in self._mechanisms.values()]})
+        client.tell('scene', {'op': 'scene', 'mechanisms': list(
+            map(self._described, self._mechanisms.values()))})
         for feed in [*self._feeds.values()]:
             client.offer(feed)
 
@@ -446,17 +435,15 @@ class SceneView:
             self._is_stale = True
             self._news.set()
             return
-        if event.node not in self._graph:
-            return
-        for owner in [*self._scenes]:
+        for owner in [*self._scenes] if event.node in self._graph else ():
+            whole = self._scenes[owner]
             with suppress(SceneError):
                 self._read(owner)
-        for shown in self._mechanisms.values():
-            description = self._described(shown)
-            if description != shown.sent:
-                shown.sent = description
-                for client in self.clients:
-                    client.tell(shown.key, {'op': 'mechanism', **description})
+            for shown in self._mechanisms.values():
+                if shown.owner == owner and (self._scenes[owner].machines[shown.name]
+                                             is not whole.machines[shown.name]):
+                    for client in self.clients:
+                        client.tell(shown.key, {'op': 'mechanism', **self._described(shown)})
 
 
 def _space(name: str) -> str:
