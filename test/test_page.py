@@ -697,7 +697,7 @@ def test_titles_are_written_beside_or_below_each_other_wherever_they_are(
         seen = (x >= 0.0) & (x <= width)
         assert (x - 0.5 * wide)[seen].min(initial=width) > 0.0
         assert (x + 0.5 * wide)[seen].max(initial=0.0) < width
-        assert y.max() + 18.0 < height
+        assert y.max() + 9.0 < height
         apart = np.maximum(abs(y[:, None] - y) / 18.0,
                            2.0 * abs(x[:, None] - x) / (wide[:, None] + wide))
         assert apart[~np.eye(len(x), dtype=bool)].min(initial=1.0) > 1.0 - 1e-9
@@ -715,13 +715,13 @@ import('/picture.js').then(({ Picture }) => {
       const [x, y] = [390 * random(), 380 * random()];
       if (places.every(([a, b]) => Math.hypot(x - a, y - b) > 70)) places.push([x, y]);
     }
-    const points = places.map((_, i) => 'joint'.slice(i % 4));
+    const points = places.map((_, i) => 'joint'.slice(i % 4) + i);
     Object.assign(picture, { scale: 1, middle: [0, 0], centre: [0, 0],
       canvas: { clientWidth: 390, clientHeight: 380 } });
     picture.at = (x, y) => [x, y];
     picture.text = (name, x, y) => written.push([x, y, picture.context.measureText(name).width]);
-    picture.names([{ mechanism: { points }, kind: 'joints', width: 6,
-      places: Float64Array.from(places.flat()) }]);
+    picture.names({ mechanism: { width: 3 },
+      seen: new Map(points.map((name, i) => [name, places[i]])) });
     return [places, written];
   });
 })"""

@@ -62,4 +62,9 @@ export class Mechanism {
   get width() {
     return [...this.markers.values()].flat().find(({ kind }) => kind === 'joints')?.width / 2;
   }
+
+  /** The frame of its markers. */
+  get frame() {
+    return [...this.markers.values()].flat()[0]?.frame;
+  }
 }

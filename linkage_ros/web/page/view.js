@@ -10,7 +10,8 @@ const [MIN_ZOOM, MAX_ZOOM] = [0.05, 200];
 const WHOLE = { zoom: 1, shift: [0, 0], yaw: 0, pitch: 0 };
 const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
-const middle = points => [0, 1].map(i => points.reduce((sum, at) => sum + at[i], 0) / points.length);
+/** The mean of some places. */
+export const middle = points => [0, 1].map(i => points.reduce((sum, at) => sum + at[i], 0) / points.length);
 
 export class View {
   /** Begins as `from`, and calls `changed()`. */
