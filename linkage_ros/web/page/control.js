@@ -7,16 +7,6 @@ import { figures, read, units } from './units.js';
 
 const STOPS = 1000;
 
-/** How a slider's place in [0, 1] becomes a value, and back: evenly, or fine about zero. */
-const EVEN = {
-  value: (place, low, high) => low + (high - low) * place,
-  place: (value, low, high) => (value - low) / (high - low),
-};
-const FINE_ABOUT_ZERO = {
-  value: (place, low, high) => high * (2 * place - 1) ** 3,
-  place: (value, low, high) => (Math.cbrt(value / high) + 1) / 2,
-};
-
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
 export function element(tag, properties = {}, ...children) {
@@ -73,12 +63,12 @@ export class Reason {
   }
 }
 
-/** A number with a slider. A gesture lasts from its first change to its release. */
+/** A number with a slider. A gesture, an object or null, lasts from its first change to its release. */
 export class Slider {
   constructor({ label, title, unit, low, high, kind, group, value, digits = 6, times = () => 1 }, request) {
     const isWhole = kind === 'integer';
     const isEven = isWhole || group === 'starts';
-    Object.assign(this, { unit, isWhole, isEven, digits, times, accepted: value, held: false, gesture: {} });
+    Object.assign(this, { unit, isWhole, isEven, digits, times, accepted: value, gesture: null });
     const id = nextId();
     this.range = element('input', { type: 'range', id, step: 1, max: STOPS });
     this.number = element('input', { type: 'text', autocomplete: 'off', ariaLabel: label });
@@ -90,12 +80,12 @@ export class Slider {
     this.requests = new Newest(async ([requested, gesture]) => this.settle(
       requested, await request(requested, gesture, this.accepted)));
     this.range.oninput = () => {
-      this.held = true;
+      this.gesture ??= {};
       this.number.value = this.shortened(this.chosen);
       this.offer(this.chosen);
     };
     this.range.onchange = () => this.release();
-    this.number.onfocus = () => { this.held = true; };
+    this.number.onfocus = () => { this.gesture ??= {}; };
     this.number.onblur = () => this.release();
     this.number.oninput = () => this.explain();
     this.number.onchange = () => {
@@ -107,7 +97,7 @@ export class Slider {
 
   offer(value) {
     this.offered = value;
-    this.requests.offer([value, this.gesture]);
+    this.requests.offer([value, this.gesture ?? {}]);
   }
 
   /** The present value, or the requested one while a request is pending. */
@@ -127,10 +117,10 @@ export class Slider {
     else this.offer(value);
   }
 
-  /** The value at the slider's place. */
+  /** The value at the slider's place: even, or fine about zero. */
   get chosen() {
     if (this.isWhole) return Number(this.range.value);
-    const value = this.scale.value(this.range.value / STOPS, this.low, this.high);
+    const value = this.middle + this.half * (2 * this.range.value / STOPS - 1) ** this.power;
     return clamp(Number(value.toPrecision(5)), this.low, this.high);
   }
 
@@ -141,7 +131,7 @@ export class Slider {
     const [wanted, low, high] = [requested, this.low, this.high].map(each => this.shortened(each));
     const unit = this.unitShown.textContent;
     this.explain(refused ? `Refused: ${wanted} ${unit}; the slider goes from ${low} to ${high} ${unit}. ${this.translated(reason)}` : reason, refused);
-    if (!this.held && !this.requests.waiting) this.render();
+    if (!this.gesture && !this.requests.waiting) this.render();
   }
 
   /** A node's rule with its numbers and its unit as they are displayed. */
@@ -158,17 +148,17 @@ export class Slider {
   }
 
   release() {
-    this.held = false;
-    this.gesture = {};
+    this.gesture = null;
     if (!this.requests.busy) this.render();
   }
 
   /** Set the ends of the range; without them nothing can be slid. */
   bound(low, high) {
-    Object.assign(this, { low, high, scale: low === -high && !this.isEven ? FINE_ABOUT_ZERO : EVEN });
+    const power = low === -high && !this.isEven ? 3 : 1;
+    Object.assign(this, { low, high, power, middle: (low + high) / 2, half: (high - low) / 2 });
     if (this.isWhole) put(this.range, { min: low, max: high });
     this.range.disabled = !(low < high);
-    if (!this.held) this.render();
+    if (!this.gesture) this.render();
   }
 
   /** Show a value that was set, which another client has done if no request is pending. */
@@ -180,14 +170,14 @@ export class Slider {
   /** Show a value that changes by itself. */
   follow(value) {
     this.accepted = value;
-    if (!this.held && !this.requests.busy) this.render();
+    if (!this.gesture && !this.requests.busy) this.render();
   }
 
   render() {
     put(this.unitShown, { textContent: units.of(this.unit).name });
     if (this.accepted === null) return;
-    this.range.value = this.isWhole ? this.accepted
-      : STOPS * clamp(this.scale.place(this.accepted, this.low, this.high), 0, 1);
+    const part = clamp((this.accepted - this.middle) / this.half, -1, 1);
+    this.range.value = this.isWhole ? this.accepted : STOPS * (Math.sign(part) * Math.abs(part) ** (1 / this.power) + 1) / 2;
     const text = this.shortened(this.accepted);
     put(this.number, { value: text });
     put(this.range, { ariaValueText: `${text} ${this.unitShown.textContent}` });

@@ -107,7 +107,7 @@ export class Tuning {
     clearTimeout(this.resting);
     this.resting = setTimeout(async () => {
       const tunable = await this.mechanism.ask('tune');
-      if ([...this.controls.values()].some(({ held }) => held)) return this.refresh();
+      if ([...this.controls.values()].some(({ gesture }) => gesture)) return this.refresh();
       if (tunable.reason) return;
       this.mechanism.tunable = tunable;
       for (const [name, ends] of Object.entries(tunable.travel)) {
