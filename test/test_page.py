@@ -720,7 +720,7 @@ import('/picture.js').then(({ Picture }) => {
       canvas: { clientWidth: 390, clientHeight: 380 } });
     picture.at = (x, y) => [x, y];
     picture.text = (name, x, y) => written.push([x, y, picture.context.measureText(name).width]);
-    picture.names({ mechanism: { width: 3 },
+    picture.names({ mechanism: { joints: { width: 6 } },
       seen: new Map(points.map((name, i) => [name, places[i]])) });
     return [places, written];
   });

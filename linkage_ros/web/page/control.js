@@ -77,8 +77,7 @@ export class Slider {
     this.unitShown = element('span', { className: 'unit' });
     this.row = element('div', { className: 'row', title },
       element('label', { htmlFor: id, textContent: label }), this.range, this.number, this.unitShown, this.reason.line);
-    this.requests = new Newest(async ([requested, gesture]) => this.settle(
-      requested, await request(requested, gesture, this.accepted)));
+    this.requests = new Newest(async ([requested, gesture]) => this.settle(requested, await request(requested, gesture)));
     this.range.oninput = () => {
       this.gesture ??= {};
       this.number.value = this.shortened(this.chosen);
@@ -194,7 +193,7 @@ export class Choice {
   constructor({ label, title, value }, words, request) {
     this.reason = new Reason();
     this.buttons = words.map(([one, word]) => [one, button(word, async () => {
-      const { reason } = await request(one, {}, this.value);
+      const { reason } = await request(one, {});
       this.reason.refuse(reason);
       if (!reason) this.update(one);
     })]);

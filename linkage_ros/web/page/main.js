@@ -5,7 +5,7 @@
 
 import { connect, isOpen, tell } from './connection.js';
 import { button, put } from './control.js';
-import { Mechanism } from './mechanism.js';
+import { isTuned, Mechanism } from './mechanism.js';
 import { Panel } from './panel.js';
 import { Picture } from './picture.js';
 import { PointerDrag } from './pointer_drag.js';
@@ -91,7 +91,7 @@ connect({
     const changed = mechanisms.get(key)?.describe(description) ?? [];
     for (const setting of changed) panel.sections.get(key)?.update(setting);
     if (changed.some(({ kind }) => kind !== 'double')) show(shown);
-    if (changed.some(({ group }) => group !== 'speeds' && group !== 'starts')) picture.refit(key);
+    if (changed.some(isTuned)) picture.refit(key);
   },
 
   /** Frames, each the length of a header, the header, and the points of its markers. */

@@ -5,7 +5,8 @@
 
 import { ask } from './connection.js';
 
-const TUNED = ['dimensions', 'branches', 'more'];
+/** Whether a setting is tuned, and not a motion. */
+export const isTuned = ({ group }) => group && group !== 'speeds' && group !== 'starts';
 
 export class Mechanism {
   constructor() {
@@ -26,7 +27,7 @@ export class Mechanism {
     Object.assign(this, description);
     const changed = settings.filter(({ name, value }) => String(value) !== String(this.value(name)));
     this.settings = new Map(settings.map(setting => [setting.name, setting]));
-    for (const { name, value } of TUNED.flatMap(group => this.group(group))) {
+    for (const { name, value } of settings.filter(isTuned)) {
       if (!this.first.has(name)) this.first.set(name, value);
     }
     return changed;
@@ -46,25 +47,13 @@ export class Mechanism {
     return [...this.settings.values()].filter(({ group }) => group === name);
   }
 
-  /** Store a value before a change; all changes of one gesture are one step. */
-  remember(name, value, gesture) {
-    const last = this.steps.at(-1);
-    if (!this.first.has(name) || last?.gesture === gesture) return;
-    this.steps.push({ gesture, values: { [name]: value } });
-  }
-
   /** The names of the parameters that are not as they were at first. */
   get changed() {
     return [...this.first.keys()].filter(name => this.value(name) !== this.first.get(name));
   }
 
-  /** The width of a bar [m], which is half of a joint's. */
-  get width() {
-    return [...this.markers.values()].flat().find(({ kind }) => kind === 'joints')?.width / 2;
-  }
-
-  /** The frame of its markers. */
-  get frame() {
-    return [...this.markers.values()].flat()[0]?.frame;
+  /** The marker of its joints; a bar is half as wide. */
+  get joints() {
+    return [...this.markers.values()].flat().find(({ kind }) => kind === 'joints');
   }
 }

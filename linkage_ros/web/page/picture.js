@@ -198,11 +198,11 @@ export class Picture {
       for (let i = 0; i < places.length; i += 2) now.get(mechanism).add(places[i] - this.aside(mechanism), places[i + 1]);
     }
     const boxes = new Map();
-    for (const [{ key, frame }, box] of now) {
+    for (const [{ key, joints }, box] of now) {
       // It was never so large if something far off was drawn that is gone.
       const isGone = box.size > 0 && this.boxes.get(key)?.size > SHRUNK * box.size;
       if (isGone || !this.boxes.has(key)) this.boxes.set(key, new Box());
-      boxes.set(frame, (boxes.get(frame) ?? new Box()).join(this.boxes.get(key).hold(box)));
+      boxes.set(joints?.frame, (boxes.get(joints?.frame) ?? new Box()).join(this.boxes.get(key).hold(box)));
     }
     const all = new Box();
     for (const [frame, { low, high, size }] of boxes) {
@@ -218,8 +218,8 @@ export class Picture {
   }
 
   /** How far a mechanism is drawn aside. */
-  aside({ frame }) {
-    return this.asides.get(frame) ?? 0;
+  aside({ joints }) {
+    return this.asides.get(joints?.frame) ?? 0;
   }
 
   at(x, y) {
@@ -320,7 +320,7 @@ export class Picture {
     context.fillStyle = mixed(shape.colour, 0.8, 'paper');
     this.legs(shape, (places, front) => {
       this.fill(places, () => 1);
-      context.lineWidth = Math.max(2, shape.mechanism.width * this.scale);
+      context.lineWidth = Math.max(2, shape.mechanism.joints?.width / 2 * this.scale);
       context.lineJoin = 'round';
       context.strokeStyle = colour(shape.colour, front);
       context.stroke();
@@ -386,7 +386,7 @@ export class Picture {
   names({ mechanism, seen }) {
     const joints = [...seen.values()];
     const centre = middle(joints);
-    const away = mechanism.width * this.scale + 12;
+    const away = mechanism.joints.width / 2 * this.scale + 12;
     const written = joints.map(([x, y]) => ({ x, y, half: 5, high: 5 }));
     for (const [name, joint] of seen) {
       if (!this.isSeen(...joint)) continue;

@@ -4,6 +4,7 @@
 // A plot of an output over a turn or a stroke of the first input; the other inputs are fixed.
 
 import { button, element, Newest, put, Reason } from './control.js';
+import { isTuned } from './mechanism.js';
 import { beside } from './motion.js';
 import { multiples, paint } from './picture.js';
 import { figures, units } from './units.js';
@@ -98,9 +99,9 @@ export class Plot {
   }
 
   /** Update the plot after a change of a parameter. */
-  update({ group }) {
-    if (group === 'speeds') this.render();
-    else if (group !== 'starts') this.refresh();
+  update(setting) {
+    if (isTuned(setting)) this.refresh();
+    else this.render();
   }
 
   async request() {

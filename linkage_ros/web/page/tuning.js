@@ -51,7 +51,7 @@ export class Tuning {
       // A dimension is displayed with its length in the picture.
       times: () => group === 'dimensions' ? this.mechanism.value('scale') : 1,
     };
-    const request = (value, gesture, before) => this.set(name, value, gesture, before);
+    const request = (value, gesture) => this.set({ [name]: value }, gesture);
     const sides = this.mechanism.sides[name.split('.')[1]];
     if (group === 'branches') return new Choice(description, [[1, sides[0]], [-1, sides[1]]], request);
     if (kind === 'bool') return new Choice(description, SWITCH, request);
@@ -66,34 +66,34 @@ export class Tuning {
     row.addEventListener('focusout', () => this.light(''));
   }
 
-  async set(name, value, gesture, before) {
-    const answer = await this.mechanism.ask('set', { values: { [name]: value } });
-    if (!answer.reason && before !== value) this.mechanism.remember(name, before, gesture);
+  /** Set values; a gesture, all of whose changes are one step of undo, has those before. */
+  async set(values, gesture) {
+    const { mechanism, mechanism: { first, steps } } = this;
+    const before = Object.fromEntries(Object.keys(values).map(name => [name, mechanism.value(name)]));
+    const answer = await mechanism.ask('set', { values });
+    const isStep = Object.keys(values).some(name => first.has(name) && before[name] !== values[name]);
+    if (gesture && isStep && !answer.reason && steps.at(-1)?.gesture !== gesture) steps.push({ gesture, values: before });
     this.renderTools();
     return answer;
   }
 
-  async undo() {
-    const { steps } = this.mechanism;
-    const step = steps.pop();
-    if (step && !await this.put(step.values)) steps.push(step);
-    this.renderTools();
-  }
-
-  async reset() {
-    const { changed, first, steps } = this.mechanism;
-    const values = from => Object.fromEntries(changed.map(name => [name, from(name)]));
-    const before = values(name => this.mechanism.value(name));
-    if (await this.put(values(name => first.get(name)))) steps.push({ values: before });
-    this.renderTools();
-  }
-
   /** Set several values at once; return whether they were accepted. */
-  async put(values) {
-    const { reason } = await this.mechanism.ask('set', { values });
+  async put(values, gesture) {
+    const { reason } = await this.set(values, gesture);
     this.reason.refuse(reason);
     for (const name of Object.keys(values)) this.controls.get(name)?.reason.say();
     return !reason;
+  }
+
+  async undo() {
+    const step = this.mechanism.steps.pop();
+    if (!await this.put(step.values)) this.mechanism.steps.push(step);
+    this.renderTools();
+  }
+
+  reset() {
+    const { changed, first } = this.mechanism;
+    return this.put(Object.fromEntries(changed.map(name => [name, first.get(name)])), {});
   }
 
   async save() {
