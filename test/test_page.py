@@ -130,12 +130,12 @@ def test_a_picture_that_cannot_be_drawn_does_not_keep_the_next_one_from_being_dr
     _, seen = look(LEVER)
     seen.value("""(() => {
         const context = picture.getContext('2d');
-        const { clearRect } = context;
+        const { fillRect } = context;
         window.drawn = 0;
-        context.clearRect = function (...where) {
+        context.fillRect = function (...where) {
             window.drawn += 1;
             if (window.drawn === 3) throw new Error('nothing can be drawn');
-            clearRect.apply(context, where);
+            fillRect.apply(context, where);
         };
     })()""")
     seen.becomes('window.drawn > 10')

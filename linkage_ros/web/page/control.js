@@ -48,13 +48,11 @@ export class Newest {
 /** The line below a control with the reason why a request was not fully granted. */
 export class Reason {
   constructor(id = nextId()) {
-    this.line = element('p', { className: 'reason', id, hidden: true });
-    this.line.setAttribute('role', 'alert');
+    this.line = element('p', { className: 'reason', id, role: 'alert', hidden: true });
   }
 
   say(words = '') {
-    this.line.textContent = words;
-    this.line.hidden = !words;
+    put(this.line, { textContent: words, hidden: !words });
   }
 
   /** Say why a request was refused; an empty reason: it was not. */
@@ -197,8 +195,7 @@ export class Choice {
       this.reason.refuse(reason);
       if (!reason) this.update(one);
     })]);
-    this.group = element('span', { className: 'choice', ariaLabel: label }, ...this.buttons.map(([, each]) => each));
-    this.group.setAttribute('role', 'group');
+    this.group = element('span', { className: 'choice', role: 'group', ariaLabel: label }, ...this.buttons.map(([, each]) => each));
     this.row = element('div', { className: 'row', title }, element('span', { textContent: label }), this.group, this.reason.line);
     this.update(value);
   }
@@ -206,7 +203,7 @@ export class Choice {
   update(value) {
     if (value !== this.value) this.reason.say();
     this.value = value;
-    for (const [one, each] of this.buttons) each.setAttribute('aria-pressed', one === value);
+    for (const [one, each] of this.buttons) put(each, { ariaPressed: String(one === value) });
   }
 
   render() {}

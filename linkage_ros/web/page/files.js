@@ -4,7 +4,6 @@
 // Downloads of a mechanism: its outputs, its picture, its robot model, its C code.
 
 import { button, element, Reason } from './control.js';
-import { paint } from './picture.js';
 
 const FORMS = {
   CSV: ['csv', 'All outputs over a turn or a stroke, in radians and metres, the input at 1 rad/s or 1 m/s'],
@@ -23,23 +22,13 @@ export function download(name, ...parts) {
   setTimeout(() => URL.revokeObjectURL(href), 1000);
 }
 
-/** The picture on its paper. */
-function painted() {
-  const seen = document.getElementById('picture');
-  const { width, height } = seen;
-  const canvas = element('canvas', { width, height });
-  const context = canvas.getContext('2d');
-  context.fillStyle = paint('--paper');
-  context.fillRect(0, 0, width, height);
-  context.drawImage(seen, 0, 0);
-  return new Promise(done => { canvas.toBlob(done); });
-}
+const picture = () => new Promise(done => { document.getElementById('picture').toBlob(done); });
 
 /** The buttons that download. */
 export function files(mechanism) {
   const reason = new Reason();
   const save = async (form, ending) => {
-    const { reason: why, text } = form === 'PNG' ? { text: await painted() } : await mechanism.ask('export', { form: form.toLowerCase() });
+    const { reason: why, text } = form === 'PNG' ? { text: await picture() } : await mechanism.ask('export', { form: form.toLowerCase() });
     reason.say(why && `Not saved: ${why}`);
     if (text) download(`${mechanism.name}.${ending}`, text);
   };

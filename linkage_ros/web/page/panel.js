@@ -3,7 +3,8 @@
 
 // The panel: motion, plot and parameters of each displayed mechanism.
 
-import { element } from './control.js';
+import { isOpen } from './connection.js';
+import { element, put } from './control.js';
 import { files } from './files.js';
 import { Motion } from './motion.js';
 import { Plot } from './plot.js';
@@ -82,7 +83,9 @@ export class Panel {
   }
 
   poll() {
-    for (const { mechanism, motion, inSight } of this.sections.values()) {
+    for (const { mechanism, motion, inSight, still } of this.sections.values()) {
+      const silent = performance.now() - mechanism.lastMarkers;
+      put(still, { hidden: !isOpen() || silent < STILL, textContent: `No markers for ${Math.round(silent / 1000)} s` });
       if (mechanism.space) continue;
       if (inSight || this.arrows || !motion.inputs.size) motion.poll(this.arrows);
     }
@@ -107,14 +110,5 @@ export class Panel {
 
   render() {
     for (const { parts } of this.sections.values()) for (const part of parts) part.render();
-  }
-
-  /** Show which mechanisms send no markers. */
-  check(now) {
-    for (const { mechanism, still } of this.sections.values()) {
-      const silent = now - mechanism.lastMarkers;
-      still.hidden = silent < STILL;
-      still.textContent = `No markers for ${Math.round(silent / 1000)} s`;
-    }
   }
 }

@@ -5,7 +5,7 @@
 
 import { put } from './control.js';
 import { figures, units } from './units.js';
-import { middle } from './view.js';
+import { middle } from './pointer.js';
 
 const MARGIN = 44;
 /** What is seen is not smaller [m]. */
@@ -112,15 +112,14 @@ export class Picture {
     this.named = true;
     /** The kind of arrows, or none. */
     this.kind = '';
-    /** The view; see view.js. */
+    /** The view; see pointer.js. */
     this.view = null;
     this.mechanisms = [];
     /** The boxes of mechanisms, seen from a direction, and how far each frame is drawn aside. */
     this.boxes = new Map();
     this.asides = new Map();
-    /** The mechanism and the dimension whose bars are lit, and the pointer that drags a joint. */
+    /** The mechanism and the dimension whose bars are lit. */
     this.lit = { mechanism: null, dimension: '' };
-    this.drag = null;
     this.legend = document.getElementById('legend');
   }
 
@@ -144,11 +143,12 @@ export class Picture {
       canvas.height = Math.round(height * pixel);
     }
     context.setTransform(pixel, 0, 0, pixel, 0, 0);
-    context.clearRect(0, 0, width, height);
+    context.fillStyle = paint('--paper');
+    context.fillRect(0, 0, width, height);
     const shapes = this.shapes();
     if (!shapes.length) return;
     // The picture is not refitted while a joint is dragged.
-    if (!this.scale || !this.drag.line) this.fit(shapes, width, height);
+    if (!this.scale || !this.view.line) this.fit(shapes, width, height);
     if (!this.view.turned && !this.mechanisms[0].space) this.grid(width, height, shapes[0].map);
     // Slots are drawn first, so that they do not hide bars.
     const rank = ({ kind }) => kind === 'slots' ? 0 : kind === 'joints' ? 2 : 1;
@@ -276,7 +276,7 @@ export class Picture {
     this.stroke(width, places, PIECE.lines, colour(rgba), 1.5);
   }
 
-  /** Draw lines through places, so many coordinates each; return their width. */
+  /** Draw lines through places, so many coordinates each. */
   stroke(width, places, size, style, least = 2) {
     const { context } = this;
     context.lineWidth = Math.max(least, width * this.scale);
@@ -285,7 +285,6 @@ export class Picture {
     context.beginPath();
     for (let i = 0; i < places.length; i += 2) context[i % size ? 'lineTo' : 'moveTo'](...this.at(places[i], places[i + 1]));
     context.stroke();
-    return context.lineWidth;
   }
 
   /** Call back with each leg's part of a shape, the last pair first, and its closeness to the front. */
@@ -303,15 +302,9 @@ export class Picture {
     this.legs(shape, (places, front) => this.stroke(shape.width, places, PIECE.lines, colour(shape.colour, front)));
   }
 
-  /** Draw slots hollow. */
+  /** Draw slots pale, beside what moves in them. */
   slots(shape) {
-    this.legs(shape, (places, front) => {
-      const inner = this.stroke(shape.width, places, PIECE.slots, colour(shape.colour, front)) - 4;
-      if (inner <= 0) return;
-      this.context.strokeStyle = paint('--paper');
-      this.context.lineWidth = inner;
-      this.context.stroke();
-    });
+    this.legs(shape, places => this.stroke(shape.width, places, PIECE.slots, mixed(shape.colour, 0.6, 'paper')));
   }
 
   /** Draw plates pale between their bars. */
@@ -511,7 +504,7 @@ export class Picture {
 
   /** Draw a line from the dragged joint to the pointer. */
   dragLine() {
-    const { line } = this.drag;
+    const { line } = this.view;
     if (!line) return;
     const { context } = this;
     context.setLineDash([6, 6]);

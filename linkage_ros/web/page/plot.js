@@ -70,8 +70,7 @@ export class Plot {
     this.other = element('input', { type: 'text', placeholder: 'distance(A,C)', ariaLabel: 'Another output', onchange: () => choose(this.other.value.trim() || undefined) });
     const enlarging = button('Enlarge', () => this.element.requestFullscreen(), { hidden: !document.fullscreenEnabled });
     this.now = element('div', { className: 'now' });
-    this.place = element('div', { className: 'plot', tabIndex: 0, ariaLabel: 'No curve yet' });
-    this.place.setAttribute('role', 'img');
+    this.place = element('div', { className: 'plot', role: 'img', tabIndex: 0, ariaLabel: 'No curve yet' });
     this.read = element('p', { className: 'answer' });
     this.marks = element('p', { className: 'answer' });
     this.reason = new Reason();
