@@ -176,7 +176,7 @@ def test_what_every_node_is_given_is_of_the_node_that_reads_it(show):
               if setting['name'] == 'crank.speed')
     assert (speed['low'], speed['high']) == (-100.0, 100.0) and '[rad/s]' in speed['meaning']
     assert running.value('leg.crank.speed') == -2.5
-    assert 'rate: 20.0' in page.ask('save', mechanism='/leg')['text']
+    assert 'rate: 20.0' in page.ask('export', mechanism='/leg', form='yaml')['text']
 
 
 def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
@@ -282,7 +282,7 @@ def test_what_is_saved_starts_the_tuned_scene_again(show, tmp_path):
     lever = again.mechanisms('/lever', '/drop')['/lever']
     assert lever['inputs']['crank']['speed'] == 2.0
     file = tmp_path / 'tuned.yaml'
-    file.write_text(again.ask('save', mechanism='/lever')['text'])
+    file.write_text(again.ask('export', mechanism='/lever', form='yaml')['text'])
     lever, drop = scene.load(str(file)).machines.values()
     assert (lever.linkage.dimensions['a'], lever.scale) == (81.25, 0.01)
     assert (lever.first.start, lever.first.speed) == (0.75, 2.0)
@@ -311,11 +311,11 @@ def test_what_is_saved_or_exported_is_the_mechanism_as_it_is(page):
     defined = {'lever.scale': 1.0, 'drop.scale': 1.0, **{
         parameter.name: parameter.value for parameter in scene.read(LEVER).parameters
         if '.dimensions.' in parameter.name}}
-    saved = yaml.safe_load(page.ask('save', mechanism='/drop')['text'])
+    saved = yaml.safe_load(page.ask('export', mechanism='/drop', form='yaml')['text'])
     assert saved == {'/**': {'ros__parameters': {**LEVER, **defined}}}
     machine = scene.read(LEVER).machines['lever']
     assert [page.ask('export', mechanism='/lever', form=form)['text']
-            for form in ('csv', 'urdf', 'c')] == [
+            for form in ('csv', 'urdf', 'h')] == [
         curves.exported(machine, [0.0], 'csv', ''), urdf.describe([machine], 'world'),
         header.written(machine)]
 
@@ -405,7 +405,7 @@ def test_where_an_input_is_that_nobody_has_named_is_not_guessed(graph, show):
     assert [page.ask(op, mechanism='/leg', **more)['reason'] for op, more in (
         ('pose', {}), ('curve', {}), ('export', {'form': 'csv'}))] == [
         'the crank is not known yet: no message names leg_crank'] * 3
-    assert page.ask('export', mechanism='/leg', form='c')['reason'] == ''
+    assert page.ask('export', mechanism='/leg', form='h')['reason'] == ''
 
     def inputs():
         crank_states.publish(JointState(name=['leg_crank'], position=[2.0]))

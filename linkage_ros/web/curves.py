@@ -124,10 +124,10 @@ def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSIT
 
 
 def exported(mechanism: SceneMechanism, present: Sequence[float], form: str, frame_id: str) -> str:
-    """Return a text: 'csv', all kinds of all outputs in rad and m; 'urdf'; or 'c'."""
+    """Return a text: 'csv', all kinds of all outputs in rad and m; 'urdf'; or 'h', of C."""
     if form == 'urdf':
         return urdf.describe([mechanism], mechanism.frame_id or frame_id)
-    if form == 'c':
+    if form == 'h':
         return header.written(mechanism)
     sweep, text = Sweep(mechanism, present), io.StringIO()
     columns = {f'{sweep.input.name} [{sweep.input.unit}]': sweep.values, **{

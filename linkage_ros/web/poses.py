@@ -62,8 +62,8 @@ def drawn(mechanism: SceneMechanism, speeds: Mapping[str, float]) -> dict[str, A
     Describe what the page needs to know of a mechanism beside its parameters and markers.
 
     `points` are the joints of a leg in markers, `legs` the number of legs, `pairs` of those on one
-    side. Each input has its unit, allowed `arcs` [rad or m], `turn` [rad] after which poses repeat
-    (None: never), and speed when it plays. `sides` are the words for a branch of +1 and of -1.
+    side. Each input has its unit, `ends` of its slider [rad or m], `turn` [rad] after which poses
+    repeat (None: never), and speed when it plays. `sides` are the words for a branch of +1 and of -1.
     """
     return {
         'space': mechanism.in_space, 'points': mechanism.points, 'pairs': mechanism.leg_pairs,
@@ -71,7 +71,8 @@ def drawn(mechanism: SceneMechanism, speeds: Mapping[str, float]) -> dict[str, A
         'sides': {name: mechanism.linkage.line_of(name).sides or SIGNS
                   for name in mechanism.linkage.branches},
         'inputs': {name: {
-            'unit': drive.input.unit, 'arcs': drive.arcs, 'speed': speeds[name],
+            'unit': drive.input.unit, 'speed': speeds[name],
+            'ends': [min(low for low, _ in drive.arcs), max(high for _, high in drive.arcs)],
             'turn': drive.input.turn if drive.input.wraps else None}
             for name, drive in mechanism.inputs.items()}}
 

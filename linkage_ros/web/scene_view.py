@@ -208,22 +208,23 @@ class SceneView:
             curves.curve, *self._state(self._find(mechanism)), **about)
 
     async def export(self, mechanism: str, form: str) -> Answer:
-        """Return the result of `curves.exported`."""
+        """Return the result of `curves.exported`, or as 'yaml' the mechanism's scene."""
         shown = self._find(mechanism)
         whole = self._scenes[shown.owner]
-        state = (whole.machines[shown.name], []) if form == 'c' else self._state(shown)
+        if form == 'yaml':
+            return {'text': await asyncio.to_thread(self._saved, shown.owner)}
+        state = (whole.machines[shown.name], []) if form == 'h' else self._state(shown)
         return {'text': await asyncio.to_thread(
             curves.exported, *state, form, whole.frame_id)}
 
-    async def save(self, mechanism: str) -> Answer:
-        """Return a parameter file of a mechanism's scene: its definition and changed values."""
-        owner = self._find(mechanism).owner
+    def _saved(self, owner: str) -> str:
+        """Return a parameter file of a node's scene: its definition and changed values."""
         whole = self._scenes[owner]
         names = {parameter.name for parameter in whole.parameters}
         # An input that was stopped is saved with the speed that it had.
         speeds = {name: speed for name, speed in self._speeds[owner].items() if name in names}
-        return {'text': await asyncio.to_thread(lambda: writing.in_yaml(writing.without_defaults(
-            scene.changed(whole, speeds, strict=False), DEFINES)))}
+        return writing.in_yaml(writing.without_defaults(
+            scene.changed(whole, speeds, strict=False), DEFINES))
 
     async def read(self, text: str) -> Answer:
         """Return the result of `poses.number`."""

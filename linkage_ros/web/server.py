@@ -44,7 +44,7 @@ HEADERS = {
 }
 # What the browser sends when it has drawn a picture, and its requests: methods of SceneView.
 DRAWN = '"drawn"'
-REQUESTS = 'set', 'pose', 'tune', 'curve', 'export', 'save', 'read'
+REQUESTS = 'set', 'pose', 'tune', 'curve', 'export', 'read'
 # Size of a request; requests that wait; time in which a browser reads a message, and closes.
 MAX_BYTES, MAX_WAITING, MAX_READ_S, MAX_CLOSE_S = 1 << 16, 64, 10.0, 1.0
 MAX_REASON = 299

@@ -23,12 +23,10 @@ function inWords({ name, arcs, unit }) {
 /** An angle plus the whole turns that bring it nearest to another. */
 export const beside = (value, other, turn) => turn ? value + turn * Math.round((other - value) / turn) : value;
 
-const ends = ({ arcs }) => [Math.min(...arcs.map(([low]) => low)), Math.max(...arcs.map(([, high]) => high))];
-
 /** The slider of an input, which follows it, with buttons for a step back and on. */
 class InputSlider extends Slider {
   constructor(name, input, value, want) {
-    const [low, high] = ends(input);
+    const [low, high] = input.ends;
     super({
       label: name, unit: input.unit, kind: 'double', group: 'starts', value, digits: FIGURES, low, high,
       title: `The ${name} [${input.unit}]. Moved by hand it stops there.`,
@@ -53,7 +51,7 @@ class InputSlider extends Slider {
   }
 
   show(input, value) {
-    const [low, high] = ends(this.input = input);
+    const { ends: [low, high] } = this.input = input;
     if (low !== this.low || high !== this.high) this.bound(low, high);
     this.follow(this.beside(value));
   }

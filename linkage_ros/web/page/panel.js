@@ -5,7 +5,6 @@
 
 import { isOpen } from './connection.js';
 import { element, put } from './control.js';
-import { files } from './files.js';
 import { Motion } from './motion.js';
 import { Plot } from './plot.js';
 import { Tuning } from './tuning.js';
@@ -35,7 +34,7 @@ class Section {
     this.element = element('section', { ariaLabel: title },
       element('header', {}, element('h2', { textContent: title }),
         element('span', { className: 'about', textContent: type === name ? '' : type }), this.motion.play),
-      about, this.still, this.motion.element, ...this.tuning.speeds, this.tuning.element, files(mechanism));
+      about, this.still, this.motion.element, ...this.tuning.speeds, this.tuning.element, this.tuning.files());
     this.element.dataset.key = key;
     // Foldings that are open in the section that this one replaces are open here.
     const openTitles = [...old?.element.querySelectorAll('details[open] > summary') ?? []].map(one => one.textContent);

@@ -20,8 +20,6 @@ const HEAD = 9;
 /** Where a name is tried: beside its joint from the side away from the middle on, then farther out. */
 const TURNS = [1, 1.9].flatMap(ring => [0, 1, -1, 2, -2, 3, -3, 4].map(eighth => [ring, eighth * Math.PI / 4]));
 const MAX_LINES = 100;
-/** The number of coordinates of a line, a triangle, a joint, by the kind of their marker. */
-const PIECE = { lines: 4, slots: 4, plates: 6, triangles: 6, joints: 2 };
 /** A linkage in space is seen from the front, from the right and above. */
 const OBLIQUE = { right: [0.8, 0.6, 0], up: [-0.168, 0.224, 0.96], out: [0.576, -0.768, 0.28] };
 const FONT = "13px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
@@ -267,31 +265,26 @@ export class Picture {
     this.context.stroke();
   }
 
-  locus({ width, places, colour: rgba }) {
-    this.stroke(width, places, places.length, colour(rgba), 1.5);
+  locus(shape) {
+    this.stroke(shape, shape.places, colour(shape.colour), 1.5);
   }
 
-  /** Curves as a list of lines. */
-  loci({ width, places, colour: rgba }) {
-    this.stroke(width, places, PIECE.lines, colour(rgba), 1.5);
-  }
-
-  /** Draw lines through places, so many coordinates each. */
-  stroke(width, places, size, style, least = 2) {
+  /** Draw the lines of a shape through places. */
+  stroke({ width, piece }, places, style, least = 2) {
     const { context } = this;
     context.lineWidth = Math.max(least, width * this.scale);
     context.strokeStyle = style;
     context.lineJoin = context.lineCap = 'round';
     context.beginPath();
-    for (let i = 0; i < places.length; i += 2) context[i % size ? 'lineTo' : 'moveTo'](...this.at(places[i], places[i + 1]));
+    for (let i = 0; i < places.length; i += 2) context[i % (2 * piece) ? 'lineTo' : 'moveTo'](...this.at(places[i], places[i + 1]));
     context.stroke();
   }
 
   /** Call back with each leg's part of a shape, the last pair first, and its closeness to the front. */
-  legs({ mechanism, kind, places }, draw) {
+  legs({ mechanism, piece, places }, draw) {
     const { pairs, legs } = mechanism;
     const size = places.length / legs;
-    if (size % PIECE[kind]) return draw(places, 0);
+    if (size % (2 * piece)) return draw(places, 0);
     for (let leg = legs - 1; leg >= 0; leg--) {
       const pair = Math.floor(leg * pairs / legs);
       draw(places.subarray(leg * size, (leg + 1) * size), pairs > 1 ? 1 - pair / (pairs - 1) : 0);
@@ -299,12 +292,12 @@ export class Picture {
   }
 
   lines(shape) {
-    this.legs(shape, (places, front) => this.stroke(shape.width, places, PIECE.lines, colour(shape.colour, front)));
+    this.legs(shape, (places, front) => this.stroke(shape, places, colour(shape.colour, front)));
   }
 
   /** Draw slots pale, beside what moves in them. */
   slots(shape) {
-    this.legs(shape, places => this.stroke(shape.width, places, PIECE.slots, mixed(shape.colour, 0.6, 'paper')));
+    this.legs(shape, places => this.stroke(shape, places, mixed(shape.colour, 0.6, 'paper')));
   }
 
   /** Draw plates pale between their bars. */
@@ -330,7 +323,7 @@ export class Picture {
   fill(places, magnified) {
     const { context } = this;
     context.beginPath();
-    for (let i = 0; i < places.length; i += PIECE.triangles) {
+    for (let i = 0; i < places.length; i += 6) {
       const [[x, y], ...others] = [0, 2, 4].map(k => this.at(places[i + k], places[i + k + 1]));
       const factor = magnified(Math.max(...others.map(([a, b]) => Math.hypot(a - x, b - y))));
       context.moveTo(x, y);

@@ -18,16 +18,6 @@ const MAX_BEYOND = 8;
 /** The least range of what is drawn, as a part of its values. */
 const MIN_RANGE = 1e-9;
 
-let loading = null;
-
-/** Load the library once, when the first plot is opened. */
-function library() {
-  loading ??= new Promise((done, failed) => document.head.append(
-    element('link', { rel: 'stylesheet', href: 'vendor/uPlot.min.css' }),
-    element('script', { src: 'vendor/uPlot.iife.min.js', onload: done, onerror: failed })));
-  return loading;
-}
-
 const options = names => names.map(textContent => element('option', { textContent }));
 
 const shown = value => value === null || value === undefined ? '—' : figures(value, FIGURES);
@@ -105,7 +95,7 @@ export class Plot {
 
   async request() {
     const { kind: { value: kind }, about } = this;
-    const [answer] = await Promise.all([this.mechanism.ask('curve', { kind, output: this.chosen[about] }), library()]);
+    const answer = await this.mechanism.ask('curve', { kind, output: this.chosen[about] });
     this.reason.say(answer.reason);
     if (answer.reason) this.chosen[about] = this.curve?.about === about ? this.curve.output : undefined;
     if (answer.reason || about !== this.about || !this.element.open) return;

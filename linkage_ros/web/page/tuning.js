@@ -1,13 +1,23 @@
 // SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// The parameters of a mechanism: a control for each, undo and reset, and its scene as a file.
+// The parameters of a mechanism: a control for each, undo and reset, and files to download.
 
 import { button, Choice, element, Reason, Slider } from './control.js';
-import { download } from './files.js';
 
 const RESTED = 300;
 const SWITCH = [[true, 'yes'], [false, 'no']];
+const FORMS = {
+  'scene file': ['yaml', 'The scene as it is now'],
+  CSV: ['csv', 'All outputs over a turn or a stroke, in radians and metres, the input at 1 rad/s or 1 m/s'],
+  PNG: ['png', 'The present view'],
+  URDF: ['urdf', 'The robot model'],
+  C: ['h', 'A C99 header for a microcontroller'],
+};
+/** What there is not of a linkage in space. */
+const PLANAR = ['csv', 'urdf'];
+
+const picture = () => new Promise(done => { document.getElementById('picture').toBlob(done); });
 
 /** A parameter's name without the part that its group in the panel implies. */
 function labelled({ name, group }, inputs) {
@@ -29,7 +39,7 @@ export class Tuning {
       return element('details', { open: unfolded, hidden: !rows.length }, element('summary', { textContent: title }), ...rows);
     };
     this.element = element('div', {},
-      element('div', { className: 'tools' }, this.undoing, this.resetting, button('Save as scene file', () => this.save()), this.reason.line),
+      element('div', { className: 'tools' }, this.undoing, this.resetting, this.reason.line),
       folding('Dimensions', ['dimensions'], open), folding('Branches', ['branches'], open), folding('More', ['starts', 'more'], false));
     this.renderTools();
     this.refresh();
@@ -96,10 +106,21 @@ export class Tuning {
     return this.put(Object.fromEntries(changed.map(name => [name, first.get(name)])), {});
   }
 
-  async save() {
-    const { reason, text } = await this.mechanism.ask('save');
+  /** The buttons that download. */
+  files() {
+    const forms = Object.entries(FORMS).filter(([, [form]]) => !this.mechanism.space || !PLANAR.includes(form));
+    return element('div', { className: 'tools' }, element('span', { className: 'about', textContent: 'Download' }),
+      ...forms.map(([name, [form, title]]) => button(name, () => this.download(form), { title })));
+  }
+
+  /** Let the browser save a file. */
+  async download(form) {
+    const { reason, text } = form === 'png' ? { text: await picture() } : await this.mechanism.ask('export', { form });
     this.reason.say(reason && `Not saved: ${reason}`);
-    if (text) download(`${this.mechanism.name}.yaml`, text);
+    if (!text) return;
+    const href = URL.createObjectURL(new Blob([text]));
+    element('a', { download: `${this.mechanism.name}.${form}`, href }).click();
+    setTimeout(() => URL.revokeObjectURL(href), 1000);
   }
 
   /** Update the ranges of dimensions, once no slider is held. */
