@@ -130,12 +130,12 @@ def test_a_picture_that_cannot_be_drawn_does_not_keep_the_next_one_from_being_dr
     _, seen = look(LEVER)
     seen.value("""(() => {
         const context = picture.getContext('2d');
-        const { clearRect } = context;
+        const { fillRect } = context;
         window.drawn = 0;
-        context.clearRect = function (...where) {
+        context.fillRect = function (...where) {
             window.drawn += 1;
             if (window.drawn === 3) throw new Error('nothing can be drawn');
-            clearRect.apply(context, where);
+            fillRect.apply(context, where);
         };
     })()""")
     seen.becomes('window.drawn > 10')
@@ -188,6 +188,12 @@ def test_a_slider_sets_the_nodes_and_a_refusal_springs_back_and_is_forgotten(loo
     assert re.match(r'Refused: 7000 m; the slider goes from \S+ to \S+ m\. lever.dimensions',
                     seen.reason('lever', 'e'))
     assert abs(value('e')) < 1500.0
+    seen.value('workshop.click()')
+    seen.type('lever', 'e', '7000000')
+    until(lambda: 'e=7000000, a=80000 do not' in seen.reason('lever', 'e'))
+    seen.type('lever', 'speed', '7200')
+    until(lambda: 'from -5729.58 to 5729.58, not 7200' in seen.reason('lever', 'speed'))
+    seen.value('workshop.click()')
     for good in ('150', '151', ''):
         seen.type('lever', 'b', '-150')
         until(lambda: seen.reason('lever', 'b'))
@@ -199,19 +205,6 @@ def test_a_slider_sets_the_nodes_and_a_refusal_springs_back_and_is_forgotten(loo
             # By somebody who comes later.
             running.set('lever.dimensions.b', value('b') + 1.0)
         until(lambda: seen.reason('lever', 'b') == '')
-
-
-@pytest.mark.nightly
-def test_what_was_mistyped_is_said_though_an_earlier_number_is_granted_later(look):
-    running, seen = look(LEVER, 'lever')
-    field = f'{seen.row("lever", "a")}.querySelector("input[type=text]")'
-    seen.value(f"""for (const text of ['80.5', '8x']) {{
-        ({field}).value = text;
-        ({field}).dispatchEvent(new Event('change'));
-    }}""")
-    until(lambda: running.value('lever.dimensions.a') == 80.5)
-    seen.becomes(f'({field}).value === "80.5"')
-    assert seen.reason('lever', 'a').startswith("Refused: '8x' is not a number")
 
 
 @pytest.mark.nightly
@@ -274,7 +267,7 @@ def test_a_bar_and_its_slider_light_up_and_changes_are_undone_and_saved(look, tm
     seen.type('leg', 'g', '37.25')
     until(lambda: value('g') == 37.25)
     seen.downloads(tmp_path)
-    seen.click(seen.button('Save as scene file'))
+    seen.click(seen.button('scene file'))
     saved = tmp_path / 'leg.yaml'
     until(saved.exists)
     dimensions = scene.load(str(saved)).machines['leg'].linkage.dimensions
@@ -704,7 +697,7 @@ def test_titles_are_written_beside_or_below_each_other_wherever_they_are(
         seen = (x >= 0.0) & (x <= width)
         assert (x - 0.5 * wide)[seen].min(initial=width) > 0.0
         assert (x + 0.5 * wide)[seen].max(initial=0.0) < width
-        assert y.max() + 18.0 < height
+        assert y.max() + 9.0 < height
         apart = np.maximum(abs(y[:, None] - y) / 18.0,
                            2.0 * abs(x[:, None] - x) / (wide[:, None] + wide))
         assert apart[~np.eye(len(x), dtype=bool)].min(initial=1.0) > 1.0 - 1e-9
@@ -722,13 +715,13 @@ import('/picture.js').then(({ Picture }) => {
       const [x, y] = [390 * random(), 380 * random()];
       if (places.every(([a, b]) => Math.hypot(x - a, y - b) > 70)) places.push([x, y]);
     }
-    const points = places.map((_, i) => 'joint'.slice(i % 4));
+    const points = places.map((_, i) => 'joint'.slice(i % 4) + i);
     Object.assign(picture, { scale: 1, middle: [0, 0], centre: [0, 0],
       canvas: { clientWidth: 390, clientHeight: 380 } });
     picture.at = (x, y) => [x, y];
     picture.text = (name, x, y) => written.push([x, y, picture.context.measureText(name).width]);
-    picture.names([{ mechanism: { points }, kind: 'joints', width: 6,
-      places: Float64Array.from(places.flat()) }]);
+    picture.names({ mechanism: { joints: { width: 6 } },
+      seen: new Map(points.map((name, i) => [name, places[i]])) });
     return [places, written];
   });
 })"""

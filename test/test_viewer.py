@@ -25,7 +25,7 @@ from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
 from linkage_ros.scene import slider  # noqa: E402
-from linkage_ros.web import curves, poses, scene_view  # noqa: E402
+from linkage_ros.web import curves, scene_view  # noqa: E402
 from linkage_ros.web.scene_view import LATCHED  # noqa: E402
 from rcl_interfaces.msg import (  # noqa: E402
     Parameter as ParameterMessage,
@@ -86,20 +86,19 @@ def test_every_setting_is_described_as_the_scene_has_it(page):
     assert settings == {parameter.name: {
         'name': name, 'value': list(value) if isinstance(value, tuple) else value,
         'kind': field.kind, 'meaning': field.meaning, 'allowed': field.allowed,
-        'unit': field.unit, 'low': low, 'high': high, 'group': groups.get(name, '')}
+        'unit': field.unit, 'group': groups.get(name, '')}
         for parameter in whole.parameters if '.' in parameter.name
         for name, field, value in [(
-            parameter.name.partition('.')[2], parameter.field, parameter.value)]
-        for low, high in [slider.ends(whole, parameter) or (None, None)]}
+            parameter.name.partition('.')[2], parameter.field, parameter.value)]}
 
 
 def test_a_page_is_told_of_legs_that_are_added(show):
     page = show(LEG).page()
     first = page.mechanisms('/leg')['/leg']
     assert page.set('/leg', leg_pairs=3) == ''
-    more = page.message('value', name='leg_pairs', value=3)['drawn']
+    more = page.setting('/leg', 'leg_pairs', 3)
     assert page.set('/leg', mirrored=True) == ''
-    both = page.message('value', name='mirrored', value=True)['drawn']
+    both = page.setting('/leg', 'mirrored', True)
     assert [(told['legs'], told['pairs']) for told in (first, more, both)] == [
         (1, 1), (3, 3), (6, 3)]
 
@@ -108,21 +107,19 @@ def test_a_slider_sets_the_node_that_owns_the_parameter_and_others_changes_are_s
     running = show(LEVER)
     page = running.page()
     assert page.set('/lever', dimensions__b=160) == page.set('/lever', crank__speed=-2.5) == ''
-    page.message('value', mechanism='/lever', name='dimensions.b', value=160.0)
-    page.message('value', mechanism='/lever', name='crank.speed', value=-2.5)
+    page.setting('/lever', 'dimensions.b', 160.0)
+    page.setting('/lever', 'crank.speed', -2.5)
     assert running.value('lever.dimensions.b') == 160.0
     assert running.value('lever.crank.speed') == -2.5
     running.set('drop.crank.speed', 3.25)
-    page.message('value', mechanism='/drop', name='crank.speed', value=3.25)
+    page.setting('/drop', 'crank.speed', 3.25)
 
 
 @pytest.mark.parametrize('values, reason', [
     ({'dimensions__b': -150.0}, r'lever\.dimensions\.b .*-150'),
     ({'dimensions__b': 'long'}, 'lever.dimensions.b must be a finite number'),
     ({'dimensions__b': True}, 'lever.dimensions.b must be a finite number'),
-    ({'dimensions__q': 1.0}, "lever has no parameter 'dimensions.q'"),
-    ({'type': 'jansen'}, 'lever.type is no number, .*: use ros2 param set .*lever.type'),
-    ({'points': ['L']}, 'lever.points is no number'),
+    ({'type': 'jansen'}, 'read-only parameter: lever.type'),
     ({'dimensions__a': 10.0, 'dimensions__e': 700.0}, 'be assembled'),
     ({'branches__L': 5}, r'lever\.branches\.L'),
 ])
@@ -160,9 +157,9 @@ def test_announcements_that_make_no_sense_change_nothing(graph, show):
             publisher.publish(ParameterEvent(node=node, new_parameters=values))
     publisher.publish(ParameterEvent(node='/crank_driver', changed_parameters=[
         Parameter('lever.crank.speed', value=3.25).to_parameter_msg()]))
-    page.message('value', mechanism='/lever', name='crank.speed', value=3.25)
+    page.setting('/lever', 'crank.speed', 3.25)
     assert page.set('/lever', dimensions__b=152.0) == ''
-    page.message('value', mechanism='/lever', name='dimensions.b', value=152.0)
+    page.setting('/lever', 'dimensions.b', 152.0)
     json.dumps(page.messages, allow_nan=False)
     answer = page.pose('/lever')
     assert answer['reason'] == '' and 'crank' in answer['inputs']
@@ -179,7 +176,7 @@ def test_what_every_node_is_given_is_of_the_node_that_reads_it(show):
               if setting['name'] == 'crank.speed')
     assert (speed['low'], speed['high']) == (-100.0, 100.0) and '[rad/s]' in speed['meaning']
     assert running.value('leg.crank.speed') == -2.5
-    assert 'rate: 20.0' in page.ask('save', mechanism='/leg')['text']
+    assert 'rate: 20.0' in page.ask('export', mechanism='/leg', form='yaml')['text']
 
 
 def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
@@ -212,7 +209,7 @@ def test_an_input_goes_again_to_where_it_started_though_that_is_a_middle_or_an_e
         graph, show, parameters):
     cranks = graph.listen(JointState, 'crank_states')
     name, page = parameters['mechanisms'][0], show(parameters).page()
-    arcs = poses.arcs(scene.read(parameters).machines[name].first)
+    arcs = scene.read(parameters).machines[name].first.arcs
 
     def away(value):
         states = dict(zip(cranks[-1].name, cranks[-1].position)) if cranks else {}
@@ -248,9 +245,7 @@ def test_a_lever_that_is_dragged_beyond_its_reach_goes_to_its_end(show, lengths,
 @pytest.mark.parametrize('key, want, reason', [
     ('/gone', {}, "no mechanism '/gone'; there are: /lever, /drop"),
     ('/drop', {'output': 'lever', 'value': 0.1}, "no output 'lever'"),
-    ('/drop', {'joint': 'X', 'place': [0.0, 0.0]}, "joint must be one of .*, not 'X'"),
-    ('/drop', {'joint': 'P', 'place': [0.0, 0.0], 'leg': 1}, 'leg must be a whole number below 1'),
-    ('/drop', {'joint': 'P', 'place': [0.0]}, 'place must be two finite numbers'),
+    ('/drop', {'joint': 'X', 'place': [0.0, 0.0]}, "water_drop has no point 'X'; allowed: O, C, "),
 ])
 def test_what_cannot_be_brought_about_says_why(lever, page, key, want, reason):
     assert re.search(reason, page.pose(key, **want)['reason'])
@@ -275,19 +270,19 @@ def test_what_is_saved_starts_the_tuned_scene_again(show, tmp_path):
     running = show({**LEVER, 'drop.pose': [0.0, 0.0, 0.5, 1.5, 0.0, 0.0]})
     page = running.page()
     assert page.set('/lever', **{'dimensions.a': 81.25, 'scale': 0.01}) == ''
-    page.message('value', mechanism='/lever', name='scale', value=0.01)
+    page.setting('/lever', 'scale', 0.01)
     assert page.set('/lever', crank__speed=2.0) == ''
-    page.message('value', mechanism='/lever', name='crank.speed', value=2.0)
+    page.setting('/lever', 'crank.speed', 2.0)
     page.pose('/lever', output='crank', value=0.75)
-    stopped = page.message('value', mechanism='/lever', name='crank.speed', value=0.0)
-    assert stopped['drawn']['inputs']['crank']['speed'] == 2.0
-    page.message('value', mechanism='/lever', name='crank.start', value=0.75)
+    stopped = page.setting('/lever', 'crank.speed', 0.0)
+    assert stopped['inputs']['crank']['speed'] == 2.0
+    page.setting('/lever', 'crank.start', 0.75)
     # Whoever opens the page again finds it stopped, and what it had before.
     again = running.page()
     lever = again.mechanisms('/lever', '/drop')['/lever']
     assert lever['inputs']['crank']['speed'] == 2.0
     file = tmp_path / 'tuned.yaml'
-    file.write_text(again.ask('save', mechanism='/lever')['text'])
+    file.write_text(again.ask('export', mechanism='/lever', form='yaml')['text'])
     lever, drop = scene.load(str(file)).machines.values()
     assert (lever.linkage.dimensions['a'], lever.scale) == (81.25, 0.01)
     assert (lever.first.start, lever.first.speed) == (0.75, 2.0)
@@ -304,24 +299,23 @@ def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(page):
             ('drop', 'OC', {'a': 'OC OA AB AP BP CB'.split()})):
         answer = page.ask('tune', mechanism=f'/{name}')
         ends = {parameter.name.partition('.')[2]: slider.ends(whole, parameter)
-                for parameter in whole.machines[name].parameters
-                if '.dimensions.' in parameter.name}
+                for parameter in whole.machines[name].parameters}
         assert {**answer, 'id': 0} == {
             'op': 'answer', 'id': 0, 'reason': '', 'fixed': list(fixed),
             'bars': {f'dimensions.{key}': [list(pair) for pair in pairs]
                      for key, pairs in bars.items()},
-            'travel': {key: list(pair) for key, pair in ends.items()}}
+            'travel': {key: pair and list(pair) for key, pair in ends.items()}}
 
 
 def test_what_is_saved_or_exported_is_the_mechanism_as_it_is(page):
     defined = {'lever.scale': 1.0, 'drop.scale': 1.0, **{
         parameter.name: parameter.value for parameter in scene.read(LEVER).parameters
         if '.dimensions.' in parameter.name}}
-    saved = yaml.safe_load(page.ask('save', mechanism='/drop')['text'])
+    saved = yaml.safe_load(page.ask('export', mechanism='/drop', form='yaml')['text'])
     assert saved == {'/**': {'ros__parameters': {**LEVER, **defined}}}
     machine = scene.read(LEVER).machines['lever']
     assert [page.ask('export', mechanism='/lever', form=form)['text']
-            for form in ('csv', 'urdf', 'c')] == [
+            for form in ('csv', 'urdf', 'h')] == [
         curves.exported(machine, [0.0], 'csv', ''), urdf.describe([machine], 'world'),
         header.written(machine)]
 
@@ -411,7 +405,7 @@ def test_where_an_input_is_that_nobody_has_named_is_not_guessed(graph, show):
     assert [page.ask(op, mechanism='/leg', **more)['reason'] for op, more in (
         ('pose', {}), ('curve', {}), ('export', {'form': 'csv'}))] == [
         'the crank is not known yet: no message names leg_crank'] * 3
-    assert page.ask('export', mechanism='/leg', form='c')['reason'] == ''
+    assert page.ask('export', mechanism='/leg', form='h')['reason'] == ''
 
     def inputs():
         crank_states.publish(JointState(name=['leg_crank'], position=[2.0]))
@@ -458,7 +452,7 @@ def test_an_input_that_is_moved_is_there_while_messages_may_be_older(graph, show
     assert after(math.inf) == 1.75
     monkeypatch.setattr(scene_view, 'MAX_MOVE_S', 0.0)
     assert [crank(output='crank', value=2.5), crank()] == [2.5, 1.75]
-    page.message('value', name='crank.start', value=2.5)
+    page.setting('/leg', 'crank.start', 2.5)
     # A start moves an input only if it is another than before.
     assert crank(output='crank', value=2.5) == 2.5
     assert running.value('leg.crank.start') == math.nextafter(2.5, 0.0)

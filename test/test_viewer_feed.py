@@ -27,7 +27,9 @@ def frame_of(markers):
     return [({'mechanism': '/leg', 'topic': 'markers', 'markers': [
         {'kind': {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'locus', Marker.SPHERE_LIST:
                   'joints', Marker.TRIANGLE_LIST: 'triangles'}[marker.type],
-         'frame': marker.header.frame_id, 'width': marker.scale.x, 'points': len(marker.points),
+         'piece': {Marker.LINE_LIST: 2, Marker.SPHERE_LIST: 1, Marker.TRIANGLE_LIST: 3}.get(
+             marker.type, len(marker.points)), 'frame': marker.header.frame_id,
+         'width': marker.scale.x, 'points': len(marker.points),
          'pose': [*parts(marker.pose.position), *parts(marker.pose.orientation)],
          'colour': parts(marker.color)} for marker in markers]}, [
              [list(map(np.float32, parts(point))) for point in marker.points]

@@ -19,6 +19,7 @@ pytest.importorskip('rclpy')
 
 from linkage_ros import mechanisms, scene  # noqa: E402
 from linkage_ros.web import curves, poses  # noqa: E402
+from linkage_ros.web.nearest_pose import theta_of  # noqa: E402
 from viewer_harness import DOUBLE, example, EXAMPLES, machine_of  # noqa: E402
 
 
@@ -45,9 +46,9 @@ def test_the_page_is_told_what_it_draws_and_moves(path):
             start = [one.start for one in machine.inputs.values()]
             other = [value + (turn or 0.0) * (one == key)
                      for one, value in zip(machine.inputs, start)]
-            for joint, place in machine.linkage.solve(poses.theta_of(start)).items():
+            for joint, place in machine.linkage.solve(theta_of(start)).items():
                 np.testing.assert_allclose(
-                    machine.linkage.solve(poses.theta_of(other))[joint], place, atol=1e-9)
+                    machine.linkage.solve(theta_of(other))[joint], place, atol=1e-9)
 
 
 @pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
@@ -86,7 +87,7 @@ def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
         for kind, per in (('position', ''), ('velocity', '/s'), ('acceleration', '/s²'))
         for output, unit in outputs.items()), *(
         f'transmission angle {joint} [rad]' for joint in linkage.transmission_angles(
-            poses.theta_of([drive.start / machine.scale_of(key)
+            theta_of([drive.start / machine.scale_of(key)
                             for key, drive in machine.inputs.items()]))), *(
         f'force ratio {output} [{ratio[unit + input_.unit]}]'
         for output, unit in outputs.items())]
@@ -95,8 +96,8 @@ def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
     own = [x / machine.scale_of(input_.name), *(
         value / machine.scale_of(other.name) for other, value in zip(others, present[1:]))]
     columns = dict(zip(heads, table[:, 1:-1]))
-    truth = linkage.joint_angles(poses.theta_of(own), list(outputs))
-    sharp = linkage.transmission_angles(poses.theta_of(own))
+    truth = linkage.joint_angles(theta_of(own), list(outputs))
+    sharp = linkage.transmission_angles(theta_of(own))
     for joint in angles:
         np.testing.assert_allclose(columns[f'transmission angle {joint} [rad]'], sharp[joint],
                                    rtol=1e-9, atol=1e-9)
@@ -126,7 +127,7 @@ def test_arrows_are_how_the_joints_move_in_the_picture(name, kind):
     def places(time):
         own = [(start + time * speed) / machine.scale_of(name)
                for start, (name, speed) in zip(starts, speeds.items())]
-        solved = machine.linkage.solve(poses.theta_of(own))
+        solved = machine.linkage.solve(theta_of(own))
         return {joint: machine.scale * place for joint, place in solved.items()}
 
     found, h = poses.arrows(machine, starts, kind, speeds), 1e-4
@@ -155,7 +156,7 @@ def test_an_input_goes_where_it_is_wanted_or_as_near_as_it_gets(
     found, missed = poses.reached(machine, present, {'output': input_, 'value': value})
     assert dict(zip(machine.inputs, found)) == pytest.approx(
         {**dict(zip(machine.inputs, present)), input_: expected}, rel=1e-15)
-    assert missed == (reach and {'name': input_, 'arcs': [reach],
+    assert missed == (reach and {'name': input_, 'arcs': (reach,),
                                  'unit': machine.inputs[input_].input.unit})
 
 
@@ -189,7 +190,7 @@ def test_an_input_goes_to_the_nearest_of_two_arcs_and_not_where_nothing_can_be_a
             0.0 if inside else min(ends), abs=1e-12)
         assert expected is None or found == expected
     five, = scene.read({'mechanisms': ['five_bar']}).machines.values()
-    with pytest.raises(poses.Refused, match='^five_bar cannot be assembled there$'):
+    with pytest.raises(scene.SceneError, match='^five_bar cannot be assembled there$'):
         poses.reached(five, [1.9, 1.24], {'output': 'crank2', 'value': -1.9})
 
 
@@ -331,8 +332,8 @@ def test_no_line_goes_through_a_pole():
     curve = curves.curve(machine, [0.3], 'force ratio', 'lever')
     x, y = np.array(curve['x']), np.array(curve['y'], float)
     turns = math.pi - math.acos(80.0 / 150.0)
-    gaps = x[np.isnan(y)].reshape(2, 3)
-    np.testing.assert_allclose(gaps[:, 1], [-turns, turns], atol=1e-3)
+    gaps = x[np.isnan(y)].reshape(2, 2)
+    assert (gaps[:, 0] < [-turns, turns]).all() and ([-turns, turns] < gaps[:, 1]).all()
     assert np.ptp(gaps, axis=1).max() < 0.02
     assert (np.diff(x) >= 0.0).all()
     # Wherever two neighbours are joined, the ratio is of one sign.

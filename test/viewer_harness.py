@@ -171,6 +171,13 @@ class Page:
         return until(lambda: [message for message in self.messages if {
             **message, 'op': op, **fields} == message], (op, fields))[0]
 
+    def setting(self, key, name, value):
+        """Return the first description of a mechanism in which a parameter has a value."""
+        return until(lambda: [about for about in self.messages if about['op'] == 'mechanism'
+                              and about['key'] == key and any(
+                                  (one['name'], one['value']) == (name, value)
+                                  for one in about['settings'])], (key, name, value))[0]
+
     def mechanisms(self, *keys):
         """Return the mechanisms by key, when these are all there are, with settings."""
         def known():
@@ -262,6 +269,7 @@ class Seen(browser.Browser):
     def slide(self, name, label, part):
         """Drag a slider from where it is to a part of its way."""
         slider = f'{self.row(name, label)}.querySelector("input")'
+        self.becomes(f'!{slider}.disabled')
         x, y, width = self.middle(slider)
         at = self.value(f'(({slider}).value - ({slider}).min) / (({slider}).max - ({slider}).min)')
         left, inner = x - 0.5 * width + 8.0, width - 16.0

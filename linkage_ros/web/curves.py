@@ -8,22 +8,18 @@ from typing import Any, Optional, Sequence
 
 import numpy as np
 
-from .poses import linkage_inputs, Refused, theta_of
-from .settings import shown
+from .nearest_pose import theta_of
+from .poses import linkage_inputs, shown
 from ..c_code import header
 from ..linkage import ascending, sampled
 from ..robot_model import urdf
-from ..scene import SceneMechanism
-from ..words import listed, meant, quoted
+from ..scene import SceneError, SceneMechanism
 
 SAMPLES = 361
 KINDS = POSITION, VELOCITY, ACCELERATION, TRANSMISSION, FORCE = (
     'position', 'velocity', 'acceleration', 'transmission angle', 'force ratio')
-# Quantities without poles, and the power of the speed with which the others grow.
-BOUNDED = POSITION, TRANSMISSION
-POWERS = {VELOCITY: 1, ACCELERATION: 2}
-# An end of the reach this near to a dead point [rad, or of the stroke] is that dead point.
-SAME = 1e-9
+# By quantity: the power of the input's speed with which it grows, and what that adds to its unit.
+POWERS, PER = {VELOCITY: 1, ACCELERATION: 2}, {VELOCITY: '/s', ACCELERATION: '/s²'}
 # Units of the force ratio, by the units of output and input.
 FORCES = {('rad', 'm'): 'N·m/N', ('m', 'rad'): 'N/(N·m)'}
 
@@ -39,26 +35,23 @@ class Sweep:
     def __init__(self, mechanism: SceneMechanism, present: Sequence[float],
                  dense_ends: bool = False) -> None:
         self._mechanism, self.linkage = mechanism, mechanism.linkage
-        self.input = mechanism.first.input
-        self._size = mechanism.scale_of(self.input.name)
+        self.input, self._size = mechanism.first.input, mechanism.scales[0]
         _, *others = np.atleast_1d(linkage_inputs(mechanism, present))
         reach, dead = self.linkage.reach(*others), self.linkage.dead_points(*others)
         if not reach:
-            raise Refused(f'{mechanism.name} cannot be assembled where its other inputs are')
+            raise SceneError(f'{mechanism.name} cannot be assembled where its other inputs are')
+        is_whole = self.input.is_whole(reach)
         # A NaN separates two arcs.
         values = ascending(np.concatenate([
             *(np.linspace(low, high, SAMPLES) for low, high in reach),
-            *(sampled(low, high) for low, high in reach
-              if dense_ends and not self.input.is_whole(reach)),
+            *(sampled(low, high) for low, high in reach if dense_ends and not is_whole),
             [0.5 * (before + after) for (_, before), (after, _) in zip(reach, reach[1:])]]))
         still = [0.0] * len(others)
         self._inputs, self._speeds, self._still = map(theta_of, (
             [values, *others], [1.0 / self._size, *still], [0.0, *still]))
         self.values, self.dead = values * self._size, np.multiply(dead, self._size)
-        # The ends of the reach that are no dead points; a full rotation has none.
-        self.ends = [] if self.input.is_whole(reach) else [
-            end for end in np.multiply(np.ravel(reach), self._size).tolist()
-            if (self.input.apart(end, self.dead) > SAME * self.input.size).all()]
+        # A full rotation has no ends.
+        self.ends = np.multiply([] if is_whole else np.ravel(reach), self._size)
 
     def names(self, kind: str) -> list[str]:
         """Return the joints with a transmission angle, or the outputs."""
@@ -74,7 +67,7 @@ class Sweep:
         unit = 'rad' if kind == TRANSMISSION or self.linkage.is_angle(name) else 'm'
         if kind == FORCE:
             return FORCES.get((unit, self.input.unit), '')
-        return unit + {VELOCITY: '/s', ACCELERATION: '/s²'}.get(kind, '')
+        return unit + PER.get(kind, '')
 
     @np.errstate(all='ignore')
     def of(self, kind: str, names: Sequence[str]) -> dict[str, np.ndarray]:
@@ -93,18 +86,6 @@ class Sweep:
         factor = 1.0 / self._size if kind == VELOCITY else 1.0
         return {name: value * factor * size(name) for name, value in values.items()}
 
-    def poles(self, kind: str, name: str) -> np.ndarray:
-        """Return inputs [rad or m] at which a quantity may be infinite."""
-        if kind in BOUNDED:
-            return np.empty(0)
-        rate = self.of(VELOCITY, (name,))[name]
-        with np.errstate(all='ignore'):
-            part = rate[:-1] / (rate[:-1] - rate[1:])
-            turned = (rate[:-1] * rate[1:] < 0.0) & np.isfinite(part) & (kind == FORCE)
-        x = self.values
-        at = (x[:-1] + part * np.diff(x))[turned]
-        return np.sort([*at, *(dead for dead in self.dead if x[0] < dead < x[-1])])
-
 
 def plots(mechanism: SceneMechanism) -> dict[str, str]:
     """Return of what each of KINDS is plotted: an 'output' or a 'joint'; {} for no plot."""
@@ -112,44 +93,42 @@ def plots(mechanism: SceneMechanism) -> dict[str, str]:
         kind: 'joint' if kind == TRANSMISSION else 'output' for kind in KINDS}
 
 
+@np.errstate(invalid='ignore')
 def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSITION,
           output: Optional[str] = None) -> dict[str, Any]:
     """
     Return one of KINDS over the first input: x and y in `units`, y None where it has none.
 
-    `dead` are the dead points, `ends` the other ends of the reach; y grows with the `power` of the
+    `dead` are the dead points, `ends` those of the reach; y grows with the `power` of the
     input's speed.
     """
-    if kind not in KINDS:
-        raise ValueError(f'kind must be one of {", ".join(KINDS)}, not {quoted(kind)}')
-    sweep = Sweep(mechanism, present, dense_ends=kind in BOUNDED)
+    sweep = Sweep(mechanism, present, dense_ends=True)
     names = sweep.names(kind)
     output = names[0] if names and output is None else output or ''
-    if not (output in names or kind != TRANSMISSION and sweep.linkage.has_output(output)):
-        raise Refused(f'there is no {kind} of {quoted(output)}; there is of {listed(names)}'
-                      f'{meant(output, names)}')
+    if kind != TRANSMISSION:
+        sweep.linkage.check_there(output)
     x, y, unit = sweep.values, sweep.of(kind, (output,))[output], sweep.unit(kind, output)
-    poles = sweep.poles(kind, output)
-    after = np.searchsorted(x, poles)
-    # A visible gap.
-    y[after - 1] = y[after] = np.nan
-    x, y = np.insert(x, after, poles), np.insert(y, after, np.nan)
+    # No line is drawn through a pole.
+    after = np.searchsorted(x, sweep.dead[(x[0] < sweep.dead) & (sweep.dead < x[-1])])
+    if kind == FORCE:
+        after = np.append(after, 1 + np.flatnonzero(y[:-1] * y[1:] < 0.0))
+    if kind not in (POSITION, TRANSMISSION):
+        y[after - 1] = y[after] = np.nan
     if (kind, unit) == (POSITION, 'rad'):
         known = np.isfinite(y)
         y[known] = np.unwrap(y[known])
     return {'input': sweep.input.name, 'output': output, 'names': names,
             'units': [sweep.input.unit, unit], 'power': POWERS.get(kind, 0), 'x': x.tolist(),
-            'y': list(map(shown, y.tolist())), 'ends': sweep.ends, 'dead': sweep.dead.tolist()}
+            'y': list(map(shown, y.tolist())),
+            'ends': sweep.ends.tolist(), 'dead': sweep.dead.tolist()}
 
 
 def exported(mechanism: SceneMechanism, present: Sequence[float], form: str, frame_id: str) -> str:
-    """Return a text: 'csv', all kinds of all outputs in rad and m; 'urdf'; or 'c'."""
+    """Return a text: 'csv', all kinds of all outputs in rad and m; 'urdf'; or 'h', of C."""
     if form == 'urdf':
         return urdf.describe([mechanism], mechanism.frame_id or frame_id)
-    if form == 'c':
+    if form == 'h':
         return header.written(mechanism)
-    if form != 'csv':
-        raise ValueError(f'form must be csv, urdf or c, not {quoted(form)}')
     sweep, text = Sweep(mechanism, present), io.StringIO()
     columns = {f'{sweep.input.name} [{sweep.input.unit}]': sweep.values, **{
         f'{kind} {name} [{sweep.unit(kind, name) or 1}]': values for kind in KINDS

@@ -12,12 +12,13 @@ from visualization_msgs.msg import Marker
 from ..nodes import messages
 from ..nodes.message_layout import deserialized
 
-# How the page draws a marker, by its type; for some of kinematics' markers, by type and id.
-KINDS = {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'locus', Marker.SPHERE_LIST: 'joints',
-         Marker.TRIANGLE_LIST: 'triangles'}
-KINDS_BY_ID = {(Marker.LINE_LIST, messages.GUIDES_ID): 'slots',
-               (Marker.LINE_LIST, messages.LOCUS_ID): 'loci',
-               (Marker.TRIANGLE_LIST, messages.PLATES_ID): 'plates'}
+# How the page draws a marker, and how many points are a piece of it, all if 0: by its type; for
+# some of kinematics' markers by type and id.
+KINDS = {Marker.LINE_LIST: ('lines', 2), Marker.LINE_STRIP: ('locus', 0),
+         Marker.SPHERE_LIST: ('joints', 1), Marker.TRIANGLE_LIST: ('triangles', 3)}
+KINDS_BY_ID = {(Marker.LINE_LIST, messages.GUIDES_ID): ('slots', 2),
+               (Marker.LINE_LIST, messages.LOCUS_ID): ('locus', 2),
+               (Marker.TRIANGLE_LIST, messages.PLATES_ID): ('plates', 3)}
 
 
 class Feed:
@@ -53,8 +54,9 @@ class Feed:
         Return the markers of the newest message for the page.
 
         A frame has the length of a header [bytes], uint32; the header, JSON: mechanism, topic and,
-        for each of its `markers`, kind, frame, pose (x, y, z, qx, qy, qz, qw), width [m], colour
-        and number of points; then all points, float32 x, y, z. Numbers are little-endian.
+        for each of its `markers`, kind, points a piece, frame, pose (x, y, z, qx, qy, qz, qw),
+        width [m], colour and number of points; then all points, float32 x, y, z. Numbers are
+        little-endian.
         """
         if self.newest is not None and self.newest is not self._converted:
             self._converted = self.newest
@@ -83,7 +85,8 @@ class Feed:
 
 def _described(marker: Marker) -> dict[str, Any]:
     place, turn, colour = marker.pose.position, marker.pose.orientation, marker.color
-    return {'kind': KINDS_BY_ID.get((marker.type, marker.id), KINDS[marker.type]),
-            'frame': marker.header.frame_id, 'width': marker.scale.x, 'points': len(marker.points),
+    kind, piece = KINDS_BY_ID.get((marker.type, marker.id), KINDS[marker.type])
+    return {'kind': kind, 'piece': piece or len(marker.points), 'points': len(marker.points),
+            'frame': marker.header.frame_id, 'width': marker.scale.x,
             'pose': [place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w],
             'colour': [colour.r, colour.g, colour.b, colour.a]}

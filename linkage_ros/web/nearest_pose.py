@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import Sequence
+from typing import Any, Sequence
 
 import numpy as np
 
@@ -18,6 +18,11 @@ LEASH = 0.1
 GAUSS_NEWTON_STEPS, STEP_HALVINGS = 60, 12
 
 
+def theta_of(values: Any) -> Any:
+    """Return the inputs as an argument of a linkage: a sequence only if there are several."""
+    return values if len(values) > 1 else values[0]
+
+
 def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
                    present: Sequence[float], arcs: Sequence[Sequence[Sequence[float]]]
                    ) -> np.ndarray:
@@ -28,13 +33,35 @@ def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
     its `arcs`, a sequence of (low, high). Raises ValueError if the joint does not exist, or the
     linkage cannot be assembled on these arcs.
     """
-    goal = np.asarray(place, float)
-    if len(linkage.inputs) > 1:
+    goal, sizes = np.asarray(place, float), np.array([input_.size for input_ in linkage.inputs])
+    if len(sizes) > 1:
         low, high = np.array([input_arcs[0] for input_arcs in arcs]).T
-        start = np.clip(present, low, high)
+        value = np.clip(present, low, high)
     else:
-        start, low, high = _nearest_sample(linkage, joint, goal, present[0], arcs[0])
-    return _descended(linkage, joint, goal, start, low, high)
+        value, low, high = _nearest_sample(linkage, joint, goal, present[0], arcs[0])
+
+    def gap_at(inputs: np.ndarray) -> np.ndarray:
+        error: np.ndarray = goal - linkage.solve(theta_of(inputs), (joint,))[joint]
+        return error
+
+    gap = gap_at(value)
+    for _ in range(GAUSS_NEWTON_STEPS):
+        rates = np.stack([linkage.velocity(theta_of(value), (joint,), by)[joint]
+                          for by in range(len(value))], axis=1) * sizes
+        if not np.isfinite(rates).all():
+            break
+        # An input at its end stays there if the gap pulls it beyond.
+        pull = gap @ rates
+        free = ~((value <= low) & (pull < 0.0) | (value >= high) & (pull > 0.0))
+        step = sizes * np.linalg.lstsq(rates * free, gap, rcond=None)[0]
+        for part in 0.5 ** np.arange(STEP_HALVINGS):
+            tried = np.clip(value + part * step, low, high)
+            if np.hypot(*gap_at(tried)) < np.hypot(*gap):
+                break
+        else:
+            break
+        value, gap = tried, gap_at(tried)
+    return value
 
 
 def _nearest_sample(linkage: Mechanism, joint: str, goal: np.ndarray, present: float,
@@ -49,35 +76,3 @@ def _nearest_sample(linkage: Mechanism, joint: str, goal: np.ndarray, present: f
         samples, present) / np.ptp(samples)
     row, column = divmod(int(np.nanargmin(away)), DRAG_SAMPLES)
     return [np.array([value]) for value in (samples[row, column], *arcs[row])]
-
-
-def _descended(linkage: Mechanism, joint: str, goal: np.ndarray, value: np.ndarray,
-               low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Return the inputs within their ends at a local minimum of the distance (Gauss-Newton)."""
-    single = len(value) == 1
-    sizes = np.array([input_.size for input_ in linkage.inputs])
-
-    def gap_at(inputs: np.ndarray) -> np.ndarray:
-        error: np.ndarray = goal - linkage.solve(inputs[0] if single else inputs, (joint,))[joint]
-        return error
-
-    gap = gap_at(value)
-    for _ in range(GAUSS_NEWTON_STEPS):
-        rates = np.stack([linkage.velocity(value[0] if single else value, (joint,), i)[joint]
-                          for i in range(len(value))], axis=1) * sizes
-        if not np.isfinite(rates).all() or not np.isfinite(gap).all():
-            break
-        free = np.ones(len(value), bool)
-        for _ in value:
-            step = np.zeros(len(value))
-            step[free] = np.linalg.lstsq(rates[:, free], gap, rcond=None)[0]
-            free &= ~((value <= low) & (step < 0.0) | (value >= high) & (step > 0.0))
-        step[~free] = 0.0
-        for part in 0.5 ** np.arange(STEP_HALVINGS):
-            tried = np.clip(value + part * step * sizes, low, high)
-            if np.hypot(*gap_at(tried)) < np.hypot(*gap):
-                break
-        else:
-            break
-        value, gap = tried, gap_at(tried)
-    return value

@@ -9,16 +9,18 @@ from typing import Any, Mapping, Optional, Sequence
 
 import numpy as np
 
-from .nearest_pose import nearest_inputs
-from .settings import is_number, shown
-from ..linkage import Arc, Formula, Mechanism
+from .nearest_pose import nearest_inputs, theta_of
+from ..linkage import Formula, Mechanism
 from ..robot_model.shapes import ground_frame
-from ..scene import InputSettings, Scene, SceneMechanism, slider
+from ..scene import InputSettings, Parameter, Scene, SceneError, SceneMechanism, slider
+from ..scene.scene_mechanism import divided
 from ..words import listed, quoted
 
 ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
 _, ACCELERATION, FORCE = ARROWS
 SIGNS = '+1', '−1'
+# Kinds of parameters with a control.
+CONTROLLED = 'double', 'integer', 'bool'
 # Change of a dimension that detects dependent bars, as a fraction of the longest bar.
 NUDGE = 1e-6
 # Tolerance of an input at its end.
@@ -27,13 +29,32 @@ CLOSE = 1e-9
 ROUNDING = 1e-12
 
 
-class Refused(Exception):
-    """A refused request; the text has the reason."""
-
-
 # A request's inputs, and what is reached if they do not meet it exactly: name of the input or
 # output, its `arcs` and their `unit`.
 Reached = tuple[list[float], Optional[dict[str, Any]]]
+
+
+def shown(value: Any) -> Any:
+    """Return a value for JSON: None for a number that is not finite."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def name_in_mechanism(parameter: Parameter) -> str:
+    """Return the name of a parameter without its mechanism."""
+    return parameter.name.partition('.')[2]
+
+
+def setting(parameter: Parameter) -> dict[str, Any]:
+    """
+    Describe a parameter for the page.
+
+    The page has a control for it in a `group`, or none if that is empty.
+    """
+    field = parameter.field
+    has_control = not field.read_only and field.kind in CONTROLLED
+    return {'name': name_in_mechanism(parameter), 'value': parameter.value,
+            'kind': field.kind, 'meaning': field.meaning, 'allowed': field.allowed,
+            'unit': field.unit, 'group': (field.group or 'more') if has_control else ''}
 
 
 def drawn(mechanism: SceneMechanism, speeds: Mapping[str, float]) -> dict[str, Any]:
@@ -41,8 +62,8 @@ def drawn(mechanism: SceneMechanism, speeds: Mapping[str, float]) -> dict[str, A
     Describe what the page needs to know of a mechanism beside its parameters and markers.
 
     `points` are the joints of a leg in markers, `legs` the number of legs, `pairs` of those on one
-    side. Each input has its unit, allowed `arcs` [rad or m], `turn` [rad] after which poses repeat
-    (None: never), and speed when it plays. `sides` are the words for a branch of +1 and of -1.
+    side. Each input has its unit, `ends` of its slider [rad or m], `turn` [rad] after which poses
+    repeat (None: never), and speed when it plays. `sides` are the words for a branch of +1 and -1.
     """
     return {
         'space': mechanism.in_space, 'points': mechanism.points, 'pairs': mechanism.leg_pairs,
@@ -50,7 +71,8 @@ def drawn(mechanism: SceneMechanism, speeds: Mapping[str, float]) -> dict[str, A
         'sides': {name: mechanism.linkage.line_of(name).sides or SIGNS
                   for name in mechanism.linkage.branches},
         'inputs': {name: {
-            'unit': drive.input.unit, 'arcs': arcs(drive), 'speed': speeds[name],
+            'unit': drive.input.unit, 'speed': speeds[name],
+            'ends': [min(low for low, _ in drive.arcs), max(high for _, high in drive.arcs)],
             'turn': drive.input.turn if drive.input.wraps else None}
             for name, drive in mechanism.inputs.items()}}
 
@@ -95,8 +117,6 @@ def arrows(mechanism: SceneMechanism, present: Sequence[float], kind: str,
     Speeds [rad/s or m/s] are by input. Forces are the loads; `efforts` by input [N m or N] balance
     them.
     """
-    if kind not in ARROWS:
-        raise ValueError(f'arrows must be one of {", ".join(ARROWS)}, not {quoted(kind)}')
     if kind == FORCE:
         efforts = mechanism.efforts(present) if mechanism.loads else ()
         return {'unit': 'N', 'at': {
@@ -118,14 +138,11 @@ def arrows(mechanism: SceneMechanism, present: Sequence[float], kind: str,
 
 def number(text: str) -> dict[str, Any]:
     """Return the `value` of arithmetic such as pi/2, and whether it is in rad (`turns`)."""
-    try:
-        # A number may have a decimal comma; arithmetic has commas in parentheses only.
-        formula = Formula(text if '(' in text else text.replace(',', '.'))
-        if formula.names:
-            raise Refused(f'{quoted(text)} is not a number: {listed(formula.names)} is unknown')
-        value = float(formula.value({}))
-    except ValueError as error:
-        raise Refused(str(error)) from None
+    # A number may have a decimal comma; arithmetic has commas in parentheses only.
+    formula = Formula(text if '(' in text else text.replace(',', '.'))
+    if formula.names:
+        raise SceneError(f'{quoted(text)} is not a number: {listed(formula.names)} is unknown')
+    value = float(formula.value({}))
     return {'value': value, 'turns': bool({'pi', 'deg'} & formula.words.keys())}
 
 
@@ -146,29 +163,21 @@ def reached(mechanism: SceneMechanism, present: Sequence[float],
 
     Raises
     ------
-    Refused
-        If the output or joint does not exist, or has no solution.
-    KeyError, TypeError, ValueError
-        If the request is malformed.
+    ValueError
+        If the output or the joint does not exist, or has no solution.
 
     """
     if 'joint' in want:
         return _joint_at(mechanism, present, **want), None
     name, value = want['output'], want['value']
-    if not is_number(value):
-        raise ValueError(f'value must be a finite number, not {quoted(value)}')
     if name in mechanism.inputs:
         return _input_at(mechanism, present, name, value)
-    if not mechanism.linkage.has_output(name):
-        raise Refused(f'{mechanism.name} has no output {quoted(name)}')
-    if len(mechanism.inputs) > 1:
-        raise Refused(f'only a linkage with one input can be solved for {quoted(name)}')
-    return _output_at(mechanism, present[0], name, value)
+    return _output_at(mechanism, present, name, value)
 
 
 def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
               value: float) -> Reached:
-    drive, ends = mechanism.inputs[name], arcs(mechanism.inputs[name])
+    drive, ends = mechanism.inputs[name], mechanism.inputs[name].arcs
     near = min((min(max(float(drive.input.beside(value, (low + high) / 2.0)), low), high)
                 for low, high in ends), key=lambda end: drive.input.apart(end, value))
     whole = drive.input.is_whole(ends)
@@ -176,89 +185,65 @@ def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
     inputs = [new if key == name else old for key, old in zip(mechanism.inputs, present)]
     places = mechanism.linkage.solve(linkage_inputs(mechanism, inputs))
     if not all(math.isfinite(part) for place in places.values() for part in place):
-        raise Refused(f'{mechanism.name} cannot be assembled there')
+        raise SceneError(f'{mechanism.name} cannot be assembled there')
     missed = not whole and drive.input.apart(near, value) > CLOSE * drive.input.size
     return inputs, {'name': name, 'arcs': ends, 'unit': drive.input.unit} if missed else None
 
 
-def _output_at(mechanism: SceneMechanism, present: float, name: str,
+def _output_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
                value: float) -> Reached:
-    linkage, drive = mechanism.linkage, mechanism.first
-    size, output_size = mechanism.scale_of(drive.input.name), mechanism.scale_of(name)
-    ends = drive.ends and (drive.ends[0] / size, drive.ends[1] / size)
-    solution = float(linkage.servo_for(name, value / output_size, present / size, ends)[0])
-    if math.isfinite(solution):
-        return [solution * size], None
-    spans = linkage.extremes(name, [(low / size, high / size) for low, high in arcs(drive)])
+    solution, _ = mechanism.follow((name,), (value,), present)
+    if math.isfinite(solution[0]):
+        return solution, None
+    linkage, size, (scale,) = mechanism.linkage, mechanism.scale_of(name), mechanism.scales
+    spans = linkage.extremes(name, [(low / scale, high / scale)
+                                    for low, high in mechanism.first.arcs])
     turn = math.tau if linkage.is_angle(name) else math.inf
-    _, nearest = min((abs(math.remainder(extreme - value / output_size, turn)), at)
+    _, nearest = min((abs(math.remainder(extreme - value / size, turn)), at)
                      for span in spans for extreme, at in span)
-    return [nearest * size], {
+    return [nearest * scale], {
         'name': name, 'unit': 'rad' if linkage.is_angle(name) else 'm',
-        'arcs': [(low * output_size, high * output_size) for (low, _), (high, _) in spans]}
+        'arcs': [(low * size, high * size) for (low, _), (high, _) in spans]}
 
 
 def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, place: Any,
               leg: int = 0) -> list[float]:
-    if not (isinstance(place, list) and len(place) == 2 and all(map(is_number, place))):
-        raise ValueError(f'place must be two finite numbers, not {quoted(place)}')
-    legs = list(mechanism.assembly().legs.values())
-    if type(leg) is not int or not 0 <= leg < len(legs):
-        raise ValueError(f'leg must be a whole number below {len(legs)}, not {quoted(leg)}')
-    if joint not in mechanism.linkage.points:
-        raise ValueError(f'joint must be one of {listed(mechanism.linkage.points)}, '
-                         f'not {quoted(joint)}')
     # The inputs of this leg and back: for a single leg, those of the linkage in the scene's size.
-    lag, start, side, _ = legs[leg]
-    sizes = [mechanism.scale_of(name) for name in mechanism.inputs]
+    lag, start, side, _ = list(mechanism.assembly().legs.values())[leg]
+    sizes = mechanism.scales
     inputs = nearest_inputs(
         mechanism.linkage, joint,
         [side * place[0] / mechanism.scale, place[1] / mechanism.scale],
         [start + side * (value / size - lag) for value, size in zip(present, sizes)],
-        [[sorted(start + side * (end / size - lag) for end in arc) for arc in arcs(drive)]
+        [[sorted(start + side * (end / size - lag) for end in arc) for arc in drive.arcs]
          for drive, size in zip(mechanism.inputs.values(), sizes)])
     return [float(lag + side * (value - start)) * size for value, size in zip(inputs, sizes)]
 
 
-def arcs(drive: InputSettings) -> list[Arc]:
-    """Return the allowed intervals of an input [rad or m]."""
-    return [drive.ends] if drive.ends else list(drive.reach)
-
-
 def next_to(drive: InputSettings, value: float) -> float:
     """Return a neighbour of an input's value, in the same of its allowed intervals."""
-    low, high = min(arcs(drive), key=lambda arc: max(arc[0] - value, value - arc[1]))
+    low, high = min(drive.arcs, key=lambda arc: max(arc[0] - value, value - arc[1]))
     return math.nextafter(value, low if value > low else high)
 
 
 def linkage_inputs(mechanism: SceneMechanism, values: Sequence[float]) -> Any:
     """Return inputs [rad or m], or their speeds, as an argument of the unscaled linkage."""
-    return theta_of([value / mechanism.scale_of(name)
-                     for name, value in zip(mechanism.inputs, values)])
-
-
-def theta_of(values: Sequence[Any]) -> Any:
-    """Return the inputs as an argument of a linkage: a sequence only if there are several."""
-    return values if len(values) > 1 else values[0]
-
-
-def travel(scene_: Scene, name: str) -> dict[str, Optional[Arc]]:
-    """Return the ends of the slider of each parameter of a mechanism, or None; this is slow."""
-    return {parameter.name[len(name) + 1:]: slider.ends(scene_, parameter)
-            for parameter in scene_.machines[name].parameters}
+    return theta_of(divided(values, mechanism.scales))
 
 
 def tunable(scene_: Scene, name: str) -> dict[str, Any]:
     """
-    Return `travel` and `bars` of each dimension of a mechanism by its parameter.
+    Return the `travel` of a mechanism's parameters, and `bars` that follow its dimensions.
 
-    These are the ends of its slider, and the pairs of joints that follow it. `fixed` are the
-    joints that do not move.
+    By parameter, these are the ends of its slider, or None, and pairs of joints. `fixed` are the
+    joints that do not move. This is slow.
     """
-    linkage, ends = scene_.machines[name].linkage, travel(scene_, name)
-    names = {f'dimensions.{key}': key for key in linkage.dimensions}
-    return {'travel': {name: ends[name] for name in names}, 'fixed': list(ground_frame(linkage)),
-            'bars': {name: _bars(linkage, key) for name, key in names.items()}}
+    machine = scene_.machines[name]
+    return {'travel': {name_in_mechanism(parameter): slider.ends(scene_, parameter)
+                       for parameter in machine.parameters},
+            'fixed': list(ground_frame(machine.linkage)),
+            'bars': {f'dimensions.{key}': _bars(machine.linkage, key)
+                     for key in machine.linkage.dimensions}}
 
 
 def _bars(linkage: Mechanism, key: str) -> list[tuple[str, str]]:

@@ -8,11 +8,10 @@ from __future__ import annotations
 import asyncio
 from collections import defaultdict
 from contextlib import suppress
-from dataclasses import dataclass, field
 from functools import partial
 import math
 import re
-from typing import Any, Callable, Collection, Mapping, Optional, Sequence, TypeVar
+from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence
 
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import SetParametersAtomically
@@ -23,14 +22,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
-from . import curves, poses, settings
+from . import curves, poses
 from .feed import Feed
-from .poses import Refused
 from .. import scene
-from ..linkage import Arc
 from ..nodes import ownership
 from ..nodes.log import Throttle
-from ..scene import writing
+from ..nodes.parameters import typed
+from ..scene import SceneError, SceneMechanism, writing
 from ..words import quoted
 
 EVENTS_TYPE, INPUTS_TYPE = 'rcl_interfaces/msg/ParameterEvent', 'sensor_msgs/msg/JointState'
@@ -44,26 +42,22 @@ MAX_ANNOUNCE_S, MAX_MOVE_S, MAX_ANSWER_S, RETRY_S = 1.0, 1.0, 3.0, 0.005
 DEFINES = re.compile(r'mechanisms|[^.]+\.(type|scale|dimensions\..+)')
 
 Answer = dict[str, Any]
-Result = TypeVar('Result')
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-@dataclass
-class ShownMechanism:
+class ShownMechanism(NamedTuple):
     """
     A mechanism on the page: prefix of its topics, node, and topics of its inputs.
 
-    `nodes` has the node that announces a parameter, by full name; `ends` are those of its slider,
-    by name in the mechanism, once they are known.
+    `nodes` has the node that announces a parameter, by full name.
     """
 
     key: str
     owner: str
     sources: Sequence[str]
     nodes: Mapping[str, str]
-    ends: dict[str, Optional[Arc]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -96,7 +90,6 @@ class SceneView:
         self.loop: asyncio.AbstractEventLoop
         self._node = node
         self._throttle = Throttle(node.get_logger())
-        self._setting = asyncio.Lock()
         # The topic on which a node announces its parameters, and those of its inputs.
         self._graph: dict[str, tuple[str, list[str]]] = {}
         self._is_stale = True
@@ -148,32 +141,26 @@ class SceneView:
 
         Raises
         ------
-        Refused
+        SceneError
             With the node's reason.
 
         """
-        async with self._setting:
-            shown = self._find(mechanism)
-            parameters = {settings.name_in_mechanism(parameter): parameter
-                          for parameter in self._settings(shown)}
-            requests: dict[str, list[Any]] = defaultdict(list)
-            for name, value in dict(values).items():
-                if name not in parameters:
-                    raise Refused(f'{shown.name} has no parameter {quoted(name)}')
-                node = shown.nodes[parameters[name].name]
-                try:
-                    requests[node].append(settings.message(parameters[name], value, node))
-                except ValueError as error:
-                    raise Refused(str(error)) from None
-            for node, messages in requests.items():
-                if f'{node}/{SETTER}' not in self._entities:
-                    raise Refused(f'{node} is gone')
-                response = await self._call(
-                    self._entities[f'{node}/{SETTER}'],
-                    SetParametersAtomically.Request(parameters=messages))
-                if not response.result.successful:
-                    raise Refused(response.result.reason or f'{node} gives no reason')
-            self._moved.pop(mechanism, None)
+        shown = self._find(mechanism)
+        parameters = {poses.name_in_mechanism(parameter): parameter
+                      for parameter in self._settings(shown)}
+        requests: dict[str, list[Any]] = defaultdict(list)
+        for key, value in values.items():
+            parameter = parameters[key]
+            checked = parameter.field.checked(parameter.name, value)
+            requests[shown.nodes[parameter.name]].append(
+                typed(parameter._replace(value=checked)).to_parameter_msg())
+        for node, messages in requests.items():
+            response = await self._call(
+                self._entities[f'{node}/{SETTER}'],
+                SetParametersAtomically.Request(parameters=messages))
+            if not response.result.successful:
+                raise SceneError(response.result.reason or f'{node} gives no reason')
+        self._moved.pop(mechanism, None)
         return {}
 
     async def pose(self, mechanism: str, want: Optional[Mapping[str, Any]] = None,
@@ -196,13 +183,13 @@ class SceneView:
                 machine, inputs, arrows, self._playing(shown.owner, machine))
         return answer
 
-    async def _hold(self, shown: ShownMechanism, machine: scene.SceneMechanism,
+    async def _hold(self, shown: ShownMechanism, machine: SceneMechanism,
                     inputs: list[float]) -> None:
         """Stop the inputs at requested values."""
         values = {}
         for (name, drive), value in zip(machine.inputs.items(), inputs):
             if f'{machine.name}.{name}.start' not in shown.nodes:
-                raise Refused(f'the {name} cannot be moved: no crank_driver is running')
+                raise SceneError(f'the {name} cannot be moved: no crank_driver is running')
             # An input moves only to a start that differs from the last one.
             values[f'{name}.start'] = poses.next_to(drive, value) if (
                 value == drive.start) else value
@@ -213,29 +200,31 @@ class SceneView:
     async def tune(self, mechanism: str) -> Answer:
         """Return the result of `poses.tunable`."""
         shown = self._find(mechanism)
-        return await self._aside(poses.tunable, self._scenes[shown.owner], shown.name)
+        return await asyncio.to_thread(poses.tunable, self._scenes[shown.owner], shown.name)
 
     async def curve(self, mechanism: str, **about: Any) -> Answer:
         """Return the result of `curves.curve`."""
-        return await self._aside(
-            partial(curves.curve, *self._state(self._find(mechanism)), **about))
+        return await asyncio.to_thread(
+            curves.curve, *self._state(self._find(mechanism)), **about)
 
     async def export(self, mechanism: str, form: str) -> Answer:
-        """Return the result of `curves.exported`."""
+        """Return the result of `curves.exported`, or as 'yaml' the mechanism's scene."""
         shown = self._find(mechanism)
         whole = self._scenes[shown.owner]
-        state = (whole.machines[shown.name], []) if form == 'c' else self._state(shown)
-        return {'text': await self._aside(curves.exported, *state, form, whole.frame_id)}
+        if form == 'yaml':
+            return {'text': await asyncio.to_thread(self._saved, shown.owner)}
+        state = (whole.machines[shown.name], []) if form == 'h' else self._state(shown)
+        return {'text': await asyncio.to_thread(
+            curves.exported, *state, form, whole.frame_id)}
 
-    async def save(self, mechanism: str) -> Answer:
-        """Return a parameter file of a mechanism's scene: its definition and changed values."""
-        owner = self._find(mechanism).owner
+    def _saved(self, owner: str) -> str:
+        """Return a parameter file of a node's scene: its definition and changed values."""
         whole = self._scenes[owner]
         names = {parameter.name for parameter in whole.parameters}
         # An input that was stopped is saved with the speed that it had.
         speeds = {name: speed for name, speed in self._speeds[owner].items() if name in names}
-        return {'text': await self._aside(lambda: writing.in_yaml(writing.without_defaults(
-            scene.changed(whole, speeds), DEFINES)))}
+        return writing.in_yaml(writing.without_defaults(
+            scene.changed(whole, speeds), DEFINES))
 
     async def read(self, text: str) -> Answer:
         """Return the result of `poses.number`."""
@@ -246,15 +235,13 @@ class SceneView:
         self._throttle.warn(subject, lambda: text)
 
     async def _call(self, client: Any, request: Any) -> Any:
-        """Return a service's response; raise Refused if there is none in time."""
+        """Return a service's response; raise SceneError if there is none in time."""
         if await self._until(client.service_is_ready, MAX_ANSWER_S):
             response = client.call_async(request)
-            try:
-                if await self._until(response.done, MAX_ANSWER_S):
-                    return response.result()
-            finally:
-                client.remove_pending_request(response)
-        raise Refused(f'{client.srv_name} does not answer')
+            if await self._until(response.done, MAX_ANSWER_S):
+                return response.result()
+            client.remove_pending_request(response)
+        raise SceneError(f'{client.srv_name} does not answer')
 
     async def _until(self, holds: Callable[[], bool], seconds: float) -> bool:
         """Wait until something holds, at most some time; return whether it does."""
@@ -268,19 +255,9 @@ class SceneView:
         with suppress(RuntimeError):
             self.loop.call_soon_threadsafe(function, *args)
 
-    async def _aside(self, work: Callable[..., Result], *args: Any) -> Result:
-        """Run slow work in another thread; return its result."""
-        try:
-            return await self.loop.run_in_executor(None, work, *args)
-        except scene.SceneError as error:
-            raise Refused(str(error)) from None
-
-    def _state(self, shown: ShownMechanism) -> tuple[scene.SceneMechanism, list[float]]:
+    def _state(self, shown: ShownMechanism) -> tuple[SceneMechanism, list[float]]:
         """Return a mechanism and its last received inputs [rad or m], or their starts."""
         machine = self._scenes[shown.owner].machines[shown.name]
-        if machine.in_space:
-            raise Refused(f'{machine.name} is a linkage in space: the page draws and tunes it, '
-                          'and moves, plots and describes linkages in a plane')
         inputs, until = self._moved.get(shown.key, ([], 0.0))
         if self.loop.time() < until:
             return machine, inputs
@@ -289,7 +266,7 @@ class SceneView:
             position = next((self._positions[topic, drive.source] for topic in shown.sources
                              if (topic, drive.source) in self._positions), None)
             if position is None and f'{machine.name}.{name}.start' not in shown.nodes:
-                raise Refused(f'the {name} is not known yet: no message names {drive.source}')
+                raise SceneError(f'the {name} is not known yet: no message names {drive.source}')
             value = drive.start if position is None else machine.from_source(
                 drive, position, None, None)[0]
             inputs.append(value if math.isfinite(value) else drive.start)
@@ -297,17 +274,13 @@ class SceneView:
 
     def _find(self, key: str) -> ShownMechanism:
         if key not in self._mechanisms:
-            raise Refused(f'there is no mechanism {quoted(key)}; '
+            raise SceneError(f'there is no mechanism {quoted(key)}; '
                           f'there are: {", ".join(self._mechanisms)}')
         return self._mechanisms[key]
 
     def _show(self, client: Any) -> None:
-        client.tell('scene', {'op': 'scene', 'mechanisms': [{
-            'key': key, 'name': shown.name, **self._drawn(shown), 'settings': [
-                settings.described(
-                    parameter, shown.ends.get(settings.name_in_mechanism(parameter)))
-                for parameter in self._settings(shown)]}
-            for key, shown in self._mechanisms.items()]})
+        client.tell('scene', {'op': 'scene', 'mechanisms': list(
+            map(self._described, self._mechanisms.values()))})
         for feed in [*self._feeds.values()]:
             client.offer(feed)
 
@@ -317,13 +290,14 @@ class SceneView:
                 for parameter in self._scenes[shown.owner].machines[shown.name].parameters
                 if parameter.name in shown.nodes]
 
-    def _drawn(self, shown: ShownMechanism) -> dict[str, Any]:
-        """Describe what the page needs of a mechanism beside its parameters and markers."""
+    def _described(self, shown: ShownMechanism) -> Answer:
+        """Describe what the page needs of a mechanism beside its markers."""
         machine = self._scenes[shown.owner].machines[shown.name]
-        return {**poses.drawn(machine, self._playing(shown.owner, machine)),
-                'curves': curves.plots(machine)}
+        return {'key': shown.key, 'name': shown.name, 'curves': curves.plots(machine),
+                'settings': list(map(poses.setting, self._settings(shown))),
+                **poses.drawn(machine, self._playing(shown.owner, machine))}
 
-    def _playing(self, owner: str, machine: scene.SceneMechanism) -> dict[str, float]:
+    def _playing(self, owner: str, machine: SceneMechanism) -> dict[str, float]:
         """Return the speeds of a mechanism when it plays: the last ones that were not zero."""
         return {name: self._speeds[owner].get(f'{machine.name}.{name}.speed', drive.default_speed)
                 for name, drive in machine.inputs.items()}
@@ -375,7 +349,7 @@ class SceneView:
         self._scenes, self._mechanisms = {}, {}
         for owner, (_, sources) in sorted(graph.items()):
             # What a node announces may be no scene.
-            with suppress(scene.SceneError):
+            with suppress(SceneError):
                 nodes = self._read(owner)
                 for name in self._scenes[owner].machines:
                     key = f'{_space(owner)}/{name}'
@@ -384,8 +358,6 @@ class SceneView:
                     wanted[f'{key}/markers'] = partial(self._draw, key, MarkerArray, NEWEST)
                     wanted[f'{key}/locus'] = partial(self._draw, key, Marker, LATCHED)
         self._keep(wanted)
-        for shown in [*self._mechanisms.values()]:
-            shown.ends = await self._aside(poses.travel, self._scenes[shown.owner], shown.name)
         for client in self.clients:
             self._show(client)
 
@@ -397,7 +369,7 @@ class SceneView:
         """
         values = self._announced.get(owner, {})
         if 'mechanisms' not in values:
-            raise scene.SceneError(f'{owner} announces no mechanisms')
+            raise SceneError(f'{owner} announces no mechanisms')
         before = self._scenes.get(owner) or scene.read(values)
         nodes = {parameter.name: node for node in (*self._announced, owner)
                  if node in self._graph and _space(node) == _space(owner)
@@ -465,21 +437,13 @@ class SceneView:
             return
         for owner in [*self._scenes] if event.node in self._graph else ():
             whole = self._scenes[owner]
-            with suppress(scene.SceneError):
+            with suppress(SceneError):
                 self._read(owner)
-                self._tell(owner, {parameter.name for parameter in
-                                   self._scenes[owner].changed_from(whole)})
-
-    def _tell(self, owner: str, changed: Collection[str]) -> None:
-        """Tell the pages the changed values of a node's mechanisms, by full name."""
-        for shown in self._mechanisms.values():
-            for parameter in self._settings(shown) if shown.owner == owner else ():
-                if parameter.name in changed:
-                    name = settings.name_in_mechanism(parameter)
-                    message = {'op': 'value', 'mechanism': shown.key, 'name': name,
-                               'value': parameter.value, 'drawn': self._drawn(shown)}
+            for shown in self._mechanisms.values():
+                if shown.owner == owner and (self._scenes[owner].machines[shown.name]
+                                             is not whole.machines[shown.name]):
                     for client in self.clients:
-                        client.tell((shown.key, name), message)
+                        client.tell(shown.key, {'op': 'mechanism', **self._described(shown)})
 
 
 def _space(name: str) -> str:

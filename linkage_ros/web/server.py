@@ -20,7 +20,6 @@ from typing import Any, Callable
 from aiohttp import web, WSCloseCode
 
 from .feed import Feed
-from .poses import Refused
 from .scene_view import SceneView
 from .. import palette
 from ..words import elided, quoted
@@ -45,10 +44,10 @@ HEADERS = {
 }
 # What the browser sends when it has drawn a picture, and its requests: methods of SceneView.
 DRAWN = '"drawn"'
-REQUESTS = 'set', 'pose', 'tune', 'curve', 'export', 'save', 'read'
+REQUESTS = 'set', 'pose', 'tune', 'curve', 'export', 'read'
 # Size of a request; requests that wait; time in which a browser reads a message, and closes.
 MAX_BYTES, MAX_WAITING, MAX_READ_S, MAX_CLOSE_S = 1 << 16, 64, 10.0, 1.0
-MAX_REASON = 200
+MAX_REASON = 299
 
 
 class Server:
@@ -183,6 +182,7 @@ class Client:
 
     def tell(self, key: Any, message: Message) -> None:
         """Send a message; it replaces a waiting one with the same key."""
+        self._texts.pop(key, None)
         self._texts[key] = message
         self._news.set()
 
@@ -237,13 +237,13 @@ class Client:
                 request = dict(json.loads(text))
                 number, op = request.pop('id', None), request.pop('op', None)
                 if op not in REQUESTS:
-                    raise Refused(f'unknown request {quoted(op)}')
+                    raise ValueError(f'unknown request {quoted(op)}')
                 answer = await getattr(self._view, op)(**request)
-            except Refused as reason:
-                answer = {'reason': str(reason)}
+            except ValueError as reason:
+                answer = {'reason': elided(str(reason), MAX_REASON)}
             except Exception as error:
                 # Without an answer the browser would wait forever.
-                answer = {'reason': f'the request fails: {elided(repr(error), MAX_REASON)}'}
+                answer = {'reason': f'the request fails: {elided(repr(error), 200)}'}
                 self._view.warn(answer['reason'])
             await self._send_message({'op': 'answer', 'reason': '', **answer, 'id': number})
 

@@ -16,7 +16,13 @@ from ..nodes import scene_node, shutdown
 from ..optional import needs
 
 VIEWER = 'viewer'
-PORT = 8020
+PORTS = IntegerRange(from_value=0, to_value=65535, step=1)
+# Name, default, description and ranges.
+PARAMETERS = [
+    ('host', '127.0.0.1', 'Address to listen at; 127.0.0.1: for browsers on this machine alone. '
+     'Whoever reaches it can move the scene.', []),
+    ('port', 8020, 'Port to listen at; 0: any that is free.', [PORTS]),
+    ('or_any_port', False, 'Whether to listen at any free port where that one is taken.', [])]
 
 
 class Viewer(Node):
@@ -53,22 +59,15 @@ class Viewer(Node):
         super().destroy_node()
 
     def _served(self, server: Any) -> Any:
-        host = self._declared('host', '127.0.0.1', 'Address to listen at; 127.0.0.1: for browsers '
-                              'on this machine alone. Whoever reaches it can move the scene.')
-        port = self._declared('port', PORT, 'Port to listen at; 0: any that is free.',
-                              integer_range=[IntegerRange(from_value=0, to_value=65535, step=1)])
-        or_any = self._declared('or_any_port', False, 'Whether to listen at any free port where '
-                                'that one is taken.')
+        host, port, or_any_port = (self.declare_parameter(name, default, ParameterDescriptor(
+            description=description, read_only=True, integer_range=ranges)).value
+            for name, default, description, ranges in PARAMETERS)
         try:
             return server(SceneView(self), host, port)
         except OSError as error:
-            if not or_any or error.errno != EADDRINUSE:
+            if not or_any_port or error.errno != EADDRINUSE:
                 raise
             return server(SceneView(self), host, 0)
-
-    def _declared(self, name: str, default: Any, description: str, **ranges: Any) -> Any:
-        return self.declare_parameter(name, default, ParameterDescriptor(
-            description=description, read_only=True, **ranges)).value
 
 
 def main(args: Optional[list[str]] = None) -> int:

@@ -7,16 +7,6 @@ import { figures, read, units } from './units.js';
 
 const STOPS = 1000;
 
-/** How a slider's place in [0, 1] becomes a value, and back: evenly, or fine about zero. */
-const EVEN = {
-  value: (place, low, high) => low + (high - low) * place,
-  place: (value, low, high) => (value - low) / (high - low),
-};
-const FINE_ABOUT_ZERO = {
-  value: (place, low, high) => high * (2 * place - 1) ** 3,
-  place: (value, low, high) => (Math.cbrt(value / high) + 1) / 2,
-};
-
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
 export function element(tag, properties = {}, ...children) {
@@ -58,13 +48,11 @@ export class Newest {
 /** The line below a control with the reason why a request was not fully granted. */
 export class Reason {
   constructor(id = nextId()) {
-    this.line = element('p', { className: 'reason', id, hidden: true });
-    this.line.setAttribute('role', 'alert');
+    this.line = element('p', { className: 'reason', id, role: 'alert', hidden: true });
   }
 
   say(words = '') {
-    this.line.textContent = words;
-    this.line.hidden = !words;
+    put(this.line, { textContent: words, hidden: !words });
   }
 
   /** Say why a request was refused; an empty reason: it was not. */
@@ -73,42 +61,40 @@ export class Reason {
   }
 }
 
-/** A number with a slider. A gesture lasts from its first change to its release. */
+/** A number with a slider. A gesture, an object or null, lasts from its first change to its release. */
 export class Slider {
   constructor({ label, title, unit, low, high, kind, group, value, digits = 6, times = () => 1 }, request) {
     const isWhole = kind === 'integer';
-    const scale = low === -high && group !== 'starts' && !isWhole ? FINE_ABOUT_ZERO : EVEN;
-    Object.assign(this, { unit, low, high, isWhole, scale, digits, times, accepted: value, held: false, gesture: {} });
+    const isEven = isWhole || group === 'starts';
+    Object.assign(this, { unit, isWhole, isEven, digits, times, accepted: value, gesture: null });
     const id = nextId();
-    this.range = element('input', { type: 'range', id, step: 1, min: isWhole ? low : 0, max: isWhole ? high : STOPS });
+    this.range = element('input', { type: 'range', id, step: 1, max: STOPS });
     this.number = element('input', { type: 'text', autocomplete: 'off', ariaLabel: label });
     this.reason = new Reason(`${id}r`);
     for (const input of [this.range, this.number]) input.setAttribute('aria-describedby', `${id}r`);
     this.unitShown = element('span', { className: 'unit' });
     this.row = element('div', { className: 'row', title },
       element('label', { htmlFor: id, textContent: label }), this.range, this.number, this.unitShown, this.reason.line);
-    this.requests = new Newest(async ([requested, gesture]) => this.settle(
-      requested, await request(requested, gesture, this.accepted)));
+    this.requests = new Newest(async ([requested, gesture]) => this.settle(requested, await request(requested, gesture)));
     this.range.oninput = () => {
-      this.held = true;
+      this.gesture ??= {};
       this.number.value = this.shortened(this.chosen);
       this.offer(this.chosen);
     };
     this.range.onchange = () => this.release();
-    this.number.onfocus = () => { this.held = true; };
+    this.number.onfocus = () => { this.gesture ??= {}; };
     this.number.onblur = () => this.release();
-    this.number.oninput = () => { this.mistyped = false; this.explain(); };
+    this.number.oninput = () => this.explain();
     this.number.onchange = () => {
       this.type(this.number.value.trim());
       this.number.blur();
     };
-    this.render();
+    this.bound(low, high);
   }
 
   offer(value) {
-    this.mistyped = false;
     this.offered = value;
-    this.requests.offer([value, this.gesture]);
+    this.requests.offer([value, this.gesture ?? {}]);
   }
 
   /** The present value, or the requested one while a request is pending. */
@@ -124,15 +110,14 @@ export class Slider {
   async type(text) {
     if (!text) return;
     const { value, reason } = await read(text, this.unit, this.factor);
-    this.mistyped = !!reason;
     if (reason) this.explain(`Refused: ${reason}`);
     else this.offer(value);
   }
 
-  /** The value at the slider's place. */
+  /** The value at the slider's place: even, or fine about zero. */
   get chosen() {
     if (this.isWhole) return Number(this.range.value);
-    const value = this.scale.value(this.range.value / STOPS, this.low, this.high);
+    const value = this.middle + this.half * (2 * this.range.value / STOPS - 1) ** this.power;
     return clamp(Number(value.toPrecision(5)), this.low, this.high);
   }
 
@@ -140,10 +125,18 @@ export class Slider {
   settle(requested, { value = requested, reason, inputs }) {
     const refused = reason && !inputs;
     if (!refused) this.accepted = value;
-    const [low, high, wanted] = [this.low, this.high, requested].map(each => this.shortened(each));
+    const [wanted, low, high] = [requested, this.low, this.high].map(each => this.shortened(each));
     const unit = this.unitShown.textContent;
-    if (!this.mistyped) this.explain(refused ? `Refused: ${wanted} ${unit}; the slider goes from ${low} to ${high} ${unit}. ${reason}` : reason, refused);
-    if (!this.held && !this.requests.waiting) this.render();
+    this.explain(refused ? `Refused: ${wanted} ${unit}; the slider goes from ${low} to ${high} ${unit}. ${this.translated(reason)}` : reason, refused);
+    if (!this.gesture && !this.requests.waiting) this.render();
+  }
+
+  /** A node's rule with its numbers and its unit as they are displayed. */
+  translated(reason) {
+    if (this.factor === 1) return reason;
+    return reason.replace(/ must .*/s, rule => rule
+      .replace(/(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)?(?!\w)/g, number => this.shortened(Number(number)))
+      .replace(`] ${this.unit},`, `] ${this.unitShown.textContent},`));
   }
 
   explain(words, refused) {
@@ -152,15 +145,17 @@ export class Slider {
   }
 
   release() {
-    this.held = false;
-    this.gesture = {};
+    this.gesture = null;
     if (!this.requests.busy) this.render();
   }
 
-  /** Set the ends of the range. */
+  /** Set the ends of the range; without them nothing can be slid. */
   bound(low, high) {
-    [this.low, this.high] = [low, high];
-    if (!this.held) this.render();
+    const power = low === -high && !this.isEven ? 3 : 1;
+    Object.assign(this, { low, high, power, middle: (low + high) / 2, half: (high - low) / 2 });
+    if (this.isWhole) put(this.range, { min: low, max: high });
+    this.range.disabled = !(low < high);
+    if (!this.gesture) this.render();
   }
 
   /** Show a value that was set, which another client has done if no request is pending. */
@@ -172,14 +167,14 @@ export class Slider {
   /** Show a value that changes by itself. */
   follow(value) {
     this.accepted = value;
-    if (!this.held && !this.requests.busy) this.render();
+    if (!this.gesture && !this.requests.busy) this.render();
   }
 
   render() {
     put(this.unitShown, { textContent: units.of(this.unit).name });
     if (this.accepted === null) return;
-    this.range.value = this.isWhole ? this.accepted
-      : STOPS * clamp(this.scale.place(this.accepted, this.low, this.high), 0, 1);
+    const part = clamp((this.accepted - this.middle) / this.half, -1, 1);
+    this.range.value = this.isWhole ? this.accepted : STOPS * (Math.sign(part) * Math.abs(part) ** (1 / this.power) + 1) / 2;
     const text = this.shortened(this.accepted);
     put(this.number, { value: text });
     put(this.range, { ariaValueText: `${text} ${this.unitShown.textContent}` });
@@ -196,12 +191,11 @@ export class Choice {
   constructor({ label, title, value }, words, request) {
     this.reason = new Reason();
     this.buttons = words.map(([one, word]) => [one, button(word, async () => {
-      const { reason } = await request(one, {}, this.value);
+      const { reason } = await request(one, {});
       this.reason.refuse(reason);
       if (!reason) this.update(one);
     })]);
-    this.group = element('span', { className: 'choice', ariaLabel: label }, ...this.buttons.map(([, each]) => each));
-    this.group.setAttribute('role', 'group');
+    this.group = element('span', { className: 'choice', role: 'group', ariaLabel: label }, ...this.buttons.map(([, each]) => each));
     this.row = element('div', { className: 'row', title }, element('span', { textContent: label }), this.group, this.reason.line);
     this.update(value);
   }
@@ -209,8 +203,10 @@ export class Choice {
   update(value) {
     if (value !== this.value) this.reason.say();
     this.value = value;
-    for (const [one, each] of this.buttons) each.setAttribute('aria-pressed', one === value);
+    for (const [one, each] of this.buttons) put(each, { ariaPressed: String(one === value) });
   }
 
   render() {}
+
+  bound() {}
 }

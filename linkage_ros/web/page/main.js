@@ -3,14 +3,13 @@
 
 // The page: passes the viewer's messages to picture and panel, and requests to the viewer.
 
-import { connect, isOpen, tell } from './connection.js';
+import { connect, tell } from './connection.js';
 import { button, put } from './control.js';
-import { Mechanism } from './mechanism.js';
+import { isTuned, Mechanism } from './mechanism.js';
 import { Panel } from './panel.js';
 import { Picture } from './picture.js';
-import { PointerDrag } from './pointer_drag.js';
+import { View } from './pointer.js';
 import { units } from './units.js';
-import { View } from './view.js';
 
 const REFUSED = 4000;
 const mechanisms = new Map();
@@ -27,19 +26,19 @@ let scheduled = false;
 const store = values => sessionStorage.setItem('kept', JSON.stringify(Object.assign(stored, values)));
 
 const picture = new Picture(at('picture'));
-const panel = new Panel(at('panel'), light, refuse);
-picture.drag = new PointerDrag(picture, {
+const panel = new Panel(at('panel'), light, words => say(words, REFUSED));
+picture.view = new View(picture, stored.from, {
+  changed() {
+    whole.hidden = picture.view.whole;
+    store({ from: picture.view.from });
+    draw();
+  },
   drag(mechanism, want) {
     panel.sections.get(mechanism.key)?.motion.target.offer(want);
     draw();
   },
   light,
   choose: (mechanism, dimension) => panel.sections.get(mechanism.key)?.tuning.goTo(dimension),
-});
-picture.view = new View(picture.canvas, stored.from, () => {
-  whole.hidden = picture.view.whole;
-  store({ from: picture.view.from });
-  draw();
 });
 whole.hidden = picture.view.whole;
 whole.onclick = () => picture.view.reset();
@@ -52,16 +51,11 @@ function light(mechanism, dimension) {
   draw();
 }
 
-/** Show over the picture why it is not available or cannot be moved; an empty text hides it. */
-function say(words) {
+/** Show over the picture why it is not available, or for some time why it cannot be moved; an empty text hides it. */
+function say(words, time) {
   clearTimeout(fading);
   put(notice, { textContent: words, hidden: !words });
-}
-
-/** Say for a while why a joint is not dragged; its part of the panel says so till it is. */
-function refuse(words) {
-  say(words);
-  fading = setTimeout(say, REFUSED, '');
+  if (time) fading = setTimeout(say, time, '');
 }
 
 connect({
@@ -86,15 +80,12 @@ connect({
     show(mechanisms.has(stored.shown) || !mechanisms.size ? stored.shown : '');
   },
 
-  value({ mechanism: key, name, value, drawn }) {
-    const mechanism = mechanisms.get(key);
-    const setting = mechanism?.settings.get(name);
-    if (!setting) return;
-    setting.value = value;
-    Object.assign(mechanism, drawn);
-    panel.sections.get(key)?.update(name, value);
-    if (typeof value !== 'number') show(shown);
-    if (setting.group !== 'speeds' && setting.group !== 'starts') picture.refit(key);
+  mechanism(description) {
+    const { key } = description;
+    const changed = mechanisms.get(key)?.describe(description) ?? [];
+    for (const setting of changed) panel.sections.get(key)?.update(setting);
+    if (changed.some(({ kind }) => kind !== 'double')) show(shown);
+    if (changed.some(isTuned)) picture.refit(key);
   },
 
   /** Frames, each the length of a header, the header, and the points of its markers. */
@@ -162,7 +153,3 @@ names.onchange = workshop.onchange = arrows.onchange = choose;
 choose();
 
 new ResizeObserver(() => draw()).observe(picture.canvas);
-
-setInterval(() => {
-  if (isOpen()) panel.check(performance.now());
-}, 1000);

@@ -5,7 +5,8 @@
 
 import { ask } from './connection.js';
 
-const TUNED = ['dimensions', 'branches', 'more'];
+/** Whether a setting is tuned, and not a motion. */
+export const isTuned = ({ group }) => group && group !== 'speeds' && group !== 'starts';
 
 export class Mechanism {
   constructor() {
@@ -18,14 +19,18 @@ export class Mechanism {
     /** Values to set for undo, one step a gesture, and the first value of each tuned parameter. */
     this.steps = [];
     this.first = new Map();
+    this.settings = new Map();
   }
 
-  describe(description) {
+  /** Adopt a description; return the settings that it changes. */
+  describe({ settings, ...description }) {
     Object.assign(this, description);
-    this.settings = new Map(this.settings.map(setting => [setting.name, setting]));
-    for (const { name, value } of TUNED.flatMap(group => this.group(group))) {
+    const changed = settings.filter(({ name, value }) => String(value) !== String(this.value(name)));
+    this.settings = new Map(settings.map(setting => [setting.name, setting]));
+    for (const { name, value } of settings.filter(isTuned)) {
       if (!this.first.has(name)) this.first.set(name, value);
     }
+    return changed;
   }
 
   /** Request something of the mechanism; return the answer. */
@@ -42,20 +47,13 @@ export class Mechanism {
     return [...this.settings.values()].filter(({ group }) => group === name);
   }
 
-  /** Store a value before a change; all changes of one gesture are one step. */
-  remember(name, value, gesture) {
-    const last = this.steps.at(-1);
-    if (!this.first.has(name) || last?.gesture === gesture) return;
-    this.steps.push({ gesture, values: { [name]: value } });
-  }
-
   /** The names of the parameters that are not as they were at first. */
   get changed() {
     return [...this.first.keys()].filter(name => this.value(name) !== this.first.get(name));
   }
 
-  /** The width of a bar [m], which is half of a joint's. */
-  get width() {
-    return [...this.markers.values()].flat().find(({ kind }) => kind === 'joints')?.width / 2;
+  /** The marker of its joints; a bar is half as wide. */
+  get joints() {
+    return [...this.markers.values()].flat().find(({ kind }) => kind === 'joints');
   }
 }

@@ -23,42 +23,37 @@ function inWords({ name, arcs, unit }) {
 /** An angle plus the whole turns that bring it nearest to another. */
 export const beside = (value, other, turn) => turn ? value + turn * Math.round((other - value) / turn) : value;
 
-const ends = ({ arcs }) => [Math.min(...arcs.map(([low]) => low)), Math.max(...arcs.map(([, high]) => high))];
-
-/** An input: its slider, which follows it, and buttons for a step back and on. */
-class InputRow {
+/** The slider of an input, which follows it, with buttons for a step back and on. */
+class InputSlider extends Slider {
   constructor(name, input, value, want) {
-    const { unit } = this.input = input;
-    const [low, high] = ends(input);
-    this.slider = new Slider({
-      label: name, unit, kind: 'double', group: 'starts', value, digits: FIGURES, low, high,
-      title: `The ${name} [${unit}]. Moved by hand it stops there.`,
+    const [low, high] = input.ends;
+    super({
+      label: name, unit: input.unit, kind: 'double', group: 'starts', value, digits: FIGURES, low, high,
+      title: `The ${name} [${input.unit}]. Moved by hand it stops there.`,
     }, async requested => {
       const answer = await want({ output: name, value: requested });
       return answer.inputs ? { ...answer, value: this.beside(answer.inputs[name]) } : answer;
     });
-    this.slider.range.before(this.button('−', `Step the ${name} back`, -1));
-    this.slider.range.after(this.button('+', `Step the ${name} on`, 1));
-    this.slider.row.classList.add('input');
+    this.input = input;
+    this.range.before(this.button('−', `Step the ${name} back`, -1));
+    this.range.after(this.button('+', `Step the ${name} on`, 1));
+    this.row.classList.add('input');
   }
 
   button(sign, title, way) {
-    return button(sign, () => {
-      const { low, high, expected } = this.slider;
-      const step = this.input.unit === 'rad' ? STEP : (high - low) / STEPS_A_STROKE;
-      this.slider.offer(this.beside(expected + way * step));
-    }, { title, ariaLabel: title });
+    const step = () => way * (this.unit === 'rad' ? STEP : (this.high - this.low) / STEPS_A_STROKE);
+    return button(sign, () => this.offer(this.beside(this.expected + step())), { title, ariaLabel: title });
   }
 
   /** An angle plus the whole turns that put it on the slider. */
   beside(value) {
-    return beside(value, (this.slider.low + this.slider.high) / 2, this.input.turn);
+    return beside(value, this.middle, this.input.turn);
   }
 
   show(input, value) {
-    const [low, high] = ends(this.input = input);
-    if (low !== this.slider.low || high !== this.slider.high) this.slider.bound(low, high);
-    this.slider.follow(this.beside(value));
+    const { ends: [low, high] } = this.input = input;
+    if (low !== this.low || high !== this.high) this.bound(low, high);
+    this.follow(this.beside(value));
   }
 }
 
@@ -77,8 +72,7 @@ class OutputRow {
       const { value, reason } = text ? await read(text, unit, units.of(unit).factor) : {};
       this.value.blur();
       if (value !== undefined) want({ output: name, value });
-      else say({ reason: reason && `Refused: ${reason}` });
-      this.render();
+      else say(reason && `Refused: ${reason}`);
     };
     this.value.onblur = () => this.render();
   }
@@ -89,6 +83,7 @@ class OutputRow {
   }
 
   render() {
+    if (!this.output) return;
     const { value, unit, rates } = this.output;
     if (document.activeElement !== this.value) put(this.value, { [this.editable ? 'value' : 'textContent']: shown(value, unit) });
     put(this.unit, { textContent: units.of(unit).name });
@@ -112,7 +107,7 @@ export class Motion {
     this.element = element('div', {}, this.place, this.reason.line, this.folding);
     this.target = new Newest(async want => {
       const answer = await this.want(want);
-      this.say(answer);
+      this.reason.say(answer.reason);
       if (isOpen()) refuse(answer.reason);
     });
     this.renderPlay();
@@ -124,20 +119,16 @@ export class Motion {
 
   stopOrPlay() {
     const values = Object.fromEntries(Object.entries(this.mechanism.inputs).map(([name, { speed }]) => [`${name}.speed`, this.moves ? 0 : speed]));
-    this.mechanism.ask('set', { values }).then(answer => this.say(answer));
+    this.mechanism.ask('set', { values }).then(answer => this.reason.say(answer.reason));
   }
 
   /** The present inputs. */
   get present() {
-    return [...this.inputs.values()].map(({ slider }) => slider.accepted);
+    return [...this.inputs.values()].map(({ accepted }) => accepted);
   }
 
   renderPlay() {
     put(this.play, { textContent: this.moves ? 'Stop' : 'Play' });
-  }
-
-  say({ reason }) {
-    this.reason.say(reason);
   }
 
   /** Request a value of an output, or a place of a joint. */
@@ -155,7 +146,7 @@ export class Motion {
     const answer = await this.mechanism.ask('pose', { arrows });
     this.polling = false;
     if (answer.inputs) this.show(answer);
-    else if (!this.inputs.size) this.say(answer);
+    else if (!this.inputs.size) this.reason.say(answer.reason);
   }
 
   show({ inputs, outputs, arrows }) {
@@ -170,16 +161,16 @@ export class Motion {
 
   build(names, inputs, outputs) {
     this.built = names;
-    this.say({});
+    this.reason.say();
     const want = async what => {
       const answer = await this.want(what);
-      if (!(what.output in inputs)) this.say(answer);
+      if (!(what.output in inputs)) this.reason.say(answer.reason);
       return answer;
     };
     const all = Object.keys(inputs);
-    this.inputs = new Map(all.map(name => [name, new InputRow(name, this.mechanism.inputs[name], inputs[name], want)]));
-    this.outputs = new Map(Object.keys(outputs).map(name => [name, new OutputRow(name, all.length, want, answer => this.say(answer))]));
-    this.place.replaceChildren(...[...this.inputs.values()].map(({ slider }) => slider.row));
+    this.inputs = new Map(all.map(name => [name, new InputSlider(name, this.mechanism.inputs[name], inputs[name], want)]));
+    this.outputs = new Map(Object.keys(outputs).map(name => [name, new OutputRow(name, all.length, want, words => this.reason.say(words))]));
+    this.place.replaceChildren(...[...this.inputs.values()].map(({ row }) => row));
     const head = (...children) => element('th', { scope: 'col' }, ...children);
     this.table.replaceChildren(
       element('thead', {}, element('tr', {}, head('output'), head('value'), ...all.map(name => head('d / d ', element('span', { textContent: name }))))),
@@ -188,7 +179,7 @@ export class Motion {
   }
 
   render() {
-    for (const { slider } of this.inputs.values()) slider.render();
-    for (const row of this.outputs.values()) if (row.output) row.render();
+    for (const slider of this.inputs.values()) slider.render();
+    for (const row of this.outputs.values()) row.render();
   }
 }

@@ -3,8 +3,8 @@
 
 // The panel: motion, plot and parameters of each displayed mechanism.
 
-import { element } from './control.js';
-import { files } from './files.js';
+import { isOpen } from './connection.js';
+import { element, put } from './control.js';
 import { Motion } from './motion.js';
 import { Plot } from './plot.js';
 import { Tuning } from './tuning.js';
@@ -34,7 +34,7 @@ class Section {
     this.element = element('section', { ariaLabel: title },
       element('header', {}, element('h2', { textContent: title }),
         element('span', { className: 'about', textContent: type === name ? '' : type }), this.motion.play),
-      about, this.still, this.motion.element, ...this.tuning.speeds, this.tuning.element, files(mechanism));
+      about, this.still, this.motion.element, ...this.tuning.speeds, this.tuning.element, this.tuning.files());
     this.element.dataset.key = key;
     // Foldings that are open in the section that this one replaces are open here.
     const openTitles = [...old?.element.querySelectorAll('details[open] > summary') ?? []].map(one => one.textContent);
@@ -46,10 +46,10 @@ class Section {
     return bottom > 0 && top < window.innerHeight;
   }
 
-  update(name, value) {
-    this.tuning.update(name, value);
+  update(setting) {
+    this.tuning.update(setting);
     this.motion.renderPlay();
-    this.plot.update(name);
+    this.plot.update(setting);
   }
 }
 
@@ -77,12 +77,14 @@ export class Panel {
       this.place.replaceChildren(...sections.map(section => section.element));
     }
     for (const section of sections) {
-      for (const { name, value } of section.mechanism.settings.values()) section.update(name, value);
+      for (const setting of section.mechanism.settings.values()) section.update(setting);
     }
   }
 
   poll() {
-    for (const { mechanism, motion, inSight } of this.sections.values()) {
+    for (const { mechanism, motion, inSight, still } of this.sections.values()) {
+      const silent = performance.now() - mechanism.lastMarkers;
+      put(still, { hidden: !isOpen() || silent < STILL, textContent: `No markers for ${Math.round(silent / 1000)} s` });
       if (mechanism.space) continue;
       if (inSight || this.arrows || !motion.inputs.size) motion.poll(this.arrows);
     }
@@ -107,14 +109,5 @@ export class Panel {
 
   render() {
     for (const { parts } of this.sections.values()) for (const part of parts) part.render();
-  }
-
-  /** Show which mechanisms send no markers. */
-  check(now) {
-    for (const { mechanism, still } of this.sections.values()) {
-      const silent = now - mechanism.lastMarkers;
-      still.hidden = silent < STILL;
-      still.textContent = `No markers for ${Math.round(silent / 1000)} s`;
-    }
   }
 }

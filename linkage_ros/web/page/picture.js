@@ -5,6 +5,7 @@
 
 import { put } from './control.js';
 import { figures, units } from './units.js';
+import { middle } from './pointer.js';
 
 const MARGIN = 44;
 /** What is seen is not smaller [m]. */
@@ -12,16 +13,13 @@ const MIN_SIZE = 1e-33;
 const SLACK = 0.06;
 const SHRUNK = 10;
 const LINE = 18;
-/** How long a number at the grid may be, and its figures where it would be longer. */
-const [MAX_LENGTH, FIGURES] = [10, 6];
+const FIGURES = 6;
 const MARK = 13;
 const ARROW = 90;
 const HEAD = 9;
 /** Where a name is tried: beside its joint from the side away from the middle on, then farther out. */
 const TURNS = [1, 1.9].flatMap(ring => [0, 1, -1, 2, -2, 3, -3, 4].map(eighth => [ring, eighth * Math.PI / 4]));
 const MAX_LINES = 100;
-/** The number of coordinates of a line, a triangle, a joint, by the kind of their marker. */
-const PIECE = { lines: 4, slots: 4, plates: 6, triangles: 6, joints: 2 };
 /** A linkage in space is seen from the front, from the right and above. */
 const OBLIQUE = { right: [0.8, 0.6, 0], up: [-0.168, 0.224, 0.96], out: [0.576, -0.768, 0.28] };
 const FONT = "13px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
@@ -91,15 +89,17 @@ class Box {
     return Math.max(...this.high.map((high, i) => high - this.low[i]));
   }
 
-  /** Grow around another box, with a margin, unless that is inside; return this one. */
-  hold({ low, high }) {
-    if (this.low.every((end, i) => end <= low[i] && high[i] <= this.high[i])) return this;
+  join({ low, high }) {
     this.add(...low);
     this.add(...high);
-    const slack = SLACK * this.size;
-    this.add(...this.low.map(end => end - slack));
-    this.add(...this.high.map(end => end + slack));
     return this;
+  }
+
+  /** Grow around another box, with a margin, unless that is inside; return this one. */
+  hold(box) {
+    if (this.low.every((end, i) => end <= box.low[i] && box.high[i] <= this.high[i])) return this;
+    const { low, high, size } = this.join(box);
+    return this.join({ low: low.map(end => end - SLACK * size), high: high.map(end => end + SLACK * size) });
   }
 }
 
@@ -110,16 +110,14 @@ export class Picture {
     this.named = true;
     /** The kind of arrows, or none. */
     this.kind = '';
-    /** The view; see view.js. */
+    /** The view; see pointer.js. */
     this.view = null;
     this.mechanisms = [];
-    /** The boxes of mechanisms, seen from a direction, their frames, and how far each frame is drawn aside. */
+    /** The boxes of mechanisms, seen from a direction, and how far each frame is drawn aside. */
     this.boxes = new Map();
-    this.frames = new Map();
     this.asides = new Map();
-    /** The mechanism and the dimension whose bars are lit, and the pointer that drags a joint. */
+    /** The mechanism and the dimension whose bars are lit. */
     this.lit = { mechanism: null, dimension: '' };
-    this.drag = null;
     this.legend = document.getElementById('legend');
   }
 
@@ -143,21 +141,23 @@ export class Picture {
       canvas.height = Math.round(height * pixel);
     }
     context.setTransform(pixel, 0, 0, pixel, 0, 0);
-    context.clearRect(0, 0, width, height);
+    context.fillStyle = paint('--paper');
+    context.fillRect(0, 0, width, height);
     const shapes = this.shapes();
     if (!shapes.length) return;
     // The picture is not refitted while a joint is dragged.
-    if (!this.scale || !this.drag.line) this.fit(shapes, width, height);
+    if (!this.scale || !this.view.line) this.fit(shapes, width, height);
     if (!this.view.turned && !this.mechanisms[0].space) this.grid(width, height, shapes[0].map);
     // Slots are drawn first, so that they do not hide bars.
     const rank = ({ kind }) => kind === 'slots' ? 0 : kind === 'joints' ? 2 : 1;
     shapes.sort((a, b) => rank(a) - rank(b) || a.depth - b.depth);
+    const legs = this.legsSeen(shapes);
     for (const shape of shapes.filter(one => rank(one) < 2)) this[shape.kind](shape);
-    this.light();
+    this.light(legs);
     for (const shape of shapes.filter(one => rank(one) === 2)) this.joints(shape);
-    this.arrows();
+    this.arrows(legs);
     this.dragLine();
-    if (this.named && this.mechanisms.length === 1) this.names(shapes);
+    if (this.named && legs.length === 1) this.names(legs[0]);
     if (this.mechanisms.length > 1) this.titles();
   }
 
@@ -167,7 +167,7 @@ export class Picture {
     this.seen = null;
     for (const mechanism of this.mechanisms) {
       for (const marker of [...mechanism.markers.values()].flat()) {
-        const { points, pose, frame } = marker;
+        const { points, pose } = marker;
         const [x, y, z] = axes(pose);
         this.seen ??= this.view.axes(mechanism.space ? OBLIQUE : { right: x, up: y, out: z });
         if (this.direction !== String(this.seen.out)) this.boxes.clear();
@@ -175,7 +175,7 @@ export class Picture {
         const depth = dot(this.seen.out, pose.slice(0, 3));
         const map = [this.seen.right, this.seen.up].map(way => [
           dot(way, x), dot(way, y), dot(way, z), dot(way, pose.slice(0, 3))]);
-        map[0][3] += this.asides.get(frame) ?? 0;
+        map[0][3] += this.aside(mechanism);
         const places = new Float64Array(points.length / 3 * 2);
         for (let from = 0, to = 0; from < points.length; from += 3) {
           for (const [a, b, c, d] of map) {
@@ -191,21 +191,16 @@ export class Picture {
   /** Choose scale and place so that everything is visible, and steady during the motion. */
   fit(shapes, width, height) {
     const now = new Map();
-    for (const { mechanism: { key }, frame, places } of shapes) {
-      this.frames.set(key, frame);
-      if (!now.has(key)) now.set(key, new Box());
-      for (let i = 0; i < places.length; i += 2) now.get(key).add(places[i] - this.aside(key), places[i + 1]);
+    for (const { mechanism, places } of shapes) {
+      if (!now.has(mechanism)) now.set(mechanism, new Box());
+      for (let i = 0; i < places.length; i += 2) now.get(mechanism).add(places[i] - this.aside(mechanism), places[i + 1]);
     }
     const boxes = new Map();
-    for (const [key, box] of now) {
+    for (const [{ key, joints }, box] of now) {
       // It was never so large if something far off was drawn that is gone.
-      const isKnown = this.boxes.has(key) && !(box.size > 0 && this.boxes.get(key).size > SHRUNK * box.size);
-      if (!isKnown) this.boxes.set(key, new Box());
-      const { low, high } = this.boxes.get(key).hold(box);
-      const frame = this.frames.get(key);
-      if (!boxes.has(frame)) boxes.set(frame, new Box());
-      boxes.get(frame).add(...low);
-      boxes.get(frame).add(...high);
+      const isGone = box.size > 0 && this.boxes.get(key)?.size > SHRUNK * box.size;
+      if (isGone || !this.boxes.has(key)) this.boxes.set(key, new Box());
+      boxes.set(joints?.frame, (boxes.get(joints?.frame) ?? new Box()).join(this.boxes.get(key).hold(box)));
     }
     const all = new Box();
     for (const [frame, { low, high, size }] of boxes) {
@@ -221,8 +216,8 @@ export class Picture {
   }
 
   /** How far a mechanism is drawn aside. */
-  aside(key) {
-    return this.asides.get(this.frames.get(key)) ?? 0;
+  aside({ joints }) {
+    return this.asides.get(joints?.frame) ?? 0;
   }
 
   at(x, y) {
@@ -237,31 +232,23 @@ export class Picture {
     const { context } = this;
     const { name, factor } = units.of('m');
     const step = round(90 / this.scale * factor) / factor;
-    const digits = Math.max(0, -Math.floor(Math.log10(step * factor) + 1e-9));
-    const said = value => {
-      const text = (value * factor).toFixed(digits);
-      return text.length < MAX_LENGTH ? text : figures(value * factor, FIGURES);
-    };
+    const said = value => figures(value * factor, FIGURES);
     // One mechanism is seen in its own plane, in which its outputs count; several in the scene's frame.
     const isOne = this.mechanisms.length === 1;
     const [across, up] = isOne ? map.map(([, , , from]) => from) : [0, 0];
     const [left, bottom] = this.from(0, height);
     const [right, top] = this.from(width, 0);
     const unit = `${name} ${isOne ? 'from its origin' : 'in the scene'}`;
-    context.font = FONT;
-    context.lineWidth = 1;
-    context.strokeStyle = paint('--grid');
-    context.fillStyle = paint('--faint');
-    context.textAlign = 'center';
-    context.textBaseline = 'bottom';
+    Object.assign(context, {
+      font: FONT, lineWidth: 1, strokeStyle: paint('--grid'), fillStyle: paint('--faint'), textAlign: 'center', textBaseline: 'bottom',
+    });
     const room = 12 + context.measureText(unit).width + 20;
     for (const value of multiples(step, left - across, right - across)) {
       const [x] = this.at(value + across, 0);
       this.line(x, 0, x, height);
       if (x > room && x < width - 30) context.fillText(said(value), x, height - 5);
     }
-    context.textAlign = 'left';
-    context.textBaseline = 'middle';
+    Object.assign(context, { textAlign: 'left', textBaseline: 'middle' });
     for (const value of multiples(step, bottom - up, top - up)) {
       const [, y] = this.at(0, value + up);
       this.line(0, y, width, y);
@@ -278,32 +265,26 @@ export class Picture {
     this.context.stroke();
   }
 
-  locus({ width, places, colour: rgba }) {
-    this.stroke(width, places, places.length, colour(rgba), 1.5);
+  locus(shape) {
+    this.stroke(shape, shape.places, colour(shape.colour), 1.5);
   }
 
-  /** Curves as a list of lines. */
-  loci({ width, places, colour: rgba }) {
-    this.stroke(width, places, PIECE.lines, colour(rgba), 1.5);
-  }
-
-  /** Draw lines through places, so many coordinates each; return their width. */
-  stroke(width, places, size, style, least = 2) {
+  /** Draw the lines of a shape through places. */
+  stroke({ width, piece }, places, style, least = 2) {
     const { context } = this;
     context.lineWidth = Math.max(least, width * this.scale);
     context.strokeStyle = style;
     context.lineJoin = context.lineCap = 'round';
     context.beginPath();
-    for (let i = 0; i < places.length; i += 2) context[i % size ? 'lineTo' : 'moveTo'](...this.at(places[i], places[i + 1]));
+    for (let i = 0; i < places.length; i += 2) context[i % (2 * piece) ? 'lineTo' : 'moveTo'](...this.at(places[i], places[i + 1]));
     context.stroke();
-    return context.lineWidth;
   }
 
   /** Call back with each leg's part of a shape, the last pair first, and its closeness to the front. */
-  legs({ mechanism, kind, places }, draw) {
+  legs({ mechanism, piece, places }, draw) {
     const { pairs, legs } = mechanism;
     const size = places.length / legs;
-    if (size % PIECE[kind]) return draw(places, 0);
+    if (size % (2 * piece)) return draw(places, 0);
     for (let leg = legs - 1; leg >= 0; leg--) {
       const pair = Math.floor(leg * pairs / legs);
       draw(places.subarray(leg * size, (leg + 1) * size), pairs > 1 ? 1 - pair / (pairs - 1) : 0);
@@ -311,18 +292,12 @@ export class Picture {
   }
 
   lines(shape) {
-    this.legs(shape, (places, front) => this.stroke(shape.width, places, PIECE.lines, colour(shape.colour, front)));
+    this.legs(shape, (places, front) => this.stroke(shape, places, colour(shape.colour, front)));
   }
 
-  /** Draw slots hollow. */
+  /** Draw slots pale, beside what moves in them. */
   slots(shape) {
-    this.legs(shape, (places, front) => {
-      const inner = this.stroke(shape.width, places, PIECE.slots, colour(shape.colour, front)) - 4;
-      if (inner <= 0) return;
-      this.context.strokeStyle = paint('--paper');
-      this.context.lineWidth = inner;
-      this.context.stroke();
-    });
+    this.legs(shape, places => this.stroke(shape, places, mixed(shape.colour, 0.6, 'paper')));
   }
 
   /** Draw plates pale between their bars. */
@@ -331,7 +306,7 @@ export class Picture {
     context.fillStyle = mixed(shape.colour, 0.8, 'paper');
     this.legs(shape, (places, front) => {
       this.fill(places, () => 1);
-      context.lineWidth = Math.max(2, shape.mechanism.width * this.scale);
+      context.lineWidth = Math.max(2, shape.mechanism.joints?.width / 2 * this.scale);
       context.lineJoin = 'round';
       context.strokeStyle = colour(shape.colour, front);
       context.stroke();
@@ -348,7 +323,7 @@ export class Picture {
   fill(places, magnified) {
     const { context } = this;
     context.beginPath();
-    for (let i = 0; i < places.length; i += PIECE.triangles) {
+    for (let i = 0; i < places.length; i += 6) {
       const [[x, y], ...others] = [0, 2, 4].map(k => this.at(places[i + k], places[i + k + 1]));
       const factor = magnified(Math.max(...others.map(([a, b]) => Math.hypot(a - x, b - y))));
       context.moveTo(x, y);
@@ -376,41 +351,38 @@ export class Picture {
 
   text(words, x, y) {
     const { context } = this;
-    context.lineJoin = 'round';
-    context.lineWidth = 4;
-    context.strokeStyle = paint('--paper');
-    context.fillStyle = paint('--ink');
-    context.strokeText(words, x, y, this.width(words));
-    context.fillText(words, x, y, this.width(words));
+    const width = this.width(words);
+    Object.assign(context, {
+      textAlign: 'center', textBaseline: 'middle', lineJoin: 'round', lineWidth: 4, strokeStyle: paint('--paper'), fillStyle: paint('--ink'),
+    });
+    context.strokeText(words, x, y, width);
+    context.fillText(words, x, y, width);
+  }
+
+  /** Write a text at the first of some places that is clear of what is written, if any is good at one that is. */
+  label(words, places, written, isGood) {
+    const free = places.filter(place => isClear(place, written));
+    const place = free.find(isGood) ?? free[0];
+    if (!place) return;
+    written.push(place);
+    this.text(words, place.x, place.y);
   }
 
   /** Write the names of the joints beside them, on the side away from the middle. */
-  names(shapes) {
-    const { context } = this;
-    context.font = `600 ${FONT}`;
-    context.textAlign = 'center';
-    context.textBaseline = 'middle';
-    for (const { mechanism, kind, width, places } of shapes) {
-      const names = mechanism.points;
-      if (kind !== 'joints' || places.length !== 2 * names.length) continue;
-      const seen = names.map((name, i) => this.at(places[2 * i], places[2 * i + 1]));
-      const middle = [0, 1].map(i => seen.reduce((sum, at) => sum + at[i], 0) / seen.length);
-      const away = width * this.scale / 2 + 12;
-      const written = seen.map(([x, y]) => ({ x, y, half: 5, high: 5 }));
-      names.forEach((name, i) => {
-        if (!this.isSeen(...seen[i])) return;
-        const half = this.width(name) / 2;
-        const start = Math.atan2(seen[i][1] - middle[1], seen[i][0] - middle[0]);
-        const tried = TURNS.map(([ring, turn]) => this.inside({
-          x: seen[i][0] + Math.cos(start + turn) * (ring * away + half - 5), y: seen[i][1] + Math.sin(start + turn) * ring * away, half, high: 8,
-        }));
-        const free = tried.filter(place => isClear(place, written));
-        // A name beside another's joint would be read as that joint's.
-        const place = free.find(at => seen.every(joint => apart(at, joint) >= apart(at, seen[i]))) ?? free[0];
-        if (!place) return;
-        written.push(place);
-        this.text(name, place.x, place.y);
-      });
+  names({ mechanism, seen }) {
+    const joints = [...seen.values()];
+    const centre = middle(joints);
+    const away = mechanism.joints.width / 2 * this.scale + 12;
+    const written = joints.map(([x, y]) => ({ x, y, half: 5, high: 5 }));
+    for (const [name, joint] of seen) {
+      if (!this.isSeen(...joint)) continue;
+      const half = this.width(name) / 2;
+      const start = Math.atan2(joint[1] - centre[1], joint[0] - centre[0]);
+      const places = TURNS.map(([ring, turn]) => this.inside({
+        x: joint[0] + Math.cos(start + turn) * (ring * away + half - 5), y: joint[1] + Math.sin(start + turn) * ring * away, half, high: 8,
+      }));
+      // A name beside another's joint would be read as that joint's.
+      this.label(name, places, written, place => joints.every(other => apart(place, other) >= apart(place, joint)));
     }
   }
 
@@ -427,44 +399,38 @@ export class Picture {
 
   /** The width of a text, which is drawn as wide as the picture at most. */
   width(words) {
+    this.context.font = `600 ${FONT}`;
     return Math.min(this.context.measureText(words).width, this.canvas.clientWidth - 8);
   }
 
-  /** Write the mechanisms' names below them, none over another, where the picture has room. */
+  /** Write the mechanisms' names below them, or above, where the picture has room. */
   titles() {
-    const { context } = this;
-    context.font = `600 ${FONT}`;
-    context.textAlign = 'center';
-    context.textBaseline = 'top';
-    const boxes = this.mechanisms.filter(({ key }) => this.boxes.has(key)).map(({ key, title }) => {
-      const { low, high } = this.boxes.get(key);
-      const [[left, bottom], [right, top]] = [low, high].map(([x, y]) => this.at(x + this.aside(key), y));
-      return { title, x: (left + right) / 2, y: (top + bottom) / 2, half: (right - left) / 2, high: (bottom - top) / 2 };
+    const boxes = this.mechanisms.filter(({ key }) => this.boxes.has(key)).map(mechanism => {
+      const { low, high } = this.boxes.get(mechanism.key);
+      const [[left, bottom], [right, top]] = [low, high].map(([x, y]) => this.at(x + this.aside(mechanism), y));
+      return { title: mechanism.title, x: (left + right) / 2, y: (top + bottom) / 2, half: (right - left) / 2, high: (bottom - top) / 2 };
     });
+    const lines = [1, -1, ...Array.from({ length: 2 * boxes.length }, (_, i) => i + 2)];
     const written = [];
-    const isFree = place => isClear(place, written) && place.y > LINE / 2 && place.y + LINE / 2 < this.canvas.clientHeight;
     for (const box of boxes) {
       const half = this.width(box.title) / 2 + 4;
       const x = this.isSeen(box.x, 0) ? this.inside({ x: box.x, y: 0, half, high: 0 }).x : box.x;
-      const at = lines => ({ x, y: box.y + Math.sign(lines) * box.high + (lines - Math.sign(lines) / 2) * LINE, half, high: LINE / 2 });
-      const below = Array.from({ length: 2 * boxes.length }, (_, line) => at(line + 1));
+      const places = lines.map(line => ({ line, x, y: box.y + Math.sign(line) * box.high + (line - Math.sign(line) / 2) * LINE, half, high: LINE / 2 }))
+        .filter(({ y }) => y > LINE / 2 && y + LINE / 2 < this.canvas.clientHeight);
       // A title on another mechanism would be read as that mechanism's.
       const others = boxes.filter(other => other !== box);
-      const place = [below[0], at(-1), below[1]].find(one => isFree(one) && isClear(one, others)) ?? below.find(isFree);
-      if (!place) continue;
-      written.push(place);
-      this.text(box.title, place.x, place.y - LINE / 2);
+      this.label(box.title, places, written, place => place.line < 3 && isClear(place, others));
     }
   }
 
   /** Return the joints of each leg by name, in pixels of the view. */
-  legsSeen() {
-    return this.shapes().filter(({ kind }) => kind === 'joints').flatMap(({ mechanism, places, map }) => {
-      const names = mechanism.points;
-      if (!this.scale || places.length !== 2 * names.length * mechanism.legs) return [];
-      return Array.from({ length: mechanism.legs }, (_, leg) => ({
-        mechanism, leg, map, seen: new Map(names.map((name, i) => {
-          const at = 2 * (leg * names.length + i);
+  legsSeen(shapes = this.shapes()) {
+    return shapes.filter(({ kind }) => kind === 'joints').flatMap(({ mechanism, places, map }) => {
+      const { points, legs } = mechanism;
+      if (!this.scale || places.length !== 2 * points.length * legs) return [];
+      return Array.from({ length: legs }, (_, leg) => ({
+        mechanism, leg, map, seen: new Map(points.map((name, i) => {
+          const at = 2 * (leg * points.length + i);
           return [name, this.at(places[at], places[at + 1])];
         })),
       }));
@@ -478,30 +444,22 @@ export class Picture {
   }
 
   /** Light up the bars of the selected dimension. */
-  light() {
+  light(legs) {
     const { mechanism, dimension } = this.lit;
-    const pairs = mechanism?.tunable.bars[dimension] ?? [];
-    if (!pairs.length) return;
-    const { context } = this;
-    context.lineCap = 'round';
-    context.lineWidth = 7;
-    context.strokeStyle = paint('--lit');
-    for (const { mechanism: own, seen } of this.legsSeen()) {
-      if (own !== mechanism) continue;
-      for (const [a, b] of pairs) {
+    Object.assign(this.context, { lineCap: 'round', lineWidth: 7, strokeStyle: paint('--lit') });
+    for (const { seen } of legs.filter(leg => leg.mechanism === mechanism)) {
+      for (const [a, b] of mechanism.tunable.bars[dimension] ?? []) {
         if (seen.has(a) && seen.has(b)) this.line(...seen.get(a), ...seen.get(b));
       }
     }
   }
 
   /** Draw the requested arrows at the joints of the first legs; the longest one has a fixed length. */
-  arrows() {
-    const { context, canvas } = this;
-    const length = Math.min(ARROW, canvas.clientHeight / 6);
-    context.strokeStyle = context.fillStyle = paint('--ink');
-    context.lineWidth = 2;
+  arrows(legs) {
+    const length = Math.min(ARROW, this.canvas.clientHeight / 6);
+    Object.assign(this.context, { lineWidth: 2, strokeStyle: paint('--ink'), fillStyle: paint('--ink') });
     let legend = '';
-    for (const { mechanism: { arrows }, leg, map, seen } of this.legsSeen()) {
+    for (const { mechanism: { arrows }, leg, map, seen } of legs) {
       if (!this.kind || leg) continue;
       const at = Object.entries(arrows.at).filter(([joint, [x]]) => x !== null && seen.has(joint));
       const most = Math.max(0, ...at.map(([, way]) => Math.hypot(...way)));
@@ -539,12 +497,11 @@ export class Picture {
 
   /** Draw a line from the dragged joint to the pointer. */
   dragLine() {
-    const { line } = this.drag;
+    const { line } = this.view;
     if (!line) return;
     const { context } = this;
     context.setLineDash([6, 6]);
-    context.lineWidth = 2;
-    context.strokeStyle = paint('--faint');
+    Object.assign(context, { lineWidth: 2, strokeStyle: paint('--faint') });
     this.line(...line.flat());
     context.setLineDash([]);
   }

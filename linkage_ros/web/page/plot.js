@@ -4,6 +4,7 @@
 // A plot of an output over a turn or a stroke of the first input; the other inputs are fixed.
 
 import { button, element, Newest, put, Reason } from './control.js';
+import { isTuned } from './mechanism.js';
 import { beside } from './motion.js';
 import { multiples, paint } from './picture.js';
 import { figures, units } from './units.js';
@@ -12,19 +13,10 @@ const FONT = "12px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 const DIGIT = 7.5;
 const DEGREES = [1, 2, 5, 10, 15, 30, 45, 90, 180, 360];
 const FIGURES = 4;
-// Values beyond the middle eight tenths by more than this many times their range grow without bound.
-const MOST = 8;
-const NOTHING = 1e-9;
-
-let loading = null;
-
-/** Load the library once, when the first plot is opened. */
-function library() {
-  loading ??= new Promise((done, failed) => document.head.append(
-    element('link', { rel: 'stylesheet', href: 'vendor/uPlot.min.css' }),
-    element('script', { src: 'vendor/uPlot.iife.min.js', onload: done, onerror: failed })));
-  return loading;
-}
+/** Values beyond the middle eight tenths by more than this many times their range grow without bound. */
+const MAX_BEYOND = 8;
+/** The least range of what is drawn, as a part of its values. */
+const MIN_RANGE = 1e-9;
 
 const options = names => names.map(textContent => element('option', { textContent }));
 
@@ -34,22 +26,12 @@ const shown = value => value === null || value === undefined ? '—' : figures(v
 function bounds(values) {
   const sorted = values.filter(value => value !== null).sort((a, b) => a - b);
   if (!sorted.length) return [-1, 1];
-  const at = part => sorted[Math.round(part * (sorted.length - 1))];
-  const way = at(0.9) - at(0.1);
-  const low = at(0) < at(0.1) - MOST * way ? at(0.1) - way : at(0);
-  const high = at(1) > at(0.9) + MOST * way ? at(0.9) + way : at(1);
-  const size = Math.max(Math.abs(low), Math.abs(high), 1e-3);
-  const room = high - low > NOTHING * size ? 0.06 * (high - low) : 0.5 * size;
-  return [low - room, high + room];
-}
-
-/** The value between the two samples beside a place. */
-function between(xs, ys, x) {
-  const after = xs.findIndex(other => other >= x);
-  if (after < 1) return ys[0] ?? null;
-  const [a, b] = [ys[after - 1], ys[after]];
-  if (a === null || b === null) return null;
-  return a + (b - a) * (x - xs[after - 1]) / (xs[after] - xs[after - 1]);
+  const [least, low, high, most] = [0, 0.1, 0.9, 1].map(part => sorted[Math.round(part * (sorted.length - 1))]);
+  const way = high - low;
+  const ends = [low - least > MAX_BEYOND * way ? low - way : least, most - high > MAX_BEYOND * way ? high + way : most];
+  const size = Math.max(...ends.map(Math.abs), 1e-3);
+  const room = ends[1] - ends[0] > MIN_RANGE * size ? 0.06 * (ends[1] - ends[0]) : 0.5 * size;
+  return [ends[0] - room, ends[1] + room];
 }
 
 /** The curve, which ends where it has no value: a gap of the library's own is joined where it is narrow. */
@@ -78,8 +60,7 @@ export class Plot {
     this.other = element('input', { type: 'text', placeholder: 'distance(A,C)', ariaLabel: 'Another output', onchange: () => choose(this.other.value.trim() || undefined) });
     const enlarging = button('Enlarge', () => this.element.requestFullscreen(), { hidden: !document.fullscreenEnabled });
     this.now = element('div', { className: 'now' });
-    this.place = element('div', { className: 'plot', tabIndex: 0, ariaLabel: 'No curve yet' });
-    this.place.setAttribute('role', 'img');
+    this.place = element('div', { className: 'plot', role: 'img', tabIndex: 0, ariaLabel: 'No curve yet' });
     this.read = element('p', { className: 'answer' });
     this.marks = element('p', { className: 'answer' });
     this.reason = new Reason();
@@ -107,15 +88,14 @@ export class Plot {
   }
 
   /** Update the plot after a change of a parameter. */
-  update(name) {
-    const { group } = this.mechanism.settings.get(name);
-    if (group === 'speeds') this.render();
-    else if (group !== 'starts') this.refresh();
+  update(setting) {
+    if (isTuned(setting)) this.refresh();
+    else this.render();
   }
 
   async request() {
     const { kind: { value: kind }, about } = this;
-    const [answer] = await Promise.all([this.mechanism.ask('curve', { kind, output: this.chosen[about] }), library()]);
+    const answer = await this.mechanism.ask('curve', { kind, output: this.chosen[about] });
     this.reason.say(answer.reason);
     if (answer.reason) this.chosen[about] = this.curve?.about === about ? this.curve.output : undefined;
     if (answer.reason || about !== this.about || !this.element.open) return;
@@ -132,8 +112,7 @@ export class Plot {
   /** Draw the curve in the displayed units. */
   draw() {
     const { kind, input, output, units: [across, up], power, x, y, ends, dead } = this.curve;
-    this.units = [units.of(across), units.of(up)];
-    const [{ name: acrossName, factor: wide }, { name: upName, factor: high }] = this.units;
+    const [{ name: acrossName, factor: wide }, { name: upName, factor: high }] = this.units = [across, up].map(unit => units.of(unit));
     const { speed } = this.mechanism.inputs[input];
     const title = `${kind} of ${output}${power ? ` with the ${input} at ${shown(speed * wide)} ${acrossName}/s` : ''}`;
     this.data = [x.map(value => value * wide), y.map(value => value === null ? null : value * high * speed ** power)];
@@ -157,9 +136,10 @@ export class Plot {
   describe(title, unit, across) {
     const known = this.data[1].filter(value => value !== null);
     const [from, to] = [this.data[0][0], this.data[0].at(-1)].map(shown);
-    const cut = this.bounds[0] > Math.min(...known) || this.bounds[1] < Math.max(...known);
-    const [low, high] = cut ? this.bounds : [Math.min(...known), Math.max(...known)];
-    const range = known.length ? `from ${shown(low)} to ${shown(high)}${unit && ` ${unit}`}${cut ? ' and beyond' : ''}` : 'no value anywhere';
+    const ends = [Math.min(...known), Math.max(...known)];
+    const isCut = this.bounds[0] > ends[0] || this.bounds[1] < ends[1];
+    const [low, high] = isCut ? this.bounds : ends;
+    const range = known.length ? `from ${shown(low)} to ${shown(high)}${unit && ` ${unit}`}${isCut ? ' and beyond' : ''}` : 'no value anywhere';
     const places = [['Dead points', this.dead], ['Ends of the reach', this.ends]].filter(([, { length }]) => length)
       .map(([what, values]) => ` ${what} at ${values.map(shown).join(', ')} ${this.units[0].name}.`);
     this.marks.textContent = `${title[0].toUpperCase()}${title.slice(1)}: ${range}.${places.join('') || ' No dead points.'}`;
@@ -192,16 +172,14 @@ export class Plot {
     const { ctx, bbox: { top, height } } = plot;
     const pixel = window.devicePixelRatio;
     ctx.save();
+    ctx.lineWidth = 1.5 * pixel;
     for (const [places, colour, dash] of [[this.ends, '--faint', []], [this.dead, '--refused', [5, 4]]]) {
       ctx.strokeStyle = paint(colour);
-      ctx.lineWidth = 1.5 * pixel;
       ctx.setLineDash(dash.map(length => length * pixel));
       for (const place of places) {
-        const x = plot.valToPos(this.inside(place), 'x', true);
-        ctx.beginPath();
-        ctx.moveTo(x, top);
-        ctx.lineTo(x, top + height);
-        ctx.stroke();
+        const line = new Path2D();
+        line.rect(plot.valToPos(this.inside(place), 'x', true), top, 0, height);
+        ctx.stroke(line);
       }
     }
     ctx.restore();
@@ -237,9 +215,8 @@ export class Plot {
     const here = this.inside(present * this.units[0].factor);
     const left = this.plot.valToPos(here, 'x');
     this.now.style.transform = `translateX(${left}px)`;
-    const { idx } = this.plot.cursor;
-    const [x, y] = idx === null || idx === undefined
-      ? [here, between(...this.data, here)] : this.data.map(values => values[idx]);
+    const idx = this.plot.cursor.idx ?? this.plot.valToIdx(here);
+    const [x, y] = this.data.map(values => values[idx]);
     const { kind, input, output, units: [, unit] } = this.curve;
     // An angle is drawn without jumps, but printed within half a turn.
     const value = kind === 'position' && unit === 'rad' && y ? beside(y, 0, 2 * Math.PI * this.units[1].factor) : y;

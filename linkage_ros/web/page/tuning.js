@@ -1,13 +1,23 @@
 // SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// The parameters of a mechanism: a control for each, undo and reset, and its scene as a file.
+// The parameters of a mechanism: a control for each, undo and reset, and files to download.
 
 import { button, Choice, element, Reason, Slider } from './control.js';
-import { download } from './files.js';
 
 const RESTED = 300;
 const SWITCH = [[true, 'yes'], [false, 'no']];
+const FORMS = {
+  'scene file': ['yaml', 'The scene as it is now'],
+  CSV: ['csv', 'All outputs over a turn or a stroke, in radians and metres, the input at 1 rad/s or 1 m/s'],
+  PNG: ['png', 'The present view'],
+  URDF: ['urdf', 'The robot model'],
+  C: ['h', 'A C99 header for a microcontroller'],
+};
+/** What there is not of a linkage in space. */
+const PLANAR = ['csv', 'urdf'];
+
+const picture = () => new Promise(done => { document.getElementById('picture').toBlob(done); });
 
 /** A parameter's name without the part that its group in the panel implies. */
 function labelled({ name, group }, inputs) {
@@ -29,7 +39,7 @@ export class Tuning {
       return element('details', { open: unfolded, hidden: !rows.length }, element('summary', { textContent: title }), ...rows);
     };
     this.element = element('div', {},
-      element('div', { className: 'tools' }, this.undoing, this.resetting, button('Save as scene file', () => this.save()), this.reason.line),
+      element('div', { className: 'tools' }, this.undoing, this.resetting, this.reason.line),
       folding('Dimensions', ['dimensions'], open), folding('Branches', ['branches'], open), folding('More', ['starts', 'more'], false));
     this.renderTools();
     this.refresh();
@@ -51,7 +61,7 @@ export class Tuning {
       // A dimension is displayed with its length in the picture.
       times: () => group === 'dimensions' ? this.mechanism.value('scale') : 1,
     };
-    const request = (value, gesture, before) => this.set(name, value, gesture, before);
+    const request = (value, gesture) => this.set({ [name]: value }, gesture);
     const sides = this.mechanism.sides[name.split('.')[1]];
     if (group === 'branches') return new Choice(description, [[1, sides[0]], [-1, sides[1]]], request);
     if (kind === 'bool') return new Choice(description, SWITCH, request);
@@ -66,40 +76,51 @@ export class Tuning {
     row.addEventListener('focusout', () => this.light(''));
   }
 
-  async set(name, value, gesture, before) {
-    const answer = await this.mechanism.ask('set', { values: { [name]: value } });
-    if (!answer.reason && before !== value) this.mechanism.remember(name, before, gesture);
+  /** Set values; a gesture, all of whose changes are one step of undo, has those before. */
+  async set(values, gesture) {
+    const { mechanism, mechanism: { first, steps } } = this;
+    const before = Object.fromEntries(Object.keys(values).map(name => [name, mechanism.value(name)]));
+    const answer = await mechanism.ask('set', { values });
+    const isStep = Object.keys(values).some(name => first.has(name) && before[name] !== values[name]);
+    if (gesture && isStep && !answer.reason && steps.at(-1)?.gesture !== gesture) steps.push({ gesture, values: before });
     this.renderTools();
     return answer;
   }
 
-  async undo() {
-    const { steps } = this.mechanism;
-    const step = steps.pop();
-    if (step && !await this.put(step.values)) steps.push(step);
-    this.renderTools();
-  }
-
-  async reset() {
-    const { changed, first, steps } = this.mechanism;
-    const values = from => Object.fromEntries(changed.map(name => [name, from(name)]));
-    const before = values(name => this.mechanism.value(name));
-    if (await this.put(values(name => first.get(name)))) steps.push({ values: before });
-    this.renderTools();
-  }
-
   /** Set several values at once; return whether they were accepted. */
-  async put(values) {
-    const { reason } = await this.mechanism.ask('set', { values });
+  async put(values, gesture) {
+    const { reason } = await this.set(values, gesture);
     this.reason.refuse(reason);
     for (const name of Object.keys(values)) this.controls.get(name)?.reason.say();
     return !reason;
   }
 
-  async save() {
-    const { reason, text } = await this.mechanism.ask('save');
+  async undo() {
+    const step = this.mechanism.steps.pop();
+    if (!await this.put(step.values)) this.mechanism.steps.push(step);
+    this.renderTools();
+  }
+
+  reset() {
+    const { changed, first } = this.mechanism;
+    return this.put(Object.fromEntries(changed.map(name => [name, first.get(name)])), {});
+  }
+
+  /** The buttons that download. */
+  files() {
+    const forms = Object.entries(FORMS).filter(([, [form]]) => !this.mechanism.space || !PLANAR.includes(form));
+    return element('div', { className: 'tools' }, element('span', { className: 'about', textContent: 'Download' }),
+      ...forms.map(([name, [form, title]]) => button(name, () => this.download(form), { title })));
+  }
+
+  /** Let the browser save a file. */
+  async download(form) {
+    const { reason, text } = form === 'png' ? { text: await picture() } : await this.mechanism.ask('export', { form });
     this.reason.say(reason && `Not saved: ${reason}`);
-    if (text) download(`${this.mechanism.name}.yaml`, text);
+    if (!text) return;
+    const href = URL.createObjectURL(new Blob([text]));
+    element('a', { download: `${this.mechanism.name}.${form}`, href }).click();
+    setTimeout(() => URL.revokeObjectURL(href), 1000);
   }
 
   /** Update the ranges of dimensions, once no slider is held. */
@@ -107,16 +128,16 @@ export class Tuning {
     clearTimeout(this.resting);
     this.resting = setTimeout(async () => {
       const tunable = await this.mechanism.ask('tune');
-      if ([...this.controls.values()].some(({ held }) => held)) return this.refresh();
+      if ([...this.controls.values()].some(({ gesture }) => gesture)) return this.refresh();
       if (tunable.reason) return;
       this.mechanism.tunable = tunable;
       for (const [name, ends] of Object.entries(tunable.travel)) {
-        if (ends && ends[0] < ends[1]) this.controls.get(name)?.bound(...ends);
+        if (ends) this.controls.get(name)?.bound(...ends);
       }
     }, RESTED);
   }
 
-  update(name, value) {
+  update({ name, value }) {
     this.controls.get(name)?.update(value);
     if (name === 'scale') this.render();
     if (!this.mechanism.first.has(name)) return;
