@@ -163,14 +163,6 @@ def test_every_parameter_is_described_as_the_scene_has_it(graph, kind):
             if ends and one.field.kind == 'double' else [])
 
 
-@pytest.mark.parametrize('kind, line', [
-    (CrankDriver, 'ready: moves leg_crank, lever_crank, own_crank on crank_states at 50 Hz'),
-    (Kinematics, 'ready: moves leg, lever, own by crank_states'),
-    (ServoInverse, 'ready: answers servo_inverse for leg, lever, own')])
-def test_a_node_says_what_it_serves(graph, kind, line):
-    assert f'ready: {graph.start(kind, EVERYTHING).serves()}' == line
-
-
 def test_names_and_types_that_there_are_not_are_refused(graph):
     client = Client(graph, graph.start(Kinematics, LEG))
     odd = ParameterMessage(name='leg.scale', value=ParameterValue(type=200))

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 import time
 from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Tuple
@@ -42,6 +41,8 @@ class InputSource(NamedTuple):
 class Kinematics(scene_node.SceneNode):
     """Solves mechanisms at the inputs from `crank_states`, only for topics with subscribers."""
 
+    task = 'moves {mechanisms} by crank_states'
+
     def __init__(self, **kwargs: Any):
         self._mechanisms: Dict[str, MechanismTopics] = {}
         self._models: Dict[str, MechanismModel] = {}
@@ -63,41 +64,32 @@ class Kinematics(scene_node.SceneNode):
             MISSING_AFTER_S, self.guarded('the check for missing inputs', self._warn_of_missing),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
-        for mechanism in self.scene.machines.values():
-            if len(mechanism.assembly().legs) > 1:
-                self._log_machine_code(mechanism.linkage)
-                break
+        self._log_machine_code()
         joint_state_reader.subscribe(self, 'crank_states', self._receive)
 
-    def _log_machine_code(self, linkage: Any) -> None:
-        """Log why there is no machine code for the legs of a walker, if there is none."""
+    def _log_machine_code(self) -> None:
+        """Log why there is no machine code for the legs of walkers, if there is none."""
+        walkers = [model for model in self._models.values() if len(model.assembly.legs) > 1]
         try:
-            linkage.accelerated()
+            for model in walkers[:1]:
+                model.mechanism.linkage.accelerated()
         except ImportError as error:
             # Whoever has not installed it knows; whoever has, does not know that it is broken.
             is_missing = isinstance(error, ModuleNotFoundError)
             log = self.get_logger().info if is_missing else self.get_logger().warning
             log(f'plain Python is used instead of machine code, with the same results: {error}')
 
-    def serves(self) -> str:
-        """Return the mechanisms' names, in words."""
-        return f'moves {listed(self.scene.machines, 200)} by crank_states'
-
     def check(self, new: scene.Scene) -> None:
         """Raise SceneError if no robot model can be made of a planar mechanism."""
         for name, mechanism in new.machines.items():
-            before = self.scene.machines[name]
+            before, frame_id = self.scene.machines[name], mechanism.frame_id or new.frame_id
             if mechanism.in_space:
                 continue
             if mechanism is not before:
                 bodies.check_range(mechanism)
-            # Nothing else that has changed can invalidate a robot model, whose limits take long.
-            alike = replace(mechanism, linkage=before.linkage, reach=before.reach,
-                            inputs=before.inputs, pose=before.pose, points=before.points,
-                            frame_id=before.frame_id)
-            frame_id = mechanism.frame_id or new.frame_id
-            if alike != before or frame_id.startswith(f'{name}_'):
-                bodies.robot([replace(alike, frame_id=frame_id)], frame_id)
+            # Only a name can invalidate the rest of a robot model, whose limits take long.
+            if mechanism.joints != before.joints or frame_id.startswith(f'{name}_'):
+                bodies.robot([mechanism], frame_id)
 
     def prepare(self, new: scene.Scene) -> Any:
         """Return a model of each mechanism by name; unchanged mechanisms keep their models."""
@@ -172,7 +164,7 @@ class Kinematics(scene_node.SceneNode):
         if in_scene:
             self._scene_joint_states.publish(self._stamp, tuple(
                 (mechanism.model, state) for mechanism in self._mechanisms.values()
-                if (state := mechanism.state_in_scene())))
+                if (state := mechanism.solved(in_scene))))
 
     def _interpret(self, message: JointState) -> Tuple[List[InputSource], List[MechanismTopics]]:
         """Return the inputs that a sender's messages set, and the mechanisms that they move."""

@@ -63,6 +63,9 @@ class SceneNode(Node):
     prepared. Raises SceneError if the initial parameters are invalid.
     """
 
+    # What the node does, for its first log message.
+    task = '{mechanisms}'
+
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         incidents = Incidents(self.get_logger(), lambda: not self.context.ok())
@@ -116,10 +119,6 @@ class SceneNode(Node):
 
     def adopt(self, prepared: Any) -> None:
         """Use the result of `prepare` from now on. It delays messages: be fast."""
-
-    def serves(self) -> str:
-        """Return what the node does, in words, for its first log message."""
-        return listed(self.scene.machines, 200)
 
     def declare_parameters(self, namespace: str, parameters: Any, ignore_override: bool = False
                            ) -> List[Parameter]:
@@ -269,7 +268,8 @@ def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_clas
             _refuse_namesake(node, nodes)
             nodes.append(node)
             if isinstance(node, SceneNode):
-                node.get_logger().info(f'ready: {node.serves()}')
+                node.get_logger().info('ready: ' + node.task.format(
+                    mechanisms=listed(node.scene.machines, 200), rate=node.scene.rate))
         # All objects so far are permanent; collections need not visit them.
         gc.freeze()
         gc.enable()

@@ -32,6 +32,8 @@ MAX_NAMED_VALUES, MAX_NAMES_LENGTH = 5, 150
 class ServoInverse(scene_node.SceneNode):
     """Serves `servo_inverse` and `inputs_for`, and turns `wanted_states` into commands."""
 
+    task = 'answers servo_inverse for {mechanisms}'
+
     def __init__(self, **kwargs: Any):
         with needs('linkage_interfaces'):
             from linkage_interfaces.srv import (  # type: ignore[attr-defined]
@@ -49,10 +51,6 @@ class ServoInverse(scene_node.SceneNode):
         self._stream = CommandStream(self, self.scene.machines, lambda mechanism: present_inputs(
             mechanism, self._positions))
         self.begin()
-
-    def serves(self) -> str:
-        """Describe the node for its first log message."""
-        return f'answers servo_inverse for {listed(self.scene.machines, 200)}'
 
     def check(self, new: scene.Scene) -> None:
         """Raise SceneError for a length that `kinematics` could not publish."""
