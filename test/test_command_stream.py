@@ -460,22 +460,22 @@ def test_a_trajectory_goes_forwards_in_time(graph, stream, capfd, times, reason)
 
 
 def test_a_newer_trajectory_ends_the_older_one(graph, plan, monkeypatch):
-    begun, queued, kinds, solved = threading.Event(), threading.Event(), [], []
-    replace, command = Worker.replace, InverseRequest.command
+    begun, both_queued, kinds, solved = threading.Event(), threading.Event(), [], []
+    queue, command = Worker.queue, InverseRequest.command
 
-    def replaced(worker, kind, job):
-        replace(worker, kind, job)
+    def queued(worker, kind, job, **how):
+        queue(worker, kind, job, **how)
         kinds.append(kind)
         if kinds.count('wanted_trajectory') == 2:
-            queued.set()
+            both_queued.set()
 
     def after_both_are_there(*args):
         begun.set()
-        assert queued.wait(20.0)
+        assert both_queued.wait(20.0)
         solved.append(args)
         return command(*args)
 
-    monkeypatch.setattr(Worker, 'replace', replaced)
+    monkeypatch.setattr(Worker, 'queue', queued)
     monkeypatch.setattr(InverseRequest, 'command', after_both_are_there)
     older = plan(['flap'], *(([flap(0.3)], []) for _ in range(50)))
     graph.until(begun.is_set)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from functools import partial
 import time
-from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Tuple
+from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Sequence, Tuple
 
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
@@ -16,7 +16,7 @@ from . import joint_state_reader, scene_node, shutdown
 from .log import MAX_NAMES, Once
 from .mechanism_model import MechanismModel
 from .mechanism_topics import MechanismTopics
-from .message_layout import NEVER, pack_time
+from .message_layout import NEVER
 from .scene_joint_states import SceneJointStates
 from .. import scene
 from ..robot_model import bodies, urdf
@@ -38,6 +38,10 @@ class InputSource(NamedTuple):
     velocity: int
 
 
+# The inputs that a sender's messages set, and the mechanisms that they move.
+Routes = Tuple[List[InputSource], List[MechanismTopics]]
+
+
 class Kinematics(scene_node.SceneNode):
     """Solves mechanisms at the inputs from `crank_states`, only for topics with subscribers."""
 
@@ -55,7 +59,6 @@ class Kinematics(scene_node.SceneNode):
         self._scene_joint_states = SceneJointStates(self, self._inputs)
         self._mechanisms.update((name, MechanismTopics(self, mechanism))
                                 for name, mechanism in self.scene.machines.items())
-        self._reader = joint_state_reader.Reader(self._interpret)
         # That of the last message that set an input.
         self._stamp = NEVER
         self._joint_names: frozenset = frozenset()
@@ -65,7 +68,7 @@ class Kinematics(scene_node.SceneNode):
             clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
         self._log_machine_code()
-        joint_state_reader.subscribe(self, 'crank_states', self._receive)
+        joint_state_reader.subscribe(self, 'crank_states', self._interpret, self._receive)
 
     def _log_machine_code(self) -> None:
         """Log why there is no machine code for the legs of walkers, if there is none."""
@@ -110,9 +113,9 @@ class Kinematics(scene_node.SceneNode):
         if not is_first:
             self._publish(changed)
         for topics in changed:
-            self.worker.append(f'latched messages of {topics.name}',
-                               partial(self._latched, topics, models[topics.name]))
-        self.worker.append('the robot_description of the scene', partial(self._robot, models))
+            self.worker.queue(f'latched messages of {topics.name}',
+                              partial(self._latched, topics, models[topics.name]))
+        self.worker.queue('the robot_description of the scene', partial(self._robot, models))
 
     def _latched(self, topics: MechanismTopics, model: MechanismModel) -> Callable[[], None]:
         """Build a mechanism's latched messages; return a function to publish them."""
@@ -140,16 +143,11 @@ class Kinematics(scene_node.SceneNode):
         for topics in self._mechanisms.values():
             topics.wait_for_deletions(deadline)
 
-    def _receive(self, data: bytes) -> None:
-        """Set the inputs by a serialised message, and publish the mechanisms that it moves."""
-        sender = self._reader.sender(data)
-        sources, moved = sender.routes
+    def _receive(self, routes: Routes, stamp: bytes, numbers: Sequence[Any]) -> None:
+        """Set the inputs by a message, and publish the mechanisms that it moves."""
+        sources, moved = routes
         if not moved:
             return
-        numbers = sender.read(data)
-        stamp = numbers[0]
-        if stamp == NEVER:
-            stamp = pack_time(self.get_clock().now().nanoseconds)
         for mechanism, i, position, velocity in sources:
             mechanism.receive(i, numbers[position], numbers[velocity] if velocity else None)
             mechanism.stamp = stamp
@@ -166,7 +164,7 @@ class Kinematics(scene_node.SceneNode):
                 (mechanism.model, state) for mechanism in self._mechanisms.values()
                 if (state := mechanism.solved(in_scene))))
 
-    def _interpret(self, message: JointState) -> Tuple[List[InputSource], List[MechanismTopics]]:
+    def _interpret(self, message: JointState) -> Routes:
         """Return the inputs that a sender's messages set, and the mechanisms that they move."""
         count, moving = len(message.position), len(message.velocity) == len(message.name)
         # Index 0 of a message's numbers is its stamp.

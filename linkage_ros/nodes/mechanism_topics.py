@@ -82,10 +82,10 @@ class MechanismTopics:
         """Return the state at the present inputs; None without assembled legs."""
         if None in self.inputs:
             return None
-        regular = self._regular(self.model, self._subscribed(), in_scene)
-        if self.state is None or self.state.solution is not regular.solution:
-            self._solve(regular)
-        return self.state if self.state.any_assembled else None
+        regular, state = self._regular(self.model, self._subscribed(), in_scene), self.state
+        if state is None or state.solution is not regular.solution:
+            state = self._solve(regular)
+        return state if state.any_assembled else None
 
     def _subscribed(self) -> Tuple[Any, Any]:
         """Return the publishers of joint states and markers, None where nobody subscribes."""
@@ -97,7 +97,7 @@ class MechanismTopics:
         return model.regular[in_scene or joint_states is not None, markers is not None,
                              None not in self.speeds]
 
-    def _solve(self, regular: AssemblyState) -> None:
+    def _solve(self, regular: AssemblyState) -> AssemblyState:
         """Solve at the present inputs; note or delete the displayed markers."""
         state = self.state = self.model.solve(regular, self.inputs, self.speeds)
         if state.assembled is not None:
@@ -106,6 +106,7 @@ class MechanismTopics:
             self._delete(self._displayed)
         elif self._markers.subscribed:
             self._displayed = self.model.marker_array.ids
+        return state
 
     def prepared(self, mechanism: scene.SceneMechanism, frame_id: str, prefix: str,
                  in_scene: bool) -> MechanismModel:

@@ -196,8 +196,8 @@ class SceneNode(Node):
             if type(self).prepare is SceneNode.prepare:
                 self._adopt(new, new)
             else:
-                self.worker.replace('a changed scene', lambda: partial(
-                    self._adopt, new, self.prepare(new)))
+                self.worker.queue('a changed scene', lambda: partial(
+                    self._adopt, new, self.prepare(new)), is_next=True)
 
     def _adopt(self, new: scenes.Scene, prepared: Any) -> None:
         self._adopted = new

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from array import array
-from contextlib import suppress
 import math
 from typing import Any, Callable, Dict, List, Mapping, Sequence, Tuple
 
@@ -15,7 +14,6 @@ from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node, shutdown
 from .command_stream import CommandStream
-from .message_layout import Unreadable
 from .. import scene
 from ..cache import Cache
 from ..optional import needs
@@ -44,8 +42,7 @@ class ServoInverse(scene_node.SceneNode):
         self._requests = Cache(self._request)
         self._sources: frozenset = frozenset()
         self._positions: Dict[str, float] = {}
-        self._reader = joint_state_reader.Reader(self._interpret)
-        joint_state_reader.subscribe(self, 'crank_states', self._receive)
+        joint_state_reader.subscribe(self, 'crank_states', self._interpret, self._receive)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
         self.create_service(InputsFor, 'inputs_for', self.answer_inputs_for)
         self._stream = CommandStream(self, self.scene.machines, lambda mechanism: present_inputs(
@@ -105,12 +102,8 @@ class ServoInverse(scene_node.SceneNode):
         return [(name, index) for index, name in enumerate(
             message.name[:len(message.position)], 1) if name in self._sources]
 
-    def _receive(self, text: bytes) -> None:
-        # `kinematics` logs unreadable messages.
-        with suppress(Unreadable):
-            sender = self._reader.sender(text)
-            numbers = sender.read(text)
-            self._positions.update((name, numbers[index]) for name, index in sender.routes)
+    def _receive(self, routes: List[Tuple[str, int]], _: bytes, numbers: Sequence[Any]) -> None:
+        self._positions.update((name, numbers[index]) for name, index in routes)
 
 
 def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
