@@ -206,7 +206,7 @@ def test_a_signal_while_a_message_is_published_is_no_failure(harness):
                 rclpy.shutdown()
                 self._publisher.publish(JointState())
 
-        sys.exit(run(Ended, 'ended', args=[]))
+        sys.exit(run([Ended], 'ended', args=[]))
         """)], cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0 and 'Traceback' not in done.stderr
 

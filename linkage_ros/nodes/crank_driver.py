@@ -110,7 +110,7 @@ class CrankDriver(scene_node.SceneNode):
 
 def main(args: Any = None) -> int:
     """Run the node with command-line arguments `args`; return the exit code."""
-    return scene_node.run(CrankDriver, scene.DRIVER, args)
+    return scene_node.run([CrankDriver], scene.DRIVER, args)
 
 
 if __name__ == '__main__':

@@ -197,7 +197,7 @@ class Kinematics(scene_node.SceneNode):
 
 def main(args: Any = None) -> int:
     """Run the node with command-line arguments `args`; return the exit code."""
-    return scene_node.run(Kinematics, scene.KINEMATICS, args)
+    return scene_node.run([Kinematics], scene.KINEMATICS, args)
 
 
 if __name__ == '__main__':

@@ -185,7 +185,7 @@ def _unreachable(inverse: InverseRequest, values: Sequence[float]) -> str:
 
 def main(args: Any = None) -> int:
     """Run the node; return the exit code."""
-    return scene_node.run(ServoInverse, scene.INVERSE, args)
+    return scene_node.run([ServoInverse], scene.INVERSE, args)
 
 
 if __name__ == '__main__':
