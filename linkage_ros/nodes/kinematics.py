@@ -136,12 +136,9 @@ class Kinematics(scene_node.SceneNode):
 
     def delete_displayed(self) -> None:
         """Delete all markers and loci."""
-        for topics in self._mechanisms.values():
-            topics.clear()
-        # The end of a process would drop messages that are still on their way.
         deadline = time.monotonic() + DELETION_TIMEOUT_S
         for topics in self._mechanisms.values():
-            topics.wait_for_deletions(deadline)
+            topics.clear(deadline)
 
     def _receive(self, routes: Routes, stamp: bytes, numbers: Sequence[Any]) -> None:
         """Set the inputs by a message, and publish the mechanisms that it moves."""

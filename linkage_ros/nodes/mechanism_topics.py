@@ -138,13 +138,11 @@ class MechanismTopics:
             self._description.publish(String(data=description))
         self._set_locus(locus)
 
-    def clear(self) -> None:
-        """Delete the markers and the locus."""
+    def clear(self, deadline: float) -> None:
+        """Delete markers and locus; wait for acknowledgements, up to a monotonic time [s]."""
         self._delete(self._displayed)
         self._set_locus(None)
-
-    def wait_for_deletions(self, deadline: float) -> None:
-        """Wait for subscribers to acknowledge deletions, up to a monotonic time [s]."""
+        # The end of a process would drop messages that are still on their way.
         for publisher in (self._markers.publisher, self._locus):
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - time.monotonic())))
 
