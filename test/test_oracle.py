@@ -107,16 +107,6 @@ def test_what_a_sensor_cannot_say_is_no_pose(graph, bad):
     assert bench.model.states['a'].values == [pytest.approx(0.54, abs=0.1)]
 
 
-@pytest.mark.nightly(all_but=2)
-@pytest.mark.parametrize('seed', range(5))
-def test_what_leaves_its_reach_leaves_the_picture(graph, seed):
-    parameters = {'mechanisms': ['b'], 'b.type': 'peaucellier'}
-    near = END + 2e-3 * np.random.default_rng(seed).normal(size=20)
-    Bench(graph, parameters).run([
-        ('listen', 'b/markers', True), message({'b_crank': 0.1}), ('compiled',),
-        *(message({'b_crank': angle}, [1.0]) for angle in [0.1, 0.1, *near, *5 * [END + 0.1]])])
-
-
 @pytest.mark.parametrize('turn', [-3, 1, 1000])
 def test_the_reach_is_the_same_in_any_turn(graph, turn):
     parameters = {'mechanisms': ['b'], 'b.type': 'peaucellier'}
