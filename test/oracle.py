@@ -28,7 +28,6 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import combinations
 import math
-import re
 import threading
 import time
 from typing import NamedTuple
@@ -43,7 +42,7 @@ from rclpy.executors import TimeoutException
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
-from ros_harness import DEADLINE, Graph
+from ros_harness import DEADLINE
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from test_reading import big_endian
@@ -915,23 +914,6 @@ def history(parameters, seed, length=60):
     return Generator(parameters, np.random.default_rng(seed)).history(length)
 
 
-def listing(steps):
-    """Return a history in words, for a report."""
-    lines = []
-    for act, *arguments in steps:
-        if act == 'send':
-            try:
-                message = deserialize_message(arguments[0], JointState)
-                lines.append(f'send {message.header.stamp.sec}.{message.header.stamp.nanosec} '
-                             f'{shortened(message.name)} {list(message.position)} '
-                             f'{list(message.velocity)}')
-            except Exception:
-                lines.append(f'send {shortened(arguments[0])}')
-        else:
-            lines.append(f'{act} {shortened(arguments)}')
-    return '\n'.join(lines)
-
-
 FOUR_BAR = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'B dyad A Q 2 1.5 left']
 SCENES = {
     'the catalogue': {},
@@ -982,28 +964,3 @@ SCENES = {
         'mechanisms': ['m', 'n'], 'm.type': 'jansen', 'm.scale': 1e-30, 'n.type': 'peaucellier',
         'n.scale': 1e27},
 }
-
-
-def failure(parameters, steps, **kwargs):
-    """Return what is otherwise in a history of a new node, '' if nothing is."""
-    with Graph() as graph:
-        try:
-            Bench(graph, parameters, **kwargs).run(steps)
-        except Mismatch as error:
-            return str(error)
-    return ''
-
-
-def shortest(parameters, steps, **kwargs):
-    """Return a history without the steps that a failure does not need."""
-    kind, size = _kind(failure(parameters, steps, **kwargs)), len(steps)
-    while size := size // 2:
-        for end in range(len(steps), 0, -size):
-            fewer = steps[:max(end - size, 0)] + steps[end:]
-            if _kind(failure(parameters, fewer, **kwargs)) == kind:
-                steps = fewer
-    return steps
-
-
-def _kind(text):
-    return re.sub(r'[^a-z/ ]', '', text)[:40]

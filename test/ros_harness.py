@@ -9,6 +9,7 @@ import math
 import os
 import subprocess
 import sys
+import tempfile
 import time
 
 from domains import Domain
@@ -226,11 +227,13 @@ class Process:
         self.domain = domain or self._domain.id
         start = ('-m', module(name)) if as_module or name == 'urdf' else (
             '-c', f'from linkage_ros import executables; executables.{name}()')
-        self._process = subprocess.Popen(
-            [sys.executable, *start, *arguments, '--ros-args',
-             '--params-file', str(parameter_file)],
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            env={**os.environ, **(env or {}), 'ROS_DOMAIN_ID': str(self.domain)})
+        # A pipe that nobody reads would hold up who writes more than it holds.
+        with tempfile.NamedTemporaryFile() as file:
+            self._printed = open(file.name, encoding='utf-8')
+            self._process = subprocess.Popen(
+                [sys.executable, *start, *arguments, '--ros-args',
+                 '--params-file', str(parameter_file)], stdout=file, stderr=subprocess.STDOUT,
+                env={**os.environ, **(env or {}), 'ROS_DOMAIN_ID': str(self.domain)})
 
     def interrupt(self, signal):
         """Send a signal."""
@@ -248,16 +251,21 @@ class Process:
 
     def line(self):
         """Return the next line that is printed, '' after the last."""
-        line = self._process.stdout.readline()
+        line, has_ended = '', False
+        while not line.endswith('\n') and not has_ended:
+            has_ended = self.has_ended
+            line += self._printed.readline()
+            time.sleep(0.0 if line else 0.005)
         # `kinematics` says so once where that is not installed.
         return self.line() if 'instead of machine code' in line else line
 
     def end(self, seconds=DEADLINE):
         """Wait for the end; return exit code and all else that was printed."""
-        try:
-            printed, _ = self._process.communicate(timeout=seconds)
-        finally:
-            self._process.kill()
-            if self._domain:
-                self._domain.release()
-        return self._process.returncode, printed
+        with self._printed:
+            try:
+                code = self._process.wait(seconds)
+            finally:
+                self._process.kill()
+                if self._domain:
+                    self._domain.release()
+            return code, self._printed.read()

@@ -179,14 +179,6 @@ def test_arguments_that_there_are_not_end_in_one_sentence(harness, capfd, name, 
 
 
 @pytest.mark.nightly
-def test_so_they_do_as_a_process(harness):
-    name, (arguments, said) = NODES[0], ARGUMENTS[0]
-    done = subprocess.run([sys.executable, '-m', harness.module(name), *arguments], cwd=ROOT,
-                          capture_output=True, text=True, timeout=60)
-    assert done.returncode == 1 and one_sentence(done.stdout + done.stderr, said)
-
-
-@pytest.mark.nightly
 def test_a_signal_while_a_message_is_published_is_no_failure(harness):
     # A process of its own: where the machine is busy, the signal may end it amid the callback.
     done = subprocess.run([sys.executable, '-c', textwrap.dedent("""
@@ -206,7 +198,7 @@ def test_a_signal_while_a_message_is_published_is_no_failure(harness):
                 rclpy.shutdown()
                 self._publisher.publish(JointState())
 
-        sys.exit(run(Ended, 'ended', args=[]))
+        sys.exit(run([Ended], 'ended', args=[]))
         """)], cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0 and 'Traceback' not in done.stderr
 
@@ -214,15 +206,8 @@ def test_a_signal_while_a_message_is_published_is_no_failure(harness):
 @pytest.mark.nightly
 @pytest.mark.parametrize('name, text, named', [
     ('kinematics', 'mechanisms: [leg]', 'leg.type must be a text'),
-    ('kinematics', 'mechanisms: []', 'mechanisms must be'),
-    ('kinematics', 'jansen.dimensions.q: 1.0', 'jansen.dimensions.q is not a parameter'),
-    ('kinematics', 'jansen.dimension.a: 1.0', 'jansen.dimension.a is not a parameter'),
-    ('kinematics', 'jansen.pose: [0, 0, 0]', 'jansen.pose must be'),
     ('kinematics', 'jansen.pose: [0, 0, 0.5, 0, 0, 0]', 'Sequence should be of same type'),
     ('crank_driver', 'rate: 2000', 'rate must be a finite number from 0 to 1000'),
-    ('crank_driver', 'jansen.crank.speed: fast', 'jansen.crank.speed must be'),
-    ('crank_driver', 'jansen.dimensions.m: -1.0', 'jansen.dimensions.m must be .* above 0'),
-    ('crank_driver', 'peaucellier.dimensions.r: 1.0', 'peaucellier.dimensions must let'),
     ('servo_inverse', 'slotted_lever.dimensions.a: 80m', 'slotted_lever.dimensions.a must be'),
 ])
 def test_a_bad_scene_ends_in_one_sentence(harness, tmp_path, name, text, named):

@@ -136,13 +136,10 @@ def test_a_signal_amid_a_callback_ends_a_node_quietly(stop, plain):
                         pass
                 super()._tick()
 
-            def delete_displayed(self):
-                print('deleted')
-
         executor = SingleThreadedExecutor if {plain} else scene_node.Executor
-        sys.exit(scene_node.run(Ended, 'ended', [], executor))
+        sys.exit(scene_node.run([Ended], 'ended', [], executor))
         """)
-    assert (done.returncode, done.stdout) == (0, 'deleted\n')
+    assert (done.returncode, done.stdout) == (0, '')
     assert done.stderr.count('\n') == 1 and ': ready: ' in done.stderr
 
 
@@ -167,7 +164,7 @@ def test_a_programming_error_is_logged_once_and_ends_nothing(executor):
 
         executor = scene_node.Executor if {executor is scene_node.Executor} else \\
             executors.SingleThreadedExecutor
-        raise SystemExit(scene_node.run(Wrong, 'wrong', executor_class=executor))
+        raise SystemExit(scene_node.run([Wrong], 'wrong', executor_class=executor))
         """)
     assert done.returncode == 0
     assert done.stderr.count('internal error in a request, which is dropped: ZeroDivision') == 1
@@ -184,7 +181,7 @@ ENDS_ITSELF = """
                 self._timer.cancel()
                 signal.raise_signal({stop})
 
-        sys.exit(scene_node.run(Ended, 'ended', []))
+        sys.exit(scene_node.run([Ended], 'ended', []))
         """
 
 

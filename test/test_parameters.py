@@ -123,17 +123,6 @@ def refuse_all(graph, kind, names):
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize('kind, least', [(CrankDriver, 40), (Kinematics, 150)])
-def test_no_value_of_any_kind_ends_a_node_or_spoils_a_parameter(graph, kind, least):
-    def one_of_each(fields):
-        kinds = {(field.kind, field.read_only): name for name, field in fields.items()
-                 if not name.startswith('leg.')}
-        return list(kinds.values())
-
-    assert refuse_all(graph, kind, one_of_each) > least
-
-
-@pytest.mark.nightly
 @pytest.mark.parametrize('kind, least', [(CrankDriver, 80), (Kinematics, 1000)])
 def test_no_value_of_any_kind_spoils_any_parameter(graph, kind, least):
     assert refuse_all(graph, kind, list) > least
@@ -161,14 +150,6 @@ def test_every_parameter_is_described_as_the_scene_has_it(graph, kind):
             if ends and one.field.kind == 'integer' else [],
             floating_point_range=[FloatingPointRange(from_value=ends[0], to_value=ends[1])]
             if ends and one.field.kind == 'double' else [])
-
-
-@pytest.mark.parametrize('kind, line', [
-    (CrankDriver, 'ready: moves leg_crank, lever_crank, own_crank on crank_states at 50 Hz'),
-    (Kinematics, 'ready: moves leg, lever, own by crank_states'),
-    (ServoInverse, 'ready: answers servo_inverse for leg, lever, own')])
-def test_a_node_says_what_it_serves(graph, kind, line):
-    assert f'ready: {graph.start(kind, EVERYTHING).serves()}' == line
 
 
 def test_names_and_types_that_there_are_not_are_refused(graph):

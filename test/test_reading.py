@@ -60,24 +60,16 @@ def check(graph, reader):
         arrived.clear()
         publisher.publish(sent)
         graph.until(lambda: arrived)
-        return compare(reader, arrived[0], sent)
+        compare(reader, arrived[0], sent)
     return check
 
 
 def compare(reader, text, sent):
-    """Read what arrived and compare it with what was sent; return its sender."""
-    sender = reader.sender(text)
-    assert sender.routes == sent.name
-    stamp, *numbers = sender.read(text)
+    """Read what arrived and compare it with what was sent."""
+    routes, (stamp, *numbers) = reader.read(text)
+    assert routes == sent.name
     assert message_layout.unpack(stamp) == sent.header.stamp
     assert numbers == [*sent.position, *sent.velocity]
-    return sender
-
-
-def read(reader, text):
-    """Return what a reader says of a message: the routes of its sender, and its numbers."""
-    sender = reader.sender(text)
-    return sender.routes, sender.read(text)
 
 
 @pytest.mark.nightly(all_but=6)
@@ -91,8 +83,8 @@ def test_a_sender_is_hardly_ever_deserialised(reader, check, names, velocities, 
 
 
 def test_what_differs_in_more_than_numbers_is_deserialised(reader, check):
-    first = check(message(['a', 'b']))
-    assert check(message(['a', 'c'])) is not first
+    check(message(['a', 'b']))
+    check(message(['a', 'c']))
     check(message(['a', 'b'], frame='x'))
     check(message(['a', 'b'], velocities=False))
     check(message(['a', 'b', 'c']))
@@ -108,13 +100,13 @@ def test_senders_that_take_turns_are_hardly_ever_deserialised(reader, check):
 
 def test_numbers_that_are_none_are_handed_on(reader):
     for _ in range(2):
-        _, numbers = read(reader, serialize_message(JointState(name=['a'], position=[math.nan])))
+        _, numbers = reader.read(serialize_message(JointState(name=['a'], position=[math.nan])))
         assert math.isnan(numbers[1])
 
 
 def test_more_names_than_positions_are_read_as_they_are(reader):
     for _ in range(2):
-        names, numbers = read(reader, serialize_message(
+        names, numbers = reader.read(serialize_message(
             JointState(name=['a', 'b'], position=[1.0])))
         assert names == ['a', 'b'] and numbers[1:] == (1.0,)
 
@@ -159,7 +151,7 @@ def test_any_number_of_senders_is_learnt(reader, senders):
     texts = [serialize_message(message([f'robot{i}_crank'])) for i in range(senders)]
     for _ in range(10):
         for text in texts:
-            reader.sender(text)
+            reader.read(text)
     assert reader.looked == senders
 
 
@@ -180,8 +172,8 @@ def test_what_is_remembered_is_bounded_whatever_comes(reader, monkeypatch):
     def after(senders):
         for i in senders:
             text = serialize_message(message(['a' * (i % 7), f'{i:09}'][i % 2:]))
-            reader.sender(text)
-            reader.sender(text)
+            reader.read(text)
+            reader.read(text)
         return held(reader)
 
     first = held(reader)
@@ -200,9 +192,9 @@ def test_a_sender_that_cannot_be_learnt_excludes_itself_alone(reader):
 
 def test_no_bytes_at_all_are_of_no_sender(reader):
     for text in (big_endian(message(['a'])), serialize_message(message(['b']))):
-        reader.sender(text)
+        reader.read(text)
         with pytest.raises(Unreadable):
-            reader.sender(b'')
+            reader.read(b'')
 
 
 def test_a_name_that_is_no_text_excludes_its_sender_alone(reader):
@@ -210,7 +202,7 @@ def test_a_name_that_is_no_text_excludes_its_sender_alone(reader):
     good, bad = (serialize_message(sent), serialize_message(sent).replace(b'a_c', b'\xff\xfec'))
     for _ in range(5):
         compare(reader, good, sent)
-        assert reader.sender(bad).routes == deserialize_message(bad, JointState).name
+        assert reader.read(bad)[0] == deserialize_message(bad, JointState).name
     assert reader.looked == 2
 
 
@@ -221,10 +213,10 @@ def test_what_is_learnt_grows_with_the_joints_alone(joints):
     reader = joint_state_reader.Reader(lambda made: looked.append(made) or made.name)
     sys.setprofile(lambda _, event, __: calls.update([event]))
     try:
-        said = read(reader, text)
+        said = reader.read(text)
     finally:
         sys.setprofile(None)
-    assert read(reader, text) == said and len(looked) == 1
+    assert reader.read(text) == said and len(looked) == 1
     assert calls.total() < 600 + 20 * joints
 
 
@@ -288,7 +280,7 @@ def test_mutated_messages_read_as_they_do_when_they_are_deserialised(reader, see
         text = mutated(random, base)
         # What is learnt from one is tried on the next, which differs in a little.
         for tried in (text, text, mutated(random, text), text, base):
-            assert outcome(read, reader, tried) == outcome(plainly, tried)
+            assert outcome(reader.read, tried) == outcome(plainly, tried)
     assert reader.looked < 300 * 5 - 400
 
 
@@ -297,11 +289,11 @@ def test_no_claim_of_padding_makes_a_short_message_dangerous(reader):
     for options in range(256):
         for size in range(MIN_BYTES):
             with pytest.raises(Unreadable):
-                reader.sender((b'\0\1\0' + bytes([options]) + whole[4:])[:size])
+                reader.read((b'\0\1\0' + bytes([options]) + whole[4:])[:size])
     for options in range(0, 256, 5):
         for size in range(MIN_BYTES, len(whole)):
             text = (b'\0\1\0' + bytes([options]) + whole[4:])[:size]
-            assert outcome(read, reader, text) == outcome(plainly, text)
+            assert outcome(reader.read, text) == outcome(plainly, text)
 
 
 @pytest.mark.parametrize('name', [b'a\0b\0', b'ab\0\0', b'abcd', b'\0\0\0\0', b'\xc3(\xff\0'])
@@ -309,7 +301,7 @@ def test_a_name_with_odd_ends_stands_for_no_other(reader, name):
     base = serialize_message(message(['abc']))
     text = base.replace(b'abc\0', name)
     for tried in (text, text, text, base, base, base, text.replace(b'\4\0\0\0', b'\2\0\0\0')):
-        assert outcome(read, reader, tried) == outcome(plainly, tried)
+        assert outcome(reader.read, tried) == outcome(plainly, tried)
 
 
 def test_the_node_hardly_ever_deserialises_a_message_of_a_sender(graph, reader):

@@ -97,11 +97,6 @@ def test_a_signal_ends_them_quietly(number):
     assert process.end() == (0, '')
 
 
-def test_one_name_for_all_is_refused(capfd):
-    assert scene_process.main(['scene', '--ros-args', '-r', '__node:=robot']) == 1
-    assert re.search(r'\[FATAL\].*two nodes would be called robot', capfd.readouterr().err)
-
-
 def test_a_bad_scene_ends_them_all_in_one_sentence(capfd):
     assert scene_process.main(['scene', '--ros-args', '-p', 'mechanisms:=[leg]']) == 1
     printed = capfd.readouterr().err

@@ -18,18 +18,11 @@ pytest.importorskip('linkage_interfaces')
 from linkage_interfaces.srv import InputsFor, ServoInverse as Service  # noqa: E402
 from linkage_ros import mechanisms, scene  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from linkage_ros.scene.inverse_request import InverseRequest  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
 
 TWO = {'mechanisms': ['left', 'right', 'drop'], 'left.type': 'slotted_lever',
        'right.type': 'slotted_lever', 'right.dimensions.a': 200.0, 'drop.type': 'water_drop'}
 LIMIT = math.asin(80.0 / 150.0)
 SWEPT = {'mechanisms': ['slotted_lever'], 'slotted_lever.crank.sweep': [-1.3, 0.8]}
-GRIPPER = {
-    'gripper.joints': ['O ground 0 0', 'Q ground base 0', 'A crank O drive',
-                       'B dyad A Q rod finger left', 'T rigid Q B 0.09 0.06 right'],
-    'gripper.dimensions.base': 0.04, 'gripper.dimensions.drive': 0.02,
-    'gripper.dimensions.rod': 0.045, 'gripper.dimensions.finger': 0.05}
 KINDS = [kind for kind in mechanisms.TYPES if len(mechanisms.create(kind).inputs) == 1]
 
 
@@ -69,14 +62,6 @@ def test_of_two_answers_the_one_near_the_servo_is_taken(call):
     assert lever_of(response.servo_angle[1]) == pytest.approx(0.3)
     assert abs(response.servo_angle[2] - 9.0) < math.pi
     assert lever_of(response.servo_angle[2]) == pytest.approx(0.3)
-
-
-def test_a_lever_that_turns_all_round_reaches_every_angle(call):
-    wanted = np.linspace(-3.0, 3.0, 13)
-    response = call(TWO, mechanism='right', lever_angle=wanted.tolist())
-    assert response.success
-    for phi, servo in zip(wanted, response.servo_angle):
-        assert lever_of(servo, a=200.0) == pytest.approx(phi)
 
 
 def test_one_angle_out_of_reach_does_not_spoil_the_others(call):
@@ -165,15 +150,6 @@ def test_any_output_of_any_mechanism_is_put_where_it_is_wanted(call):
         'values of C.y 5 cannot be reached; C.y reaches [-0.718602, 0.718602] m')
 
 
-def test_a_link_is_turned_to_an_angle_by_the_answer_nearest_to_a_servo(call):
-    response = call(mechanism='jansen', output='BE', lever_angle=[-2.2, -2.2],
-                    servo_near=[0.0, 3.0])
-    assert response.success and response.servo_angle[0] != response.servo_angle[1]
-    for servo in response.servo_angle:
-        angle = mechanisms.create('jansen').joint_angles(servo)['BE']
-        assert angle == pytest.approx(-2.2, abs=1e-14)
-
-
 FIVE_BAR = {'mechanisms': ['leg', 'drop'], 'leg.type': 'five_bar', 'leg.scale': 2.0,
             'leg.crank2.source': 'motor', 'leg.crank2.ratio': 0.5, 'drop.type': 'water_drop'}
 FOOT = {'outputs': ['P.x', 'P.y'], 'values': [0.12, 0.3]}
@@ -251,14 +227,6 @@ def ask(node, wanted, near=(), output='', mechanism=''):
     return node.answer(request, Service.Response())
 
 
-def test_the_lever_by_its_name_is_the_same_to_the_last_bit(graph):
-    node = graph.start(ServoInverse)
-    wanted, near = [0.1, 0.3, -0.5, 0.6], [0.0, 2.5, 9.0, -3.0]
-    for angles in ([], near):
-        unnamed, named = (ask(node, wanted, angles, output) for output in ('', 'lever'))
-        assert repr(unnamed) == repr(named) and named.reachable == [True, True, True, False]
-
-
 def test_many_angles_at_once_are_answered_like_each_alone(graph):
     node = graph.start(ServoInverse, SWEPT)
     wanted = np.linspace(-0.5, 0.5, 600).tolist()
@@ -294,15 +262,6 @@ def test_an_answer_lies_in_the_sweep_or_the_reason_says_which_end_forbids(graph)
         'crank.sweep [-1.3, 0.8]')
 
 
-def test_the_tutorial_s_gripper_is_answered_where_its_servo_can_stand(graph):
-    gripper = graph.start(ServoInverse, {
-        'mechanisms': ['gripper'], 'gripper.type': 'custom', 'gripper.tracer': 'T',
-        **GRIPPER, 'gripper.crank.sweep': [-1.3, 0.8]})
-    for near in ((), (-3.0,), (100.0,)):
-        answer = ask(gripper, [0.03], near, 'T.x')
-        assert answer.success and round(answer.servo_angle[0], 4) == -0.3894
-
-
 @pytest.mark.parametrize('sweep, servo', [
     ((6.0, 9.0), 0.880514 + 2 * math.pi), ((0.0, 20.0), 0.880514), ((8.0, 20.0), 9.0)])
 def test_a_sweep_may_lie_anywhere_and_be_more_than_a_turn(graph, sweep, servo):
@@ -328,48 +287,10 @@ def test_a_sweep_changes_while_the_node_runs(graph):
     assert not ask(node, [0.5]).success
 
 
-def test_the_same_question_has_the_same_answer_wherever_the_crank_is(graph):
-    node = graph.start(ServoInverse, {'mechanisms': ['slotted_lever', 'jansen']})
-    cranks = graph.node.create_publisher(JointState, 'crank_states', 10)
-    working = ask(node, [0.3]).servo_angle[0]
-    assert lever_of(working) == pytest.approx(0.3)
-    graph.until(cranks.get_subscription_count)
-    for angle in (2.5, 9.0, -3.0, math.nan):
-        cranks.publish(JointState(name=['x', 'slotted_lever_crank'], position=[1.0, angle]))
-        assert ask(node, [0.3]).servo_angle[0] == working
-    levers = np.linspace(-0.5, 0.5, 21).tolist()
-    many = ask(node, levers).servo_angle
-    assert np.abs(np.diff(many)).max() < 0.5
-    assert [lever_of(servo) for servo in many] == pytest.approx(levers)
-
-
-def test_one_servo_near_serves_any_number_of_values(graph):
-    node = graph.start(ServoInverse, {'mechanisms': ['slotted_lever']})
-    levers = np.linspace(-0.5, 0.5, 21)
-    working, other = (np.array(ask(node, levers.tolist(), near).servo_angle)
-                      for near in ([], [math.pi]))
-    assert [lever_of(servo) for servo in other] == pytest.approx(levers.tolist())
-    assert np.abs(np.diff(other)).max() < 0.5 and np.abs(other - working).min() > 0.5
-
-
 def test_an_answer_that_others_would_wait_for_is_refused(graph):
     response = ask(graph.start(ServoInverse), [0.1] * 10_001)
     assert not response.success
     assert response.message == 'lever_angle has 10001 values; give up to 10000 at once'
-
-
-@pytest.mark.parametrize('near', [[], [2.9], 'each'])
-def test_a_long_way_is_answered_as_in_one_piece(graph, near):
-    node = graph.start(ServoInverse, {'mechanisms': ['slotted_lever']})
-    # In and out of the reach; it comes near its ends.
-    values = 0.57 * np.sin(np.linspace(-1.6, 9.0, 9_000))
-    near = np.linspace(-3.0, 20.0, len(values)) if near == 'each' else np.array(near)
-    response = ask(node, values.tolist(), near.tolist())
-    inverse = InverseRequest(node.scene.machines['slotted_lever'], [''])
-    (servos,), (rates,) = inverse.positions([values], [near] if len(near) else None)
-    np.testing.assert_allclose(response.servo_angle, servos, rtol=1e-12)
-    np.testing.assert_allclose(response.reduction, rates, rtol=1e-9)
-    assert np.isnan(servos).any() and np.isfinite(servos).any()
 
 
 def random_scene(rng):

@@ -7,7 +7,7 @@ from collections import Counter
 import dis
 
 from builtin_interfaces.msg import Time
-from linkage_ros import mechanisms, scene
+from linkage_ros import mechanisms
 from linkage_ros.nodes import mechanism_model, message_layout, messages
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.publishers import LATCHED
@@ -106,16 +106,6 @@ def _operations(linkage, *points):
             if operation.opname.startswith('BINARY')]
 
 
-def test_a_crank_that_stands_still_is_published_with_the_new_stamp(graph):
-    graph.start(Kinematics)
-    heard = graph.listen(MarkerArray, 'jansen/markers')
-    turn = graph.crank(['jansen_crank'])
-    first = turn([0.7], heard, [1.0])
-    again = turn([0.7], heard, [1.0])
-    assert again.markers[1].points == first.markers[1].points
-    assert again.markers[1].header.stamp.sec > first.markers[1].header.stamp.sec
-
-
 def test_the_locus_is_sent_once_and_a_late_subscriber_gets_it(graph, monkeypatch):
     drawn = Counter()
     locus = messages.locus
@@ -132,16 +122,6 @@ def test_the_locus_is_sent_once_and_a_late_subscriber_gets_it(graph, monkeypatch
     assert graph.set(node, water_drop__dimensions__a=2.0).successful
     graph.until(lambda: drawn['water_drop'] == 2)
     assert drawn['jansen'] == 1 and len(late) == 1
-
-
-def test_a_change_of_dimensions_rebuilds_only_that_mechanism(graph, monkeypatch):
-    node = graph.start(Kinematics)
-    built = []
-    assembly = scene.SceneMechanism.assembly
-    monkeypatch.setattr(scene.SceneMechanism, 'assembly', lambda machine: (
-        built.append(machine.name) or assembly(machine)))
-    assert graph.set(node, jansen__dimensions__m=14.0).successful
-    assert set(built) == {'jansen'}
 
 
 def test_a_subscriber_that_comes_or_goes_is_served_or_spared_from_the_next_tick(graph, work):

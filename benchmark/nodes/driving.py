@@ -21,6 +21,8 @@ DEADLINE = 30.0
 LATE = 0.01
 # After the last message of a burst, answers are waited for this long [s].
 PATIENCE = 0.5
+# Between two messages to which an answer is waited for [s].
+PAUSE = 0.05
 
 
 class Process:
@@ -130,7 +132,7 @@ class Line:
         self.cranks = scenes.Cranks(scene)
         self.publisher = driver.node.create_publisher(
             JointState, f'/{process.name}/crank_states', 10)
-        self.heard = []
+        self.heard, self._sent = [], 0.0
         self._subscriptions = [
             self._hear(f'/{process.name}/{topic.name}') if topic.joints
             else driver.idle.create_subscription(
@@ -155,8 +157,14 @@ class Line:
         self._driver.wait(0.1)
 
     def send(self):
-        """Send the next crank message."""
-        self.publisher.publish(next(self.cranks))
+        """
+        Send the next crank message, unless one was just sent.
+
+        Each answer wakes who waits for all of them: of sixty, each would ask for sixty more.
+        """
+        if time.perf_counter() > self._sent + PAUSE:
+            self._sent = time.perf_counter()
+            self.publisher.publish(next(self.cranks))
 
     def connected(self):
         """Return whether both ends know each other; sends a message."""

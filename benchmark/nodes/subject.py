@@ -121,7 +121,8 @@ def main():
     options = parser.parse_args(own[1:])
     if options.ready:
         Floor.ready = Ear.ready = ready(pickle.loads(options.ready.read_bytes()))
-    return scene_node.run(KINDS[options.kind], options.kind, sys.argv[:1] + sys.argv[len(own):])
+    return scene_node.run(
+        [KINDS[options.kind]], options.kind, sys.argv[:1] + sys.argv[len(own):])
 
 
 if __name__ == '__main__':

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 import math
 from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Sequence
 
@@ -16,7 +15,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from . import joint_state_reader
 from .log import MAX_NAMES, Once, Throttle
-from .message_layout import NEVER, pack_time, unpack
+from .message_layout import unpack
 from .messages import joint_states
 from .publishers import TrackedPublisher
 from ..scene.inverse_request import Command, InverseRequest
@@ -84,16 +83,17 @@ class CommandStream:
 
     def __init__(self, node: Any, mechanisms: Iterable[str],
                  present: Callable[[SceneMechanism], list[float]]):
-        self._present, self._logger, self._clock = present, node.get_logger(), node.get_clock()
+        self._present, self._logger = present, node.get_logger()
         self._commands = TrackedPublisher(node, JointState, 'servo_commands', 10)
         self._arrays = {name: TrackedPublisher(node, Float64MultiArray, f'{name}/commands', 10)
                         for name in mechanisms}
         self._trajectories = TrackedPublisher(node, JointTrajectory, 'servo_trajectory', 10)
-        self._throttle, self._unknown = Throttle(self._logger), Once(MAX_NAMES)
+        self._throttle, self._reasons = Throttle(self._logger), Once(MAX_NAMES)
         self._mechanisms: Mapping[str, SceneMechanism] = {}
         self._last: dict[str, Command] = {}
         self._worker, self._newest = node.worker, JointTrajectory()
-        joint_state_reader.subscribe(node, 'wanted_states', self._receive)
+        self._reader = joint_state_reader.subscribe(
+            node, 'wanted_states', self._interpret, self._receive)
         node.create_subscription(JointTrajectory, 'wanted_trajectory', node.guarded(
             'wanted_trajectory', self._receive_trajectory), 10)
 
@@ -103,7 +103,7 @@ class CommandStream:
         self._last = {name: last for name, last in self._last.items() if len(last.inputs) == 1
                       or self._mechanisms[name] is mechanisms[name]}
         self._mechanisms = mechanisms
-        self._reader = joint_state_reader.Reader(self._interpret)
+        self._reader.forget()
 
     def _output(self, named: str) -> Optional[tuple[SceneMechanism, str, JointName]]:
         """Return the mechanism, output and published name for a name in messages, or None."""
@@ -115,12 +115,11 @@ class CommandStream:
                 return mechanism, joint, name
         return None
 
-    def _targets(self, names: Sequence[str]) -> tuple[list[Target], list[str], list[str]]:
+    def _targets(self, names: Sequence[str]) -> tuple[list[Target], list[str]]:
         """
-        Return three lists for the output names in a message; of a repeated name the last counts.
+        Return the targets of the output names in a message, and what is wrong with other names.
 
-        They are the targets, the names that are no outputs, and the reasons why a mechanism with
-        outputs in the message has no target.
+        Of a repeated name the last counts.
         """
         outputs_of: dict[str, list[tuple]] = {}
         targets, unknown, reasons = [], [], []
@@ -129,6 +128,9 @@ class CommandStream:
                 outputs_of.setdefault(output[0].name, []).append((index, *output[1:]))
             else:
                 unknown.append(named)
+        if unknown:
+            reasons.append(f'no output is called {listed(unknown, 150)}; an output is called '
+                           '<mechanism>_<link>, <mechanism>_<joint>.x, or as joint_names has it')
         for name, outputs in outputs_of.items():
             mechanism = self._mechanisms[name]
             n = len(mechanism.inputs)
@@ -145,26 +147,21 @@ class CommandStream:
                     InverseRequest(mechanism, joints), indices, published))
             except ValueError as error:
                 reasons.append(str(error))
-        return targets, unknown, reasons
+        return targets, reasons
 
     def _interpret(self, message: JointState) -> tuple[list[Target], int, bool]:
         """Return a sender's targets, its count of positions, and whether it has velocities."""
-        targets, unknown, reasons = self._targets(message.name[:len(message.position)])
-        for reason in reasons:
-            # Throttled, because each message of some senders is interpreted.
-            self._throttle.warn(reason, partial('wanted_states: {}'.format, reason))
-        if unknown := self._unknown.new(unknown):
-            self._logger.warning(f'wanted_states: {_no_output(unknown)}{self._unknown.ending}')
+        targets, reasons = self._targets(message.name[:len(message.position)])
+        for reason in self._reasons.new(reasons):
+            self._logger.warning(f'wanted_states: {reason}{self._reasons.ending}')
         return targets, len(message.position), len(message.velocity) == len(message.name)
 
-    def _receive(self, data: bytes) -> None:
+    def _receive(self, routes: tuple[list[Target], int, bool], stamp: bytes,
+                 numbers: Sequence[Any]) -> None:
         if not self._commands.has_subscribers and not any(
                 array.has_subscribers for array in self._arrays.values()):
             return
-        sender = self._reader.sender(data)
-        (targets, count, known), (stamp, *numbers) = sender.routes, sender.read(data)
-        if stamp == NEVER:
-            stamp = pack_time(self._clock.now().nanoseconds)
+        (targets, count, known), (_, *numbers) = routes, numbers
         commands = [(target, command) for target in targets if (command := self._command(
             target, numbers, numbers[count:] if known else None))]
         if commands:
@@ -214,9 +211,9 @@ class CommandStream:
                 raise ValueError(f'it has {len(message.points)} points; send up to {MAX_POINTS}')
             if len({*message.joint_names}) < len(message.joint_names):
                 raise ValueError('joint_names has a name twice')
-            targets, unknown, reasons = self._targets(message.joint_names)
-            if unknown or reasons:
-                raise ValueError(_no_output(unknown) if unknown else reasons[0])
+            targets, reasons = self._targets(message.joint_names)
+            if reasons:
+                raise ValueError(reasons[0])
             if message.points and not targets:
                 raise ValueError('joint_names is empty: name at least one output')
         except ValueError as error:
@@ -225,8 +222,8 @@ class CommandStream:
         seeds = [self._seed(target) for target in targets]
         jumps = [target.mechanism.name not in self._last for target in targets]
         self._newest = message
-        self._worker.replace('wanted_trajectory', lambda: self._solve(
-            message, targets, seeds, jumps))
+        self._worker.queue('wanted_trajectory', lambda: self._solve(
+            message, targets, seeds, jumps), is_next=True)
 
     def _refuse(self, error: ValueError) -> None:
         self._logger.error(f'wanted_trajectory is refused: {error}')
@@ -278,8 +275,3 @@ def _solved_point(i: int, point: JointTrajectoryPoint, n: int, targets: Sequence
         velocities=[speed for command in commands for speed in command.speeds
                     if len(point.velocities)],
         time_from_start=point.time_from_start)
-
-
-def _no_output(unknown: Sequence[str]) -> str:
-    return (f'no output is called {listed(unknown, 150)}; an output is called '
-            '<mechanism>_<link>, <mechanism>_<joint>.x, or as joint_names has it')

@@ -17,7 +17,6 @@ from .messages import joint_states
 from .publishers import PatchedPublisher, TrackedPublisher
 from .. import scene
 from ..scene.motion import Motion
-from ..words import listed
 
 # If system time gains more than this on steady time between two messages [ns], it has jumped.
 MIN_JUMP_NS = 10 ** 8
@@ -29,6 +28,7 @@ MAX_PERIOD_NS = 1e18
 class CrankDriver(scene_node.SceneNode):
     """Publishes the scene's source joints on `crank_states`, as functions of the node's time."""
 
+    task = 'drives {mechanisms} on crank_states at {rate:g} Hz'
     # System time [ns], used unless `use_sim_time` is set.
     system_time = staticmethod(time_ns)
 
@@ -107,15 +107,10 @@ class CrankDriver(scene_node.SceneNode):
         """Return position [rad or m] and speed [rad/s or m/s] of an input's source joint."""
         return self.scene.machines[key[0]].to_source(settings, *self._motions[key].at(now))
 
-    def serves(self) -> str:
-        """Return the source joints and their rate, in words."""
-        sources = [settings.source for settings in self._settings.values()]
-        return f'moves {listed(sources, 200)} on crank_states at {self.scene.rate:g} Hz'
-
 
 def main(args: Any = None) -> int:
     """Run the node with command-line arguments `args`; return the exit code."""
-    return scene_node.run(CrankDriver, scene.DRIVER, args)
+    return scene_node.run([CrankDriver], scene.DRIVER, args)
 
 
 if __name__ == '__main__':

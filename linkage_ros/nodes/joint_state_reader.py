@@ -13,21 +13,27 @@ from __future__ import annotations
 from array import array
 from contextlib import suppress
 from struct import error as StructError, Struct
-from typing import Any, Callable, List, Optional, Tuple
+from typing import Any, Callable, List, NamedTuple, Optional, Tuple
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from .log import Throttle
-from .message_layout import deserialized, HEADER, LITTLE_ENDIAN, pack, Unreadable
+from .message_layout import (
+    deserialized,
+    HEADER,
+    LITTLE_ENDIAN,
+    NEVER,
+    pack,
+    pack_time,
+    Unreadable,
+)
 
 # Best effort matches publishers of any reliability. At 1000 Hz, the queue holds 100 ms.
 ANY = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 # Maximum number of known senders; when it is reached, they are learnt anew.
 MAX_SENDERS = 256
-# Messages longer than this [bytes] are always deserialised.
-MAX_LAYOUT_BYTES = 1 << 16
 
 COUNT = Struct('<I')
 
@@ -35,17 +41,23 @@ COUNT = Struct('<I')
 Numbers = Tuple[Any, ...]
 
 
-def subscribe(node: Any, topic: str, receive: Callable[[bytes], None]) -> None:
+def subscribe(node: Any, topic: str, interpret: Callable[[JointState], Any],
+              receive: Callable[[Any, bytes, Numbers], None]) -> Reader:
     """
-    Subscribe a SceneNode to joint states; `receive` is called with each serialised message.
+    Subscribe a SceneNode to joint states; return the reader, see there for `interpret`.
 
-    If it raises Unreadable, a throttled warning is logged. Any other exception is reported.
+    `receive` is called with the routes, the packed stamp (now, if the message has none) and the
+    numbers of each message. A message that is unreadable is ignored with a throttled warning. Any
+    other exception is reported.
     """
-    throttle = Throttle(node.get_logger())
+    reader, clock, throttle = Reader(interpret), node.get_clock(), Throttle(node.get_logger())
 
     def receive_or_ignore(data: bytes) -> None:
         try:
-            receive(data)
+            routes, numbers = reader.read(data)
+            stamp = numbers[0]
+            receive(routes, pack_time(clock.now().nanoseconds) if stamp == NEVER else stamp,
+                    numbers)
         except Unreadable as error:
             reason = str(error)
             throttle.warn(topic, lambda: (f'{topic}: a message of {len(data)} bytes is ignored, '
@@ -54,6 +66,25 @@ def subscribe(node: Any, topic: str, receive: Callable[[bytes], None]) -> None:
             node.report(topic, error)
 
     node.create_subscription(JointState, topic, receive_or_ignore, ANY, raw=True)
+    return reader
+
+
+class Sender(NamedTuple):
+    """The constant bytes of a sender's messages, and the places of their numbers."""
+
+    # What `interpret` returned for its first message.
+    routes: Any
+    # Length of its messages [bytes], their constant bytes as an integer, and 0 where they vary:
+    # integers are the fastest to compare for messages this short.
+    size: int
+    constant: int
+    mask: int
+    unpack: Callable[[bytes], Numbers]
+
+    def has_sent(self, data: bytes) -> bool:
+        """Return whether a serialised message has this sender's length and constant bytes."""
+        return (len(data) == self.size
+                and int.from_bytes(data, 'little') & self.mask == self.constant)
 
 
 class Reader:
@@ -69,64 +100,36 @@ class Reader:
         self._senders: List[Sender] = []
         self._last: Optional[Sender] = None
 
-    def sender(self, data: bytes) -> Sender:
-        """Return the sender of a serialised message; raise Unreadable if it is no JointState."""
-        if self._last is None or not self._last.has_sent(data):
-            known = (sender for sender in self._senders if sender.has_sent(data))
-            self._last = next(known, None) or self._new(data)
-        return self._last
+    def forget(self) -> None:
+        """Forget all senders, so that their messages are interpreted anew."""
+        self._senders, self._last = [], None
 
-    def _new(self, data: bytes) -> Sender:
+    def read(self, data: bytes) -> Tuple[Any, Numbers]:
+        """
+        Return the routes and the numbers of a serialised message.
+
+        The numbers are the stamp (see `pack`), the positions [rad or m], then the velocities [per
+        second] if there are any. Raises Unreadable if the message is no JointState.
+        """
+        last = self._last
+        if last is None or not last.has_sent(data):
+            last = self._last = next(
+                (sender for sender in self._senders if sender.has_sent(data)), None)
+        return (last.routes, last.unpack(data)) if last else self._learn(data)
+
+    def _learn(self, data: bytes) -> Tuple[Any, Numbers]:
         message = deserialized(data, JointState)
-        sender = Sender(data, message, self._interpret(message))
-        if sender.size:
-            if len(self._senders) == MAX_SENDERS:
-                self._senders.clear()
-            self._senders.append(sender)
-        return sender
-
-
-class Sender:
-    """
-    The constant bytes of a sender's messages, and the places of their numbers.
-
-    Attributes
-    ----------
-    routes : object
-        What `interpret` returned for its first message.
-    size : int
-        Length of its messages [bytes]; 0: places are unknown, so that it reads its first message
-        only.
-
-    """
-
-    def __init__(self, data: bytes, message: JointState, routes: Any):
-        self.routes, self.size = routes, 0
-        self._numbers: Optional[Numbers] = (
-            pack(message.header.stamp), *message.position, *message.velocity)
-        if len(data) <= MAX_LAYOUT_BYTES:
-            with suppress(StructError):
-                mask, places = _layout(data)
-                unpack = Struct(places).unpack_from
-                if _bits(unpack(data)) == _bits(self._numbers):
-                    # Integers are the fastest to compare for messages this short.
-                    self.size, self._mask = len(data), int.from_bytes(mask, 'little')
-                    self._same = int.from_bytes(data, 'little') & self._mask
-                    self._numbers, self._unpack = None, unpack
-
-    def has_sent(self, data: bytes) -> bool:
-        """Return whether a serialised message has this sender's known length and bytes."""
-        return (len(data) == self.size > 0
-                and int.from_bytes(data, 'little') & self._mask == self._same)
-
-    def read(self, data: bytes) -> Numbers:
-        """
-        Return the numbers of one of this sender's messages.
-
-        They are the stamp (see `pack`), the positions [rad or m], then the velocities [per second]
-        if there are any.
-        """
-        return self._numbers or self._unpack(data)
+        routes = self._interpret(message)
+        numbers = pack(message.header.stamp), *message.position, *message.velocity
+        with suppress(StructError):
+            mask, unpack = _layout(data)
+            if _bits(unpack(data)) == _bits(numbers):
+                if len(self._senders) == MAX_SENDERS:
+                    self._senders.clear()
+                self._last = Sender(
+                    routes, len(data), int.from_bytes(data, 'little') & mask, mask, unpack)
+                self._senders.append(self._last)
+        return routes, numbers
 
 
 def _bits(numbers: Any) -> tuple:
@@ -134,12 +137,12 @@ def _bits(numbers: Any) -> tuple:
     return numbers[0], array('d', numbers[1:]).tobytes()
 
 
-def _layout(data: bytes) -> Tuple[bytearray, str]:
+def _layout(data: bytes) -> Tuple[int, Callable[[bytes], Numbers]]:
     """
     Return where the constant bytes and the numbers of a serialised JointState are.
 
-    That is a mask, 0 at stamp, numbers and padding, and the format of stamp, positions and
-    velocities. Raises StructError if the message is not in little-endian CDR.
+    That is a mask, 0 at stamp, numbers and padding, and the function that unpacks stamp, positions
+    and velocities. Raises StructError if the message is not in little-endian CDR.
     """
     if not data.startswith(LITTLE_ENDIAN):
         raise StructError
@@ -168,4 +171,4 @@ def _layout(data: bytes) -> Tuple[bytearray, str]:
         start = place + (HEADER - place) % 8 if number else place
         places += f'{start - end}x{width * number}{code}'
         place = end = start + 8 * number
-    return mask, places
+    return int.from_bytes(mask, 'little'), Struct(places).unpack_from

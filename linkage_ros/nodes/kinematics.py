@@ -5,10 +5,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 import time
-from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Tuple
+from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Sequence, Tuple
 
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
@@ -17,7 +16,7 @@ from . import joint_state_reader, scene_node, shutdown
 from .log import MAX_NAMES, Once
 from .mechanism_model import MechanismModel
 from .mechanism_topics import MechanismTopics
-from .message_layout import NEVER, pack_time
+from .message_layout import NEVER
 from .scene_joint_states import SceneJointStates
 from .. import scene
 from ..robot_model import bodies, urdf
@@ -39,8 +38,14 @@ class InputSource(NamedTuple):
     velocity: int
 
 
+# The inputs that a sender's messages set, and the mechanisms that they move.
+Routes = Tuple[List[InputSource], List[MechanismTopics]]
+
+
 class Kinematics(scene_node.SceneNode):
     """Solves mechanisms at the inputs from `crank_states`, only for topics with subscribers."""
+
+    task = 'moves {mechanisms} by crank_states'
 
     def __init__(self, **kwargs: Any):
         self._mechanisms: Dict[str, MechanismTopics] = {}
@@ -54,7 +59,6 @@ class Kinematics(scene_node.SceneNode):
         self._scene_joint_states = SceneJointStates(self, self._inputs)
         self._mechanisms.update((name, MechanismTopics(self, mechanism))
                                 for name, mechanism in self.scene.machines.items())
-        self._reader = joint_state_reader.Reader(self._interpret)
         # That of the last message that set an input.
         self._stamp = NEVER
         self._joint_names: frozenset = frozenset()
@@ -63,41 +67,32 @@ class Kinematics(scene_node.SceneNode):
             MISSING_AFTER_S, self.guarded('the check for missing inputs', self._warn_of_missing),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
-        for mechanism in self.scene.machines.values():
-            if len(mechanism.assembly().legs) > 1:
-                self._log_machine_code(mechanism.linkage)
-                break
-        joint_state_reader.subscribe(self, 'crank_states', self._receive)
+        self._log_machine_code()
+        joint_state_reader.subscribe(self, 'crank_states', self._interpret, self._receive)
 
-    def _log_machine_code(self, linkage: Any) -> None:
-        """Log why there is no machine code for the legs of a walker, if there is none."""
+    def _log_machine_code(self) -> None:
+        """Log why there is no machine code for the legs of walkers, if there is none."""
+        walkers = [model for model in self._models.values() if len(model.assembly.legs) > 1]
         try:
-            linkage.accelerated()
+            for model in walkers[:1]:
+                model.mechanism.linkage.accelerated()
         except ImportError as error:
             # Whoever has not installed it knows; whoever has, does not know that it is broken.
             is_missing = isinstance(error, ModuleNotFoundError)
             log = self.get_logger().info if is_missing else self.get_logger().warning
             log(f'plain Python is used instead of machine code, with the same results: {error}')
 
-    def serves(self) -> str:
-        """Return the mechanisms' names, in words."""
-        return f'moves {listed(self.scene.machines, 200)} by crank_states'
-
     def check(self, new: scene.Scene) -> None:
         """Raise SceneError if no robot model can be made of a planar mechanism."""
         for name, mechanism in new.machines.items():
-            before = self.scene.machines[name]
+            before, frame_id = self.scene.machines[name], mechanism.frame_id or new.frame_id
             if mechanism.in_space:
                 continue
             if mechanism is not before:
                 bodies.size(mechanism)
-            # Nothing else that has changed can invalidate a robot model, whose limits take long.
-            alike = replace(mechanism, linkage=before.linkage, reach=before.reach,
-                            inputs=before.inputs, pose=before.pose, points=before.points,
-                            frame_id=before.frame_id)
-            frame_id = mechanism.frame_id or new.frame_id
-            if alike != before or frame_id.startswith(f'{name}_'):
-                bodies.robot([replace(alike, frame_id=frame_id)], frame_id)
+            # Only a name can invalidate the rest of a robot model, whose limits take long.
+            if mechanism.joints != before.joints or frame_id.startswith(f'{name}_'):
+                bodies.robot([mechanism], frame_id)
 
     def prepare(self, new: scene.Scene) -> Any:
         """Return a model of each mechanism by name; unchanged mechanisms keep their models."""
@@ -118,9 +113,9 @@ class Kinematics(scene_node.SceneNode):
         if not is_first:
             self._publish(changed)
         for topics in changed:
-            self.worker.append(f'latched messages of {topics.name}',
-                               partial(self._latched, topics, models[topics.name]))
-        self.worker.append('the robot_description of the scene', partial(self._robot, models))
+            self.worker.queue(f'latched messages of {topics.name}',
+                              partial(self._latched, topics, models[topics.name]))
+        self.worker.queue('the robot_description of the scene', partial(self._robot, models))
 
     def _latched(self, topics: MechanismTopics, model: MechanismModel) -> Callable[[], None]:
         """Build a mechanism's latched messages; return a function to publish them."""
@@ -141,23 +136,15 @@ class Kinematics(scene_node.SceneNode):
 
     def delete_displayed(self) -> None:
         """Delete all markers and loci."""
-        for topics in self._mechanisms.values():
-            topics.clear()
-        # The end of a process would drop messages that are still on their way.
         deadline = time.monotonic() + DELETION_TIMEOUT_S
         for topics in self._mechanisms.values():
-            topics.wait_for_deletions(deadline)
+            topics.clear(deadline)
 
-    def _receive(self, data: bytes) -> None:
-        """Set the inputs by a serialised message, and publish the mechanisms that it moves."""
-        sender = self._reader.sender(data)
-        sources, moved = sender.routes
+    def _receive(self, routes: Routes, stamp: bytes, numbers: Sequence[Any]) -> None:
+        """Set the inputs by a message, and publish the mechanisms that it moves."""
+        sources, moved = routes
         if not moved:
             return
-        numbers = sender.read(data)
-        stamp = numbers[0]
-        if stamp == NEVER:
-            stamp = pack_time(self.get_clock().now().nanoseconds)
         for mechanism, i, position, velocity in sources:
             mechanism.receive(i, numbers[position], numbers[velocity] if velocity else None)
             mechanism.stamp = stamp
@@ -172,9 +159,9 @@ class Kinematics(scene_node.SceneNode):
         if in_scene:
             self._scene_joint_states.publish(self._stamp, tuple(
                 (mechanism.model, state) for mechanism in self._mechanisms.values()
-                if (state := mechanism.state_in_scene())))
+                if (state := mechanism.solved(in_scene))))
 
-    def _interpret(self, message: JointState) -> Tuple[List[InputSource], List[MechanismTopics]]:
+    def _interpret(self, message: JointState) -> Routes:
         """Return the inputs that a sender's messages set, and the mechanisms that they move."""
         count, moving = len(message.position), len(message.velocity) == len(message.name)
         # Index 0 of a message's numbers is its stamp.
@@ -207,7 +194,7 @@ class Kinematics(scene_node.SceneNode):
 
 def main(args: Any = None) -> int:
     """Run the node with command-line arguments `args`; return the exit code."""
-    return scene_node.run(Kinematics, scene.KINEMATICS, args)
+    return scene_node.run([Kinematics], scene.KINEMATICS, args)
 
 
 if __name__ == '__main__':

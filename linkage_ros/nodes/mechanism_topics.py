@@ -68,26 +68,21 @@ class MechanismTopics:
         value, self.speeds[i] = model.mechanism.from_source(
             model.inputs[i], position, speed, self._seed)
         self.inputs[i], self._position = value, position
+        self.state = None
         if math.isfinite(value):
             self._seed = value
 
     def publish(self, in_scene: bool) -> None:
         """Solve for the subscribers, and for the scene's joint states if `in_scene`; publish."""
         topics = self._subscribed()
-        if None in self.inputs or not (in_scene or any(topics)):
-            # The last solution is that of earlier inputs.
-            self.state = None
-            return
-        state = self._solve(self._regular(self.model, topics, in_scene))
-        if state.any_assembled and any(topics):
+        if (in_scene or any(topics)) and (state := self.solved(in_scene)) and any(topics):
             self.model.publishers[state, topics].publish(self.stamp, state.solution.values)
 
-    def state_in_scene(self) -> Optional[AssemblyState]:
-        """Return the present state for the scene's joint states; None without assembled legs."""
+    def solved(self, in_scene: bool) -> Optional[AssemblyState]:
+        """Return the state at the present inputs; None without assembled legs."""
         if None in self.inputs:
             return None
-        topics = self._subscribed()
-        regular, state = self._regular(self.model, topics, True), self.state
+        regular, state = self._regular(self.model, self._subscribed(), in_scene), self.state
         if state is None or state.solution is not regular.solution:
             state = self._solve(regular)
         return state if state.any_assembled else None
@@ -103,14 +98,13 @@ class MechanismTopics:
                              None not in self.speeds]
 
     def _solve(self, regular: AssemblyState) -> AssemblyState:
-        """Solve at the present inputs; display or delete markers if the state has changed."""
-        before, self.state = self.state, None
+        """Solve at the present inputs; note or delete the displayed markers."""
         state = self.state = self.model.solve(regular, self.inputs, self.speeds)
         if state.assembled is not None:
             self._throttle.warn('reach', self._out_of_reach)
         if not state.any_assembled:
             self._delete(self._displayed)
-        elif state != before and self._markers.has_subscribers:
+        elif self._markers.subscribed:
             self._displayed = self.model.marker_array.ids
         return state
 
@@ -144,13 +138,11 @@ class MechanismTopics:
             self._description.publish(String(data=description))
         self._set_locus(locus)
 
-    def clear(self) -> None:
-        """Delete the markers and the locus."""
+    def clear(self, deadline: float) -> None:
+        """Delete markers and locus; wait for acknowledgements, up to a monotonic time [s]."""
         self._delete(self._displayed)
         self._set_locus(None)
-
-    def wait_for_deletions(self, deadline: float) -> None:
-        """Wait for subscribers to acknowledge deletions, up to a monotonic time [s]."""
+        # The end of a process would drop messages that are still on their way.
         for publisher in (self._markers.publisher, self._locus):
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - time.monotonic())))
 

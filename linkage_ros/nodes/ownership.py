@@ -12,7 +12,7 @@ changed. A late subscriber receives the last full announcement and those after i
 
 from __future__ import annotations
 
-from typing import Any, Dict, Iterable, List, Mapping, Sequence, Set, Tuple
+from typing import Any, Dict, Iterable, Mapping, Sequence, Set
 
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import parameter_value_to_python
@@ -62,8 +62,12 @@ class Follower:
             ParameterEvent, TOPIC, node.guarded(TOPIC, self._receive), LATCHED)
 
     def _receive(self, event: ParameterEvent) -> None:
-        values, wrong = read((*event.new_parameters, *event.changed_parameters),
-                             self._parameters.followed)
+        fields = self._parameters.followed
+        # An invalid value raises: its announcement is reported, and not followed at all.
+        values = {message.name: fields[message.name].checked(
+            message.name, parameter_value_to_python(message.value))
+            for message in (*event.new_parameters, *event.changed_parameters)
+            if message.name in fields}
         mechanisms = values.pop('mechanisms', None)
         if mechanisms is not None:
             self._compare(event, mechanisms, values)
@@ -73,12 +77,11 @@ class Follower:
         # Values that were refused may be valid together with the new ones.
         self._waiting.update((name, value) for name, value in values.items()
                              if name.partition('.')[0] in self._mechanisms
-                             and not self._parameters.followed[name].read_only)
-        if refused := self._parameters.follow(self._waiting):
-            wrong.append(refused)
-        else:
+                             and not fields[name].read_only)
+        refusal = self._parameters.follow(self._waiting)
+        if not refusal:
             self._waiting = {}
-        self._warn('refused', wrong, 'values that cannot be followed')
+        self._warn('refused', [refusal] * bool(refusal), 'values that cannot be followed')
 
     def _compare(self, event: ParameterEvent, mechanisms: Iterable[str],
                  there: Mapping[str, Any]) -> None:
@@ -109,19 +112,3 @@ class Follower:
             self._node.get_logger().warning(
                 f'{elided(self._owner)} has {what}: {listed(particulars, 1000)}')
         self._warned[kind] = particulars
-
-
-def read(messages: Iterable, fields: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[str]]:
-    """Return the valid values of known parameters by name, and the errors of invalid ones."""
-    values: Dict[str, Any] = {}
-    wrong: List[str] = []
-    for message in messages:
-        name = message.name
-        if name in fields:
-            try:
-                values[name] = fields[name].checked(name, parameter_value_to_python(message.value))
-            except scene.SceneError as error:
-                wrong.append(str(error))
-            except RuntimeError:
-                wrong.append(f'{name} has an unknown type')
-    return values, wrong

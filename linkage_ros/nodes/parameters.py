@@ -136,10 +136,6 @@ class SceneParameters:
         except scenes.SceneError as error:
             self._refusal = str(error)
             return parameters
-        except Exception as error:
-            self._node.report('a changed parameter', error)
-            self._refusal = elided(f'internal error: {error!r}', 299)
-            return parameters
         return [typed(scenes.Parameter(
             parameter.name, self.fields[parameter.name], values[parameter.name]))
             if parameter.name in values else parameter for parameter in parameters]

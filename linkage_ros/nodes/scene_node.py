@@ -63,6 +63,9 @@ class SceneNode(Node):
     prepared. Raises SceneError if the initial parameters are invalid.
     """
 
+    # What the node does, for its first log message.
+    task = '{mechanisms}'
+
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         incidents = Incidents(self.get_logger(), lambda: not self.context.ok())
@@ -116,10 +119,6 @@ class SceneNode(Node):
 
     def adopt(self, prepared: Any) -> None:
         """Use the result of `prepare` from now on. It delays messages: be fast."""
-
-    def serves(self) -> str:
-        """Return what the node does, in words, for its first log message."""
-        return listed(self.scene.machines, 200)
 
     def declare_parameters(self, namespace: str, parameters: Any, ignore_override: bool = False
                            ) -> List[Parameter]:
@@ -197,8 +196,8 @@ class SceneNode(Node):
             if type(self).prepare is SceneNode.prepare:
                 self._adopt(new, new)
             else:
-                self.worker.replace('a changed scene', lambda: partial(
-                    self._adopt, new, self.prepare(new)))
+                self.worker.queue('a changed scene', lambda: partial(
+                    self._adopt, new, self.prepare(new)), is_next=True)
 
     def _adopt(self, new: scenes.Scene, prepared: Any) -> None:
         self._adopted = new
@@ -238,61 +237,56 @@ def _refused(response: Any, reason: str) -> Any:
     return response
 
 
-def run(node_class: Callable[[], Node], name: str, args: Any = None,
+def run(node_classes: Iterable[Callable[[], Node]], name: str, args: Any = None,
         executor_class: Any = Executor) -> int:
-    """Run a node until SIGINT or SIGTERM; return the exit code. `name` is for early messages."""
-    return run_together(lambda: [node_class()], name, args, executor_class)
+    """
+    Run nodes in one executor until SIGINT or SIGTERM; return the exit code.
 
-
-def run_together(make: Callable[[], Iterable[Node]], name: str, args: Any = None,
-                 executor_class: Any = Executor) -> int:
-    """Run the nodes that `make` yields in one executor; see `run`."""
-    with ShutdownHandler() as shutdown:
-        return _run(make, name, args, executor_class, shutdown)
-
-
-def _run(make: Callable[[], Iterable[Node]], name: str, args: Any, executor_class: Any,
-         shutdown: ShutdownHandler) -> int:
+    They are created in this order, so that each can have what those before it announce. `name` is
+    for messages before there is a node.
+    """
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        _refuse_arguments(args)
-    except (RuntimeError, scenes.SceneError) as error:
-        # The message of rclpy may quote a long argument.
-        try_shutdown()
-        return _failed(name, elided(f'bad arguments: {error}', 240))
     nodes: List[Node] = []
-    try:
-        # The creation of nodes leaves no garbage; collecting would only delay it.
-        gc.disable()
-        for node in make():
-            _refuse_namesake(node, nodes)
-            nodes.append(node)
-            if isinstance(node, SceneNode):
-                node.get_logger().info(f'ready: {node.serves()}')
-        # All objects so far are permanent; collections need not visit them.
-        gc.freeze()
-        gc.enable()
-        _spin(executor_class(), nodes, shutdown, Incidents(
-            get_logger(name), lambda: not rclpy.ok()))
-    except ExternalShutdownException:
-        pass
-    except (scenes.SceneError, ImportError) as error:
-        return _failed(name, error)
-    finally:
-        gc.enable()
-        for node in nodes:
-            node.destroy_node()
-        # Unlike this function, `rclpy.try_shutdown` restores the default signal handlers, by which
-        # the next signal would kill the process.
-        try_shutdown()
+    with ShutdownHandler() as shutdown:
+        try:
+            rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+            if unknown := remove_ros_args(args)[1:]:
+                raise scenes.SceneError(f'unknown argument {quoted(unknown[0])}: allowed are only '
+                                        'those of ROS, after --ros-args')
+        except (RuntimeError, scenes.SceneError) as error:
+            # The message of rclpy may quote a long argument.
+            try_shutdown()
+            return _failed(name, elided(f'bad arguments: {error}', 240))
+        try:
+            # The creation of nodes leaves no garbage; collecting would only delay it.
+            gc.disable()
+            for node_class in node_classes:
+                node = node_class()
+                nodes.append(node)
+                if isinstance(node, SceneNode):
+                    node.get_logger().info('ready: ' + node.task.format(
+                        mechanisms=listed(node.scene.machines, 200), rate=node.scene.rate))
+            # All objects so far are permanent; collections need not visit them.
+            gc.freeze()
+            gc.enable()
+            _spin(executor_class(), nodes, shutdown, name)
+        except ExternalShutdownException:
+            pass
+        except (scenes.SceneError, ImportError) as error:
+            return _failed(name, error)
+        finally:
+            gc.enable()
+            for node in nodes:
+                node.destroy_node()
+            # Unlike this function, `rclpy.try_shutdown` restores the default signal handlers, by
+            # which the next signal would kill the process.
+            try_shutdown()
     return 0
 
 
-def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
-          incidents: Incidents) -> None:
+def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler, name: str) -> None:
+    incidents = Incidents(get_logger(name), lambda: not rclpy.ok())
     try:
-        shutdown.before_exit = partial(_delete_displayed, nodes)
         for node in nodes:
             executor.add_node(node)
         while rclpy.ok() and not shutdown.is_over:
@@ -305,28 +299,6 @@ def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler,
                 incidents.report('a request', error)
     finally:
         executor.shutdown()
-
-
-def _delete_displayed(nodes: Iterable[Node]) -> None:
-    for node in nodes:
-        with suppress(Exception):
-            if isinstance(node, SceneNode):
-                node.delete_displayed()
-
-
-def _refuse_namesake(node: Node, others: Iterable[Node]) -> None:
-    name = node.get_name()
-    if name in {other.get_name() for other in others}:
-        node.destroy_node()
-        raise scenes.SceneError(f'two nodes would be called {name}; rename one, such as by '
-                                '-r kinematics:__node:=NAME')
-
-
-def _refuse_arguments(args: Any) -> None:
-    unknown = remove_ros_args(args)[1:]
-    if unknown:
-        raise scenes.SceneError(f'unknown argument {quoted(unknown[0])}: allowed are only those '
-                                'of ROS, after --ros-args')
 
 
 def _failed(name: str, error: Any) -> int:

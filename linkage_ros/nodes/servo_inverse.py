@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from array import array
-from contextlib import suppress
 import math
 from typing import Any, Callable, Dict, List, Mapping, Sequence, Tuple
 
@@ -15,7 +14,6 @@ from sensor_msgs.msg import JointState
 
 from . import joint_state_reader, scene_node, shutdown
 from .command_stream import CommandStream
-from .message_layout import Unreadable
 from .. import scene
 from ..cache import Cache
 from ..optional import needs
@@ -32,6 +30,8 @@ MAX_NAMED_VALUES, MAX_NAMES_LENGTH = 5, 150
 class ServoInverse(scene_node.SceneNode):
     """Serves `servo_inverse` and `inputs_for`, and turns `wanted_states` into commands."""
 
+    task = 'answers servo_inverse for {mechanisms}'
+
     def __init__(self, **kwargs: Any):
         with needs('linkage_interfaces'):
             from linkage_interfaces.srv import (  # type: ignore[attr-defined]
@@ -42,17 +42,12 @@ class ServoInverse(scene_node.SceneNode):
         self._requests = Cache(self._request)
         self._sources: frozenset = frozenset()
         self._positions: Dict[str, float] = {}
-        self._reader = joint_state_reader.Reader(self._interpret)
-        joint_state_reader.subscribe(self, 'crank_states', self._receive)
+        joint_state_reader.subscribe(self, 'crank_states', self._interpret, self._receive)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
         self.create_service(InputsFor, 'inputs_for', self.answer_inputs_for)
         self._stream = CommandStream(self, self.scene.machines, lambda mechanism: present_inputs(
             mechanism, self._positions))
         self.begin()
-
-    def serves(self) -> str:
-        """Describe the node for its first log message."""
-        return f'answers servo_inverse for {listed(self.scene.machines, 200)}'
 
     def check(self, new: scene.Scene) -> None:
         """Raise SceneError for a length that `kinematics` could not publish."""
@@ -107,12 +102,8 @@ class ServoInverse(scene_node.SceneNode):
         return [(name, index) for index, name in enumerate(
             message.name[:len(message.position)], 1) if name in self._sources]
 
-    def _receive(self, text: bytes) -> None:
-        # `kinematics` logs unreadable messages.
-        with suppress(Unreadable):
-            sender = self._reader.sender(text)
-            numbers = sender.read(text)
-            self._positions.update((name, numbers[index]) for name, index in sender.routes)
+    def _receive(self, routes: List[Tuple[str, int]], _: bytes, numbers: Sequence[Any]) -> None:
+        self._positions.update((name, numbers[index]) for name, index in routes)
 
 
 def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
@@ -194,7 +185,7 @@ def _unreachable(inverse: InverseRequest, values: Sequence[float]) -> str:
 
 def main(args: Any = None) -> int:
     """Run the node; return the exit code."""
-    return scene_node.run(ServoInverse, scene.INVERSE, args)
+    return scene_node.run([ServoInverse], scene.INVERSE, args)
 
 
 if __name__ == '__main__':

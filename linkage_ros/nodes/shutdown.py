@@ -28,18 +28,15 @@ class ShutdownHandler:
     """
     A context in which SIGINT and SIGTERM set `is_over`, and interrupt no callback.
 
-    If the context is not left within TIMEOUT_S, `before_exit` is called, and the process ends with
-    exit code 0.
+    If the context is not left within TIMEOUT_S, the process ends with exit code 0.
     """
 
-    def __init__(self) -> None:
-        self.before_exit: Callable[[], Any] = lambda: None
-        self.is_over = False
+    is_over = False
 
     def __enter__(self) -> ShutdownHandler:
         # Python's default handler would raise KeyboardInterrupt in a callback.
         self._before = {number: signal.signal(number, handler) for number, handler in (
-            (signal.SIGALRM, self._exit), (signal.SIGINT, self._receive),
+            (signal.SIGALRM, lambda *_: _exit(0)), (signal.SIGINT, self._receive),
             (signal.SIGTERM, self._receive))}
         return self
 
@@ -52,10 +49,6 @@ class ShutdownHandler:
         if not self.is_over:
             self.is_over = True
             signal.setitimer(signal.ITIMER_REAL, TIMEOUT_S)
-
-    def _exit(self, *_: Any) -> None:
-        self.before_exit()
-        _exit(0)
 
 
 def _exit(code: int) -> None:

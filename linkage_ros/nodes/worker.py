@@ -33,17 +33,11 @@ class Worker:
         self._lock, self._is_busy, self.has_ended = Lock(), False, False
         self._jobs: Dict[str, Job] = {}
 
-    def replace(self, kind: str, job: Job) -> None:
-        """Queue a job as the next one; it replaces a job of the same kind that has not begun."""
+    def queue(self, kind: str, job: Job, is_next: bool = False) -> None:
+        """Queue a job; it replaces a job of the same kind that has not begun."""
         with self._lock:
             self._jobs.pop(kind, None)
-            self._jobs = {kind: job, **self._jobs}
-        self.run_next()
-
-    def append(self, kind: str, job: Job) -> None:
-        """Queue a job as the last one, or in the place of a job of the same kind."""
-        with self._lock:
-            self._jobs[kind] = job
+            self._jobs = {kind: job, **self._jobs} if is_next else {**self._jobs, kind: job}
         self.run_next()
 
     def end(self) -> None:

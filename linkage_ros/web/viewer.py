@@ -72,7 +72,7 @@ class Viewer(Node):
 
 def main(args: Optional[list[str]] = None) -> int:
     """Run the node; return the exit code."""
-    return scene_node.run(Viewer, VIEWER, args)
+    return scene_node.run([Viewer], VIEWER, args)
 
 
 if __name__ == '__main__':
