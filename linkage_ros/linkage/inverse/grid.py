@@ -102,14 +102,9 @@ class Grid:
     def _errors(self, q: np.ndarray, target: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return the errors of the outputs from their target, and the Jacobian, per row of q."""
         problem, n, count = self._problem, len(target), len(q)
-        rows = problem.over(*(q * self._sizes).T)
-        errors = rows[:n].T - target
-        for column, turn in zip(errors.T, problem.periods):
-            if turn < math.inf:
-                column -= turn * np.round(column / turn)
-        jacobian = rows[n:].reshape(n, n, count).transpose(2, 1, 0)
-        scales = np.array(problem.scales)
-        return errors / scales, jacobian * self._sizes / scales[:, None]
+        rows = problem.over(*(q * self._sizes).T, *target)
+        jacobian = rows[-n * n:].reshape(n, n, count).transpose(2, 1, 0)
+        return rows[2:2 + n].T, jacobian * self._sizes / np.reshape(problem.scales, (-1, 1))
 
     def _solutions(self, q: np.ndarray, target: np.ndarray, rows: List[int],
                    columns: List[int]) -> np.ndarray:

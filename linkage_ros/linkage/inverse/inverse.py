@@ -454,7 +454,8 @@ class Inverse:
 
     def jacobian(self, inputs: ArrayLike) -> np.ndarray:
         """Return d outputs / d inputs at a pose (inputs,), shape (outputs, inputs)."""
-        rates = self._problem.rated.at(*self._numbers(inputs, 'inputs'))[self._n:]
+        rates = self._problem.newton_inside.at(
+            *self._numbers(inputs, 'inputs'), *[0.0] * self._n)[-self._n ** 2:]
         return np.reshape(rates, (self._n, self._n)).T
 
     def margin(self, inputs: ArrayLike) -> float:
