@@ -22,7 +22,7 @@ from . import rods
 from .choice import Choice
 from .expressions import chosen_of, modes_of, SINGLE
 from .follow import follow
-from .grid import blocks, Grid
+from .grid import check_dependence, Grid
 from .linkage import InverseLinkage, taken_apart
 from .modes import Modes
 from .problem import InverseProblem, Row
@@ -114,7 +114,7 @@ class Inverse:
 
     def __init__(self, linkage: Kinematics, outputs: Tuple[str, ...]):
         self.linkage, self.outputs, self._n = linkage, outputs, len(outputs)
-        blocks(linkage, outputs)
+        check_dependence(linkage, outputs)
         self._problem = InverseProblem(linkage, outputs)
         self._choice = Choice(self._problem)
         self.inputs = self._problem.inputs

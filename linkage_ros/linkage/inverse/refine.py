@@ -103,15 +103,18 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
     if n == 1:
         low, high, inputs, far = *candidates[:2], candidates[2:3], math.inf
     best = over(*inputs.clip(low, high), *values)
+    left = ~np.isfinite(best).all(axis=0)
     again = np.flatnonzero((best[0] > 0.0) & (best[0] <= far))
     for _ in range(STEPS if len(again) else 0):
         x = best[2 + n:2 + 2 * n].clip(low, high)
         trial = over(*x[:, again], *values[:, again])
+        # Steps out of the reach are shortened one by one.
+        left[again[np.isnan(trial[0])]] = True
         better = trial[0] < best[0, again]
         again = again[better]
         best[:, again] = trial[:, better]
     solutions = best[2 + 2 * n:]
-    left = ~((best[1] <= ACCEPTED) & np.isfinite(best).all(axis=0)) & ~(best[0] > far)
+    left = (left | ~(best[1] <= ACCEPTED)) & ~(best[0] > far)
     solutions[:, ~(best[1] <= ACCEPTED)] = math.nan
     for k in np.flatnonzero(left).tolist():
         candidate = candidates[:, k].tolist()
