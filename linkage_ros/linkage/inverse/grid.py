@@ -24,13 +24,14 @@ from .problem import ACCEPTED, InverseProblem, Row
 from .refine import distinct, refine
 from .segments import Bracket, segments_of
 from ..formulas import Names
+from ..inputs import spread
 from ..kinematics import Kinematics
 from ..motion.curves import HALVINGS
 from ..tolerances import CLOSE, SINGULAR
 from ...words import listed
 
-# Grid points at first and at most, and the least number of them that can be assembled.
-STARTS, MAX_STARTS, ASSEMBLED = 1024, 1 << 16, 250
+# Starts at first and, where fewer than this number of them can be assembled, then.
+COUNTS, ASSEMBLED = (1024, 8192, 65536), 250
 # Halvings of the distance at which a twin behind a fold is searched.
 TWINS = 24
 
@@ -85,7 +86,7 @@ class Grid:
             solutions = distinct(problem, solutions + [
                 row for q in self._descended(starts, values)
                 if (row := refine(problem, values, tuple(q)))])
-            starts = self._twins(solutions) if len(solutions) > known else []
+            starts = self._twins(solutions) if len(solutions) > known else starts[:0]
         yield from (row[:n] for row in solutions)
 
     def _solved(self, q: np.ndarray, values: Sequence[float]) -> np.ndarray:
@@ -93,15 +94,16 @@ class Grid:
         return self._problem.over(*q.T, *values)
 
     def _starts(self, held: dict, values: Sequence[float]) -> np.ndarray:
-        """Return a grid of assembled poses over the inputs, finer where few are assembled."""
-        starts, count = np.empty((0, len(self._inputs))), STARTS
-        while len(starts) < ASSEMBLED and count <= MAX_STARTS:
-            n = math.ceil(count ** (1.0 / max(len(self._inputs) - len(held), 1)))
-            axes = [held[by] if by in held else np.linspace(input_.low, input_.high, n + 2)[1:-1]
-                    for by, input_ in enumerate(self._inputs)]
-            starts = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(axes))
+        """Return assembled poses all over the inputs, more where few are assembled."""
+        starts = np.empty((0, len(self._inputs)))
+        for count in COUNTS:
+            columns = spread(self._inputs, count)
+            for by, value in held.items():
+                columns[by][:] = value
+            starts = np.stack(columns, axis=-1)
             starts = starts[self._solved(starts, values)[0] < math.inf]
-            count *= 4
+            if len(starts) >= ASSEMBLED:
+                break
         return starts
 
     def _check_independent(self) -> None:
