@@ -37,15 +37,11 @@ def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[floa
         return None
     gaps = [gap * scale for gap, scale in zip(start[2:], problem.scales)]
     if isinstance(source, Segments):
-        input_ = problem.inputs[0]
-        turns = input_.turns_of(seed[0])
-        way = source.follow(values[0], values[0] + gaps[0], (seed[0] - turns) / input_.step,
-                            problem.turns[0])
+        way = source.follow(values[0], gaps[0], seed[0])
         if not way:
             return None
-        bracket, passed = way
-        found = refine(problem, values, bracket)
-        seed = (turns + passed + bracket[2],)
+        bracket, turns = way
+        found, seed = refine(problem, values, bracket), (turns + bracket.seed,)
     else:
         found, seed = _followed(problem, values, seed, gaps, start[-problem.n ** 2:])
     return found and (*problem.nearest_equivalent(found, seed), *found[problem.n:])
