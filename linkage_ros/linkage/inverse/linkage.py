@@ -16,7 +16,7 @@ from __future__ import annotations
 import cmath
 from itertools import product
 import math
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -103,7 +103,7 @@ class InverseLinkage(NamedTuple):
 def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
     """Return the inverse linkage of a sketch; raise ValueError if the sketch is incomplete."""
     lines = joint_lines.parse(sketch.lines)
-    used = {name for read in sketch.reads for end in read.ends for name in end.joints}
+    used = {name for read in sketch.reads for name in read.joints}
     for line in lines[::-1]:
         if used & {*line.names}:
             used |= {*line.depends_on}
@@ -126,27 +126,22 @@ def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
 
 def _mode(structure: Structure, outputs: Names, reads: Sequence[_Read]) -> Mode:
     values = (argument(outputs.index(read.name)) if read.name in outputs else
-              _input_of(structure.built, *read.ends) for read in reads)
+              read.value(structure.built) for read in reads)
     return Mode(structure, tuple(
         (value - read.offset) / read.ratio for value, read in zip(values, reads)))
 
 
-class _End(NamedTuple):
-    """
-    The position of a body in the inverse linkage: two joints, and their places on the body.
-
-    A fixed body has no joints.
-    """
-
-    joints: Tuple[str, ...]
-    places: Tuple[complex, ...] = ()
-
-
 class _Read(NamedTuple):
-    """The joint from which an input is read: its link and parent; ratio * input + offset."""
+    """
+    The joint from which an input is read.
+
+    Its value is ratio * input + offset, up to `turns` of the input; `joints` are those that it
+    depends on in the inverse linkage, `value` is its function of that linkage's `Builder`.
+    """
 
     name: str
-    ends: Tuple[_End, ...]
+    joints: Tuple[str, ...]
+    value: Callable[[Any], Real]
     ratio: float
     offset: float
     turns: Tuple[float, ...]
@@ -386,29 +381,49 @@ class _Sketch(Dyads):
         counted = not input_.is_part
         for name in (input_.name, *(self._linkage.geared_to(by) if counted else ())):
             try:
-                ends = self._ends(self._links[name])
+                joints, value = self._value(self._links[name])
             except ValueError:
                 continue
             ratio, offset = (1.0, 0.0) if name == input_.name else self._linkage.gear(name, by)
             is_output = name in self._outputs and name == input_.name
             count = round(abs(ratio) * input_.period) if input_.wraps and not is_output else 1
-            return _Read(name, ends, ratio, offset, tuple(
+            return _Read(name, joints, value, ratio, offset, tuple(
                 turn * math.tau / abs(ratio) for turn in range(count)))
         raise ValueError(f'{input_.name} is not placed')
 
-    def _ends(self, link: Link) -> Tuple[_End, ...]:
-        """Return the positions of an input's link and its parent."""
+    def _value(self, link: Link) -> Tuple[Tuple[str, ...], Callable]:
+        """Return the joints that tell the position of a link on its parent, and its formula."""
+        zero = cmath.rect(1.0, self._zero(link))
         if link.kind == 'revolute':
-            return (self._end_of(link.name, cmath.rect(1.0, 0.0)),
-                    self._end_of(link.parent, cmath.rect(1.0, self._zero(link))))
-        tip, origin = ((self._joint(body, joint),) for body, joint in (
-            (link.name, link.tip), (link.parent, link.joint)))
+            ends, ahead = self._direction(link.name, 1.0 + 0.0j)
+            others, back = self._direction(link.parent, zero)
+
+            def angle(built: Any) -> Real:
+                turned = ahead(built) * back(built).conjugate()
+                return arctangent(turned.y, turned.x)
+            return ends + others, angle
+        tip, origin = self._joint(link.name, link.tip), self._joint(link.parent, link.joint)
         parent = self._links.get(link.parent)
         if parent and len(self._frames[parent.name]) == 1 and parent.kind == 'revolute':
             # A cylinder: its length is the distance of its ends.
-            return _End(tip), _End(origin)
-        along = cmath.rect(1.0, self._zero(link))
-        return _End(tip), _End(origin), self._end_of(link.parent, along)
+            return (tip, origin), lambda built: square_root(built.arm(origin, tip).square)
+        ends, along = self._direction(link.parent, zero)
+
+        def slide(built: Any) -> Real:
+            line = along(built) / along(built).length() if ends else along(built)
+            return dot(built.arm(origin, tip).vector, line)
+        return (tip, origin, *ends), slide
+
+    def _direction(self, body: str, along: complex) -> Tuple[Tuple[str, ...], Callable]:
+        """Return the joints that tell the direction of a body, and the formula of that vector."""
+        if body == self.ground:
+            return (), lambda built: _constant(along)
+        if body not in self.parts:
+            raise ValueError(f'{body} is not placed')
+        first, start = self.end(body)
+        second, end = self.other(body, first)
+        turn = _constant(along * (end - start).conjugate() / abs(end - start))
+        return (first, second), lambda built: built.arm(first, second).vector * turn
 
     def _joint(self, body: str, joint: str) -> str:
         """Return the name of a joint in the lines; raise ValueError if no line places it."""
@@ -416,39 +431,6 @@ class _Sketch(Dyads):
             if abs(at - self._frames[body][joint]) < self.near:
                 return name
         raise ValueError(f'{joint} is not placed')
-
-    def _end_of(self, body: str, along: complex) -> _End:
-        """Return two joints that give a body's angle, their places relative to a direction."""
-        if body == self.ground:
-            return _End((), (along,))
-        if body not in self.parts:
-            raise ValueError(f'{body} is not placed')
-        (one, start) = self.end(body)
-        two, end = self.other(body, one)
-        return _End((one, two), ((end - start) / along,))
-
-
-def _input_of(built: Any, one: _End, other: _End, line: Optional[_End] = None) -> Real:
-    """Return the value of an input."""
-    if one.places:
-        relative = Complex(1.0, 0.0)
-        for end, sign in ((one, 1.0), (other, -1.0)):
-            seen = end.places[0] / abs(end.places[0])
-            if end.joints:
-                bar = built.arm(*end.joints).vector
-                relative = relative * (bar if sign > 0.0 else bar.conjugate())
-                seen = seen.conjugate()
-            relative = relative * _constant(seen if sign > 0.0 else seen.conjugate())
-        return arctangent(relative.y, relative.x)
-    (tip,), (origin,) = one.joints, other.joints
-    arm = built.arm(origin, tip)
-    if line is None:
-        return square_root(arm.square)
-    along = _constant(line.places[0] / abs(line.places[0]))
-    if line.joints:
-        along = built.arm(*line.joints).vector * along.conjugate()
-        along = along / along.length()
-    return dot(arm.vector, along)
 
 
 def _constant(value: complex) -> Complex:
