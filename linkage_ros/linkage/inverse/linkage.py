@@ -25,7 +25,6 @@ from ..formulas import Names, PAIR, Structure
 from ..geometry.builder import GROUND, Link, UNIT
 from ..inputs import Input, spread
 from ..kinematics import Kinematics
-from ..motion.reach import reach_of
 from ..text import joint_lines
 from ..text.design import Design
 from ..tolerances import CLOSE, TOLERANCE
@@ -103,12 +102,14 @@ class InverseLinkage(NamedTuple):
 def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
     """Return the inverse linkage of a sketch; raise ValueError if the sketch is incomplete."""
     lines = joint_lines.parse(sketch.lines)
+    # The lines that drive are in the order of what drives them.
+    drives = dict(zip((line.names[0] for line in lines if line.drives), sketch.drives))
     used = {name for read in sketch.reads for name in read.joints}
     for line in lines[::-1]:
         if used & {*line.names}:
             used |= {*line.depends_on}
     lines = [line for line in lines if used & {*line.names}]
-    drives = {line.names[0]: sketch.driving[line.names[0]] for line in lines if line.drives}
+    drives = {line.names[0]: drives[line.names[0]] for line in lines if line.drives}
     if sorted(name for name, *_ in drives.values()) != sorted(outputs):
         raise ValueError('the inputs do not depend on all of these outputs')
     branches, turns = joint_lines.branches(lines), tuple(read.turns for read in sketch.reads)
@@ -155,7 +156,7 @@ def taken_apart(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]
     pose = _pose(linkage)
     if pose is None:
         return None
-    absolute = any(_pair(name) or name[-2:] in ('.x', '.y') for name in outputs)
+    absolute = any(PAIR.fullmatch(name) or name[-2:] in ('.x', '.y') for name in outputs)
     grounds = (GROUND,) if absolute else (GROUND, *(link.name for link in linkage.links))
     for ground in grounds:
         try:
@@ -165,26 +166,12 @@ def taken_apart(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]
     return None
 
 
-def _pair(output: str) -> Optional[Tuple[str, ...]]:
-    found = PAIR.fullmatch(output)
-    return found and found.groups()
-
-
 def _pose(linkage: Kinematics) -> Optional[Dict[str, float]]:
     """Return all joint angles and coordinates in a generic pose, away from dead points."""
     names = (*linkage.joints, *(f'{point}.{axis}' for point in linkage.points for axis in 'xy'))
-    pose = linkage.posed((), names)
-    if len(linkage.inputs) > 1:
-        values = spread(linkage.inputs, TRIES)
-    else:
-        arcs = reach_of(linkage)
-        values = [np.array([lo + part * (hi - lo) for part in (0.382, 0.7, 0.13)
-                            for lo, hi in arcs])]
-    if not len(values[0]):
-        return None
-    rows = pose.searched(*values)
-    known = np.flatnonzero(np.isfinite(rows).all(axis=0))
-    return dict(zip(names, rows[:, known[0]].tolist())) if len(known) else None
+    rows = linkage.posed((), names).searched(*spread(linkage.inputs, TRIES))
+    known = rows[:, np.isfinite(rows).all(axis=0)]
+    return dict(zip(names, known[:, 0].tolist())) if known.size else None
 
 
 class _Sketch(Dyads):
@@ -193,8 +180,8 @@ class _Sketch(Dyads):
 
     Attributes
     ----------
-    driving : dict
-        By the joint that a line places: the output that drives it, its ratio and offset.
+    drives : list of tuple
+        For each line that drives, in their order: the output that drives it, its ratio and offset.
     reads : list of _Read
         Where each input of the linkage is read.
 
@@ -203,11 +190,11 @@ class _Sketch(Dyads):
     def __init__(self, linkage: Kinematics, outputs: Names, ground: str, pose: Dict[str, float]):
         self._linkage, self._outputs, self._pose = linkage, outputs, pose
         self._links = {link.name: link for link in linkage.links}
-        self.driving: Dict[str, Tuple[str, float, float]] = {}
+        self.drives: List[Tuple[str, float, float]] = []
         self._scaled: Dict[str, Tuple[float, float]] = {}
-        self._pending_drive: Optional[Tuple[str, float, float]] = None
         self._named: Dict[str, Dict[str, complex]] = {}
-        self._at: Dict[str, Tuple[complex, complex]] = {}
+        # The origin and the direction of each body in the pose.
+        self._at: Dict[str, Tuple[complex, complex]] = {GROUND: (0.0j, 1.0 + 0.0j)}
         slides: List[Slide] = []
         motors: List[Motor] = []
         # Each link in its own frame, whose x axis is its bar.
@@ -218,20 +205,22 @@ class _Sketch(Dyads):
         for body, frame in self._frames.items():
             for joint, place in frame.items():
                 self._named.setdefault(joint, {})[body] = place
-        self._turns = {GROUND: 1.0 + 0.0j}
         for link in linkage.links:
             angle = self._zero(link) + (pose[link.name] if link.kind == 'revolute' else 0.0)
-            self._turns[link.name] = self._turns[link.parent] * cmath.rect(1.0, angle)
+            turn = self._at[link.parent][1] * cmath.rect(1.0, angle)
+            joint, origin = next(iter(self._frames[link.name].items()))
+            self._at[link.name] = self._place(joint) - turn * origin, turn
             motion = self._motion(link)
-            if link.name in outputs:
+            if motion.joint in outputs:
                 motors.append(motion)
             elif isinstance(motion, Slide):
                 slides.append(motion)
         for block, pin in linkage.yokes.items():
-            slides.append(self._guided(pin, f'{block}-{pin}', block, 1j, self._turns[block]))
+            slides.append(self._guided(pin, f'{block}-{pin}', block, 1j, self._at[block][1]))
+        done = [motor.joint for motor in motors]
         for output in sorted(outputs, key=lambda name: name.startswith('angle(')):
-            if output not in self._links:
-                self._add(output, slides, motors)
+            if output not in done:
+                done += self._add(output, slides, motors)
         size = max(abs(place) for frame in self._frames.values() for place in frame.values())
         size = max(size, linkage.longest)
         bodies = [*self._frames, *(body for pin in self._named.values() for body in pin),
@@ -258,8 +247,15 @@ class _Sketch(Dyads):
         if link.kind == 'revolute':
             return Hinge(bodies, (hangs, self._frames[link.name][link.joint]), 1.0,
                          self._zero(link), link.name)
-        along = cmath.rect(1.0, self._zero(link))
-        return Slide(bodies, (hangs, 0.0j), (along, 1.0 + 0.0j), link.name)
+        along, name = cmath.rect(1.0, self._zero(link)), link.name
+        for axis, part in ('x', along.real), ('y', along.imag):
+            # The slide of a block on a fixed line determines the coordinates of the block.
+            if link.parent == GROUND and f'{link.tip}.{axis}' in self._outputs and \
+                    abs(part) > CLOSE and link.tip in self._frames[link.name]:
+                name, start = f'{link.tip}.{axis}', hangs + along * self._frames[
+                    link.name][link.tip]
+                self._scaled[name] = part, start.real if axis == 'x' else start.imag
+        return Slide(bodies, (hangs, 0.0j), (along, 1.0 + 0.0j), name)
 
     def _place(self, joint: str) -> complex:
         return complex(self._pose[f'{joint}.x'], self._pose[f'{joint}.y'])
@@ -275,43 +271,25 @@ class _Sketch(Dyads):
         """Put a joint on a line through the origin of a body; `turn` is the body's direction."""
         return Slide((base, self._pin(joint, body, turn)), (0.0j, 0.0j), (axis, axis), body)
 
-    def _add(self, output: str, slides: List[Slide], motors: List[Motor]) -> None:
-        """Add the bodies that measure an output other than a joint's value."""
-        if pair := _pair(output):
-            first, second = pair
+    def _add(self, output: str, slides: List[Slide], motors: List[Motor]) -> List[str]:
+        """Add bodies that measure an output other than a joint's value; return what they do."""
+        if pair := PAIR.fullmatch(output):
+            first, second = pair.groups()
             apart = self._place(second) - self._place(first)
             along = apart / abs(apart) if apart else 1.0 + 0.0j
-            if output.startswith('distance'):
-                motors.append(Slide((self._pin(first, f'{output} barrel', along),
+            motors.append(self._aimed(output, first, second, along, slides) if output.startswith(
+                'angle') else Slide((self._pin(first, f'{output} barrel', along),
                                      self._pin(second, f'{output} rod', along)),
                                     (0.0j, 0.0j), (1.0 + 0.0j, 1.0 + 0.0j), output))
-                return
-            motors.append(self._aimed(output, first, second, along, slides))
-            return
+            return [output]
         joint, axis = output.split('.')
-        for link in self._linkage.links:
-            along = cmath.rect(1.0, self._zero(link))
-            part = along.real if axis == 'x' else along.imag
-            if (link.tip, link.parent, link.kind) == (joint, GROUND, 'prismatic') and \
-                    abs(part) > CLOSE and joint in self._frames[link.name]:
-                # The slide of a block on a fixed line determines the block's coordinates.
-                start = self._frames[GROUND][link.joint] + along * self._frames[link.name][joint]
-                self._scaled[output] = part, start.real if axis == 'x' else start.imag
-                motion = next(slide for slide in slides if slide.joint == link.name)
-                slides.remove(motion)
-                motors.append(motion._replace(joint=output))
-                return
-        body, along = f'{joint}.xy', 1.0 + 0.0j if axis == 'x' else 1j
-        if body in self._named[joint]:
-            # The other coordinate has put it on a line; this one drives it along that line.
-            other = next(slide for slide in slides if slide.bodies[1] == body)
-            slides.remove(other)
-            motors.append(other._replace(joint=output))
-            return
+        along, other = (1.0 + 0.0j, f'{joint}.y') if axis == 'x' else (1j, f'{joint}.x')
         self._at[output] = self._place(joint), 1.0 + 0.0j
         motors.append(Slide((GROUND, output), (0.0j, 0.0j), (along, along), output))
         # Along the other axis, whose coordinate may drive it.
-        slides.append(self._guided(joint, body, output, 1.0 + 1.0j - along))
+        across = self._guided(joint, f'{joint}.xy', output, 1.0 + 1.0j - along)
+        (motors if other in self._outputs else slides).append(across._replace(joint=other))
+        return [output, other]
 
     def _aimed(self, output: str, first: str, second: str, along: complex,
                slides: List[Slide]) -> Hinge:
@@ -335,15 +313,12 @@ class _Sketch(Dyads):
 
     def place_in_pose(self, body: str, place: complex) -> complex:
         """Return a place on a body, in the coordinates of the pose."""
-        if body in self._at:
-            start, turn = self._at[body]
-            return start + turn * place
-        joint, origin = next(iter(self._frames[body].items()))
-        return self._place(joint) + self._turns[body] * (place - origin)
+        start, turn = self._at[body]
+        return start + turn * place
 
     def direction_in_pose(self, body: str, along: complex) -> complex:
         """Return a direction on a body, in the coordinates of the pose."""
-        return (self._at[body][1] if body in self._at else self._turns[body]) * along
+        return self._at[body][1] * along
 
     def length_text(self, value: float) -> str:
         """Return a length with all its digits."""
@@ -363,17 +338,10 @@ class _Sketch(Dyads):
         return next(name for name in (f'{letter}{number or ""}' for number in range(1000)
                                       for letter in 'XYZUVW') if name not in taken)
 
-    def name(self, place: complex, body: str, line: str) -> str:
-        """Add the line that places a joint, and return the joint's name."""
-        name = super().name(place, body, line)
-        if self._pending_drive:
-            self.driving[name], self._pending_drive = self._pending_drive, None
-        return name
-
     def drive(self, word: str, joint: Any, ratio: float, offset: float) -> Tuple[str, str]:
-        """Record an input, whose joint the next line places."""
+        """Record an input, which the next line drives."""
         part, start = self._scaled.get(joint, (1.0, 0.0))
-        self._pending_drive = joint, ratio / part, offset - ratio * start / part
+        self.drives.append((joint, ratio / part, offset - ratio * start / part))
         return self.number(word), ''
 
     def _read(self, by: int, input_: Input) -> _Read:
