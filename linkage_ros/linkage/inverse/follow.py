@@ -31,8 +31,7 @@ LONGEST = 0.7
 def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
            source: object) -> Optional[Row]:
     """Return the solution, with the whole turns of `seed`, and its rates; None if none."""
-    code = problem.newton if problem.n > 1 else problem.newton_inside
-    start = code.at(*seed, *values)
+    start = problem.newton.at(*seed, *values)
     if not start[0] < math.inf:
         return None
     gaps = [gap * scale for gap, scale in zip(start[2:], problem.scales)]

@@ -101,7 +101,7 @@ class Solution(NamedTuple):
     def jacobian(self) -> np.ndarray:
         """Return d outputs / d inputs [rad or m, per rad or m], shape (outputs, inputs)."""
         n = len(self.inputs)
-        rates = self.inverse.problem.newton_inside.at(*self.inputs, *[0.0] * n)[-n * n:]
+        rates = self.inverse.problem.newton.at(*self.inputs, *[0.0] * n)[-n * n:]
         return np.reshape(rates, (n, n)).T
 
     @property

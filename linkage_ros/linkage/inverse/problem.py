@@ -91,27 +91,17 @@ class InverseProblem:
 
     @cached_property
     def newton(self) -> Pose:
-        """Return the code for a step of Newton's method; see `newton`. NaN outside the reach."""
-        return self._newton(True)
-
-    @cached_property
-    def newton_inside(self) -> Pose:
-        """Return the same code, with values wherever outputs have some."""
-        return self._newton(False)
-
-    def _newton(self, is_checked: bool) -> Pose:
-        linkage = self.linkage
-        program = newton(linkage.structure, self.outputs, is_checked, tuple(self.periods),
+        """Return the code for a step of Newton's method; see `newton`."""
+        program = newton(self.linkage.structure, self.outputs, tuple(self.periods),
                          tuple(self.turns))
-        return program.bind({**linkage.lengths, LONGEST_BAR: linkage.longest, **{
+        return program.bind({**self.linkage.lengths, LONGEST_BAR: self.linkage.longest, **{
             f'[{input_.name}]': size for input_, size in zip(self.inputs, self.sizes)}}, {},
-            linkage.is_accelerated)
+            self.linkage.is_accelerated)
 
     @cached_property
     def over(self) -> Any:
-        """Return the same code for arrays; of one input, candidates are inside the reach."""
-        code = self.newton if self.n > 1 else self.newton_inside
-        return code.over if self.linkage.is_accelerated else code.searched
+        """Return the same code for arrays."""
+        return self.newton.over if self.linkage.is_accelerated else self.newton.searched
 
     def reduced(self, values: Sequence[float]) -> Sequence[float]:
         """Return values with large angles reduced to one period, exactly."""
@@ -153,8 +143,8 @@ def nearest(x: Real, seed: Real, turn: float) -> Real:
 
 
 @cached(64, shared=True)
-def newton(structure: Structure, outputs: Tuple[str, ...], is_checked: bool,
-           periods: Sequence[float], turns: Sequence[float]) -> Program:
+def newton(structure: Structure, outputs: Tuple[str, ...], periods: Sequence[float],
+           turns: Sequence[float]) -> Program:
     """
     Return the code for a step of Newton's method, from the inputs and values of the outputs.
 
@@ -163,7 +153,8 @@ def newton(structure: Structure, outputs: Tuple[str, ...], is_checked: bool,
     without sign; and the rates of all outputs by the first input, by the second and so on.
     """
     n, inputs = len(outputs), [argument(by) for by in range(len(outputs))]
-    rows = structure.checked(outputs) if is_checked else structure.parts(((), outputs, outputs))
+    # Of one input, candidates are inside the reach.
+    rows = structure.checked(outputs) if n > 1 else structure.parts(((), outputs, outputs))
     scales = [real(1.0) if structure.turns(name) else dimension(LONGEST_BAR) for name in outputs]
     sizes = [real(1.0) if input_.turns else dimension(f'[{input_.name}]')
              for input_ in structure.built.inputs]

@@ -63,7 +63,7 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Br
                    ) -> Optional[Row]:
     """Return the solution in a bracket, which Newton's method does not leave; None if none."""
     low, high, x, sign, place, others = bracket
-    n, at = problem.n, problem.newton_inside.at
+    n, at = problem.n, problem.newton.at
     x = x if low <= x <= high else 0.5 * (low + high)
     best, best_x = (math.inf, math.inf), x
     for _ in range(HALVINGS):
