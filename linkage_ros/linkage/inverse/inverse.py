@@ -275,15 +275,9 @@ class Inverse:
                 found[:len(solutions), :, k] = solutions or math.nan
             return found
         values = problem.reduced_arrays(values)
-        parts = self._source.candidate_arrays(values)
-        found = np.full((len(parts) or 1, n + n * n, count), math.nan)
-        if parts:
-            places, candidates = zip(*parts)
-            solved = refine_arrays(problem, values[:, np.concatenate(places)], np.concatenate(
-                candidates, axis=1))
-            for rows, place, part in zip(found, places, np.split(
-                    solved, np.cumsum([len(place) for place in places])[:-1], axis=1)):
-                rows[:, place] = part
+        numbers, places, candidates = self._source.candidate_arrays(values)
+        found = np.full((numbers.max(initial=0) + 1, n + n * n, count), math.nan)
+        found[numbers, :, places] = refine_arrays(problem, values[:, places], candidates).T
         return distinct_arrays(problem, found)
 
     # --- arguments ---

@@ -141,9 +141,10 @@ class Segments:
                 target += period
         return found
 
-    def candidate_arrays(self, values: np.ndarray) -> List[Tuple[np.ndarray, np.ndarray]]:
-        """Return for each segment the places of values (1, n) that it has, and brackets."""
-        found, period = [], self._period
+    def candidate_arrays(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return numbers of brackets of a value, of values (1, m) that have them, and brackets."""
+        found: List[Tuple[np.ndarray, ...]] = []
+        period, none = self._period, np.empty(0, int)
         # They are searched faster in order.
         order = values[0].argsort()
         for low, high, sign, theta, samples in self._rows:
@@ -153,11 +154,12 @@ class Segments:
             while len(inside := np.flatnonzero((low <= target) & (target <= high))):
                 goal = target[inside]
                 i = samples[1:-1].searchsorted(goal, 'right')
-                found.append((order[inside], np.stack([
+                found.append((np.full(len(i), len(found)), order[inside], np.stack([
                     theta[i], theta[i + 1], np.interp(goal, samples, theta),
                     np.full(len(i), sign)])))
                 target = target + period
-        return found
+        numbers, places, brackets = zip((none, none, np.empty((4, 0))), *found)
+        return np.concatenate(numbers), np.concatenate(places), np.hstack(brackets)
 
     def follow(self, value: float, gap: float, seed: float) -> Optional[Tuple[Bracket, float]]:
         """
