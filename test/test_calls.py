@@ -80,7 +80,6 @@ def test_what_is_no_number_is_refused_with_its_name(bars, arm, wrong):
             (lambda: two.nearest([0.1, 0.1], [0.1, wrong]), 'near'),
             (lambda: one.path(wrong), 'values'), (lambda: two.path([[0.1], wrong]), 'values'),
             (lambda: two.path([[0.1], [0.1]], [0.1, wrong]), 'near'),
-            (lambda: one.margin(wrong), 'inputs'), (lambda: two.signs([0.1, wrong]), 'inputs'),
             (lambda: one.follow(wrong, 0.1), 'values'), (lambda: two.follow(
                 [0.1, 0.1], [0.1, wrong]), 'near'),
             (lambda: arm.reach(wrong), 'others'), (lambda: arm.dead_points(wrong), 'others'),
@@ -100,12 +99,10 @@ def test_there_are_as_many_numbers_as_inputs(bars, arm):
                 x), lambda x: one.over(*x))),
             (bars, 'near', (lambda x: one.nearest(0.7, x), lambda x: one.all(0.7, x),
                             lambda x: one.path([[0.7]], x))),
-            (bars, 'inputs', (one.margin, one.signs)),
             (arm, 'values', (lambda x: two.nearest(x), lambda x: two.all(x), lambda x: two.path(
                 x), lambda x: two.over(*x))),
             (arm, 'near', (lambda x: two.nearest([0.1, 0.1], x), lambda x: two.path(
-                [[0.1], [0.1]], x), lambda x: two.follow([0.1, 0.1], x))),
-            (arm, 'inputs', (two.margin, two.signs))):
+                [[0.1], [0.1]], x), lambda x: two.follow([0.1, 0.1], x)))):
         for ask in asks:
             with pytest.raises(ValueError, match=f'{linkage.type} has . inputs: {name} must be'):
                 ask([0.1, 0.2, 0.3])
@@ -120,7 +117,7 @@ def test_arrays_of_shapes_that_do_not_broadcast_are_refused_with_their_shapes(ba
     for ask in (lambda: bars.servo_for('QB', [0.1, 0.2], [1.0, 1.0, 1.0]),
                 lambda: arm.inverse(('P.x', 'P.y')).over([0.1, 0.2], [0.1, 0.2, 0.3]),
                 lambda: arm.inverse(('P.x', 'P.y')).path([[0.1, 0.2], [0.1, 0.2, 0.3]])):
-        with pytest.raises(ValueError, match=r'broadcast, got \(2,\), \(3,\)'):
+        with pytest.raises(ValueError, match=r'broadcast.*\(2,\).*\(3,\)'):
             ask()
 
 
@@ -216,7 +213,7 @@ def test_the_margin_of_a_pose_without_rates_is_zero():
             0.0, (output,))[output])
         found = inverse.all(value)
         assert any(abs(answer.inputs[0]) < 1e-9 for answer in found)
-        assert inverse.margin(0.0) == 0.0
+        assert Solution((0.0,), inverse).margin == 0.0
         assert all(0.0 <= answer.margin <= 1.0 and repr(answer) for answer in found)
 
 

@@ -187,7 +187,7 @@ def test_outputs_of_few_inputs_are_solved_first():
     (('P.x', 'P.x'), [0.1, 0.1],
      'P.x, P.x do not determine all inputs: P.x, P.x depends on too few'),
     (('A.x', 'crank'), [0.1, 0.1],
-     'A.x, crank do not determine all inputs: crank depends on too few'),
+     'A.x, crank do not determine all inputs: A.x, crank depends on too few'),
     (('P.x', 'O.x'), [0.1, 0.1], 'P.x, O.x do not determine all inputs: O.x depends on too few'),
     (('P.x', 'P.y'), [0.1], r'values must be as many numbers, got \[0.1\]'),
     (('P.x', 'P.y'), 'ab', "values must be a number or an array of numbers, got 'ab'")])

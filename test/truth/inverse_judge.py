@@ -11,6 +11,7 @@ answer is invented if its own pose has another value, and a duplicate if it is n
 from collections import Counter
 import math
 
+from linkage_ros.linkage import Solution
 import numpy as np
 
 # Distances of questions from ends, extremes and dead points [rad, sizes].
@@ -185,11 +186,11 @@ def judge_several(linkage, names, rng, count=6):
     for _ in range(count):
         pose = [float(rng.uniform(input_.low, input_.high)) for input_ in linkage.inputs]
         row = np.array(linkage.checked(names).at(*pose)[:len(names)])
-        if not np.isfinite(row).all() or not inverse.margin(pose) > 1e-6:
+        if not np.isfinite(row).all() or not Solution(pose, inverse).margin > 1e-6:
             continue
         answers = inverse.all(row.tolist())
         found['ordinary', 'questions'] += 1
-        margin = inverse.margin(pose)
+        margin = Solution(pose, inverse).margin
         if not any(max(input_.apart(x, y) / size for input_, x, y, size in zip(
                 linkage.inputs, answer.inputs, pose, sizes)) < 1e-9 / margin
                 for answer in answers):

@@ -16,7 +16,7 @@ from typing import Any, List, Sequence
 
 import numpy as np
 
-from .problem import InverseProblem
+from .problem import InverseProblem, nearest
 from ..tolerances import CLOSE, SINGULAR, TOLERANCE
 from ...cache import Cache
 from ...formula.expression import argument, gated, nearest_integer, Real, real, square_root, where
@@ -57,11 +57,6 @@ def better(solution: Sequence[Reals], best: Sequence[Reals]) -> List[Reals]:
     is_there, was_there = (abs(sum(x[1:], x[0])) < math.inf for x in (places, best_places))
     chosen = where(was_there, where(is_there, precedes, is_there), is_there)
     return [[where(chosen, x, y) for x, y in zip(*parts)] for parts in zip(solution, best)]
-
-
-def nearest(x: Real, seed: Real, turn: float) -> Real:
-    """Return a number that is periodic by a turn, next to a seed."""
-    return x if turn == math.inf else x + turn * nearest_integer((seed - x) / turn)
 
 
 def _inside(problem: InverseProblem, by: int, place: Real, rates: Reals, ends: Reals,

@@ -14,9 +14,9 @@ from functools import reduce
 from itertools import product
 from typing import List, Optional, Tuple
 
-from .choice import better, nearest, ranked
+from .choice import better, ranked
 from .linkage import InverseLinkage
-from .problem import InverseProblem
+from .problem import InverseProblem, nearest
 from ..geometry.spatial import IN_SINGLE
 from ..tolerances import CLOSE
 from ...formula.expression import argument, gated, Real, real, substituted

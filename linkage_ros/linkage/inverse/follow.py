@@ -31,30 +31,25 @@ LONGEST = 0.7
 def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
            source: object) -> Optional[Row]:
     """Return the solution, with the whole turns of `seed`, and its rates; None if none."""
-    start = problem.forward.at(*seed)[:problem.n]
-    if not all(map(math.isfinite, start)):
+    start = problem.newton.at(*seed, *values)
+    if not start[0] < math.inf:
         return None
+    gaps = [gap * scale for gap, scale in zip(start[2:], problem.scales)]
     if isinstance(source, Segments):
-        input_ = problem.inputs[0]
-        turns = input_.turns_of(seed[0])
-        way = source.follow(values[0], start[0], (seed[0] - turns) / input_.step,
-                            problem.turns[0])
+        way = source.follow(values[0], gaps[0], seed[0])
         if not way:
             return None
-        bracket, passed = way
-        found = refine(problem, values, bracket)
-        seed = (turns + passed + bracket[2],)
+        bracket, turns = way
+        found, seed = refine(problem, values, bracket), (turns + bracket.seed,)
     else:
-        found, seed = _followed(problem, values, seed, start)
+        found, seed = _followed(problem, values, seed, gaps, start[-problem.n ** 2:])
     return found and (*problem.nearest_equivalent(found, seed), *found[problem.n:])
 
 
 def _followed(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
-              start: Sequence[float]) -> Tuple[Optional[Row], Sequence[float]]:
+              gaps: Sequence[float], rates: Row) -> Tuple[Optional[Row], Sequence[float]]:
     """Return the end of the motion, None if there is none, and inputs in its turn."""
-    gaps = [math.remainder(now - value, turn) for now, value, turn in zip(
-        start, values, problem.periods)]
-    side, left, part = _side(problem.forward.at(*seed)[problem.n:]), 1.0, 1.0
+    side, left, part = _side(rates), 1.0, 1.0
     for _ in range(4 * HALVINGS if side else 0):
         rest = max(left - part, 0.0)
         found = refine(problem, [x + rest * gap for x, gap in zip(values, gaps)], tuple(seed))

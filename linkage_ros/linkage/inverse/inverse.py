@@ -22,7 +22,7 @@ from . import rods
 from .choice import Choice
 from .expressions import chosen_of, modes_of, SINGLE
 from .follow import follow
-from .grid import blocks, Grid
+from .grid import check_dependence, Grid
 from .linkage import InverseLinkage, taken_apart
 from .modes import Modes
 from .problem import InverseProblem, Row
@@ -68,7 +68,20 @@ class Solution(NamedTuple):
         from the line between the crank's joints, +1 left; and 'det', the sign of the determinant
         of d outputs / d inputs. 0 where rounding hides the sign.
         """
-        return self.inverse.signs(self.inputs)
+        linkage, inputs = self.inverse.linkage, self.inputs
+        names = [input_.name for input_ in linkage.inputs if input_.turns]
+        cranks = {link.name: link for link in linkage.links if link.name in names}
+        places, signs = linkage.solve(inputs if len(inputs) > 1 else inputs[0]), {}
+        for link in linkage.links if linkage.axes == 'xy' else ():
+            crank = cranks.get(link.parent)
+            if crank and link.kind == 'revolute' and link.joint != crank.joint:
+                (a, b), (c, d) = (places[end] - places[start] for start, end in (
+                    (crank.joint, link.joint), (link.joint, link.tip)))
+                cross, size = a * d - b * c, math.hypot(a, b) * math.hypot(c, d)
+                signs[link.name] = int(np.sign(cross)) if abs(cross) > SINGULAR * size else 0
+        signs['det'] = 0 if self.is_singular else int(np.sign(np.linalg.det(
+            self.inverse.problem.scaled(self.jacobian))))
+        return signs
 
     @property
     def margin(self) -> float:
@@ -78,12 +91,18 @@ class Solution(NamedTuple):
         It is 0 where the inputs cannot move the outputs in some direction, or cannot resist a load
         in some direction. Units are rad, the longest bar for outputs, about the stroke for inputs.
         """
-        return self.inverse.margin(self.inputs)
+        jacobian = self.inverse.problem.scaled(self.jacobian)
+        if not np.isfinite(jacobian).all():
+            return 0.0
+        values = np.linalg.svd(jacobian, compute_uv=False)
+        return float(values[-1] / max(1.0, values[0]))
 
     @property
     def jacobian(self) -> np.ndarray:
         """Return d outputs / d inputs [rad or m, per rad or m], shape (outputs, inputs)."""
-        return self.inverse.jacobian(self.inputs)
+        n = len(self.inputs)
+        rates = self.inverse.problem.newton.at(*self.inputs, *[0.0] * n)[-n * n:]
+        return np.reshape(rates, (n, n)).T
 
     @property
     def is_singular(self) -> bool:
@@ -114,10 +133,15 @@ class Inverse:
 
     def __init__(self, linkage: Kinematics, outputs: Tuple[str, ...]):
         self.linkage, self.outputs, self._n = linkage, outputs, len(outputs)
-        blocks(linkage, outputs)
-        self._problem = InverseProblem(linkage, outputs)
-        self._choice = Choice(self._problem)
-        self.inputs = self._problem.inputs
+        if len(outputs) != len(linkage.inputs):
+            raise ValueError(f'{linkage.type} has {len(linkage.inputs)} inputs: as many outputs '
+                             f'are needed, got {listed(outputs)}')
+        if outputs[1:] == tuple(input_.name for input_ in linkage.inputs[1:]):
+            linkage.check_output(outputs[0])
+        check_dependence(linkage, outputs)
+        self.problem = InverseProblem(linkage, outputs)
+        self._choice = Choice(self.problem)
+        self.inputs = self.problem.inputs
         self._is_part = any(each.is_part for each in self.inputs)
         if not self.is_quick:
             assert self._source  # raises ValueError for dependent outputs
@@ -139,7 +163,7 @@ class Inverse:
         """Return what yields candidates."""
         if self._n == 1:
             return segments_of(self.linkage, self.outputs[0], (), self.inputs[0])
-        return Modes(self._problem, self.closed) if self.closed else Grid(self._problem)
+        return Modes(self.problem, self.closed) if self.closed else Grid(self.problem)
 
     def __reduce__(self) -> Tuple[Any, ...]:
         """Pickle the linkage and the outputs only."""
@@ -186,9 +210,9 @@ class Inverse:
         found = [row[:self._n] for row in self._all(self._numbers(values), seed)]
         if seed:
             found = sorted(
-                (self._problem.nearest_equivalent(inputs, seed) for inputs in found),
+                (self.problem.nearest_equivalent(inputs, seed) for inputs in found),
                 key=lambda x: sum(((a - b) / size) ** 2 for a, b, size in zip(
-                    x, seed, self._problem.sizes)))
+                    x, seed, self.problem.sizes)))
         return [Solution(inputs, self) for inputs in found]
 
     def _around(self, near: Sequence[float]) -> Tuple[Inverse, np.ndarray, np.ndarray]:
@@ -215,7 +239,7 @@ class Inverse:
             output by the first input, by the second and so on.
 
         """
-        rows = _broadcast(self._each(values))
+        rows = np.broadcast_arrays(*self._each(values))
         found = self._all_arrays(np.stack([row.ravel() for row in rows]))
         found = np.moveaxis(found, 0, -1).reshape(len(found[0]), *rows[0].shape, len(found))
         return found[:self._n], found[self._n:]
@@ -229,35 +253,31 @@ class Inverse:
                     (values - own).tolist())]
         if not all(map(math.isfinite, values)):
             return []
-        problem = self._problem
+        problem = self.problem
         values = problem.reduced(values)
         found = [row for candidate in self._source.candidates(values)
                  if (row := refine(problem, values, candidate))]
         return distinct(problem, found) if len(found) > 1 else found
 
-    def _all_arrays(self, values: np.ndarray) -> np.ndarray:
+    def _all_arrays(self, values: np.ndarray, near: Any = ()) -> np.ndarray:
         """
         Return all solutions for values (outputs, m) in order, padded with NaN.
 
+        Each has the solutions of the turns around its `near` (inputs, m), if these are many.
         Their shape is (solutions, inputs and rates, m), with one solution at least.
         """
-        problem, n, count = self._problem, self._n, values.shape[1]
-        if count <= FEW or isinstance(self._source, Grid):
-            lists = [self._all(column) for column in values.T.tolist()]
+        problem, n, count = self.problem, self._n, values.shape[1]
+        if count <= FEW or isinstance(self._source, Grid) or self._is_part and len(near):
+            lists = [self._all(column[:n], column[n:])
+                     for column in np.vstack([values, *near]).T.tolist()]
             found = np.full((max(map(len, lists), default=0) or 1, n + n * n, count), math.nan)
             for k, solutions in enumerate(lists):
                 found[:len(solutions), :, k] = solutions or math.nan
             return found
         values = problem.reduced_arrays(values)
-        parts = self._source.candidate_arrays(values)
-        found = np.full((len(parts) or 1, n + n * n, count), math.nan)
-        if parts:
-            places, candidates = zip(*parts)
-            solved = refine_arrays(problem, values[:, np.concatenate(places)], np.concatenate(
-                candidates, axis=1))
-            for rows, place, part in zip(found, places, np.split(
-                    solved, np.cumsum([len(place) for place in places])[:-1], axis=1)):
-                rows[:, place] = part
+        numbers, places, candidates = self._source.candidate_arrays(values)
+        found = np.full((numbers.max(initial=0) + 1, n + n * n, count), math.nan)
+        found[numbers, :, places] = refine_arrays(problem, values[:, places], candidates).T
         return distinct_arrays(problem, found)
 
     # --- arguments ---
@@ -339,16 +359,10 @@ class Inverse:
         if {float} == {*map(type, values), *map(type, seed)}:
             row = self._choice.of(self._all(values, seed), seed, limits)
             return tuple(row[:n]), tuple(row[n:])
-        rows = _broadcast((*values, *seed))
-        shape, flat = rows[0].shape, np.stack([row.ravel() for row in rows])
-        if seed and self._is_part:
-            # Each has the solutions of its own turns.
-            chosen = np.reshape([
-                self._choice.of(self._all(column[:n], column[n:]), column[n:], limits)
-                for column in flat.T.tolist()], (-1, n + n * n)).T
-        else:
-            chosen = self._choice.of(self._all_arrays(flat[:n]), flat[n:], limits)
-        found = [row.reshape(shape) for row in chosen]
+        rows = np.broadcast_arrays(*(*values, *seed))
+        flat = np.stack([row.ravel() for row in rows])
+        chosen = self._choice.of(self._all_arrays(flat[:n], flat[n:]), flat[n:], limits)
+        found = [row.reshape(rows[0].shape) for row in chosen]
         return tuple(found[:n]), tuple(found[n:])
 
     def path(self, values: Sequence[ArrayLike], near: Optional[ArrayLike] = None,
@@ -372,11 +386,11 @@ class Inverse:
         """
         limits = self._limits(ends)
         seed: Row = () if near is None else self._numbers(near, 'near', finite=True)
-        rows = [np.atleast_1d(row) for row in _broadcast(self._each(values))]
+        rows = [np.atleast_1d(row) for row in np.broadcast_arrays(*self._each(values))]
         if rows[0].ndim > 1:
             raise self._miscounted(values, 'values')
-        inverse, turned, own = self._around(seed)
-        solutions = inverse._all_arrays(rows - own[:, None]) + turned[:, None]
+        solutions = self._all_arrays(np.stack(rows), np.repeat(
+            np.reshape(seed, (-1, 1)), len(rows[0]), axis=1))
         found = self._choice.along(solutions, seed, limits)
         return tuple(found[:self._n]), tuple(found[self._n:])
 
@@ -402,7 +416,7 @@ class Inverse:
         """
         values, near = self._numbers(values), self._numbers(near, 'near')
         inverse, turned, own = self._around(near)
-        problem, row = inverse._problem, None
+        problem, row = inverse.problem, None
         if all(map(math.isfinite, (*values, *near))):
             row = follow(problem, problem.reduced((values - own).tolist()), (
                 near - turned[:self._n]).tolist(), inverse._source)
@@ -436,7 +450,7 @@ class Inverse:
             If there is no closed form.
 
         """
-        outputs = chosen_of(self._problem, self.closed, follows)
+        outputs = chosen_of(self.problem, self.closed, follows)
         return array_function(outputs, (1 + follows) * self._n, xp, self.linkage.lengths, SINGLE)
 
     def modes(self, xp: Any) -> Callable:
@@ -446,53 +460,9 @@ class Inverse:
         It returns a tuple with a tuple for each assembly mode, in one order everywhere: an array
         for each input, NaN where the mode is no solution. See `function`.
         """
-        outputs = [x for inputs, _ in modes_of(self._problem, self.closed) for x in inputs]
+        outputs = [x for inputs, _ in modes_of(self.problem, self.closed) for x in inputs]
         flat = array_function(outputs, self._n, xp, self.linkage.lengths, SINGLE)
         return lambda *values: tuple(zip(*self._n * [iter(flat(*values))]))
-
-    # --- the working mode ---
-
-    def jacobian(self, inputs: ArrayLike) -> np.ndarray:
-        """Return d outputs / d inputs at a pose (inputs,), shape (outputs, inputs)."""
-        rates = self._problem.rated.at(*self._numbers(inputs, 'inputs'))[self._n:]
-        return np.reshape(rates, (self._n, self._n)).T
-
-    def margin(self, inputs: ArrayLike) -> float:
-        """Return the distance of a pose from a singular one; see `Solution.margin`."""
-        jacobian = self._problem.scaled(self.jacobian(inputs))
-        if not np.isfinite(jacobian).all():
-            return 0.0
-        values = np.linalg.svd(jacobian, compute_uv=False)
-        return float(values[-1] / max(1.0, values[0]))
-
-    def signs(self, inputs: Sequence[float]) -> Mapping[str, int]:
-        """Return the working mode of a pose; see `Solution.signs`."""
-        linkage, inputs = self.linkage, self._numbers(inputs, 'inputs')
-        cranks = {link.name: link for link in linkage.links
-                  if any(input_.turns and link.name == input_.name for input_ in linkage.inputs)}
-        places, signs = linkage.solve(inputs if self._n > 1 else inputs[0]), {}
-        for link in linkage.links if linkage.axes == 'xy' else ():
-            crank = cranks.get(link.parent)
-            if crank and link.kind == 'revolute' and link.joint != crank.joint:
-                (a, b), (c, d) = (places[end] - places[start] for start, end in (
-                    (crank.joint, link.joint), (link.joint, link.tip)))
-                signs[link.name] = _sign(a * d - b * c, math.hypot(a, b) * math.hypot(c, d))
-        signs['det'] = 0 if self.margin(inputs) < SINGULAR else _sign(float(np.linalg.det(
-            self._problem.scaled(self.jacobian(inputs)))), 0.0)
-        return signs
-
-
-def _broadcast(values: Sequence[Any]) -> Sequence[np.ndarray]:
-    """Return arrays of one shape; raise ValueError with their shapes if they have none."""
-    try:
-        return np.broadcast_arrays(*values)
-    except ValueError:
-        shapes = ', '.join(str(np.shape(each)) for each in values)
-        raise ValueError(f'arrays must have shapes that broadcast, got {shapes}') from None
-
-
-def _sign(value: float, size: float) -> int:
-    return int(np.sign(value)) if abs(value) > SINGULAR * size else 0
 
 
 def inverse_of(linkage: Kinematics, outputs: Union[str, Sequence[str]]) -> Inverse:
@@ -507,15 +477,5 @@ def inverse_of(linkage: Kinematics, outputs: Union[str, Sequence[str]]) -> Inver
     for name in names:
         linkage.check_there(name)
     plain = tuple(map(plain_text, names))
-    made = linkage.cache.get_or_make(('inverse', plain), lambda: _made(linkage, plain))
-    return linkage.cache.get_or_make(
-        ('inverse', plain[0] if isinstance(outputs, str) else plain), lambda: made)
-
-
-def _made(linkage: Kinematics, names: Tuple[str, ...]) -> Inverse:
-    if len(names) != len(linkage.inputs):
-        raise ValueError(f'{linkage.type} has {len(linkage.inputs)} inputs: as many outputs are '
-                         f'needed, got {listed(names)}')
-    if names[1:] == tuple(input_.name for input_ in linkage.inputs[1:]):
-        linkage.check_output(names[0])
-    return Inverse(linkage, names)
+    key = plain[0] if isinstance(outputs, str) else plain
+    return linkage.cache.get_or_make(('inverse', key), lambda: Inverse(linkage, plain))

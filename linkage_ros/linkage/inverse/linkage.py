@@ -16,7 +16,7 @@ from __future__ import annotations
 import cmath
 from itertools import product
 import math
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from ..formulas import Names, PAIR, Structure
 from ..geometry.builder import GROUND, Link, UNIT
 from ..inputs import Input, spread
 from ..kinematics import Kinematics
-from ..motion.reach import reach_of
 from ..text import joint_lines
 from ..text.design import Design
 from ..tolerances import CLOSE, TOLERANCE
@@ -103,12 +102,14 @@ class InverseLinkage(NamedTuple):
 def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
     """Return the inverse linkage of a sketch; raise ValueError if the sketch is incomplete."""
     lines = joint_lines.parse(sketch.lines)
-    used = {name for read in sketch.reads for end in read.ends for name in end.joints}
+    # The lines that drive are in the order of what drives them.
+    drives = dict(zip((line.names[0] for line in lines if line.drives), sketch.drives))
+    used = {name for read in sketch.reads for name in read.joints}
     for line in lines[::-1]:
         if used & {*line.names}:
             used |= {*line.depends_on}
     lines = [line for line in lines if used & {*line.names}]
-    drives = {line.names[0]: sketch.driving[line.names[0]] for line in lines if line.drives}
+    drives = {line.names[0]: drives[line.names[0]] for line in lines if line.drives}
     if sorted(name for name, *_ in drives.values()) != sorted(outputs):
         raise ValueError('the inputs do not depend on all of these outputs')
     branches, turns = joint_lines.branches(lines), tuple(read.turns for read in sketch.reads)
@@ -126,27 +127,22 @@ def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
 
 def _mode(structure: Structure, outputs: Names, reads: Sequence[_Read]) -> Mode:
     values = (argument(outputs.index(read.name)) if read.name in outputs else
-              _input_of(structure.built, *read.ends) for read in reads)
+              read.value(structure.built) for read in reads)
     return Mode(structure, tuple(
         (value - read.offset) / read.ratio for value, read in zip(values, reads)))
 
 
-class _End(NamedTuple):
-    """
-    The position of a body in the inverse linkage: two joints, and their places on the body.
-
-    A fixed body has no joints.
-    """
-
-    joints: Tuple[str, ...]
-    places: Tuple[complex, ...] = ()
-
-
 class _Read(NamedTuple):
-    """The joint from which an input is read: its link and parent; ratio * input + offset."""
+    """
+    The joint from which an input is read.
+
+    Its value is ratio * input + offset, up to `turns` of the input; `joints` are those that it
+    depends on in the inverse linkage, `value` is its function of that linkage's `Builder`.
+    """
 
     name: str
-    ends: Tuple[_End, ...]
+    joints: Tuple[str, ...]
+    value: Callable[[Any], Real]
     ratio: float
     offset: float
     turns: Tuple[float, ...]
@@ -160,7 +156,7 @@ def taken_apart(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]
     pose = _pose(linkage)
     if pose is None:
         return None
-    absolute = any(_pair(name) or name[-2:] in ('.x', '.y') for name in outputs)
+    absolute = any(PAIR.fullmatch(name) or name[-2:] in ('.x', '.y') for name in outputs)
     grounds = (GROUND,) if absolute else (GROUND, *(link.name for link in linkage.links))
     for ground in grounds:
         try:
@@ -170,26 +166,12 @@ def taken_apart(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]
     return None
 
 
-def _pair(output: str) -> Optional[Tuple[str, ...]]:
-    found = PAIR.fullmatch(output)
-    return found and found.groups()
-
-
 def _pose(linkage: Kinematics) -> Optional[Dict[str, float]]:
     """Return all joint angles and coordinates in a generic pose, away from dead points."""
     names = (*linkage.joints, *(f'{point}.{axis}' for point in linkage.points for axis in 'xy'))
-    pose = linkage.posed((), names)
-    if len(linkage.inputs) > 1:
-        values = spread(linkage.inputs, TRIES)
-    else:
-        arcs = reach_of(linkage)
-        values = [np.array([lo + part * (hi - lo) for part in (0.382, 0.7, 0.13)
-                            for lo, hi in arcs])]
-    if not len(values[0]):
-        return None
-    rows = pose.searched(*values)
-    known = np.flatnonzero(np.isfinite(rows).all(axis=0))
-    return dict(zip(names, rows[:, known[0]].tolist())) if len(known) else None
+    rows = linkage.posed((), names).searched(*spread(linkage.inputs, TRIES))
+    known = rows[:, np.isfinite(rows).all(axis=0)]
+    return dict(zip(names, known[:, 0].tolist())) if known.size else None
 
 
 class _Sketch(Dyads):
@@ -198,8 +180,8 @@ class _Sketch(Dyads):
 
     Attributes
     ----------
-    driving : dict
-        By the joint that a line places: the output that drives it, its ratio and offset.
+    drives : list of tuple
+        For each line that drives, in their order: the output that drives it, its ratio and offset.
     reads : list of _Read
         Where each input of the linkage is read.
 
@@ -208,11 +190,11 @@ class _Sketch(Dyads):
     def __init__(self, linkage: Kinematics, outputs: Names, ground: str, pose: Dict[str, float]):
         self._linkage, self._outputs, self._pose = linkage, outputs, pose
         self._links = {link.name: link for link in linkage.links}
-        self.driving: Dict[str, Tuple[str, float, float]] = {}
+        self.drives: List[Tuple[str, float, float]] = []
         self._scaled: Dict[str, Tuple[float, float]] = {}
-        self._pending_drive: Optional[Tuple[str, float, float]] = None
         self._named: Dict[str, Dict[str, complex]] = {}
-        self._at: Dict[str, Tuple[complex, complex]] = {}
+        # The origin and the direction of each body in the pose.
+        self._at: Dict[str, Tuple[complex, complex]] = {GROUND: (0.0j, 1.0 + 0.0j)}
         slides: List[Slide] = []
         motors: List[Motor] = []
         # Each link in its own frame, whose x axis is its bar.
@@ -223,20 +205,22 @@ class _Sketch(Dyads):
         for body, frame in self._frames.items():
             for joint, place in frame.items():
                 self._named.setdefault(joint, {})[body] = place
-        self._turns = {GROUND: 1.0 + 0.0j}
         for link in linkage.links:
             angle = self._zero(link) + (pose[link.name] if link.kind == 'revolute' else 0.0)
-            self._turns[link.name] = self._turns[link.parent] * cmath.rect(1.0, angle)
+            turn = self._at[link.parent][1] * cmath.rect(1.0, angle)
+            joint, origin = next(iter(self._frames[link.name].items()))
+            self._at[link.name] = self._place(joint) - turn * origin, turn
             motion = self._motion(link)
-            if link.name in outputs:
+            if motion.joint in outputs:
                 motors.append(motion)
             elif isinstance(motion, Slide):
                 slides.append(motion)
         for block, pin in linkage.yokes.items():
-            slides.append(self._guided(pin, f'{block}-{pin}', block, 1j, self._turns[block]))
+            slides.append(self._guided(pin, f'{block}-{pin}', block, 1j, self._at[block][1]))
+        done = [motor.joint for motor in motors]
         for output in sorted(outputs, key=lambda name: name.startswith('angle(')):
-            if output not in self._links:
-                self._add(output, slides, motors)
+            if output not in done:
+                done += self._add(output, slides, motors)
         size = max(abs(place) for frame in self._frames.values() for place in frame.values())
         size = max(size, linkage.longest)
         bodies = [*self._frames, *(body for pin in self._named.values() for body in pin),
@@ -263,8 +247,15 @@ class _Sketch(Dyads):
         if link.kind == 'revolute':
             return Hinge(bodies, (hangs, self._frames[link.name][link.joint]), 1.0,
                          self._zero(link), link.name)
-        along = cmath.rect(1.0, self._zero(link))
-        return Slide(bodies, (hangs, 0.0j), (along, 1.0 + 0.0j), link.name)
+        along, name = cmath.rect(1.0, self._zero(link)), link.name
+        for axis, part in ('x', along.real), ('y', along.imag):
+            # The slide of a block on a fixed line determines the coordinates of the block.
+            if link.parent == GROUND and f'{link.tip}.{axis}' in self._outputs and \
+                    abs(part) > CLOSE and link.tip in self._frames[link.name]:
+                name, start = f'{link.tip}.{axis}', hangs + along * self._frames[
+                    link.name][link.tip]
+                self._scaled[name] = part, start.real if axis == 'x' else start.imag
+        return Slide(bodies, (hangs, 0.0j), (along, 1.0 + 0.0j), name)
 
     def _place(self, joint: str) -> complex:
         return complex(self._pose[f'{joint}.x'], self._pose[f'{joint}.y'])
@@ -280,43 +271,25 @@ class _Sketch(Dyads):
         """Put a joint on a line through the origin of a body; `turn` is the body's direction."""
         return Slide((base, self._pin(joint, body, turn)), (0.0j, 0.0j), (axis, axis), body)
 
-    def _add(self, output: str, slides: List[Slide], motors: List[Motor]) -> None:
-        """Add the bodies that measure an output other than a joint's value."""
-        if pair := _pair(output):
-            first, second = pair
+    def _add(self, output: str, slides: List[Slide], motors: List[Motor]) -> List[str]:
+        """Add bodies that measure an output other than a joint's value; return what they do."""
+        if pair := PAIR.fullmatch(output):
+            first, second = pair.groups()
             apart = self._place(second) - self._place(first)
             along = apart / abs(apart) if apart else 1.0 + 0.0j
-            if output.startswith('distance'):
-                motors.append(Slide((self._pin(first, f'{output} barrel', along),
+            motors.append(self._aimed(output, first, second, along, slides) if output.startswith(
+                'angle') else Slide((self._pin(first, f'{output} barrel', along),
                                      self._pin(second, f'{output} rod', along)),
                                     (0.0j, 0.0j), (1.0 + 0.0j, 1.0 + 0.0j), output))
-                return
-            motors.append(self._aimed(output, first, second, along, slides))
-            return
+            return [output]
         joint, axis = output.split('.')
-        for link in self._linkage.links:
-            along = cmath.rect(1.0, self._zero(link))
-            part = along.real if axis == 'x' else along.imag
-            if (link.tip, link.parent, link.kind) == (joint, GROUND, 'prismatic') and \
-                    abs(part) > CLOSE and joint in self._frames[link.name]:
-                # The slide of a block on a fixed line determines the block's coordinates.
-                start = self._frames[GROUND][link.joint] + along * self._frames[link.name][joint]
-                self._scaled[output] = part, start.real if axis == 'x' else start.imag
-                motion = next(slide for slide in slides if slide.joint == link.name)
-                slides.remove(motion)
-                motors.append(motion._replace(joint=output))
-                return
-        body, along = f'{joint}.xy', 1.0 + 0.0j if axis == 'x' else 1j
-        if body in self._named[joint]:
-            # The other coordinate has put it on a line; this one drives it along that line.
-            other = next(slide for slide in slides if slide.bodies[1] == body)
-            slides.remove(other)
-            motors.append(other._replace(joint=output))
-            return
+        along, other = (1.0 + 0.0j, f'{joint}.y') if axis == 'x' else (1j, f'{joint}.x')
         self._at[output] = self._place(joint), 1.0 + 0.0j
         motors.append(Slide((GROUND, output), (0.0j, 0.0j), (along, along), output))
         # Along the other axis, whose coordinate may drive it.
-        slides.append(self._guided(joint, body, output, 1.0 + 1.0j - along))
+        across = self._guided(joint, f'{joint}.xy', output, 1.0 + 1.0j - along)
+        (motors if other in self._outputs else slides).append(across._replace(joint=other))
+        return [output, other]
 
     def _aimed(self, output: str, first: str, second: str, along: complex,
                slides: List[Slide]) -> Hinge:
@@ -340,15 +313,12 @@ class _Sketch(Dyads):
 
     def place_in_pose(self, body: str, place: complex) -> complex:
         """Return a place on a body, in the coordinates of the pose."""
-        if body in self._at:
-            start, turn = self._at[body]
-            return start + turn * place
-        joint, origin = next(iter(self._frames[body].items()))
-        return self._place(joint) + self._turns[body] * (place - origin)
+        start, turn = self._at[body]
+        return start + turn * place
 
     def direction_in_pose(self, body: str, along: complex) -> complex:
         """Return a direction on a body, in the coordinates of the pose."""
-        return (self._at[body][1] if body in self._at else self._turns[body]) * along
+        return self._at[body][1] * along
 
     def length_text(self, value: float) -> str:
         """Return a length with all its digits."""
@@ -368,17 +338,10 @@ class _Sketch(Dyads):
         return next(name for name in (f'{letter}{number or ""}' for number in range(1000)
                                       for letter in 'XYZUVW') if name not in taken)
 
-    def name(self, place: complex, body: str, line: str) -> str:
-        """Add the line that places a joint, and return the joint's name."""
-        name = super().name(place, body, line)
-        if self._pending_drive:
-            self.driving[name], self._pending_drive = self._pending_drive, None
-        return name
-
     def drive(self, word: str, joint: Any, ratio: float, offset: float) -> Tuple[str, str]:
-        """Record an input, whose joint the next line places."""
+        """Record an input, which the next line drives."""
         part, start = self._scaled.get(joint, (1.0, 0.0))
-        self._pending_drive = joint, ratio / part, offset - ratio * start / part
+        self.drives.append((joint, ratio / part, offset - ratio * start / part))
         return self.number(word), ''
 
     def _read(self, by: int, input_: Input) -> _Read:
@@ -386,29 +349,49 @@ class _Sketch(Dyads):
         counted = not input_.is_part
         for name in (input_.name, *(self._linkage.geared_to(by) if counted else ())):
             try:
-                ends = self._ends(self._links[name])
+                joints, value = self._value(self._links[name])
             except ValueError:
                 continue
             ratio, offset = (1.0, 0.0) if name == input_.name else self._linkage.gear(name, by)
             is_output = name in self._outputs and name == input_.name
             count = round(abs(ratio) * input_.period) if input_.wraps and not is_output else 1
-            return _Read(name, ends, ratio, offset, tuple(
+            return _Read(name, joints, value, ratio, offset, tuple(
                 turn * math.tau / abs(ratio) for turn in range(count)))
         raise ValueError(f'{input_.name} is not placed')
 
-    def _ends(self, link: Link) -> Tuple[_End, ...]:
-        """Return the positions of an input's link and its parent."""
+    def _value(self, link: Link) -> Tuple[Tuple[str, ...], Callable]:
+        """Return the joints that tell the position of a link on its parent, and its formula."""
+        zero = cmath.rect(1.0, self._zero(link))
         if link.kind == 'revolute':
-            return (self._end_of(link.name, cmath.rect(1.0, 0.0)),
-                    self._end_of(link.parent, cmath.rect(1.0, self._zero(link))))
-        tip, origin = ((self._joint(body, joint),) for body, joint in (
-            (link.name, link.tip), (link.parent, link.joint)))
+            ends, ahead = self._direction(link.name, 1.0 + 0.0j)
+            others, back = self._direction(link.parent, zero)
+
+            def angle(built: Any) -> Real:
+                turned = ahead(built) * back(built).conjugate()
+                return arctangent(turned.y, turned.x)
+            return ends + others, angle
+        tip, origin = self._joint(link.name, link.tip), self._joint(link.parent, link.joint)
         parent = self._links.get(link.parent)
         if parent and len(self._frames[parent.name]) == 1 and parent.kind == 'revolute':
             # A cylinder: its length is the distance of its ends.
-            return _End(tip), _End(origin)
-        along = cmath.rect(1.0, self._zero(link))
-        return _End(tip), _End(origin), self._end_of(link.parent, along)
+            return (tip, origin), lambda built: square_root(built.arm(origin, tip).square)
+        ends, along = self._direction(link.parent, zero)
+
+        def slide(built: Any) -> Real:
+            line = along(built) / along(built).length() if ends else along(built)
+            return dot(built.arm(origin, tip).vector, line)
+        return (tip, origin, *ends), slide
+
+    def _direction(self, body: str, along: complex) -> Tuple[Tuple[str, ...], Callable]:
+        """Return the joints that tell the direction of a body, and the formula of that vector."""
+        if body == self.ground:
+            return (), lambda built: _constant(along)
+        if body not in self.parts:
+            raise ValueError(f'{body} is not placed')
+        first, start = self.end(body)
+        second, end = self.other(body, first)
+        turn = _constant(along * (end - start).conjugate() / abs(end - start))
+        return (first, second), lambda built: built.arm(first, second).vector * turn
 
     def _joint(self, body: str, joint: str) -> str:
         """Return the name of a joint in the lines; raise ValueError if no line places it."""
@@ -416,39 +399,6 @@ class _Sketch(Dyads):
             if abs(at - self._frames[body][joint]) < self.near:
                 return name
         raise ValueError(f'{joint} is not placed')
-
-    def _end_of(self, body: str, along: complex) -> _End:
-        """Return two joints that give a body's angle, their places relative to a direction."""
-        if body == self.ground:
-            return _End((), (along,))
-        if body not in self.parts:
-            raise ValueError(f'{body} is not placed')
-        (one, start) = self.end(body)
-        two, end = self.other(body, one)
-        return _End((one, two), ((end - start) / along,))
-
-
-def _input_of(built: Any, one: _End, other: _End, line: Optional[_End] = None) -> Real:
-    """Return the value of an input."""
-    if one.places:
-        relative = Complex(1.0, 0.0)
-        for end, sign in ((one, 1.0), (other, -1.0)):
-            seen = end.places[0] / abs(end.places[0])
-            if end.joints:
-                bar = built.arm(*end.joints).vector
-                relative = relative * (bar if sign > 0.0 else bar.conjugate())
-                seen = seen.conjugate()
-            relative = relative * _constant(seen if sign > 0.0 else seen.conjugate())
-        return arctangent(relative.y, relative.x)
-    (tip,), (origin,) = one.joints, other.joints
-    arm = built.arm(origin, tip)
-    if line is None:
-        return square_root(arm.square)
-    along = _constant(line.places[0] / abs(line.places[0]))
-    if line.joints:
-        along = built.arm(*line.joints).vector * along.conjugate()
-        along = along / along.length()
-    return dot(arm.vector, along)
 
 
 def _constant(value: complex) -> Complex:

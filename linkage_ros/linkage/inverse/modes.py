@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from itertools import product
 import math
-from typing import Iterator, List, Sequence, Tuple
+from typing import Iterator, Sequence, Tuple
 
 import numpy as np
 
@@ -33,10 +33,10 @@ class Modes:
             if math.isfinite(sum(inputs)):
                 yield inputs
 
-    def candidate_arrays(self, values: np.ndarray) -> List[Tuple[np.ndarray, np.ndarray]]:
-        """Return for each mode the places of values (outputs, m) that it has, with inputs."""
+    def candidate_arrays(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return numbers of modes, of values (outputs, m) that they have, and the inputs there."""
         pose, m = self._pose, values.shape[1]
         over = pose.over if self._problem.linkage.is_accelerated else pose.searched
         modes = over(*values).reshape(-1, self._problem.n, m)
-        places = [np.flatnonzero(np.isfinite(inputs).all(axis=0)) for inputs in modes]
-        return [(place, inputs[:, place]) for place, inputs in zip(places, modes)]
+        numbers, places = np.nonzero(np.isfinite(modes).all(axis=1))
+        return numbers, places, modes[numbers, :, places].T

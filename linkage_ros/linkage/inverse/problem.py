@@ -10,16 +10,27 @@ them (`refine`), and what chooses one (`choice`) or continues one (`follow`).
 
 from __future__ import annotations
 
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
+from itertools import combinations
 import math
-from typing import Any, Sequence, Tuple
+from typing import Any, Dict, Sequence, Tuple
 
 import numpy as np
 
+from ..formulas import Structure
 from ..inputs import Input, is_periodic, spread
 from ..kinematics import Kinematics
 from ..motion.curves import LEAST
-from ...formula.program import Pose
+from ..tolerances import SINGULAR
+from ...cache import cached
+from ...formula.expression import argument, dimension, greater, nearest_integer, Real, real, where
+from ...formula.program import Pose, Program
+
+# The largest error of a solution, relative to rounding of outputs, and of inputs times rates.
+ACCEPTED = 64.0 * 2.0 ** -53
+
+# The dimension of this name is the unit of lengths [m]; those of inputs' names are their units.
+LONGEST_BAR = '[longest bar]'
 
 # The inputs of a solution, then the rates of all outputs by the first input, by the second etc.
 Row = Tuple[float, ...]
@@ -42,16 +53,12 @@ class InverseProblem:
         The unit of each output and of each input in which they are compared [rad or m].
     periods, turns : list of float
         For each output and for each input after how much it is the same [rad], or inf.
-    forward : Pose
-        The code for the outputs and for their rates by each input.
 
     """
 
     def __init__(self, linkage: Kinematics, outputs: Tuple[str, ...]):
         self.linkage, self.outputs, self.n = linkage, outputs, len(outputs)
-        # Of one input, candidates are inside the reach.
-        self.forward: Pose = linkage.checked(outputs) if self.n > 1 else self.rated
-        if self.forward.shape:
+        if any(map(np.ndim, linkage.dimensions.values())):
             raise ValueError('the inverse is for one set of dimensions, not for arrays')
         self.angular = [linkage.is_angle(name) for name in outputs]
         self.scales = [1.0 if angular else linkage.longest for angular in self.angular]
@@ -83,14 +90,18 @@ class InverseProblem:
                                for row, angular, scale in rows])
 
     @cached_property
-    def rated(self) -> Pose:
-        """Return the code for outputs and rates, wherever these have values."""
-        return self.linkage.posed((), self.outputs, self.outputs)
+    def newton(self) -> Pose:
+        """Return the code for a step of Newton's method; see `newton`."""
+        program = newton(self.linkage.structure, self.outputs, tuple(self.periods),
+                         tuple(self.turns))
+        return program.bind({**self.linkage.lengths, LONGEST_BAR: self.linkage.longest, **{
+            f'[{input_.name}]': size for input_, size in zip(self.inputs, self.sizes)}}, {},
+            self.linkage.is_accelerated)
 
     @cached_property
     def over(self) -> Any:
-        """Return the function from arrays of inputs to outputs and rates, as arrays."""
-        return self.forward.over if self.linkage.is_accelerated else self.forward.searched
+        """Return the same code for arrays."""
+        return self.newton.over if self.linkage.is_accelerated else self.newton.searched
 
     def reduced(self, values: Sequence[float]) -> Sequence[float]:
         """Return values with large angles reduced to one period, exactly."""
@@ -98,23 +109,10 @@ class InverseProblem:
                 for x, turn in zip(values, self.periods)]
 
     def reduced_arrays(self, values: np.ndarray) -> np.ndarray:
-        """Return what `reduced` does for values (outputs, m); NaN for those not finite."""
-        values = np.where(np.isfinite(values), values, math.nan)
-        for row, turn in zip(values, self.periods):
-            far = np.abs(row) > turn
-            row[far] = _within_period(row[far], turn)
-        return values
-
-    def wrapped(self, inputs: Sequence[float]) -> Row:
-        """Return inputs, angles within one period around zero, zero without sign."""
-        return tuple([(x if 2.0 * abs(x) < turn else x - turn * math.floor(x / turn + 0.5))
-                      if abs(x) > LEAST * size else 0.0
-                      for x, turn, size in zip(inputs, self.turns, self.sizes)])
-
-    def wrapped_arrays(self, inputs: np.ndarray) -> np.ndarray:
-        """Return what `wrapped` does for inputs (inputs, m)."""
-        return np.stack([np.asarray(input_.wrapped(np.where(np.abs(x) < LEAST * size, 0.0, x)))
-                         for input_, x, size in zip(self.inputs, inputs, self.sizes)])
+        """Return what `reduced` does for values (outputs, m)."""
+        return np.stack([row if turn == math.inf else np.where(
+            np.abs(row) <= turn, row, _within_period(row, turn))
+                         for row, turn in zip(values, self.periods)])
 
     def distance(self, by: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the distances of values of an input, without whole periods, in its size."""
@@ -137,3 +135,61 @@ def _within_period(value: Any, turn: float) -> Any:
     # Sine and cosine remove any number of whole turns without loss.
     count = turn / math.tau
     return count * np.arctan2(np.sin(value / count), np.cos(value / count))
+
+
+def nearest(x: Real, seed: Real, turn: float) -> Real:
+    """Return a number that is periodic by a turn, next to a seed."""
+    return x if turn == math.inf else x + turn * nearest_integer((seed - x) / turn)
+
+
+@cached(64, shared=True)
+def newton(structure: Structure, outputs: Tuple[str, ...], periods: Sequence[float],
+           turns: Sequence[float]) -> Program:
+    """
+    Return the code for a step of Newton's method, from the inputs and values of the outputs.
+
+    It returns the error of the outputs in their units, the largest one relative to rounding, and
+    that of each output; the inputs after a step; the inputs within one period around zero, zero
+    without sign; and the rates of all outputs by the first input, by the second and so on.
+    """
+    n, inputs = len(outputs), [argument(by) for by in range(len(outputs))]
+    # Of one input, candidates are inside the reach.
+    rows = structure.checked(outputs) if n > 1 else structure.parts(((), outputs, outputs))
+    scales = [real(1.0) if structure.turns(name) else dimension(LONGEST_BAR) for name in outputs]
+    sizes = [real(1.0) if input_.turns else dimension(f'[{input_.name}]')
+             for input_ in structure.built.inputs]
+    gaps = [nearest(row - argument(n + by), real(0.0), turn) / scale
+            for by, (row, turn, scale) in enumerate(zip(rows, periods, scales))]
+    # A row for each output, in units of outputs and inputs.
+    jacobian = [[rate * size / scale for rate, size in zip(rows[n + by::n], sizes)]
+                for by, scale in enumerate(scales)]
+    weights = [greater(abs(x) / size, real(1.0)) for x, size in zip(inputs, sizes)]
+    most = real(SINGULAR / ACCEPTED)
+    ratios = []
+    for gap, rates in zip(gaps, jacobian):
+        rounding = sum((abs(rate) * weight for rate, weight in zip(rates, weights)), real(1.0))
+        # Where a pose has no rates, they explain nothing.
+        ratios.append(abs(gap) / where(
+            rounding < most, rounding, where(most <= rounding, most, 1.0)))
+    determinant, wrapped = _determinant(jacobian), []
+    steps = [_determinant([[*rates[:by], gap, *rates[by + 1:]]
+                           for gap, rates in zip(gaps, jacobian)]) for by in range(n)]
+    for x, size, turn in zip(inputs, sizes, turns):
+        x = nearest(where(abs(x) > LEAST * size, x, 0.0), real(0.0), turn)
+        wrapped.append(x if turn == math.inf else where(x < 0.5 * turn, x, -0.5 * turn))
+    return Program([
+        sum(map(abs, gaps), real(0.0)), reduce(greater, ratios), *gaps,
+        *(x - step * size / determinant for x, step, size in zip(inputs, steps, sizes)),
+        *wrapped, *rows[n:]], 2 * n)
+
+
+def _determinant(rows: Sequence[Sequence[Real]]) -> Real:
+    """Return a determinant, expanded by rows from below; each minor is computed once."""
+    minors: Dict[Tuple[int, ...], Real] = {(): real(1.0)}
+    for size, row in enumerate(reversed(rows), 1):
+        minors = {columns: sum((
+            (-1.0) ** place * row[column] * minors[columns[:place] + columns[place + 1:]]
+            for place, column in enumerate(columns)), real(0.0))
+            for columns in combinations(range(len(rows)), size)}
+    determinant, = minors.values()
+    return determinant

@@ -53,9 +53,8 @@ class Segment(NamedTuple):
 
     Attributes
     ----------
-    theta, value, speed : float array (samples,)
-        The input in its size, the output times the sign of its rate, and the rate's size. The
-        first two ascend.
+    theta, value : float array (samples,)
+        The input in its size, and the output times the sign of its rate. Both ascend.
     sign : float
         1.0 where the output rises, -1.0 where it falls.
 
@@ -63,7 +62,6 @@ class Segment(NamedTuple):
 
     theta: np.ndarray
     value: np.ndarray
-    speed: np.ndarray
     sign: float
 
 
@@ -90,7 +88,8 @@ class Segments:
 
     def __init__(self, curve: Callable, arcs: Sequence[Arc], near_zeros: Sequence[NearZero],
                  input_: Input, period: float, size: float):
-        self._curve, self._period, self._size, self._unit = curve, period, size, input_.step
+        self._curve, self._period, self._size = curve, period, size
+        self._input, self._unit = input_, input_.step
         self._rounding, counted = TOLERANCE * size, input_.counted()
         special = distinct((near.value for near in near_zeros if near.gap <= near.rounding),
                            counted)
@@ -104,41 +103,28 @@ class Segments:
             runs, self.jumps = [], []
         self.all = [segment for run in runs for segment in self._monotone(*run)]
         self.all.sort(key=lambda segment: float(segment.theta[0]))
-        turn = counted.turn if counted.wraps else math.inf
-        # The segment, if any, on which the output goes on after the last input of each.
-        following = [self._continues(*pair, turn) for pair in zip(
-            self.all, self.all[1:] + self.all[:1])]
-        self._preceding = following[-1:] + following[:-1]
-        self._following = following
-        self._rows = [self._row(*each) for each in zip(self.all, *self._slack())]
+        # Whether the output goes on after the last input of each segment.
+        self._goes_on = [*map(self._continues, self.all, self.all[1:] + self.all[:1])]
+        self._rows = [*map(self._row, range(len(self.all)))]
 
-    def _row(self, segment: Segment, below: float, above: float) -> Tuple:
+    def _row(self, number: int) -> Tuple:
         """
-        Return what values need.
+        Return what values need: the range in which the segment has answers, its sign and samples.
 
-        This is the range in which the segment has answers, its sign, samples, and what `_estimate`
-        needs between them. The outer cells have no width: they are those of values that are
-        answered by the end of the segment.
+        The outer cells have no width: they are those of values that are answered by the end of the
+        segment.
         """
-        theta, value, speed, sign = segment
-        least, greatest = float(value[0] - below), float(value[-1] + above)
+        theta, value, sign = self.all[number]
+        slack = self._slack(number, 0), self._slack(number, -1)
+        least, greatest = float(value[0] - slack[0]), float(value[-1] + slack[1])
         # Values so near to an end of the segment are the end's.
-        near = np.minimum((below, above), ONE * self._size)
+        near = np.minimum(slack, ONE * self._size)
         # At an end of the reach there is a pose also when whole turns are added.
         start, end = (x + side * 2.0 * math.ulp(max(abs(x), math.pi)) * (x in self._ends)
                       for x, side in zip(theta[[0, -1]].tolist(), (1.0, -1.0)))
         theta = np.array([start, *theta.clip(start, end), end]) * self._unit
-        value = np.pad(value.clip(value[0] + near[0], value[-1] - near[1]), 1, 'edge')
-        width, change = np.diff(theta), np.diff(value)
-        # A parabola between two samples, from the one with the lower rate.
-        rate = np.pad(speed, 1) / self._unit
-        is_last = rate[:-1] > rate[1:]
-        slower, side = np.arange(len(width)) + is_last, np.where(is_last, -1.0, 1.0)
-        with np.errstate(invalid='ignore'):
-            slow = np.where(change > 0.0, np.fmin(rate[slower] * width, change).clip(1e-300), 1.0)
-        return (least, greatest, sign, theta, value[1:-1], np.stack([
-            theta[slower], side * width, value[slower], side, slow,
-            np.where(change > 0.0, change - slow, 0.0)]))
+        return least, greatest, sign, theta, np.pad(value.clip(
+            value[0] + near[0], value[-1] - near[1]), 1, 'edge')
 
     # --- candidates ---
 
@@ -155,54 +141,55 @@ class Segments:
                 target += period
         return found
 
-    def candidate_arrays(self, values: np.ndarray) -> List[Tuple[np.ndarray, np.ndarray]]:
-        """Return for each segment the places of values (1, n) that it has, and brackets."""
-        found, period = [], self._period
+    def candidate_arrays(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return numbers of brackets of a value, of values (1, m) that have them, and brackets."""
+        found: List[Tuple[np.ndarray, ...]] = []
+        period, none = self._period, np.empty(0, int)
         # They are searched faster in order.
         order = values[0].argsort()
-        for low, high, sign, theta, samples, cells in self._rows:
+        for low, high, sign, theta, samples in self._rows:
             target = sign * values[0, order]
             if period < math.inf:
                 target = target + period * np.ceil((low - target) / period)
             while len(inside := np.flatnonzero((low <= target) & (target <= high))):
                 goal = target[inside]
-                i = samples.searchsorted(goal, 'right')
-                found.append((order[inside], np.stack([
-                    theta[i], theta[i + 1], _estimate(goal, *cells.take(i, axis=1)),
+                i = samples[1:-1].searchsorted(goal, 'right')
+                found.append((np.full(len(i), len(found)), order[inside], np.stack([
+                    theta[i], theta[i + 1], np.interp(goal, samples, theta),
                     np.full(len(i), sign)])))
                 target = target + period
-        return found
+        numbers, places, brackets = zip((none, none, np.empty((4, 0))), *found)
+        return np.concatenate(numbers), np.concatenate(places), np.hstack(brackets)
 
-    def follow(self, value: float, now: float, near: float, turn: float
-               ) -> Optional[Tuple[Bracket, float]]:
+    def follow(self, value: float, gap: float, seed: float) -> Optional[Tuple[Bracket, float]]:
         """
-        Return the bracket of a value on the segment of `near` or those that continue it.
+        Return the bracket of a value on the segment of a seed or those that continue it.
 
-        The output goes straight there from its present value `now`, an angle the shorter way;
-        also returned are the whole turns that the input passes.
+        The output goes straight there, from `gap` above it; also returned are the whole turns of
+        the input there.
         """
-        gap, passed = math.remainder(value - now, self._period), 0.0
-        number = next((i for i, (theta, *_) in enumerate(self.all)
-                       if theta[0] <= near <= theta[-1]), None)
+        turns = self._input.turns_of(seed)
+        near = (seed - turns) / self._unit
+        number = next((i for i, segment in enumerate(self.all)
+                       if segment.theta[0] <= near <= segment.theta[-1]), None)
         if number is None:
             return None
-        theta, values, _, sign = self.all[number]
+        theta, values, sign = self.all[number]
         target = float(np.interp(near, theta, values))
-        target += math.remainder(sign * now - target, self._period) + sign * gap
+        target += math.remainder(sign * (value + gap) - target, self._period) - sign * gap
         for _ in range(2 * len(self.all)):
             low, high, *_ = row = self._rows[number]
             if low <= target <= high:
-                return _bracket(target, row), passed
-            if not (self._following if target > high else self._preceding)[number]:
+                return _bracket(target, row), turns
+            end, side = (-1, 1) if target > high else (0, -1)
+            if not self._goes_on[number if end else number - 1]:
                 break
-            one, two, other = (-1, 0, number + 1) if target > high else (0, -1, number - 1)
-            other %= len(self.all)
-            there = self.all[other]
+            here, number = self.all[number], (number + side) % len(self.all)
+            there = self.all[number]
             # The same value, or whole periods from it.
-            target += float(there.value[two] - self.all[number].value[one])
-            gap = float(self.all[number].theta[one] - there.theta[two]) * self._unit
-            passed += turn * round(gap / turn) if turn < math.inf else 0.0
-            number = other
+            target += float(there.value[-1 - end] - here.value[end])
+            turns += self._input.turns_of(
+                float(here.theta[end] - there.theta[-1 - end]) * self._unit)
         return None
 
     # --- for other uses ---
@@ -220,7 +207,7 @@ class Segments:
     def pieces(self, most: float) -> List[Tuple[float, float, float, float]]:
         """Return pieces of the segments, each two inputs and outputs at most `most` apart."""
         cut = []
-        for theta, value, _, sign in self.all:
+        for theta, value, sign in self.all:
             places = [0]
             for i in range(1, len(theta)):
                 if i + 1 == len(theta) or value[i + 1] - value[places[-1]] > most:
@@ -322,7 +309,6 @@ class Segments:
         found = value[places] + self._difference(
             np.where(np.isfinite(found), found, value[places]) - value[places])
         theta, value = np.insert(theta, places + 1, at), np.insert(value, places + 1, found)
-        speed = np.abs(np.insert(rate, places + 1, 0.0))
         cuts = [0, *(places + 1 + np.arange(len(places))).tolist(), len(theta) - 1]
         for first, last in zip(cuts, cuts[1:]):
             part = slice(first, last + 1)
@@ -330,30 +316,26 @@ class Segments:
             values = sign * value[part]
             # An extreme in noise has a value of its own.
             values[0] = values[:2].min()
-            yield Segment(theta[part], np.maximum.accumulate(values), speed[part], sign)
+            yield Segment(theta[part], np.maximum.accumulate(values), sign)
 
-    def _slack(self) -> List[np.ndarray]:
-        """Return how far below and above each segment values are those of its ends."""
-        found: List[np.ndarray] = []
-        for end, goes_on, side in ((0, self._preceding, -1), (-1, self._following, 1)):
-            x, other, value, sign, there = np.array([
-                (segment.theta[end], segment.theta[-1 - end], segment.value[end], segment.sign,
-                 self.all[(i + side) % len(self.all)].value[-1 - end])
-                for i, segment in enumerate(self.all)]).reshape(-1, 5).T
-            # An end is a float, too: next to it the output may change quickly.
-            beside = x + np.copysign(ULPS * np.spacing(np.maximum(abs(x), 1.0)), other - x)
-            change = np.abs(self._difference(self._curve(beside)[0] - sign * value))
-            found.append(np.where(
-                goes_on, self._rounding + np.abs(self._difference(there - value)),
-                np.fmin(np.fmax(change, CLOSE * self._size), SINGULAR * self._size)))
-        return found
+    def _slack(self, number: int, end: int) -> float:
+        """Return how far beyond an end of a segment, 0 or -1, values are those of the end."""
+        theta, value, sign = self.all[number]
+        if self._goes_on[number if end else number - 1]:
+            there = self.all[(number + (1 if end else -1)) % len(self.all)]
+            return self._rounding + abs(self._difference(there.value[-1 - end] - value[end]))
+        # An end is a float, too: next to it the output may change quickly.
+        ulps = ULPS * np.spacing(max(abs(theta[end]), 1.0))
+        beside = theta[end:end + 1 or None] + math.copysign(ulps, theta[-1 - end] - theta[end])
+        change = abs(self._difference(self._curve(beside)[0, 0] - sign * value[end]))
+        return float(np.fmin(np.fmax(change, CLOSE * self._size), SINGULAR * self._size))
 
-    def _continues(self, segment: Segment, other: Segment, turn: float) -> bool:
+    def _continues(self, segment: Segment, other: Segment) -> bool:
         """Return whether the output goes on from a segment to the next one."""
-        apart = float(other.theta[0] - segment.theta[-1])
+        step = float(other.theta[0] - segment.theta[-1]) * self._unit
         return other.sign == segment.sign and abs(
-            math.remainder(apart, turn)) <= ONE and bool(abs(self._difference(
-                other.value[0] - segment.value[-1])) <= CLOSE * self._size)
+            step - self._input.turns_of(step)) <= ONE * self._unit and bool(abs(
+                self._difference(other.value[0] - segment.value[-1])) <= CLOSE * self._size)
 
 
 def segments_of(linkage: Kinematics, output: str, others: Sequence[float] = (),
@@ -392,15 +374,9 @@ def _cut(arcs: Sequence[Arc], marks: Any) -> Iterator[Arc]:
         yield from zip([start, *inside], [*inside, end])
 
 
-def _estimate(target: Any, start: Any, width: Any, value: Any, side: Any, slow: Any, curve: Any
-              ) -> Any:
-    """Return the input at a value, by a parabola between two samples."""
-    rest = side * (target - value)
-    return start + width * 2.0 * rest / (slow + (slow * slow + 4.0 * curve * rest) ** 0.5)
-
-
 def _bracket(target: float, row: Tuple) -> Bracket:
-    *_, sign, theta, samples, cells = row
-    i = samples.searchsorted(target, 'right')
-    low, high = theta[i:i + 2].tolist()
-    return Bracket(low, high, _estimate(target, *cells[:, i].tolist()), sign)
+    *_, sign, theta, samples = row
+    i = samples[1:-1].searchsorted(target, 'right')
+    (low, high), (least, greatest) = theta[i:i + 2].tolist(), samples[i:i + 2].tolist()
+    part = (target - least) / (greatest - least) if greatest > least else 0.5
+    return Bracket(low, high, low + part * (high - low), sign)
