@@ -4,7 +4,6 @@
 """A cache: what it lacks is made, its size is bounded, and threads may do what they like."""
 
 from functools import partial
-from itertools import combinations
 import random
 import sys
 import threading
@@ -127,27 +126,6 @@ def test_threads_hammer_it(shared):
 
     at_once(*(lambda seed=seed: hammer(seed) for seed in range(THREADS)))
     assert len(cache) <= 4
-
-
-@pytest.mark.nightly
-def test_threads_ask_one_mechanism_for_more_than_it_caches():
-    leg = mechanisms.create('jansen')
-    outputs = [f'distance({p},{q})' for p, q in combinations(leg.points, 2)]
-    theta = np.linspace(-3.0, 3.0, 7)
-    asked = [(names, theta) for names in combinations(outputs, 2)][:160]
-    expected = [mechanisms.create('jansen').joint_angles(at, names) for names, at in asked]
-
-    def ask(seed):
-        order = list(range(len(asked)))
-        random.Random(seed).shuffle(order)
-        for index in order[:80]:
-            names, at = asked[index]
-            for name, values in leg.joint_angles(at, names).items():
-                assert np.array_equal(values, expected[index][name]), name
-            leg.solve(0.3, names[0][9:-1].split(','))
-            leg.function(names[0][9:-1].split(','))
-
-    at_once(*(lambda seed=seed: ask(seed) for seed in range(THREADS)))
 
 
 @pytest.mark.nightly

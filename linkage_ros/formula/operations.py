@@ -53,21 +53,12 @@ SUM_ERROR = '(({0} - (({0} + {1}) - (({0} + {1}) - {0}))) + ({1} - (({0} + {1}) 
 
 
 def _root(x: Any, tolerance: Any) -> Any:
-    if _least(x) > 0.0:
-        return np.sqrt(x)
     # The root of a negative zero is zero, as elsewhere.
     return np.where((x > 0.0) | (x >= -tolerance), np.sqrt(np.maximum(x, 0.0)) + 0.0, np.nan)
 
 
 def _gated(x: Any, margin: Any, tolerance: Any) -> Any:
-    if not np.ndim(tolerance) and _least(margin) >= -tolerance:
-        return x
     return np.where(margin >= -tolerance, x, np.nan)
-
-
-def _least(x: Any) -> Any:
-    """Return the minimum of numbers, NaN if any is NaN, in one pass."""
-    return np.minimum.reduce(x, axis=None, initial=math.inf)
 
 
 def _sum_error(x: Any, y: Any) -> Any:

@@ -13,7 +13,7 @@ code for a pose has no branches for them.
 from __future__ import annotations
 
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import chain, count
 import linecache
 import math
@@ -81,34 +81,25 @@ def _with_releases(lines: Sequence[Tuple[str, str]], outputs: Sequence[str]) -> 
             for text in (f'{name} = {code}', *([f'del {", ".join(rest)}'] if rest else []))]
 
 
-def _python(listing: Listing, dialect: Dialect, arguments: int,
-            names: Tuple[str, ...] = ()) -> Callable:
+def _python(listing: Listing, dialect: Dialect, arguments: int) -> Callable:
     """
     Return a factory from constants and a fallback `instead` to the function of the arguments.
 
-    That function returns the outputs as a tuple or, with names, as an array (2,) for each name.
-    Where Python's floats raise, it calls `instead`.
+    That function returns the outputs as a tuple. Where Python's floats raise, it calls `instead`.
     """
     lines, outputs = listing.statements(dialect)
-    ending = [f'return ({"".join(code + ", " for code in outputs)})']
-    if names:
-        # Names of any class of text, such as enums, are written as plain text.
-        rows = ', '.join(f'{str.__repr__(name)}: pairs[{i}]' for i, name in enumerate(names))
-        # Packing floats as bytes takes a quarter of the time of numpy's conversion.
-        ending = [f'pairs = empty(({len(names)}, 2))', f'pack(pairs, 0, {", ".join(outputs)})',
-                  f'return {{{rows}}}']
+    ending = f'return ({"".join(code + ", " for code in outputs)})'
     given = ', '.join(f'x{i}' for i in range(arguments))
     if dialect.templates is ARRAYS.templates:
-        body = [*_with_releases(lines, outputs), *ending]
+        body = [*_with_releases(lines, outputs), ending]
     else:
         body = ['try:', *(f'    {line}' for line in [
-            *(f'{name} = {code}' for name, code in lines), *ending]),
+            *(f'{name} = {code}' for name, code in lines), ending]),
             'except (ArithmeticError, ValueError):', f'    return instead({given})']
     source = '\n'.join([
         f'def bind({"".join(f"k{n}, " for n in listing.constants)}instead=None):',
         f'    def pose({given}):', *(f'        {line}' for line in body), '    return pose'])
-    scope: Dict[str, Any] = {
-        **dialect.names, 'empty': np.empty, 'pack': Struct(f'{len(outputs)}d').pack_into}
+    scope = dict(dialect.names)
     file = f'<linkage_ros formula {next(_NUMBERS)}>'
     exec(compile(source, file, 'exec'), scope)
     # For tracebacks and debuggers, as long as the code lives.
@@ -125,8 +116,8 @@ class _Variant:
         self.arguments, self.outputs = arguments, len(outputs)
         self.constants = [self.listing.entries[n][0] for n in self.listing.constants]
         self.steps = in_order(self.constants)
-        # The code for one pose that returns the outputs in pairs, by name.
-        self.placing = Cache(partial(_python, self.listing, FLOATS, arguments))
+        # Packing floats as bytes takes a quarter of the time of numpy's conversion.
+        self.pack: Any = Struct(f'{self.outputs}d').pack_into
 
     @cached_property
     def float(self) -> Callable:
@@ -153,7 +144,7 @@ class _Variant:
     def arrays(self) -> Any:
         """Return the machine code for arrays of poses."""
         with needs('llvmlite'):
-            from .llvm_arrays import Arrays
+            from .llvm_code import Arrays
         return Arrays(*self.listing.operations())
 
 
@@ -229,12 +220,11 @@ class Pose:
         constants = dict(zip((f'k{n}' for n in listing.constants), self.constants))
         return constants, *listing.statements(dialect)
 
-    def placer(self, names: tuple) -> Callable:
-        """Return the function from one argument, a float, to an array (2,) for each name."""
-        def quietly(theta: float) -> Dict[str, np.ndarray]:
-            return dict(zip(names, np.reshape(self._quietly(theta), (-1, 2))))
-
-        return self.variant.placing[names](*self.constants, quietly)
+    def rows(self, count: int, argument: float) -> np.ndarray:
+        """Return the outputs at one argument, a float, in rows of so many numbers."""
+        rows = np.empty((self.variant.outputs // count, count))
+        self.variant.pack(rows, 0, *self.at(argument))
+        return rows
 
     def over(self, *arguments: Any) -> np.ndarray:
         """Return the outputs over broadcast arrays, shape (outputs, *shape)."""
@@ -317,6 +307,7 @@ class Batch:
         self._loop: Optional[Future] = loop
         self._code: Any = None
         self._constants, self._rows = constants, rows
+        self._solved = np.empty(rows.shape[::-1])
 
     def solve(self, shared: Sequence[Any] = ()) -> bool:
         """
@@ -330,7 +321,8 @@ class Batch:
             return False
         for row, value in zip(self.arguments, shared):
             row.fill(value)
-        self._code.run(*self._code_arguments)
+        self._code.run(0, len(self._rows), *self._code_arguments)
+        self._rows[:] = self._solved.T
         return True
 
     def _adopt(self, loop: Future) -> None:
@@ -340,4 +332,4 @@ class Batch:
             return
         self._code = loop.result()
         self._code_arguments = self._code.arguments(
-            self.arguments, self._constants, self._rows.T)
+            self.arguments, self._constants, self._solved)

@@ -309,13 +309,9 @@ class Dyads:
             mark, end = self.other(base, centre)
             zero, along = f' zero {mark}', end - start
         centred = hinge.places[1 - way]
-        origin, rail = next(self._rails(body), (centred, 1.0 + 0.0j))
-        foot = origin + rail * ((centred - origin) / rail).real
-        # The pin is where a line that another body slides on passes nearest to the hinge. Seen
-        # from a distant joint, that place would be rounded in proportion to the distance.
-        place = foot if abs(foot - centred) >= self.near else next(
-            (pin[body] for pin in self.pins
-             if body in pin and abs(pin[body] - centred) > self.near), centred + self.size * rail)
+        place = next((pin[body] for pin in self.pins
+                      if body in pin and abs(pin[body] - centred) > self.near),
+                     centred + self.size)
         sign = -1.0 if way else 1.0
         start = sign * hinge.zero + phase((place - centred) / along)
         quarters = self.quarters(start) if base == self.ground else None
@@ -327,16 +323,6 @@ class Dyads:
                          f'{zero}{geared}')
         self.on[body].setdefault(centre, centred)
         return self.hang(body, centre, name, f'crank{number}')
-
-    def _rails(self, body: str) -> Iterator[Tuple[complex, complex]]:
-        """Yield the lines of a body on which pins of others slide: a point and a direction."""
-        for slide in (*self.slides, *self.motors):
-            if isinstance(slide, Slide) and body in slide.bodies:
-                own = slide.bodies.index(body)
-                pin = next((pin[slide.bodies[1 - own]] for pin in self.pins
-                            if slide.bodies[1 - own] in pin), slide.origins[1 - own])
-                aside = ((pin - slide.origins[1 - own]) / slide.axes[1 - own]).imag
-                yield slide.origins[own] + 1j * slide.axes[own] * aside, slide.axes[own]
 
     def _carriage(self, slide: Slide, way: int) -> bool:
         """Place the body that a motor moves along a placed one."""

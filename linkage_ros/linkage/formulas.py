@@ -13,7 +13,7 @@ from itertools import chain, cycle
 import re
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
 
-from .geometry.builder import Builder, in_metres
+from .geometry.builder import Builder
 from .geometry.planar import Arm, Limit
 from .geometry.spatial import Vector
 from .text import joint_lines
@@ -97,7 +97,7 @@ class Structure:
             (points, joints, moving), lambda: self._legs(points, joints, moving))
 
     def _points(self, names: Points) -> List[Real]:
-        return [in_metres(part) for place in map(self._place, names)
+        return [part for place in map(self._place, names)
                 for part in (place if isinstance(place, Vector) else (place.x, place.y))]
 
     def _place(self, point: Union[str, LinkPoint]) -> Union[Complex, Vector]:
@@ -123,14 +123,13 @@ class Structure:
     def output(self, name: str) -> Real:
         """Return a joint angle, a slide, or another output by its name."""
         if name in self.built.joint_values:
-            value = self.built.joint_values[name]
-            return in_metres(value) if self._slides(name) else value
+            return self.built.joint_values[name]
         if (arm := self._arm(name)) is None:
             joint, _, axis = name.rpartition('.')
             return self._points((joint,))[self.built.axes.index(axis)]
         if self.turns(name):
             return arctangent(arm.vector.y, arm.vector.x)
-        return in_metres(square_root(arm.square))
+        return square_root(arm.square)
 
     def _arm(self, name: str) -> Optional[Arm]:
         """Return the arm of a distance or an angle; None for another name."""

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .formulas import LinkPoint, Points, structure_of
-from .geometry.builder import in_metres, UNIT
 from .geometry.spatial import IN_SINGLE
 from .inputs import FASTEST, Input, is_periodic, MAX_COUNTED, MOST_TURNS, spread
 from .text import joint_lines
@@ -29,9 +28,6 @@ from ..formula.program import evaluate, Pose, Program
 from ..optional import needs
 from ..words import listed, meant, plain_text, quoted
 
-# Lengths beyond this [m] and its inverse have a unit of their own, a power of two. It changes no
-# bit of a result and keeps squares and products of lengths inside the range of float64.
-LARGE_LENGTH = 1e30
 # Cached values of expressions of dimensions: some twenty times those of Jansen's leg.
 MOST_VALUES = 10000
 # Quantities of joints; all others are of links.
@@ -54,11 +50,6 @@ def _hashable(names: Any) -> Any:
                          f'got {quoted(names)}') from None
 
 
-def _plain(names: Any) -> Any:
-    """Return hashable names as plain text, since a subclass of str may change."""
-    return tuple(map(plain_text, names)) if isinstance(names, tuple) else plain_text(names)
-
-
 class Kinematics:
     """What all else of a linkage builds on; `Mechanism` lists its attributes."""
 
@@ -74,9 +65,8 @@ class Kinematics:
         self.grounded, self.axes = built.grounded, built.axes
         self.bars = tuple((bar.first, bar.second) for bar in built.bars)
         self.cylinders, self.yokes = tuple(built.cylinders), dict(built.yokes)
-        self.lengths = _in_own_unit(self.dimensions, design.has_literal_lengths)
         self._evaluated: dict = {}
-        self._poses, self._placers, self.cache = Cache(), Cache(), Cache()
+        self._poses, self.cache = Cache(), Cache()
         self.inputs = tuple(map(self._counted_input, range(len(built.inputs)), built.inputs))
         own = {input_.name for input_ in self.inputs}
         self.geared = tuple(name for name in built.driven if name not in own)
@@ -95,14 +85,14 @@ class Kinematics:
     @cached_property
     def bar_lengths(self) -> Mapping:
         """Return the length [m] of each bar."""
-        return MappingProxyType({(bar.first, bar.second): self._metres(bar.length)
+        return MappingProxyType({(bar.first, bar.second): self._number(bar.length)
                                  for bar in self.structure.built.bars})
 
     @cached_property
     def frames(self) -> Mapping:
         """Coordinates of each link's joints [m] in the link's frame, x along its bar."""
         return MappingProxyType({
-            link: {name: tuple(map(self._metres, (place.x, place.y)))
+            link: {name: tuple(map(self._number, (place.x, place.y)))
                    for name, place in frame.items()}
             for link, frame in self.structure.built.frames.items()})
 
@@ -129,14 +119,13 @@ class Kinematics:
         return [self.constants(window) for window in self.structure.built.windows]
 
     def value(self, length: Real) -> Any:
-        """Return the value of an expression of dimensions alone, lengths in its own unit."""
+        """Return the value of an expression of dimensions alone."""
         with np.errstate(all='ignore'):
-            return evaluate(length, self.lengths, self._evaluated)
+            return evaluate(length, self.dimensions, self._evaluated)
 
-    def _metres(self, length: Real) -> Any:
-        """Return the value [m] of a length of dimensions alone: a float, or an array."""
-        with np.errstate(all='ignore'):
-            value = self.value(real(length)) * self.lengths[UNIT.args[0]]
+    def _number(self, length: Real) -> Any:
+        """Return the value of an expression of dimensions alone: a float, or an array."""
+        value = self.value(real(length))
         return value if np.ndim(value) else float(value)
 
     def check(self) -> None:
@@ -206,7 +195,7 @@ class Kinematics:
         without an llvmlite that works.
         """
         with needs('llvmlite'):
-            from ..formula import llvm_arrays  # noqa: F401
+            from ..formula import llvm_code  # noqa: F401
         return self.cache.get_or_make('accelerated', lambda: type(self)(
             self.design, self.dimensions, self.branches, True))
 
@@ -265,24 +254,17 @@ class Kinematics:
     def _with_stroke(self, input_: Input) -> Input:
         """Return an input with its stroke [m]; an angle is unchanged."""
         return input_ if input_.turns else input_._replace(
-            low=self._metres(input_.low), high=self._metres(input_.high))
+            low=self._number(input_.low), high=self._number(input_.high))
 
     # --- poses and how they change ---
 
     def solve(self, theta: Inputs, points: Names = None) -> dict:
         """Return the coordinates of each joint [m]: theta's shape and a last axis for x and y."""
         if isinstance(theta, float) and len(self.inputs) == 1:
-            names = _hashable(points)
-            place = self._placers.get(names) or self._placer(names)
-            return place(theta)
+            names, pose = self._ready('points', points)
+            if not pose.shape:
+                return dict(zip(names, pose.rows(len(self.axes), theta)))
         return self._vectors('points', theta, points)
-
-    def _placer(self, points: Any) -> Callable:
-        """Return a function from one value of the input, a float, to joints."""
-        names, pose = self._ready('points', points)
-        if pose.shape:
-            return lambda theta: self._vectors('points', theta, points)
-        return self._placers.get_or_make(_plain(points), lambda: pose.placer(names))
 
     def velocity(self, theta: Inputs, points: Names = None, by: int = 0) -> dict:
         """Differentiate `solve` by an input [m/rad, m/m]; infinite or NaN at a dead point."""
@@ -353,7 +335,7 @@ class Kinematics:
         if any(map(np.ndim, self.dimensions.values())):
             raise ValueError('xp is for one set of dimensions, not for arrays')
         outputs = self.structure.parts(self._requested(points, joints, rates))
-        return array_function(outputs, len(self.inputs), xp, self.lengths, IN_SINGLE)
+        return array_function(outputs, len(self.inputs), xp, self.dimensions, IN_SINGLE)
 
     def posed(self, points: Names = None, joints: Sequence[str] = (),
               rates: Sequence[str] = ()) -> Pose:
@@ -362,8 +344,8 @@ class Kinematics:
 
     def _requested(self, *names: Any) -> Tuple[Tuple[str, ...], ...]:
         """Return names of points, joints and rates."""
-        return tuple(self._names(kind, _plain(_hashable(each)))
-                     for kind, each in zip(('points', 'angles', 'rates'), names))
+        return tuple(self._names(kind, _hashable(requested))
+                     for kind, requested in zip(('points', 'angles', 'rates'), names))
 
     def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]) -> Pose:
         """
@@ -378,12 +360,12 @@ class Kinematics:
             points, joints, moving))
 
     def _legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]) -> Pose:
-        lengths, unit = dict(self.lengths), self.lengths[UNIT.args[0]]
+        lengths = dict(self.dimensions)
         named: List[Union[str, LinkPoint]] = []
         for i, point in enumerate(points):
             if isinstance(point, LinkPoint):
                 names = f'[x{i}]', f'[y{i}]'
-                lengths.update(zip(names, (point.x / unit, point.y / unit)))
+                lengths.update(zip(names, (point.x, point.y)))
                 point = LinkPoint(point.link, *names)
             named.append(point)
         program = self.structure.legs(tuple(named), joints, moving)
@@ -428,8 +410,7 @@ class Kinematics:
 
     def gear(self, name: str, by: int = 0) -> Tuple[float, float]:
         """Return ratio and offset [rad or m] by which an input drives a link, anywhere."""
-        input_, value = self.structure.built.driven[name]
-        value = value if input_.turns else in_metres(value)
+        _, value = self.structure.built.driven[name]
         program = Program([derivative(value, {by: 1.0}, {}), value], len(self.inputs))
         ratio, offset = self.bind(program).at(*[0.0] * len(self.inputs))
         return ratio, offset
@@ -445,7 +426,7 @@ class Kinematics:
         if len(self._evaluated) > MOST_VALUES:
             # A new dictionary, since a thread may be reading the old one.
             self._evaluated = {}
-        return program.bind(self.lengths, self._evaluated, self.is_accelerated)
+        return program.bind(self.dimensions, self._evaluated, self.is_accelerated)
 
     def bound(self, kind: str, names: Any, *by: int) -> Pose:
         """Return the code for quantities of one kind; see `Structure.program`."""
@@ -491,13 +472,12 @@ class Kinematics:
 
     def _ready(self, kind: str, requested: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
         """Return the requested names and the function that computes them."""
-        key = kind, _hashable(requested), *by
-        return self._poses.get(key) or self._pose(kind, _plain(key[1]), *by)
+        def make() -> Tuple[Tuple[str, ...], Pose]:
+            names = self._names(kind, requested)
+            return names, self.bound(kind, names, *by)
 
-    def _pose(self, kind: str, requested: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
-        names = self._names(kind, requested)
-        return self._poses.get_or_make(
-            (kind, requested, *by), lambda: (names, self.bound(kind, names, *by)))
+        requested = _hashable(requested)
+        return self._poses.get_or_make((kind, requested, *by), make)
 
     def _names(self, kind: str, requested: Any) -> Tuple[str, ...]:
         what, allowed = ('point', self.points) if kind in OF_POINTS else ('joint', self.joints)
@@ -505,18 +485,10 @@ class Kinematics:
             what, allowed = 'transmission angle at', tuple(self.structure.built.transmissions)
         if requested is None:
             return allowed
-        names = (requested,) if isinstance(requested, str) else requested
+        # A subclass of str may print, or change, in its own way.
+        names = tuple(map(plain_text, (requested,) if isinstance(requested, str) else requested))
         for name in names:
             if name not in allowed and not (what == 'joint' and self.has_output(name)):
                 raise ValueError(f'{self.type} has no {what} {quoted(name)}; '
                                  f'allowed: {listed(allowed)}{meant(name, allowed)}')
         return names
-
-
-def _in_own_unit(dimensions: Mapping, fixed: bool) -> dict:
-    """Return dimensions in a unit that is a power of two, and that unit [m]."""
-    longest = max((np.max(np.abs(length)) for length in dimensions.values()), default=1.0)
-    if fixed or 1.0 / LARGE_LENGTH < longest < LARGE_LENGTH:
-        return {**dimensions, UNIT.args[0]: 1.0}
-    unit = 2.0 ** np.frexp(longest)[1]
-    return {UNIT.args[0]: unit, **{name: length / unit for name, length in dimensions.items()}}

@@ -61,8 +61,6 @@ class Mechanism(Kinematics):
         Whether compiled code solves arrays.
     structure : Structure
         Formulas, for any dimensions.
-    lengths : mapping
-        Dimensions in the linkage's own unit, and that unit, the arguments of its programs.
     cache : Cache
         Cached results: reach, inverses, travels.
 

@@ -17,7 +17,7 @@ The catalogue: mechanisms by the names that users type.
 from importlib import import_module
 import pkgutil
 from types import MappingProxyType, ModuleType
-from typing import Dict, Iterable, Mapping, Optional, Sequence
+from typing import Iterable, Mapping, Optional, Sequence
 
 from numpy.typing import ArrayLike
 
@@ -29,27 +29,10 @@ from ..words import meant, plain_text, quoted
 CATALOGUE = {'water_drop': 0.1, 'jansen': 0.005, 'peaucellier': 0.1, 'slotted_lever': 0.002}
 
 WRITTEN = tuple(custom.WORDS)
-
-
-def _found() -> Dict[str, ModuleType]:
-    """Return the modules of this folder by type, those of CATALOGUE first."""
-    names = [module.name for module in pkgutil.iter_modules(__path__) if module.name != 'custom']
-    return {name: _module(name) for name in dict.fromkeys((*CATALOGUE, *sorted(names)))}
-
-
-def _module(name: str) -> ModuleType:
-    """Import a mechanism; raise ImportError with its name if the module is not one."""
-    try:
-        module = import_module(f'{__name__}.{name}')
-        type_ = module.DESIGN.name
-    except Exception as error:
-        raise ImportError(f'{__name__}.{name} is not a mechanism: {error}') from error
-    if type_ != name:
-        raise ImportError(f'{__name__}.{name} must have the name of its design, {quoted(type_)}')
-    return module
-
-
-TYPES = MappingProxyType(_found())
+# The modules of this folder by type, those of CATALOGUE first.
+TYPES: Mapping[str, ModuleType] = MappingProxyType({
+    name: import_module(f'{__name__}.{name}') for name in dict.fromkeys((*CATALOGUE, *sorted(
+        module.name for module in pkgutil.iter_modules(__path__) if module.name != 'custom')))})
 
 
 def design(type_: str, /, joints: Optional[Sequence[str]] = None, tracer: Optional[str] = None,

@@ -38,7 +38,7 @@ CHOICES = {'side': ('left', 'right'), 'half': ('out', 'in'), 'angle': ('0', '90d
 
 def design(rng, lines=4):
     """Return a random `Design` of equal bars with one input; every line of it is allowed."""
-    unit = 10.0 ** int(rng.choice((-150, -20, 0, 0, 0, 0, 0, 20, 150)))
+    unit = 10.0 ** int(rng.choice((-28, -9, 0, 0, 0, 0, 0, 9, 28)))
     dimensions = {'a': float(rng.choice((1.0, 0.3, 0.7))) * unit,
                   'b': float(rng.choice((1.0, 0.4, 2.5))) * unit}
     ground = [(x, y) for x in ('0', 'a', '-a') for y in ('0', '0', 'a') if (x, y) != ('0', '0')]

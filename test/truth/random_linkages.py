@@ -100,7 +100,7 @@ class _Writer:
         self._literal = rng.choice((0.0, 0.0, 0.3, 1.0))
         self._size = 1.0
         if rng.random() < 0.15:
-            self._size = 10.0 ** int(rng.choice((-150, -20, -6, 6, 20, 150)))
+            self._size = 10.0 ** int(rng.choice((-26, -20, -6, 6, 20, 26)))
             if abs(math.log10(self._size)) > 10:
                 self._literal = 0.0
 

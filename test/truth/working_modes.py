@@ -6,7 +6,7 @@
 import cmath
 import math
 
-from .closed_loops import cis, cross
+from .cases import cis, cross
 
 LEFT, RIGHT = 1, -1
 

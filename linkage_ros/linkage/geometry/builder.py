@@ -11,6 +11,7 @@ links, the drawn bars, the spanning tree of joint angles and the limits of the r
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import takewhile
 from math import pi
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
@@ -23,7 +24,6 @@ from ...formula.expression import (
     Complex,
     cosine,
     cross,
-    dimension,
     dot,
     gated,
     nearest_integer,
@@ -31,22 +31,9 @@ from ...formula.expression import (
     Real,
     real,
     sine,
-    where,
 )
 
 GROUND = 'ground'
-# The linkage's own unit of lengths [m].
-UNIT = dimension('[m]')
-
-
-def in_metres(length: Real) -> Real:
-    """Convert a length to metres."""
-    return where(abs(UNIT - 1.0) <= 0.0, length, length * UNIT)
-
-
-def in_own_unit(length: Real) -> Real:
-    """Convert a length [m] to the linkage's own unit."""
-    return where(abs(UNIT - 1.0) <= 0.0, length, length / UNIT)
 
 
 class ConstructionError(ValueError):
@@ -93,7 +80,6 @@ class Point:
     place: Any
     home: str
     span: Real
-    depends_on: frozenset = frozenset()
     crank: Optional[planar.Crank] = None
 
 
@@ -137,9 +123,9 @@ class Builder:
         self.driven: Dict[str, Tuple[Input, Real]] = {}
         self._kites: Dict[Tuple[str, str], planar.CrankArm] = {}
 
-    def require(self, amount: Real, problem: str) -> None:
-        """Refuse the line for dimensions with which an amount is not above zero."""
-        self.demands.append((self.drawn, amount, problem))
+    def require(self, amount: Real, problem: str, line: Any = None) -> None:
+        """Refuse a line, the one drawn, for dimensions with which an amount is not above zero."""
+        self.demands.append((line or self.drawn, amount, problem))
 
     @property
     def grounded(self) -> Tuple[str, ...]:
@@ -171,7 +157,7 @@ class Builder:
         bar = crank.bar() if parent == GROUND else planar.turned(along, turning, length)
         self._hang(centre, name, bar, length, link, parent, start)
         self.joint_values[link] = turning
-        self._place(name, centre, bar, link, length, () if zero is None else (zero,))
+        self._place(name, centre, bar, link, length)
         if parent == GROUND:
             self.points[name].crank = crank
 
@@ -184,7 +170,7 @@ class Builder:
         found = planar.extended(self._plain_arm(base, pivot), length, bar, side, longest)
         self.limits += found.limits
         link = self._hang(pivot, name, found.second, bar)
-        self._place(name, pivot, found.second, link, bar, (base,))
+        self._place(name, pivot, found.second, link, bar)
         self.transmissions[name] = planar.transmission(found)
         barrel = self._hang(base, name, found.first, None, self._numbered('barrel'))
         self._axes[barrel] = _Vector(found.first, real(1.0), barrel)
@@ -212,17 +198,16 @@ class Builder:
         block = self._numbered('block')
         self.yokes[block] = pin
         self._ride(block, name, origin, towards,
-                   dot(along, end.place - start.place), end.span + start.span, pin)
+                   dot(along, end.place - start.place), end.span + start.span)
 
-    def _ride(self, link: str, name: str, origin: str, towards: str, place: Real, way: Real,
-              *others: str) -> None:
+    def _ride(self, link: str, name: str, origin: str, towards: str, place: Real, way: Real
+              ) -> None:
         """Place a joint on the line of two others, as the block that slides there."""
         parent, along, direction = self._direction(origin, towards)
         self._slide(link, parent, origin, name, place, along, direction)
         start = self.points[origin]
         self.points[name] = Point(
-            start.place + planar.on_line(along, place), link, start.span + way, frozenset().union(
-                *({x} | self.points[x].depends_on for x in (origin, towards, *others))))
+            start.place + planar.on_line(along, place), link, start.span + way)
 
     def block(self, name: str, joint: str, along: Real, across: Real) -> None:
         """Add a joint to the block that slides with a joint: along its line, and to its left."""
@@ -232,7 +217,7 @@ class Builder:
             raise ConstructionError(f'{joint} is not a joint of a block')
         offset = Complex(along, across)
         arm = planar.parallel(self._axes[link].vector * offset, self.points[joint].place)
-        self._place(name, joint, arm, link, offset.length(), ())
+        self._place(name, joint, arm, link, offset.length())
         self.frames[link][name] = self.frames[link][joint] + offset
 
     def drive(self, input_: Input, geared: Optional[Gear]) -> Real:
@@ -241,10 +226,9 @@ class Builder:
             self.require(real(input_.high - input_.low), f'the lower end of the {input_.name} '
                          'must be less than its upper end')
         if geared is None:
-            leaf = argument(len(self.inputs))
+            value = argument(len(self.inputs))
             self.inputs.append(input_)
-            self.arguments.append(leaf)
-            value = leaf if input_.turns else in_own_unit(leaf)
+            self.arguments.append(value)
         else:
             other, driving = self.driven.get(geared.input, (None, None))
             if other is None or driving is None or other.turns != input_.turns:
@@ -301,7 +285,7 @@ class Builder:
         if start.home != GROUND == pivot.home:
             # About a joint of the ground it can only turn.
             place = planar.with_velocity(place, pivot.place, found.second)
-        self._pair(name, first, second, found, to_first, to_second, place=place)
+        self._pair(name, first, second, found, to_first, to_second, place)
 
     def rigid(self, name: str, first: str, second: str, to_first: Real, to_second: Real,
               side: float) -> None:
@@ -329,7 +313,7 @@ class Builder:
             start = self.points[first]
             self.points[name] = Point(start.place + vector * corner, GROUND, start.span + length)
             return
-        self._place(name, first, vector * corner, link, length, (second,), place)
+        self._place(name, first, vector * corner, link, length, place)
         frame = self.frames[link]
         frame[name] = frame[first] + (frame[second] - frame[first]) * corner
 
@@ -339,7 +323,7 @@ class Builder:
         ends = [self._side(end, point).vector for end in (second, first)]
         place, arm = self.points[point].place, self.arm(second, first, smooth=True)
         self._reflect(name, first, second, arm, place, arm.offset(place, ends[0]), ends,
-                      self.distance(first, point), self.distance(second, point), point)
+                      self.distance(first, point), self.distance(second, point))
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
             self._kites[first, name] = arm
 
@@ -352,7 +336,7 @@ class Builder:
         from_first, from_second = (planar.parallel(side.vector, place)
                                    for side in (to_second, to_first))
         self._pair(name, first, second, planar.Dyad(from_first, from_second, ()),
-                   to_second.length, to_first.length, corner)
+                   to_second.length, to_first.length)
 
     def antiparallelogram(self, name: str, corner: str, first: str, second: str) -> None:
         """Join two bars as long as those from a corner, but crossed."""
@@ -365,11 +349,11 @@ class Builder:
             if isinstance(arm, planar.CrankArm) else None
         self._reflect(name, first, second, arm, opposite, offset,
                       (to_first.vector, to_second.vector), to_second.length, to_first.length,
-                      corner, place=place)
+                      place)
 
     def _reflect(self, name: str, first: str, second: str, arm: planar.Arm, point: Complex,
                  offset: Real, ends: Sequence[Complex], to_first: Real, to_second: Real,
-                 *others: str, place: Optional[Complex] = None) -> None:
+                 place: Optional[Complex] = None) -> None:
         """
         Join two bars at a point's mirror image, given its bars from second and first.
 
@@ -378,7 +362,7 @@ class Builder:
         self.folds.append(planar.Limit(offset, TOLERANCE * to_first * to_second))
         place, from_second, from_first = planar.mirror(arm, point, offset, ends, place)
         self._pair(name, first, second, planar.Dyad(from_first, from_second, ()), to_first,
-                   to_second, *others, place=place)
+                   to_second, place)
 
     def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real,
                  short: Real) -> None:
@@ -388,7 +372,7 @@ class Builder:
         self.limits += found.right.limits
         self._pair(right, pole, pin, found.right, long, short)
         link = self._hang(right, corner, found.left.second, short)
-        self._place(corner, right, found.left.second, link, short, (),
+        self._place(corner, right, found.left.second, link, short,
                     self.points[pole].place + found.inverse)
         self._pair(left, pole, pin, found.left, long, short)
         link = self._hang(left, corner, found.right.second, short)
@@ -401,7 +385,7 @@ class Builder:
         self.limits.append(found.limit)
         start = real(pi / 2) if self.points[pivot].home == GROUND else real(0.0)
         lever = self._hang(pivot, tip, found.along, length, self._numbered('lever'), start=start)
-        self._place(tip, pivot, found.along * length, lever, length, (pin,))
+        self._place(tip, pivot, found.along * length, lever, length)
         self._axes[lever] = self._vectors[pivot, tip]
         self.transmissions[tip] = arctangent(abs(found.slide), offset)
         self._slide(self._numbered('slide'), lever, pivot, pin, found.slide, found.along)
@@ -422,29 +406,16 @@ class Builder:
             if self.mirrors:
                 along = self._mirrored(along)
                 angle = arctangent(along.y, along.x)
-        rail = self._rail(pin, origin, along, direction)
+        start, end = self.points[origin], self.points[pin]
+        rail = planar.CrankRail(end.crank, start.place, along) \
+            if end.crank and not along.x.varies and start.home == GROUND \
+            else planar.Rail(end.place, start.place, along, start.span + end.span)
         found = planar.slider(rail, rod, side)
         self.limits += found.limits
         link = self._hang(pin, name, found.rod, rod)
-        others = (origin, direction) if isinstance(direction, str) else (origin,)
-        self._place(name, pin, found.rod, link, rod, others)
+        self._place(name, pin, found.rod, link, rod)
         self.transmissions[name] = arctangent(abs(found.reach), rail.height)
         self._slide(self._numbered('block'), parent, origin, name, found.place, along, angle)
-
-    def _rail(self, pin: str, origin: str, along: Complex, towards: object) -> planar.Rail:
-        """Return a joint as seen from a line through another."""
-        start, end = self.points[origin], self.points[pin]
-        link = self._side(origin, towards).link if isinstance(towards, str) else GROUND
-        crank = next((point.crank for point in self.points.values()
-                      if point.crank and point.home == link), None)
-        if crank and end.home == GROUND and end.place is not crank.centre:
-            frame = self.frames[link]
-            zero = frame[str(towards)] - frame[origin]
-            return planar.TurnedRail(end.place, crank, start.place, along, zero.direction(),
-                                     frame[origin])
-        if end.crank and not along.x.varies and start.home == GROUND:
-            return planar.CrankRail(end.crank, start.place, along)
-        return planar.Rail(end.place, start.place, along, start.span + end.span)
 
     def _on_ground(self, name: str, otherwise: str = '') -> None:
         if self.points[name].home != GROUND:
@@ -527,24 +498,23 @@ class Builder:
 
     def _between(self, first: str, second: str) -> Complex:
         """Return the vector between two joints; bars from a common joint are more accurate."""
-        ends = [self.points[end] for end in (first, second)]
-        shared = ends[0].depends_on & ends[1].depends_on
-        for name in self.points:
+        # A joint that was placed after one of them may depend on both.
+        for name in takewhile(lambda name: name not in (first, second), self.points):
             bars = [self._vectors[name, end] for end in (first, second)
                     if (name, end) in self._vectors]
-            if name in shared and len(bars) == 2:
+            if len(bars) == 2:
                 return bars[1].vector - bars[0].vector
-        return ends[1].place - ends[0].place
+        return self.points[second].place - self.points[first].place
 
     def distance(self, first: str, second: str) -> Real:
         """Return the constant distance [m] of two joints of one link or of the ground."""
         return self._side(first, second).length
 
     def _pair(self, name: str, first: str, second: str, found: planar.Dyad, to_first: Real,
-              to_second: Real, *others: str, place: Optional[Complex] = None) -> None:
+              to_second: Real, place: Optional[Complex] = None) -> None:
         """Join the two bars of a dyad: the joint belongs to the first, the second is cut there."""
         link = self._hang(first, name, found.first, to_first)
-        self._place(name, first, found.first, link, to_first, (second, *others), place)
+        self._place(name, first, found.first, link, to_first, place)
         link = self._hang(second, name, found.second, to_second)
         self._bar(second, name, found.second, to_second, link)
         self.transmissions[name] = planar.transmission(found)
@@ -573,17 +543,10 @@ class Builder:
         return name
 
     def _place(self, name: str, start: str, vector: Complex, link: str, length: Real,
-               others: Tuple[str, ...], place: Optional[Complex] = None) -> None:
-        """
-        Place a joint at the end of a bar from another; it depends on others, too.
-
-        A place that is known in a better way is given.
-        """
+               place: Optional[Complex] = None) -> None:
+        """Place a joint at the end of a bar from another, or where it is known to be."""
         origin = self.points[start]
-        depends_on = frozenset().union(
-            *({x} | self.points[x].depends_on for x in (start, *others)))
-        self.points[name] = Point(place or origin.place + vector, link, origin.span + length,
-                                  depends_on)
+        self.points[name] = Point(place or origin.place + vector, link, origin.span + length)
         self._bar(start, name, vector, length, link)
 
     def _bar(self, first: str, second: str, vector: Complex, length: Number,

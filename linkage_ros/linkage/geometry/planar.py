@@ -576,26 +576,6 @@ class CrankRail(Rail):
             start, end, arctangent(self._turn.y, self._turn.x), self._crank.angle))
 
 
-class TurnedRail(CrankRail):
-    """
-    A ground joint relative to a line on a crank: a pin that turns backwards about its centre.
-
-    `zero` and `origin` are the line's direction and a point of it, relative to the crank's bar.
-    """
-
-    def __init__(self, pin: Complex, crank: Crank, place: Complex, along: Complex, zero: Complex,
-                 origin: Complex):
-        arm = pin - crank.centre
-        Rail.__init__(self, pin, place, along, arm.length() + origin.length())
-        self._crank = Crank(crank.centre, arm.length(), arm.direction(), -crank.angle)
-        self._centre = -cross(zero, origin)
-        self._turn = (arm.direction() * (crank.zero * zero).conjugate()).turned()
-
-    def limits(self, rod: Real) -> Tuple[Limit, ...]:
-        """Return the margins whose product is rod^2 - height^2."""
-        return tuple(Limit(limit.margin, limit.tolerance) for limit in super().limits(rod))
-
-
 class Slider(NamedTuple):
     """
     A block on a fixed line: the rod to it, its place along the line [m], and the limits.

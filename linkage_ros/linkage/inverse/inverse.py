@@ -451,7 +451,8 @@ class Inverse:
 
         """
         outputs = chosen_of(self.problem, self.closed, follows)
-        return array_function(outputs, (1 + follows) * self._n, xp, self.linkage.lengths, SINGLE)
+        return array_function(
+            outputs, (1 + follows) * self._n, xp, self.linkage.dimensions, SINGLE)
 
     def modes(self, xp: Any) -> Callable:
         """
@@ -461,7 +462,7 @@ class Inverse:
         for each input, NaN where the mode is no solution. See `function`.
         """
         outputs = [x for inputs, _ in modes_of(self.problem, self.closed) for x in inputs]
-        flat = array_function(outputs, self._n, xp, self.linkage.lengths, SINGLE)
+        flat = array_function(outputs, self._n, xp, self.linkage.dimensions, SINGLE)
         return lambda *values: tuple(zip(*self._n * [iter(flat(*values))]))
 
 

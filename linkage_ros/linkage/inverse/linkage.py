@@ -22,7 +22,7 @@ import numpy as np
 
 from ..dyads import Dyads, Hinge, Motor, Slide
 from ..formulas import Names, PAIR, Structure
-from ..geometry.builder import GROUND, Link, UNIT
+from ..geometry.builder import GROUND, Link
 from ..inputs import Input, spread
 from ..kinematics import Kinematics
 from ..text import joint_lines
@@ -151,7 +151,7 @@ class _Read(NamedTuple):
 def taken_apart(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
     """Return the inverse linkage for outputs, None where no closed form is known."""
     # Lengths in joint lines are in metres.
-    if linkage.value(UNIT) != 1.0 or len(set(outputs)) < len(outputs):
+    if len(set(outputs)) < len(outputs):
         return None
     pose = _pose(linkage)
     if pose is None:

@@ -94,7 +94,7 @@ class InverseProblem:
         """Return the code for a step of Newton's method; see `newton`."""
         program = newton(self.linkage.structure, self.outputs, tuple(self.periods),
                          tuple(self.turns))
-        return program.bind({**self.linkage.lengths, LONGEST_BAR: self.linkage.longest, **{
+        return program.bind({**self.linkage.dimensions, LONGEST_BAR: self.linkage.longest, **{
             f'[{input_.name}]': size for input_, size in zip(self.inputs, self.sizes)}}, {},
             self.linkage.is_accelerated)
 

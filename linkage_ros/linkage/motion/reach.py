@@ -12,7 +12,7 @@ for the whole arc. At each end the linkage can still be assembled.
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Iterable, List, Sequence, Tuple
+from typing import Any, Callable, Iterable, List, Tuple
 
 import numpy as np
 
@@ -34,40 +34,21 @@ def reach_of(linkage: Kinematics, others: Tuple[float, ...] = ()) -> List[Arc]:
     return linkage.cache.get_or_make(('reach', *others), lambda: _reach(linkage, others))
 
 
-def _reach(linkage: Kinematics, others: Tuple[float, ...]) -> List[Arc]:
-    margins = linkage.bound('margins', ())
-    if margins.shape:
+def over_first(linkage: Kinematics, kind: str, names: Any, others: Tuple[float, ...]) -> Callable:
+    """Return the function from values of the first input (n,), in its step, to numbers."""
+    pose, step = linkage.bound(kind, names), linkage.inputs[0].step
+    if pose.shape:
         raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
                          'not for arrays')
-    step = linkage.inputs[0].step
-    return [(lo * step, hi * step) for lo, hi in arcs(
-        lambda value: margins.searched(value * step, *others), linkage.inputs[0].counted(),
-        linkage.structure.built.limits, linkage.value,
-        lambda theta: linkage.bound('points', linkage.points).searched(theta * step, *others),
-        step)]
+    return lambda value: pose.searched(value * step, *others)
 
 
-def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Callable,
-         places: Callable, step: float) -> List[Arc]:
-    """
-    Return the parts of the first input's range, each (lo, hi), on which no margin is negative.
+def _reach(linkage: Kinematics, others: Tuple[float, ...]) -> List[Arc]:
+    margins = over_first(linkage, 'margins', (), others)
+    limits, step = linkage.structure.built.limits, linkage.inputs[0].step
+    # From here on the input is in units of its step.
+    input_ = linkage.inputs[0].counted()
 
-    Parameters
-    ----------
-    margins : callable
-        From values of the input, shape (n,), to margins, shape (limits, n).
-    input_ : Input
-        The first input, in units of its step.
-    limits : sequence of Limit
-        The limits of the margins.
-    value : callable
-        From an expression of dimensions to its value.
-    places : callable
-        From values of the input, shape (n,), to the coordinates of all joints, shape (any, n).
-    step : float
-        The step of the input [rad or m].
-
-    """
     def assembled(theta: Any) -> Any:
         return _failing(margins, theta) == len(limits)
 
@@ -77,17 +58,17 @@ def arcs(margins: Callable, input_: Input, limits: Sequence[Limit], value: Calla
                                                            input_.high + math.tau / step)
     turns = range(round(first * step / math.tau), round(last * step / math.tau))
     ends = [(end + math.tau * turn) / step for limit in closed
-            for end in _crank_ends(limit, value) for turn in turns]
+            for end in _crank_ends(limit, linkage.value) for turn in turns]
     if input_.wraps:
         # The linkage may be assembled differently a turn later: the arcs then end at -pi and pi.
         ends.append(input_.low)
     if any(x.margin.varies and x not in closed for x in limits):
         ends += [end for arc in input_.between(ends) for end in _limits(margins, *arc)]
-    found = reachable_arcs(ends, assembled, input_, lambda: is_periodic(places, input_))
-    if input_.is_whole(found):
-        return found
-    trimmed = [_trimmed(assembled, *arc) for arc in found]
-    return [(lo, hi) for lo, hi in trimmed if lo < hi]
+    arcs = reachable_arcs(ends, assembled, input_, lambda: is_periodic(
+        over_first(linkage, 'points', linkage.points, others), input_))
+    if not input_.is_whole(arcs):
+        arcs = [_trimmed(assembled, *arc) for arc in arcs]
+    return [(lo * step, hi * step) for lo, hi in arcs if lo < hi]
 
 
 def _failing(margins: Callable, theta: Any) -> Any:
@@ -185,9 +166,8 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
 
 
 def _crank_ends(limit: Limit, value: Callable) -> List[float]:
-    """Return the crank angles at which a margin vanishes."""
-    if limit.ends is None:
-        return []
+    """Return the crank angles at which the margin of a crank arm vanishes."""
+    assert limit.ends
     start, end, turn = map(value, limit.ends[:3])
     tolerance = value(limit.tolerance)
     # A gap within rounding is a limit that is only touched; it may be the whole reach.

@@ -16,7 +16,7 @@ from typing import Callable, Iterable, Iterator, List, NamedTuple, Optional, Seq
 import numpy as np
 
 from .curves import LEAST, refined, sampled
-from .reach import reach_of
+from .reach import over_first, reach_of
 from ..inputs import Arc, Input
 from ..kinematics import Kinematics
 from ..tolerances import CLOSE, ONE, TOLERANCE
@@ -36,63 +36,6 @@ class NearZero(NamedTuple):
     gap: float
     rounding: float
     size: float
-
-
-def near_zeros(curve: Callable, arc: Arc, input_: Input, rounding: np.ndarray,
-               folds: np.ndarray) -> Iterator[NearZero]:
-    """
-    Yield the values on an arc at which closures come near to zero.
-
-    Parameters
-    ----------
-    curve : callable
-        From values of the input, shape (n,), to each closure and its rate, shape (2 closures, n).
-    arc : (float, float)
-        The range of the input, in units of its size.
-    input_ : Input
-        The input.
-    rounding : float array (closures,)
-        The rounding of each closure.
-    folds : bool array (closures,)
-        Whether a closure changes sign at a zero; the others end the reach there, or turn back.
-
-    """
-    def split(value: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        rows = curve(value)
-        return rows[0::2], rows[1::2]
-
-    theta = sampled(*arc)
-    values, rates = split(theta)
-    size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
-    # A closure as small as its rounding counts as zero. One that is never larger, such as the area
-    # of a kite that is always flat, is ignored.
-    rounding = np.where(size > FLAT * rounding, rounding + TOLERANCE ** 2 * size, -np.inf)
-    for end in (0, -1):
-        if input_.is_cut(theta[end]):
-            yield from map(NearZero, [float(theta[end])] * len(size),
-                           np.abs(values[:, end]).tolist(), rounding.tolist(), size.tolist())
-    # A sample may be the zero itself, with a rate of either sign.
-    inner, before, after = np.abs(values[:, 1:-1]), np.abs(values[:, :-2]), np.abs(values[:, 2:])
-    row, place = np.nonzero((inner <= rounding[:, None]) & (inner < before) & (inner <= after))
-    yield from map(NearZero, theta[place + 1].tolist(), inner[row, place].tolist(),
-                   rounding[row].tolist(), size[row].tolist())
-    searched = ((_crossings(values, folds), values),
-                (_approaches(theta, values, rates, NEAR * size[:, None]), rates))
-    for kind, ((row, place), samples) in enumerate(searched):
-        chosen = np.arange(len(row))
-
-        def unchanged(angles: np.ndarray, kind: int = kind, row: np.ndarray = row,
-                      chosen: np.ndarray = chosen,
-                      start: np.ndarray = samples[row, place] >= 0.0) -> np.ndarray:
-            now = split(angles.ravel())[kind].reshape(-1, *angles.shape)[row, chosen]
-            return (now >= 0.0) == start[:, None]
-
-        found, _ = refined(unchanged, theta[place], theta[place + 1])
-        # A fold that changes sign vanishes between two neighbouring values.
-        gaps = np.abs(split(found)[0][row, chosen]) if kind else np.zeros(len(row))
-        relevant = rounding[row] > 0.0
-        yield from map(NearZero, found[relevant].tolist(), gaps[relevant].tolist(),
-                       rounding[row][relevant].tolist(), size[row][relevant].tolist())
 
 
 def _crossings(values: np.ndarray, folds: np.ndarray) -> Places:
@@ -161,25 +104,63 @@ class Analysis:
 
     def curve(self, kind: str, name: object) -> Callable:
         """Return the function from the first input to numbers, and each one's rate by it."""
-        pose, size, others = self._linkage.bound(kind, name), self._first.step, self._others
+        over, size = over_first(self._linkage, kind, name, self._others), self._first.step
 
         def curve(value: np.ndarray) -> np.ndarray:
-            rows = pose.searched(value * size, *others)
+            rows = over(value)
             rows[1::2] *= size
             return rows
         return curve
 
     def near_zeros(self) -> List[NearZero]:
         """Return the inputs at which a dyad stretches or folds, or nearly does."""
-        structure = self._linkage.structure
-        closures, folds = structure.closures, structure.built.folds
-
-        def find() -> List[NearZero]:
-            reach = self.reach() if closures else []
-            rounding = np.array([2.0 * float(self._linkage.value(x.tolerance)) for x in closures])
-            return [near for arc in reach for near in near_zeros(
-                self.curve('closures', ()), arc, self._first.counted(), rounding,
-                np.array([x in folds for x in closures]))]
-
         return self._linkage.cache.get_or_make(
-            ('near zeros', self._first.period, *self._others), find)
+            ('near zeros', self._first.period, *self._others), lambda: [
+                near for arc in (self.reach() if self._linkage.structure.closures else ())
+                for near in self._near_zeros(*arc)])
+
+    def _near_zeros(self, lo: float, hi: float) -> Iterator[NearZero]:
+        """Yield the values on an arc at which closures come near to zero."""
+        structure, curve = self._linkage.structure, self.curve('closures', ())
+        # Those that change sign at a zero; the others end the reach there, or turn back.
+        folds = np.array([x in structure.built.folds for x in structure.closures])
+        rounding = np.array([
+            2.0 * float(self._linkage.value(x.tolerance)) for x in structure.closures])
+        theta = sampled(lo, hi)
+        values, rates = np.reshape(curve(theta), (len(folds), 2, -1)).swapaxes(0, 1)
+        size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
+        # A closure as small as its rounding counts as zero. One that is never larger, such as the
+        # area of a kite that is always flat, is ignored.
+        ignored = size <= FLAT * rounding
+        rounding = rounding + TOLERANCE ** 2 * size
+
+        def near(row: np.ndarray, value: np.ndarray, gap: np.ndarray) -> Iterator[NearZero]:
+            return (NearZero(*numbers) for *numbers, flat in zip(
+                value.tolist(), gap.tolist(), rounding[row].tolist(), size[row].tolist(),
+                ignored[row].tolist()) if not flat)
+
+        for end in (0, -1):
+            if self._first.counted().is_cut(theta[end]):
+                yield from near(np.arange(len(folds)), np.full(len(folds), theta[end]),
+                                np.abs(values[:, end]))
+        # A sample may be the zero itself, with a rate of either sign.
+        inner, before, after = (np.abs(values[:, 1:-1]), np.abs(values[:, :-2]),
+                                np.abs(values[:, 2:]))
+        row, place = np.nonzero(
+            (inner <= rounding[:, None]) & (inner < before) & (inner <= after))
+        yield from near(row, theta[place + 1], inner[row, place])
+        searched = ((_crossings(values, folds), values),
+                    (_approaches(theta, values, rates, NEAR * size[:, None]), rates))
+        for kind, ((row, place), samples) in enumerate(searched):
+            chosen = np.arange(len(row))
+
+            def unchanged(angles: np.ndarray, kind: int = kind, row: np.ndarray = row,
+                          chosen: np.ndarray = chosen,
+                          start: np.ndarray = samples[row, place] >= 0.0) -> np.ndarray:
+                now = curve(angles.ravel())[kind::2].reshape(-1, *angles.shape)[row, chosen]
+                return (now >= 0.0) == start[:, None]
+
+            zeros, _ = refined(unchanged, theta[place], theta[place + 1])
+            # A fold that changes sign vanishes between two neighbouring values.
+            yield from near(row, zeros, np.abs(curve(zeros)[0::2][row, chosen]) if kind
+                            else np.zeros(len(row)))

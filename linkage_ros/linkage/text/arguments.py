@@ -12,7 +12,8 @@ import numpy as np
 from .design import Design
 from ...words import listed, meant, quoted
 
-SHORTEST_LENGTH, LONGEST_LENGTH = 1e-300, 1e300
+# The eighth power of a length is a normal number.
+SHORTEST_LENGTH, LONGEST_LENGTH = 1e-30, 1e30
 
 
 def checked_dimensions(design: Design, given: Mapping[str, Any]) -> dict:

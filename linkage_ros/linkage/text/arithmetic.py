@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import operator
 import re
-from typing import Any, Callable, Iterable, List, Mapping, Optional, Union
+from typing import Any, Callable, Iterable, List, Mapping, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,8 +22,6 @@ from ...words import quoted
 
 # A number, or the name of a dimension or an operation.
 Step = Union[float, str]
-# Power of a length in a result; None for zero, which has any power, NaN for mixed powers.
-Degree = Optional[float]
 
 # The largest number; the smallest is its inverse.
 LARGEST_NUMBER = 1e70
@@ -44,17 +42,6 @@ _EXPRESSIONS: Mapping[Step, Callable] = {
     'deg': lambda x: x * (math.pi / 180.0)}
 _VALUES: Mapping[Step, Callable] = {
     **_EXPRESSIONS, '/': np.divide, 'max': np.maximum, 'sqrt': np.sqrt}
-
-
-def _alike(x: Degree, y: Degree) -> Degree:
-    return y if x is None else x if y is None or x == y else math.nan
-
-
-_DEGREES: Mapping[Step, Callable] = {
-    '+': _alike, '-': _alike, 'max': _alike, 'negative ': lambda x: x, 'deg': lambda x: x,
-    '*': lambda x, y: None if x is None or y is None else x + y,
-    '/': lambda x, y: x if x is None else math.nan if y is None else x - y,
-    'sqrt': lambda x: x and x / 2}
 
 
 def in_range(number: ArrayLike) -> Any:
@@ -84,12 +71,6 @@ class Formula:
             raise ValueError(
                 f'{quoted(text)} is not a number, dimension or arithmetic on them; '
                 'allowed: + - * / ( ) max(a,b) sqrt(a) pi 30deg') from None
-
-    @property
-    def degree(self) -> Degree:
-        """Return its power of a length: 0, 1, ...; None if zero, NaN if mixed."""
-        return self._computed(lambda leaf: 1 if leaf in self.names else 0 if leaf else None,
-                              _DEGREES)
 
     def expression(self, symbols: Mapping[str, Real]) -> Real:
         """Return it as an expression of dimensions."""

@@ -45,11 +45,6 @@ class Design:
         return self.words.parse(self.joints)
 
     @cached_property
-    def has_literal_lengths(self) -> bool:
-        """Whether a length is written as a number, so that all count in metres."""
-        return joint_lines.has_literal_lengths(self.lines)
-
-    @cached_property
     def branches(self) -> dict:
         """Return the assembly sign, +1 or -1, of each joint that has two."""
         return self.words.branches(self.lines)

@@ -52,7 +52,7 @@ A gear's ratio is a number up to 1000. Poses repeat after as many turns as its d
 from __future__ import annotations
 
 import re
-from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple, Union
+from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -64,10 +64,8 @@ from ...words import elided, listed, meant, quoted
 
 _WORDS = {'left': 1.0, 'right': -1.0, 'out': 1.0, 'in': -1.0}
 _JOINTS = ('CENTRE', 'BASE', 'FIRST', 'SECOND', 'POINT', 'CORNER', 'POLE', 'PIN', 'PIVOT',
-           'ORIGIN', 'JOINT', 'TOWARDS')
+           'ORIGIN', 'JOINT', 'TOWARDS', 'LINK')
 _NUMBERS = ('X', 'Y', 'Z', 'U', 'V', 'W', 'LENGTH', 'DISTANCE', 'OFFSET', 'ANGLE', 'RATIO')
-# Numbers that do not scale with lengths.
-_PLAIN = ('ANGLE', 'RATIO', 'U', 'V', 'W')
 
 # The arguments of each word, in the order of its construction's parameters; options in brackets.
 # Each word of INPUTS adds an input, unless that is geared to another.
@@ -185,7 +183,7 @@ def parse(texts: Iterable[str]) -> List[Line]:
     for text in texts:
         line = parsed(text)
         lines += _mirrored(lines, line) if line.word == 'mirrored' else [line]
-    _check_order(lines)
+    check_order(lines)
     return lines
 
 
@@ -293,58 +291,43 @@ def _is_literal(kind: str) -> bool:
     return kind.islower() and '|' not in kind
 
 
-def _check_order(lines: List[Line]) -> None:
-    """Raise ValueError unless every joint is placed once, from joints placed before it."""
-    placed: Dict[str, Line] = {}
-    for line in lines:
+def check_order(lines: Sequence[Line], what: str = 'joint', placed: Sequence[str] = (),
+                bars: Sequence[str] = ()) -> None:
+    """
+    Raise ValueError unless each line places something new, from what is placed before it.
+
+    `placed` is there from the beginning; nothing is placed from what lines of `bars` place.
+    """
+    where = {name: number for number, line in reversed([*enumerate(lines, 1)])
+             for name in line.names if line.word not in bars}
+    taken, known = {*placed}, dict.fromkeys(placed)
+    for number, line in enumerate(lines, 1):
         if len(set(line.depends_on)) < len(line.depends_on):
-            raise line.error('the joints that it is placed from must differ')
-        for joint in line.depends_on:
-            if joint not in placed:
-                raise line.error(_missing(lines, line, joint, placed))
+            raise line.error(f'the {what}s that it is placed from must differ')
+        for name in line.depends_on:
+            if name not in known and where.get(name, 0) > number:
+                raise line.error(
+                    f'{what} {name} is placed later, in line {where[name]}: move it up; if it '
+                    f'depends on {line.names[0]}, they cannot be solved: only dyads, groups of '
+                    'two bars, can, not Assur groups of class III as a platform on three bars')
+            if name not in known:
+                raise line.error(f'{what} {elided(name)} is not placed before; there are: '
+                                 f'{listed(known)}{meant(name, known)}')
         for name in line.names:
-            if name in placed:
-                raise line.error(f'joint {name} is placed already')
-            placed[name] = line
+            if name in taken:
+                raise line.error(f'{what} {name} is placed already')
+            taken.add(name)
+            if line.word not in bars:
+                known[name] = None
 
 
-def _missing(lines: List[Line], line: Line, joint: str, placed: Mapping[str, Line]) -> str:
-    """Return why a joint that a line needs is not placed before it."""
-    places = {name: each for each in lines for name in each.names}
-    if joint not in places or joint in line.names:
-        return (f'joint {elided(joint)} is not placed before; there are: {listed(placed)}'
-                f'{meant(joint, placed)}')
-    after: Dict[str, Optional[str]] = {joint: None}
-    waiting = [joint]
-    for name in waiting:
-        for needed in places[name].depends_on:
-            if needed in line.names:
-                return (f'joints {listed((needed, *_chain(after, name)))} depend on each other: '
-                        'only dyads, groups of two bars, can be solved, one after another, not '
-                        'Assur groups of class III, such as a platform on three bars')
-            if needed in places and needed not in placed and needed not in after:
-                after[needed] = name
-                waiting.append(needed)
-    return f'joint {joint} is placed later, in line {lines.index(places[joint]) + 1}: move it up'
-
-
-def _chain(after: Mapping[str, Optional[str]], name: Optional[str]) -> Iterable[str]:
-    while name:
-        yield name
-        name = after[name]
-
-
-def _check_number(line: Line, kind: str, number: Formula, dimensions: Mapping,
-                  fixed: bool = False) -> None:
+def _check_number(line: Line, kind: str, number: Formula, dimensions: Mapping) -> None:
     """Raise ValueError if a number is invalid for its kind, with dimensions or arrays of them."""
     value = number.value(dimensions)
-    if not np.all(np.isfinite(value)):
-        raise line.error(f'{quoted(number.text)} is not finite')
+    if not np.all(in_range(value)):
+        raise line.error(f'{quoted(number.text)} must be {IN_RANGE}')
     if kind == 'LENGTH' and not np.all(value > 0.0):
         raise line.error(f'a bar must be longer than zero, got {elided(number.text)}')
-    if kind != 'ANGLE' and fixed and not np.all(in_range(value)):
-        raise line.error(f'{quoted(number.text)} must be {IN_RANGE} where '
-                         'lengths are written as numbers')
     if kind == 'ANGLE' and np.any(np.abs(value) > _TURN) \
             and not {'deg', 'pi'} & number.words.keys():
         plain = number.text.lstrip('-').replace('.', '').isdigit()
@@ -355,14 +338,9 @@ def _check_number(line: Line, kind: str, number: Formula, dimensions: Mapping,
 
 def check_numbers(design: Any, dimensions: Mapping) -> None:
     """Raise ValueError that names the line of an invalid number, for dimensions or arrays."""
-    if not design.has_literal_lengths:
-        # A unit that is a power of two changes no digit, and no product overflows or underflows.
-        longest = max((np.max(np.abs(length)) for length in dimensions.values()), default=1.0)
-        unit = 2.0 ** np.frexp(longest)[1]
-        dimensions = {name: length / unit for name, length in dimensions.items()}
     for line in design.lines:
         for kind, number in line.numbers():
-            _check_number(line, kind, number, dimensions, design.has_literal_lengths)
+            _check_number(line, kind, number, dimensions)
 
 
 def branches(lines: Iterable[Line]) -> dict:
@@ -392,12 +370,6 @@ def lengths(lines: Iterable[Line]) -> dict:
             for name in number.names:
                 found[name] = found.get(name, False) or (kind == 'LENGTH' and number.text == name)
     return found
-
-
-def has_literal_lengths(lines: Iterable[Line]) -> bool:
-    """Return whether any length does not scale with the dimensions, or an angle does."""
-    return any(number.degree not in (None, 0 if kind in _PLAIN else 1)
-               for line in lines for kind, number in line.numbers())
 
 
 def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],

@@ -36,13 +36,12 @@ from typing import (
     Mapping,
     NamedTuple,
     Optional,
-    Sequence,
     Tuple,
 )
 
 import numpy as np
 
-from .joint_lines import formula, Line, parsed
+from .joint_lines import check_order, formula, Line, parsed
 from ..geometry.builder import Bar, Builder, GROUND, Link, Point
 from ..geometry.planar import Limit
 from ..geometry.spatial import (
@@ -66,7 +65,7 @@ from ..geometry.window import Window, WindowRod
 from ..inputs import ANGLE, Input, LENGTH
 from ..tolerances import SINGULAR, TOLERANCE
 from ...formula.expression import Real, real
-from ...words import listed, meant, quoted
+from ...words import listed
 
 FORMS = {
     'hinge': ('hinge LINK at X Y Z axis U V W [within ANGLE ANGLE]',),
@@ -105,7 +104,6 @@ class TwoRodLink(NamedTuple):
     """A link on two hinges in a row and two rods: the data of its window, as expressions."""
 
     lines: Tuple[Line, Line]
-    inputs: Tuple[str, ...]
     limits: Tuple[Optional[Tuple[Real, ...]], ...]
     rods: Tuple[WindowRod, ...]
 
@@ -123,9 +121,9 @@ class TwoRodLink(NamedTuple):
             return
         largest, names = window.largest(), [line.names[0] for line in self.lines]
         raise WindowError(
-            self.lines[1], _why_not(window, self.inputs, names) if limited
-            else 'both hinges need limits', dict(zip(names, zip(
-                largest.low.tolist(), largest.high.tolist()))) if largest else {})
+            self.lines[1], 'there may be a second pose in these limits, or one that the steps of '
+            "Newton's method do not reach" if limited else 'both hinges need limits',
+            dict(zip(names, zip(largest.low.tolist(), largest.high.tolist()))) if largest else {})
 
 
 def parse(texts: Iterable[str]) -> List[Line]:
@@ -133,36 +131,16 @@ def parse(texts: Iterable[str]) -> List[Line]:
     lines = [parsed(text, FORMS) for text in texts]
     if len(lines) > MOST_LINES:
         raise ValueError(f'a linkage in space has up to {MOST_LINES} lines, got {len(lines)}')
-    places = {line.names[0]: i for i, line in reversed([*enumerate(lines, 1)])}
-    links = [GROUND]
-    for i, line in enumerate(lines, 1):
-        name, ends = line.names[0], _links(line)
-        if name == GROUND or places[name] < i:
-            raise line.error(f'the name {name} is used by another link or rod')
-        for end in ends:
-            if end not in links:
-                later = places.get(end, 0)
-                raise line.error(
-                    f'link {end} is written later, in line {later}: move it up'
-                    if later > i and lines[later - 1].word not in _RODS else
-                    f'there is no link {quoted(end)} before this line; there are: {listed(links)}'
-                    f'{meant(end, links)}')
-        if len(set(ends)) < len(ends):
-            raise line.error(f'both of its ends are on {ends[0]}')
-        links += [name] * (line.word not in _RODS)
+    check_order(lines, 'link', (GROUND,), _RODS)
     _Assembly(lines).order()
     return lines
-
-
-def _links(line: Line) -> List[str]:
-    return [arg.text for arg in line.arguments if arg.kind == 'LINK']
 
 
 def points(lines: Iterable[Line]) -> List[str]:
     """Return the points that lines place: an origin of each link, and both ends of each rod."""
     joints = [line.names[0] for line in lines if line.word in _JOINTS]
     return [*(f'{line.names[0]}_{link}' for line in lines if line.word in _RODS
-              for link in _links(line)), *(f'{name}_origin' for name in joints)]
+              for link in line.depends_on), *(f'{name}_origin' for name in joints)]
 
 
 def branches(lines: Iterable[Line]) -> dict:
@@ -200,7 +178,7 @@ class _Assembly:
         self.lines = {line.names[0]: line for line in lines}
         self.inputs = tuple(inputs) or tuple(
             name for name, line in self.lines.items() if line.word in INPUTS)
-        self.parents = {name: _links(line)[0] for name, line in self.lines.items()
+        self.parents = {name: line.depends_on[0] for name, line in self.lines.items()
                         if line.word not in _RODS}
 
     def chain(self, link: str) -> List[str]:
@@ -223,7 +201,7 @@ class _Assembly:
         left = [line for line in self.lines.values() if line.word in _RODS]
         found: List[Group] = []
         while left:
-            open_ = [(line, tuple(x for x in self.between(*_links(line)) if x in unknown))
+            open_ = [(line, tuple(x for x in self.between(*line.depends_on) if x in unknown))
                      for line in left]
             rods, links = self._next(open_)
             found.append((rods, links))
@@ -265,7 +243,7 @@ class _Joint:
     """A link on its joint, which is solved once it has a turn or a shift."""
 
     def __init__(self, line: Line, numbers: List[Real]):
-        self.line, (self.parent,) = line, _links(line)
+        self.line, (self.parent,) = line, line.depends_on
         self.turn: Optional[Turn] = None
         self.shift: Optional[Real] = None
         self.limits = numbers[6:]
@@ -334,17 +312,13 @@ class _Drawing:
             return
         length = joint.hinge.direction.length()
         if length.value is None or length.value <= 0.0:
-            self._require(joint.line, length, 'its axis has no direction')
+            self._builder.require(length, 'its axis has no direction', joint.line)
         for low, high in [joint.limits] if joint.limits else []:
-            self._require(joint.line, high - low,
-                          'the first end of within must be less than the second')
+            self._builder.require(
+                high - low, 'the first end of within must be less than the second', joint.line)
             for end in (low, high) if joint.line.word == 'hinge' else ():
-                self._require(joint.line, math.pi + EDGE - abs(end),
-                              'within must be inside -180deg and 180deg')
-
-    def _require(self, line: Line, amount: Real, problem: str) -> None:
-        """Refuse a line for dimensions with which an amount is zero or negative."""
-        self._builder.demands.append((line, amount, problem))
+                self._builder.require(math.pi + EDGE - abs(end),
+                                      'within must be inside -180deg and 180deg', joint.line)
 
     def _drive(self, name: str) -> None:
         """Make an angle or a length an input."""
@@ -363,7 +337,7 @@ class _Drawing:
             self._lengths[name] = value
 
     def _ends(self, line: Line) -> Tuple[_End, _End]:
-        first, second = _links(line)
+        first, second = line.depends_on
         numbers = self._numbers[line.names[0]]
         return _End(first, Vector(*numbers[:3])), _End(second, Vector(*numbers[3:6]))
 
@@ -408,18 +382,23 @@ class _Drawing:
         length, hinge = self._lengths[name], joint.hinge
         base, point = self._pivot(pivot, joint.parent), self._on_link(end, link)
         span = self._span + (length if not length.varies else real(0.0))
-        side, sided = (drawn_ahead if joint.line.word == 'slide' else drawn_side)(
-            hinge, pivot.point, end.point)
-        side *= self._signs.get(name, 1)
+        side = self._side(line, joint, pivot, end)
         if joint.line.word == 'slide':
             joint.shift, *limits = rod_on_slide(hinge.axis, base.place, point, length, side, span)
         else:
             joint.turn, *limits, self._builder.transmissions[name] = rod_on_hinge(
                 hinge, base, point, length, side, span)
-        self._require(line, sided - SINGULAR, f'as drawn it is at a dead point of {link}, on '
-                      'neither side; draw the linkage in another pose')
         self._builder.limits += limits
         joint.gate(self._add_limits(joint, joint.turn.angle if joint.turn else joint.shift))
+
+    def _side(self, line: Line, joint: _Joint, pivot: _End, end: _End) -> Real:
+        """Return the side on which a rod is drawn, seen from a joint, or its other side."""
+        side, sided = (drawn_ahead if joint.line.word == 'slide' else drawn_side)(
+            joint.hinge, pivot.point, end.point)
+        self._builder.require(
+            sided - SINGULAR, f'as drawn it is at a dead point of {joint.line.names[0]}, on '
+            'neither side; draw the linkage in another pose', line)
+        return side * self._signs.get(line.names[0], 1)
 
     def _add_limits(self, joint: _Joint, value: Any) -> List[Limit]:
         """Add the limits of a joint to the linkage, and return them."""
@@ -433,9 +412,10 @@ class _Drawing:
     def _place_hinges(self, lines: Tuple[Line, ...], first: _Joint, second: _Joint) -> None:
         """Turn two hinges in a row so that two rods fit."""
         frame, link = Frame.of(first.hinge, second.hinge), second.line.names[0]
-        self._require(second.line, first.hinge.leaning(second.hinge) - _LEANING,
-                      f'its axis is nearly parallel to that of {first.line.names[0]}')
-        rods, inputs = [], []
+        self._builder.require(first.hinge.leaning(second.hinge) - _LEANING,
+                              f'its axis is nearly parallel to that of {first.line.names[0]}',
+                              second.line)
+        rods = []
         for line in lines:
             end, base = self._beyond(line, link)
             pivot, length = self._pivot(base, first.parent), self._lengths[line.names[0]]
@@ -446,22 +426,15 @@ class _Drawing:
                 what = 'be fixed to' if length.varies else 'turn about one axis on'
                 raise line.error(f'its end on {base.link} must {what} {first.parent}, which '
                                  'carries the two hinges that it shares with another rod')
-            side, name = real(0.0), line.names[0]
-            if pivot.turn:
-                name, = self._moving(base.link, first.parent)
-                side, sided = drawn_side(self._joints[name].hinge, end.point, base.point)
-                side *= self._signs.get(line.names[0], 1)
-                self._require(line, sided - SINGULAR, f'as drawn it is at a dead point of {name}, '
-                              'on neither side; draw the linkage in another pose')
-            inputs.append(name)
+            side = self._side(line, self._joints[self._moving(base.link, first.parent)[0]], end,
+                              base) if pivot.turn else real(0.0)
             rods.append(Rod(pivot._replace(path=frame.transformed(pivot.path)),
                             frame.transformed(second.hinge.circle(end.point)), length, side))
         limits = first.limits, second.limits
         self._builder.windows.append(TwoRodLink(
-            (first.line, second.line), tuple(inputs),
-            tuple(tuple(each) or None for each in limits), tuple(WindowRod(
-                rod.pivot.path, rod.end, None if rod.length.varies else rod.length, rod.side)
-                for rod in rods)))
+            (first.line, second.line), tuple(tuple(ends) or None for ends in limits),
+            tuple(WindowRod(rod.pivot.path, rod.end, None if rod.length.varies else rod.length,
+                            rod.side) for rod in rods)))
         first.turn, second.turn, limit = two_rods(rods, [
             0.5 * (each[0] + each[1]) if each else real(0.0) for each in limits])
         drawn = [rod.drawn(first.turn, second.turn, self._span) for rod in rods if rod.pivot.turn]
@@ -490,13 +463,13 @@ class _Drawing:
                 builder.bars.append(Bar(f'{end.link}_origin', place, length))
         if line.word == 'rod':
             builder.bars.append(Bar(places[0], places[1], self._lengths[name]))
-            self._require(line, self._lengths[name], 'it must be longer than zero')
+            self._builder.require(self._lengths[name], 'it must be longer than zero', line)
         else:
             self._add_value(name, 'prismatic', places[0], self._lengths[name])
             builder.cylinders.append((places[0], places[1]))
 
     def _add_value(self, name: str, kind: str, place: str, value: Any) -> None:
-        parent = _links(self._assembly.lines[name])[0]
+        parent = self._assembly.lines[name].depends_on[0]
         self._builder.links.append(Link(name, parent, place, kind, real(0.0), place))
         self._builder.joint_values[name] = value
 
@@ -504,16 +477,3 @@ class _Drawing:
         if name in self._builder.points:
             raise self._assembly.lines[end.link].error(f'the name {name} is used by another point')
         self._builder.points[name] = Point(self._on_link(end, GROUND), end.link, self._span)
-
-
-def _why_not(window: Window, inputs: Sequence[str], hinges: Sequence[str]) -> str:
-    """Return why limits are not proved: two poses if there are some."""
-    def at(names: Sequence[str], values: Iterable[float]) -> str:
-        return ', '.join(f'{name} at {value:.6g}' for name, value in zip(names, values))
-
-    if two := window.second_pose():
-        return (f'there is a second pose in these limits: with {at(inputs, two.motors)}, '
-                + ' as well as '.join(at(hinges, pose) for pose in two.poses))
-    missed = window.missed()
-    return 'there may be a second pose in these limits' if missed is None else (
-        f"the steps of Newton's method do not lead to {at(hinges, missed)}")
