@@ -43,6 +43,7 @@ def loaded(folder, code, *flags):
     source, library = folder / 'code.c', folder / 'code.so'
     if not library.exists() or source.read_text() != code:
         source.write_text(code)
-        subprocess.run([COMPILER, '-std=c99', '-DLKR_MAX_INPUTS=3', *STRICT, *flags, '-shared',
-                        '-fPIC', source, '-o', library, '-lm'], check=True)
+        subprocess.run([
+            COMPILER, '-std=c99', '-DLKR_MAX_INPUTS=3', '-DLKR_MAX_SOLUTIONS=512', *STRICT, *flags,
+            '-shared', '-fPIC', source, '-o', library, '-lm'], check=True)
     return ctypes.CDLL(str(library))

@@ -187,8 +187,8 @@ def test_a_header_says_what_it_has(machines, name, single, times, inputs, joints
     actuators = ', '.join(f'{name}_{each}' for each in inputs.split(', '))
     assert f'/* Actuators: {actuators}; joints: {joints}. */' in text
     assert f' * Input: {inputs}. Angles' in head and f'#ifndef {name.upper()}_LINKAGE_H\n' in text
-    assert int(re.search('call takes at most (.*) poses', head)[1]) == max(
-        map(int, re.findall(r'(\d+) poses at most', text)))
+    assert int(re.search('call takes at most (.*) poses', head)[1]) == header.POSES * (
+        1 + int(re.search(r'define LKR_MAX_SOLUTIONS (\d+)', text)[1]))
     struct = re.search(r'typedef struct {\n([^}]*)} \w+_pose;', text)[1].splitlines()
     assert struct == [f'    {number} {declared};'.ljust(34) + unit for declared, unit in (
         (field.split()[0], f'/* to {field.split()[1]} [rad] */') if ' ' in field else (
@@ -243,7 +243,7 @@ def test_the_inverse_finds_the_nearest_input(library, machines, name, output):
 def test_an_inverse_takes_no_more_poses_than_its_header_says(machines, tmp_path, name, output):
     machine, rng = machines[name], np.random.default_rng(6)
     text = header.written(machine, (output,))
-    said = re.findall(r'(\d+) poses at most', text)[-1]
+    said = re.search(r'call takes at most (\d+) poses', text)[1]
     counted = re.sub(rf'(int {name}_at\w*\([^;]*?\)\n{{\n)', r'\1    taken++;\n', text)
     assert counted.count('taken++') and 'where there is none. */' in text
     library = loaded(tmp_path, f"""
@@ -463,7 +463,7 @@ int both(float crank, float *angle, float *back, float *servo)
         return 0;
     *angle = p.angle_lever;
     desired.position[0] = p.angle_lever;
-    memory.q[1][0] = crank;
+    memory.q[0] = crank;
     if (lever_joints_to_actuators(&memory, &desired, &found))
         return 0;
     *servo = found.position[LEVER_ACTUATOR_LEVER_CRANK];

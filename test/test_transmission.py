@@ -66,7 +66,6 @@ SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 
 UNWRITTEN = 0.123456789
 CALLER = """
 static {name}_memory {name}_m;
-const char *{name}_named(int side, int i) {{ return {name}_model.axis[side][i].name; }}
 int {name}_started(void) {{ return {name}_begin(&{name}_m); }}
 int {name}_sent(int side, const double *from, double *to)
 {{
@@ -239,17 +238,6 @@ def test_a_first_pose_is_found_in_a_small_workspace(tmp_path):
             'A crank O 1', 'C crank Q 1', 'P dyad A C 1.05 1.05 left']}).machines.values()
     library = compiled(tmp_path, machines)
     assert [library[f'{machine.name}_started']() for machine in machines] == [1] * 4
-
-
-@pytest.mark.parametrize('name', SCENE['mechanisms'])
-def test_names_are_those_of_the_scene(library, machines, name):
-    machine, named = machines[name], library[f'{name}_named']
-    named.restype = ctypes.c_char_p
-    sources = [drive.source for drive in machine.inputs.values()]
-    commanded = [{'lever': 'flap', 'int': 'while/1:x', 'leg': 'leg_crank'}.get(name), 'leg_AP']
-    assert [named(0, i).decode() for i in range(len(sources))] == sources
-    assert commanded[0] is None or [named(1, i).decode() for i in range(
-        len(sources))] == commanded[:len(sources)]
 
 
 def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, machines):

@@ -17,6 +17,8 @@ from ..words import listed
 # Relative size of a Jacobian below which outputs do not determine the inputs, and the poses in
 # which it is looked at.
 DEPENDENT, SPREAD = 1e-9, 200
+# States that are tried for a first pose.
+SAMPLES = 4096
 
 
 class Axis(NamedTuple):
@@ -142,11 +144,11 @@ def pieces(machine: SceneMechanism, axis: Axis) -> List[Tuple[float, ...]]:
     """Return parts of the reach in which an axis only rises or falls: inputs, and outputs."""
     linkage, drive = machine.linkage, machine.first
     # In a piece an angle changes by half a turn at most, so that its gaps are known.
-    found, _ = linkage.monotone(axis.output, math.pi if axis.turn else math.inf)
+    parts, _ = linkage.monotone(axis.output, math.pi if axis.turn else math.inf)
     if linkage.inputs[0].is_part and drive.ends:
         low, high = (end / machine.scale_of(linkage.inputs[0].name) for end in drive.ends)
-        found = [piece for piece in found if piece[0] <= high and low <= piece[1]]
-    return found
+        parts = [part for part in parts if part[0] <= high and low <= part[1]]
+    return [part for part in parts if part[2] != part[3]]
 
 
 def loads(machine: SceneMechanism) -> Iterator[Tuple[str, float]]:
@@ -163,9 +165,13 @@ def loads(machine: SceneMechanism) -> Iterator[Tuple[str, float]]:
 
 
 def start(machine: SceneMechanism) -> List[float]:
-    """Return the starts of the inputs, in the linkage's own units."""
-    return [Motion.of(drive).at(0)[0] / machine.scale_of(name)
-            for name, drive in machine.inputs.items()]
+    """Return the starts of the inputs, in the linkage's own units; elsewhere if it has no pose."""
+    linkage = machine.linkage
+    first = [Motion.of(drive).at(0)[0] / machine.scale_of(name)
+             for name, drive in machine.inputs.items()]
+    samples = np.vstack([first, np.transpose(spread(linkage.inputs, SAMPLES))])
+    values = linkage.posed(linkage.points, ()).over(*samples.T)
+    return samples[np.isfinite(values).all(axis=0).argmax()].tolist()
 
 
 def _key(machine: SceneMechanism, link: str) -> str:

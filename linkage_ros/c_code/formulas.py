@@ -6,17 +6,16 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Iterable, Iterator, List, Sequence, Tuple
+from typing import Iterator, List, Sequence, Tuple
 
-from .code import Block, Code, indented
+from .code import Block, Code
 from .names import distinct, field, parameter
-from ..formula.program import Program
 from ..scene import SceneMechanism
 
 
 class Formulas:
     """
-    Writes the struct of a pose, and the functions that fill it.
+    Writes the struct of a pose, and the function that fills it.
 
     Parameters
     ----------
@@ -29,130 +28,93 @@ class Formulas:
 
     Attributes
     ----------
+    parameters, by : list of str
+        The inputs as parameters, and the names of the rates by them.
     fields : dict
         The fields of a pose, by output.
 
     """
 
     def __init__(self, machine: SceneMechanism, code: Code, outputs: Sequence[str]):
-        self.name, self._machine, self._code = machine.name, machine, code
+        self._machine, self._code = machine, code
         self._linkage = linkage = machine.linkage
         self.inputs = [input_.name for input_ in linkage.inputs]
-        # The inputs as parameters, and the rates by them.
-        self.given = [*map(parameter, self.inputs)]
+        self.parameters = [*map(parameter, self.inputs)]
         self.by = [f'by_{name}' for name in self.inputs]
         # Points in space are of no use on a board.
         self._points = () if machine.in_space else linkage.points
-        named = list(dict.fromkeys((
+        named = dict.fromkeys((
             *(f'{point}.{axis}' for point in self._points for axis in 'xy'), *linkage.joints,
-            *outputs)))
+            *outputs))
         self.fields = dict(zip(named, distinct(field(linkage, each) for each in named)))
 
-    def unit(self, output: str) -> float:
-        """Return the unit of a field: the scene's, in the linkage's own."""
-        return self._machine.scale_of(output)
-
-    def text(self) -> str:
-        """Return the struct and the functions."""
-        return '\n'.join([self._struct(), self._formulas(), self._solve(), self._rates()])
-
-    def _struct(self) -> str:
+    def struct(self) -> str:
+        """Return the fields of a pose."""
         parents = {link.name: link.parent for link in self._linkage.links}
-        number, places = self._code.number, {f'{point}.{axis}' for point in self._points
-                                             for axis in 'xy'}
-        lines = [f'    {number} {point}_x, {point}_y;'.ljust(34) + '/* [m] */'
-                 for point in self._points]
-        for output, name in self.fields.items():
-            if output not in places:
-                unit = '[rad]' if self._linkage.is_angle(output) else '[m]'
-                to = f'to {parents[output]} ' if output in parents and unit == '[rad]' else ''
-                lines.append(f'    {number} {name};'.ljust(34) + f'/* {to}{unit} */')
-        return '\n'.join(['/* Where the joints are, and each link to its parent. */',
-                          'typedef struct {', *lines, f'}} {self.name}_pose;', ''])
+        rows = [(f'{point}_x, {point}_y', '[m]') for point in self._points]
+        for output, name in [*self.fields.items()][2 * len(self._points):]:
+            is_angle = self._linkage.is_angle(output)
+            to = f'to {parents[output]} ' if is_angle and output in parents else ''
+            rows.append((name, to + ('[rad]' if is_angle else '[m]')))
+        return '\n'.join(f'    {self._code.number} {names};'.ljust(34) + f'/* {about} */'
+                         for names, about in rows)
 
-    def _parameters(self) -> str:
-        return ', '.join(f'{self._code.number} {name}' for name in self.given)
-
-    def _formulas(self) -> str:
+    def function(self) -> str:
         """Return the function for all fields and their rates."""
-        structure, code = self._linkage.structure, self._code
-        blocks, outputs = [], []
-        for about, own in self._groups():
-            count = len(own)
-            rates = structure.checked(tuple(own))[count:]
-            outputs += [*map(structure.output, own), *rates]
-            blocks.append(Block(about, count + len(rates), partial(self._filled, own)))
+        structure, inputs = self._linkage.structure, self._linkage.inputs
+        blocks = []
+        for about, outputs in self._groups():
+            rates = structure.checked(tuple(outputs))[len(outputs):]
+            blocks.append(Block(about, [*map(structure.output, outputs), *rates],
+                                partial(self._assigned, outputs)))
         limits = [limit for limit in structure.built.limits if limit.margin.varies]
-        inputs = self._linkage.inputs
         if len(inputs) == 1 and inputs[0].is_whole(self._linkage.reach()):
             # It can be assembled at any input: no limit needs to be checked.
             limits = []
-        outputs += [part for limit in limits for part in (limit.margin, limit.tolerance)]
-        blocks.append(Block('', 2 * len(limits), lambda codes: ['return ' + (' && '.join(
-            f'{margin} >= -{tolerance}' for margin, tolerance in zip(codes[::2], codes[1::2]))
-            or '1') + ';']))
-        return code.function(
+        blocks.append(Block(
+            '', [part for limit in limits for part in (limit.margin, limit.tolerance)],
+            lambda codes: ['return ' + (' && '.join(
+                f'{margin} >= -{tolerance}' for margin, tolerance in zip(codes[::2], codes[1::2]))
+                or '1') + ';']))
+        name, number = self._machine.name, self._code.number
+        poses = ', '.join(f'{name}_pose *{each}' for each in ['p', *self.by])
+        return self._code.function(
             f'/* The pose, and its rates by {" and by ".join(self.inputs)}. Returns 0 if a limit '
-            'is exceeded. */\n'
-            f'LKR_FORMULA int {self.name}_formulas({self._parameters()}, {self.name}_pose *p, '
-            + ', '.join(f'{self.name}_pose *{by}' for by in self.by) + ')',
-            self._linkage.bind(Program(outputs, len(inputs))),
-            [code.times(given, 1.0 / self.unit(name))
-             for given, name in zip(self.given, self.inputs)], blocks)
+            f'is exceeded. */\nLKR_FORMULA int {name}_formulas('
+            f'{", ".join(f"{number} {each}" for each in self.parameters)}, {poses})',
+            [self._code.times(each, 1.0 / self._machine.scale_of(name))
+             for each, name in zip(self.parameters, self.inputs)], blocks)
 
     def _groups(self) -> Iterator[Tuple[str, List[str]]]:
         """Yield the joint lines, with the outputs that each adds."""
-        linkage, left = self._linkage, list(self.fields)
-        lines = linkage.design.lines
+        lines = [line.text for line in self._linkage.design.lines]
         if self._machine.in_space:
             # The joints follow from all rods together.
-            yield '; '.join(line.text for line in lines), left
+            yield '; '.join(lines), [*self.fields]
             return
-        order = {name: i for i, line in enumerate(lines) for name in line.names}
-        for link in linkage.links:
+        order = {name: i for i, line in enumerate(self._linkage.design.lines)
+                 for name in line.names}
+        for link in self._linkage.links:
             order[link.name] = max(order.get(name, 0) for name in (
                 link.joint, link.tip, link.parent))
-        for i, line in enumerate(lines):
-            own = [output for output in left if order.get(
-                output[:-2] if output[-2:] in ('.x', '.y') else output) == i]
-            left = [output for output in left if output not in own]
-            if own:
-                yield line.text, own
-        if left:
-            yield 'Other outputs', left
+        for i, about in enumerate([*lines, 'Other outputs']):
+            outputs = [output for output in self.fields if i == order.get(
+                output.removesuffix('.x').removesuffix('.y'), len(lines))]
+            if outputs:
+                yield about, outputs
 
-    def _filled(self, outputs: Sequence[str], codes: Sequence[str]) -> List[str]:
-        """Return the assignments of outputs and of their rates."""
-        lines = self._assigned('p', outputs, codes[:len(outputs)])
-        for i, (by, name) in enumerate(zip(self.by, self.inputs), 1):
-            lines += self._assigned(by, outputs, codes[i * len(outputs):], self.unit(name))
-        return lines
-
-    def _assigned(self, pose: str, outputs: Iterable[str], codes: Iterable[str],
-                  unit: float = 1.0) -> List[str]:
-        """Return the assignments of a pose, whose fields are divided by a unit."""
+    def _assigned(self, outputs: Sequence[str], codes: Sequence[str]) -> List[str]:
+        """Return the assignments of outputs and of their rates by each input."""
+        scale_of, n = self._machine.scale_of, len(outputs)
+        units = [1.0, *map(scale_of, self.inputs)]
         return [f'{pose}->{self.fields[output]} = '
-                f'{self._code.times(value, self.unit(output) / unit)};'
-                for output, value in zip(outputs, codes)]
+                f'{self._code.times(codes[k * n + i], scale_of(output) / unit)};'
+                for k, (pose, unit) in enumerate(zip(['p', *self.by], units))
+                for i, output in enumerate(outputs)]
 
-    def called(self, given: Sequence[str], pose: str, by: Sequence[str]) -> str:
-        """Return a call of the formulas."""
-        return f'{self.name}_formulas({", ".join([*given, pose, *by])})'
-
-    def _solve(self) -> str:
-        rates = [f'&{by}' for by in self.by]
-        return '\n'.join([
-            '/* Place the joints. Return 0 if not all can be assembled: NaN is what cannot. */',
-            f'static inline int {self.name}_solve({self._parameters()}, {self.name}_pose *p)', '{',
-            *indented([f'{self.name}_pose {", ".join(self.by)};',
-                       f'(void){self.called(self.given, "p", rates)};',
-                       f'return isfinite({" + ".join(f"p->{x}" for x in self.fields.values())});'
-                       ]), '}', ''])
-
-    def _rates(self) -> str:
-        poses = ', '.join(f'{self.name}_pose *{by}' for by in self.by)
-        return '\n'.join([
-            f'/* Differentiate all of it by {" and by ".join(self.inputs)}. */',
-            f'static inline void {self.name}_rates({self._parameters()}, {poses})', '{',
-            *indented([f'{self.name}_pose p;',
-                       f'(void){self.called(self.given, "&p", self.by)};']), '}', ''])
+    def call(self) -> str:
+        """Return a call of the function for inputs q in their sizes, to s and the rates."""
+        values = [self._code.times(f'q[{i}]', input_.size * self._machine.scale_of(input_.name))
+                  for i, input_ in enumerate(self._linkage.inputs)]
+        results = ['&s', *(f'&{by}' for by in self.by)]
+        return f'{self._machine.name}_formulas({", ".join(values + results)})'

@@ -10,20 +10,31 @@ library's sine, cosine and arctangent. What all mechanisms have in common is `li
 
 from __future__ import annotations
 
-from typing import List, NamedTuple, Sequence
+from typing import Any, Dict, Iterator, List, NamedTuple, Sequence
 
 import numpy as np
 
 from .axes import actuators, Axis, axis, check_inverse, joints, loads
 from .code import Code, indented
 from .formulas import Formulas
-from .model import Model
-from .names import comment, constants, distinct, field, filled, prefix, template
+from .names import comment, constants, distinct, field, filled, parameter, prefix, template
+from .tables import Tables
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
 # Number of inputs at which the error of `float` is measured.
 SAMPLED = 2001
+# Poses from a solution of an inverse or from the near inputs, as in `linkage.h`: Newton's method,
+# and one without rates.
+POSES = 5
+INVERSE = """\
+/* The @what@ for @outputs@, nearest to `near`, whole turns included. Returns 0, and
+   leaves @what@ alone, where there is none. */
+static inline int @name@_@what@_for@tag@(@parameters@)
+{
+@body@
+}
+"""
 
 
 class Request(NamedTuple):
@@ -65,19 +76,22 @@ def written(machine: SceneMechanism, outputs: Sequence[str] = (), single: bool =
 
 def printed(requests: Sequence[Request], single: bool = False) -> str:
     """Return the headers of mechanisms, one after another, and what they have in common."""
-    most = max(len(request.machine.inputs) for request in requests)
-    common = template('linkage.h')
-    return '\n'.join(header(request, single, most, '' if i else common)
-                     for i, request in enumerate(requests))
+    first, *others = headers(requests, single, '@common@')
+    return '\n'.join([first.replace('@common@', template('linkage.h').rstrip()), *(
+        other.replace('@common@\n', '') for other in others)])
 
 
-def header(request: Request, single: bool, most: int, common: str) -> str:
-    """Return a header that begins with the text `common`, for `most` inputs in the program."""
-    return _Header(request, single).text(most, common)
+def headers(requests: Sequence[Request], single: bool, common: str) -> List[str]:
+    """Return the headers of mechanisms in one program, each with a text `common`."""
+    made = [_Header(request, single) for request in requests]
+    sizes = {'inputs': max(each.values['own_inputs'] for each in made),
+             'solutions': max(each.values['own_solutions'] for each in made)}
+    return [filled(template('mechanism.h.in'), {**each.values, **sizes, 'common': common})
+            for each in made]
 
 
 class _Header:
-    """Writes one header."""
+    """Writes one header: `values` are those of its template."""
 
     def __init__(self, request: Request, single: bool):
         self.machine, self.name = request.machine, request.machine.name
@@ -95,87 +109,88 @@ class _Header:
         inverses = [[axis(self.machine, output, output) for output in group] for group in groups]
         for axes in inverses:
             check_inverse(self.machine, axes)
-        self._sides = actuators(self.machine), joints(self.machine, request.joints)
-        needed = [each.output for axes in (*self._sides, *inverses) for each in axes]
-        self._code = Code(linkage, single)
-        self._formulas = Formulas(self.machine, self._code, [
-            *needed, *(output for output, _ in loads(self.machine))])
+        sides = actuators(self.machine), joints(self.machine, request.joints)
+        code = Code(linkage, single)
+        formulas = Formulas(self.machine, code, [
+            *(each.output for axes in (*sides, *inverses) for each in axes),
+            *(output for output, _ in loads(self.machine))])
         tags = distinct('_'.join(['', *(field(linkage, each) for each in group)])
                         for group in groups)
-        self._models = [Model(self.machine, self._code, self._formulas, self._sides)]
-        self._models += [Model(self.machine, self._code, self._formulas, ([], axes), tag)
-                         for axes, tag in zip(inverses, tags)]
-        self._inverses = list(zip(tags, inverses))
-        self._passive = request.passive
+        first = Tables(self.machine, code, formulas, sides)
+        others = [Tables(self.machine, code, formulas, ([], axes), tag)
+                  for axes, tag in zip(inverses, tags)]
+        model = first.text() + (first.passive(request.passive) if request.passive else '')
+        parts = [text for each, axes, tag in zip(others, inverses, tags)
+                 for text in (each.text(), self._inverse(axes, tag, code))]
+        solutions = max(each.solutions for each in (first, *others))
+        about = [*self._about(), f'A call takes at most {POSES * (solutions + 1)} poses.',
+                 *([self._error()] if single else [])]
+        whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
+        self.values: Dict[str, Any] = {
+            'about': '\n'.join(f' * {line}' for line in about),
+            'name': self.name, 'N': prefix(self.name), 'float': int(single),
+            'number': code.number, 'own_inputs': n, 'own_solutions': solutions,
+            'fields': formulas.struct(), 'pose': formulas.function(),
+            'parameters': ', '.join(f'{code.number} {each}' for each in formulas.parameters),
+            'arguments': ', '.join(formulas.parameters), 'by': ', '.join(formulas.by),
+            'by_places': ', '.join(f'&{by}' for by in formulas.by),
+            'by_pointers': ', '.join(f'{self.name}_pose *{by}' for by in formulas.by),
+            'inputs_named': ' and by '.join(formulas.inputs),
+            'whole': '\n'.join(indented([f'return isfinite({whole});'])),
+            'enums': '\n'.join(map(self._enum, ('actuator', 'joint'), sides)),
+            'axes': comment('; '.join(f'{side}: {self._with_units(axes)}' for side, axes in zip(
+                ('Actuators', 'joints'), sides))),
+            'model': model, 'inverses': '\n'.join(parts)}
 
-    def text(self, most: int, common: str) -> str:
-        """Return the whole header."""
-        first, *others = self._models
-        models = [first.text(), *(text for model, (tag, axes) in zip(others, self._inverses)
-                                  for text in (model.text(), self._inverse(tag, axes)))]
-        models += [first.passive(self._passive)] * bool(self._passive)
-        return filled(template('mechanism.h.in'), {
-            'about': '\n'.join(f' * {line}' for line in self._about()),
-            'name': self.name, 'N': prefix(self.name), 'common': common.rstrip(), 'most': most,
-            'inputs': len(self.linkage.inputs), 'float': int(self._code.number == 'float'),
-            'number': self._code.number, 'pose': self._formulas.text(),
-            'enums': '\n'.join(map(self._enum, ('actuator', 'joint'), self._sides)),
-            'axes': self._axes(), 'model': models[0], 'inverses': '\n'.join(models[1:])})
-
-    def _about(self) -> List[str]:
+    def _about(self) -> Iterator[str]:
         linkage = self.linkage
         lengths = ', '.join(f'{name} = {length:.9g}'
                             for name, length in linkage.dimensions.items())
         inputs = ', '.join(f'{input_.name} [{input_.unit}]' for input_ in linkage.inputs)
         scale = f', times {self.machine.scale:.9g}' if self.machine.scale != 1.0 else ''
-        lines = [f'{self.name}: {linkage.type}, written by linkage_ros.',
-                 f'Lengths [m]{scale}: {lengths or "those of the joint lines"}.',
-                 f'Input: {inputs}. Angles [rad] count counterclockwise.', *self._reach(),
-                 f'A call takes at most {max(model.poses for model in self._models)} poses.']
-        return lines + [self._error()] * (self._code.number == 'float')
-
-    def _reach(self) -> List[str]:
-        if len(self.linkage.inputs) > 1 or self.linkage.inputs[0].is_part:
-            return []
-        ranges = ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in self.machine.first.reach)
-        return [f'It can be assembled in {ranges} {self.linkage.inputs[0].unit}.']
+        yield f'{self.name}: {linkage.type}, written by linkage_ros.'
+        yield f'Lengths [m]{scale}: {lengths or "those of the joint lines"}.'
+        yield f'Input: {inputs}. Angles [rad] count counterclockwise.'
+        if len(linkage.inputs) == 1 and not linkage.inputs[0].is_part:
+            arcs = ' or '.join(
+                f'[{low:.6g}, {high:.6g}]' for low, high in self.machine.first.reach)
+            yield f'It can be assembled in {arcs} {linkage.inputs[0].unit}.'
 
     def _enum(self, side: str, axes: Sequence[Axis]) -> str:
         upper = f'{prefix(self.name)}_{side.upper()}'
         return 'enum { ' + ', '.join(f'{upper}_{name} = {i}' for i, name in enumerate(
             constants(each.name for each in axes))) + ' };'
 
-    def _axes(self) -> str:
-        return comment('; '.join(f'{side}: ' + ', '.join(
-            f'{each.name} [{"rad" if self.linkage.is_angle(each.output) else "m"}]'
-            for each in axes) for side, axes in zip(('Actuators', 'joints'), self._sides)))
+    def _with_units(self, axes: Sequence[Axis]) -> str:
+        return ', '.join(f'{each.name} [{"rad" if self.linkage.is_angle(each.output) else "m"}]'
+                         for each in axes)
 
-    def _inverse(self, tag: str, axes: Sequence[Axis]) -> str:
+    def _inverse(self, axes: Sequence[Axis], tag: str, code: Code) -> str:
         """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
-        formulas, code, n = self._formulas, self._code, len(axes)
-        number, units = code.number, [input_.size * formulas.unit(input_.name)
-                                      for input_ in self.linkage.inputs]
-        names = ', '.join(f'{each.output} [{"rad" if self.linkage.is_angle(each.output) else "m"}]'
-                          for each in axes)
+        n, number = len(axes), code.number
+        names = [*self.machine.inputs]
         if n == 1:
-            what, out, given, near, made = (
-                formulas.inputs[0], formulas.given[0], '&value', ['near'],
-                [f'*{formulas.given[0]}'])
-            head = f'{number} value, {number} near, {number} *{out}'
+            what, place = names[0], parameter(names[0])
+            near, made, value = ['near'], [f'*{place}'], '&value'
+            parameters = f'{number} value, {number} near, {number} *{place}'
         else:
-            what, given = 'inputs', 'value'
-            near, made = ([f'{name}[{i}]' for i in range(n)] for name in ('near', 'inputs'))
-            head = f'const {number} value[{n}], const {number} near[{n}], {number} inputs[{n}]'
-        return '\n'.join([
-            f'/* The {what} for {names}, nearest to `near`, whole turns included. Returns 0, and',
-            f'   leaves {what} alone, where there is none. */',
-            f'static inline int {self.name}_{what}_for{tag}({head})', '{',
-            *indented([
-                f'{number} q[{n}];', 'lkr_point p;',
-                *(f'q[{i}] = {code.times(each, 1.0 / units[i])};' for i, each in enumerate(near)),
-                f'if (!{self.name}_from{tag}({given}, q, &p)) {{', '    return 0;', '}',
-                *(f'{each} = {code.times(f"q[{i}]", units[i])};' for i, each in enumerate(made)),
-                'return 1;']), '}', ''])
+            what, value = 'inputs', 'value'
+            near, made = ([f'{name}[{i}]' for i in range(n)] for name in ('near', what))
+            parameters = ', '.join([f'const {number} value[{n}]', f'const {number} near[{n}]',
+                                    f'{number} inputs[{n}]'])
+        units = [input_.size * self.machine.scale_of(input_.name)
+                 for input_ in self.linkage.inputs]
+        lines = [
+            f'{number} q[LKR_MAX_INPUTS];', 'lkr_point p;',
+            *(f'q[{i}] = {code.times(each, 1.0 / units[i])};' for i, each in enumerate(near)),
+            f'if (!lkr_inverse(&{self.name}_model{tag}, LKR_JOINTS, {value}, q, &p)) {{',
+            '    return 0;', '}',
+            *(f'{each} = {code.times(f"q[{i}]", units[i])};' for i, each in enumerate(made)),
+            'return 1;']
+        return filled(INVERSE, {
+            'what': what, 'name': self.name, 'tag': tag,
+            'outputs': self._with_units(axes), 'parameters': parameters,
+            'body': '\n'.join(indented(lines))})
 
     def _error(self) -> str:
         """Describe the error of single precision over the reach."""

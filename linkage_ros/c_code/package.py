@@ -59,15 +59,15 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
         '#include "pluginlib/class_list_macros.hpp"\n',
         *(f'PLUGINLIB_EXPORT_CLASS(\n  {name}_plugins::{class_}Loader, '
           'transmission_interface::TransmissionLoader)' for class_ in classes), ''])
-    most = max(len(machine.inputs) for machine, _ in machines)
     files[Path('src/linkage.h')] = template('linkage.h')
-    for part, (machine, chosen) in zip(parts, machines):
-        own = part['name']
-        files[Path(f'src/{own}_linkage.h')] = header.header(
-            header.Request(machine, (), chosen, passive(machine, joints(machine, chosen))), False,
-            most, '#include "linkage.h"')
-        files[Path(f'src/{own}.hpp')] = filled(template('mechanism.hpp'), part)
-        files[Path(f'test/test_{own}.cpp')] = filled(template('test.cpp'), part)
+    written = header.headers([
+        header.Request(machine, (), chosen, passive(machine, joints(machine, chosen)))
+        for machine, chosen in machines], False, '#include "linkage.h"')
+    for part, text in zip(parts, written):
+        mechanism = part['name']
+        files[Path(f'src/{mechanism}_linkage.h')] = text
+        files[Path(f'src/{mechanism}.hpp')] = filled(template('mechanism.hpp'), part)
+        files[Path(f'test/test_{mechanism}.cpp')] = filled(template('test.cpp'), part)
     return files
 
 

@@ -15,69 +15,58 @@
 #include <math.h>
 #include <string.h>
 
-/* The most inputs of a linkage in this program, and whether it computes in float. */
-#ifndef LKR_MAX_INPUTS
-#define LKR_MAX_INPUTS 6
-#endif
-#ifndef LKR_FLOAT
-#define LKR_FLOAT 0
-#endif
-
 #if LKR_FLOAT
 typedef float lkr_real;
-#define lkr_abs fabsf
-#define lkr_floor floorf
-#define lkr_sqrt sqrtf
-#define lkr_atan2 atan2f
+#define LKR_MATH(name) name##f
 /* A Jacobian below this part of its size is singular: for velocities, and for Newton's method. */
 #define LKR_SINGULAR 1e-3f
 #define LKR_LEAST 1e-5f
-/* Newton's method ends at ENOUGH, and may leave CLOSE, times the rate or STEEPEST [rad, sizes]. */
+/* A position is reached at ENOUGH; where rounding allows no less, CLOSE times the rate or STEEPEST
+   may be left [rad, sizes]. */
 #define LKR_ENOUGH 2e-6f
 #define LKR_CLOSE 4e-6f
 #define LKR_STEEPEST 1e3f
-/* An input may be beyond an end of the reach by SLACK; it is then moved inside by INSIDE. */
-#define LKR_SLACK 1e-5f
-#define LKR_INSIDE 2e-6f
 #else
 #if DBL_MANT_DIG < 53
 #error "double is a float on this machine: print the header again with --float"
 #endif
 typedef double lkr_real;
-#define lkr_abs fabs
-#define lkr_floor floor
-#define lkr_sqrt sqrt
-#define lkr_atan2 atan2
+#define LKR_MATH(name) name
 #define LKR_SINGULAR 1e-6
 #define LKR_LEAST 1e-12
 #define LKR_ENOUGH 1e-14
 #define LKR_CLOSE 1e-13
 #define LKR_STEEPEST 4e6
-#define LKR_SLACK 1e-9
-#define LKR_INSIDE 1e-14
 #endif
 
-/* Poses of Newton's method: from a closed form, and of a search in a piece of the reach. */
-#define LKR_CLOSED_POSES 4
-#define LKR_SEARCH_POSES 64
-/* States that are tried for a first pose. */
-#define LKR_SAMPLES 4096
+/* Terms of a series. */
+#define LKR_TERMS 16
+/* Steps of Newton's method from a solution that rounding has moved. */
+#define LKR_MAX_STEPS 3
 #define LKR_NAN ((lkr_real)NAN)
-/* A closed form that misses by more than this belongs to another assembly [rad, sizes]. */
+#define LKR_FAR ((lkr_real)1e30)
+/* A solution that misses by more than this belongs to another assembly [rad, sizes]. */
 #define LKR_OTHER ((lkr_real)0.01)
-/* Half, in a form that both kinds of numbers have. */
 #define LKR_HALF ((lkr_real)0.5)
+#define LKR_PI ((lkr_real)3.14159265358979323846)
 
 /* Formulas are inlined wherever a pose is needed, so that only what is used there is computed. */
 #ifdef __GNUC__
 #define LKR_FORMULA static inline __attribute__((always_inline))
 #define LKR_PURE static __attribute__((const, noinline, unused))
-/* Farther than anything: where that is infinite, a compiler leaves out what asks for it. */
-#define LKR_FAR ((lkr_real)INFINITY)
 #else
-#define LKR_FAR ((lkr_real)1e30)
 #define LKR_FORMULA static inline
 #define LKR_PURE static inline
+#endif
+
+/* Series stay in the flash memory of an AVR, which has another address space than its RAM. */
+#ifdef __AVR__
+#include <avr/pgmspace.h>
+#define LKR_IN_FLASH PROGMEM
+#define lkr_copy_of_flash memcpy_P
+#else
+#define LKR_IN_FLASH
+#define lkr_copy_of_flash memcpy
 #endif
 
 /* --- numbers --- */
@@ -93,29 +82,20 @@ static inline lkr_real lkr_min(lkr_real a, lkr_real b)
     return b < a ? b : a;
 }
 
-/* Whether x is more than half a turn, if there are turns. */
-LKR_FORMULA int lkr_is_beyond(lkr_real x, lkr_real turn)
-{
-    return turn > 0 && lkr_abs(x) > turn / 2;
-}
-
-/* The whole turns nearest to x; a compiler divides where it compiles. */
+/* The whole turns nearest to x, if there are turns; a compiler divides where it compiles. */
 LKR_FORMULA lkr_real lkr_turns(lkr_real x, lkr_real turn)
 {
-    return turn * lkr_floor(x * (1 / turn) + LKR_HALF);
-}
-
-/* x without whole turns, if there are any. */
-LKR_FORMULA lkr_real lkr_wrapped(lkr_real x, lkr_real turn)
-{
-    return lkr_is_beyond(x, turn) ? x - lkr_turns(x, turn) : x;
+    if (!(turn > 0) || LKR_MATH(fabs)(x) <= turn / 2) {
+        return 0;
+    }
+    return turn * LKR_MATH(floor)(x * (1 / turn) + LKR_HALF);
 }
 
 /* A limit that is missed by rounding counts as reached. */
 static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
 {
     if (x > 0) {
-        return lkr_sqrt(x);
+        return LKR_MATH(sqrt)(x);
     }
     return x >= -tolerance ? 0 : LKR_NAN;
 }
@@ -128,12 +108,24 @@ static inline lkr_real lkr_gated(lkr_real x, lkr_real margin, lkr_real tolerance
 /* The angle of (x, y); a compiler leaves it out where it is not used. */
 LKR_PURE lkr_real lkr_angle(lkr_real y, lkr_real x)
 {
-    return lkr_atan2(y, x);
+    return LKR_MATH(atan2)(y, x);
+}
+
+static inline int lkr_are_finite(int n, const lkr_real *x)
+{
+    int i;
+    for (i = 0; i < n; i++) {
+        if (!isfinite(x[i])) {
+            return 0;
+        }
+    }
+    return 1;
 }
 
 /* --- types --- */
 
-enum { LKR_ACTUATORS = 0, LKR_JOINTS = 1 };
+/* The two sides of a linkage; LKR_NEITHER of them is known at first. */
+enum { LKR_ACTUATORS = 0, LKR_JOINTS = 1, LKR_NEITHER = 2 };
 
 /* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep. SINGULAR: a
    velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or infinite, which of a command
@@ -157,7 +149,6 @@ typedef struct {
 
 /* The place of an actuator or a joint in a linkage. */
 typedef struct {
-    const char *name;
     /* One over the size of its position, and what it may change by without effect, or 0. */
     lkr_real scale, turn;
     /* If it counts the turns of an input: the input, the rate by it, and the position where that is 0.
@@ -166,130 +157,99 @@ typedef struct {
     lkr_real rate, zero;
 } lkr_axis;
 
-/* An input, in rad or in its size: after how much poses repeat, or 0; its start, the range of its
-   samples, their step, and its sweep. */
-typedef struct {
-    lkr_real turn, start, low, width, step;
-    lkr_real sweep[2];
-} lkr_input;
-
 /* A linkage. Inputs q are in rad or in sizes. */
 typedef struct {
     int inputs;
-    /* Whether the pose of an inverse is to have rates and loads. */
+    /* Whether the first pose of an inverse is to have rates and loads. */
     int is_rated;
     /* The pose at inputs, with rates and loads or without; 0 if it cannot be assembled. */
     int (*at)(const lkr_real *q, int is_rated, lkr_point *p);
+    /* All inputs that positions of a side may have, NaN where there is none; returns their number. */
+    int (*solutions[2])(const lkr_real *position, lkr_real (*q)[LKR_MAX_INPUTS]);
     lkr_axis axis[2][LKR_MAX_INPUTS];
-    lkr_input input[LKR_MAX_INPUTS];
     /* After how much of each input the actuators or the joints repeat, or 0. */
     lkr_real turn[2][LKR_MAX_INPUTS];
-    /* The reach of its only input, if it has ends: middles of arcs and half their lengths. */
-    int arcs;
-    const lkr_real (*arc)[2];
+    /* Where each input starts, its sweep, and the range of its samples. */
+    lkr_real start[LKR_MAX_INPUTS];
+    lkr_real sweep[LKR_MAX_INPUTS][2];
+    lkr_real range[LKR_MAX_INPUTS][2];
 } lkr_model;
 
-/* From positions of actuators or joints to the inputs nearest to q, and the pose there. */
-typedef int lkr_inverse(const lkr_real *position, lkr_real *q, lkr_point *p);
-
-/* What an inverse looks for: positions and near inputs without the whole turns that are counted. */
+/* A part of the reach in which a position only rises, or only falls: its middle value, half its
+   change, the inputs at its ends, and the input as a series of Chebyshev polynomials of the position's
+   arcsine, which is smooth at an extreme and at an end of the reach. */
 typedef struct {
-    lkr_real to[LKR_MAX_INPUTS];
-    lkr_real near[LKR_MAX_INPUTS];
-    lkr_real whole[LKR_MAX_INPUTS];
-} lkr_goal;
-
-/* Inputs from which a goal may be reached, and how far they are from the near ones, or -1. */
-typedef struct {
-    lkr_real q[LKR_MAX_INPUTS];
-    lkr_real away;
-} lkr_start;
-
-/* A part of the reach in which a position only rises, or only falls: both ends. */
-typedef struct {
-    lkr_real q[2];
-    lkr_real position[2];
+    lkr_real middle, half, low, high;
+    lkr_real term[LKR_TERMS];
 } lkr_piece;
 
-/* The state between calls: the last poses and inputs by measured actuators [0] and by commanded
-   joints [1], which of them is newer, and whether there is one; what is held: the actuators [0] where
-   they were last commanded or measured, whichever is newer, and the joints [1] where they were last
-   measured. NaN was never there. */
+/* The state between calls: the last pose and its inputs, the side that it follows from, and what is
+   held: the positions of the actuators where they were last commanded or measured, whichever is newer,
+   of the joints where they were last measured, NaN before; the last efforts. */
 typedef struct {
-    lkr_point point[2];
-    lkr_real q[2][LKR_MAX_INPUTS];
-    int newer, is_known;
+    lkr_point point;
+    lkr_real q[LKR_MAX_INPUTS];
+    int newest;
     lkr_side held[2];
 } lkr_memory;
 
 /* --- a pose and positions --- */
 
 /* Gaps from a pose to positions, the shorter way round; returns the largest, in sizes. */
-static inline lkr_real lkr_gap(const lkr_model *model, int side, const lkr_real *to,
+static inline lkr_real lkr_gap(const lkr_model *model, int side, const lkr_real *position,
     const lkr_point *p, lkr_real *gap)
 {
     lkr_real most = 0;
     int i;
     for (i = 0; i < model->inputs; i++) {
         const lkr_axis *axis = &model->axis[side][i];
-        gap[i] = lkr_wrapped(to[i] - p->position[side][i], axis->turn);
-        most = lkr_max(most, lkr_abs(gap[i]) * axis->scale);
+        gap[i] = position[i] - p->position[side][i];
+        gap[i] -= lkr_turns(gap[i], axis->turn);
+        most = lkr_max(most, LKR_MATH(fabs)(gap[i]) * axis->scale);
     }
     return most;
 }
 
-/* Solve a x = b in place, b in x; returns the determinant's sign, 0 where a is singular. */
+/* Solve a x = b in place, b in x; returns 0 where a is singular. */
 static inline int lkr_solve(int size, lkr_real least,
     lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS], lkr_real *x)
 {
     /* A compiler knows this bound. */
     const int n = size < LKR_MAX_INPUTS ? size : LKR_MAX_INPUTS;
     lkr_real most = 1;
-    int i, j, k, sign = 1;
+    int i, j, k;
     for (i = 0; i < n; i++) {
         for (j = 0; j < n; j++) {
-            if (!isfinite(a[i][j])) {
-                return 0;
-            }
-            most = lkr_max(most, lkr_abs(a[i][j]));
+            most = lkr_max(most, LKR_MATH(fabs)(a[i][j]));
         }
     }
     for (k = 0; k < n; k++) {
-        lkr_real pivot;
+        lkr_real pivot, value;
         int best = k;
         for (i = k + 1; i < n; i++) {
-            best = lkr_abs(a[i][k]) > lkr_abs(a[best][k]) ? i : best;
+            best = LKR_MATH(fabs)(a[i][k]) > LKR_MATH(fabs)(a[best][k]) ? i : best;
         }
-        if (!(lkr_abs(a[best][k]) > least * most)) {
+        pivot = a[best][k];
+        if (!(LKR_MATH(fabs)(pivot) > least * most)) {
             return 0;
         }
         for (j = k; j < n; j++) {
-            const lkr_real swapped = a[k][j];
-            a[k][j] = a[best][j];
-            a[best][j] = swapped;
+            value = a[best][j];
+            a[best][j] = a[k][j];
+            a[k][j] = value / pivot;
         }
-        pivot = x[best];
+        value = x[best];
         x[best] = x[k];
-        x[k] = pivot;
-        sign = (best == k) == (a[k][k] > 0) ? sign : -sign;
-        for (i = k + 1; i < n; i++) {
-            const lkr_real factor = a[i][k] / a[k][k];
+        x[k] = value / pivot;
+        for (i = 0; i < n; i++) {
+            const lkr_real factor = i == k ? 0 : a[i][k];
             for (j = k; j < n; j++) {
                 a[i][j] -= factor * a[k][j];
             }
             x[i] -= factor * x[k];
         }
     }
-    for (i = n - 1; i >= 0; i--) {
-        for (j = i + 1; j < n; j++) {
-            x[i] -= a[i][j] * x[j];
-        }
-        x[i] /= a[i][i];
-        if (!isfinite(x[i])) {
-            return 0;
-        }
-    }
-    return sign;
+    return lkr_are_finite(n, x);
 }
 
 /* The change of the inputs for a change of positions; returns as lkr_solve. */
@@ -308,450 +268,207 @@ static inline int lkr_input_change(const lkr_model *model, int side, const lkr_p
     return lkr_solve(model->inputs, least, a, x);
 }
 
-/* Whether a pose at inputs q misses positions by rounding only: of the inputs, where it moves fast. */
-static inline int lkr_is_at(const lkr_model *model, int side, const lkr_point *p,
-    const lkr_real *q, lkr_real left)
-{
-    lkr_real steepest = 1;
-    int i, j;
-    for (i = 0; i < model->inputs; i++) {
-        for (j = 0; j < model->inputs; j++) {
-            const lkr_real rate = lkr_abs(p->rate[side][i][j]) * model->axis[side][i].scale;
-            steepest = lkr_max(steepest, rate * lkr_max(1, lkr_abs(q[j])));
-        }
-    }
-    /* At an end of the reach the rate is infinite, yet rounding is not. */
-    return left <= LKR_CLOSE * lkr_min(steepest, LKR_STEEPEST);
-}
-
 /* --- the inverse --- */
 
-/* What to look for; returns 0 if a position is not finite. */
-static inline int lkr_aim(const lkr_model *model, int side, const lkr_real *position,
-    const lkr_real *q, lkr_goal *goal)
+/* The inputs are those that the axes count. */
+static inline int lkr_counted(const lkr_real *position, lkr_real (*q)[LKR_MAX_INPUTS])
 {
-    int i;
-    for (i = 0; i < model->inputs; i++) {
-        goal->near[i] = q[i];
-        goal->whole[i] = 0;
-    }
-    for (i = 0; i < model->inputs; i++) {
-        const lkr_axis *axis = &model->axis[side][i];
-        if (!isfinite(position[i])) {
-            return 0;
-        }
-        goal->to[i] = position[i];
-        if (axis->rate != 0) {
-            /* It determines the input; whole turns are subtracted, so that they cost no digits. */
-            const int k = axis->input;
-            const lkr_real turn = model->input[k].turn;
-            goal->near[k] = (position[i] - axis->zero) / axis->rate;
-            if (lkr_is_beyond(goal->near[k], turn)) {
-                goal->whole[k] = lkr_turns(goal->near[k], turn);
-                goal->to[i] -= axis->rate * goal->whole[k];
-            }
-        }
-    }
+    (void)position;
+    memset(q, 0, sizeof *q);
     return 1;
 }
 
-/* Whether an input is in its reach, or beyond an end by rounding. */
-static inline int lkr_is_within(const lkr_model *model, lkr_real q, lkr_real *inside)
+/* The input in each piece of the reach that has a position, of such a size and with such a period. */
+static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, lkr_real turn,
+    lkr_real position, lkr_real (*q)[LKR_MAX_INPUTS])
 {
-    int i;
-    for (i = 0; i < model->arcs; i++) {
-        const lkr_real gap = lkr_wrapped(q - model->arc[i][0], model->input[0].turn);
-        const lkr_real over = lkr_abs(gap) - model->arc[i][1];
-        if (over <= LKR_SLACK) {
-            *inside = q;
-            if (over > 0) {
-                *inside += gap > 0 ? -over : over;
+    int i, k, solutions = 0;
+    for (k = 0; k < count && solutions < LKR_MAX_SOLUTIONS; k++) {
+        lkr_piece part;
+        lkr_real gap;
+        lkr_copy_of_flash(&part, &piece[k], sizeof part);
+        gap = position - part.middle;
+        gap -= lkr_turns(gap, turn);
+        if (LKR_MATH(fabs)(gap) <= LKR_MATH(fabs)(part.half) + LKR_CLOSE * size) {
+            const lkr_real sine = gap / part.half;
+            const lkr_real cosine = LKR_MATH(sqrt)(lkr_max(0, (1 - sine) * (1 + sine)));
+            const lkr_real x = lkr_angle(sine, cosine) / (LKR_PI / 2);
+            lkr_real sum = 0;
+            lkr_real before = 0;
+            /* Clenshaw's recurrence. */
+            for (i = LKR_TERMS - 1; i > 0; i--) {
+                const lkr_real next = 2 * x * sum - before + part.term[i];
+                before = sum;
+                sum = next;
             }
-            return 1;
+            sum = x * sum - before + part.term[0];
+            q[solutions][0] = lkr_min(lkr_max(sum, part.low), part.high);
+            solutions++;
         }
     }
-    return 0;
+    return solutions;
 }
 
-/* Add the whole turns to x that bring it nearest to the goal; returns how far it is from there, -1 if
-   not allowed. A command has to be in the sweeps. What is measured may be outside, which counts ten
-   times more. */
-static inline lkr_real lkr_bring(const lkr_model *model, int side,
-    const lkr_goal *goal, const lkr_real *x, lkr_real *q)
+/* From inputs q to those of positions next to them, and their pose; returns 0 if there are none. */
+static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position, lkr_real *q,
+    lkr_point *p)
+{
+    lkr_real gap[LKR_MAX_INPUTS], change[LKR_MAX_INPUTS], moved[LKR_MAX_INPUTS];
+    lkr_real left;
+    lkr_real steepest = 1;
+    int i, j, step;
+    if (!model->at(q, model->is_rated, p)) {
+        return 0;
+    }
+    left = lkr_gap(model, side, position, p, gap);
+    if (left <= LKR_ENOUGH) {
+        return 1;
+    }
+    if (!(left <= LKR_OTHER) || (!model->is_rated && !model->at(q, 1, p))) {
+        return 0;
+    }
+    for (step = 0; step < LKR_MAX_STEPS && left > LKR_ENOUGH; step++) {
+        lkr_point next;
+        lkr_real now;
+        if (!lkr_input_change(model, side, p, LKR_LEAST, gap, change)) {
+            break;
+        }
+        for (i = 0; i < model->inputs; i++) {
+            moved[i] = q[i] + change[i];
+        }
+        if (!model->at(moved, 1, &next)) {
+            break;
+        }
+        now = lkr_gap(model, side, position, &next, gap);
+        if (!(now < left)) {
+            break;
+        }
+        left = now;
+        *p = next;
+        memcpy(q, moved, sizeof moved);
+    }
+    /* What is left may be rounding: of the inputs, where a position changes fast; at an end of the
+       reach the rate is infinite, yet rounding is not. */
+    for (i = 0; i < model->inputs; i++) {
+        for (j = 0; j < model->inputs; j++) {
+            const lkr_real rate = LKR_MATH(fabs)(p->rate[side][i][j]) * model->axis[side][i].scale;
+            steepest = lkr_max(steepest, rate * lkr_max(1, LKR_MATH(fabs)(q[j])));
+        }
+    }
+    return left <= LKR_CLOSE * lkr_min(steepest, LKR_STEEPEST);
+}
+
+/* Add the turns to x that bring it nearest to inputs; returns how far it is from there, -1 if not
+   allowed. A command has to be in the sweeps. What is measured may be outside, which counts ten times
+   more. */
+static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_real *near,
+    const lkr_real *x, lkr_real *q)
 {
     lkr_real away = 0;
     int i;
     for (i = 0; i < model->inputs; i++) {
-        const lkr_real low = model->input[i].sweep[0];
-        const lkr_real high = model->input[i].sweep[1];
+        const lkr_real low = model->sweep[i][0];
+        const lkr_real high = model->sweep[i][1];
         const lkr_real turn = model->turn[side][i];
-        lkr_real near = goal->near[i];
         if (side == LKR_JOINTS) {
-            near = lkr_min(lkr_max(near, low), high);
-        }
-        q[i] = x[i] + goal->whole[i];
-        if (lkr_is_beyond(near - q[i], turn)) {
-            q[i] += lkr_turns(near - q[i], turn);
-        }
-        if (side == LKR_JOINTS && q[i] < low) {
-            q[i] += turn;
-        } else if (side == LKR_JOINTS && q[i] > high) {
-            q[i] -= turn;
-        }
-        if (q[i] < low || q[i] > high) {
-            if (side == LKR_JOINTS) {
+            const lkr_real inside = lkr_min(lkr_max(near[i], low), high);
+            q[i] = x[i] + lkr_turns(inside - x[i], turn);
+            if (q[i] < low) {
+                q[i] += turn;
+            } else if (q[i] > high) {
+                q[i] -= turn;
+            }
+            if (q[i] < low || q[i] > high) {
                 return -1;
             }
-            away += 10 * lkr_max(low - q[i], q[i] - high);
+        } else {
+            q[i] = x[i] + lkr_turns(near[i] - x[i], turn);
+            away += 10 * lkr_max(0, lkr_max(low - q[i], q[i] - high));
         }
-        away += lkr_abs(q[i] - goal->near[i]);
+        away += LKR_MATH(fabs)(q[i] - near[i]);
     }
     return isfinite(away) ? away : -1;
 }
 
-/* Give the positions of a pose at x the whole turns of q. */
-static inline void lkr_count_turns(const lkr_model *model, const lkr_real *x,
-    const lkr_real *q, lkr_point *p)
+/* From positions to the inputs nearest to q, and their pose; returns 0 if there are none. */
+static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *position, lkr_real *q,
+    lkr_point *p)
 {
-    int side, i;
-    for (side = LKR_ACTUATORS; side <= LKR_JOINTS; side++) {
-        for (i = 0; i < model->inputs; i++) {
-            const lkr_axis *axis = &model->axis[side][i];
-            if (axis->rate != 0) {
-                p->position[side][i] += axis->rate * (q[axis->input] - x[axis->input]);
-            }
-        }
-    }
-}
-
-/* Newton's method from a rated pose at inputs q that misses positions by gaps, of which `left` is the
-   largest: each step comes nearer, and stays on its side of singular poses. Returns 0, with any q, if
-   it does not get there. */
-static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *to,
-    lkr_real left, lkr_real *gap, lkr_real *q, lkr_point *p)
-{
-    lkr_point next;
-    lkr_real moved[LKR_MAX_INPUTS];
-    lkr_real x[LKR_MAX_INPUTS], y[LKR_MAX_INPUTS];
-    lkr_real share = 1;
-    int sign = lkr_input_change(model, side, p, LKR_LEAST, gap, x);
-    int i, step;
-    for (step = 1; step < LKR_CLOSED_POSES && sign != 0 && left > LKR_ENOUGH; step++) {
-        lkr_real now = left;
-        lkr_real longest = LKR_HALF;
-        int other = 0;
-        for (i = 0; i < model->inputs; i++) {
-            longest = lkr_max(longest, lkr_abs(x[i]));
-        }
-        for (i = 0; i < model->inputs; i++) {
-            moved[i] = q[i] + share * LKR_HALF / longest * x[i];
-        }
-        if (model->at(moved, 1, &next)) {
-            now = lkr_gap(model, side, to, &next, gap);
-        }
-        if (now < left) {
-            other = lkr_input_change(model, side, &next, LKR_LEAST, gap, y);
-        }
-        if (now < left && (other == sign || now <= LKR_CLOSE)) {
-            *p = next;
-            left = now;
-            sign = other;
-            share = 1;
-            for (i = 0; i < model->inputs; i++) {
-                q[i] = moved[i];
-                x[i] = y[i];
-            }
-        } else if (left <= LKR_CLOSE) {
-            break;
-        } else {
-            share /= 2;
-        }
-    }
-    return lkr_is_at(model, side, p, q, left);
-}
-
-/* From a start to positions; returns 0 if they are not reached in this assembly. */
-static inline int lkr_reach(const lkr_model *model, int side, const lkr_goal *goal,
-    lkr_real most, lkr_real *x, lkr_point *p)
-{
-    lkr_real gap[LKR_MAX_INPUTS];
-    lkr_real left;
-    /* A start may be beyond an end of the reach by rounding. */
-    if (!model->at(x, model->is_rated, p)
-        && !(model->arcs > 0 && lkr_is_within(model, x[0], &x[0]) && model->at(x, model->is_rated, p))) {
+    lkr_real x[LKR_MAX_SOLUTIONS + 1][LKR_MAX_INPUTS];
+    lkr_real away[LKR_MAX_SOLUTIONS + 1];
+    lkr_real near[LKR_MAX_INPUTS];
+    const int count = model->solutions[side](position, x);
+    int i, k, s;
+    if (!lkr_are_finite(model->inputs, position)) {
         return 0;
     }
-    left = lkr_gap(model, side, goal->to, p, gap);
-    if (left <= LKR_ENOUGH) {
-        return 1;
-    }
-    return left <= most && (model->is_rated || model->at(x, 1, p))
-        && lkr_refine(model, side, goal->to, left, gap, x, p);
-}
-
-/* The inputs nearest to those of the goal, of `count` starts; what an axis counts is known. If none
-   leads there, by Newton's method from the near ones, for which there is one more start. */
-static inline int lkr_choose(const lkr_model *model, int side, const lkr_goal *goal,
-    int count, lkr_start *start, lkr_real *q, lkr_point *p)
-{
-    lkr_real inside;
-    int i, k;
-    for (k = 0; k < count; k++) {
-        for (i = 0; i < model->inputs; i++) {
-            const lkr_axis *axis = &model->axis[side][i];
-            if (axis->rate != 0) {
-                start[k].q[axis->input] = goal->near[axis->input] - goal->whole[axis->input];
-            }
-        }
-        start[k].away = lkr_bring(model, side, goal, start[k].q, q);
-        if (model->arcs > 0 && !lkr_is_within(model, start[k].q[0], &inside)) {
-            start[k].away = -1;
-        }
+    for (i = 0; i < model->inputs; i++) {
+        near[i] = q[i];
     }
     for (i = 0; i < model->inputs; i++) {
-        start[count].q[i] = lkr_wrapped(goal->near[i] - goal->whole[i], model->input[i].turn);
+        const lkr_axis *axis = &model->axis[side][i];
+        for (k = 0; k < count && axis->rate != 0; k++) {
+            near[axis->input] = (position[i] - axis->zero) / axis->rate;
+            x[k][axis->input] = near[axis->input];
+        }
     }
-    start[count].away = LKR_FAR;
+    for (k = 0; k < count; k++) {
+        away[k] = lkr_bring(model, side, near, x[k], q);
+    }
+    /* Rounding may hide a solution next to the near inputs. */
+    memcpy(x[count], near, sizeof near);
+    away[count] = LKR_FAR;
     for (;;) {
-        lkr_start *nearest = 0;
-        lkr_real most;
+        int nearest = -1;
         for (k = 0; k <= count; k++) {
-            if (start[k].away >= 0 && (!nearest || start[k].away < nearest->away)) {
-                nearest = &start[k];
+            if (away[k] >= 0 && (nearest < 0 || away[k] < away[nearest])) {
+                nearest = k;
             }
         }
-        if (!nearest) {
+        if (nearest < 0) {
             return 0;
         }
-        most = nearest == &start[count] ? LKR_FAR : LKR_OTHER;
-        nearest->away = -1;
-        if (lkr_reach(model, side, goal, most, nearest->q, p)
-            && lkr_bring(model, side, goal, nearest->q, q) >= 0) {
-            lkr_count_turns(model, nearest->q, q, p);
+        away[nearest] = -1;
+        if (lkr_refine(model, side, position, x[nearest], p)
+            && lkr_bring(model, side, near, x[nearest], q) >= 0) {
+            /* Positions that count inputs have their turns. */
+            for (s = LKR_ACTUATORS; s <= LKR_JOINTS; s++) {
+                for (i = 0; i < model->inputs; i++) {
+                    const lkr_axis *axis = &model->axis[s][i];
+                    p->position[s][i] += axis->rate * (q[axis->input] - x[nearest][axis->input]);
+                }
+            }
             return 1;
         }
     }
-}
-
-/* Search a position in a piece of the reach, by Newton's method between brackets. */
-static inline int lkr_search_piece(const lkr_model *model, int side,
-    const lkr_piece *piece, lkr_real position, lkr_real near, lkr_real *x,
-    lkr_point *p)
-{
-    const lkr_real range = piece->position[1] - piece->position[0];
-    const lkr_real middle = (piece->q[0] + piece->q[1]) / 2;
-    const lkr_real scale = model->axis[side][0].scale;
-    lkr_real low = piece->q[0];
-    lkr_real high = piece->q[1];
-    lkr_real left = LKR_FAR;
-    lkr_real gap, inside, next;
-    int step;
-    p->position[side][0] = (piece->position[0] + piece->position[1]) / 2;
-    (void)lkr_gap(model, side, &position, p, &gap);
-    inside = (lkr_abs(range) / 2 - lkr_abs(gap)) * scale;
-    if (!(inside >= -LKR_CLOSE)) {
-        return 0;
-    }
-    next = low + (high - low) * (LKR_HALF + gap / range);
-    near = middle + lkr_wrapped(near - middle, model->turn[side][0]);
-    if (inside <= LKR_CLOSE) {
-        next = next > middle ? high : low;
-    } else if (near > low && near < high) {
-        next = near;
-    }
-    for (step = 0; step < LKR_SEARCH_POSES; step++) {
-        const lkr_real before = left;
-        int is_at = 0;
-        *x = next;
-        if (!model->at(x, 1, p)) {
-            /* Beyond an end by rounding. */
-            if (*x < middle) {
-                low = *x;
-            } else {
-                high = *x;
-            }
-            next = (low + high) / 2;
-        } else {
-            left = lkr_gap(model, side, &position, p, &gap);
-            is_at = lkr_is_at(model, side, p, x, left);
-            if (left <= LKR_ENOUGH || (left <= LKR_CLOSE && left > before / 2)) {
-                return is_at;
-            }
-            if ((gap > 0) == (range > 0)) {
-                low = *x;
-            } else {
-                high = *x;
-            }
-            next = *x + gap / p->rate[side][0][0];
-            if (!(next > low && next < high) || left > before / 2) {
-                next = (low + high) / 2;
-            }
-        }
-        if (!(next > low && next < high)) {
-            return is_at;
-        }
-    }
-    return 0;
-}
-
-/* The input nearest to q, searched in all pieces of the reach that have the position. */
-static inline int lkr_search(const lkr_model *model, int side, int count,
-    const lkr_piece *piece, const lkr_real *position, lkr_real *q, lkr_point *p)
-{
-    const lkr_goal goal = { { 0 }, { q[0] }, { 0 } };
-    lkr_real best = -1;
-    int k;
-    for (k = 0; k < count && isfinite(position[0]); k++) {
-        lkr_point found;
-        lkr_real x, brought, away;
-        if (!lkr_search_piece(model, side, &piece[k], position[0], goal.near[0], &x, &found)) {
-            continue;
-        }
-        away = lkr_bring(model, side, &goal, &x, &brought);
-        if (away >= 0 && (best < 0 || away < best)) {
-            best = away;
-            *q = brought;
-            *p = found;
-            lkr_count_turns(model, &x, q, p);
-        }
-    }
-    return best >= 0;
 }
 
 /* --- actuators and joints --- */
 
-/* Sample i of the inputs, all over their ranges; 0 is where they start. */
+/* Sample i of the inputs, all over their ranges. */
 static inline void lkr_sample(const lkr_model *model, long i, lkr_real *q)
 {
     int k;
     for (k = 0; k < model->inputs; k++) {
-        const lkr_input *input = &model->input[k];
-        const lkr_real x = input->step * (lkr_real)i;
-        q[k] = i ? input->low + input->width * (x - lkr_floor(x)) : input->start;
+        const lkr_real *range = model->range[k];
+        /* Multiples of an irrational number, without their whole parts. */
+        const lkr_real x = (lkr_real)i * LKR_MATH(sqrt)((lkr_real)((k + 1) * (k + 1) + 1));
+        q[k] = range[0] + (range[1] - range[0]) * (x - LKR_MATH(floor)(x));
     }
 }
 
-/* Initialize the memory and find a first pose; returns 0 if there is none. */
+/* Initialize the memory; returns 0 if the linkage cannot be assembled where it starts. */
 static inline int lkr_begin(const lkr_model *model, lkr_memory *m)
 {
     int i;
     memset(m, 0, sizeof *m);
-    m->newer = LKR_JOINTS;
+    m->newest = LKR_NEITHER;
     for (i = 0; i < model->inputs; i++) {
+        m->q[i] = model->start[i];
         m->held[LKR_ACTUATORS].position[i] = LKR_NAN;
         m->held[LKR_JOINTS].position[i] = LKR_NAN;
     }
-    for (i = 0; i < LKR_SAMPLES; i++) {
-        lkr_sample(model, i, m->q[LKR_JOINTS]);
-        if (model->at(m->q[LKR_JOINTS], 1, &m->point[LKR_JOINTS])) {
-            return 1;
-        }
-    }
-    return 0;
-}
-
-static inline int lkr_are_finite(int n, const lkr_real *x)
-{
-    int i;
-    for (i = 0; i < n; i++) {
-        if (!isfinite(x[i])) {
-            return 0;
-        }
-    }
-    return 1;
-}
-
-/* Find the pose of positions, and keep it as the newest; returns a status. */
-static inline int lkr_move(const lkr_model *model, lkr_inverse *inverse,
-    lkr_memory *m, int side, const lkr_real *position)
-{
-    const int other = 1 - side;
-    lkr_point p = m->point[m->newer];
-    lkr_real q[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS];
-    int i, is_there;
-    if (!lkr_are_finite(model->inputs, position)) {
-        return LKR_NOT_KNOWN;
-    }
-    /* Where it is already needs no search; but a command has to be in the sweep. */
-    is_there = m->is_known && lkr_gap(model, side, position, &p, gap) <= LKR_ENOUGH;
-    for (i = 0; i < model->inputs; i++) {
-        const lkr_real *sweep = model->input[i].sweep;
-        q[i] = m->q[m->newer][i];
-        if (side == LKR_JOINTS && !(q[i] >= sweep[0] && q[i] <= sweep[1])) {
-            is_there = 0;
-        }
-    }
-    if (!is_there && !inverse(position, q, &p)) {
-        return LKR_OUT_OF_REACH;
-    }
-    if (!lkr_are_finite(model->inputs, p.position[other])) {
-        return LKR_OUT_OF_REACH;
-    }
-    m->newer = side;
-    m->is_known = 1;
-    m->point[side] = p;
-    for (i = 0; i < model->inputs; i++) {
-        m->q[side][i] = q[i];
-        m->held[other].position[i] = p.position[other][i];
-    }
-    return LKR_OK;
-}
-
-/* Velocities of the other side at the newest pose, 0 where they are not OK; returns a status, from
-   that of the positions: velocities alone are those at the last pose. */
-static inline int lkr_velocities(const lkr_model *model, const lkr_memory *m, int side,
-    int status, const lkr_real *velocity, lkr_real *other)
-{
-    const lkr_point *p = &m->point[m->newer];
-    lkr_real x[LKR_MAX_INPUTS];
-    int i, j;
-    if (status == LKR_NOT_KNOWN && m->is_known) {
-        status = LKR_OK;
-    }
-    if (!lkr_are_finite(model->inputs, velocity)) {
-        status |= LKR_NOT_KNOWN;
-    }
-    if (status == LKR_OK
-        && !lkr_input_change(model, side, p, LKR_SINGULAR, velocity, x)) {
-        status = LKR_SINGULAR_POSE;
-    }
-    for (i = 0; i < model->inputs; i++) {
-        other[i] = 0;
-        for (j = 0; j < model->inputs && status == LKR_OK; j++) {
-            other[i] += p->rate[1 - side][i][j] * x[j];
-        }
-        if (!isfinite(other[i])) {
-            other[i] = 0;
-            status = LKR_SINGULAR_POSE;
-        }
-    }
-    return status;
-}
-
-/* Efforts of the other side at a pose; returns a status. The power of the actuators is that of the
-   joints less that of the loads. */
-static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int side,
-    const lkr_real *effort, lkr_real *other)
-{
-    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS];
-    int i, j;
-    if (!lkr_are_finite(model->inputs, effort)) {
-        return LKR_NOT_KNOWN;
-    }
-    for (i = 0; i < model->inputs; i++) {
-        other[i] = side == LKR_JOINTS ? p->load[i] : -p->load[i];
-        for (j = 0; j < model->inputs; j++) {
-            other[i] += p->rate[side][j][i] * effort[j];
-            a[i][j] = p->rate[1 - side][j][i] * model->axis[1 - side][j].scale;
-        }
-    }
-    if (!lkr_solve(model->inputs, LKR_SINGULAR, a, other)) {
-        return LKR_SINGULAR_POSE;
-    }
-    for (i = 0; i < model->inputs; i++) {
-        other[i] *= model->axis[1 - side][i].scale;
-    }
-    return lkr_are_finite(model->inputs, other) ? LKR_OK : LKR_SINGULAR_POSE;
+    return model->at(m->q, 1, &m->point);
 }
 
 /* Copy the values that are finite. */
@@ -765,67 +482,123 @@ static inline void lkr_copy(int n, const lkr_real *from, lkr_real *to)
     }
 }
 
-/* From the actuators' positions, velocities and efforts to the joints'. Returns a status: where it is
-   not OK, positions and efforts are the last measured ones, and velocities 0. */
-static inline int lkr_to_joints(const lkr_model *model, lkr_inverse *inverse,
-    lkr_memory *m, const lkr_side *from, lkr_side *to)
+/* Find the pose of positions, and keep it as the newest; returns a status. */
+static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, const lkr_real *position)
 {
-    lkr_side *held = &m->held[LKR_JOINTS];
-    lkr_real made[LKR_MAX_INPUTS];
     const int n = model->inputs;
-    int position, velocity, effort = LKR_NOT_KNOWN;
-    /* Where an actuator is measured is newer than its command, within the reach or not. */
-    lkr_copy(n, from->position, m->held[LKR_ACTUATORS].position);
-
-    position = lkr_move(model, inverse, m, LKR_ACTUATORS, from->position);
-    lkr_copy(n, held->position, to->position);
-
-    velocity = lkr_velocities(model, m, LKR_ACTUATORS, position, from->velocity, made);
-    lkr_copy(n, made, to->velocity);
-
-    if (m->is_known) {
-        effort = lkr_efforts(model, &m->point[m->newer], LKR_ACTUATORS, from->effort, made);
+    lkr_point p;
+    lkr_real q[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS];
+    int is_there;
+    if (!lkr_are_finite(n, position)) {
+        return LKR_NOT_KNOWN;
     }
-    if (effort == LKR_OK) {
-        lkr_copy(n, made, held->effort);
+    /* Where it is already needs no inverse; but a command has to be in the sweeps. */
+    is_there = m->newest != LKR_NEITHER
+        && lkr_gap(model, side, position, &m->point, gap) <= LKR_ENOUGH
+        && lkr_bring(model, side, m->q, m->q, q) == 0;
+    p = m->point;
+    memcpy(q, m->q, sizeof q);
+    if (!is_there && !lkr_inverse(model, side, position, q, &p)) {
+        return LKR_OUT_OF_REACH;
     }
-    lkr_copy(n, held->effort, to->effort);
-    return position | velocity | effort;
+    if (!lkr_are_finite(n, p.position[1 - side])) {
+        return LKR_OUT_OF_REACH;
+    }
+    m->newest = side;
+    m->point = p;
+    memcpy(m->q, q, sizeof q);
+    lkr_copy(n, p.position[1 - side], m->held[1 - side].position);
+    return LKR_OK;
 }
 
-/* The same from the joints to the actuators, to the inputs nearest to the last ones. Out of reach the
-   actuators are commanded to where they are: what was last commanded or measured, whichever is newer.
-   What is not commanded, NaN, is not written. */
-static inline int lkr_to_actuators(const lkr_model *model, lkr_inverse *inverse,
-    lkr_memory *m, const lkr_side *from, lkr_side *to)
+/* Velocities of the other side at a pose, 0 where they are not OK; returns a status. */
+static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int side,
+    const lkr_real *velocity, lkr_real *other)
 {
-    const int before = m->newer, was_known = m->is_known;
-    lkr_side *held = &m->held[LKR_ACTUATORS];
-    lkr_real made[LKR_MAX_INPUTS];
-    const int n = model->inputs;
-    int i, position, velocity, effort = LKR_NOT_KNOWN;
-    /* Efforts act where the actuators are, not where they are commanded to be. */
-    const lkr_point here = m->point[before];
+    lkr_real x[LKR_MAX_INPUTS];
+    int i, j, is_regular;
+    memset(other, 0, sizeof x);
+    if (!lkr_are_finite(model->inputs, velocity)) {
+        return LKR_NOT_KNOWN;
+    }
+    is_regular = lkr_input_change(model, side, p, LKR_SINGULAR, velocity, x);
+    for (i = 0; i < model->inputs; i++) {
+        for (j = 0; j < model->inputs; j++) {
+            other[i] += p->rate[1 - side][i][j] * x[j];
+        }
+    }
+    if (!is_regular || !lkr_are_finite(model->inputs, other)) {
+        memset(other, 0, sizeof x);
+        return LKR_SINGULAR_POSE;
+    }
+    return LKR_OK;
+}
 
-    position = lkr_move(model, inverse, m, LKR_JOINTS, from->position);
-    if (position != LKR_NOT_KNOWN) {
+/* The same for efforts. The power of the actuators is that of the joints less that of the loads. */
+static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int side,
+    const lkr_real *effort, lkr_real *other)
+{
+    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS];
+    int i, j, is_regular;
+    if (!lkr_are_finite(model->inputs, effort)) {
+        return LKR_NOT_KNOWN;
+    }
+    for (i = 0; i < model->inputs; i++) {
+        other[i] = side == LKR_JOINTS ? p->load[i] : -p->load[i];
+        for (j = 0; j < model->inputs; j++) {
+            other[i] += p->rate[side][j][i] * effort[j];
+            a[i][j] = p->rate[1 - side][j][i] * model->axis[1 - side][j].scale;
+        }
+    }
+    is_regular = lkr_solve(model->inputs, LKR_SINGULAR, a, other);
+    for (i = 0; i < model->inputs; i++) {
+        other[i] *= model->axis[1 - side][i].scale;
+    }
+    return is_regular && lkr_are_finite(model->inputs, other) ? LKR_OK : LKR_SINGULAR_POSE;
+}
+
+/* From one side's positions, velocities and efforts to the other's; returns a status. What cannot be
+   had is held, a velocity 0. What is not commanded is not written. */
+static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, const lkr_side *from,
+    lkr_side *to)
+{
+    const int n = model->inputs;
+    const int missing = side == LKR_JOINTS ? LKR_NOT_KNOWN : 0;
+    /* Commanded efforts act where the actuators are, not where they are commanded to be. */
+    const int is_here = side == LKR_JOINTS && m->newest != LKR_NEITHER;
+    const lkr_point here = m->point;
+    lkr_side *held = &m->held[1 - side];
+    lkr_side made;
+    int position, velocity, effort;
+    if (side == LKR_ACTUATORS) {
+        /* Where an actuator is measured is newer than its command, within the reach or not. */
+        lkr_copy(n, from->position, m->held[LKR_ACTUATORS].position);
+    }
+    position = lkr_move(model, m, side, from->position);
+    effort = lkr_efforts(model, is_here ? &here : &m->point, side, from->effort, made.effort);
+    velocity = lkr_velocities(model, &m->point, side, from->velocity, held->velocity);
+    if (position == LKR_OUT_OF_REACH) {
+        velocity &= LKR_NOT_KNOWN;
+        memset(held->velocity, 0, sizeof held->velocity);
+    }
+    if (m->newest == LKR_NEITHER) {
+        velocity = LKR_NOT_KNOWN;
+        effort = LKR_NOT_KNOWN;
+        memset(held->velocity, 0, sizeof held->velocity);
+    }
+    if (effort == LKR_OK) {
+        memcpy(held->effort, made.effort, sizeof made.effort);
+    } else if (effort & missing) {
+        /* What was commanded before a pause is not held after it. */
+        memset(held->effort, 0, sizeof held->effort);
+    }
+    if (!(position & missing)) {
         lkr_copy(n, held->position, to->position);
     }
-
-    velocity = lkr_velocities(model, m, LKR_JOINTS, position, from->velocity, made);
-    if (!(velocity & LKR_NOT_KNOWN)) {
-        lkr_copy(n, made, to->velocity);
+    if (!(velocity & missing)) {
+        lkr_copy(n, held->velocity, to->velocity);
     }
-
-    if (m->is_known) {
-        effort = lkr_efforts(model, was_known ? &here : &m->point[m->newer], LKR_JOINTS,
-            from->effort, made);
-    }
-    for (i = 0; i < n && effort != LKR_SINGULAR_POSE; i++) {
-        /* What was commanded before a pause is not held after it. */
-        held->effort[i] = effort == LKR_OK ? made[i] : 0;
-    }
-    if (effort != LKR_NOT_KNOWN) {
+    if (!(effort & missing)) {
         lkr_copy(n, held->effort, to->effort);
     }
     return position | velocity | effort;

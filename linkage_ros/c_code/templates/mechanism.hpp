@@ -22,8 +22,6 @@ struct @class@Code
   static constexpr std::array<Axis, @passive_count@> passive{@passive@};
   static constexpr Passive * at_passive = @passive_function@;
   static constexpr const lkr_model & model = @name@_model;
-  static constexpr lkr_inverse * from_actuators = @name@_from_actuators;
-  static constexpr lkr_inverse * from_joints = @name@_from_joints;
 };
 
 using @class@Transmission = TransmissionOf<@class@Code>;

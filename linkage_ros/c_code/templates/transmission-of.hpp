@@ -9,10 +9,9 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
 #include <cstddef>
+#include <future>
 #include <limits>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -44,11 +43,7 @@ public:
   ~HeldLog()
   {
     if (thread_.joinable()) {
-      {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        is_over_ = true;
-      }
-      over_.notify_one();
+      over_.set_value();
       thread_.join();
     }
   }
@@ -80,8 +75,10 @@ private:
       "actuators are measured where the linkage cannot be: the joints' positions are held",
       "measured at a singular pose: velocities are 0 or efforts are held",
       "a measured value is not finite: the joints' values are held"};
-    std::unique_lock<std::mutex> lock(mutex_);
-    for (int before = 0;;) {
+    const auto over = over_.get_future();
+    bool is_over = false;
+    for (int before = 0; !is_over;) {
+      is_over = over.wait_for(std::chrono::seconds(1)) == std::future_status::ready;
       const int now = seen_.exchange(0, std::memory_order_relaxed);
       for (std::size_t i = 0; i < reasons.size(); ++i) {
         // A reason that goes on is logged once.
@@ -90,18 +87,12 @@ private:
         }
       }
       before = now;
-      if (is_over_) {
-        return;
-      }
-      over_.wait_for(lock, std::chrono::seconds(1), [this] { return is_over_; });
     }
   }
 
   std::string name_;
   std::atomic<int> seen_{0};
-  bool is_over_ = false;
-  std::mutex mutex_;
-  std::condition_variable over_;
+  std::promise<void> over_;
   std::thread thread_;
 };
 
@@ -287,12 +278,12 @@ public:
   {
     if constexpr (size > 0) {
       double position[size], rate[size][LKR_MAX_INPUTS], x[LKR_MAX_INPUTS];
-      if (count_ == 0 || !memory.is_known || memory.newer != LKR_ACTUATORS) {
+      if (count_ == 0 || memory.newest != LKR_ACTUATORS) {
         return;
       }
-      Code::at_passive(memory.q[LKR_ACTUATORS], position, rate);
+      Code::at_passive(memory.q, position, rate);
       is_moving = is_moving && lkr_input_change(
-        &Code::model, LKR_ACTUATORS, &memory.point[LKR_ACTUATORS], LKR_SINGULAR,
+        &Code::model, LKR_ACTUATORS, &memory.point, LKR_SINGULAR,
         actuators.velocity, x) != 0;
       for (std::size_t i = 0; i < size; ++i) {
         double velocity = 0.0;
@@ -365,22 +356,11 @@ public:
 
   void actuator_to_joint() override
   {
-    auto found = unwritten();
-    const auto given = actuators_.read();
-    status_ = lkr_to_joints(&Code::model, Code::from_actuators, &memory_, &given, &found);
-    note(false);
-    joints_.write(found);
-    passive_.write(memory_, given, !(status_ & OUT_OF_REACH));
+    const auto measured = transmit(LKR_ACTUATORS, actuators_, joints_);
+    passive_.write(memory_, measured, !(status_ & OUT_OF_REACH));
   }
 
-  void joint_to_actuator() override
-  {
-    auto found = unwritten();
-    const auto given = joints_.read();
-    status_ = lkr_to_actuators(&Code::model, Code::from_joints, &memory_, &given, &found);
-    note(true);
-    actuators_.write(found);
-  }
+  void joint_to_actuator() override { transmit(LKR_JOINTS, joints_, actuators_); }
 
   std::size_t num_actuators() const override { return Code::size; }
 
@@ -394,22 +374,23 @@ private:
     throw transmission_interface::Exception("transmission '" + info_.name + "': " + why);
   }
 
-  /// Values that are not written unless they are set.
-  static lkr_side unwritten()
+  /// From the handles of one side to those of the other; return the values of the first.
+  template <class From, class To>
+  lkr_side transmit(int side, const From & from, To & to)
   {
-    lkr_side made;
-    std::fill_n(made.position, LKR_MAX_INPUTS, LKR_NAN);
-    std::fill_n(made.velocity, LKR_MAX_INPUTS, LKR_NAN);
-    std::fill_n(made.effort, LKR_MAX_INPUTS, LKR_NAN);
-    return made;
-  }
-
-  void note(bool is_command)
-  {
+    const auto values = from.read();
+    lkr_side result;
+    for (auto kind : {result.position, result.velocity, result.effort}) {
+      // What is not set is not written.
+      std::fill_n(kind, LKR_MAX_INPUTS, LKR_NAN);
+    }
+    status_ = lkr_transmit(&Code::model, &memory_, side, &values, &result);
     if (!joints_.have(1) && !joints_.have(2)) {
       status_ &= ~SINGULAR;
     }
-    log_.note(status_, is_command);
+    log_.note(status_, side == LKR_JOINTS);
+    to.write(result);
+    return values;
   }
 
   hardware_interface::TransmissionInfo info_;
