@@ -99,7 +99,7 @@ class Code:
             body += [f'const {self.number} {name} = {code};' for name, code in ready]
             body += ending(codes[:n])
             statements, numbers, codes = statements[len(ready):], numbers[n:], codes[n:]
-        # Lengths have their names and come first; coordinates of points on links are dimensions, too.
+        # Lengths have names and come first; coordinates of points on links are dimensions, too.
         names = {name: f'length_{node.args[0]}' for name, node in zip(
             constants, pose.variant.constants)
             if node.op == 'dimension' and node.args[0].isidentifier()}
