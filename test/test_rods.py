@@ -215,7 +215,7 @@ def check_windows(seed, count):
         try:
             made(ankle.within(middle - half, middle + half))
         except WindowError as error:
-            assert 'there may be a second pose' in str(error)
+            assert re.search('there (is|may be) a second pose', str(error))
             ambiguous += rods.is_ambiguous(ankle, middle - half, middle + half)
             # The largest that is offered instead is as near to a second pose as the proof goes.
             if error.limits:
@@ -236,10 +236,32 @@ def test_limits_with_a_second_or_a_singular_pose_are_refused(seed, count):
 @pytest.mark.nightly
 def test_of_limits_that_are_too_wide_the_largest_that_can_be_are_named():
     wide = [line.replace('-50deg 30deg', '-170deg 150deg') for line in G1]
-    with pytest.raises(ValueError, match='there may be a second pose in these limits.*; the '
+    with pytest.raises(ValueError, match='there is a second pose in these limits: with right at '
+                       '.*, left at .*, pitch at .*, roll at .* as well as pitch at .*; the '
                        r'largest proved to have one at most: pitch within -\d.*deg, roll '
                        r'within -\d.*deg'):
         made(wide)
+
+
+@pytest.mark.parametrize('seed', [1, 2])
+def test_the_two_poses_of_refused_limits_are_two_poses(seed):
+    rng, found = np.random.default_rng(seed), 0
+    for _ in range(4):
+        ankle = rods.random_ankle(rng)
+        try:
+            made(ankle.within([-1.6, -1.4], [1.6, 1.4]))
+        except WindowError as error:
+            said = re.findall(r'[lr] at ([^,]+), [lr] at ([^,]+), pitch at (\S+), roll at (\S+) '
+                              r'as well as pitch at (\S+), roll at ([^;]+)$', error.problem)
+            for left, right, *poses in np.array(said, float):
+                # With six digits they are next to poses of these motors.
+                for pitch, roll in (poses[:2], poses[2:]):
+                    every = np.stack(rods.assemblies(ankle, [[left], [right]]), axis=-1)[0]
+                    assert np.nanmin(np.abs(every - (pitch, roll)).max(axis=-1)) < 1e-3
+                    assert rods.are_drawn(ankle, [left, right], pitch, roll)
+                assert max(abs(np.subtract(poses[:2], poses[2:]))) > 1e-2
+                found += 1
+    assert found
 
 
 @pytest.fixture(scope='module')

@@ -36,6 +36,8 @@ MOST_PAIRS, MOST_IN_SEARCH = 50_000, 4_000
 POSES, CONVERGED = 33, 0.01 * LAST_STEP
 # Halvings in the search for the largest rectangle.
 HALVINGS = 7
+# Two poses differ by this [rad] at least; so many pairs are tried to find some.
+DISTINCT, TRIED = 1e-4, 1000
 
 
 class Boxes(NamedTuple):
@@ -47,6 +49,13 @@ class Boxes(NamedTuple):
     def some(self, which: np.ndarray) -> Boxes:
         """Return some of the boxes, whose halves differ."""
         return Boxes(self.middle[which], self.half[which])
+
+
+class TwoPoses(NamedTuple):
+    """Two poses [rad] for the same motors: the angles of cranks, or lengths [m]."""
+
+    motors: Sequence[float]
+    poses: Sequence[np.ndarray]
 
 
 class WindowRod(NamedTuple):
@@ -196,10 +205,10 @@ class Window:
 
     def is_proved(self, most: int = MOST_PAIRS) -> bool:
         """Return whether it has one pose at most, by proof, and Newton's method finds it."""
-        return self._is_found() and not self._is_ambiguous(most)
+        return self._is_found() and not self.undecided(most)[0].size
 
-    def _is_ambiguous(self, most: int) -> bool:
-        """Return whether pairs of boxes are left that may have two poses of some motors."""
+    def undecided(self, most: int = MOST_PAIRS) -> Tuple[np.ndarray, np.ndarray]:
+        """Return the middles (2, n) of pairs of boxes that may have two poses of some motors."""
         # A little beyond the edges.
         middle, half = self.middle[:, None], 0.5 * (self.high - self.low) + 2.0 * EDGE
         first = second = np.zeros(1, int)
@@ -219,7 +228,7 @@ class Window:
                     2 * second, 2 * second + 1, 2 * second + 1, 2 * second[both]]))
             used, places = np.unique(np.concatenate([first, second]), return_inverse=True)
             middle, (first, second) = middle[:, used], places.reshape(2, -1)
-        return len(first) > 0
+        return middle[:, first], middle[:, second]
 
     def _is_open(self, boxes: Boxes, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Return whether pairs of boxes may have two poses of some motors."""
@@ -234,6 +243,29 @@ class Window:
             apart = np.minimum(away, math.pi - away) > right.half + left.half + SINGULAR
         return ~(apart | np.isnan(shared[0].half) | np.isnan(shared[1].half))
 
+    def second_pose(self) -> Optional[TwoPoses]:
+        """Return two poses for the same motors, far from each other, if some are found."""
+        start, other = (ends.clip(self.low[:, None], self.high[:, None])
+                        for ends in self.undecided())
+        # Not more than Newton's method can try at once.
+        apart = np.abs(start - other).max(axis=0)
+        some = np.argsort(-apart, kind='stable')[::max(1, len(apart) // TRIED)]
+        start, other = start[:, some], other[:, some]
+        with np.errstate(all='ignore'):
+            motors = [rod.motors(start) for rod in self.rods]
+            found = self._closed([rod.bar(each) for rod, each in zip(self.rods, motors)], other,
+                                 2 * STEPS)
+            again = [rod.motors(found) for rod in self.rods]
+            good = (found > self.low[:, None]) & (found < self.high[:, None])
+            good &= [abs(np.exp(1j * one) - np.exp(1j * two)) < CONVERGED if rod.turns
+                     else abs(one - two) < CONVERGED * two
+                     for rod, one, two in zip(self.rods, again, motors)]
+        apart = np.abs(found - start).max(axis=0) * good.all(axis=0)
+        if not (apart > DISTINCT).any():
+            return None
+        i = int(np.nanargmax(apart))
+        return TwoPoses((motors[0][i], motors[1][i]), (start[:, i], found[:, i]))
+
     def _is_found(self) -> bool:
         """Return whether Newton's method finds the poses of a grid, from the middle."""
         axes = [np.linspace(low, high, POSES) for low, high in zip(self.low, self.high)]
@@ -242,13 +274,19 @@ class Window:
             motors = np.array([rod.motors(poses) for rod in self.rods])
             there = ~np.isnan(motors).any(axis=0)
             poses, motors = poses[:, there], motors[:, there]
-            bars = [rod.bar(values) for rod, values in zip(self.rods, motors)]
-            pose = _pose(self.middle)
-            for _ in range(STEPS - 1):
-                pose, _step = newton_step(bars, pose)
-            missed = np.abs(np.arctan2(pose[1::2], pose[::2]) - poses)
+            found = self._closed([rod.bar(each) for rod, each in zip(self.rods, motors)],
+                                 self.middle, STEPS - 1)
         # A NaN fails this comparison.
-        return bool((missed < CONVERGED).all())
+        return bool((np.abs(found - poses) < CONVERGED).all())
+
+    @staticmethod
+    def _closed(bars: Sequence[Tuple[Vector, Circle, Any]], start: np.ndarray, steps: int
+                ) -> np.ndarray:
+        """Return poses after so many steps of Newton's method."""
+        pose = _pose(start)
+        for _ in range(steps):
+            pose, _step = newton_step(bars, pose)
+        return np.arctan2(pose[1::2], pose[::2])
 
 
 def _norm(vector: Vector) -> float:

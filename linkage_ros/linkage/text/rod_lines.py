@@ -36,6 +36,7 @@ from typing import (
     Mapping,
     NamedTuple,
     Optional,
+    Sequence,
     Tuple,
 )
 
@@ -104,6 +105,7 @@ class TwoRodLink(NamedTuple):
     """A link on two hinges in a row and two rods: the data of its window, as expressions."""
 
     lines: Tuple[Line, Line]
+    inputs: Tuple[str, ...]
     limits: Tuple[Optional[Tuple[Real, ...]], ...]
     rods: Tuple[WindowRod, ...]
 
@@ -121,9 +123,21 @@ class TwoRodLink(NamedTuple):
             return
         largest, names = window.largest(), [line.names[0] for line in self.lines]
         raise WindowError(
-            self.lines[1], 'there may be a second pose in these limits, or one that the steps of '
-            "Newton's method do not reach" if limited else 'both hinges need limits',
+            self.lines[1], _why_not(window, self.inputs, names) if limited
+            else 'both hinges need limits',
             dict(zip(names, zip(largest.low.tolist(), largest.high.tolist()))) if largest else {})
+
+
+def _why_not(window: Window, inputs: Sequence[str], hinges: Sequence[str]) -> str:
+    """Return why limits are not proved: two poses if there are some."""
+    def at(names: Sequence[str], values: Iterable[float]) -> str:
+        return ', '.join(f'{name} at {value:.6g}' for name, value in zip(names, values))
+
+    if two := window.second_pose():
+        return (f'there is a second pose in these limits: with {at(inputs, two.motors)}, '
+                + ' as well as '.join(at(hinges, pose) for pose in two.poses))
+    return ("there may be a second pose in these limits, or one that the steps of Newton's method "
+            'do not reach')
 
 
 def parse(texts: Iterable[str]) -> List[Line]:
@@ -415,7 +429,7 @@ class _Drawing:
         self._builder.require(first.hinge.leaning(second.hinge) - _LEANING,
                               f'its axis is nearly parallel to that of {first.line.names[0]}',
                               second.line)
-        rods = []
+        rods, inputs = [], []
         for line in lines:
             end, base = self._beyond(line, link)
             pivot, length = self._pivot(base, first.parent), self._lengths[line.names[0]]
@@ -426,15 +440,18 @@ class _Drawing:
                 what = 'be fixed to' if length.varies else 'turn about one axis on'
                 raise line.error(f'its end on {base.link} must {what} {first.parent}, which '
                                  'carries the two hinges that it shares with another rod')
-            side = self._side(line, self._joints[self._moving(base.link, first.parent)[0]], end,
-                              base) if pivot.turn else real(0.0)
+            inputs.append(self._moving(base.link, first.parent)[0] if pivot.turn
+                          else line.names[0])
+            side = self._side(line, self._joints[inputs[-1]], end, base) \
+                if pivot.turn else real(0.0)
             rods.append(Rod(pivot._replace(path=frame.transformed(pivot.path)),
                             frame.transformed(second.hinge.circle(end.point)), length, side))
         limits = first.limits, second.limits
         self._builder.windows.append(TwoRodLink(
-            (first.line, second.line), tuple(tuple(ends) or None for ends in limits),
-            tuple(WindowRod(rod.pivot.path, rod.end, None if rod.length.varies else rod.length,
-                            rod.side) for rod in rods)))
+            (first.line, second.line), tuple(inputs),
+            tuple(tuple(ends) or None for ends in limits), tuple(WindowRod(
+                rod.pivot.path, rod.end, None if rod.length.varies else rod.length, rod.side)
+                for rod in rods)))
         first.turn, second.turn, limit = two_rods(rods, [
             0.5 * (each[0] + each[1]) if each else real(0.0) for each in limits])
         drawn = [rod.drawn(first.turn, second.turn, self._span) for rod in rods if rod.pivot.turn]
