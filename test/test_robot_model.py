@@ -71,27 +71,18 @@ class Read(SimpleNamespace):
         Of each link its visuals, in space.
     joints : dict
         Of each joint kind, parent, child and axis.
-    points : dict
-        Of each point its link and its place in space.
-    masses : dict
-        Of each link that has one.
 
     """
 
     def __init__(self):
-        super().__init__(poses={}, seen={}, joints={}, points={}, masses={})
+        super().__init__(poses={}, seen={}, joints={})
 
     def check(self, other):
-        """Check that another file has the same links, joints and points."""
-        for what in 'poses', 'seen', 'points':
-            assert vars(self)[what].keys() == vars(other)[what].keys()
+        """Check that another file has the same links and joints."""
+        assert self.poses.keys() == other.poses.keys() and self.joints == other.joints
         for name, pose in self.poses.items():
             assert pose == pytest.approx(other.poses[name], abs=1e-9), name
-        for name, (link, place) in self.points.items():
-            assert link == other.points[name][0]
-            assert place == pytest.approx(other.points[name][1], abs=1e-9)
         check_seen(self.seen, other.seen)
-        assert self.joints == other.joints
 
 
 def check_seen(found, wanted):
@@ -122,18 +113,13 @@ def read_urdf(text, positions):
             moved, still = np.array(axis) * positions[joint.get('name')], (0, 0, 0)
             pose = pose @ turned(*moved, *still) if kind == 'prismatic' else (
                 pose @ turned(*still, *moved))
-        poses[name], owner = pose, name
-        if name.endswith('_link'):
-            found.poses[name] = pose
-            found.joints[joint.get('name')] = (
-                kind, found.points.get(parent, [parent])[0], name, axis)
-        else:
-            assert joint.get('name') == f'{name}_fixed' and kind == 'fixed'
-            owner, found.points[name] = parent, (parent, pose[:3, 3])
+        poses[name] = found.poses[name] = pose
+        found.joints[joint.get('name')] = kind, parent, name, axis
+        found.seen[name] = []
         for visual in link.iter('visual'):
             shape, = visual.find('geometry')
             sizes = numbers(' '.join(filter(None, map(shape.get, ('size', 'radius', 'length')))))
-            found.seen.setdefault(owner, []).append(seen(
+            found.seen[name].append(seen(
                 shape.tag, colours[visual.find('material').get('name')], sizes,
                 pose @ origin(visual)))
     return found
@@ -145,9 +131,8 @@ def origin(element):
 
 
 def read_sdf(text):
-    """Return what an SDF says, without the pins that close its loops, and these by name."""
-    root, found = ElementTree.fromstring(text)[0], Read()
-    pins = {}
+    """Return what an SDF says, where a loop was cut what it is closed to, and the masses."""
+    root, found, masses = ElementTree.fromstring(text)[0], Read(), {}
     for link in root.findall('link'):
         name, base = link.get('name'), link.find('pose').get('relative_to')
         pose = turned(*numbers(link.findtext('pose')))
@@ -163,22 +148,20 @@ def read_sdf(text):
                 shape.tag, ambient, [value for size in shape for value in numbers(size.text)],
                 found.poses[name] @ turned(*numbers(visual.findtext('pose')))))
         if (inertial := link.find('inertial')) is not None:
-            found.masses[name] = float(inertial.findtext('mass'))
-    for frame in root.findall('frame'):
-        link = frame.get('attached_to')
-        place = (found.poses[link] @ turned(*numbers(frame.findtext('pose'))))[:3, 3]
-        found.points[frame.get('name')] = link, place
+            masses[name] = float(inertial.findtext('mass'))
     for joint in root.findall('joint'):
         axis = joint.findtext('axis/xyz')
-        said = (joint.get('type'), joint.findtext('parent'), joint.findtext('child'),
-                axis and numbers(axis))
-        if said[2].endswith('_link'):
-            found.joints[joint.get('name')] = said
-        else:
-            pins.setdefault(said[2], {})[joint.get('name')] = said
-    return found, root, {name: (joints, *(vars(found)[what].pop(name)
-                                          for what in ('poses', 'seen', 'masses')))
-                         for name, joints in pins.items()}
+        found.joints[joint.get('name')] = (
+            joint.get('type'), joint.findtext('parent'), joint.findtext('child'),
+            axis and numbers(axis))
+    closed = {name: found.joints.pop(f'{name}_closed') for name in found.poses
+              if f'{name}_closed' in found.joints}
+    for name, (kind, _, child, _) in closed.items():
+        turns, parent, pin, axis = found.joints.pop(f'{name}_hinge')
+        assert (turns, axis, kind) == ('revolute', [0.0, 0.0, 1.0], 'fixed')
+        assert pin == child == name
+        found.joints[f'{name}_fixed'] = 'fixed', parent, name, None
+    return found, root, {name: met for name, (_, met, *_) in closed.items()}, masses
 
 
 def read_mjcf(text):
@@ -206,8 +189,6 @@ def read_mjcf(text):
                 sizes *= {'box': 2.0, 'sphere': 1.0, 'cylinder': [1.0, 2.0]}[shape]
                 found.seen[name].append(seen(
                     shape, numbers(geom.get('rgba')), sizes, there @ pose(geom)))
-            for site in child.findall('site'):
-                found.points[site.get('name')] = name, (there @ pose(site))[:3, 3]
             read(child, name, there)
 
     read(root.find('worldbody'), 'world', np.eye(4))
@@ -215,7 +196,7 @@ def read_mjcf(text):
 
 
 def scene_seen(one, thetas, width):
-    """Return what is seen of the links of a scene, and the bare names of the points on them."""
+    """Return what is seen of the links of a scene, and the balls of the points on each."""
     _, places = posed(one, thetas)
     found, points = {}, {}
     shown = shapes(one)
@@ -224,6 +205,9 @@ def scene_seen(one, thetas, width):
 
     def add(link, *visual):
         found.setdefault(f'm_{link}_link', []).append(row(*visual))
+
+    def ball(place):
+        return row('sphere', GREY, width, place, place)
 
     def colour(link):
         return ORANGE if link in one.inputs else BLUE
@@ -234,10 +218,9 @@ def scene_seen(one, thetas, width):
         joints = {link.name: link.joint for link in one.linkage.links}
         for link, frame in {'ground': ground_frame(one.linkage), **one.linkage.frames}.items():
             name = link if link == 'ground' else prefix + link
-            on = [point for point in frame if point != joints.get(link)]
-            points.setdefault(f'm_{name}_link', []).extend(f'm_{prefix}{point}' for point in on)
-            for point in on or [joints[link]]:
-                add(name, 'sphere', GREY, width, spots[point], spots[point])
+            points.setdefault(f'm_{name}_link', {}).update(
+                (f'm_{prefix}{point}', [ball(spots[point])]) for point in frame
+                if point != joints.get(link))
             for start, end in one.linkage.bars if link != 'ground' else ():
                 if {start, end} <= set(frame):
                     add(name, 'cylinder', colour(link), width / 2, spots[start], spots[end])
@@ -247,11 +230,8 @@ def scene_seen(one, thetas, width):
                     BARREL: ('cylinder', colour(slide), 1.25 * width),
                     ROD: ('cylinder', BLUE, width / 2)}[shape.kind]
             drawn = (*look, in_space(one.pose, start), in_space(one.pose, end))
-            if link != 'ground' or row(*drawn) not in found['m_ground_link']:
+            if link != 'ground' or row(*drawn) not in found.get('m_ground_link', []):
                 add(link if link == 'ground' else prefix + link, *drawn)
-    if len(one.assembly().legs) > 1:
-        hub = in_space(one.pose, places['m_left0_' + one.linkage.links[0].joint])
-        add(one.linkage.links[0].name, 'sphere', GREY, width, hub, hub)
     return found, points
 
 
@@ -270,37 +250,45 @@ def test_three_formats_say_what_the_scene_has(name):
     positions, places = posed(one, starts)
     tree = read_urdf(urdf.write(robot), positions)
     wanted, points = scene_seen(one, starts, width)
-    check_seen(tree.seen, wanted)
-    for link, names in points.items():
-        assert sorted(bare(point) for point, (on, _) in tree.points.items() if on == link) == (
-            sorted(names))
+    for link, rows in tree.seen.items():
+        if link.endswith('_link'):
+            # A moving link of which nothing else is seen is a ball at its own joint.
+            place = tree.poses[link][:3, 3]
+            check_seen({link: rows}, {link: wanted.get(link) or [
+                row('sphere', GREY, width, place, place)] * (link != 'm_ground_link')})
+    for link, balls in points.items():
+        on = {bare(child): tree.seen[child] for _, parent, child, _ in tree.joints.values()
+              if parent == link and not child.endswith('_link')}
+        check_seen(on, balls)
     texts = mjcf.write(built), sdf.write(built)
     # People read it: a line for each element.
     assert all(text.count('\n') >= text.count('/>') + text.count('</') - 1 for text in texts)
-    (loops, simulator, at), (gazebo, root, pins) = read_mjcf(texts[0]), read_sdf(texts[1])
+    (loops, simulator, at), (gazebo, root, closed, masses) = (
+        read_mjcf(texts[0]), read_sdf(texts[1]))
     loops.check(gazebo)
     ratios = gears(one, starts)
-    moving = sum(mass for name, mass in gazebo.masses.items() if name != 'm_ground_link')
-    check_mjcf(one, loops, simulator, starts, places, ratios, 9.81 * moving)
-    check_sdf(one, gazebo, root, pins, starts, ratios, width)
+    assert closed == cuts(one, gazebo)
+    assert masses.keys() == {name for name in gazebo.seen if gazebo.seen[name]}
+    check_mjcf(one, simulator, starts, places, ratios, closed, 9.81 * sum(masses.values()))
+    check_sdf(one, root, starts, ratios, closed)
     # What runs in a yoke's slot hangs on the yoke, with a pin where the point in the slot is.
     for prefix in one.assembly().legs:
         for link, pin in one.linkage.yokes.items():
-            slot = f'm_{prefix}{link}_slot'
+            slot, end = f'm_{prefix}{link}_slot', f'm_{prefix}{link}_pin'
             place = in_space(one.pose, places[f'm_{prefix}{pin}'])
-            wanted[f'{slot}_link'] = [row('sphere', GREY, width, place, place)]
-            check_seen({'': loops.seen.pop(f'{slot}_link')}, {'': wanted[f'{slot}_link']})
+            for name in f'{slot}_link', end:
+                assert loops.poses.pop(name)[:3, 3] == pytest.approx(place)
+                check_seen({'': loops.seen.pop(name)},
+                           {'': [row('sphere', GREY, width, place, place)]})
             assert loops.joints.pop(slot) == (
                 'prismatic', f'm_{prefix}{link}_link', f'{slot}_link', [1.0, 0.0, 0.0])
-            on, where = loops.points.pop(f'm_{prefix}{link}_pin')
-            assert on == f'{slot}_link' and where == pytest.approx(place)
-            assert loops.poses.pop(on)[:3, 3] == pytest.approx(place) and at.pop(slot) == 0.0
+            assert loops.joints.pop(f'{end}_fixed') == ('fixed', f'{slot}_link', end, None)
+            assert at.pop(slot) == 0.0
     loops.check(tree)
     assert at == pytest.approx(positions)
-    assert gazebo.masses.keys() == wanted.keys()
 
 
-def check_mjcf(one, loops, root, starts, places, ratios, weight):
+def check_mjcf(one, root, starts, places, ratios, closed, weight):
     """Check all that an MJCF says but its bodies."""
     size, links = bodies.size(one), {link.name: link for link in one.linkage.links}
     assert (root.tag, root.get('model')) == ('mujoco', 'm')
@@ -316,7 +304,8 @@ def check_mjcf(one, loops, root, starts, places, ratios, weight):
     assert numbers(equality.get('solref')) == pytest.approx([2.0 * step, 1.0])
     assert numbers(equality.get('solimp')) == [0.9999, 0.9999, 1.0]
     assert {tuple(sorted(each.items())) for each in root.findall('equality/connect')} == {
-        (('name', cut), ('site1', met), ('site2', cut)) for cut, met in cuts(one, loops).items()}
+        (('anchor', '0 0 0'), ('body1', met), ('body2', cut), ('name', cut))
+        for cut, met in closed.items()}
     assert [(joint.attrib, numbers(joint.attrib.pop('polycoef')))
             for joint in root.findall('equality/joint')] == [
         ({'joint1': name, 'joint2': other}, pytest.approx([0.0, ratio, 0.0, 0.0, 0.0], abs=1e-6))
@@ -338,32 +327,22 @@ def check_mjcf(one, loops, root, starts, places, ratios, weight):
     assert len(root.find('actuator')) == len(published)
 
 
-def check_sdf(one, found, root, pins, starts, ratios, width):
+def check_sdf(one, root, starts, ratios, closed):
     """Check all that an SDF says but its links."""
     assert root.get('name') == 'm'
-    closed, plugins = cuts(one, found), []
-    for cut, met in closed.items():
-        joints, pose, ball, mass = pins.pop(f'{cut}_pin')
-        (link, place), (other, _) = found.points[cut], found.points[met]
-        assert joints == {f'{cut}_hinge': ('revolute', link, f'{cut}_pin', [0.0, 0.0, 1.0]),
-                          f'{cut}_closed': ('fixed', other, f'{cut}_pin', None)}
-        assert pose[:3, :3] == pytest.approx(found.poses[link][:3, :3])
-        assert pose[:3, 3] == pytest.approx(place)
-        check_seen({cut: ball}, {cut: [row('sphere', GREY, width, place, place)]})
-        assert mass == pytest.approx(DENSITY * 4.0 / 3.0 * math.pi * width ** 3)
-        plugins.append(('detachable-joint', 'DetachableJoint', {
-            'parent_link': other, 'child_model': '__model__', 'child_link': f'{cut}_pin'}))
-    assert not pins
+    plugins = [('detachable-joint', 'DetachableJoint', {
+        'parent_link': met, 'child_model': '__model__', 'child_link': cut})
+        for cut, met in closed.items()]
     published = {joint.name: [end - joint.of(start) for end in swept(joint, drive)]
                  for joint, drive, start in zip(map(one.joints.get, one.inputs),
                                                 one.inputs.values(), starts)}
     plugins += [('joint-state-publisher', 'JointStatePublisher', {}), *(
         ('joint-position-controller', 'JointPositionController',
          {'joint_name': name, 'use_velocity_commands': 'true'}) for name in published)]
-    assert [(each.attrib, {part.tag: part.text for part in each})
-            for each in root.findall('plugin')] == [
+    assert sorted(((each.attrib, {part.tag: part.text for part in each})
+                   for each in root.findall('plugin')), key=repr) == sorted((
         ({'filename': f'gz-sim-{file}-system', 'name': f'gz::sim::systems::{name}'}, values)
-        for file, name, values in plugins]
+        for file, name, values in plugins), key=repr)
     for joint in root.findall('joint'):
         name, axis = joint.get('name'), joint.find('axis')
         mimic, limit = (None if axis is None else axis.find(tag) for tag in ('mimic', 'limit'))
@@ -382,7 +361,7 @@ def cuts(one, file):
     """Return the points that coincide with another one, by name."""
     yokes = {f'm_{prefix}{link}_pin': f'm_{prefix}{pin}' for prefix in one.assembly().legs
              for link, pin in one.linkage.yokes.items()}
-    return {**{name: bare(name) for name in file.points if '_cut' in name}, **yokes}
+    return {**{name: bare(name) for name in file.poses if '_cut' in name}, **yokes}
 
 
 def gears(one, starts):
@@ -415,11 +394,11 @@ def test_a_hand_on_an_arm_is_the_same_in_three_formats(link):
     positions = {one.joints[name].name: one.joints[name].of(angle) for one in machines
                  for name, angle in one.linkage.joint_angles(one.first.start).items()}
     loops, root, at = read_mjcf(mjcf.write(built))
-    gazebo, robot, _ = read_sdf(sdf.write(built))
+    gazebo, robot, _, masses = read_sdf(sdf.write(built))
     loops.check(gazebo)
     loops.check(read_urdf(urdf.describe(machines, 'world'), positions))
     assert at == pytest.approx(positions)
-    assert gazebo.masses.keys() == loops.poses.keys()
+    assert masses.keys() == {name for name in gazebo.seen if gazebo.seen[name]}
     assert root.get('model') == robot.get('name') == 'linkages'
     assert len(root.find('actuator')) == 2 and len(root.find('equality')) == 2
 

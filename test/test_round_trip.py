@@ -43,8 +43,6 @@ def check_read(model, form, folder):
     frames = {name: stands @ frame for name, frame in robot.frames.items()}
     assert read.root == root and {*frames} - {model.root} <= read.frames.keys()
     size = max(1e-3, *(np.abs(frame[:3, 3]).max() for frame in frames.values()))
-    for point in robot.points:
-        frames[point.name] = frames[point.body] @ matrix([*point.place, *[0.0] * 4])
     for name, frame in read.frames.items():
         if name in frames:
             assert name == read.root or frame[:3, :3] == pytest.approx(
@@ -84,22 +82,20 @@ def check_read(model, form, folder):
 
 def check_loops(robot, form, joints, frames, size):
     """Check that loops are closed where points meet, and nothing else is."""
-    homes = {point.name: point.body for point in robot.points}
-    for point in (point for point in robot.points if point.meets):
-        ends, places = (homes[point.meets], homes[point.name]), None
+    homes = {joint.bodies[1]: joint.bodies[0] for joint in robot.joints}
+    for cut, met in robot.meets.items():
         if form == 'mjcf':
-            cut = joints.pop(point.name)
-            assert (cut.kind, cut.bodies, cut.is_cut) == ('ball', ends, True)
-            places = cut.places
+            ball = joints.pop(cut)
+            assert (ball.kind, ball.bodies, ball.is_cut) == ('ball', (met, cut), True)
+            places = ball.places
         else:
-            pin = f'{point.name}_pin'
-            hinge, closed = (joints.pop(f'{point.name}_{end}') for end in ('hinge', 'closed'))
-            assert (hinge.kind, hinge.bodies) == ('hinge', (ends[1], pin))
-            assert (closed.kind, closed.bodies) == ('fixed', (ends[0], pin))
-            assert joints.pop(f'{ends[0]}={pin}').kind == 'fixed'
-            assert hinge.axes[0] == pytest.approx(frames[ends[1]][:3, 2], abs=1e-12)
+            hinge, closed = (joints.pop(f'{cut}_{end}') for end in ('hinge', 'closed'))
+            assert (hinge.kind, hinge.bodies) == ('hinge', (homes[cut], cut))
+            assert (closed.kind, closed.bodies) == ('fixed', (met, cut))
+            assert joints.pop(f'{met}={cut}').kind == 'fixed'
+            assert hinge.axes[0] == pytest.approx(frames[cut][:3, 2], abs=1e-12)
             places = closed.places[0], hinge.places[0]
-        for place, name in zip(places, (point.meets, point.name)):
+        for place, name in zip(places, (met, cut)):
             assert place == pytest.approx(frames[name][:3, 3], abs=1e-9 * size)
     assert {joint.kind for joint in joints.values()} <= {'fixed'}
 

@@ -49,9 +49,8 @@ def write(model: Model) -> str:
     starts = []
     for robot in robots:
         joints = {joint.name: joint for joint in robot.joints}
-        for point in robot.points:
-            if point.meets:
-                add(equality, 'connect', name=point.name, site1=point.meets, site2=point.name)
+        for cut, met in robot.meets.items():
+            add(equality, 'connect', name=cut, body1=met, body2=cut, anchor='0 0 0')
         for name in robot.follows:
             other, ratio, offset = robot.changes(name)
             add(equality, 'joint', joint1=name, joint2=other,
@@ -72,16 +71,13 @@ def _add_body(parent: Element, body: Body, robot: Robot) -> Element:
                     ref=numbers(joint.start))
         if joint.limits:
             moved.set('range', numbers(*np.clip(joint.limits, -FAR, FAR)))
-    for piece in robot.solid(body.name):
+    for piece in robot.pieces.get(body.name, ()):
         half, thickness = 0.5 * piece.length, piece.thickness
         sizes = {CYLINDER: (thickness, half), BOX: (half, 0.5 * thickness, 0.5 * thickness),
                  BALL: (thickness,)}[piece.shape]
         add(made, 'geom', type=piece.shape, pos=numbers(*piece.pose[:3]),
             euler=numbers(*piece.pose[3:]), size=numbers(*sizes),
             rgba=numbers(*COLOURS[piece.colour]))
-    for point in robot.points:
-        if point.body == body.name:
-            add(made, 'site', name=point.name, pos=numbers(*point.place, 0.0), group='4')
     return made
 
 

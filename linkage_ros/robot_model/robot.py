@@ -17,7 +17,7 @@ from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Optional, Seque
 import numpy as np
 
 from .places import at, coordinates, displacements, pose, screws
-from .shapes import Piece, Point
+from .shapes import Piece
 from ..command import RequestError
 from ..words import listed, meant
 
@@ -162,8 +162,8 @@ class Robot:
         Positions of joints that are fixed.
     pieces : dict
         What is seen of bodies.
-    points : list of Point
-        Joints of linkages on bodies, which are pieces of them, too.
+    meets : dict
+        For each body that was cut off a closed loop the other one, whose origin is in its own.
     servos : dict
         The mass [kg] and the arm [m] that a driven joint moves, where they are known.
 
@@ -176,7 +176,7 @@ class Robot:
     follows: dict[str, tuple[str, float, float]] = field(default_factory=dict)
     held: dict[str, float] = field(default_factory=dict)
     pieces: dict[str, list[Piece]] = field(default_factory=dict)
-    points: list[Point] = field(default_factory=list)
+    meets: dict[str, str] = field(default_factory=dict)
     servos: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def hang(self, name: str, parent: str, place: Sequence[float], kind: str = FIXED,
@@ -188,11 +188,6 @@ class Robot:
             joint or f'{name}_fixed', kind, (parent, name), (frame[:3, 3],) * 2,
             (frame[:3, :3] @ axis,) * 2, None if kind == FIXED else 0.0, limits, '',
             (frame[:3, :3],) * 2))
-
-    def solid(self, body: str) -> list[Piece]:
-        """Return what is seen of a body and of its points."""
-        return [*self.pieces.get(body, ()), *(
-            point.ball(point.place) for point in self.points if point.body == body)]
 
     def bodies(self) -> Iterator[Body]:
         """Yield the bodies on the root, parents first; a joint is at the origin of its body."""
