@@ -4,7 +4,6 @@
 """What is written of a robot model is read again: read(write(x)) = x in URDF, SDF and MJCF."""
 
 from contextlib import suppress
-import math
 from pathlib import Path
 
 from linkage_ros import mechanisms, scene
@@ -15,22 +14,11 @@ from linkage_ros.robot_model.shapes import BALL, Piece
 import numpy as np
 import pytest
 from test_robot_files import random_urdf, ROBOTS
+from test_robot_model import turned
 from truth import random_linkages
 
 CONFIGS = sorted(Path(__file__).parents[1].glob('config/*.yaml'))
 FORMATS = {'urdf': urdf.write, 'sdf': sdf.write, 'mjcf': mjcf.write}
-
-
-def matrix(numbers):
-    """Return a pose as a matrix: about the fixed axes x, y and z in turn."""
-    made = np.eye(4)
-    for angle, (i, j) in zip(numbers[3:], ((1, 2), (2, 0), (0, 1))):
-        turn = np.eye(4)
-        turn[i, i] = turn[j, j] = math.cos(angle)
-        turn[j, i], turn[i, j] = math.sin(angle), -math.sin(angle)
-        made = turn @ made
-    made[:3, 3] = numbers[:3]
-    return made
 
 
 def check_read(model, form, folder):
@@ -39,7 +27,7 @@ def check_read(model, form, folder):
     file.write_text(FORMATS[form](model), encoding='utf-8')
     read, (part,) = readers.read(str(file)), model.parts
     robot, root = part.robot, {'urdf': model.root}.get(form, 'world')
-    stands = matrix(part.pose) if part.base else np.eye(4)
+    stands = turned(*part.pose) if part.base else np.eye(4)
     frames = {name: stands @ frame for name, frame in robot.frames.items()}
     assert read.root == root and {*frames} - {model.root} <= read.frames.keys()
     size = max(1e-3, *(np.abs(frame[:3, 3]).max() for frame in frames.values()))
@@ -86,13 +74,14 @@ def check_loops(robot, form, joints, frames, size):
     for cut, met in robot.meets.items():
         if form == 'mjcf':
             ball = joints.pop(cut)
-            assert (ball.kind, ball.bodies, ball.is_cut) == ('ball', (met, cut), True)
+            assert (ball.kind, ball.bodies, ball.is_cut) == (
+                'ball', (homes[met], homes[cut]), True)
             places = ball.places
         else:
             hinge, closed = (joints.pop(f'{cut}_{end}') for end in ('hinge', 'closed'))
             assert (hinge.kind, hinge.bodies) == ('hinge', (homes[cut], cut))
-            assert (closed.kind, closed.bodies) == ('fixed', (met, cut))
-            assert joints.pop(f'{met}={cut}').kind == 'fixed'
+            assert (closed.kind, closed.bodies) == ('fixed', (homes[met], cut))
+            assert joints.pop(f'{homes[met]}={cut}').kind == 'fixed'
             assert hinge.axes[0] == pytest.approx(frames[cut][:3, 2], abs=1e-12)
             places = closed.places[0], hinge.places[0]
         for place, name in zip(places, (met, cut)):

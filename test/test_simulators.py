@@ -73,10 +73,13 @@ class MuJoCo:
 
     def closed(self):
         """Yield the points that have to meet."""
-        for kind, one, other in zip(self.model.eq_type, self.model.eq_obj1id,
-                                    self.model.eq_obj2id):
-            if kind == self.library.mjtEq.mjEQ_CONNECT:
-                yield self.model.body(one).name, self.model.body(other).name
+        model = self.model
+        for i in np.flatnonzero(model.eq_type == self.library.mjtEq.mjEQ_CONNECT):
+            met, = (model.body(point).name for point in range(model.nbody)
+                    if model.body_parentid[point] == model.eq_obj1id[i]
+                    and not model.body_jntnum[point]
+                    and np.array_equal(model.body_pos[point], model.eq_data[i, :3]))
+            yield met, model.equality(i).name
 
     def places(self, names):
         return {name: self.data.body(name).xpos.copy() for name in names}

@@ -47,10 +47,12 @@ def write(model: Model) -> str:
             elements[body.name] = _add_body(elements[body.parent], body, part.robot)
     equality, actuator = add(root, 'equality'), add(root, 'actuator')
     starts = []
-    for robot in robots:
+    for part in model.parts:
+        robot, bodies = part.robot, {body.name: body for body in part.bodies()}
         joints = {joint.name: joint for joint in robot.joints}
         for cut, met in robot.meets.items():
-            add(equality, 'connect', name=cut, body1=met, body2=cut, anchor='0 0 0')
+            add(equality, 'connect', name=cut, body1=bodies[met].parent, body2=bodies[cut].parent,
+                anchor=numbers(*bodies[met].pose[:3]))
         for name in robot.follows:
             other, ratio, offset = robot.changes(name)
             add(equality, 'joint', joint1=name, joint2=other,

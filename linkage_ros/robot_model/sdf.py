@@ -27,15 +27,16 @@ def write(model: Model) -> str:
     root = Element('sdf', version='1.11' if any(robot.follows for robot in robots) else '1.7')
     made = add(root, 'model', name=model.name)
     for part in model.parts:
-        meets = part.robot.meets
+        meets, parents = part.robot.meets, {}
         for body in part.bodies():
+            parents[body.name] = body.parent
             if body.name in meets:
                 hinge = Joint(f'{body.name}_hinge', HINGE, (body.parent, body.name), (), ())
                 body = body._replace(joint=hinge, axis=(0.0, 0.0, 1.0))
             _add_body(made, model, part.robot, body)
         for cut, met in meets.items():
-            _add_joint(made, f'{cut}_closed', 'fixed', met, cut)
-            _add_plugin(made, 'detachable-joint', 'DetachableJoint', parent_link=met,
+            _add_joint(made, f'{cut}_closed', 'fixed', parents[met], cut)
+            _add_plugin(made, 'detachable-joint', 'DetachableJoint', parent_link=parents[met],
                         child_model='__model__', child_link=cut)
     _add_plugin(made, 'joint-state-publisher', 'JointStatePublisher')
     for robot in robots:
