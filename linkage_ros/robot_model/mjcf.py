@@ -18,16 +18,15 @@ from xml.etree.ElementTree import Element, indent, tostring
 import numpy as np
 
 from .bodies import add, COLOURS, Model, numbers
-from .robot import Body, HINGE, Joint, Robot
+from .robot import Body, FARTHEST, HINGE, Joint, Robot
 from .shapes import BALL, BOX, CYLINDER
 
 # Time step [s] for a linkage of a metre; smaller linkages oscillate faster.
 STEP = 1e-3
 # A servo yields by this [rad, or of its arm] to the weight of all bodies, and bears so much of it.
 YIELD, STRENGTH = 1e-3, 10.0
+# [m/s^2]
 GRAVITY = 9.81
-# The end of a joint that has none [rad or m].
-FAR = 1e9
 
 
 def write(model: Model) -> str:
@@ -72,7 +71,7 @@ def _add_body(parent: Element, body: Body, robot: Robot) -> Element:
         moved = add(made, 'joint', name=joint.name, type=joint.kind, axis=numbers(*body.axis),
                     ref=numbers(joint.start))
         if joint.limits:
-            moved.set('range', numbers(*np.clip(joint.limits, -FAR, FAR)))
+            moved.set('range', numbers(*np.clip(joint.limits, -FARTHEST, FARTHEST)))
     for piece in robot.pieces.get(body.name, ()):
         half, thickness = 0.5 * piece.length, piece.thickness
         sizes = {CYLINDER: (thickness, half), BOX: (half, 0.5 * thickness, 0.5 * thickness),

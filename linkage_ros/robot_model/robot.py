@@ -28,8 +28,6 @@ KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical'
          '6d': FIXED, 'revolute2': UNIVERSAL, 'floating': FREE}
 # No robot has parts farther off [m], or limits [m or rad].
 FARTHEST = 1e9
-
-
 # Joints that a tree prefers, if they are not driven.
 _TREE = {FIXED: 0, SLIDE: 1, FREE: 2, BALL: 3, HINGE: 4}
 
@@ -47,8 +45,8 @@ class Limits(NamedTuple):
 
     def text(self, joint: str) -> str:
         """Return the limits of a joint as text."""
-        own = '' if self.joints == (joint,) else f' {joint}'
-        return f'{", ".join(self.joints)},{own} from {self.low:.4g} to {self.high:.4g}'
+        name = '' if self.joints == (joint,) else f' {joint}'
+        return f'{", ".join(self.joints)},{name} from {self.low:.4g} to {self.high:.4g}'
 
 
 @dataclass(eq=False)
@@ -132,13 +130,13 @@ class Joint:
     @property
     def hinges(self) -> list[Joint]:
         """Return the hinges of a ball that is made of some, else the joint itself."""
-        return [one for part in self.parts for one in part.hinges] or [self]
+        return [hinge for part in self.parts for hinge in part.hinges] or [self]
 
 
-def plain(name: str, most: int) -> str:
+def plain(name: str, length: int) -> str:
     """Return a name of at most so many letters, digits and single underscores."""
-    found = re.sub('[^A-Za-z0-9]+', '_', name).strip('_')[:most]
-    return found if found[:1].isalpha() else f'joint_{found}'.rstrip('_')
+    text = re.sub('[^A-Za-z0-9]+', '_', name).strip('_')[:length]
+    return text if text[:1].isalpha() else f'joint_{text}'.rstrip('_')
 
 
 @dataclass(eq=False)
@@ -220,17 +218,18 @@ class Robot:
         ends, no_limits = _limits(limits, kind.lower() == 'continuous')
         kind = KINDS.get(kind.lower(), kind.lower())
         frames = frame, frame if other is None else other
-        ways = axis, axis if second is None else second
-        turns, places = (tuple(each[:3, part] for each in frames) for part in (slice(3), 3))
-        sizes = np.linalg.norm(ways, axis=1)
-        if not np.all(np.abs((*places, *ways)) < FARTHEST):
+        directions = axis, axis if second is None else second
+        turns, places = zip(*((matrix[:3, :3], matrix[:3, 3]) for matrix in frames))
+        sizes = np.linalg.norm(directions, axis=1)
+        if not np.all(np.abs((*places, *directions)) < FARTHEST):
             raise RequestError(f'joint {name} must be within {FARTHEST:g} m')
         if kind in (HINGE, SLIDE, UNIVERSAL) and not np.all(sizes > 0.0):
             raise RequestError(f'the axis of joint {name} has no length')
         if kind != UNIVERSAL:
             self.joints.append(Joint(
                 name, kind, bodies, places, tuple(
-                    turn @ way / (size or 1.0) for turn, way, size in zip(turns, ways, sizes)),
+                    turn @ direction / (size or 1.0)
+                    for turn, direction, size in zip(turns, directions, sizes)),
                 position if kind in (HINGE, SLIDE) else None, ends, no_limits, turns,
                 other is not None))
             return
@@ -243,10 +242,10 @@ class Robot:
         self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame, second, other,
                   position if other is None else None)
 
-    def close(self, name: str, kind: str, bodies: tuple[str, str], own: Sequence[np.ndarray],
+    def close(self, name: str, kind: str, bodies: tuple[str, str], frames: Sequence[np.ndarray],
               axis: Any = (0.0, 0.0, 1.0), second: Any = None) -> None:
         """Close a loop by a joint, by its frame on each body as this has it; see `join`."""
-        first, other = (self.frames[body] @ frame for body, frame in zip(bodies, own))
+        first, other = (self.frames[body] @ frame for body, frame in zip(bodies, frames))
         self.join(name, kind, bodies, first, axis, other, second=second)
 
     def follow(self, name: str, other: str, ratio: float, offset: float) -> None:
@@ -274,16 +273,16 @@ class Robot:
 
     def sources(self, name: str) -> list[tuple[str, float, float]]:
         """Return a joint and those that it depends on in turn, each with ratio and offset."""
-        found, passed = [(name, 1.0, 0.0)], [*self.driven]
+        sources, passed = [(name, 1.0, 0.0)], [*self.driven]
         while name in self.follows and name not in passed:
             passed.append(name)
-            _, ratio, offset = found[-1]
+            _, ratio, offset = sources[-1]
             name, factor, start = self.follows[name]
-            found.append((name, ratio * factor, offset + ratio * start))
+            sources.append((name, ratio * factor, offset + ratio * start))
         if name not in self.positions:
             raise RequestError(f'{passed[-1]} follows {name!r}, which is no joint'
                                f'{meant(name, self.positions)}')
-        return found
+        return sources
 
     def source(self, name: str) -> tuple[str, float, float]:
         """Return the joint that another depends on, or itself, with ratio and offset."""
