@@ -437,6 +437,16 @@ def test_a_linkage_in_space_makes_no_model():
         model(machines.values())
 
 
+def test_what_has_no_length_is_not_drawn():
+    # At its shortest the cylinder has no length, and so has its barrel.
+    lines = ['P ground 0 0', 'O ground 1 0', 'B cylinder P O 1 right']
+    one = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.cylinder.start': 1.0,
+                      'm.joints': lines}).machines['m']
+    pieces = [piece for pieces in model([one]).parts[0].robot.pieces.values() for piece in pieces]
+    assert {(piece.shape, piece.length > 0.0) for piece in pieces} == {
+        ('sphere', False), ('cylinder', True)}
+
+
 @settings(max_examples=40)
 @given(st.lists(st.floats(-10.0, 10.0), min_size=3, max_size=3),
        st.lists(st.sampled_from([k * math.pi / 4.0 for k in range(-4, 5)])
