@@ -17,6 +17,7 @@ from linkage_ros.robot_model.command import main, show
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, ground_frame, GUIDE, ROD, shapes
 import numpy as np
 import pytest
+from test_robot_files import rotation
 from test_simulators import model, simulated, some_quick
 from test_urdf import in_space, MACHINES, OWN, posed
 
@@ -27,15 +28,10 @@ GREY, BLUE, ORANGE = ([round(part / 255, 3) for part in colour] + [1.0] for colo
 DENSITY, WIDTHS = 1234.5, {'boom and arm': 0.06, 'slotted_lever': 0.01}
 
 
-def turned(x, y, z, roll, pitch, yaw):
+def turned(x, y, z, *angles):
     """Return a pose as a matrix: about the fixed axes x, y and z in turn."""
     made = np.eye(4)
-    for angle, (i, j) in zip((roll, pitch, yaw), ((1, 2), (2, 0), (0, 1))):
-        turn = np.eye(4)
-        turn[i, i] = turn[j, j] = math.cos(angle)
-        turn[j, i], turn[i, j] = math.sin(angle), -math.sin(angle)
-        made = turn @ made
-    made[:3, 3] = x, y, z
+    made[:3, :3], made[:3, 3] = rotation(angles), (x, y, z)
     return made
 
 
