@@ -505,6 +505,7 @@ RVIZ = {'Visualization Manager': {
 @pytest.mark.parametrize('angles, pitch, yaw', [
     ((math.pi / 2, 0.0, 0.0), 0.15, -math.pi / 2), ((0.0, 0.0, 0.7), 1.56, -math.pi / 2),
     ((1.0, 0.0, 0.5), math.pi / 2 - 1.0, 0.5 - math.pi / 2),
+    ((0.3, 0.0, 1.0), math.pi / 2 - 0.3, 1.0 - math.pi / 2),
     ((math.pi / 2, 0.0, 2.0), 0.15, 2.0 - math.pi / 2), ((math.pi, 0.0, 0.0), 0.15, -math.pi / 2),
     ((0.05, 0.0, 1.0), math.pi / 2 - 0.05, -math.pi / 2)])
 def test_rviz_s_camera_sees_all_of_a_scene_square_to_the_first_plane(angles, pitch, yaw):
