@@ -189,19 +189,19 @@ class Robot:
 
     def bodies(self) -> Iterator[Body]:
         """Yield the bodies on the root, parents first; a joint is at the origin of its body."""
-        span = max(float(np.max(np.abs(frame[:3, 3]))) for frame in self.frames.values())
+        span = np.abs([frame[:3, 3] for frame in self.frames.values()]).max()
         for name, (base, joint) in trees(self)[0].items():
             frame, seen = self.frames[name], self.frames[base]
-            moves = joint.kind in (HINGE, SLIDE) and joint.position is not None
-            home = at(joint.place(name) if moves else frame[:3, 3], frame[:3, :3])
-            is_apart = np.abs(home - frame).max() > 1e-12 * span
-            if moves:
+            if joint.kind in (HINGE, SLIDE) and joint.position is not None:
+                home = at(joint.place(name), frame[:3, :3])
+                is_apart = np.abs(home - frame).max() > 1e-12 * span
                 axis = np.round(home[:3, :3].T @ joint.motion(name), 15) + 0.0
                 yield Body(f'{name}/joint' if is_apart else name, base, _seen(seen, home, span),
                            joint, axis.tolist())
+                if not is_apart:
+                    continue
                 base, seen = f'{name}/joint', home
-            if is_apart or not moves:
-                yield Body(name, base, _seen(seen, frame, span))
+            yield Body(name, base, _seen(seen, frame, span))
 
     def join(self, name: str, kind: str, bodies: tuple[str, str], frame: np.ndarray,
              axis: Any = (0.0, 0.0, 1.0), other: Optional[np.ndarray] = None,
