@@ -4,7 +4,6 @@
 """What is written of a robot model is read again: read(write(x)) = x in URDF, SDF and MJCF."""
 
 from contextlib import suppress
-import math
 from pathlib import Path
 
 from linkage_ros import mechanisms, scene
@@ -15,22 +14,11 @@ from linkage_ros.robot_model.shapes import BALL, Piece
 import numpy as np
 import pytest
 from test_robot_files import random_urdf, ROBOTS
+from test_robot_model import turned
 from truth import random_linkages
 
 CONFIGS = sorted(Path(__file__).parents[1].glob('config/*.yaml'))
 FORMATS = {'urdf': urdf.write, 'sdf': sdf.write, 'mjcf': mjcf.write}
-
-
-def matrix(numbers):
-    """Return a pose as a matrix: about the fixed axes x, y and z in turn."""
-    made = np.eye(4)
-    for angle, (i, j) in zip(numbers[3:], ((1, 2), (2, 0), (0, 1))):
-        turn = np.eye(4)
-        turn[i, i] = turn[j, j] = math.cos(angle)
-        turn[j, i], turn[i, j] = math.sin(angle), -math.sin(angle)
-        made = turn @ made
-    made[:3, 3] = numbers[:3]
-    return made
 
 
 def check_read(model, form, folder):
@@ -39,12 +27,10 @@ def check_read(model, form, folder):
     file.write_text(FORMATS[form](model), encoding='utf-8')
     read, (part,) = readers.read(str(file)), model.parts
     robot, root = part.robot, {'urdf': model.root}.get(form, 'world')
-    stands = matrix(part.pose) if part.base else np.eye(4)
+    stands = turned(*part.pose) if part.base else np.eye(4)
     frames = {name: stands @ frame for name, frame in robot.frames.items()}
     assert read.root == root and {*frames} - {model.root} <= read.frames.keys()
     size = max(1e-3, *(np.abs(frame[:3, 3]).max() for frame in frames.values()))
-    for point in robot.points:
-        frames[point.name] = frames[point.body] @ matrix([*point.place, *[0.0] * 4])
     for name, frame in read.frames.items():
         if name in frames:
             assert name == read.root or frame[:3, :3] == pytest.approx(
@@ -84,22 +70,21 @@ def check_read(model, form, folder):
 
 def check_loops(robot, form, joints, frames, size):
     """Check that loops are closed where points meet, and nothing else is."""
-    homes = {point.name: point.body for point in robot.points}
-    for point in (point for point in robot.points if point.meets):
-        ends, places = (homes[point.meets], homes[point.name]), None
+    homes = {joint.bodies[1]: joint.bodies[0] for joint in robot.joints}
+    for cut, met in robot.meets.items():
         if form == 'mjcf':
-            cut = joints.pop(point.name)
-            assert (cut.kind, cut.bodies, cut.is_cut) == ('ball', ends, True)
-            places = cut.places
+            ball = joints.pop(cut)
+            assert (ball.kind, ball.bodies, ball.is_cut) == (
+                'ball', (homes[met], homes[cut]), True)
+            places = ball.places
         else:
-            pin = f'{point.name}_pin'
-            hinge, closed = (joints.pop(f'{point.name}_{end}') for end in ('hinge', 'closed'))
-            assert (hinge.kind, hinge.bodies) == ('hinge', (ends[1], pin))
-            assert (closed.kind, closed.bodies) == ('fixed', (ends[0], pin))
-            assert joints.pop(f'{ends[0]}={pin}').kind == 'fixed'
-            assert hinge.axes[0] == pytest.approx(frames[ends[1]][:3, 2], abs=1e-12)
+            hinge, closed = (joints.pop(f'{cut}_{end}') for end in ('hinge', 'closed'))
+            assert (hinge.kind, hinge.bodies) == ('hinge', (homes[cut], cut))
+            assert (closed.kind, closed.bodies) == ('fixed', (homes[met], cut))
+            assert joints.pop(f'{homes[met]}={cut}').kind == 'fixed'
+            assert hinge.axes[0] == pytest.approx(frames[cut][:3, 2], abs=1e-12)
             places = closed.places[0], hinge.places[0]
-        for place, name in zip(places, (point.meets, point.name)):
+        for place, name in zip(places, (met, cut)):
             assert place == pytest.approx(frames[name][:3, 3], abs=1e-9 * size)
     assert {joint.kind for joint in joints.values()} <= {'fixed'}
 

@@ -64,7 +64,7 @@ class MuJoCo:
             self.data.joint(name).qpos = value
         self.library.mj_kinematics(self.model, self.data)
         for first, second in self.closed():
-            slot = self.model.body(self.model.site(second).bodyid[0])
+            slot = self.model.body(self.model.body(second).parentid[0])
             if slot.name.endswith('_slot_link'):
                 apart = self.places([first])[first] - self.places([second])[second]
                 joint = slot.jntadr[0]
@@ -73,13 +73,16 @@ class MuJoCo:
 
     def closed(self):
         """Yield the points that have to meet."""
-        for kind, one, other in zip(self.model.eq_type, self.model.eq_obj1id,
-                                    self.model.eq_obj2id):
-            if kind == self.library.mjtEq.mjEQ_CONNECT:
-                yield self.model.site(one).name, self.model.site(other).name
+        model = self.model
+        for i in np.flatnonzero(model.eq_type == self.library.mjtEq.mjEQ_CONNECT):
+            met, = (model.body(point).name for point in range(model.nbody)
+                    if model.body_parentid[point] == model.eq_obj1id[i]
+                    and not model.body_jntnum[point]
+                    and np.array_equal(model.body_pos[point], model.eq_data[i, :3]))
+            yield met, model.equality(i).name
 
     def places(self, names):
-        return {name: self.data.site(name).xpos.copy() for name in names}
+        return {name: self.data.body(name).xpos.copy() for name in names}
 
     def open(self):
         """Return how far a loop is open [m]."""
@@ -212,6 +215,10 @@ def test_bodies_weigh_in_an_sdf_what_mujoco_finds_their_shapes_to_weigh(name):
              for link in ElementTree.fromstring(sdf.write(built)).iter('link')}
     for body in built.parts[0].bodies():
         there, link = robot.model.body(body.name), links[body.name]
+        if link is None:
+            # Nothing is seen of it.
+            assert there.mass == 0.0
+            continue
         xx, yy, zz, xy = (float(link.findtext(f'inertia/i{way}'))
                           for way in ('xx', 'yy', 'zz', 'xy'))
         assert there.mass == pytest.approx(float(link.findtext('mass')))
@@ -222,6 +229,13 @@ def test_bodies_weigh_in_an_sdf_what_mujoco_finds_their_shapes_to_weigh(name):
         axes = axes.reshape(3, 3)
         assert axes @ np.diag(there.inertia) @ axes.T == pytest.approx(
             np.array([[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, zz]]), abs=1e-9 * zz)
+
+
+def test_the_servo_of_a_slide_yields_by_a_part_of_the_longest_bar():
+    one = MACHINES['boom']()
+    servo, = ElementTree.fromstring(mjcf.write(model([one]))).iter('position')
+    strength = float(servo.get('forcerange').split()[1])
+    assert float(servo.get('kp')) == pytest.approx(strength / 10.0 / (1e-3 * bodies.size(one)))
 
 
 def test_a_start_out_of_reach_is_refused():

@@ -16,6 +16,7 @@ from linkage_ros.robot_model.bodies import travels
 import numpy as np
 import pytest
 from robots import LIBRARIES, Pinocchio, Yourdfpy
+from test_robot_files import rotation
 from truth.cases import CASES
 
 ROOT = Path(__file__).parents[1]
@@ -98,13 +99,7 @@ def posed(one, thetas):
 
 def in_space(pose, place):
     """Return a place in the plane [m] turned by roll, pitch and yaw in turn, and shifted."""
-    x, y, z = *place, 0.0
-    for angle, (i, j) in zip(pose[3:], ((1, 2), (2, 0), (0, 1))):
-        turned = [x, y, z]
-        turned[i] = math.cos(angle) * [x, y, z][i] - math.sin(angle) * [x, y, z][j]
-        turned[j] = math.sin(angle) * [x, y, z][i] + math.cos(angle) * [x, y, z][j]
-        x, y, z = turned
-    return np.array([x, y, z]) + pose[:3]
+    return rotation(pose[3:]) @ (*place, 0.0) + pose[:3]
 
 
 def description(one):

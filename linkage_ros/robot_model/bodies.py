@@ -28,8 +28,8 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from . import shapes
-from .robot import Body, HINGE, posed, Robot, SLIDE
-from .shapes import BALL, BOX, CYLINDER, Piece, Place, Point, weight
+from .robot import Body, FIXED, HINGE, posed, Robot, SLIDE
+from .shapes import BALL, BOX, CYLINDER, Piece, Place, weight
 from .. import palette
 from ..linkage import Arc, extremes, GROUND, Leg, Link, Mechanism
 from ..scene import SceneError, SceneMechanism
@@ -70,11 +70,6 @@ class Part:
         if self.base:
             yield Body(self.robot.root, self.base, self.pose)
         yield from self.robot.bodies()
-
-    @property
-    def links(self) -> List[str]:
-        """Return the names of its bodies and points."""
-        return [*self.robot.frames, *(point.name for point in self.robot.points)]
 
 
 @dataclass
@@ -132,7 +127,7 @@ def together(models: Sequence[Model]) -> Model:
     They must have the same root link, or the root of one must be a link of another.
     """
     parts = [part for model in models for part in model.parts]
-    below = {link: part.base for part in parts for link in part.links}
+    below = {link: part.base for part in parts for link in part.robot.frames}
     # From the base of each part the bases below it, up to the last.
     lines = {part.base: [part.base] for part in parts}
     for line in lines.values():
@@ -164,6 +159,7 @@ class _Tree:
             raise SceneError(f'{machine.name} is {IN_SPACE}')
         length = size(machine)
         self._length = length if width is None else width / WIDTH
+        self._ball = self._piece('joint', (0.0, 0.0), (0.0, 0.0))
         self._machine, legs = machine, machine.assembly().legs
         self._shapes = shapes.shapes(machine)
         self._frames = {GROUND: shapes.ground_frame(machine.linkage), **machine.linkage.frames}
@@ -175,7 +171,7 @@ class _Tree:
         self._shared = machine.linkage.links[0] if len(legs) > 1 else None
         if self._shared:
             self._hang('', 1.0, self._shared)
-            self._add_hub(self._body('', self._shared.name))
+            self.robot.pieces[self._body('', self._shared.name)] = [self._ball]
         for prefix, leg in legs.items():
             self._add_leg(prefix, leg)
 
@@ -191,16 +187,18 @@ class _Tree:
                 self._hang(prefix, leg.side, link)
             pieces = robot.pieces.setdefault(body, [])
             pieces += [piece for piece in self._pieces(leg.side, name) if piece not in pieces]
-            points = [point for point in frame if not link or point != link.joint]
-            for point in points:
-                ends[point] += 1
-                met = f'{self._machine.name}_{prefix}{point}'
-                cut = f'_cut{ends[point] - 1 if ends[point] > 2 else ""}' * (ends[point] > 1)
-                robot.points.append(Point(
-                    met + cut, body, self._place(leg.side, name, frame[point]),
-                    met if cut else '', LOOKS['joint'][1] * self._length))
-            if link and not points:
-                self._add_hub(body)
+            if link and not pieces:
+                pieces.append(self._ball)
+            for point, place in frame.items():
+                if not link or point != link.joint:
+                    ends[point] += 1
+                    met = f'{self._machine.name}_{prefix}{point}'
+                    cut = f'_cut{ends[point] - 1 if ends[point] > 2 else ""}' * (ends[point] > 1)
+                    place = *self._place(leg.side, name, place), 0.0, 0.0, 0.0, 0.0
+                    robot.hang(met + cut, body, place)
+                    robot.pieces[met + cut] = [self._ball]
+                    if cut:
+                        robot.meets[met + cut] = met
 
     def _hang(self, prefix: str, side: float, link: Link) -> None:
         """Add a body that moves on its parent; in a mirrored leg the other way round."""
@@ -230,16 +228,14 @@ class _Tree:
         drawn += [(shape.kind, shape.slide.name, shape.start[1:], shape.end[1:])
                   for shape in self._shapes if shape.start.link == name]
         for kind, mover, *ends in drawn:
-            form, thickness, colour = LOOKS[kind]
             start, end = (self._place(side, name, place) for place in ends)
             if start != end:
-                yield Piece(form, colour or ('driven' if mover in self._machine.inputs else 'bar'),
-                            thickness * self._length, start, end)
+                yield self._piece(kind, start, end, mover in self._machine.inputs)
 
-    def _add_hub(self, body: str) -> None:
-        """Add a visible hub with a weight to a body without joints."""
-        self.robot.pieces.setdefault(body, []).append(
-            Point('', body, (0.0, 0.0), '', LOOKS['joint'][1] * self._length).ball())
+    def _piece(self, kind: str, start: Place, end: Place, is_driven: bool = False) -> Piece:
+        form, thickness, colour = LOOKS[kind]
+        return Piece(form, colour or ('driven' if is_driven else 'bar'), thickness * self._length,
+                     start, end)
 
     def _body(self, prefix: str, name: str) -> str:
         return f'{self._machine.name}_{"" if name == GROUND else prefix}{name}_link'
@@ -307,15 +303,8 @@ def assembled(model: Model, density: float = DENSITY) -> Model:
     All inputs are at their starts, so that every loop is closed at the beginning of a simulation;
     raises SceneError if there is no pose.
     """
-    points = {point.name: point for part in model.parts for point in part.robot.points}
-    parts = []
-    for part in model.parts:
-        base, pose = part.base, part.pose
-        if point := points.get(base):
-            (x, y), (u, v, *turned) = point.place, pose
-            base, pose = point.body, (u + x, v + y, *turned)
-        parts.append(replace(part, base=base, pose=pose, robot=_started(part, density)))
-    return replace(model, parts=parts, density=density)
+    return replace(model, density=density, parts=[
+        replace(part, robot=_started(part, density)) for part in model.parts])
 
 
 def _started(part: Part, density: float) -> Robot:
@@ -336,10 +325,14 @@ def _started(part: Part, density: float) -> Robot:
         raise SceneError(f'{keys} must be where {machine.name} can be assembled, not at '
                          f'{", ".join(f"{start:g}" for start in starts)}')
     positions = {joints[name].name: joints[name].of(value) for name, value in values.items()}
-    robot = replace(part.robot, points=[*part.robot.points], driven=[], servos={}, follows={})
+    robot = replace(part.robot, pieces={**part.robot.pieces}, meets={**part.robot.meets},
+                    driven=[], servos={}, follows={})
     robot = posed(robot, {name: positions[name] for name in robot.positions})
     _add_slots(machine, robot)
-    mass = sum(weight(robot.solid(body), density)[0] for body in [*robot.frames][1:])
+    still = {robot.root, *(joint.bodies[1] for joint in robot.joints
+                           if joint.kind == FIXED and joint.bodies[0] == robot.root)}
+    mass = sum(weight(pieces, density)[0] for body, pieces in robot.pieces.items()
+               if pieces and body not in still)
     tips = {link.name: link.tip for link in linkage.links}
     for name in inputs:
         joint, arm = joints[name], machine.scale * math.hypot(*linkage.frames[name][tips[name]])
@@ -359,16 +352,16 @@ def _started(part: Part, density: float) -> Robot:
 
 def _add_slots(machine: SceneMechanism, robot: Robot) -> None:
     """Add the bodies in slots of yokes, which have no joint in the tree."""
-    points = {point.name: point for point in robot.points}
     for prefix in machine.assembly().legs:
         for link, pin in machine.linkage.yokes.items():
             name, point = (f'{machine.name}_{prefix}{end}' for end in (link, pin))
-            place = robot.frames[points[point].body] @ (*points[point].place, 0.0, 1.0)
-            x, y = np.linalg.solve(robot.frames[f'{name}_link'], place)[:2].tolist()
-            robot.hang(f'{name}_slot_link', f'{name}_link', (x, y, 0.0, 0.0, 0.0, 0.5 * math.pi),
+            slot, end = f'{name}_slot_link', f'{name}_pin'
+            x, y, *_ = np.linalg.solve(robot.frames[f'{name}_link'], robot.frames[point])[:, 3]
+            robot.hang(slot, f'{name}_link', (x, y, 0.0, 0.0, 0.0, 0.5 * math.pi),
                        SLIDE, (1.0, 0.0, 0.0), None, f'{name}_slot')
-            robot.points.append(Point(f'{name}_pin', f'{name}_slot_link', (0.0, 0.0), point,
-                                      points[point].radius))
+            robot.hang(end, slot, 6 * (0.0,))
+            robot.pieces[slot] = robot.pieces[end] = robot.pieces[point]
+            robot.meets[end] = point
 
 
 def numbers(*values: float) -> str:

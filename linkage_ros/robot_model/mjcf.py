@@ -18,16 +18,15 @@ from xml.etree.ElementTree import Element, indent, tostring
 import numpy as np
 
 from .bodies import add, COLOURS, Model, numbers
-from .robot import Body, HINGE, Joint, Robot
+from .robot import Body, FARTHEST, HINGE, Joint, Robot
 from .shapes import BALL, BOX, CYLINDER
 
 # Time step [s] for a linkage of a metre; smaller linkages oscillate faster.
 STEP = 1e-3
 # A servo yields by this [rad, or of its arm] to the weight of all bodies, and bears so much of it.
 YIELD, STRENGTH = 1e-3, 10.0
+# [m/s^2]
 GRAVITY = 9.81
-# The end of a joint that has none [rad or m].
-FAR = 1e9
 
 
 def write(model: Model) -> str:
@@ -47,11 +46,12 @@ def write(model: Model) -> str:
             elements[body.name] = _add_body(elements[body.parent], body, part.robot)
     equality, actuator = add(root, 'equality'), add(root, 'actuator')
     starts = []
-    for robot in robots:
+    for part in model.parts:
+        robot, bodies = part.robot, {body.name: body for body in part.bodies()}
         joints = {joint.name: joint for joint in robot.joints}
-        for point in robot.points:
-            if point.meets:
-                add(equality, 'connect', name=point.name, site1=point.meets, site2=point.name)
+        for cut, met in robot.meets.items():
+            add(equality, 'connect', name=cut, body1=bodies[met].parent, body2=bodies[cut].parent,
+                anchor=numbers(*bodies[met].pose[:3]))
         for name in robot.follows:
             other, ratio, offset = robot.changes(name)
             add(equality, 'joint', joint1=name, joint2=other,
@@ -71,17 +71,14 @@ def _add_body(parent: Element, body: Body, robot: Robot) -> Element:
         moved = add(made, 'joint', name=joint.name, type=joint.kind, axis=numbers(*body.axis),
                     ref=numbers(joint.start))
         if joint.limits:
-            moved.set('range', numbers(*np.clip(joint.limits, -FAR, FAR)))
-    for piece in robot.solid(body.name):
+            moved.set('range', numbers(*np.clip(joint.limits, -FARTHEST, FARTHEST)))
+    for piece in robot.pieces.get(body.name, ()):
         half, thickness = 0.5 * piece.length, piece.thickness
         sizes = {CYLINDER: (thickness, half), BOX: (half, 0.5 * thickness, 0.5 * thickness),
                  BALL: (thickness,)}[piece.shape]
         add(made, 'geom', type=piece.shape, pos=numbers(*piece.pose[:3]),
             euler=numbers(*piece.pose[3:]), size=numbers(*sizes),
             rgba=numbers(*COLOURS[piece.colour]))
-    for point in robot.points:
-        if point.body == body.name:
-            add(made, 'site', name=point.name, pos=numbers(*point.place, 0.0), group='4')
     return made
 
 

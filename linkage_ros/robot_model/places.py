@@ -20,22 +20,21 @@ def at(place: Any, turned: Any = ((1, 0, 0), (0, 1, 0), (0, 0, 1))) -> np.ndarra
 
 def pose(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> np.ndarray:
     """Return a pose as a matrix (4, 4), by its place [m] and its angles about fixed axes [rad]."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos((roll, pitch, yaw)), np.sin((roll, pitch, yaw))
-    about_z, about_y, about_x = np.array([
-        [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]],
-        [[1, 0, 0], [0, cr, -sr], [0, sr, cr]]])
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = about_z @ about_y @ about_x, (x, y, z)
-    return made
+    (cr, cp, cy), (sr, sp, sy) = map(math.cos, (roll, pitch, yaw)), map(math.sin, (
+        roll, pitch, yaw))
+    return np.array([
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y],
+        [-sp, cp * sr, cp * cr, z], [0.0, 0.0, 0.0, 1.0]])
 
 
 def coordinates(matrix: np.ndarray) -> Tuple[float, ...]:
     """Return x, y, z [m], roll, pitch and yaw [rad] of a pose (4, 4)."""
-    a, b = matrix[:2, 0]
+    (a, d, g, x), (b, e, h, y), (c, _, _, z), _ = matrix.tolist()
     yaw = math.atan2(b, a) if math.hypot(a, b) > 1e-9 else 0.0
-    left = pose(0.0, 0.0, 0.0, 0.0, 0.0, -yaw) @ matrix
-    return (*matrix[:3, 3].tolist(), math.atan2(-left[1, 2], left[1, 1]),
-            math.atan2(-left[2, 0], left[0, 0]), yaw)
+    sin, cos = math.sin(yaw), math.cos(yaw)
+    return (x, y, z, math.atan2(sin * g - cos * h, cos * e - sin * d),
+            math.atan2(-c, cos * a + sin * b), yaw)
 
 
 def screws(axes: np.ndarray, places: np.ndarray, slides: Any = False) -> np.ndarray:

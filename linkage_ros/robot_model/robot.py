@@ -17,7 +17,7 @@ from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Optional, Seque
 import numpy as np
 
 from .places import at, coordinates, displacements, pose, screws
-from .shapes import Piece, Point
+from .shapes import Piece
 from ..command import RequestError
 from ..words import listed, meant
 
@@ -28,8 +28,6 @@ KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical'
          '6d': FIXED, 'revolute2': UNIVERSAL, 'floating': FREE}
 # No robot has parts farther off [m], or limits [m or rad].
 FARTHEST = 1e9
-
-
 # Joints that a tree prefers, if they are not driven.
 _TREE = {FIXED: 0, SLIDE: 1, FREE: 2, BALL: 3, HINGE: 4}
 
@@ -47,8 +45,8 @@ class Limits(NamedTuple):
 
     def text(self, joint: str) -> str:
         """Return the limits of a joint as text."""
-        own = '' if self.joints == (joint,) else f' {joint}'
-        return f'{", ".join(self.joints)},{own} from {self.low:.4g} to {self.high:.4g}'
+        name = '' if self.joints == (joint,) else f' {joint}'
+        return f'{", ".join(self.joints)},{name} from {self.low:.4g} to {self.high:.4g}'
 
 
 @dataclass(eq=False)
@@ -132,13 +130,13 @@ class Joint:
     @property
     def hinges(self) -> list[Joint]:
         """Return the hinges of a ball that is made of some, else the joint itself."""
-        return [one for part in self.parts for one in part.hinges] or [self]
+        return [hinge for part in self.parts for hinge in part.hinges] or [self]
 
 
-def plain(name: str, most: int) -> str:
+def plain(name: str, length: int) -> str:
     """Return a name of at most so many letters, digits and single underscores."""
-    found = re.sub('[^A-Za-z0-9]+', '_', name).strip('_')[:most]
-    return found if found[:1].isalpha() else f'joint_{found}'.rstrip('_')
+    text = re.sub('[^A-Za-z0-9]+', '_', name).strip('_')[:length]
+    return text if text[:1].isalpha() else f'joint_{text}'.rstrip('_')
 
 
 @dataclass(eq=False)
@@ -162,8 +160,8 @@ class Robot:
         Positions of joints that are fixed.
     pieces : dict
         What is seen of bodies.
-    points : list of Point
-        Joints of linkages on bodies, which are pieces of them, too.
+    meets : dict
+        For each body that was cut off a closed loop the other one, whose origin is in its own.
     servos : dict
         The mass [kg] and the arm [m] that a driven joint moves, where they are known.
 
@@ -176,7 +174,7 @@ class Robot:
     follows: dict[str, tuple[str, float, float]] = field(default_factory=dict)
     held: dict[str, float] = field(default_factory=dict)
     pieces: dict[str, list[Piece]] = field(default_factory=dict)
-    points: list[Point] = field(default_factory=list)
+    meets: dict[str, str] = field(default_factory=dict)
     servos: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def hang(self, name: str, parent: str, place: Sequence[float], kind: str = FIXED,
@@ -189,26 +187,21 @@ class Robot:
             (frame[:3, :3] @ axis,) * 2, None if kind == FIXED else 0.0, limits, '',
             (frame[:3, :3],) * 2))
 
-    def solid(self, body: str) -> list[Piece]:
-        """Return what is seen of a body and of its points."""
-        return [*self.pieces.get(body, ()), *(
-            point.ball(point.place) for point in self.points if point.body == body)]
-
     def bodies(self) -> Iterator[Body]:
         """Yield the bodies on the root, parents first; a joint is at the origin of its body."""
-        span = max(float(np.max(np.abs(frame[:3, 3]))) for frame in self.frames.values())
+        span = np.abs([frame[:3, 3] for frame in self.frames.values()]).max()
         for name, (base, joint) in trees(self)[0].items():
             frame, seen = self.frames[name], self.frames[base]
-            moves = joint.kind in (HINGE, SLIDE) and joint.position is not None
-            home = at(joint.place(name) if moves else frame[:3, 3], frame[:3, :3])
-            is_apart = np.abs(home - frame).max() > 1e-12 * span
-            if moves:
+            if joint.kind in (HINGE, SLIDE) and joint.position is not None:
+                home = at(joint.place(name), frame[:3, :3])
+                is_apart = np.abs(home - frame).max() > 1e-12 * span
                 axis = np.round(home[:3, :3].T @ joint.motion(name), 15) + 0.0
                 yield Body(f'{name}/joint' if is_apart else name, base, _seen(seen, home, span),
                            joint, axis.tolist())
+                if not is_apart:
+                    continue
                 base, seen = f'{name}/joint', home
-            if is_apart or not moves:
-                yield Body(name, base, _seen(seen, frame, span))
+            yield Body(name, base, _seen(seen, frame, span))
 
     def join(self, name: str, kind: str, bodies: tuple[str, str], frame: np.ndarray,
              axis: Any = (0.0, 0.0, 1.0), other: Optional[np.ndarray] = None,
@@ -225,17 +218,18 @@ class Robot:
         ends, no_limits = _limits(limits, kind.lower() == 'continuous')
         kind = KINDS.get(kind.lower(), kind.lower())
         frames = frame, frame if other is None else other
-        ways = axis, axis if second is None else second
-        turns, places = (tuple(each[:3, part] for each in frames) for part in (slice(3), 3))
-        sizes = np.linalg.norm(ways, axis=1)
-        if not np.all(np.abs((*places, *ways)) < FARTHEST):
+        directions = axis, axis if second is None else second
+        turns, places = zip(*((matrix[:3, :3], matrix[:3, 3]) for matrix in frames))
+        sizes = np.linalg.norm(directions, axis=1)
+        if not np.all(np.abs((*places, *directions)) < FARTHEST):
             raise RequestError(f'joint {name} must be within {FARTHEST:g} m')
         if kind in (HINGE, SLIDE, UNIVERSAL) and not np.all(sizes > 0.0):
             raise RequestError(f'the axis of joint {name} has no length')
         if kind != UNIVERSAL:
             self.joints.append(Joint(
                 name, kind, bodies, places, tuple(
-                    turn @ way / (size or 1.0) for turn, way, size in zip(turns, ways, sizes)),
+                    turn @ direction / (size or 1.0)
+                    for turn, direction, size in zip(turns, directions, sizes)),
                 position if kind in (HINGE, SLIDE) else None, ends, no_limits, turns,
                 other is not None))
             return
@@ -248,10 +242,10 @@ class Robot:
         self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame, second, other,
                   position if other is None else None)
 
-    def close(self, name: str, kind: str, bodies: tuple[str, str], own: Sequence[np.ndarray],
+    def close(self, name: str, kind: str, bodies: tuple[str, str], frames: Sequence[np.ndarray],
               axis: Any = (0.0, 0.0, 1.0), second: Any = None) -> None:
         """Close a loop by a joint, by its frame on each body as this has it; see `join`."""
-        first, other = (self.frames[body] @ frame for body, frame in zip(bodies, own))
+        first, other = (self.frames[body] @ frame for body, frame in zip(bodies, frames))
         self.join(name, kind, bodies, first, axis, other, second=second)
 
     def follow(self, name: str, other: str, ratio: float, offset: float) -> None:
@@ -279,16 +273,16 @@ class Robot:
 
     def sources(self, name: str) -> list[tuple[str, float, float]]:
         """Return a joint and those that it depends on in turn, each with ratio and offset."""
-        found, passed = [(name, 1.0, 0.0)], [*self.driven]
+        sources, passed = [(name, 1.0, 0.0)], [*self.driven]
         while name in self.follows and name not in passed:
             passed.append(name)
-            _, ratio, offset = found[-1]
+            _, ratio, offset = sources[-1]
             name, factor, start = self.follows[name]
-            found.append((name, ratio * factor, offset + ratio * start))
+            sources.append((name, ratio * factor, offset + ratio * start))
         if name not in self.positions:
             raise RequestError(f'{passed[-1]} follows {name!r}, which is no joint'
                                f'{meant(name, self.positions)}')
-        return found
+        return sources
 
     def source(self, name: str) -> tuple[str, float, float]:
         """Return the joint that another depends on, or itself, with ratio and offset."""

@@ -13,14 +13,11 @@ Format: the SDFormat specification (sdformat.org/spec).
 
 from __future__ import annotations
 
-from typing import Sequence
 from xml.etree.ElementTree import Element, indent, tostring
 
 from .bodies import add, COLOURS, Model
 from .robot import Body, HINGE, Joint, Robot, SLIDE
-from .shapes import Piece, weight
-
-UNTURNED = 0.0, 0.0, 0.0
+from .shapes import weight
 
 
 def write(model: Model) -> str:
@@ -30,21 +27,17 @@ def write(model: Model) -> str:
     root = Element('sdf', version='1.11' if any(robot.follows for robot in robots) else '1.7')
     made = add(root, 'model', name=model.name)
     for part in model.parts:
+        meets, parents = part.robot.meets, {}
         for body in part.bodies():
-            _add_body(made, model, part.robot, body, part.robot.solid(body.name))
-    points = {point.name: point for robot in robots for point in robot.points}
-    for name, point in points.items():
-        frame = add(made, 'frame', name=name, attached_to=point.body)
-        place = *point.place, 0.0, *UNTURNED
-        add(frame, 'pose', *place)
-        if point.meets:
-            hinge = Joint(f'{name}_hinge', HINGE, (point.body, name), (), ())
-            pin = Body(f'{name}_pin', point.body, place, hinge, (0.0, 0.0, 1.0))
-            _add_body(made, model, robots[0], pin, [point.ball()])
-            other = points[point.meets].body
-            _add_joint(made, f'{name}_closed', 'fixed', other, pin.name)
-            _add_plugin(made, 'detachable-joint', 'DetachableJoint', parent_link=other,
-                        child_model='__model__', child_link=pin.name)
+            parents[body.name] = body.parent
+            if body.name in meets:
+                hinge = Joint(f'{body.name}_hinge', HINGE, (body.parent, body.name), (), ())
+                body = body._replace(joint=hinge, axis=(0.0, 0.0, 1.0))
+            _add_body(made, model, part.robot, body)
+        for cut, met in meets.items():
+            _add_joint(made, f'{cut}_closed', 'fixed', parents[met], cut)
+            _add_plugin(made, 'detachable-joint', 'DetachableJoint', parent_link=parents[met],
+                        child_model='__model__', child_link=cut)
     _add_plugin(made, 'joint-state-publisher', 'JointStatePublisher')
     for robot in robots:
         for name in robot.driven:
@@ -68,21 +61,21 @@ def _add_joint(made: Element, name: str, kind: str, parent: str, child: str) -> 
     return joint
 
 
-def _add_body(made: Element, model: Model, robot: Robot, body: Body, solid: Sequence[Piece]
-              ) -> None:
+def _add_body(made: Element, model: Model, robot: Robot, body: Body) -> None:
     """Add a body and its joint, whose positions begin at 0."""
     base, parent = (('__model__', 'world') if body.parent == model.root else
                     (body.parent, body.parent))
     link = add(made, 'link', name=body.name)
     add(link, 'pose', *body.pose, relative_to=base)
-    mass, centre, moments = weight(solid, model.density)
-    inertial = add(link, 'inertial')
-    add(inertial, 'pose', *centre, 0.0, *UNTURNED)
-    add(inertial, 'mass', mass)
-    inertia = add(inertial, 'inertia')
-    for tag, moment in zip(('ixx', 'iyy', 'izz', 'ixy'), moments):
-        add(inertia, tag, moment)
-    for i, piece in enumerate(solid):
+    if pieces := robot.pieces.get(body.name):
+        mass, centre, moments = weight(pieces, model.density)
+        inertial = add(link, 'inertial')
+        add(inertial, 'pose', *centre, *4 * (0.0,))
+        add(inertial, 'mass', mass)
+        inertia = add(inertial, 'inertia')
+        for tag, moment in zip(('ixx', 'iyy', 'izz', 'ixy'), moments):
+            add(inertia, tag, moment)
+    for i, piece in enumerate(pieces or ()):
         visual = add(link, 'visual', name=f'{body.name}_{i}')
         add(visual, 'pose', *piece.pose)
         shape = add(add(visual, 'geometry'), piece.shape)

@@ -170,24 +170,6 @@ class Piece(NamedTuple):
                 }[self.shape]
 
 
-class Point(NamedTuple):
-    """
-    A joint of a linkage on a body.
-
-    `meets` is the coinciding point on another body if a loop was cut here.
-    """
-
-    name: str
-    body: str
-    place: Place
-    meets: str
-    radius: float
-
-    def ball(self, place: Place = (0.0, 0.0)) -> Piece:
-        """Return its visible ball, at a place in its own frame or in another."""
-        return Piece(BALL, 'joint', self.radius, place, place)
-
-
 def weight(pieces: Sequence[Piece], density: float) -> Tuple[float, List[float], List[float]]:
     """
     Return the common weight of one or more pieces of a density [kg/m^3].

@@ -40,10 +40,6 @@ def write(model: Model) -> str:
     for part in model.parts:
         for body in part.bodies():
             _add_link(root, body, part.robot.pieces.get(body.name, ()))
-            for point in part.robot.points:
-                if point.body == body.name:
-                    _add_link(root, Body(point.name, point.body, (*point.place, *[0.0] * 4)),
-                              [point.ball()])
     indent(root)
     return tostring(root, encoding='unicode')
 
