@@ -130,7 +130,6 @@ class _Loops:
         self._check_start()
         low, high = corners = np.array([
             self._ends.get(source, (value,) * 2) for source, value in self._start.items()]).T
-        self._enter(low, high)
         walk, beyond = self._walk_to(corners if len(self._ends) == 1 else np.random.default_rng(
             1).uniform(low, high, (PATHS, len(low))))
         if (count := walk.good.sum()) < MIN_POSES:
@@ -155,14 +154,6 @@ class _Loops:
                 if abs(off) > OTHER + self._slack:
                     raise Difference(f'{self._at(self._start)} {joint.name} is off by '
                                      f'{abs(off):.2g}')
-
-    def _enter(self, low: np.ndarray, high: np.ndarray) -> None:
-        """Let walks start inside ranges of the sources, if there is a way from the file's pose."""
-        inside = np.clip([*self._start.values()], low, high)
-        if (inside != [*self._start.values()]).any():
-            walk = self._walk(inside[None], POSES)
-            if walk.good.all():
-                self._start, self._pose = dict(zip(self._start, inside.tolist())), walk.poses[-1]
 
     def _walk_to(self, targets: np.ndarray) -> Tuple[Walk, str]:
         """

@@ -154,10 +154,12 @@ def _choice(questions: Sequence[Question], why: str) -> ValueError:
 def _question(component: Component, poses: np.ndarray, which: np.ndarray, where: str = ''
               ) -> List[Question]:
     """Return the choice of two poses by the joint that differs most, if they are different."""
-    name, first, second = component.most_different(poses[0], poses[1], which)
+    apart = np.abs(component.away(poses[0] - poses[1])) * which
+    name = max(component.named, key=lambda name: apart[component.named[name]])
+    first, second = component.read(poses)[name]
     one, other = (component.texts(pose, which) for pose in poses)
     return [(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', one, other)] * (
-        abs(first - second) > DISTINCT)
+        bool(apart[component.named[name]] > DISTINCT))
 
 
 def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], least: float
@@ -243,7 +245,7 @@ def nearest(component: Component, motors: List[str], followers: List[str]
         pose[which] = some[first, which]
         for i in more:
             alike = distances[i] < ALIKE * distances[first] + ALIKE_LENGTH
-            if alike and (question := _question(component, some[[first, i]], determined)):
+            if alike and component.named and (question := _question(component, some[[first, i]], determined)):
                 questions += question
                 break
     if questions:

@@ -114,7 +114,6 @@ class Component:
             above[i, i] = True
         self.named = {screw.joint.name: i for i, screw in enumerate(self._screws)
                       if screw.joint.position is not None}
-        self._is_named = np.isin(np.arange(len(above) - 1), [*self.named.values()])
         self._starts = np.array([screw.joint.start for screw in self._screws])
         self._slides = np.array([screw.kind == SLIDE for screw in self._screws], bool)
         self._in_balls = np.array([any(
@@ -165,9 +164,9 @@ class Component:
         """Names of the hinges that close its loops, whose angles `read` returns."""
         return {cut.name for cut in self._cuts if cut.position is not None and cut.kind == HINGE}
 
-    def at_start(self, count: int = 1) -> np.ndarray:
-        """Return the pose of the file, `count` times."""
-        return np.zeros((count, len(self._screws)))
+    def at_start(self) -> np.ndarray:
+        """Return the pose of the file."""
+        return np.zeros((1, len(self._screws)))
 
     def is_of(self, names: Sequence[str]) -> np.ndarray:
         """Return which screws are of the joints that are named."""
@@ -310,16 +309,6 @@ class Component:
         # The spin of a rod on balls does not count.
         ways = self.free_ways(pose, self.is_of(motors)) * ~self._in_balls
         return [name for name, i in self.named.items() if is_free(ways)[i]], ways
-
-    def most_different(self, one: np.ndarray, other: np.ndarray, which: Any
-                       ) -> Tuple[str, float, float]:
-        """Return the joint with the largest difference of two poses, and its positions."""
-        apart = np.abs(self.away(one - other)) * which * self._is_named
-        if not apart.any():
-            return '', 0.0, 0.0
-        name = self._screws[int(np.argmax(apart))].joint.name
-        first, second = self.read(np.array([one, other]))[name]
-        return name, float(first), float(second)
 
     def read(self, poses: np.ndarray) -> Dict[str, np.ndarray]:
         """Return the positions of named joints [rad or m], within half a turn of the file's."""
