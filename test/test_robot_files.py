@@ -21,6 +21,7 @@ from hypothesis import example, given, settings, strategies as st
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_files import check, closing, command, model, readers
 from linkage_ros.robot_model.robot import posed, trees
+from linkage_ros.robot_model.urdf import write
 import numpy as np
 import pytest
 from robots import LIBRARIES
@@ -1120,7 +1121,7 @@ def test_a_tree_of_mujoco_is_the_same_tree_as_urdf(tmp_path, seed):
         data.qpos[whole.joint(name).qposadr] = value
     mujoco.mj_kinematics(whole, data)
     bodies = [whole.body(i).name for i in range(1, whole.nbody)]
-    found = LIBRARIES[1](model.urdf(robot)).places(positions, bodies)
+    found = LIBRARIES[1](write(model.drawn(robot))).places(positions, bodies)
     for i, body in enumerate(bodies):
         assert found[body] == pytest.approx(data.xpos[i + 1], abs=1e-13)
 
@@ -1330,7 +1331,7 @@ def as_urdf(robot, rng, loops=None):
     """Return a robot of cuts as URDF, each loop closed in a dialect of its own."""
     for joint in robot.joints:
         joint.is_cut = joint.name.startswith('cut_')
-    text, closings = model.urdf(robot), ''
+    text, closings = write(model.drawn(robot)), ''
     for i, cut in enumerate(trees(robot)[1]):
         given = f'c{i}', *cut.bodies, *cut.places
         closings += CLOSINGS[rng.integers(len(CLOSINGS))](*given) if loops is None else in_file(

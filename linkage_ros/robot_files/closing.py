@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 import shlex
-from typing import Any, Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
+from typing import Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -151,15 +151,17 @@ def _choice(questions: Sequence[Question], why: str) -> ValueError:
         for each in sides))
 
 
-def _question(component: Component, poses: np.ndarray, which: np.ndarray, where: str = ''
-              ) -> List[Question]:
+def _question(component: Component, poses: np.ndarray, which: np.ndarray,
+              motors: Sequence[str] = ()) -> List[Question]:
     """Return the choice of two poses by the joint that differs most, if they are different."""
     apart = np.abs(component.away(poses[0] - poses[1])) * which
-    name = max(component.named, key=lambda name: apart[component.named[name]])
+    name = max(component.named, key=lambda name: apart[component.named[name]], default='')
+    if not name or apart[component.named[name]] < DISTINCT:
+        return []
     first, second = component.read(poses)[name]
     one, other = (component.texts(pose, which) for pose in poses)
-    return [(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', one, other)] * (
-        bool(apart[component.named[name]] > DISTINCT))
+    where = ''.join(f'{motor}={one[motor]} ' for motor in motors)
+    return [(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', one, other)]
 
 
 def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], least: float
@@ -172,33 +174,24 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], l
             return
         sizes = np.linalg.norm(ways, axis=0)
         motors = [max(component.named, key=lambda name: sizes[component.named[name]])]
-    fixed, questions = component.is_of(motors), []
+    fixed = component.is_of(motors)
+    questions: List[Question] = []
+    steps = sorted((pose + ahead * component.unit * fixed for ahead in (ASIDE, -ASIDE)),
+                   key=lambda step: not component.within(step[None], fixed)[0])
     for which, rows in component.independent(fixed):
         ways = component.free_ways(pose, fixed | ~which, least)
         for way in ways if len(ways) > component.nullity(fixed | ~which) else ():
-            questions += _folded(component, pose, motors, 3.0 * ASIDE * component.unit * way,
-                                 rows)
+            aside = 3.0 * ASIDE * component.unit * np.array([way, -way])
+            pairs = [component.closed(step + aside, fixed, 40) for step in steps]
+            pairs = [poses for poses in pairs if np.max(component.gap(poses, rows)) < CLOSED]
+            if not pairs:
+                raise ValueError(f'its loops end where the file has {listed(motors)}: choose '
+                                 'another pose by --pose, or mend lengths or places in the file')
+            asked = [question for poses in pairs for question in _question(
+                component, poses, (way != 0.0) | fixed, motors)]
+            questions += asked[:1]
     if questions:
         raise _choice(questions, 'bars lie in line where the file has them, and it moves on')
-
-
-def _folded(component: Component, pose: np.ndarray, motors: List[str], aside: np.ndarray,
-            rows: Any) -> List[Question]:
-    """Return the choice of neighbouring poses of a dead point, if there are two."""
-    fixed, is_end = component.is_of(motors), True
-    steps = [pose + ahead * component.unit * fixed for ahead in (ASIDE, -ASIDE)]
-    for step in sorted(steps, key=lambda step: not component.within(step[None], fixed)[0]):
-        poses = component.closed(step + np.array([aside, -aside]), fixed, 40)
-        if np.max(component.gap(poses, rows)) < CLOSED:
-            is_end = False
-            if question := _question(component, poses, (aside != 0.0) | fixed, ''.join(
-                    f'{name}={value} ' for name, value in component.texts(
-                        poses[0], fixed).items())):
-                return question
-    if is_end:
-        raise ValueError(f'its loops end where the file has {listed(motors)}: choose another '
-                         'pose by --pose, or mend lengths or places in the file')
-    return []
 
 
 def nearest(component: Component, motors: List[str], followers: List[str]
@@ -245,7 +238,7 @@ def nearest(component: Component, motors: List[str], followers: List[str]
         pose[which] = some[first, which]
         for i in more:
             alike = distances[i] < ALIKE * distances[first] + ALIKE_LENGTH
-            if alike and component.named and (question := _question(component, some[[first, i]], determined)):
+            if alike and (question := _question(component, some[[first, i]], determined)):
                 questions += question
                 break
     if questions:

@@ -24,12 +24,7 @@ OTHERS = 'others'
 def description(path: str, loops: Optional[str] = None) -> str:
     """Return a robot as robot_state_publisher takes it: a URDF as it is, else its tree."""
     robot = readers.read(path, loops)
-    return Path(path).read_text() if parse(path).tag == 'robot' else urdf(robot)
-
-
-def urdf(robot: Robot) -> str:
-    """Return the tree of a robot, all joints at zero where its URDF has them at zero."""
-    return write(drawn(robot))
+    return Path(path).read_text() if parse(path).tag == 'robot' else write(drawn(robot))
 
 
 def drawn(robot: Robot) -> bodies.Model:
