@@ -28,11 +28,8 @@ def read(path: str, loops: Optional[str] = None) -> Robot:
             with needs('mujoco'):
                 from . import mjcf
             robot = mjcf.read(path)
-        elif root.tag == 'sdf':
-            robot = sdf.read(root)
         else:
-            reader = urdf.Reader(root)
-            robot = reader.robot
+            robot = sdf.read(root) if root.tag == 'sdf' else urdf.read(root)
         names = Counter(joint.name for joint in robot.joints if joint.position is not None)
         if '' in names:
             raise RequestError('a joint has no name')
@@ -41,7 +38,7 @@ def read(path: str, loops: Optional[str] = None) -> Robot:
     if loops:
         given = _loops(loops)
         with _blaming(loops):
-            reader.of_file(given)
+            urdf.close(robot, given)
     with _blaming(path):
         for name in robot.follows:
             robot.source(name)
