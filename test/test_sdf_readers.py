@@ -131,7 +131,8 @@ class Writer:
         axis /= np.linalg.norm(axis)
         seen, said = there, ''
         if number <= (1, 4):
-            seen = at
+            seen, said = [(at, ''), (there, '<use_parent_model_frame>0</use_parent_model_frame>')][
+                rng.integers(2)]
         elif number <= (1, 6) and rng.random() < 0.5:
             seen, said = at, '<use_parent_model_frame>true</use_parent_model_frame>'
         elif number >= (1, 7) and rng.random() < 0.5:

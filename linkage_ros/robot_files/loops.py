@@ -195,17 +195,16 @@ def flat(robot: Robot, group: Group, drives: Sequence[str]) -> Loop:
                          f'{OPEN:g} of their size')
     pins = [joint for joint in found if joint.position is not None]
     still: List[str] = []
-    up = hinges[0].axis * np.sign((seen[:3, :3] @ hinges[0].axis)[2])
     stiff = [joint for joint in found if len(joint.hinges) == 2 and not any(
-        joint.kind == HINGE and _lean(joint, up) < ASKEW for joint in joint.hinges)]
+        joint.kind == HINGE and _lean(joint, hinges[0].axis) < ASKEW for joint in joint.hinges)]
     for joint in found:
         # A rod turns in the plane about one hinge of the ball at its end; the others stay, unless
         # its other end needs them.
         for hinge, sign in joint.chain:
-            if _lean(hinge, up) < ASKEW and not any(
+            if _lean(hinge, hinges[0].axis) < ASKEW and not any(
                     {*joint.bodies} & {*other.bodies} for other in stiff):
                 pins.append(replace(joint, name=hinge.name, kind=HINGE, position=hinge.position,
-                                    axes=[sign * float(np.sign(hinge.axis @ up))] * 2))
+                                    axes=[sign * float(np.sign(hinge.axis @ hinges[0].axis))] * 2))
                 still += [one.name for one, _ in joint.chain if one is not hinge]
                 break
     return Loop(ground, frame, found, size, gap, lean, pins, still)
