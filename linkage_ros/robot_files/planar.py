@@ -10,6 +10,7 @@ The lines of a mechanism have its inputs first, then its dyads.
 from __future__ import annotations
 
 from cmath import phase
+from dataclasses import replace
 from itertools import combinations
 import math
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Set, Tuple
@@ -17,14 +18,16 @@ from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Se
 import numpy as np
 
 from . import check, loops
-from .spatial import EXACT
+from .spatial import EXACT, TOGETHER
 from .. import mechanisms, scene
 from ..linkage import bar_name, Dyads, Hinge, Mechanism, Motor, Pin, ROUNDING, short, Slide
-from ..robot_model.places import coordinates
-from ..robot_model.robot import Joint, Limits, NotDriven, plain, Robot, SLIDE
+from ..robot_model.places import at, coordinates
+from ..robot_model.robot import HINGE, Joint, Limits, NotDriven, plain, Robot, SLIDE
 from ..scene import FARTHEST
 from ..scene.joint_names import quoted_name
 
+# Loops with a smaller gap, of their size, are closed: files have rounded numbers.
+OPEN = 1e-4
 # The most joints of which pairs are tried as motors.
 MAX_PAIRED = 30
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
@@ -46,24 +49,49 @@ class Drawing(Dyads):
 
     Attributes
     ----------
+    frame : array
+        The pose of its plane on the ground.
+    joints : list of Joint
+        Joints whose places are complex [m], and so are the axes of slides; the axis of a hinge is
+        1 or -1.
+    gap, lean : float
+        The distance that cannot be closed [m], and the inclination of axes [rad].
+    measured : list of Joint
+        Hinges and slides with a position, those of balls in the plane included.
+    still : list of str
+        The other hinges of these balls.
     drives : list of Source
         The inputs.
     driven : list of Joint
         The joints of the inputs.
 
+    Raises
+    ------
+    ValueError
+        If it is not planar, or not closed.
+
     """
 
-    def __init__(self, robot: Robot, loop: loops.Loop, drives: Sequence[str]):
-        self.loop, self._robot = loop, robot
+    def __init__(self, robot: Robot, group: loops.Group, drives: Sequence[str]):
+        self._robot = robot
+        self._flatten(group, drives)
         self.drives: List[Source] = []
         # Tips of triangles that are a dyad: they turn with a link of their own.
         self._tips: Set[str] = set()
-        self.driven = [joint for joint in loop.joints if joint.name in drives]
+        self.driven = [joint for joint in self.joints if joint.name in drives]
+        places = [place for joint in self.joints for place in joint.places]
+        size = max(abs(place - other) for place in places for other in places)
+        if size < TOGETHER:
+            raise ValueError('all its joints are at one place')
+        if self.gap > OPEN * size:
+            raise ValueError(f'its loops cannot be closed: they stay open by {self.gap:.3g} m, '
+                             f'more than {OPEN:g} of their size')
+        near = size * min(max(ROUNDING, 10.0 * self.gap / size), 1e-6)
         pins: List[Dict[str, complex]] = []
-        for joint in loop.joints:
+        for joint in self.joints:
             pin = dict(zip(joint.bodies, joint.places))
             same = [other for other in pins if any(
-                abs(other[body] - pin[body]) < loop.near for body in other.keys() & pin.keys())]
+                abs(other[body] - pin[body]) < near for body in other.keys() & pin.keys())]
             if joint.kind != SLIDE:
                 pins = [other for other in pins if other not in same]
                 pins.append({body: place for each in (*same, pin)
@@ -73,17 +101,56 @@ class Drawing(Dyads):
                                  joint.places[1]), (joint.axis, joint.axis), joint)
             if joint.kind == SLIDE else
             Hinge(joint.bodies, joint.places, joint.axis, -joint.axis * joint.start,
-                  joint) for joint in loop.joints]
+                  joint) for joint in self.joints]
         super().__init__(
-            loop.ground, [body for joint in loop.joints for body in joint.bodies], pins,
+            group.ground, [body for joint in self.joints for body in joint.bodies], pins,
             [each for each in moved if isinstance(each, Slide) and each.joint not in self.driven],
-            [each for each in moved if each.joint in self.driven], loop.size, loop.near)
+            [each for each in moved if each.joint in self.driven], size, near)
         self.take_apart()
+
+    def _flatten(self, group: loops.Group, drives: Sequence[str]) -> None:
+        """Set the plane, and the joints in it."""
+        ground = group.ground
+        hinges, self.lean = loops.check_planar(ground, group.joints, drives)
+        base = self._robot.frames[ground]
+        normal = base[:3, :3].T @ hinges[0].axis
+        right = np.eye(3)[int(abs(normal[0]) > 0.9)]
+        right = (right - right @ normal * normal) / np.linalg.norm(np.cross(right, normal))
+        turned = np.column_stack([right, np.cross(normal, right), normal])
+        origin = next((joint for joint in hinges if ground in joint.bodies), hinges[0])
+        self.frame = at(base[:3, :3].T @ (origin.places[0] - base[:3, 3]), turned)
+        seen = np.linalg.inv(base @ self.frame)
+        self.joints: List[Joint] = []
+        for joint in group.joints:
+            first, second = ((seen @ [*place, 1.0])[:2] for place in joint.places)
+            axis = seen[:3, :3] @ joint.axis
+            way = complex(*axis[:2])
+            self.joints.append(replace(
+                joint, places=(complex(*first), complex(*second)),
+                axes=[way / abs(way) if joint.kind == SLIDE else float(np.sign(axis[2]))] * 2))
+        gaps = ((joint.places[1] - joint.places[0], joint) for joint in self.joints)
+        self.gap = max(abs((apart / joint.axis).imag if joint.kind == SLIDE else apart)
+                       for apart, joint in gaps)
+        self.measured = [joint for joint in self.joints if joint.position is not None]
+        self.still: List[str] = []
+        up = hinges[0].axis
+        stiff = {body for joint in self.joints for body in joint.bodies
+                 if len(joint.hinges) == 2 and not loops.pins(joint, up)}
+        for joint in self.joints:
+            # A rod turns in the plane about one hinge of the ball at its end; the others stay,
+            # unless its other end needs them.
+            pins = [(hinge, sign) for hinge, sign in joint.chain if hinge in loops.pins(joint, up)]
+            if pins and not stiff & {*joint.bodies}:
+                (hinge, sign), *_ = pins
+                self.measured.append(replace(
+                    joint, name=hinge.name, kind=HINGE, position=hinge.position,
+                    axes=[sign * float(np.sign(hinge.axis @ up))] * 2))
+                self.still += [other.name for other, _ in joint.chain if other is not hinge]
 
     @property
     def allowed(self) -> float:
         """Return the allowed distance of a pose from the file's, of the size."""
-        return max(ROUNDING, 30.0 * self.loop.gap / self.loop.size + self.loop.lean)
+        return max(ROUNDING, 30.0 * self.gap / self.size + self.lean)
 
     @property
     def places(self) -> Iterator[Pin]:
@@ -100,7 +167,7 @@ class Drawing(Dyads):
         values = [drive.value for drive in self.drives]
         places = linkage.solve(values if len(values) > 1 else values[0])
         return float(np.max([abs(complex(*places[name]) - place) for name, place in self.places
-                             if name in (names or places)])) / self.loop.size
+                             if name in (names or places)])) / self.size
 
     def measured_by(self, joint: Joint) -> Optional[Tuple[str, float, float]]:
         """Return the link whose angle is a joint's position, with sign and position, if any."""
@@ -176,17 +243,17 @@ class Drawing(Dyads):
     def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
         """Return the start of a line for bars that mirror others, and so pass dead points."""
         (first, start), (second, end) = one, two
-        for corner, at in self.places:
+        for corner, there in self.places:
             links = [{body for body in self.parts
                       if {corner, name} <= self.on[body].keys()} for name in (first, second)]
             if corner in (first, second) or not all(links) or links[0] == links[1]:
                 continue
-            opposite, along = start + end - at, end - start
+            opposite, along = start + end - there, end - start
             kite, crossed = (start + along * ((each - start) / along).conjugate()
-                             for each in (at, opposite))
+                             for each in (there, opposite))
             for word, seen in (('parallelogram', opposite), ('mirror', kite),
                                ('antiparallelogram', crossed)):
-                if max(abs(seen - place), abs(seen - other)) < self.loop.near < abs(at - place):
+                if max(abs(seen - place), abs(seen - other)) < self.near < abs(there - place):
                     return f'{word} {corner} {first} {second}'
         return None
 
@@ -200,7 +267,7 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
     """
     drawing = _drawn(robot, group)
     name = check.name_beside(others, plain(drawing.driven[0].name, 60))
-    loop, given = drawing.loop, {
+    given = {
         f'{name}.{key}': value for key, value in _parameters(drawing)}
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if not any(called.published for called in machine.joints.values()):
@@ -210,7 +277,7 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
         reports.append(f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.')
     ends = {}
     for drive in drawing.drives:
-        around = math.pi if drive.name[:5] == 'crank' else 0.5 * loop.size
+        around = math.pi if drive.name[:5] == 'crank' else 0.5 * drawing.size
         low, high = drive.value - around, drive.value + around
         if drive.source in limits:
             try:
@@ -227,12 +294,12 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
     machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if drawing.apart(machine.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
-    slack = loop.lean + loop.gap / loop.size
+    slack = drawing.lean + drawing.gap / drawing.size
     if slack > EXACT:
-        reports.append(f'Warning: the file is not exact: axes lean by {loop.lean:.2g} rad, and '
-                       f'loops stay open by {loop.gap:.2g} m; so is what is published.')
+        reports.append(f'Warning: the file is not exact: axes lean by {drawing.lean:.2g} rad, and '
+                       f'loops stay open by {drawing.gap:.2g} m; so is what is published.')
     return check.Imported(name, given, reports, [joint.name for joint in drawing.driven], ends,
-                          slack, loop.still)
+                          slack, drawing.still)
 
 
 def _sweep(drive: Source, limits: Limits, settings: scene.InputSettings) -> Tuple[float, float]:
@@ -265,8 +332,7 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
               for body in joint.bodies if body != group.ground)
     drawings: List[Drawing] = []
     for drives, ground in tries:
-        loop = loops.flat(robot, group._replace(ground=ground), drives)
-        drawings.append(Drawing(robot, loop, drives))
+        drawings.append(Drawing(robot, group._replace(ground=ground), drives))
         if not drawings[-1].left:
             break
     best = min(drawings, key=lambda drawing: len(drawing.left))
@@ -282,7 +348,7 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
 
 def _why(drawing: Drawing) -> str:
     """Return why bodies are left."""
-    holders = [joint for joint in drawing.loop.joints if {*joint.bodies} & {*drawing.left}]
+    holders = [joint for joint in drawing.joints if {*joint.bodies} & {*drawing.left}]
     freedom = 3 * len(drawing.left) - 2 * len(holders) - sum(
         joint in drawing.driven for joint in holders)
     between = [joint.name for joint in holders if joint in drawing.driven
@@ -297,12 +363,12 @@ def _why(drawing: Drawing) -> str:
 
 
 def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
-    measured = [(joint, found) for joint in drawing.loop.pins if joint not in drawing.driven
+    measured = [(joint, found) for joint in drawing.measured if joint not in drawing.driven
                 and (found := drawing.measured_by(joint))]
     yield 'type', 'custom'
     yield 'joints', drawing.lines
-    yield 'frame_id', drawing.loop.ground
-    yield 'pose', [float(short(value)) for value in coordinates(drawing.loop.frame)]
+    yield 'frame_id', drawing.ground
+    yield 'pose', [float(short(value)) for value in coordinates(drawing.frame)]
     links = {link.name: link for link in drawing.linkage.links}
     for drive in drawing.drives:
         yield f'{drive.name}.source', drive.source
