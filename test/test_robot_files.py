@@ -116,10 +116,13 @@ URDF = {
                       [('front_foot', 'back_foot')]),
     'palletiser.urdf': (('--loops', ROBOTS / 'palletiser_loops.yaml'),
                         {'joint_2': (-0.5, 0.9), 'joint_3': (0.6, -0.8)},
-                        [('tail_a', 'tail_b'), ('level_a', 'level_b'), ('tool_a', 'tool_b')])}
+                        [('tail_a', 'tail_b'), ('level_a', 'level_b'), ('tool_a', 'tool_b')]),
+    # The bell's angle is that of a link less that of the thigh, both on one pin of a third link.
+    'wheel_leg.urdf': ((), {'hip': (-0.25, 0.3), 'crank_motor': (0.35, -0.35)},
+                       [('rod_eye', 'bell_eye'), ('tendon_eye', 'shin_eye')])}
 
 
-@pytest.mark.nightly(all_but=4)
+@pytest.mark.nightly(all_but=5)
 @pytest.mark.parametrize('library', LIBRARIES)
 @pytest.mark.parametrize('file', URDF)
 def test_the_joints_of_a_urdf_close_its_loops(imported, file, library):
@@ -322,37 +325,32 @@ def test_hinges_that_cross_at_the_end_of_a_rod_are_a_ball(imported, capsys, tmp_
         'rocker hangs', 'coupler hangs', refused(capsys, loose))
 
 
-LEG = {'hip': (-0.25, 0.3), 'crank_motor': (0.35, -0.35)}
+# A motor at the knee; a motor that follows the other; a knee that stays, as on a four-bar.
+FIVE_BARS = [
+    ('name_mot: [mot_front, front_knee]', '', lambda angle: {
+        'mot_front': 0.2, 'front_knee': angle}),
+    ('name_mot: [mot_front]', '<mimic joint="mot_front" multiplier="0.5"/>', lambda angle: {
+        'mot_front': angle, 'mot_back': 0.5 * angle}),
+    ('joint_name: [front_knee], joint_type: [FIXED], name_mot: [mot_front]', '', lambda angle: {
+        'mot_front': 0.3 * angle, 'front_knee': 0.0})]
 
 
-@pytest.mark.parametrize('library', LIBRARIES)
-def test_a_bell_crank_on_the_pin_of_a_motor_is_published(imported, library):
-    # Its angle is that of a link less that of the thigh, both on one pin of a third link.
-    text = (ROBOTS / 'wheel_leg.urdf').read_text()
-    machine, = imported('wheel_leg.urdf').values()
-    ends = {'rod': (0.12, 0.0, 0.0), 'bell': (0.0, 0.0, 0.08), 'tendon': (0.09, 0.0, -0.19),
-            'shin': (-0.05, 0.0, -0.02)}
-    robot = library(text.replace('</robot>', ''.join(
-        fixed(link, f'{link}_eye', place) for link, place in ends.items()) + '</robot>'))
-    for part in np.linspace(0.0, 1.0, 9):
-        joints = published(machine, **{motor: low + part * (high - low)
-                                       for motor, (low, high) in LEG.items()})
-        assert joints.keys() == {*robot.joints}
-        places = robot.places(joints, [f'{link}_eye' for link in ends])
-        for first, second in (('rod', 'bell'), ('tendon', 'shin')):
-            assert places[f'{first}_eye'] == pytest.approx(places[f'{second}_eye'], abs=1e-15)
-
-
-def test_a_motor_at_the_knee_drives_as_well(imported, tmp_path):
-    loops = tmp_path / 'loops.yaml'
-    loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [3d], '
-                     'name_mot: [mot_front, front_knee]}')
-    machine, = imported('five_bar.urdf', '--loops', loops).values()
-    robot = LIBRARIES[0]((ROBOTS / 'five_bar.urdf').read_text())
-    for knee in np.linspace(-0.3, 0.3, 7):
-        joints = published(machine, mot_front=0.2, front_knee=knee)
+@pytest.mark.parametrize('more, mimic, motors', FIVE_BARS, ids=range(3))
+def test_a_five_bar_is_closed_by_what_moves_it(imported, tmp_path, more, mimic, motors):
+    axis, loops = '<axis xyz="0 -1 0"/>', tmp_path / 'loops.yaml'
+    file = written(tmp_path, 'five_bar.urdf', (axis, axis + mimic))
+    loops.write_text(f'{{closed_loop: [[front_foot, back_foot]], type: [3d], {more}}}')
+    machine, = imported(file, '--loops', loops).values()
+    assert {drive.source for drive in machine.inputs.values()} == {
+        *re.search(r'name_mot: \[(.*)\]', more)[1].split(', ')}
+    robot = LIBRARIES[1]((ROBOTS / 'five_bar.urdf').read_text())
+    for angle in np.linspace(-0.3, 0.3, 7):
+        joints = published(machine, **motors(angle))
         places = robot.places(joints, ['front_foot', 'back_foot'])
         assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
+    rest, lost = model.others(readers.read(str(file), str(loops)), {'m': machine}, {})
+    assert not lost and [value for key, value in rest.items() if key.endswith('.source')] == [
+        'front_knee'] * ('FIXED' in more) + ['mot_front'] * bool(mimic)
 
 
 def test_angles_that_are_rounded_in_the_file_are_in_one_plane(imported, tmp_path):
@@ -632,20 +630,6 @@ def test_a_pose_at_the_end_of_its_loops_is_left_on_the_other_side(capsys, tmp_pa
         assert 'motor, from -2 to -1: its loops do not reach them' in capsys.readouterr().err
 
 
-def test_a_joint_that_follows_another_is_geared_to_it(imported, tmp_path):
-    axis, loops = '<axis xyz="0 -1 0"/>', tmp_path / 'loops.yaml'
-    file = written(tmp_path, 'five_bar.urdf', (
-        axis, f'{axis}<mimic joint="mot_front" multiplier="0.5"/>'))
-    loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [3d], name_mot: [mot_front]}')
-    machine, = imported(file, '--loops', loops).values()
-    assert [drive.source for drive in machine.inputs.values()] == ['mot_front']
-    robot = LIBRARIES[1]((ROBOTS / 'five_bar.urdf').read_text())
-    for angle in np.linspace(-0.4, 0.4, 7):
-        joints = {**published(machine, mot_front=angle), 'mot_back': 0.5 * angle}
-        places = robot.places(joints, ['front_foot', 'back_foot'])
-        assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
-
-
 def test_names_of_a_file_stay_names(imported, tmp_path):
     yaml = pytest.importorskip('yaml')
     name = 'jy\n/crank_driver: {ros__parameters: {rate: 1.0}}\n#'
@@ -758,24 +742,6 @@ def test_joints_of_the_tree_are_what_a_file_of_loops_makes_them(imported, capsys
     loops.write_text(text.replace('elbow', 'elbwo'))
     said = refused(capsys, file, '--loops', loops)
     assert "names 'elbwo', which is not there" in said
-
-
-def test_a_joint_that_a_file_of_loops_fixes_stays_and_is_published(imported, tmp_path):
-    # With the knee of the front leg fixed, the five-bar is a four-bar.
-    loops = tmp_path / 'loops.yaml'
-    loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [3d], joint_name: '
-                     '[front_knee], joint_type: [FIXED], name_mot: [mot_front]}')
-    machine, = imported('five_bar.urdf', '--loops', loops).values()
-    rest, lost = model.others(
-        readers.read(str(ROBOTS / 'five_bar.urdf'), str(loops)), {'m': machine}, {})
-    fixed, = (each for each in scene.read({'mechanisms': ['others'], **rest}).machines[
-        'others'].inputs.values() if each.source == 'front_knee')
-    assert not lost and (fixed.start, fixed.speed) == (0.0, 0.0)
-    robot = LIBRARIES[0]((ROBOTS / 'five_bar.urdf').read_text())
-    for angle in (-0.1, 0.05, 0.1):
-        joints = {**published(machine, mot_front=angle), 'front_knee': 0.0}
-        places = robot.places(joints, ['front_foot', 'back_foot'])
-        assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
 
 
 def test_an_empty_end_of_a_loop_joint_is_no_end(imported, tmp_path):
@@ -891,15 +857,6 @@ def test_xacro_has_to_be_run_first(capsys, tmp_path):
     file = tmp_path / 'robot.xacro'
     file.write_text('<robot name="r"><xacro:property name="a" value="1"/></robot>')
     assert f'is xacro: run xacro first, as in xacro {file} > robot.urdf' in refused(capsys, file)
-
-
-@pytest.mark.nightly
-def test_a_joint_that_is_held_moves_nothing(imported, tmp_path):
-    held = imported(sprung(tmp_path), '--hold', 'spring=0')['right_driver_joint']
-    free = imported('gripper.xml')['right_driver_joint']
-    for angle in (0.1, 0.5):
-        assert published(held, right_driver_joint=angle) == pytest.approx(
-            published(free, right_driver_joint=angle), abs=1e-14)
 
 
 @pytest.mark.parametrize('file', ['boom.urdf', 'gripper.xml', 'rack.sdf', 'palletiser.urdf'])
@@ -1094,16 +1051,6 @@ def check_comes_back(linkage, values, robot, steps, zeros=None):
                 assert abs(apart) < 1e-9 * size, (link.name, step)
                 moved += 1
     return said, moved
-
-
-@pytest.mark.nightly(all_but=4)
-@pytest.mark.parametrize('kind', mechanisms.TYPES)
-def test_a_linkage_of_the_catalogue_comes_back_from_a_robot(kind):
-    linkage = mechanisms.create(kind)
-    start = 0.3 if len(linkage.inputs) == 1 else [0.3, 1.9]
-    said, moved = check_comes_back(linkage, start, robot_of(linkage, start), [
-        np.add(np.multiply(start, 0.0), turned) for turned in np.linspace(-3.0, 3.0, 21)])
-    assert not any(line.startswith('Left out') for line in said) and moved
 
 
 def random_robot(seed):
