@@ -584,8 +584,8 @@ FLAT = [f'{name}={value!r}' for name, value in (
 
 
 @pytest.mark.parametrize('side', [0, 1])
-def test_bars_in_line_move_on_as_they_are_told(imported, capsys, side):
-    file = ROBOTS / 'four_bar.urdf'
+def test_bars_in_line_move_on_as_they_are_told(imported, capsys, tmp_path, side):
+    file = written(tmp_path, 'four_bar.urdf', (LIMIT, 'lower="-3" upper="3"'))
     line = refused(capsys, file, '--driven', 'motor', '--pose', *FLAT)
     motor, joint, *ends = re.search(
         r'bars lie in line where the file has them, and it moves on with (.*) (.*)=(.*) as '

@@ -179,13 +179,33 @@ class _Loops:
         return walk, beyond
 
     def _walk(self, targets: np.ndarray, steps: int) -> Walk:
-        """Return what is published on straight paths of the sources, and how it opens loops."""
-        start = np.array([*self._start.values()])
-        way = np.arange(1, steps + 1) / max(steps, 1)
+        """
+        Put what is published on straight paths of the sources into the loops.
+
+        By how much the file's own misfit opens them does not count. A joint that closes a loop
+        opens it by its error in angle times the loops' size.
+        """
+        component, start = self._component, np.array([*self._start.values()])
+        parts = np.arange(1, steps + 1) / max(steps, 1)
         sources = dict(zip(self._start, np.moveaxis(
-            start + (targets - start)[:, None] * way[:, None], -1, 0)))
+            start + (targets - start)[:, None] * parts[:, None], -1, 0)))
         joints = self._positions(sources)
-        gaps, poses = self._opened(joints, (len(targets), steps))
+        fixed = component.is_of([*joints])
+        isnan = np.any([np.isnan(values) for values in joints.values()], axis=0)
+        pose, gaps, poses = np.repeat(self._pose, len(targets), axis=0), np.empty(isnan.shape), []
+        for k in range(steps):
+            here = {name: np.where(isnan[:, k], component.positions[name], values[:, k])
+                    for name, values in joints.items()}
+            pose = component.moved_to(pose, here)
+            pose = pose if fixed.all() else component.closed(pose, fixed)
+            gaps[:, k] = np.max(np.abs(component.errors(pose)[0] - self._misfit), axis=1)
+            read = component.read(pose)
+            for name in here.keys() & component.cut_names:
+                off = here[name] - read[name]
+                gaps[:, k] = np.maximum(gaps[:, k], component.size * np.abs(
+                    off - math.tau * np.round(off / math.tau)))
+            poses.append(pose)
+        gaps[isnan] = math.nan
         return Walk({**sources, **joints}, gaps, poses,
                     np.logical_and.accumulate(gaps <= self._allowed, axis=1))
 
@@ -201,32 +221,6 @@ class _Loops:
                              for link, called in machine.joints.items() if called.published)
         return {name: values for name, values in positions.items()
                 if name in self._component.named.keys() | self._component.cut_names}
-
-    def _opened(self, joints: Mapping[str, np.ndarray], shape: Tuple[int, int]
-                ) -> Tuple[np.ndarray, List[np.ndarray]]:
-        """
-        Put positions of joints into the loops; return how far they stand open [m].
-
-        By how much the file's own misfit opens them does not count. A joint that closes a loop
-        opens it by its error in angle times the loops' size. The poses are those of each step.
-        """
-        component = self._component
-        fixed = component.is_of([*joints])
-        isnan = np.any([np.isnan(values) for values in joints.values()], axis=0)
-        pose, gaps, poses = np.repeat(self._pose, shape[0], axis=0), np.empty(shape), []
-        for k in range(shape[1]):
-            here = {name: np.where(isnan[:, k], component.positions[name], values[:, k])
-                    for name, values in joints.items()}
-            pose = component.moved_to(pose, here)
-            pose = pose if fixed.all() else component.closed(pose, fixed)
-            gaps[:, k] = np.max(np.abs(component.errors(pose)[0] - self._misfit), axis=1)
-            read = component.read(pose)
-            for name in here.keys() & component.cut_names:
-                off = here[name] - read[name]
-                gaps[:, k] = np.maximum(gaps[:, k], component.size * np.abs(
-                    off - math.tau * np.round(off / math.tau)))
-            poses.append(pose)
-        return np.where(isnan, math.nan, gaps), poses
 
     def _check_end(self, walk: Walk, path: int, step: int) -> None:
         """

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 import shlex
-from typing import Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -58,12 +58,11 @@ class Closed(NamedTuple):
 Question = Tuple[str, Mapping[str, str], Mapping[str, str]]
 
 
-def closed(robot: Robot, given: Collection[str] = ()) -> Closed:
+def closed(robot: Robot) -> Closed:
     """
     Close the loops of a robot; its motors keep their positions if possible.
 
-    If that does not determine a pose, joints outside their limits start inside them, but for those
-    whose positions are given.
+    If that does not determine a pose, joints outside their limits start inside them.
     """
     made = _closed(robot)
     if not made.faults:
@@ -71,8 +70,7 @@ def closed(robot: Robot, given: Collection[str] = ()) -> Closed:
     inside = {}
     for _, joint in trees(robot)[0].values():
         low, high = joint.range
-        if joint.position is not None and joint.name not in given \
-                and not low <= joint.position <= high:
+        if joint.position is not None and not low <= joint.position <= high:
             margin = INSIDE * min(high - low, 1.0)
             inside[joint.name] = low + margin if joint.position < low else high - margin
     other = _closed(posed(robot, inside))

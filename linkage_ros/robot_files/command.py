@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from typing import Any, Collection, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -48,7 +48,7 @@ def show(args: Optional[List[str]]) -> None:
         robot.check_names(asked.driven or ())
         robot = posed(robot, _values(asked.pose))
         robot = closing.held(robot, {**robot.held, **_values(asked.hold)})
-        given, reports, still = described(robot, [*_values(asked.pose)])
+        given, reports, still = described(robot)
     # Unprintable characters in names of the file could end a comment.
     head = [*(elided(line, 10 ** 6) for line in (
         f'From {asked.file}. Its joints on /joint_states, and its model:',
@@ -69,15 +69,13 @@ def _launch(asked: Any, still: Mapping[str, float]) -> str:
         f'{name}:={shlex.quote(text)}' for name, text in arguments.items() if text)
 
 
-def described(robot: Robot, given_pose: Collection[str] = ()
-              ) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
+def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
     """
     Return the parameters of a robot's scene, and the report on omissions and checks.
 
-    Also return the positions of joints in loops that stay. Joints of a given pose do not move to
-    start inside their limits.
+    Also return the positions of joints in loops that stay.
     """
-    closed = closing.closed(robot, given_pose)
+    closed = closing.closed(robot)
     robot, reports = closed.robot, closed.report
     imported: List[check.Imported] = []
     for group in loops.groups(robot):
