@@ -10,6 +10,7 @@ The lines of a mechanism have its inputs first, then its dyads.
 from __future__ import annotations
 
 from cmath import phase
+from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 import math
@@ -169,16 +170,20 @@ class Drawing(Dyads):
         return float(np.max([abs(complex(*places[name]) - place) for name, place in self.places
                              if name in (names or places)])) / self.size
 
-    def measured_by(self, joint: Joint) -> Optional[Tuple[str, float, float]]:
-        """Return the link whose angle is a joint's position, with sign and position, if any."""
+    def measured_by(self, joint: Joint) -> Tuple[str, float, float]:
+        """
+        Return the link whose angle is a joint's position, with sign and position.
+
+        Raises ValueError if there is none, as no word places a second joint on a block or barrel.
+        """
         if not self.parts.keys() >= {*joint.bodies}:
-            return None
+            raise ValueError(joint.name)
         parent, child = joint.bodies
         if joint.kind == SLIDE:
             block = child if self.parts[child].slide is joint else parent
             part = self.parts[block]
             if part.slide is not joint:
-                return None
+                raise ValueError(joint.name)
             sign = math.copysign(1.0, (part.along / joint.motion(block)).real)
             way = (self.on[block][part.joint] - part.start) / part.along
             return part.link, sign, way.real
@@ -189,11 +194,7 @@ class Drawing(Dyads):
         link, hangs, along, slide, _ = self.parts[body]
         if not link or hangs != pin or slide:
             # The angle of a triangle on this link is the angle between the two links.
-            try:
-                tip = self._triangle(body, pin, 'dyad')
-            except ValueError:
-                # No word places a second joint on this block or barrel.
-                return None
+            tip = self._triangle(body, pin, 'dyad')
             self._tips.add(tip)
             along = self.on[body][tip] - self.on[body][pin]
             link = bar_name(pin, tip)
@@ -206,17 +207,13 @@ class Drawing(Dyads):
         return self.name(start + (end - start) * complex(0.5, 0.75 ** 0.5), body,
                          f'{word} {pin} {other} {side} {side} left')
 
-    def _between(self, pin: str, base: str, body: str, joint: Joint
-                 ) -> Optional[Tuple[str, float, float]]:
+    def _between(self, pin: str, base: str, body: str, joint: Joint) -> Tuple[str, float, float]:
         """Return the link of an angle between two bodies that turn on a pin of a third one."""
         # A bar parallel to the one body that hangs on the other.
-        try:
-            tip, end = self.other(body, pin)
-            aside = next((name for name in self.on[base]
-                          if self.home[name] == base and name not in self._tips), '') \
-                or self._triangle(base, pin)
-        except ValueError:
-            return None
+        tip, end = self.other(body, pin)
+        aside = next((name for name in self.on[base]
+                      if self.home[name] == base and name not in self._tips), '') \
+            or self._triangle(base, pin)
         along = end - self.on[body][pin]
         name = self.name(self.on[base][aside] + along, body, f'parallelogram {pin} {aside} {tip}')
         return bar_name(aside, name), joint.motion(body), phase(along / self.parts[base].along)
@@ -363,8 +360,11 @@ def _why(drawing: Drawing) -> str:
 
 
 def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
-    measured = [(joint, found) for joint in drawing.measured if joint not in drawing.driven
-                and (found := drawing.measured_by(joint))]
+    measured = []
+    for joint in drawing.measured:
+        with suppress(ValueError):
+            if joint not in drawing.driven:
+                measured.append((joint, drawing.measured_by(joint)))
     yield 'type', 'custom'
     yield 'joints', drawing.lines
     yield 'frame_id', drawing.ground
