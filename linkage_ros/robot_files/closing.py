@@ -120,19 +120,19 @@ def _check_driven(component: Component, pose: np.ndarray, motors: List[str], fol
         raise ValueError('it cannot move, as its joints hold each other' + (
             f': {listed(fixed)} makes one body of two, where a pin has the type 3d'
             if fixed else ''))
-    ways = component.free_ways(pose, component.is_of([]))
-    count = len(chosen := component.chosen(ways, motors))
+    motions = component.free_ways(pose, component.is_of([]))
+    count = len(chosen := component.chosen(motions, motors))
     if count < len(motors):
         raise NotDriven(
             f'{listed(motors)} drive it, and hold each other, as {count} of them tell where all '
             f'is: name these by --driven, as in --driven {shlex.join(chosen)}')
-    loose, ways = component.loose(pose, motors + followers)
+    loose, motions = component.loose(pose, motors + followers)
     if not loose:
         return
     _check_unfolded(component, pose, motors, DEAD_POINT)
     stiff = [joint.name for joint in component.joints if joint.name in loose
              and joint.no_limits.endswith('no range')]
-    more = component.chosen(ways, loose, stiff)
+    more = component.chosen(motions, loose, stiff)
     at = component.texts(pose, component.is_of(more))
     raise NotDriven(
         f'not driven: {len(more)} of {listed(loose)} must be moved, named by --driven, or held, '
@@ -145,8 +145,8 @@ def _choice(questions: Sequence[Question], why: str) -> ValueError:
     """Return the error of all that has to be chosen, with what to type."""
     texts, *sides = zip(*questions)
     return ValueError(f'{why} {", and ".join(texts)}: choose by ' + ', or by '.join(option(
-        'pose', {name: value for side in each for name, value in side.items()})
-        for each in sides))
+        'pose', {name: value for side in choices for name, value in side.items()})
+        for choices in sides))
 
 
 def _question(component: Component, poses: np.ndarray, which: np.ndarray,
@@ -157,9 +157,9 @@ def _question(component: Component, poses: np.ndarray, which: np.ndarray,
     if not name or apart[component.named[name]] < DISTINCT:
         return []
     first, second = component.read(poses)[name]
-    one, other = (component.texts(pose, which) for pose in poses)
-    where = ''.join(f'{motor}={one[motor]} ' for motor in motors)
-    return [(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', one, other)]
+    side, other = (component.texts(pose, which) for pose in poses)
+    where = ''.join(f'{motor}={side[motor]} ' for motor in motors)
+    return [(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', side, other)]
 
 
 def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], least: float
@@ -167,18 +167,18 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], l
     """Raise ValueError at a dead point, which a linkage can leave in two ways."""
     if not motors:
         # Without motors, drive a joint that this pose does not stop.
-        ways = component.free_ways(pose, component.is_of([]), least)
-        if len(ways) <= component.nullity(component.is_of([])):
+        motions = component.free_ways(pose, component.is_of([]), least)
+        if len(motions) <= component.nullity(component.is_of([])):
             return
-        sizes = np.linalg.norm(ways, axis=0)
+        sizes = np.linalg.norm(motions, axis=0)
         motors = [max(component.named, key=lambda name: sizes[component.named[name]])]
     fixed = component.is_of(motors)
     questions: List[Question] = []
     steps = sorted((pose + ahead * component.unit * fixed for ahead in (ASIDE, -ASIDE)),
                    key=lambda step: not component.within(step[None], fixed)[0])
     for which, rows in component.independent(fixed):
-        ways = component.free_ways(pose, fixed | ~which, least)
-        for way in ways if len(ways) > component.nullity(fixed | ~which) else ():
+        motions = component.free_ways(pose, fixed | ~which, least)
+        for way in motions if len(motions) > component.nullity(fixed | ~which) else ():
             aside = 3.0 * ASIDE * component.unit * np.array([way, -way])
             pairs = [component.closed(step + aside, fixed, 40) for step in steps]
             pairs = [poses for poses in pairs if np.max(component.gap(poses, rows)) < CLOSED]
@@ -211,22 +211,22 @@ def nearest(component: Component, motors: List[str], followers: List[str]
                         max(DEAD_POINT, 3.0 * math.sqrt(min(gap, 1e-4))))
         return poses[0], ''
     # If the loops cannot be closed otherwise, followers move, and then motors.
-    found, still, open_by = start, motors, math.inf
+    candidates, still, open_by = start, motors, math.inf
     for names in [motors + followers] * bool(followers) + [motors] + [[]] * bool(motors):
         others = _searched(component, component.is_of(names))
         smallest = max(component.gap(others, rows).min()
                        for _, rows in component.independent(component.is_of(names)))
         if smallest < 0.9 * open_by:
-            found, still, open_by = others, names, smallest
+            candidates, still, open_by = others, names, smallest
         if open_by < CLOSED:
             break
     report = '' if still or not motors else \
         f'{", ".join(motors)} moved: their loops cannot be closed where the file has them.'
-    fixed, pose, questions = component.is_of(still), found[0].copy(), []
+    fixed, pose, questions = component.is_of(still), candidates[0].copy(), []
     for which, rows in component.independent(fixed):
         # Those with the smallest gap, inside limits if there are any; the nearest first.
-        gaps = component.gap(found, rows)
-        some = found[gaps <= 1.001 * gaps.min() + CLOSED]
+        gaps = component.gap(candidates, rows)
+        some = candidates[gaps <= 1.001 * gaps.min() + CLOSED]
         inside = component.within(some, which)
         some = some[inside] if inside.any() else some
         determined = which & ~is_free(component.free_ways(some[0], fixed | ~which)) \

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Dict, Iterable, Optional, Sequence, Tuple, Union
 import xml.etree.ElementTree as ElementTree
 from xml.parsers import expat
@@ -87,8 +86,6 @@ def origin(part: Optional[Element]) -> np.ndarray:
 
 def turned_by(quaternion: Any) -> np.ndarray:
     """Return the rotation matrix of a quaternion w, x, y, z."""
-    w, x, y, z = np.asarray(quaternion) / math.sqrt(sum(part * part for part in quaternion))
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+    w, *axis = np.asarray(quaternion) / np.linalg.norm(quaternion)
+    across = np.cross(np.eye(3), axis)
+    return np.eye(3) + 2.0 * (w * across + across @ across)

@@ -88,13 +88,14 @@ def _with_balls(robot: Robot) -> List[Joint]:
         if body == robot.root or len(held) != 2 or any(
                 joint.name in robot.driven or joint.kind not in (HINGE, BALL) for joint in held):
             continue
-        one, two = held
-        ends = one.other(body), two.other(body)
-        places = one.place(ends[0]), two.place(ends[1])
+        first, second = held
+        ends = first.other(body), second.other(body)
+        places = first.place(ends[0]), second.place(ends[1])
         if ends[0] != ends[1] and np.linalg.norm(places[0] - places[1]) < TOGETHER \
-                and (BALL in (one.kind, two.kind)
-                     or np.linalg.norm(np.cross(one.axis, two.axis)) > ASKEW):
-            ball = Joint(f'{one.name}+{two.name}', BALL, ends, places, one.axes, parts=(one, two))
+                and (BALL in (first.kind, second.kind)
+                     or np.linalg.norm(np.cross(first.axis, second.axis)) > ASKEW):
+            ball = Joint(f'{first.name}+{second.name}', BALL, ends, places, first.axes,
+                         parts=(first, second))
             joints = [*(joint for joint in joints if joint not in held), ball]
             bodies += ends
     return joints

@@ -54,19 +54,21 @@ def others(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
     loops = components(closing.held(robot, held))
     passive = {joint.name for each in loops for joint in each.joints}.difference(
         known, held, robot.driven)
-    given: Dict[str, Any] = {}
+    parameters: Dict[str, Any] = {}
     lines, names, lost = ['A ground 0 0'], [], []
     for name in [each for each in robot.positions if each not in known]:
         source, ratio, offset = (name, 1.0, 0.0) if name in held else robot.source(name)
         if source in passive:
             lost.append(name)
             continue
-        own = f'crank{len(lines) if len(lines) > 1 else ""}'
+        crank = f'crank{len(lines) if len(lines) > 1 else ""}'
         value = ratio * held.get(source, robot.positions[source]) + offset
-        given.update({f'{own}.source': source, f'{own}.ratio': ratio, f'{own}.offset': offset,
-                      f'{own}.start': value, f'{own}.speed': 0.0})
+        parameters.update({
+            f'{crank}.source': source, f'{crank}.ratio': ratio, f'{crank}.offset': offset,
+            f'{crank}.start': value, f'{crank}.speed': 0.0})
         lines.append(f'B{len(lines)} crank A 1')
         if source != name:
-            names.append(f'{own}={quoted_name(name)}')
-    given.update(type='custom', joints=lines, joint_names=names, only_named=True)
-    return {f'{OTHERS}.{key}': value for key, value in given.items()} if lines[1:] else {}, lost
+            names.append(f'{crank}={quoted_name(name)}')
+    parameters.update(type='custom', joints=lines, joint_names=names, only_named=True)
+    parameters = {f'{OTHERS}.{key}': value for key, value in parameters.items()}
+    return parameters if lines[1:] else {}, lost

@@ -36,9 +36,9 @@ def read(path: str, loops: Optional[str] = None) -> Robot:
         if twice := [name for name, count in names.items() if count > 1]:
             raise RequestError(f'two joints are called {twice[0]!r}')
     if loops:
-        given = _loops(loops)
+        content = _loops(loops)
         with _blaming(loops):
-            urdf.close(robot, given)
+            urdf.close(robot, content)
     with _blaming(path):
         for name in robot.follows:
             robot.source(name)

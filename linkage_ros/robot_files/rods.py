@@ -61,11 +61,11 @@ class Rods:
         self._names: Set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
         rods = {body: tuple(held) for body, held in _on_bodies(group.joints).items()
                 if body != ground and [joint.kind for joint in held] == [BALL, BALL]}
-        joints = [one for joint in group.joints for one in (
+        joints = [hinge for joint in group.joints for hinge in (
             [joint] if {*joint.bodies} & rods.keys() else joint.hinges)]
-        own = _on_bodies(joints)
+        held_by = _on_bodies(joints)
         halves = [joint for joint in joints if joint.kind == SLIDE and joint.name in self._driven
-                  and all(len(own[body]) == 2 and body != ground for body in joint.bodies)]
+                  and all(len(held_by[body]) == 2 and body != ground for body in joint.bodies)]
         self._bodies = {ground: 'ground'}
         left = [joint for joint in joints if joint not in halves and not {
             *joint.bodies} & rods.keys() and not any({*joint.bodies} & {*half.bodies}
@@ -81,7 +81,7 @@ class Rods:
             self._rod(body, held)
             self._universal(body, held)
         for half in halves:
-            self._cylinder(half, [next(joint for joint in own[body] if joint is not half)
+            self._cylinder(half, [next(joint for joint in held_by[body] if joint is not half)
                                   for body in half.bodies])
 
     def _named(self, joint: Joint) -> str:
@@ -228,15 +228,15 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
         if why and link not in {*made.inputs, *made.universals}:
             reports.append(f'Left out: the limits of {joint.name}, {why}.')
     name = check.name_beside(others, f'{next(iter(made.inputs))}_rods')
-    given = {f'{name}.{key}': value for key, value in made.parameters(lines)}
-    machine = scene.read({'mechanisms': [name], **given}).machines[name]
+    parameters = {f'{name}.{key}': value for key, value in made.parameters(lines)}
+    machine = scene.read({'mechanisms': [name], **parameters}).machines[name]
     ends = _ranges(machine, made, limits)
     for link, joint in made.inputs.items():
         low, high = (end + machine.inputs[link].offset for end in ends[joint.name])
-        given[f'{name}.{link}.sweep'] = [float(short(low)), float(short(high))]
-        given[f'{name}.{link}.start'] = min(max(made.zeros[link], low), high)
-    return check.Imported(name, given, reports, [joint.name for joint in made.inputs.values()],
-                          ends, still=made.still)
+        parameters[f'{name}.{link}.sweep'] = [float(short(low)), float(short(high))]
+        parameters[f'{name}.{link}.start'] = min(max(made.zeros[link], low), high)
+    driven = [joint.name for joint in made.inputs.values()]
+    return check.Imported(name, parameters, reports, driven, ends, still=made.still)
 
 
 def _ranges(machine: scene.SceneMechanism, made: Rods, limits: Mapping[str, Limits]

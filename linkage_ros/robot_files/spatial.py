@@ -141,14 +141,14 @@ class Component:
         self._cut_ends = [[last[body] for body in cut.bodies] for cut in self._cuts]
         ends, points = [], []
         for end, cut in zip(self._cut_ends, self._cuts):
-            ways = [np.zeros((2, 3))]
+            offsets = [np.zeros((2, 3))]
             if cut.kind == HINGE:
                 first, second = cut.axes
-                ways.append(np.array([first, second if first @ second > 0.0 else -second]))
+                offsets.append(np.array([first, second if first @ second > 0.0 else -second]))
             if cut.kind == FIXED:
-                ways += [np.array([turn[:, k] for turn in cut.turns]) for k in range(3)]
-            points += [np.array(cut.places) + self.size * way for way in ways]
-            ends += [end] * len(ways)
+                offsets += [np.array([turn[:, k] for turn in cut.turns]) for k in range(3)]
+            points += [np.array(cut.places) + self.size * offset for offset in offsets]
+            ends += [end] * len(offsets)
         self._ends = np.array(ends, int).reshape(-1, 2)
         self._points = np.concatenate([points, np.ones((len(ends), 2, 1))], axis=2)
         self._signs = above[self._ends] * np.array([[1.0], [-1.0]])
@@ -250,12 +250,12 @@ class Component:
             inside &= ~which[i] | (low <= positions[name]) & (positions[name] <= high)
         return inside
 
-    def chosen(self, ways: np.ndarray, names: Sequence[str], first: Sequence[str] = ()
+    def chosen(self, motions: np.ndarray, names: Sequence[str], first: Sequence[str] = ()
                ) -> List[str]:
         """Return joints that tell where all is; ways to move have a column for each screw."""
         found: List[str] = []
         for name in sorted(names, key=lambda name: name not in first):
-            if np.linalg.matrix_rank(ways[:, self.is_of([*found, name])], 1e-6) > len(found):
+            if np.linalg.matrix_rank(motions[:, self.is_of([*found, name])], 1e-6) > len(found):
                 found.append(name)
         return found
 
@@ -267,8 +267,8 @@ class Component:
     def moves(self, pose: np.ndarray) -> Dict[str, np.ndarray]:
         """Return the displacement of each body on its parent in a pose."""
         moved: Dict[str, np.ndarray] = {}
-        for screw, each in zip(self._screws, displacements(self._twists, pose, self._slides)):
-            moved[screw.body] = moved.get(screw.body, np.eye(4)) @ each
+        for screw, step in zip(self._screws, displacements(self._twists, pose, self._slides)):
+            moved[screw.body] = moved.get(screw.body, np.eye(4)) @ step
         return moved
 
     def away(self, poses: np.ndarray) -> np.ndarray:
@@ -288,9 +288,9 @@ class Component:
         Loops that are less stiff than `least`, of their size, do not count.
         """
         slope = self.errors(pose[None], True)[1][0][:, ~fixed]
-        _, values, ways = np.linalg.svd(slope)
-        found = np.zeros((len(ways) - np.sum(values > least * self.size), len(fixed)))
-        found[:, ~fixed] = ways[len(ways) - len(found):]
+        _, values, motions = np.linalg.svd(slope)
+        found = np.zeros((len(motions) - np.sum(values > least * self.size), len(fixed)))
+        found[:, ~fixed] = motions[len(motions) - len(found):]
         return found
 
     def nullity(self, fixed: np.ndarray) -> int:
@@ -307,8 +307,8 @@ class Component:
     def loose(self, pose: np.ndarray, motors: Sequence[str]) -> Tuple[List[str], np.ndarray]:
         """Return the joints that move while motors do not, and the ways in which they do."""
         # The spin of a rod on balls does not count.
-        ways = self.free_ways(pose, self.is_of(motors)) * ~self._in_balls
-        return [name for name, i in self.named.items() if is_free(ways)[i]], ways
+        motions = self.free_ways(pose, self.is_of(motors)) * ~self._in_balls
+        return [name for name, i in self.named.items() if is_free(motions)[i]], motions
 
     def read(self, poses: np.ndarray) -> Dict[str, np.ndarray]:
         """Return the positions of named joints [rad or m], within half a turn of the file's."""
@@ -326,6 +326,6 @@ class Component:
         return found
 
 
-def is_free(ways: np.ndarray) -> np.ndarray:
+def is_free(motions: np.ndarray) -> np.ndarray:
     """Return which screws move in some of the ways."""
-    return np.linalg.norm(ways, axis=0) > 1e-6
+    return np.linalg.norm(motions, axis=0) > 1e-6

@@ -97,14 +97,14 @@ def _close_by_frames(robot: Robot) -> None:
 
 def _join_by_gazebo(robot: Robot, root: Element) -> None:
     for cut in root.findall('gazebo/joint'):
-        one, other = (attribute(cut, tag, 'link') or text(cut, tag) for tag in (
+        parent, child = (attribute(cut, tag, 'link') or text(cut, tag) for tag in (
             'parent', 'child'))
-        frame = robot.frames[other] @ pose(*numbers(text(cut, 'pose', '0 0 0 0 0 0'), 6))
+        frame = robot.frames[child] @ pose(*numbers(text(cut, 'pose', '0 0 0 0 0 0'), 6))
         axis = numbers(text(cut, 'axis/xyz') or attribute(cut, 'axis', 'xyz', '0 0 1'))
         if text(cut, 'axis/use_parent_model_frame') in ('1', 'true'):
             axis = frame[:3, :3].T @ axis
         second = text(cut, 'axis2/xyz')
-        robot.join(cut.get('name', ''), cut.get('type', ''), (one, other), frame, axis,
+        robot.join(cut.get('name', ''), cut.get('type', ''), (parent, child), frame, axis,
                    second=numbers(second) if second else None)
     weld(robot, root.findall('gazebo/plugin'))
 
