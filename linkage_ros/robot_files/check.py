@@ -19,7 +19,9 @@ import numpy as np
 
 from .spatial import Component, components, EXACT
 from .. import scene
+from ..linkage import short
 from ..robot_model.robot import Robot, SLIDE
+from ..scene.joint_names import quoted_name
 
 # Number of paths of several motors, of poses on all paths, and of poses that a check needs.
 PATHS, POSES, MIN_POSES = 12, 240, 200
@@ -60,6 +62,33 @@ class Imported(NamedTuple):
 def name_beside(others: Sequence[Imported], name: str) -> str:
     """Return a name that no other mechanism has."""
     return f'{name}_{len(others)}' if name in [made.name for made in others] else name
+
+
+class Source(NamedTuple):
+    """An input: ratio * position + offset of its source."""
+
+    name: str
+    source: str
+    ratio: float
+    offset: float
+    value: float
+
+
+def parameters(mechanism: str, kind: str, lines: Sequence[str], frame_id: str,
+               drives: Sequence[Source], joints: Sequence[Tuple[str, float, str, float]],
+               **more: Any) -> Dict[str, Any]:
+    """Return a mechanism's; of joints the link, the sign, the robot's name and the position."""
+    values = {'type': kind, 'joints': [*lines], 'frame_id': frame_id, **more}
+    for drive in drives:
+        values.update({f'{drive.name}.source': drive.source, f'{drive.name}.ratio': drive.ratio,
+                       f'{drive.name}.offset': float(short(drive.offset)),
+                       f'{drive.name}.start': float(short(drive.value, 1e-15))})
+    values['joint_names'] = [
+        f'{link}={"-" * (sign < 0.0)}{quoted_name(name)}' + (
+            f'{zero:+}' if (zero := float(short(position))) else '')
+        for link, sign, name, position in joints]
+    values['only_named'] = True
+    return {f'{mechanism}.{key}': value for key, value in values.items()}
 
 
 class Walk(NamedTuple):

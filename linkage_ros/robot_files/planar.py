@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 import math
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Set, Tuple
 
 import numpy as np
 
@@ -25,23 +25,12 @@ from ..linkage import bar_name, Dyads, Hinge, Mechanism, Motor, Pin, ROUNDING, s
 from ..robot_model.places import at, coordinates
 from ..robot_model.robot import HINGE, Joint, Limits, NotDriven, plain, Robot, SLIDE
 from ..scene import FARTHEST
-from ..scene.joint_names import quoted_name
 
 # Loops with a smaller gap, of their size, are closed: files have rounded numbers.
 OPEN = 1e-4
 # The most joints of which pairs are tried as motors.
 MAX_PAIRED = 30
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
-
-
-class Source(NamedTuple):
-    """An input: ratio * position + offset of its source."""
-
-    name: str
-    source: str
-    ratio: float
-    offset: float
-    value: float
 
 
 class Drawing(Dyads):
@@ -76,7 +65,7 @@ class Drawing(Dyads):
     def __init__(self, robot: Robot, group: loops.Group, drives: Sequence[str]):
         self._robot = robot
         self._flatten(group, drives)
-        self.drives: List[Source] = []
+        self.drives: List[check.Source] = []
         # Tips of triangles that are a dyad: they turn with a link of their own.
         self._tips: Set[str] = set()
         self.driven = [joint for joint in self.joints if joint.name in drives]
@@ -229,8 +218,8 @@ class Drawing(Dyads):
                 angle_or_length = self.length_text(offset) if word != 'crank' else short(
                     math.remainder(offset, math.tau))
                 return number, f' geared {other.name} {gear!r} {angle_or_length}'
-        self.drives.append(Source(word + number, source, ratio, offset, ratio * (
-            self._robot.positions.get(source) or 0.0) + offset))
+        value = ratio * (self._robot.positions.get(source) or 0.0) + offset
+        self.drives.append(check.Source(word + number, source, ratio, offset, value))
         return number, ''
 
     def position(self, joint: Joint) -> float:
@@ -264,9 +253,8 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
     """
     drawing = _drawn(robot, group)
     name = check.name_beside(others, plain(drawing.driven[0].name, 60))
-    given = {
-        f'{name}.{key}': value for key, value in _parameters(drawing)}
-    machine = scene.read({'mechanisms': [name], **given}).machines[name]
+    parameters = _parameters(drawing, name)
+    machine = scene.read({'mechanisms': [name], **parameters}).machines[name]
     if not any(called.published for called in machine.joints.values()):
         raise NotDriven(_why(drawing))
     limits, reports = robot.limits(drawing.driven)
@@ -279,8 +267,8 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
         if drive.source in limits:
             try:
                 low, high = sweep = _sweep(drive, limits[drive.source], machine.inputs[drive.name])
-                given[f'{name}.{drive.name}.sweep'] = [*sweep]
-                given[f'{name}.{drive.name}.start'] = min(max(drive.value, low), high)
+                parameters[f'{name}.{drive.name}.sweep'] = [*sweep]
+                parameters[f'{name}.{drive.name}.start'] = min(max(drive.value, low), high)
             except ValueError as error:
                 reports.append('Left out: the limits of '
                                f'{limits[drive.source].text(drive.source)}: {error}.')
@@ -288,18 +276,18 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
         low, high = sorted((end - drive.offset) / drive.ratio for end in (
             max(low, start - 2.0 * around), min(high, start + 2.0 * around)))
         ends[drive.source] = low, high
-    machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if drawing.apart(machine.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
     slack = drawing.lean + drawing.gap / drawing.size
     if slack > EXACT:
         reports.append(f'Warning: the file is not exact: axes lean by {drawing.lean:.2g} rad, and '
                        f'loops stay open by {drawing.gap:.2g} m; so is what is published.')
-    return check.Imported(name, given, reports, [joint.name for joint in drawing.driven], ends,
-                          slack, drawing.still)
+    driven = [joint.name for joint in drawing.driven]
+    return check.Imported(name, parameters, reports, driven, ends, slack, drawing.still)
 
 
-def _sweep(drive: Source, limits: Limits, settings: scene.InputSettings) -> Tuple[float, float]:
+def _sweep(drive: check.Source, limits: Limits, settings: scene.InputSettings
+           ) -> Tuple[float, float]:
     """Return the limits of an input within its reach; raise ValueError if it has no such ends."""
     low, high = (float(short(end, 1e-15)) if abs(end) < FARTHEST else math.copysign(math.inf, end)
                  for end in (drive.ratio * end + drive.offset
@@ -359,28 +347,18 @@ def _why(drawing: Drawing) -> str:
             'bars (an Assur group of class III or higher)')
 
 
-def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
+def _parameters(drawing: Drawing, name: str) -> Dict[str, Any]:
     measured = []
     for joint in drawing.measured:
         with suppress(ValueError):
             if joint not in drawing.driven:
-                measured.append((joint, drawing.measured_by(joint)))
-    yield 'type', 'custom'
-    yield 'joints', drawing.lines
-    yield 'frame_id', drawing.ground
-    yield 'pose', [float(short(value)) for value in coordinates(drawing.frame)]
+                measured.append((joint, *drawing.measured_by(joint)))
     links = {link.name: link for link in drawing.linkage.links}
-    for drive in drawing.drives:
-        yield f'{drive.name}.source', drive.source
-        yield f'{drive.name}.ratio', drive.ratio
-        yield f'{drive.name}.offset', float(short(drive.offset))
-        yield f'{drive.name}.start', float(short(drive.value, 1e-15))
-    names = []
-    for joint, (link, sign, angle) in measured:
+    joints = []
+    for joint, link, sign, angle in measured:
         if links[link].kind != 'prismatic':
             angle = math.remainder(angle - float(np.asarray(links[link].zero)), math.tau)
-        zero = float(short(joint.start - sign * angle))
-        names.append(f'{link}={"-" * (sign < 0.0)}{quoted_name(joint.name)}'
-                     + (f'{zero:+}' if zero else ''))
-    yield 'joint_names', names
-    yield 'only_named', True
+        joints.append((link, sign, joint.name, joint.start - sign * angle))
+    return check.parameters(
+        name, 'custom', drawing.lines, drawing.ground, drawing.drives, joints,
+        pose=[float(short(value)) for value in coordinates(drawing.frame)])
