@@ -52,11 +52,11 @@ def others(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
             if name in robot.positions}
     known = published(machines)
     loops = components(closing.held(robot, held))
-    passive = {joint.name for each in loops for joint in each.joints}.difference(
+    passive = {joint.name for component in loops for joint in component.joints}.difference(
         known, held, robot.driven)
     parameters: Dict[str, Any] = {}
     lines, names, lost = ['A ground 0 0'], [], []
-    for name in [each for each in robot.positions if each not in known]:
+    for name in [name for name in robot.positions if name not in known]:
         source, ratio, offset = (name, 1.0, 0.0) if name in held else robot.source(name)
         if source in passive:
             lost.append(name)

@@ -84,8 +84,8 @@ class Drawing(Dyads):
                 abs(other[body] - pin[body]) < near for body in other.keys() & pin.keys())]
             if joint.kind != SLIDE:
                 pins = [other for other in pins if other not in same]
-                pins.append({body: place for each in (*same, pin)
-                             for body, place in each.items()})
+                pins.append({body: place for other in (*same, pin)
+                             for body, place in other.items()})
         moved: List[Motor] = [
             Slide(joint.bodies, (joint.places[1] - joint.axis * joint.start,
                                  joint.places[1]), (joint.axis, joint.axis), joint)
@@ -94,8 +94,9 @@ class Drawing(Dyads):
                   joint) for joint in self.joints]
         super().__init__(
             group.ground, [body for joint in self.joints for body in joint.bodies], pins,
-            [each for each in moved if isinstance(each, Slide) and each.joint not in self.driven],
-            [each for each in moved if each.joint in self.driven], size, near)
+            [slide for slide in moved if isinstance(slide, Slide)
+             and slide.joint not in self.driven],
+            [motor for motor in moved if motor.joint in self.driven], size, near)
         self.take_apart()
 
     def _flatten(self, group: loops.Group, drives: Sequence[str]) -> None:
@@ -235,8 +236,8 @@ class Drawing(Dyads):
             if corner in (first, second) or not all(links) or links[0] == links[1]:
                 continue
             opposite, along = start + end - there, end - start
-            kite, crossed = (start + along * ((each - start) / along).conjugate()
-                             for each in (there, opposite))
+            kite, crossed = (start + along * ((point - start) / along).conjugate()
+                             for point in (there, opposite))
             for word, seen in (('parallelogram', opposite), ('mirror', kite),
                                ('antiparallelogram', crossed)):
                 if max(abs(seen - place), abs(seen - other)) < self.near < abs(there - place):

@@ -253,11 +253,11 @@ class Component:
     def chosen(self, motions: np.ndarray, names: Sequence[str], first: Sequence[str] = ()
                ) -> List[str]:
         """Return joints that tell where all is; ways to move have a column for each screw."""
-        found: List[str] = []
+        basis: List[str] = []
         for name in sorted(names, key=lambda name: name not in first):
-            if np.linalg.matrix_rank(motions[:, self.is_of([*found, name])], 1e-6) > len(found):
-                found.append(name)
-        return found
+            if np.linalg.matrix_rank(motions[:, self.is_of([*basis, name])], 1e-6) > len(basis):
+                basis.append(name)
+        return basis
 
     def texts(self, pose: np.ndarray, which: Any) -> Dict[str, str]:
         """Return the positions of some screws with names in a pose."""
@@ -289,9 +289,9 @@ class Component:
         """
         slope = self.errors(pose[None], True)[1][0][:, ~fixed]
         _, values, motions = np.linalg.svd(slope)
-        found = np.zeros((len(motions) - np.sum(values > least * self.size), len(fixed)))
-        found[:, ~fixed] = motions[len(motions) - len(found):]
-        return found
+        basis = np.zeros((len(motions) - np.sum(values > least * self.size), len(fixed)))
+        basis[:, ~fixed] = motions[len(motions) - len(basis):]
+        return basis
 
     def nullity(self, fixed: np.ndarray) -> int:
         """Return the degrees of freedom that the loops leave, in a random open pose."""
@@ -314,16 +314,16 @@ class Component:
         """Return the positions of named joints [rad or m], within half a turn of the file's."""
         turns = math.tau * np.round(poses / math.tau)
         positions = self._starts + poses - np.where(self._slides, 0.0, turns)
-        found = {name: positions[:, i] for name, i in self.named.items()}
+        by_name = {name: positions[:, i] for name, i in self.named.items()}
         frames = self._frames(poses)
         for cut, (first, second) in zip(self._cuts, self._cut_ends):
             if cut.name in self.cut_names:
                 turned = frames[:, first, :3, :3].swapaxes(1, 2) @ frames[:, second, :3, :3]
                 across = np.cross(cut.axis, np.eye(3)[np.argmin(np.abs(cut.axis))])
                 ahead = turned @ across
-                found[cut.name] = cut.start + np.arctan2(
+                by_name[cut.name] = cut.start + np.arctan2(
                     np.cross(across, ahead) @ cut.axis, ahead @ across)
-        return found
+        return by_name
 
 
 def is_free(motions: np.ndarray) -> np.ndarray:
