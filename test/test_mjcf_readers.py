@@ -13,17 +13,12 @@ import math
 import re
 from xml.sax.saxutils import quoteattr
 
-from linkage_ros import scene
 from linkage_ros.robot_files import command, readers
-from linkage_ros.robot_model import bodies, mjcf, sdf
-from linkage_ros.robot_model.bodies import assembled
 from linkage_ros.robot_model.robot import trees
 import numpy as np
 import pytest
-from test_robot_files import check_comes_back, published, random_robot, words
+from test_robot_files import check_comes_back, random_robot, words
 from test_sdf_readers import frame, quaternion
-from test_simulators import simulated
-from test_urdf import drives, posed
 
 mujoco = pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
 
@@ -179,39 +174,6 @@ class Writer:
             else:
                 motors += f'<motor joint="{name}"/>'
         return f'<tendon>{tendons}</tendon><actuator>{motors}</actuator>'
-
-
-ROUND = 'four_bar', 'slotted_lever', 'slider_crank', 'five_bar', 'boom'
-
-
-@pytest.mark.parametrize('name', ROUND)
-@pytest.mark.parametrize('write', [mjcf.write, sdf.write])
-def test_a_scene_comes_back_from_the_model_that_is_written_of_it(tmp_path, capsys, name, write):
-    # What is published of the model's joints is what the scene had published of them.
-    one = simulated(name)
-    file, made = tmp_path / 'model.xml', tmp_path / 'scene.yaml'
-    file.write_text(write(assembled(bodies.robot([one], 'world'))))
-    assert command.main([str(file)]) == 0
-    made.write_text(capsys.readouterr().out)
-    machines, moved = scene.load(made).machines.values(), 0
-    # Positions in an SDF are zero where it starts.
-    zeros = posed(one, np.array([drive.start for drive in one.inputs.values()]))[0]
-    rows = drives(one, 9)
-    for thetas in rows[np.linspace(0, len(rows) - 1, 9).astype(int)][1:-1]:
-        there, _ = posed(one, thetas)
-        if write is sdf.write:
-            there = {key: value - zeros[key] for key, value in there.items()}
-        for machine in machines:
-            found = published(machine, **{drive.source: there[drive.source]
-                                          for drive in machine.inputs.values()})
-            for key in found.keys() & there.keys():
-                off = found[key] - there[key]
-                off = off if 'block' in key or 'cylinder' in key else math.remainder(
-                    off, math.tau)
-                assert off == pytest.approx(0.0, abs=1e-9) or math.isnan(off), key
-                moved += not math.isnan(off) and key not in {
-                    drive.source for drive in machine.inputs.values()}
-    assert moved > 5
 
 
 def check_is_read(folder, seeds):

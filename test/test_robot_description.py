@@ -21,7 +21,6 @@ from linkage_ros.nodes.urdf_command import main  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from robots import in_frame, Pinocchio, Yourdfpy  # noqa: E402
-from ros_harness import Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
@@ -136,31 +135,10 @@ def test_a_new_dimension_makes_a_new_description(graph):
     assert ends == pytest.approx([2.0 * math.acos(5.0 / (2.0 * r)) for r in (3.0, 3.1)])
 
 
-@pytest.mark.nightly
-def test_the_command_prints_the_robot_of_a_scene():
-    code, printed = Process('urdf', CATALOGUE).end()
-    found = scene.load(str(CATALOGUE))
-    assert code == 0
-    assert printed == urdf.describe(found.machines.values(), found.frame_id) + '\n'
-
-
 def test_the_command_prints_those_that_are_named(capsys):
     assert main(['--mechanism', 'jansen', '--ros-args', '--params-file', str(CATALOGUE)]) == 0
     jansen = scene.load(str(CATALOGUE)).machines['jansen']
     assert capsys.readouterr().out == urdf.describe([jansen], 'world') + '\n'
-
-
-@pytest.mark.parametrize('arguments, lines, complaint', [
-    (['--mechanism', 'leg'], 'rate: 50.0', "there is no mechanism 'leg'; allowed: water_drop, "),
-    ([], 'rate: -1.0', 'rate must be a finite number'),
-])
-def test_the_command_says_in_one_line_what_is_wrong(
-        tmp_path, capsys, arguments, lines, complaint):
-    file = tmp_path / 'scene.yaml'
-    file.write_text(f'/**:\n  ros__parameters:\n    {lines}\n')
-    assert main([*arguments, '--ros-args', '--params-file', str(file)]) == 1
-    printed = capsys.readouterr()
-    assert complaint in printed.err and not printed.out and printed.err.count('\n') == 1
 
 
 NOWHERE, NO_SCENE, FOREIGN = 'nowhere.yaml', 'rate.yaml', 'foreign.yaml'

@@ -15,6 +15,7 @@ from xml.sax.saxutils import quoteattr
 from linkage_ros.robot_files import readers
 import numpy as np
 import pytest
+from test_robot_files import words
 
 VERSIONS = '1.4', '1.5', '1.6', '1.7', '1.9', '1.11'
 
@@ -30,10 +31,6 @@ def frame(rng):
     made = np.eye(4)
     made[:3, :3], made[:3, 3] = rotation(rng), rng.normal(size=3)
     return made
-
-
-def words(numbers):
-    return ' '.join(repr(float(number)) for number in numbers)
 
 
 def euler(turned):
@@ -131,7 +128,8 @@ class Writer:
         axis /= np.linalg.norm(axis)
         seen, said = there, ''
         if number <= (1, 4):
-            seen = at
+            seen, said = [(at, ''), (there, '<use_parent_model_frame>0</use_parent_model_frame>')][
+                rng.integers(2)]
         elif number <= (1, 6) and rng.random() < 0.5:
             seen, said = at, '<use_parent_model_frame>true</use_parent_model_frame>'
         elif number >= (1, 7) and rng.random() < 0.5:

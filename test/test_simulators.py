@@ -13,6 +13,7 @@ from linkage_ros.robot_model import bodies, mjcf, sdf
 from linkage_ros.robot_model.bodies import assembled
 import numpy as np
 import pytest
+from test_robot_files import published
 from test_urdf import drives, in_space, MACHINES, OWN, posed
 
 # One of each kind; the others are long.
@@ -126,14 +127,6 @@ def test_gravity_tears_no_scene(file):
     assert max(robot.open() for _ in robot.run(1.0)) < 1e-5 * bar
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize('name', [*MACHINES, *OWN])
-def test_gravity_tears_no_linkage(name):
-    one = simulated(name)
-    robot = MuJoCo(mjcf.write(model([one])))
-    assert max(robot.open() for _ in robot.run(1.0)) < 1e-5 * bodies.size(one)
-
-
 def follow(one, robot, seconds):
     """Drive inputs through their sweeps, or a turn; return how far points are from `solve`."""
     solution = one.assembly().solution(one.linkage.points)
@@ -162,18 +155,6 @@ def test_servos_drive_the_linkage_through_the_poses_of_solve(file):
         assert max(follow(one, robot, 2.0)) < 2e-3 * bodies.size(one)
 
 
-def published(machines, motors):
-    """Return what scenes publish where a robot's motors are."""
-    found = {}
-    for one in machines:
-        values = [drive.ratio * motors[drive.source] + drive.offset
-                  for drive in one.inputs.values()]
-        angles = one.linkage.joint_angles(values if len(values) > 1 else values[0])
-        found.update((called.name, float(called.of(angles[joint])))
-                     for joint, called in one.joints.items() if called.published)
-    return found
-
-
 @pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('form', [sdf, mjcf], ids=['sdf', 'mjcf'])
 @pytest.mark.parametrize('name', some_quick(
@@ -199,7 +180,11 @@ def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
         if thetas[0] in ends:
             continue
         wanted = {name: value - zeros[name] for name, value in posed(one, thetas)[0].items()}
-        for joint, value in published(machines, wanted).items():
+        found = {}
+        for each in machines:
+            found.update(published(each, **{
+                drive.source: wanted[drive.source] for drive in each.inputs.values()}))
+        for joint, value in found.items():
             if joint in wanted:
                 apart = value - wanted[joint]
                 apart = math.remainder(apart, math.tau) if turns[joint] else apart

@@ -19,7 +19,9 @@ import numpy as np
 
 from .spatial import Component, components, EXACT
 from .. import scene
+from ..linkage import short
 from ..robot_model.robot import Robot, SLIDE
+from ..scene.joint_names import quoted_name
 
 # Number of paths of several motors, of poses on all paths, and of poses that a check needs.
 PATHS, POSES, MIN_POSES = 12, 240, 200
@@ -60,6 +62,33 @@ class Imported(NamedTuple):
 def name_beside(others: Sequence[Imported], name: str) -> str:
     """Return a name that no other mechanism has."""
     return f'{name}_{len(others)}' if name in [made.name for made in others] else name
+
+
+class Source(NamedTuple):
+    """An input: ratio * position + offset of its source."""
+
+    name: str
+    source: str
+    ratio: float
+    offset: float
+    value: float
+
+
+def parameters(mechanism: str, kind: str, lines: Sequence[str], frame_id: str,
+               drives: Sequence[Source], joints: Sequence[Tuple[str, float, str, float]],
+               **more: Any) -> Dict[str, Any]:
+    """Return a mechanism's; of joints the link, the sign, the robot's name and the position."""
+    values = {'type': kind, 'joints': [*lines], 'frame_id': frame_id, **more}
+    for drive in drives:
+        values.update({f'{drive.name}.source': drive.source, f'{drive.name}.ratio': drive.ratio,
+                       f'{drive.name}.offset': float(short(drive.offset)),
+                       f'{drive.name}.start': float(short(drive.value, 1e-15))})
+    values['joint_names'] = [
+        f'{link}={"-" * (sign < 0.0)}{quoted_name(name)}' + (
+            f'{zero:+}' if (zero := float(short(position))) else '')
+        for link, sign, name, position in joints]
+    values['only_named'] = True
+    return {f'{mechanism}.{key}': value for key, value in values.items()}
 
 
 class Walk(NamedTuple):
@@ -130,7 +159,6 @@ class _Loops:
         self._check_start()
         low, high = corners = np.array([
             self._ends.get(source, (value,) * 2) for source, value in self._start.items()]).T
-        self._enter(low, high)
         walk, beyond = self._walk_to(corners if len(self._ends) == 1 else np.random.default_rng(
             1).uniform(low, high, (PATHS, len(low))))
         if (count := walk.good.sum()) < MIN_POSES:
@@ -156,14 +184,6 @@ class _Loops:
                     raise Difference(f'{self._at(self._start)} {joint.name} is off by '
                                      f'{abs(off):.2g}')
 
-    def _enter(self, low: np.ndarray, high: np.ndarray) -> None:
-        """Let walks start inside ranges of the sources, if there is a way from the file's pose."""
-        inside = np.clip([*self._start.values()], low, high)
-        if (inside != [*self._start.values()]).any():
-            walk = self._walk(inside[None], POSES)
-            if walk.good.all():
-                self._start, self._pose = dict(zip(self._start, inside.tolist())), walk.poses[-1]
-
     def _walk_to(self, targets: np.ndarray) -> Tuple[Walk, str]:
         """
         Return a walk of the sources to targets, a row each, and why it ends before, if it does.
@@ -188,13 +208,33 @@ class _Loops:
         return walk, beyond
 
     def _walk(self, targets: np.ndarray, steps: int) -> Walk:
-        """Return what is published on straight paths of the sources, and how it opens loops."""
-        start = np.array([*self._start.values()])
-        way = np.arange(1, steps + 1) / max(steps, 1)
+        """
+        Put what is published on straight paths of the sources into the loops.
+
+        By how much the file's own misfit opens them does not count. A joint that closes a loop
+        opens it by its error in angle times the loops' size.
+        """
+        component, start = self._component, np.array([*self._start.values()])
+        parts = np.arange(1, steps + 1) / max(steps, 1)
         sources = dict(zip(self._start, np.moveaxis(
-            start + (targets - start)[:, None] * way[:, None], -1, 0)))
+            start + (targets - start)[:, None] * parts[:, None], -1, 0)))
         joints = self._positions(sources)
-        gaps, poses = self._opened(joints, (len(targets), steps))
+        fixed = component.is_of([*joints])
+        isnan = np.any([np.isnan(values) for values in joints.values()], axis=0)
+        pose, gaps, poses = np.repeat(self._pose, len(targets), axis=0), np.empty(isnan.shape), []
+        for k in range(steps):
+            here = {name: np.where(isnan[:, k], component.positions[name], values[:, k])
+                    for name, values in joints.items()}
+            pose = component.moved_to(pose, here)
+            pose = pose if fixed.all() else component.closed(pose, fixed)
+            gaps[:, k] = np.max(np.abs(component.errors(pose)[0] - self._misfit), axis=1)
+            read = component.read(pose)
+            for name in here.keys() & component.cut_names:
+                off = here[name] - read[name]
+                gaps[:, k] = np.maximum(gaps[:, k], component.size * np.abs(
+                    off - math.tau * np.round(off / math.tau)))
+            poses.append(pose)
+        gaps[isnan] = math.nan
         return Walk({**sources, **joints}, gaps, poses,
                     np.logical_and.accumulate(gaps <= self._allowed, axis=1))
 
@@ -210,32 +250,6 @@ class _Loops:
                              for link, called in machine.joints.items() if called.published)
         return {name: values for name, values in positions.items()
                 if name in self._component.named.keys() | self._component.cut_names}
-
-    def _opened(self, joints: Mapping[str, np.ndarray], shape: Tuple[int, int]
-                ) -> Tuple[np.ndarray, List[np.ndarray]]:
-        """
-        Put positions of joints into the loops; return how far they stand open [m].
-
-        By how much the file's own misfit opens them does not count. A joint that closes a loop
-        opens it by its error in angle times the loops' size. The poses are those of each step.
-        """
-        component = self._component
-        fixed = component.is_of([*joints])
-        isnan = np.any([np.isnan(values) for values in joints.values()], axis=0)
-        pose, gaps, poses = np.repeat(self._pose, shape[0], axis=0), np.empty(shape), []
-        for k in range(shape[1]):
-            here = {name: np.where(isnan[:, k], component.positions[name], values[:, k])
-                    for name, values in joints.items()}
-            pose = component.moved_to(pose, here)
-            pose = pose if fixed.all() else component.closed(pose, fixed)
-            gaps[:, k] = np.max(np.abs(component.errors(pose)[0] - self._misfit), axis=1)
-            read = component.read(pose)
-            for name in here.keys() & component.cut_names:
-                off = here[name] - read[name]
-                gaps[:, k] = np.maximum(gaps[:, k], component.size * np.abs(
-                    off - math.tau * np.round(off / math.tau)))
-            poses.append(pose)
-        return np.where(isnan, math.nan, gaps), poses
 
     def _check_end(self, walk: Walk, path: int, step: int) -> None:
         """

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 import shlex
-from typing import Any, Collection, Dict, List, Mapping, NamedTuple, Sequence, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -58,12 +58,11 @@ class Closed(NamedTuple):
 Question = Tuple[str, Mapping[str, str], Mapping[str, str]]
 
 
-def closed(robot: Robot, given: Collection[str] = ()) -> Closed:
+def closed(robot: Robot) -> Closed:
     """
     Close the loops of a robot; its motors keep their positions if possible.
 
-    If that does not determine a pose, joints outside their limits start inside them, but for those
-    whose positions are given.
+    If that does not determine a pose, joints outside their limits start inside them.
     """
     made = _closed(robot)
     if not made.faults:
@@ -71,8 +70,7 @@ def closed(robot: Robot, given: Collection[str] = ()) -> Closed:
     inside = {}
     for _, joint in trees(robot)[0].values():
         low, high = joint.range
-        if joint.position is not None and joint.name not in given \
-                and not low <= joint.position <= high:
+        if joint.position is not None and not low <= joint.position <= high:
             margin = INSIDE * min(high - low, 1.0)
             inside[joint.name] = low + margin if joint.position < low else high - margin
     other = _closed(posed(robot, inside))
@@ -122,19 +120,19 @@ def _check_driven(component: Component, pose: np.ndarray, motors: List[str], fol
         raise ValueError('it cannot move, as its joints hold each other' + (
             f': {listed(fixed)} makes one body of two, where a pin has the type 3d'
             if fixed else ''))
-    ways = component.free_ways(pose, component.is_of([]))
-    count = len(chosen := component.chosen(ways, motors))
+    motions = component.free_ways(pose, component.is_of([]))
+    count = len(chosen := component.chosen(motions, motors))
     if count < len(motors):
         raise NotDriven(
             f'{listed(motors)} drive it, and hold each other, as {count} of them tell where all '
             f'is: name these by --driven, as in --driven {shlex.join(chosen)}')
-    loose, ways = component.loose(pose, motors + followers)
+    loose, motions = component.loose(pose, motors + followers)
     if not loose:
         return
     _check_unfolded(component, pose, motors, DEAD_POINT)
     stiff = [joint.name for joint in component.joints if joint.name in loose
              and joint.no_limits.endswith('no range')]
-    more = component.chosen(ways, loose, stiff)
+    more = component.chosen(motions, loose, stiff)
     at = component.texts(pose, component.is_of(more))
     raise NotDriven(
         f'not driven: {len(more)} of {listed(loose)} must be moved, named by --driven, or held, '
@@ -147,17 +145,21 @@ def _choice(questions: Sequence[Question], why: str) -> ValueError:
     """Return the error of all that has to be chosen, with what to type."""
     texts, *sides = zip(*questions)
     return ValueError(f'{why} {", and ".join(texts)}: choose by ' + ', or by '.join(option(
-        'pose', {name: value for side in each for name, value in side.items()})
-        for each in sides))
+        'pose', {name: value for side in choices for name, value in side.items()})
+        for choices in sides))
 
 
-def _question(component: Component, poses: np.ndarray, which: np.ndarray, where: str = ''
-              ) -> List[Question]:
+def _question(component: Component, poses: np.ndarray, which: np.ndarray,
+              motors: Sequence[str] = ()) -> List[Question]:
     """Return the choice of two poses by the joint that differs most, if they are different."""
-    name, first, second = component.most_different(poses[0], poses[1], which)
-    one, other = (component.texts(pose, which) for pose in poses)
-    return [(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', one, other)] * (
-        abs(first - second) > DISTINCT)
+    apart = np.abs(component.away(poses[0] - poses[1])) * which
+    name = max(component.named, key=lambda name: apart[component.named[name]], default='')
+    if not name or apart[component.named[name]] < DISTINCT:
+        return []
+    first, second = component.read(poses)[name]
+    side, other = (component.texts(pose, which) for pose in poses)
+    where = ''.join(f'{motor}={side[motor]} ' for motor in motors)
+    return [(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', side, other)]
 
 
 def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], least: float
@@ -165,38 +167,29 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], l
     """Raise ValueError at a dead point, which a linkage can leave in two ways."""
     if not motors:
         # Without motors, drive a joint that this pose does not stop.
-        ways = component.free_ways(pose, component.is_of([]), least)
-        if len(ways) <= component.nullity(component.is_of([])):
+        motions = component.free_ways(pose, component.is_of([]), least)
+        if len(motions) <= component.nullity(component.is_of([])):
             return
-        sizes = np.linalg.norm(ways, axis=0)
+        sizes = np.linalg.norm(motions, axis=0)
         motors = [max(component.named, key=lambda name: sizes[component.named[name]])]
-    fixed, questions = component.is_of(motors), []
+    fixed = component.is_of(motors)
+    questions: List[Question] = []
+    steps = sorted((pose + ahead * component.unit * fixed for ahead in (ASIDE, -ASIDE)),
+                   key=lambda step: not component.within(step[None], fixed)[0])
     for which, rows in component.independent(fixed):
-        ways = component.free_ways(pose, fixed | ~which, least)
-        for way in ways if len(ways) > component.nullity(fixed | ~which) else ():
-            questions += _folded(component, pose, motors, 3.0 * ASIDE * component.unit * way,
-                                 rows)
+        motions = component.free_ways(pose, fixed | ~which, least)
+        for way in motions if len(motions) > component.nullity(fixed | ~which) else ():
+            aside = 3.0 * ASIDE * component.unit * np.array([way, -way])
+            pairs = [component.closed(step + aside, fixed, 40) for step in steps]
+            pairs = [poses for poses in pairs if np.max(component.gap(poses, rows)) < CLOSED]
+            if not pairs:
+                raise ValueError(f'its loops end where the file has {listed(motors)}: choose '
+                                 'another pose by --pose, or mend lengths or places in the file')
+            asked = [question for poses in pairs for question in _question(
+                component, poses, (way != 0.0) | fixed, motors)]
+            questions += asked[:1]
     if questions:
         raise _choice(questions, 'bars lie in line where the file has them, and it moves on')
-
-
-def _folded(component: Component, pose: np.ndarray, motors: List[str], aside: np.ndarray,
-            rows: Any) -> List[Question]:
-    """Return the choice of neighbouring poses of a dead point, if there are two."""
-    fixed, is_end = component.is_of(motors), True
-    steps = [pose + ahead * component.unit * fixed for ahead in (ASIDE, -ASIDE)]
-    for step in sorted(steps, key=lambda step: not component.within(step[None], fixed)[0]):
-        poses = component.closed(step + np.array([aside, -aside]), fixed, 40)
-        if np.max(component.gap(poses, rows)) < CLOSED:
-            is_end = False
-            if question := _question(component, poses, (aside != 0.0) | fixed, ''.join(
-                    f'{name}={value} ' for name, value in component.texts(
-                        poses[0], fixed).items())):
-                return question
-    if is_end:
-        raise ValueError(f'its loops end where the file has {listed(motors)}: choose another '
-                         'pose by --pose, or mend lengths or places in the file')
-    return []
 
 
 def nearest(component: Component, motors: List[str], followers: List[str]
@@ -218,22 +211,22 @@ def nearest(component: Component, motors: List[str], followers: List[str]
                         max(DEAD_POINT, 3.0 * math.sqrt(min(gap, 1e-4))))
         return poses[0], ''
     # If the loops cannot be closed otherwise, followers move, and then motors.
-    found, still, open_by = start, motors, math.inf
+    candidates, still, open_by = start, motors, math.inf
     for names in [motors + followers] * bool(followers) + [motors] + [[]] * bool(motors):
         others = _searched(component, component.is_of(names))
         smallest = max(component.gap(others, rows).min()
                        for _, rows in component.independent(component.is_of(names)))
         if smallest < 0.9 * open_by:
-            found, still, open_by = others, names, smallest
+            candidates, still, open_by = others, names, smallest
         if open_by < CLOSED:
             break
     report = '' if still or not motors else \
         f'{", ".join(motors)} moved: their loops cannot be closed where the file has them.'
-    fixed, pose, questions = component.is_of(still), found[0].copy(), []
+    fixed, pose, questions = component.is_of(still), candidates[0].copy(), []
     for which, rows in component.independent(fixed):
         # Those with the smallest gap, inside limits if there are any; the nearest first.
-        gaps = component.gap(found, rows)
-        some = found[gaps <= 1.001 * gaps.min() + CLOSED]
+        gaps = component.gap(candidates, rows)
+        some = candidates[gaps <= 1.001 * gaps.min() + CLOSED]
         inside = component.within(some, which)
         some = some[inside] if inside.any() else some
         determined = which & ~is_free(component.free_ways(some[0], fixed | ~which)) \

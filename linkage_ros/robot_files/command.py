@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from typing import Any, Collection, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -41,43 +41,41 @@ def show(args: Optional[List[str]]) -> None:
                             ('hold', 'position at which a joint is fixed')):
         parser.add_argument(f'--{option}', metavar='JOINT=VALUE', nargs='+', default=[],
                             help=f'{meaning} [rad or m]; several may follow')
-    asked = parser.parse_args(args)
+    arguments = parser.parse_args(args)
     with np.errstate(all='ignore'):
-        robot = readers.read(asked.file, asked.loops)
-        robot.driven = asked.driven or robot.driven
-        robot.check_names(asked.driven or ())
-        robot = posed(robot, _values(asked.pose))
-        robot = closing.held(robot, {**robot.held, **_values(asked.hold)})
-        given, reports, still = described(robot, [*_values(asked.pose)])
+        robot = readers.read(arguments.file, arguments.loops)
+        robot.driven = arguments.driven or robot.driven
+        robot.check_names(arguments.driven or ())
+        robot = posed(robot, _values(arguments.pose))
+        robot = closing.held(robot, {**robot.held, **_values(arguments.hold)})
+        parameters, reports, still = described(robot)
     # Unprintable characters in names of the file could end a comment.
     head = [*(elided(line, 10 ** 6) for line in (
-        f'From {asked.file}. Its joints on /joint_states, and its model:',
-        _launch(asked, still))), *map(sentence, reports)]
-    print(*(f'# {line}' for line in head), in_yaml(given), sep='\n', end='')
+        f'From {arguments.file}. Its joints on /joint_states, and its model:',
+        _launch(arguments, still))), *map(sentence, reports)]
+    print(*(f'# {line}' for line in head), in_yaml(parameters), sep='\n', end='')
     print(*(f'{NAME}: {line}' for line in head[2:]), sep='\n', file=sys.stderr)
     if wrong := [line for line in reports if WRONG in line]:
         raise command.RequestError(f'{len(wrong)} mechanisms are left out, as they differ from '
                                    'the robot or could not be compared with it')
 
 
-def _launch(asked: Any, still: Mapping[str, float]) -> str:
+def _launch(parsed: Any, still: Mapping[str, float]) -> str:
     """Return the command that launches the robot with its scene; some joints stay."""
-    arguments = {'robot': asked.file, 'scene': 'SCENE.yaml', 'loops': asked.loops or '',
-                 'hold': shlex.join([*asked.hold, *(
+    arguments = {'robot': parsed.file, 'scene': 'SCENE.yaml', 'loops': parsed.loops or '',
+                 'hold': shlex.join([*parsed.hold, *(
                      f'{name}={short(value)}' for name, value in still.items())])}
     return 'ros2 launch linkage_ros robot.launch.py ' + ' '.join(
         f'{name}:={shlex.quote(text)}' for name, text in arguments.items() if text)
 
 
-def described(robot: Robot, given_pose: Collection[str] = ()
-              ) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
+def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
     """
     Return the parameters of a robot's scene, and the report on omissions and checks.
 
-    Also return the positions of joints in loops that stay. Joints of a given pose do not move to
-    start inside their limits.
+    Also return the positions of joints in loops that stay.
     """
-    closed = closing.closed(robot, given_pose)
+    closed = closing.closed(robot)
     robot, reports = closed.robot, closed.report
     imported: List[check.Imported] = []
     for group in loops.groups(robot):
@@ -113,17 +111,18 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
     """Return what is described, without mechanisms that differ from the robot."""
     if not imported:
         raise command.RequestError(' '.join(reports) or 'no joint of this robot closes a loop')
-    given: Dict[str, Any] = {'mechanisms': [made.name for made in imported]}
+    parameters: Dict[str, Any] = {'mechanisms': [made.name for made in imported]}
     for made in imported:
-        given.update(made.parameters)
-    machines = scene.read(given).machines
+        parameters.update(made.parameters)
+    machines = scene.read(parameters).machines
     tree = {joint.name: joint for _, joint in trees(robot)[0].values()}
     stay = {name for made in imported for name in made.still}
     still = {name: value for name, value in robot.positions.items()
              if name in tree.keys() & stay - check.published(machines)}
     rest, lost = model.others(robot, machines, still)
     if rest:
-        machines = scene.read({**given, **rest, 'mechanisms': [*machines, model.OTHERS]}).machines
+        names = [*machines, model.OTHERS]
+        machines = scene.read({**parameters, **rest, 'mechanisms': names}).machines
     checks, wrong = check.compared(robot, machines, imported)
     if wrong:
         return _checked(robot, [made for made in imported if made.name not in wrong], [
@@ -135,18 +134,18 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
                 if name and joint.kind not in (HINGE, SLIDE, FIXED)]:
         reports.append(f'Not published: {", ".join(free)}: a ball or a free joint has no one '
                        'position. The model of the robot has them fixed where the file has them.')
-    return given, reports, still
+    return parameters, reports, still
 
 
 def _values(texts: Sequence[str]) -> Dict[str, float]:
     """Parse texts such as JOINT=VALUE; raise RequestError for an invalid one."""
-    found = {}
-    for each in texts:
-        name, _, value = each.rpartition('=')
+    values = {}
+    for text in texts:
+        name, _, value = text.rpartition('=')
         try:
-            found[name] = float(value)
+            values[name] = float(value)
         except ValueError:
-            found[name] = math.nan
-        if not name or not abs(found[name]) < FARTHEST:
-            raise command.RequestError(f'{each!r} must be JOINT=VALUE, its value in rad or m')
-    return found
+            values[name] = math.nan
+        if not name or not abs(values[name]) < FARTHEST:
+            raise command.RequestError(f'{text!r} must be JOINT=VALUE, its value in rad or m')
+    return values

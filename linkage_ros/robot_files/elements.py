@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Dict, Iterable, Optional, Sequence, Tuple, Union
 import xml.etree.ElementTree as ElementTree
 from xml.parsers import expat
@@ -44,17 +43,17 @@ def parse(path: str) -> Element:
 
 def once(parts: Iterable[Tuple[str, Element]]) -> Dict[str, Element]:
     """Return parts by name; raise RequestError if two have the same name."""
-    found: Dict[str, Element] = {}
+    named: Dict[str, Element] = {}
     for name, part in parts:
-        if found.setdefault(name, part) is not part:
+        if named.setdefault(name, part) is not part:
             raise RequestError(f'there are two of <{part.tag}> for {name!r}, which may have one')
-    return found
+    return named
 
 
 def attribute(part: Element, tag: str, key: str, otherwise: str = '') -> str:
     """Return an attribute of an element in a part."""
-    found = part.find(tag)
-    return otherwise if found is None else found.get(key, otherwise)
+    element = part.find(tag)
+    return otherwise if element is None else element.get(key, otherwise)
 
 
 def text(part: Element, tag: str, otherwise: str = '') -> str:
@@ -62,20 +61,20 @@ def text(part: Element, tag: str, otherwise: str = '') -> str:
     return (part.findtext(tag) or otherwise).strip()
 
 
-def numbers(given: Union[str, Sequence[Any]], count: int = 3) -> np.ndarray:
+def numbers(values: Union[str, Sequence[Any]], count: int = 3) -> np.ndarray:
     """Return the numbers of a text or a list; raise ValueError if they are not `count`."""
-    found = np.array(given.split() if isinstance(given, str) else given, float)
-    if found.shape != (count,) or not np.all(np.abs(found) < FARTHEST):
-        raise ValueError(f'{given!r} must be {count} numbers within {FARTHEST:g}')
-    return found
+    array = np.array(values.split() if isinstance(values, str) else values, float)
+    if array.shape != (count,) or not np.all(np.abs(array) < FARTHEST):
+        raise ValueError(f'{values!r} must be {count} numbers within {FARTHEST:g}')
+    return array
 
 
 def weld(robot: Robot, plugins: Iterable[Element]) -> None:
     """Fix the links of Gazebo's DetachableJoint to each other, if plugins are one."""
     for plugin in plugins:
         if 'detachable' in f'{plugin.get("name")} {plugin.get("filename")}'.lower():
-            one, other = (text(plugin, tag) for tag in ('parent_link', 'child_link'))
-            robot.join(f'{one}={other}', FIXED, (one, other), robot.frames[one])
+            parent, child = (text(plugin, tag) for tag in ('parent_link', 'child_link'))
+            robot.join(f'{parent}={child}', FIXED, (parent, child), robot.frames[parent])
 
 
 def origin(part: Optional[Element]) -> np.ndarray:
@@ -87,8 +86,6 @@ def origin(part: Optional[Element]) -> np.ndarray:
 
 def turned_by(quaternion: Any) -> np.ndarray:
     """Return the rotation matrix of a quaternion w, x, y, z."""
-    w, x, y, z = np.asarray(quaternion) / math.sqrt(sum(part * part for part in quaternion))
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+    w, *axis = np.asarray(quaternion) / np.linalg.norm(quaternion)
+    across = np.cross(np.eye(3), axis)
+    return np.eye(3) + 2.0 * (w * across + across @ across)

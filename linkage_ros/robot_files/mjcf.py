@@ -83,20 +83,20 @@ def _compiled(path: str) -> Any:
 
 def _tie(robot: Robot, model: Any, i: int, bodies: Any, names: Any) -> None:
     """Add the constraint of an equality between two bodies or joints."""
-    kind, given = mujoco.mjtEq(model.eq_type[i]).name[5:].lower(), model.eq_data[i]
+    kind, numbers = mujoco.mjtEq(model.eq_type[i]).name[5:].lower(), model.eq_data[i]
     ends = [model.eq_obj1id[i], model.eq_obj2id[i]]
     if kind == 'joint' and ends[1] < 0:
-        robot.held[names[ends[0]]] = float(given[0] + model.qpos0[model.jnt_qposadr[ends[0]]])
-    elif kind == 'joint' and not given[2:5].any():
-        one, other = model.qpos0[model.jnt_qposadr[ends]]
-        robot.follow(names[ends[0]], names[ends[1]], given[1], given[0] + one - given[1] * other)
+        robot.held[names[ends[0]]] = float(numbers[0] + model.qpos0[model.jnt_qposadr[ends[0]]])
+    elif kind == 'joint' and not numbers[2:5].any():
+        (start, ratio), (first, second) = numbers[:2], model.qpos0[model.jnt_qposadr[ends]]
+        robot.follow(names[ends[0]], names[ends[1]], ratio, start + first - ratio * second)
     if kind in ('connect', 'weld'):
         welds = kind == 'weld'
         if mujoco.mjtObj(model.eq_objtype[i]) == mujoco.mjtObj.mjOBJ_SITE:
             frames = [at(model.site_pos[end], turned_by(model.site_quat[end])) for end in ends]
             ends = model.site_bodyid[ends]
         else:
-            own, other = (given[3:6], given[:3]) if welds else (given[:3], given[3:6])
-            frames = [at(own, turned_by(given[6:10]) if welds else np.eye(3)), at(other)]
+            anchor, other = (numbers[3:6], numbers[:3]) if welds else (numbers[:3], numbers[3:6])
+            frames = [at(anchor, turned_by(numbers[6:10]) if welds else np.eye(3)), at(other)]
         robot.close(model.equality(i).name or f'equality{i}', FIXED if welds else BALL,
                     (bodies[ends[0]], bodies[ends[1]]), frames)

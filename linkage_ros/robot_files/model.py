@@ -24,12 +24,7 @@ OTHERS = 'others'
 def description(path: str, loops: Optional[str] = None) -> str:
     """Return a robot as robot_state_publisher takes it: a URDF as it is, else its tree."""
     robot = readers.read(path, loops)
-    return Path(path).read_text() if parse(path).tag == 'robot' else urdf(robot)
-
-
-def urdf(robot: Robot) -> str:
-    """Return the tree of a robot, all joints at zero where its URDF has them at zero."""
-    return write(drawn(robot))
+    return Path(path).read_text() if parse(path).tag == 'robot' else write(drawn(robot))
 
 
 def drawn(robot: Robot) -> bodies.Model:
@@ -57,21 +52,23 @@ def others(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
             if name in robot.positions}
     known = published(machines)
     loops = components(closing.held(robot, held))
-    passive = {joint.name for each in loops for joint in each.joints}.difference(
+    passive = {joint.name for component in loops for joint in component.joints}.difference(
         known, held, robot.driven)
-    given: Dict[str, Any] = {}
+    parameters: Dict[str, Any] = {}
     lines, names, lost = ['A ground 0 0'], [], []
-    for name in [each for each in robot.positions if each not in known]:
+    for name in [name for name in robot.positions if name not in known]:
         source, ratio, offset = (name, 1.0, 0.0) if name in held else robot.source(name)
         if source in passive:
             lost.append(name)
             continue
-        own = f'crank{len(lines) if len(lines) > 1 else ""}'
+        crank = f'crank{len(lines) if len(lines) > 1 else ""}'
         value = ratio * held.get(source, robot.positions[source]) + offset
-        given.update({f'{own}.source': source, f'{own}.ratio': ratio, f'{own}.offset': offset,
-                      f'{own}.start': value, f'{own}.speed': 0.0})
+        parameters.update({
+            f'{crank}.source': source, f'{crank}.ratio': ratio, f'{crank}.offset': offset,
+            f'{crank}.start': value, f'{crank}.speed': 0.0})
         lines.append(f'B{len(lines)} crank A 1')
         if source != name:
-            names.append(f'{own}={quoted_name(name)}')
-    given.update(type='custom', joints=lines, joint_names=names, only_named=True)
-    return {f'{OTHERS}.{key}': value for key, value in given.items()} if lines[1:] else {}, lost
+            names.append(f'{crank}={quoted_name(name)}')
+    parameters.update(type='custom', joints=lines, joint_names=names, only_named=True)
+    parameters = {f'{OTHERS}.{key}': value for key, value in parameters.items()}
+    return parameters if lines[1:] else {}, lost

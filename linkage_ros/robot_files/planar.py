@@ -10,34 +10,27 @@ The lines of a mechanism have its inputs first, then its dyads.
 from __future__ import annotations
 
 from cmath import phase
+from contextlib import suppress
+from dataclasses import replace
 from itertools import combinations
 import math
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Set, Tuple
 
 import numpy as np
 
 from . import check, loops
-from .spatial import EXACT
+from .spatial import EXACT, TOGETHER
 from .. import mechanisms, scene
 from ..linkage import bar_name, Dyads, Hinge, Mechanism, Motor, Pin, ROUNDING, short, Slide
-from ..robot_model.places import coordinates
-from ..robot_model.robot import Joint, Limits, NotDriven, plain, Robot, SLIDE
+from ..robot_model.places import at, coordinates
+from ..robot_model.robot import HINGE, Joint, Limits, NotDriven, plain, Robot, SLIDE
 from ..scene import FARTHEST
-from ..scene.joint_names import quoted_name
 
+# Loops with a smaller gap, of their size, are closed: files have rounded numbers.
+OPEN = 1e-4
 # The most joints of which pairs are tried as motors.
 MAX_PAIRED = 30
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
-
-
-class Source(NamedTuple):
-    """An input: ratio * position + offset of its source."""
-
-    name: str
-    source: str
-    ratio: float
-    offset: float
-    value: float
 
 
 class Drawing(Dyads):
@@ -46,44 +39,109 @@ class Drawing(Dyads):
 
     Attributes
     ----------
+    frame : array
+        The pose of its plane on the ground.
+    joints : list of Joint
+        Joints whose places are complex [m], and so are the axes of slides; the axis of a hinge is
+        1 or -1.
+    gap, lean : float
+        The distance that cannot be closed [m], and the inclination of axes [rad].
+    measured : list of Joint
+        Hinges and slides with a position, those of balls in the plane included.
+    still : list of str
+        The other hinges of these balls.
     drives : list of Source
         The inputs.
     driven : list of Joint
         The joints of the inputs.
 
+    Raises
+    ------
+    ValueError
+        If it is not planar, or not closed.
+
     """
 
-    def __init__(self, robot: Robot, loop: loops.Loop, drives: Sequence[str]):
-        self.loop, self._robot = loop, robot
-        self.drives: List[Source] = []
+    def __init__(self, robot: Robot, group: loops.Group, drives: Sequence[str]):
+        self._robot = robot
+        self._flatten(group, drives)
+        self.drives: List[check.Source] = []
         # Tips of triangles that are a dyad: they turn with a link of their own.
         self._tips: Set[str] = set()
-        self.driven = [joint for joint in loop.joints if joint.name in drives]
+        self.driven = [joint for joint in self.joints if joint.name in drives]
+        places = [place for joint in self.joints for place in joint.places]
+        size = max(abs(place - other) for place in places for other in places)
+        if size < TOGETHER:
+            raise ValueError('all its joints are at one place')
+        if self.gap > OPEN * size:
+            raise ValueError(f'its loops cannot be closed: they stay open by {self.gap:.3g} m, '
+                             f'more than {OPEN:g} of their size')
+        near = size * min(max(ROUNDING, 10.0 * self.gap / size), 1e-6)
         pins: List[Dict[str, complex]] = []
-        for joint in loop.joints:
+        for joint in self.joints:
             pin = dict(zip(joint.bodies, joint.places))
             same = [other for other in pins if any(
-                abs(other[body] - pin[body]) < loop.near for body in other.keys() & pin.keys())]
+                abs(other[body] - pin[body]) < near for body in other.keys() & pin.keys())]
             if joint.kind != SLIDE:
                 pins = [other for other in pins if other not in same]
-                pins.append({body: place for each in (*same, pin)
-                             for body, place in each.items()})
+                pins.append({body: place for other in (*same, pin)
+                             for body, place in other.items()})
         moved: List[Motor] = [
             Slide(joint.bodies, (joint.places[1] - joint.axis * joint.start,
                                  joint.places[1]), (joint.axis, joint.axis), joint)
             if joint.kind == SLIDE else
             Hinge(joint.bodies, joint.places, joint.axis, -joint.axis * joint.start,
-                  joint) for joint in loop.joints]
+                  joint) for joint in self.joints]
         super().__init__(
-            loop.ground, [body for joint in loop.joints for body in joint.bodies], pins,
-            [each for each in moved if isinstance(each, Slide) and each.joint not in self.driven],
-            [each for each in moved if each.joint in self.driven], loop.size, loop.near)
+            group.ground, [body for joint in self.joints for body in joint.bodies], pins,
+            [slide for slide in moved if isinstance(slide, Slide)
+             and slide.joint not in self.driven],
+            [motor for motor in moved if motor.joint in self.driven], size, near)
         self.take_apart()
+
+    def _flatten(self, group: loops.Group, drives: Sequence[str]) -> None:
+        """Set the plane, and the joints in it."""
+        ground = group.ground
+        hinges, self.lean = loops.check_planar(ground, group.joints, drives)
+        base = self._robot.frames[ground]
+        normal = base[:3, :3].T @ hinges[0].axis
+        right = np.eye(3)[int(abs(normal[0]) > 0.9)]
+        right = (right - right @ normal * normal) / np.linalg.norm(np.cross(right, normal))
+        turned = np.column_stack([right, np.cross(normal, right), normal])
+        origin = next((joint for joint in hinges if ground in joint.bodies), hinges[0])
+        self.frame = at(base[:3, :3].T @ (origin.places[0] - base[:3, 3]), turned)
+        seen = np.linalg.inv(base @ self.frame)
+        self.joints: List[Joint] = []
+        for joint in group.joints:
+            first, second = ((seen @ [*place, 1.0])[:2] for place in joint.places)
+            axis = seen[:3, :3] @ joint.axis
+            way = complex(*axis[:2])
+            self.joints.append(replace(
+                joint, places=(complex(*first), complex(*second)),
+                axes=[way / abs(way) if joint.kind == SLIDE else float(np.sign(axis[2]))] * 2))
+        gaps = ((joint.places[1] - joint.places[0], joint) for joint in self.joints)
+        self.gap = max(abs((apart / joint.axis).imag if joint.kind == SLIDE else apart)
+                       for apart, joint in gaps)
+        self.measured = [joint for joint in self.joints if joint.position is not None]
+        self.still: List[str] = []
+        up = hinges[0].axis
+        stiff = {body for joint in self.joints for body in joint.bodies
+                 if len(joint.hinges) == 2 and not loops.pins(joint, up)}
+        for joint in self.joints:
+            # A rod turns in the plane about one hinge of the ball at its end; the others stay,
+            # unless its other end needs them.
+            pins = [(hinge, sign) for hinge, sign in joint.chain if hinge in loops.pins(joint, up)]
+            if pins and not stiff & {*joint.bodies}:
+                (hinge, sign), *_ = pins
+                self.measured.append(replace(
+                    joint, name=hinge.name, kind=HINGE, position=hinge.position,
+                    axes=[sign * float(np.sign(hinge.axis @ up))] * 2))
+                self.still += [other.name for other, _ in joint.chain if other is not hinge]
 
     @property
     def allowed(self) -> float:
         """Return the allowed distance of a pose from the file's, of the size."""
-        return max(ROUNDING, 30.0 * self.loop.gap / self.loop.size + self.loop.lean)
+        return max(ROUNDING, 30.0 * self.gap / self.size + self.lean)
 
     @property
     def places(self) -> Iterator[Pin]:
@@ -100,18 +158,22 @@ class Drawing(Dyads):
         values = [drive.value for drive in self.drives]
         places = linkage.solve(values if len(values) > 1 else values[0])
         return float(np.max([abs(complex(*places[name]) - place) for name, place in self.places
-                             if name in (names or places)])) / self.loop.size
+                             if name in (names or places)])) / self.size
 
-    def measured_by(self, joint: Joint) -> Optional[Tuple[str, float, float]]:
-        """Return the link whose angle is a joint's position, with sign and position, if any."""
+    def measured_by(self, joint: Joint) -> Tuple[str, float, float]:
+        """
+        Return the link whose angle is a joint's position, with sign and position.
+
+        Raises ValueError if there is none, as no word places a second joint on a block or barrel.
+        """
         if not self.parts.keys() >= {*joint.bodies}:
-            return None
+            raise ValueError(joint.name)
         parent, child = joint.bodies
         if joint.kind == SLIDE:
             block = child if self.parts[child].slide is joint else parent
             part = self.parts[block]
             if part.slide is not joint:
-                return None
+                raise ValueError(joint.name)
             sign = math.copysign(1.0, (part.along / joint.motion(block)).real)
             way = (self.on[block][part.joint] - part.start) / part.along
             return part.link, sign, way.real
@@ -122,11 +184,7 @@ class Drawing(Dyads):
         link, hangs, along, slide, _ = self.parts[body]
         if not link or hangs != pin or slide:
             # The angle of a triangle on this link is the angle between the two links.
-            try:
-                tip = self._triangle(body, pin, 'dyad')
-            except ValueError:
-                # No word places a second joint on this block or barrel.
-                return None
+            tip = self._triangle(body, pin, 'dyad')
             self._tips.add(tip)
             along = self.on[body][tip] - self.on[body][pin]
             link = bar_name(pin, tip)
@@ -139,17 +197,13 @@ class Drawing(Dyads):
         return self.name(start + (end - start) * complex(0.5, 0.75 ** 0.5), body,
                          f'{word} {pin} {other} {side} {side} left')
 
-    def _between(self, pin: str, base: str, body: str, joint: Joint
-                 ) -> Optional[Tuple[str, float, float]]:
+    def _between(self, pin: str, base: str, body: str, joint: Joint) -> Tuple[str, float, float]:
         """Return the link of an angle between two bodies that turn on a pin of a third one."""
         # A bar parallel to the one body that hangs on the other.
-        try:
-            tip, end = self.other(body, pin)
-            aside = next((name for name in self.on[base]
-                          if self.home[name] == base and name not in self._tips), '') \
-                or self._triangle(base, pin)
-        except ValueError:
-            return None
+        tip, end = self.other(body, pin)
+        aside = next((name for name in self.on[base]
+                      if self.home[name] == base and name not in self._tips), '') \
+            or self._triangle(base, pin)
         along = end - self.on[body][pin]
         name = self.name(self.on[base][aside] + along, body, f'parallelogram {pin} {aside} {tip}')
         return bar_name(aside, name), joint.motion(body), phase(along / self.parts[base].along)
@@ -165,8 +219,8 @@ class Drawing(Dyads):
                 angle_or_length = self.length_text(offset) if word != 'crank' else short(
                     math.remainder(offset, math.tau))
                 return number, f' geared {other.name} {gear!r} {angle_or_length}'
-        self.drives.append(Source(word + number, source, ratio, offset, ratio * (
-            self._robot.positions.get(source) or 0.0) + offset))
+        value = ratio * (self._robot.positions.get(source) or 0.0) + offset
+        self.drives.append(check.Source(word + number, source, ratio, offset, value))
         return number, ''
 
     def position(self, joint: Joint) -> float:
@@ -176,17 +230,17 @@ class Drawing(Dyads):
     def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
         """Return the start of a line for bars that mirror others, and so pass dead points."""
         (first, start), (second, end) = one, two
-        for corner, at in self.places:
+        for corner, there in self.places:
             links = [{body for body in self.parts
                       if {corner, name} <= self.on[body].keys()} for name in (first, second)]
             if corner in (first, second) or not all(links) or links[0] == links[1]:
                 continue
-            opposite, along = start + end - at, end - start
-            kite, crossed = (start + along * ((each - start) / along).conjugate()
-                             for each in (at, opposite))
+            opposite, along = start + end - there, end - start
+            kite, crossed = (start + along * ((point - start) / along).conjugate()
+                             for point in (there, opposite))
             for word, seen in (('parallelogram', opposite), ('mirror', kite),
                                ('antiparallelogram', crossed)):
-                if max(abs(seen - place), abs(seen - other)) < self.loop.near < abs(at - place):
+                if max(abs(seen - place), abs(seen - other)) < self.near < abs(there - place):
                     return f'{word} {corner} {first} {second}'
         return None
 
@@ -200,9 +254,8 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
     """
     drawing = _drawn(robot, group)
     name = check.name_beside(others, plain(drawing.driven[0].name, 60))
-    loop, given = drawing.loop, {
-        f'{name}.{key}': value for key, value in _parameters(drawing)}
-    machine = scene.read({'mechanisms': [name], **given}).machines[name]
+    parameters = _parameters(drawing, name)
+    machine = scene.read({'mechanisms': [name], **parameters}).machines[name]
     if not any(called.published for called in machine.joints.values()):
         raise NotDriven(_why(drawing))
     limits, reports = robot.limits(drawing.driven)
@@ -210,13 +263,13 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
         reports.append(f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.')
     ends = {}
     for drive in drawing.drives:
-        around = math.pi if drive.name[:5] == 'crank' else 0.5 * loop.size
+        around = math.pi if drive.name[:5] == 'crank' else 0.5 * drawing.size
         low, high = drive.value - around, drive.value + around
         if drive.source in limits:
             try:
                 low, high = sweep = _sweep(drive, limits[drive.source], machine.inputs[drive.name])
-                given[f'{name}.{drive.name}.sweep'] = [*sweep]
-                given[f'{name}.{drive.name}.start'] = min(max(drive.value, low), high)
+                parameters[f'{name}.{drive.name}.sweep'] = [*sweep]
+                parameters[f'{name}.{drive.name}.start'] = min(max(drive.value, low), high)
             except ValueError as error:
                 reports.append('Left out: the limits of '
                                f'{limits[drive.source].text(drive.source)}: {error}.')
@@ -224,18 +277,18 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
         low, high = sorted((end - drive.offset) / drive.ratio for end in (
             max(low, start - 2.0 * around), min(high, start + 2.0 * around)))
         ends[drive.source] = low, high
-    machine = scene.read({'mechanisms': [name], **given}).machines[name]
     if drawing.apart(machine.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
-    slack = loop.lean + loop.gap / loop.size
+    slack = drawing.lean + drawing.gap / drawing.size
     if slack > EXACT:
-        reports.append(f'Warning: the file is not exact: axes lean by {loop.lean:.2g} rad, and '
-                       f'loops stay open by {loop.gap:.2g} m; so is what is published.')
-    return check.Imported(name, given, reports, [joint.name for joint in drawing.driven], ends,
-                          slack, loop.still)
+        reports.append(f'Warning: the file is not exact: axes lean by {drawing.lean:.2g} rad, and '
+                       f'loops stay open by {drawing.gap:.2g} m; so is what is published.')
+    driven = [joint.name for joint in drawing.driven]
+    return check.Imported(name, parameters, reports, driven, ends, slack, drawing.still)
 
 
-def _sweep(drive: Source, limits: Limits, settings: scene.InputSettings) -> Tuple[float, float]:
+def _sweep(drive: check.Source, limits: Limits, settings: scene.InputSettings
+           ) -> Tuple[float, float]:
     """Return the limits of an input within its reach; raise ValueError if it has no such ends."""
     low, high = (float(short(end, 1e-15)) if abs(end) < FARTHEST else math.copysign(math.inf, end)
                  for end in (drive.ratio * end + drive.offset
@@ -265,8 +318,7 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
               for body in joint.bodies if body != group.ground)
     drawings: List[Drawing] = []
     for drives, ground in tries:
-        loop = loops.flat(robot, group._replace(ground=ground), drives)
-        drawings.append(Drawing(robot, loop, drives))
+        drawings.append(Drawing(robot, group._replace(ground=ground), drives))
         if not drawings[-1].left:
             break
     best = min(drawings, key=lambda drawing: len(drawing.left))
@@ -282,7 +334,7 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
 
 def _why(drawing: Drawing) -> str:
     """Return why bodies are left."""
-    holders = [joint for joint in drawing.loop.joints if {*joint.bodies} & {*drawing.left}]
+    holders = [joint for joint in drawing.joints if {*joint.bodies} & {*drawing.left}]
     freedom = 3 * len(drawing.left) - 2 * len(holders) - sum(
         joint in drawing.driven for joint in holders)
     between = [joint.name for joint in holders if joint in drawing.driven
@@ -296,25 +348,18 @@ def _why(drawing: Drawing) -> str:
             'bars (an Assur group of class III or higher)')
 
 
-def _parameters(drawing: Drawing) -> Iterator[Tuple[str, Any]]:
-    measured = [(joint, found) for joint in drawing.loop.pins if joint not in drawing.driven
-                and (found := drawing.measured_by(joint))]
-    yield 'type', 'custom'
-    yield 'joints', drawing.lines
-    yield 'frame_id', drawing.loop.ground
-    yield 'pose', [float(short(value)) for value in coordinates(drawing.loop.frame)]
+def _parameters(drawing: Drawing, name: str) -> Dict[str, Any]:
+    measured = []
+    for joint in drawing.measured:
+        with suppress(ValueError):
+            if joint not in drawing.driven:
+                measured.append((joint, *drawing.measured_by(joint)))
     links = {link.name: link for link in drawing.linkage.links}
-    for drive in drawing.drives:
-        yield f'{drive.name}.source', drive.source
-        yield f'{drive.name}.ratio', drive.ratio
-        yield f'{drive.name}.offset', float(short(drive.offset))
-        yield f'{drive.name}.start', float(short(drive.value, 1e-15))
-    names = []
-    for joint, (link, sign, angle) in measured:
+    joints = []
+    for joint, link, sign, angle in measured:
         if links[link].kind != 'prismatic':
             angle = math.remainder(angle - float(np.asarray(links[link].zero)), math.tau)
-        zero = float(short(joint.start - sign * angle))
-        names.append(f'{link}={"-" * (sign < 0.0)}{quoted_name(joint.name)}'
-                     + (f'{zero:+}' if zero else ''))
-    yield 'joint_names', names
-    yield 'only_named', True
+        joints.append((link, sign, joint.name, joint.start - sign * angle))
+    return check.parameters(
+        name, 'custom', drawing.lines, drawing.ground, drawing.drives, joints,
+        pose=[float(short(value)) for value in coordinates(drawing.frame)])

@@ -28,20 +28,17 @@ def read(path: str, loops: Optional[str] = None) -> Robot:
             with needs('mujoco'):
                 from . import mjcf
             robot = mjcf.read(path)
-        elif root.tag == 'sdf':
-            robot = sdf.read(root)
         else:
-            reader = urdf.Reader(root)
-            robot = reader.robot
+            robot = sdf.read(root) if root.tag == 'sdf' else urdf.read(root)
         names = Counter(joint.name for joint in robot.joints if joint.position is not None)
         if '' in names:
             raise RequestError('a joint has no name')
         if twice := [name for name, count in names.items() if count > 1]:
             raise RequestError(f'two joints are called {twice[0]!r}')
     if loops:
-        given = _loops(loops)
+        content = _loops(loops)
         with _blaming(loops):
-            reader.of_file(given)
+            urdf.close(robot, content)
     with _blaming(path):
         for name in robot.follows:
             robot.source(name)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
-from typing import Any, Dict, Iterator, List, Mapping, Sequence, Set, Tuple
+from typing import Dict, List, Mapping, Sequence, Set, Tuple
 
 import numpy as np
 
@@ -22,7 +22,6 @@ from .loops import Group
 from .. import mechanisms, scene
 from ..linkage import FORMS, short, WindowError
 from ..robot_model.robot import BALL, HINGE, Joint, Limits, NotDriven, plain, Robot, SLIDE
-from ..scene.joint_names import quoted_name
 from ..words import listed
 
 # A hinge with wider limits [rad] has none.
@@ -45,7 +44,7 @@ class Rods:
     """
 
     def __init__(self, robot: Robot, group: Group):
-        ground = self.frame_id = group.ground
+        ground = group.ground
         self._seen = np.linalg.inv(robot.frames[ground])
         self._driven = {*robot.driven}
         # The joint of each link, and its end of a line: its parent, its place and its axis.
@@ -61,11 +60,11 @@ class Rods:
         self._names: Set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
         rods = {body: tuple(held) for body, held in _on_bodies(group.joints).items()
                 if body != ground and [joint.kind for joint in held] == [BALL, BALL]}
-        joints = [one for joint in group.joints for one in (
+        joints = [hinge for joint in group.joints for hinge in (
             [joint] if {*joint.bodies} & rods.keys() else joint.hinges)]
-        own = _on_bodies(joints)
+        held_by = _on_bodies(joints)
         halves = [joint for joint in joints if joint.kind == SLIDE and joint.name in self._driven
-                  and all(len(own[body]) == 2 and body != ground for body in joint.bodies)]
+                  and all(len(held_by[body]) == 2 and body != ground for body in joint.bodies)]
         self._bodies = {ground: 'ground'}
         left = [joint for joint in joints if joint not in halves and not {
             *joint.bodies} & rods.keys() and not any({*joint.bodies} & {*half.bodies}
@@ -81,7 +80,7 @@ class Rods:
             self._rod(body, held)
             self._universal(body, held)
         for half in halves:
-            self._cylinder(half, [next(joint for joint in own[body] if joint is not half)
+            self._cylinder(half, [next(joint for joint in held_by[body] if joint is not half)
                                   for body in half.bodies])
 
     def _named(self, joint: Joint) -> str:
@@ -180,22 +179,6 @@ class Rods:
             lines.append(f'{name} {word} {self._ends[name]}{within}')
         return lines + self.rods
 
-    def parameters(self, lines: Sequence[str]) -> Iterator[Tuple[str, Any]]:
-        """Yield the parameters of its mechanism."""
-        yield 'type', 'rods'
-        yield 'joints', [*lines]
-        yield 'frame_id', self.frame_id
-        for name, joint in self.inputs.items():
-            yield f'{name}.source', joint.name
-            yield f'{name}.offset', self.zeros[name] - joint.start
-            yield f'{name}.start', self.zeros[name]
-        yield 'joint_names', [
-            f'{name}={quoted_name(joint.name)}' + (
-                f'{position:+}' if (position := float(short(joint.start))) else '')
-            for name, joint in self.links.items() if name not in self.inputs
-            and joint.position is not None]
-        yield 'only_named', True
-
 
 def _on_bodies(joints: Sequence[Joint]) -> Dict[str, List[Joint]]:
     return {body: [joint for joint in joints if body in joint.bodies]
@@ -228,31 +211,32 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
         if why and link not in {*made.inputs, *made.universals}:
             reports.append(f'Left out: the limits of {joint.name}, {why}.')
     name = check.name_beside(others, f'{next(iter(made.inputs))}_rods')
-    given = {f'{name}.{key}': value for key, value in made.parameters(lines)}
-    machine = scene.read({'mechanisms': [name], **given}).machines[name]
-    ends = _ranges(machine, made, limits)
-    for link, joint in made.inputs.items():
-        low, high = (end + machine.inputs[link].offset for end in ends[joint.name])
-        given[f'{name}.{link}.sweep'] = [float(short(low)), float(short(high))]
-        given[f'{name}.{link}.start'] = min(max(made.zeros[link], low), high)
-    return check.Imported(name, given, reports, [joint.name for joint in made.inputs.values()],
-                          ends, still=made.still)
+    drives = [check.Source(link, joint.name, 1.0, made.zeros[link] - joint.start, made.zeros[link])
+              for link, joint in made.inputs.items()]
+    parameters = check.parameters(name, 'rods', lines, group.ground, drives, [
+        (link, 1.0, joint.name, joint.start) for link, joint in made.links.items()
+        if link not in made.inputs and joint.position is not None])
+    machine = scene.read({'mechanisms': [name], **parameters}).machines[name]
+    ends = {}
+    for drive, (low, high) in zip(machine.inputs.values(), _sweeps(machine, limits)):
+        ends[drive.source] = low - drive.offset, high - drive.offset
+        key = f'{name}.{drive.input.name}'
+        parameters[f'{key}.sweep'] = [float(short(low)), float(short(high))]
+        parameters[f'{key}.start'] = min(max(drive.start, low), high)
+    return check.Imported(name, parameters, reports, [*ends], ends, still=made.still)
 
 
-def _ranges(machine: scene.SceneMechanism, made: Rods, limits: Mapping[str, Limits]
-            ) -> Dict[str, Tuple[float, float]]:
-    """Return the motors' limits, made smaller until every pose in them exists."""
-    places = [(joint.name, drive.start - drive.offset, drive.offset)
-              for joint, drive in zip(made.inputs.values(), machine.inputs.values())]
-    low, high = np.array([limits.get(name, (-math.inf, math.inf))[:2] for name, *_ in places]).T
-    start, zero = np.array([place[1:] for place in places]).T
-    start = np.clip(start, low, high)
-    size = np.array([2.5 if drive.input.turns else 0.5 * drive.start
-                     for drive in machine.inputs.values()])
+def _sweeps(machine: scene.SceneMechanism, limits: Mapping[str, Limits]) -> List[List[float]]:
+    """Return the ends of the inputs: limits, made smaller until every pose in them exists."""
+    drives = machine.inputs.values()
+    low, high = np.array([np.add(limits.get(drive.source, (-math.inf, math.inf))[:2], drive.offset)
+                          for drive in drives]).T
+    start = np.clip([drive.start for drive in drives], low, high)
+    size = np.array([2.5 if drive.input.turns else 0.5 * drive.start for drive in drives])
     for share in _SMALLER ** np.arange(_TRIES):
-        ends = np.clip(start - share * size, low, high), np.clip(start + share * size, low, high)
-        values = np.meshgrid(*np.linspace(*ends, _SIDE).T + zero[:, None])
+        ends = np.clip([start - share * size, start + share * size], low, high)
+        values = np.meshgrid(*np.linspace(ends[0], ends[1], _SIDE).T)
         angles = machine.linkage.joint_angles(values if len(values) > 1 else values[0])
         if np.isfinite(list(angles.values())).all():
             break
-    return {name: each for (name, *_), each in zip(places, zip(*map(np.ndarray.tolist, ends)))}
+    return ends.T.tolist()

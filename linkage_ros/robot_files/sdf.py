@@ -66,8 +66,8 @@ class _Model:
             for plugin in model.findall('plugin'):
                 kind = f'{plugin.get("name")} {plugin.get("filename")}'.lower()
                 if 'state' not in kind:
-                    robot.driven += [(one.text or '').strip()
-                                     for one in plugin.findall('joint_name')]
+                    robot.driven += [(element.text or '').strip()
+                                     for element in plugin.findall('joint_name')]
             weld(robot, model.findall('plugin'))
         return robot
 
@@ -88,9 +88,9 @@ class _Model:
             return name
         part = self._parts[name]
         if part.tag == 'model':
-            first = part.get('canonical_link') or next(
-                (one.get('name', '') for one in part if one.tag in ('link', 'model')), '')
-            return self.body(self.named(name, first, True))
+            first = next((inner for inner in part if inner.tag in ('link', 'model')), part)
+            return self.body(self.named(
+                name, part.get('canonical_link', first.get('name', '')), True))
         return self.body(self.named(name, part.get('attached_to') or text(
             part, 'child', '__model__')))
 

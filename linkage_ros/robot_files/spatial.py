@@ -114,7 +114,6 @@ class Component:
             above[i, i] = True
         self.named = {screw.joint.name: i for i, screw in enumerate(self._screws)
                       if screw.joint.position is not None}
-        self._is_named = np.isin(np.arange(len(above) - 1), [*self.named.values()])
         self._starts = np.array([screw.joint.start for screw in self._screws])
         self._slides = np.array([screw.kind == SLIDE for screw in self._screws], bool)
         self._in_balls = np.array([any(
@@ -142,14 +141,14 @@ class Component:
         self._cut_ends = [[last[body] for body in cut.bodies] for cut in self._cuts]
         ends, points = [], []
         for end, cut in zip(self._cut_ends, self._cuts):
-            ways = [np.zeros((2, 3))]
+            offsets = [np.zeros((2, 3))]
             if cut.kind == HINGE:
                 first, second = cut.axes
-                ways.append(np.array([first, second if first @ second > 0.0 else -second]))
+                offsets.append(np.array([first, second if first @ second > 0.0 else -second]))
             if cut.kind == FIXED:
-                ways += [np.array([turn[:, k] for turn in cut.turns]) for k in range(3)]
-            points += [np.array(cut.places) + self.size * way for way in ways]
-            ends += [end] * len(ways)
+                offsets += [np.array([turn[:, k] for turn in cut.turns]) for k in range(3)]
+            points += [np.array(cut.places) + self.size * offset for offset in offsets]
+            ends += [end] * len(offsets)
         self._ends = np.array(ends, int).reshape(-1, 2)
         self._points = np.concatenate([points, np.ones((len(ends), 2, 1))], axis=2)
         self._signs = above[self._ends] * np.array([[1.0], [-1.0]])
@@ -165,9 +164,9 @@ class Component:
         """Names of the hinges that close its loops, whose angles `read` returns."""
         return {cut.name for cut in self._cuts if cut.position is not None and cut.kind == HINGE}
 
-    def at_start(self, count: int = 1) -> np.ndarray:
-        """Return the pose of the file, `count` times."""
-        return np.zeros((count, len(self._screws)))
+    def at_start(self) -> np.ndarray:
+        """Return the pose of the file."""
+        return np.zeros((1, len(self._screws)))
 
     def is_of(self, names: Sequence[str]) -> np.ndarray:
         """Return which screws are of the joints that are named."""
@@ -251,14 +250,14 @@ class Component:
             inside &= ~which[i] | (low <= positions[name]) & (positions[name] <= high)
         return inside
 
-    def chosen(self, ways: np.ndarray, names: Sequence[str], first: Sequence[str] = ()
+    def chosen(self, motions: np.ndarray, names: Sequence[str], first: Sequence[str] = ()
                ) -> List[str]:
         """Return joints that tell where all is; ways to move have a column for each screw."""
-        found: List[str] = []
+        basis: List[str] = []
         for name in sorted(names, key=lambda name: name not in first):
-            if np.linalg.matrix_rank(ways[:, self.is_of([*found, name])], 1e-6) > len(found):
-                found.append(name)
-        return found
+            if np.linalg.matrix_rank(motions[:, self.is_of([*basis, name])], 1e-6) > len(basis):
+                basis.append(name)
+        return basis
 
     def texts(self, pose: np.ndarray, which: Any) -> Dict[str, str]:
         """Return the positions of some screws with names in a pose."""
@@ -268,8 +267,8 @@ class Component:
     def moves(self, pose: np.ndarray) -> Dict[str, np.ndarray]:
         """Return the displacement of each body on its parent in a pose."""
         moved: Dict[str, np.ndarray] = {}
-        for screw, each in zip(self._screws, displacements(self._twists, pose, self._slides)):
-            moved[screw.body] = moved.get(screw.body, np.eye(4)) @ each
+        for screw, step in zip(self._screws, displacements(self._twists, pose, self._slides)):
+            moved[screw.body] = moved.get(screw.body, np.eye(4)) @ step
         return moved
 
     def away(self, poses: np.ndarray) -> np.ndarray:
@@ -289,10 +288,10 @@ class Component:
         Loops that are less stiff than `least`, of their size, do not count.
         """
         slope = self.errors(pose[None], True)[1][0][:, ~fixed]
-        _, values, ways = np.linalg.svd(slope)
-        found = np.zeros((len(ways) - np.sum(values > least * self.size), len(fixed)))
-        found[:, ~fixed] = ways[len(ways) - len(found):]
-        return found
+        _, values, motions = np.linalg.svd(slope)
+        basis = np.zeros((len(motions) - np.sum(values > least * self.size), len(fixed)))
+        basis[:, ~fixed] = motions[len(motions) - len(basis):]
+        return basis
 
     def nullity(self, fixed: np.ndarray) -> int:
         """Return the degrees of freedom that the loops leave, in a random open pose."""
@@ -308,35 +307,25 @@ class Component:
     def loose(self, pose: np.ndarray, motors: Sequence[str]) -> Tuple[List[str], np.ndarray]:
         """Return the joints that move while motors do not, and the ways in which they do."""
         # The spin of a rod on balls does not count.
-        ways = self.free_ways(pose, self.is_of(motors)) * ~self._in_balls
-        return [name for name, i in self.named.items() if is_free(ways)[i]], ways
-
-    def most_different(self, one: np.ndarray, other: np.ndarray, which: Any
-                       ) -> Tuple[str, float, float]:
-        """Return the joint with the largest difference of two poses, and its positions."""
-        apart = np.abs(self.away(one - other)) * which * self._is_named
-        if not apart.any():
-            return '', 0.0, 0.0
-        name = self._screws[int(np.argmax(apart))].joint.name
-        first, second = self.read(np.array([one, other]))[name]
-        return name, float(first), float(second)
+        motions = self.free_ways(pose, self.is_of(motors)) * ~self._in_balls
+        return [name for name, i in self.named.items() if is_free(motions)[i]], motions
 
     def read(self, poses: np.ndarray) -> Dict[str, np.ndarray]:
         """Return the positions of named joints [rad or m], within half a turn of the file's."""
         turns = math.tau * np.round(poses / math.tau)
         positions = self._starts + poses - np.where(self._slides, 0.0, turns)
-        found = {name: positions[:, i] for name, i in self.named.items()}
+        by_name = {name: positions[:, i] for name, i in self.named.items()}
         frames = self._frames(poses)
         for cut, (first, second) in zip(self._cuts, self._cut_ends):
             if cut.name in self.cut_names:
                 turned = frames[:, first, :3, :3].swapaxes(1, 2) @ frames[:, second, :3, :3]
                 across = np.cross(cut.axis, np.eye(3)[np.argmin(np.abs(cut.axis))])
                 ahead = turned @ across
-                found[cut.name] = cut.start + np.arctan2(
+                by_name[cut.name] = cut.start + np.arctan2(
                     np.cross(across, ahead) @ cut.axis, ahead @ across)
-        return found
+        return by_name
 
 
-def is_free(ways: np.ndarray) -> np.ndarray:
+def is_free(motions: np.ndarray) -> np.ndarray:
     """Return which screws move in some of the ways."""
-    return np.linalg.norm(ways, axis=0) > 1e-6
+    return np.linalg.norm(motions, axis=0) > 1e-6

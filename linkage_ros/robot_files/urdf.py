@@ -14,14 +14,14 @@ from __future__ import annotations
 
 from graphlib import TopologicalSorter
 import re
-from typing import Any, Mapping, Sequence, Tuple
+from typing import Any, Mapping, Sequence
 
 import numpy as np
 
 from .elements import attribute, Element, numbers, once, origin, text, weld
 from ..command import RequestError
 from ..robot_model.places import at, pose
-from ..robot_model.robot import BALL, FIXED, HINGE, KINDS, Robot, UNIVERSAL
+from ..robot_model.robot import BALL, FIXED, HINGE, Robot, UNIVERSAL
 from ..words import listed, meant, quoted
 
 # The keys of a file of loops; the last two have no effect.
@@ -30,141 +30,118 @@ _KEYS = ('closures', 'closed_loop', 'pin_loops', 'ball_loops', 'type', 'joint_na
 _CLOSING = re.compile(r'(?P<name>.*closing_.+)_1')
 
 
-class Reader:
-    """
-    Reads a URDF.
-
-    Attributes
-    ----------
-    robot : Robot
-        The robot, with the loops that are in its file.
-
-    """
-
-    def __init__(self, root: Element):
-        self._root = root
-        links = once((link.get('name', ''), link) for link in root.findall('link'))
-        joints = once((attribute(joint, 'child', 'link'), joint)
-                      for joint in root.findall('joint'))
-        bases = {child: attribute(joint, 'parent', 'link') for child, joint in joints.items()}
-        roots = [link for link in links if link not in joints]
-        if len(roots) != 1:
-            raise RequestError(f'a URDF has one root link, not {len(roots)}')
-        robot = self.robot = Robot(roots[0], {roots[0]: np.eye(4)})
-        for link in TopologicalSorter({link: [base] for link, base in bases.items()}
-                                      ).static_order():
-            if link in joints and link in links:
-                robot.frames[link] = robot.frames[bases[link]] @ origin(
-                    joints[link].find('origin'))
-        # Joints stand for their children.
-        self._links = {**{joint.get('name', ''): child for child, joint in joints.items()},
-                       **{link: link for link in robot.frames}}
-        for child, joint in joints.items():
-            self._tree_joint(joint, (bases[child], child))
-        self._of_elements()
-        self._of_frames()
-        self._of_gazebo()
-        robot.driven = [joint.get('name', '') for joint in (
-            *root.findall('transmission/joint'),
-            *root.findall('ros2_control/joint[command_interface]'))]
-        # URDF+ says which joints are not independent.
-        if not robot.driven and root.find('joint[@independent="false"]') is not None:
-            robot.driven = [name for joint in joints.values() if joint.get(
-                'independent') != 'false' and (name := joint.get('name', '')) in robot.positions]
-
-    def _tree_joint(self, joint: Element, ends: Tuple[str, str]) -> None:
+def read(root: Element) -> Robot:
+    """Return the robot in a URDF, with the loops that its elements close."""
+    links = once((link.get('name', ''), link) for link in root.findall('link'))
+    joints = once((attribute(joint, 'child', 'link'), joint) for joint in root.findall('joint'))
+    bases = {child: attribute(joint, 'parent', 'link') for child, joint in joints.items()}
+    roots = [link for link in links if link not in joints]
+    if len(roots) != 1:
+        raise RequestError(f'a URDF has one root link, not {len(roots)}')
+    robot = Robot(roots[0], {roots[0]: np.eye(4)})
+    for link in TopologicalSorter({link: [base] for link, base in bases.items()}).static_order():
+        if link in joints and link in links:
+            robot.frames[link] = robot.frames[bases[link]] @ origin(joints[link].find('origin'))
+    for child, joint in joints.items():
         name, mimic, limit = joint.get('name', ''), joint.find('mimic'), joint.find('limit')
-        self.robot.join(
-            name, joint.get('type', ''), ends, self.robot.frames[ends[1]],
-            numbers(attribute(joint, 'axis', 'xyz', '1 0 0')), position=0.0,
-            limits=('-inf', 'inf') if limit is None else (
-                limit.get('lower', '0'), limit.get('upper', '0')))
+        robot.join(name, joint.get('type', ''), (bases[child], child), robot.frames[child],
+                   numbers(attribute(joint, 'axis', 'xyz', '1 0 0')), position=0.0,
+                   limits=('-inf', 'inf') if limit is None else (
+                       limit.get('lower', '0'), limit.get('upper', '0')))
         if mimic is not None:
             ratio, start = numbers(f'{mimic.get("multiplier", 1)} {mimic.get("offset", 0)}', 2)
-            self.robot.follow(name, mimic.get('joint', ''), ratio, start)
+            robot.follow(name, mimic.get('joint', ''), ratio, start)
+    _close_by_elements(robot, root)
+    _close_by_frames(robot)
+    _join_by_gazebo(robot, root)
+    robot.driven = [joint.get('name', '') for joint in (
+        *root.findall('transmission/joint'),
+        *root.findall('ros2_control/joint[command_interface]'))]
+    # URDF+ says which joints are not independent.
+    if not robot.driven and root.find('joint[@independent="false"]') is not None:
+        robot.driven = [name for joint in joints.values() if joint.get(
+            'independent') != 'false' and (name := joint.get('name', '')) in robot.positions]
+    return robot
 
-    def _pair(self, name: str, kind: str, ends: Sequence[str], *axes: Any) -> None:
-        """Close a loop by the frames of two links, each by its name or that of its joint."""
-        one, other = (self._links[end] for end in ends)
-        self.robot.close(name, kind, (one, other), [np.eye(4)] * 2, *axes)
 
-    def _of_elements(self) -> None:
-        """Add the loops that elements of the URDF close."""
-        for tag, ends in (('loop_joint', ('link1', 'link2')), (
-                'loop', ('predecessor', 'successor'))):
-            for cut in self._root.findall(tag):
-                # An example of Isaac Sim has an empty end first.
-                parts = [part for end in ends if (part := cut.find(f'{end}[@link]')) is not None]
-                if len(parts) < 2:
-                    raise RequestError(f'{tag} {cut.get("name")} has no {ends[0]} or {ends[1]}')
-                self.robot.close(
-                    cut.get('name', ''), cut.get('type', ''),
-                    (parts[0].attrib['link'], parts[1].attrib['link']),
-                    [origin(part if part.find('origin') is None else part.find('origin'))
-                     for part in parts], numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
+def _pair(robot: Robot, name: str, kind: str, ends: Sequence[str], *axes: Any) -> None:
+    """Close a loop by the frames of two links, each by its name or that of its joint."""
+    links = {**{joint.name: joint.bodies[1] for joint in robot.joints},
+             **{link: link for link in robot.frames}}
+    robot.close(name, kind, (links[ends[0]], links[ends[1]]), [np.eye(4)] * 2, *axes)
 
-    def _of_frames(self) -> None:
-        """Add the loops that links called closing_NAME_1 and closing_NAME_2 close."""
-        frames = self.robot.frames
-        for match in filter(None, map(_CLOSING.fullmatch, [*frames])):
-            ends = match[0], f'{match["name"]}_2'
-            if ends[1] in frames:
-                axes = [np.linalg.solve(frames[end], frames[f'{end}_z'])[:3, 3] for end in ends
-                        if f'{end}_z' in frames]
-                self._pair(match['name'], HINGE if len(axes) == 2 else BALL, ends, *axes)
 
-    def _of_gazebo(self) -> None:
-        """Add the joints that Gazebo adds to the model."""
-        for cut in self._root.findall('gazebo/joint'):
-            one, other = (attribute(cut, tag, 'link') or text(cut, tag)
-                          for tag in ('parent', 'child'))
-            frame = self.robot.frames[other] @ pose(
-                *numbers(text(cut, 'pose', '0 0 0 0 0 0'), 6))
-            axis = numbers(text(cut, 'axis/xyz') or attribute(cut, 'axis', 'xyz', '0 0 1'))
-            if text(cut, 'axis/use_parent_model_frame') in ('1', 'true'):
-                axis = frame[:3, :3].T @ axis
-            second = text(cut, 'axis2/xyz')
-            self.robot.join(cut.get('name', ''), cut.get('type', ''), (one, other), frame, axis,
-                            second=numbers(second) if second else None)
-        weld(self.robot, self._root.findall('gazebo/plugin'))
+def _close_by_elements(robot: Robot, root: Element) -> None:
+    for tag, ends in (('loop_joint', ('link1', 'link2')), ('loop', ('predecessor', 'successor'))):
+        for cut in root.findall(tag):
+            # An example of Isaac Sim has an empty end first.
+            parts = [part for end in ends if (part := cut.find(f'{end}[@link]')) is not None]
+            if len(parts) < 2:
+                raise RequestError(f'{tag} {cut.get("name")} has no {ends[0]} or {ends[1]}')
+            robot.close(cut.get('name', ''), cut.get('type', ''),
+                        (parts[0].attrib['link'], parts[1].attrib['link']),
+                        [origin(part if part.find('origin') is None else part.find('origin'))
+                         for part in parts], numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
 
-    def of_file(self, loops: Mapping[str, Any]) -> None:
-        """Add the loops of another file; raise RequestError for a key that is not known."""
-        for key in loops:
-            if key not in _KEYS:
-                raise RequestError(f'there is no key {quoted(key)}; allowed: '
-                                   f'{listed(_KEYS, 200)}{meant(key, _KEYS)}')
-        for i, cut in enumerate(loops.get('closures', ())):
-            point = at(numbers(cut['point']))
-            self.robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), point,
-                            numbers(cut['axis']), point)
-        types = loops.get('type', ())
-        for i, ends in enumerate(loops.get('closed_loop', ())):
-            self._pair('='.join(ends), str(types[i] if i < len(types) else FIXED), ends)
-        for key, kind in (('pin_loops', HINGE), ('ball_loops', BALL)):
-            for i, cut in enumerate(loops.get(key, ())):
-                self.robot.close(
-                    str(cut.get('name', f'{key}[{i}]')), kind, (cut['parent'], cut['child']),
-                    [at(numbers(cut[f'{end}_xyz'])) for end in ('parent', 'child')],
-                    numbers(cut['axis'] if kind == HINGE else '0 0 1'))
-        for name, kind in zip(loops.get('joint_name', ()), loops.get('joint_type', ())):
-            self._change(name, str(kind).upper())
-        # Its motors are those of the closed robot, transmissions those of the open tree.
-        self.robot.driven = [*loops.get('independent', ()), *loops.get('name_mot', ())] \
-            or self.robot.driven
 
-    def _change(self, name: str, kind: str) -> None:
-        """Change the type of a joint of the tree; the axes of `UJOINT_XY` are in its frame."""
-        joint = {joint.name: joint for joint in self.robot.joints}[name]
-        if kind.startswith('UJOINT'):
-            self.robot.joints.remove(joint)
-            first, second = (np.eye(3)['XYZ'.index(way)] for way in kind[-2:])
-            self.robot.join(name, UNIVERSAL, joint.bodies, at(joint.places[0], joint.turns[0]),
-                            first, second=second)
-        else:
-            joint.kind = KINDS.get(kind.lower(), kind.lower())
-            if joint.kind == FIXED and joint.position is not None:
-                # The URDF still has it, so that its position is published.
-                self.robot.held[name], joint.kind = joint.position, HINGE
-            else:
-                joint.position, joint.limits, joint.no_limits = None, None, ''
+def _close_by_frames(robot: Robot) -> None:
+    """Add the loops that links called closing_NAME_1 and closing_NAME_2 close."""
+    frames = robot.frames
+    for match in filter(None, map(_CLOSING.fullmatch, [*frames])):
+        ends = match[0], f'{match["name"]}_2'
+        if ends[1] in frames:
+            axes = [np.linalg.solve(frames[end], frames[f'{end}_z'])[:3, 3] for end in ends
+                    if f'{end}_z' in frames]
+            _pair(robot, match['name'], HINGE if len(axes) == 2 else BALL, ends, *axes)
+
+
+def _join_by_gazebo(robot: Robot, root: Element) -> None:
+    for cut in root.findall('gazebo/joint'):
+        parent, child = (attribute(cut, tag, 'link') or text(cut, tag) for tag in (
+            'parent', 'child'))
+        frame = robot.frames[child] @ pose(*numbers(text(cut, 'pose', '0 0 0 0 0 0'), 6))
+        axis = numbers(text(cut, 'axis/xyz') or attribute(cut, 'axis', 'xyz', '0 0 1'))
+        if text(cut, 'axis/use_parent_model_frame') in ('1', 'true'):
+            axis = frame[:3, :3].T @ axis
+        second = text(cut, 'axis2/xyz')
+        robot.join(cut.get('name', ''), cut.get('type', ''), (parent, child), frame, axis,
+                   second=numbers(second) if second else None)
+    weld(robot, root.findall('gazebo/plugin'))
+
+
+def close(robot: Robot, loops: Mapping[str, Any]) -> None:
+    """Add the loops of another file; raise RequestError for a key that is not known."""
+    for key in loops:
+        if key not in _KEYS:
+            raise RequestError(f'there is no key {quoted(key)}; allowed: {listed(_KEYS, 200)}'
+                               f'{meant(key, _KEYS)}')
+    for i, cut in enumerate(loops.get('closures', ())):
+        point = at(numbers(cut['point']))
+        robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), point,
+                   numbers(cut['axis']), point)
+    types = loops.get('type', ())
+    for i, ends in enumerate(loops.get('closed_loop', ())):
+        _pair(robot, '='.join(ends), str(types[i] if i < len(types) else FIXED), ends)
+    for key, kind in (('pin_loops', HINGE), ('ball_loops', BALL)):
+        for i, cut in enumerate(loops.get(key, ())):
+            robot.close(str(cut.get('name', f'{key}[{i}]')), kind, (cut['parent'], cut['child']),
+                        [at(numbers(cut[f'{end}_xyz'])) for end in ('parent', 'child')],
+                        numbers(cut['axis'] if kind == HINGE else '0 0 1'))
+    for name, kind in zip(loops.get('joint_name', ()), loops.get('joint_type', ())):
+        _change(robot, name, str(kind).lower())
+    # Its motors are those of the closed robot, transmissions those of the open tree.
+    robot.driven = [*loops.get('independent', ()), *loops.get('name_mot', ())] or robot.driven
+
+
+def _change(robot: Robot, name: str, kind: str) -> None:
+    """Change the type of a joint of the tree; the axes of `UJOINT_XY` are in its frame."""
+    joint = {joint.name: joint for joint in robot.joints}[name]
+    if kind == FIXED and joint.position is not None:
+        # The URDF still has it, so that its position is published.
+        robot.held[name] = joint.position
+        return
+    first, second = (np.eye(3)['xyz'.index(axis)] for axis in kind[-2:]) \
+        if kind.startswith('ujoint') else (joint.turns[0].T @ joint.axis, None)
+    robot.joints.remove(joint)
+    robot.join(name, kind if second is None else UNIVERSAL, joint.bodies,
+               at(joint.places[0], joint.turns[0]), first, second=second)
