@@ -31,7 +31,7 @@ FENCE = re.compile(r'^```(\w*)\n(.*?)^```', re.MULTILINE | re.DOTALL)
 
 @pytest.fixture
 def catalogue(monkeypatch):
-    for module in ('matplotlib', 'tqdm', 'yaml'):
+    for module in ('matplotlib', 'yaml'):
         pytest.importorskip(module)
     monkeypatch.syspath_prepend(ROOT / 'docs')
     import catalogue

@@ -32,7 +32,7 @@ WAYS = {
 SCENE = str(CONFIG / 'jansen.yaml')
 # Commands that cannot do without a package.
 COMMANDS = {
-    'render': (('matplotlib', 'PIL', 'tqdm', 'yaml'), 'render', (
+    'render': (('matplotlib', 'PIL', 'yaml'), 'render', (
         SCENE, '--out', 'a.svg', '--size', '128x128', '--hide', 'axes,title')),
     'urdf': (('yaml',), 'robot_model', (SCENE,)),
     'c_code': (('yaml',), 'c_code', (SCENE,)),

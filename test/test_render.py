@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-for module in ('matplotlib', 'tqdm', 'yaml'):
+for module in ('matplotlib', 'yaml'):
     pytest.importorskip(module)
 
 from linkage_ros import mechanisms, palette, scene  # noqa: E402
@@ -229,7 +229,7 @@ def test_the_pairs_of_a_walker_pale_from_the_first_to_the_last(tmp_path):
 
 def segments_of(picture):
     trace = next(layer for layer in picture.panels[0].moving if isinstance(layer, layers.Trace))
-    return [np.asarray(path.vertices) for path in trace.artists[0].get_paths()]
+    return [np.asarray(path.vertices) for path in trace.lines.get_paths()]
 
 
 def test_a_growing_trace_is_what_the_tracer_went_through_until_now():
@@ -254,7 +254,7 @@ def test_a_fading_trace_ends_at_the_tracer_and_begins_where_it_was_three_tenths_
         first, last = drop.linkage.solve(math.tau * np.array([turns - 0.3, turns]), ('P',))['P']
         assert np.allclose(pieces[-1][-1], last, atol=1e-12)
         assert math.dist(pieces[0][0], first) < 0.04 and len(pieces) == 216
-        colours = picture.panels[0].moving[0].artists[0].get_colors()
+        colours = picture.panels[0].moving[0].lines.get_colors()
         assert colours[[0, -1], :3] == pytest.approx(np.array([[1.0] * 3, to_rgb(palette.LOCUS)]))
 
 
@@ -309,9 +309,9 @@ def test_the_floor_moves_as_the_foot_that_stands_on_it():
         picture.show(turns)
         feet = picture.panels[0].pose.places[:, foot]
         lowest = int(feet[:, 1].argmin())
-        marks = np.array([path.vertices[0] for path in floor.artists[1].get_paths()])
+        marks = np.array([path.vertices[0] for path in floor.marks.get_paths()])
         assert marks[:, 1] == pytest.approx(feet[lowest, 1])
-        low, high = floor.artists[1].axes.get_xlim()
+        low, high = floor.marks.axes.get_xlim()
         assert marks[0, 0] <= low and marks[-1, 0] >= high - floor.spacing
         return lowest, feet[lowest, 0], marks[3, 0]
 

@@ -35,7 +35,7 @@ def still(picture, turns, file: Path):
         picture.figure.savefig(new, format=format_, metadata=metadata)
 
 
-def gif(picture, times, fps, loop, colours, file: Path, progress):
+def gif(picture, times, fps, loop, colours, file: Path):
     """
     Write a picture at some times as a GIF, with one palette for all frames.
 
@@ -53,8 +53,6 @@ def gif(picture, times, fps, loop, colours, file: Path, progress):
         Largest number of colours.
     file : Path
         Output file.
-    progress : callable
-        Yields the times one by one.
 
     """
     def reduced(pixels):
@@ -66,7 +64,7 @@ def gif(picture, times, fps, loop, colours, file: Path, progress):
     # White is 255 again.
     shown = [255 * value // SIX_BITS for value in palette.getpalette()]
     frames = []
-    for turns in progress(times):
+    for turns in times:
         frame = reduced(picture.at(turns)).quantize(palette=palette, dither=Image.Dither.NONE)
         frame.putpalette(shown)
         frames.append(frame)
@@ -77,7 +75,7 @@ def gif(picture, times, fps, loop, colours, file: Path, progress):
                        duration=[1000 // FINEST * int(d) for d in np.diff(ends)], **repeats)
 
 
-def mp4(picture, times, fps, file: Path, progress):
+def mp4(picture, times, fps, file: Path):
     """Write a picture at some times as MP4; raise OSError with ffmpeg's message if it fails."""
     height, width, _ = picture.at(times[0]).shape
     with replacing(file) as new, tempfile.TemporaryFile() as messages:
@@ -89,7 +87,7 @@ def mp4(picture, times, fps, file: Path, progress):
         try:
             assert encoder.stdin
             with encoder.stdin as pipe:
-                for turns in progress(times):
+                for turns in times:
                     pipe.write(picture.at(turns).tobytes())
         except BrokenPipeError:
             pass

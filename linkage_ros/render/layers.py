@@ -4,7 +4,7 @@
 """
 The layers of a picture, drawn with Matplotlib: traces, guides, legs, floor, headline and names.
 
-Each adds artists to axes and moves them; `artists` are those that move, in drawing order.
+Each adds artists to axes and moves them.
 """
 
 import cmath
@@ -53,36 +53,29 @@ class Trace:
     def __init__(self, axes, mechanism, cycle, kind, unit):
         self._cycle, self._kind = cycle, kind
         self._tracer = mechanism.linkage.points.index(mechanism.tracer)
-        self.artists = []
-        if kind in ('growing', 'fading'):
-            lines = LineCollection([], lw=3 * unit, color=LOCUS, zorder=2)
-            axes.add_collection(lines, autolim=False)
-            self.artists = [lines]
-        elif kind != 'none':
-            curve = cycle.locus(mechanism)
-            for side in (1.0, -1.0)[:1 + mechanism.mirrored] if len(curve) else ():
-                self._add_still(axes, curve * (side, 1.0), unit)
-
-    def _add_still(self, axes, curve, unit):
         bold = {'color': LOCUS, 'lw': 3 * unit, 'zorder': 2}
-        if self._kind == 'stance':
-            axes.plot(*curve.T, color=whiter(LOCUS, 0.65), lw=1.2 * unit, zorder=2)
-            curve = standing(curve)
-        axes.plot(*curve.T, **bold)
+        self.lines = axes.add_collection(LineCollection([], **bold), autolim=False)
+        curve = cycle.locus(mechanism) if kind in ('whole', 'stance') else np.empty(0)
+        for side in (1.0, -1.0)[:1 + mechanism.mirrored] if len(curve) else ():
+            foot = curve * (side, 1.0)
+            if kind == 'stance':
+                axes.plot(*foot.T, color=whiter(LOCUS, 0.65), lw=1.2 * unit, zorder=2)
+                foot = standing(foot)
+            axes.plot(*foot.T, **bold)
 
     def show(self, pose):
         """Draw the curve up to the tracer."""
         if self._kind == 'growing':
             start, end = 0.0, min(pose.turns, float(self._cycle.turns))
             curves = self._cycle.curve(self._tracer, start, end)
-            self.artists[0].set_segments(np.moveaxis(curves, 1, 0))
+            self.lines.set_segments(np.moveaxis(curves, 1, 0))
         elif self._kind == 'fading':
             curves = self._cycle.curve(self._tracer, pose.turns - FADED, pose.turns)
             pieces = np.stack([curves[:-1], curves[1:]], axis=2)
             ages = np.linspace(1.0, 0.0, len(pieces))
-            self.artists[0].set_segments(pieces.reshape(-1, 2, 2))
-            self.artists[0].set_color(np.repeat([whiter(LOCUS, age) for age in ages],
-                                                pieces.shape[1], axis=0))
+            self.lines.set_segments(pieces.reshape(-1, 2, 2))
+            self.lines.set_color(np.repeat([whiter(LOCUS, age) for age in ages],
+                                           pieces.shape[1], axis=0))
 
 
 def standing(curve):
@@ -229,11 +222,8 @@ class Floor:
         self._tracer = tracer
         self._axes = axes
         style = {'color': FLOOR, 'zorder': 1, 'capstyle': 'round'}
-        self._line = LineCollection([], lw=3 * unit, **style)
-        self._marks = LineCollection([], lw=2 * unit, **style)
-        self.artists = [self._line, self._marks]
-        for artist in self.artists:
-            axes.add_collection(artist, autolim=False)
+        self._line, self.marks = (axes.add_collection(
+            LineCollection([], lw=width * unit, **style), autolim=False) for width in (3, 2))
 
     def show(self, pose):
         """Move the floor under the lowest foot."""
@@ -245,7 +235,7 @@ class Floor:
         first = low + (way - low) % self.spacing - self.spacing
         marks = np.arange(first, high + self.spacing, self.spacing)
         depth = 0.22 * self.spacing
-        self._marks.set_segments([[(x, level), (x - depth, level - depth)] for x in marks])
+        self.marks.set_segments([[(x, level), (x - depth, level - depth)] for x in marks])
 
 
 class Headline:

@@ -15,6 +15,7 @@ from . import layers
 from .cycle import Cycle
 from .parts import DEFAULT
 from ..palette import FRAME, GRID
+from ..scene import SceneError
 
 DOTS_PER_INCH = 100
 CROWDED = 'the size is too small for the drawn parts: choose a larger one, or hide a part'
@@ -22,7 +23,7 @@ PADDING = 0.1  # inches, around everything
 READABLE = 24  # poses in which the joints' names keep clear of the links
 
 
-class PictureError(ValueError):
+class PictureError(SceneError):
     """A picture that cannot be drawn; the text has the reason."""
 
 

@@ -258,12 +258,8 @@ def _linkage(name: str, type_: str, values: Values) -> tuple[Mechanism, tuple[Ar
     except ValueError as error:
         raise SceneError(f'{name}.dimensions: {error}') from None
     if not reach:
-        # Changed dimensions come first, since a long list is shortened.
-        usual = sorted(dimensions, key=lambda key: dimensions[key] == design.dimensions[key])
-        lengths = listed(f'{key}={dimensions[key]:g}' for key in usual)
         raise SceneError(f'{name}.{"dimensions" if dimensions else "joints"} must let the {type_} '
-                         f'be assembled at some {linkage.inputs[0].kind}'
-                         + f', which {lengths} do not' * bool(dimensions))
+                         f'be assembled at some {linkage.inputs[0].kind}')
     return linkage, reach
 
 
