@@ -154,20 +154,6 @@ def test_the_table_of_words_names_all_of_them():
     assert set(joint_lines.FORMS) <= set(named)
 
 
-@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_the_pictures_that_a_page_says_to_render_can_be_asked_for(page):
-    for module in ('matplotlib', 'yaml'):
-        pytest.importorskip(module)
-    from linkage_ros.render.command import parsed
-
-    for line in '\n'.join(blocks(page, 'console')).splitlines():
-        command = RENDER.match(line)
-        if command:
-            asked = parsed(shlex.split(command[1]))
-            if '/' in asked.scene:  # else the page has it
-                scene.load(ROOT / asked.scene)
-
-
 def test_the_library_in_the_readme_works_as_written():
     code = re.search(r'^    from linkage_ros .*?\n\n', (ROOT / 'README.md').read_text(),
                      re.MULTILINE | re.DOTALL)[0]
