@@ -63,6 +63,20 @@ def test_all_files_name_one_version(settings):
     assert f"\nversion: {version}\ndate-released: '{released[0][1]}'\n" in citation
 
 
+def test_every_source_begins_with_its_licence():
+    folders = [path for path in ROOT.iterdir() if path.is_dir()
+               and not path.name.startswith(('.', 'build', 'install', 'log'))]
+    sources = [path for folder in (ROOT / '.ci', *folders) for path in folder.rglob('*')
+               if path.suffix in ('.py', '.c', '.cpp', '.hpp', '.h', '.cmake', '.js')
+               and not {'vendor', '_build'} & {*path.parts}] + [ROOT / 'setup.py']
+    tags = 'FileCopyrightText: 2026 linkage_ros contributors', 'License-Identifier: Apache-2.0'
+    notice = ' '.join(f'SPDX-{tag}' for tag in tags)
+    heads = {path: ' '.join(re.findall(r'[^\s#/*]\S*', path.read_text()[:200]))
+             for path in sources if not (path.parent / 'AMENT_IGNORE').exists()}
+    assert len(heads) > 300 and not [
+        path for path, head in heads.items() if not head.startswith(notice)]
+
+
 def test_setup_names_the_package_of_the_manifest(settings):
     assert settings['metadata']['name'] == manifest('.').findtext('name')
     assert settings['metadata']['license'] == manifest('.').findtext('license')

@@ -468,12 +468,8 @@ def test_an_svg_has_every_part_in_its_order_where_it_was_solved(tmp_path, size, 
 @pytest.mark.parametrize('args, said', [
     (['nowhere.yaml', '--out', 'a.png'], 'nowhere.yaml: No such file'),
     (['stil.yaml', '--out', 'a.png'], 'No such file or directory; did you mean still.yaml?'),
-    (['jansen.yaml', '--out', 'a.png', '--bogus'], 'unrecognized arguments: --bogus'),
     (['jansen.yaml', '--out', 'a.png', '--trce', 'none'], '--trce none; did you mean --trace?'),
-    (['jansen.yaml', 'all.yaml', '--out', 'a.png'], 'unrecognized arguments: all.yaml'),
     (['foreign.yaml', '--out', 'a.png'], "foreign.yaml must be YAML with '/**:'"),
-    (['empty.yaml', '--out', 'a.png'], "empty.yaml must be YAML with '/**:'"),
-    (['date.yaml', '--out', 'a.png'], 'such as /**, is expected in line 1'),
     (['itself.yaml', '--out', 'a.png'], 'ROS does not support aliases and tags in line 1'),
     (['.', '--out', 'a.png'], '.: Is a directory'),
     (['jansen.yaml', '--out', 'a.bmp'], '--out must end in .png, .svg, .gif, .mp4, not a.bmp'),
@@ -481,7 +477,6 @@ def test_an_svg_has_every_part_in_its_order_where_it_was_solved(tmp_path, size, 
     (['jansen.yaml', '--out', 'no/a.png'], 'there is no folder no'),
     (['jansen.yaml', '--out', 'a.png', '--data', 'no/a.csv'], 'there is no folder no'),
     (['jansen.yaml', '--out', 'a.png', '--fps', '30'], '--fps is for .gif and .mp4 only'),
-    (['jansen.yaml', '--out', 'a.gif', '--angle', '30'], '--angle is for .png and .svg only'),
     (['jansen.yaml', '--out', 'a.gif', '--fps', '60'], '--fps must be at most 50'),
     (['jansen.yaml', '--out', 'a.gif', '--fps', 'x'], "--fps: invalid number value: 'x'"),
     (['jansen.yaml', '--out', 'a.gif', '--fps', '241'], 'must be from 0.001 to 240, not 241'),
@@ -495,11 +490,8 @@ def test_an_svg_has_every_part_in_its_order_where_it_was_solved(tmp_path, size, 
     (['jansen.yaml', '--out', 'a.svg', '--size', '64x8193'], 'each side from 64 to 8192, not 64x'),
     (['jansen.yaml', '--out', 'a.svg', '--size', '720'], 'must be like 720x720, each side from'),
     (['excavator.yaml', '--out', 'a.svg', '--angle', '1'], '--angle is for a crank: excavator is'),
-    (['jansen.yaml', '--out', 'a.gif', '--turns', '0'], 'from 0.001'),
     (['jansen.yaml', '--out', 'a.gif', '--turns', 'nan'], 'from 0.001'),
     (['jansen.yaml', '--out', 'a.gif', '--turns', '999'], 'frames, more than'),
-    (['jansen.yaml', '--out', 'a.gif', '--loop', '-1'], 'from 0'),
-    (['jansen.yaml', '--out', 'a.png', '--size', '7x7'], '64'),
     (['all.yaml', '--out', 'a.png', '--size', '99x99'], 'size is too small'),
     (['jansen.yaml', '--out', 'a.png', '--hide', 'legs'], 'unknown part legs'),
     (['jansen.yaml', '--out', 'a.png', '--trace', 'x'], 'growing'),
@@ -508,7 +500,6 @@ def test_an_svg_has_every_part_in_its_order_where_it_was_solved(tmp_path, size, 
     (['jansen.yaml', '--out', 'a.png', '--angle', 'r/2'], 'such as 30, pi/6 or 30deg, not r/2'),
     (['jansen.yaml', '--out', 'a.png', '--angle', 'inf'], 'such as 30, pi/6 or 30deg, not inf'),
     (['jansen.yaml', '--out', 'a.png', '--show', 'lables'], 'did you mean labels?'),
-    (['bad.yaml', '--out', 'a.png'], 'leg.type must be'),
     (['picture.png', '--out', 'a.png'], 'picture.png'),
     (['still.yaml', '--out', 'a.gif'], 'nothing moves'),
 ])
@@ -517,11 +508,8 @@ def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
     monkeypatch.chdir(tmp_path)
     scene_file = CONFIG / args[0]
     start = '/**: {ros__parameters: {mechanisms: [leg], leg.type: '
-    (tmp_path / 'bad.yaml').write_text(start + 'unknown}}')
     (tmp_path / 'still.yaml').write_text(start + 'jansen, leg.crank.speed: 0.0}}')
     (tmp_path / 'foreign.yaml').write_text('/other: {ros__parameters: {rate: 5.0}}')
-    (tmp_path / 'empty.yaml').write_text('')
-    (tmp_path / 'date.yaml').write_text('a: 2020-13-45')
     (tmp_path / 'itself.yaml').write_text('/**: {ros__parameters: &a {b: *a}}')
     (tmp_path / 'picture.png').write_bytes(b'\x89PNG\r\n\xff')
     before = set(tmp_path.iterdir())

@@ -116,14 +116,9 @@ def test_a_linkage_of_ones_own_is_written_joint_by_joint():
     assert places['B'][1] < places['A'][1]
 
 
-def test_a_branch_is_the_assembly_sign_of_the_linkage():
-    given = {'mechanisms': ['jansen'], 'jansen.branches.F': -1}
-    assert scene.read(given).machines['jansen'].linkage.branches['F'] == -1
-
-
-def test_the_sign_0_is_the_usual_one():
-    given = {'mechanisms': ['jansen'], 'jansen.branches.E': 0, 'jansen.branches.F': 0}
-    assert scene.read(given).machines['jansen'].linkage.branches == {'C': 1, 'E': -1, 'F': 1}
+def test_a_branch_is_an_assembly_sign_and_0_the_usual_one():
+    given = {'mechanisms': ['jansen'], 'jansen.branches.E': 0, 'jansen.branches.F': -1}
+    assert scene.read(given).machines['jansen'].linkage.branches == {'C': 1, 'E': -1, 'F': -1}
 
 
 def test_only_more_than_one_pair_is_mirrored_by_default():
@@ -140,17 +135,13 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'mechanisms': None}, 'mechanisms must be'),
     ({'mechanisms': ['jansen', 'jansen']}, 'mechanisms must be .* each once'),
     ({'mechanisms': ['two words']}, 'mechanisms must be .* letters'),
-    ({'mechanisms': ['2nd'], '2nd.type': 'jansen'}, 'mechanisms must be'),
     ({'mechanisms': ['a__b'], 'a__b.type': 'jansen'}, 'mechanisms must be'),
     ({'mechanisms': 'jansen'}, 'mechanisms must be a list'),
-    ({'mechanisms': ['leg']}, "leg.type must be .*, one of water_drop, .*, not 'leg'"),
     ({'mechanisms': ['leg'], 'leg.type': 'camel'}, "leg.type must be .* one of .*, not 'camel'"),
     ({'jansen.dimensions.m': -1.0}, 'jansen.dimensions.m must be .* above 0, not -1.0'),
     ({'jansen.dimensions.m': 0.0}, 'jansen.dimensions.m must be .* above 0'),
-    ({'jansen.dimensions.m': 'long'}, "jansen.dimensions.m must be .* not 'long'"),
     ({'jansen.dimensions.m': True}, 'jansen.dimensions.m must be'),
     ({'jansen.dimensions.m': math.nan}, 'jansen.dimensions.m must be a finite'),
-    ({'jansen.dimensions.m': math.inf}, 'jansen.dimensions.m must be a finite'),
     ({'jansen.dimensions.m': 500.0}, 'jansen.dimensions must let the jansen be assembled'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 1 2 left']},
      'own.joints must let the custom be assembled at some angle$'),
@@ -160,28 +151,20 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'leg.type': 'jansen'}, r'leg.type is not a parameter .* mechanisms, .* jansen\.\*'),
     ({'jansen.branches.C': 2}, 'jansen.branches.C must be .* -1 to 1, not 2'),
     ({'jansen.branches.C': 1.0}, 'jansen.branches.C must be a whole number'),
-    ({'jansen.scale': 0.0}, 'jansen.scale must be .* above 0'),
     ({'jansen.leg_pairs': 0}, 'jansen.leg_pairs must be a whole number from 1'),
     ({'water_drop.leg_pairs': 2}, 'water_drop.leg_pairs must be 1 and mirrored false: only'),
     ({'water_drop.mirrored': True}, 'water_drop.leg_pairs must be 1 and mirrored false: only'),
-    ({'jansen.mirrored': 1}, 'jansen.mirrored must be true or false'),
     ({'jansen.points': ['G', 'Z']}, 'jansen.points must be .* some of O, .* G'),
     ({'jansen.points': []}, 'jansen.points must be'),
     ({'jansen.points': ['G', 'G']}, 'jansen.points must be .* each once'),
     ({'jansen.pose': [0.0] * 5}, 'jansen.pose must be .* six'),
-    ({'jansen.pose': [True] * 6}, 'jansen.pose must be'),
     ({'jansen.pose': [math.nan] * 6}, 'jansen.pose must be .* finite'),
-    ({'jansen.crank.speed': True}, 'jansen.crank.speed must be'),
     ({'jansen.crank.speed': 101.0}, 'jansen.crank.speed must be .* from -100 to 100'),
-    ({'jansen.crank.start': math.nan}, 'jansen.crank.start must be'),
     ({'jansen.crank.sweep': [1.0]}, 'jansen.crank.sweep must be .* lower end and the higher end'),
-    ({'jansen.crank.sweep': [1.0, 1.0]}, 'jansen.crank.sweep must be'),
     ({'jansen.crank.sweep': [1e16, 1e16 + 8.0]}, r'jansen.crank.sweep must be .* within 1e\+06'),
-    ({'jansen.crank.sweep': [-1e300, 1e300]}, r'jansen.crank.sweep must be .* within 1e\+06'),
     ({'peaucellier.crank.sweep': [-1.2, 1.0]},
      r'peaucellier.crank.sweep must be inside the reach \[-1.17137, 1.17137\] rad'),
     ({'rate': -1.0}, 'rate must be .* from 0 to 1000'),
-    ({'rate': 1001}, 'rate must be .* from 0 to 1000'),
     ({'rate': 10 ** 5000}, 'rate must be .* from 0 to 1000'),
     ({'frame_id': 3}, 'frame_id must be a text'),
     *[({'frame_id': text}, 'frame_id must be a text .* 1 to 100 characters') for text in (
@@ -203,22 +186,15 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'mechanisms': ['leg', 'leg_left0'], 'leg.type': 'jansen', 'leg.leg_pairs': 2,
       'leg_left0.type': 'jansen'}, 'leg_left0.joint_names must give .* both leg_left0_BC'),
     ({'jansen.only_named': 1}, 'jansen.only_named must be true or false'),
-    ({'mechanisms': ['jansen\n']}, 'mechanisms must be'),
     ({'mechanisms': ['j' * 65]}, 'mechanisms must be .* up to 64 letters'),
-    ({'jansen.type': 'j' * 10 ** 6}, 'jansen.type must be'),
     ({'q' * 10 ** 6: 1.0}, 'qqq.* is not a parameter of the scene'),
     ({'jansen.' + 'q' * 10 ** 6: 1.0}, 'jansen.qqq.* is not a parameter of the scene'),
-    ({'jansen.points': ['Z' * 10 ** 6]}, 'jansen.points must be a list'),
-    ({'jansen.points': ['O'] * 10 ** 6}, 'jansen.points must'),
     ({'jansen.pose': [0.0] * 10 ** 6}, 'jansen.pose must be'),
     ({'mechanisms': ['custom']}, 'custom.joints: joints must be a list of lines'),
     ({**OWN, 'own.joints': ['A qq O 1']}, 'own.joints: joint line "A qq O 1": expected NAME and'),
     ({**OWN, 'own.joints': ['A crunk O 1']},
      r".* unknown construction 'crunk'; did you mean crank\?$"),
-    ({'jansen.dimension.m': 1.0}, r'.*; did you mean jansen.dimensions.m\?$'),
     ({'jansen.Crank.speed': 1.0}, r'.*; did you mean jansen.crank.speed\?$'),
-    ({'mechanism': ['jansen']}, r'.*; did you mean mechanisms\?$'),
-    ({'mechanisms': ['jansn']}, r'.*; did you mean jansen\?$'),
     ({'jansen.joint_names': ['BCC=left_shin']}, r'.*; did you mean BC\?$'),
     ({'jansen.loads': ['EFF=2.5']}, r'.*; did you mean EF\?$'),
     ({'mechanisms': ['own'], 'own.type': 'rods', 'own.joints': [
@@ -228,13 +204,8 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O r']}, 'own.joints: .* dimension r'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1', 'B crank O 1'], 'own.mirrored': True},
      'own.leg_pairs must be 1 and mirrored false: only a linkage whose one crank'),
-    ({'five_bar.crank3.speed': 1.0, 'mechanisms': ['five_bar']},
-     'five_bar.crank3.speed is not a parameter'),
-    ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O r'], 'own.dimensions.r': 0.0},
-     'own.dimensions.r must be .* above 0'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1'], 'own.dimensions.r': 1.0},
      'own.dimensions.r is not a parameter'),
-    ({'mechanisms': ['six_bar']}, "six_bar.type must be .* one of .*, not 'six_bar'"),
     ({'jansen.joints': ['O ground 0 0']}, 'jansen.joints is not a parameter'),
 ])
 def test_a_wrong_parameter_is_named_with_what_is_allowed(given, named):
