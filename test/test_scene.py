@@ -695,27 +695,3 @@ def test_a_start_is_put_where_it_is_in_the_sweep_or_at_the_nearer_end(turns):
         assert min(abs(found - each) for each in expected) < 1e-12
         insides += len(inside) > 0
     assert 1 < insides < 180
-
-
-@pytest.mark.parametrize('start, end', [(0.0, 0.3), (0.25, 1.0), (0.1234, 0.6789), (0.9, 1.6),
-                                        (0.0, 0.0)])
-def test_a_trace_is_the_way_of_its_joint_up_to_where_it_is(start, end):
-    machine = scene.read({'mechanisms': ['jansen']}).machines['jansen']
-    foot = machine.linkage.points.index('G')
-    cycle = Cycle(machine)
-    curve = cycle.curve(foot, start, end)[:, 0]
-
-    def place(turns):
-        inputs = [drive.start for drive in machine.inputs.values()]
-        return machine.linkage.solve(inputs[0] + math.tau * turns, ('G',))['G']
-
-    np.testing.assert_allclose(curve[-1], place(end), atol=1e-12)
-
-    def steps(points):
-        return np.linalg.norm(np.diff(points, axis=0), axis=1)
-
-    way = steps(np.array([place(turns) for turns in np.linspace(start, end, 2000)])).sum()
-    longest = 1.01 * steps(cycle.curve(foot, 0.0, 1.0)[:, 0]).max()
-    # It may begin up to a sample late.
-    assert way - longest <= steps(curve).sum() <= way * (1 + 1e-9)
-    assert not len(curve[1:]) or steps(curve).max() <= longest

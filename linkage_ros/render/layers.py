@@ -79,13 +79,9 @@ class Trace:
 
 
 def standing(curve):
-    """Return the stance part of a foot's closed curve, shape (n, 2)."""
+    """Return a foot's curve (n, 2), NaN where the foot is not on the ground."""
     height = curve[:, 1] - curve[:, 1].min()
-    low = height[:-1] <= STANCE * height.max()
-    start = int(np.argmax(low & ~np.roll(low, 1)))
-    rolled = np.roll(low, -start)
-    length = len(low) if rolled.all() else int(np.argmin(rolled))
-    return np.roll(curve[:-1], -start, axis=0)[:length]
+    return np.where(height[:, None] <= STANCE * height.max(), curve, np.nan)
 
 
 def guides(axes, mechanism, cycle, unit):
@@ -108,15 +104,12 @@ def guides(axes, mechanism, cycle, unit):
 
 
 def straight(curve):
-    """Return the ends of a curve that is a straight line, else None."""
+    """Return two points of a curve that is a straight line, else None."""
     if not len(curve):
         return None
-    first = curve[0]
-    last = curve[np.argmax(np.hypot(*(curve - first).T))]
-    along = last - first
-    length = math.hypot(*along)
-    across = np.abs((curve - first) @ (-along[1], along[0]))
-    return (first, last) if length and across.max() <= STRAIGHT * length * length else None
+    middle = curve.mean(axis=0)
+    _, sizes, directions = np.linalg.svd(curve - middle, full_matrices=False)
+    return (middle, middle + directions[0]) if sizes[1] <= STRAIGHT * sizes[0] > 0.0 else None
 
 
 def around(frame):
@@ -316,13 +309,13 @@ class Names:
                   if len(line.get_xdata()) > CURVED]
         # All that a name keeps clear of, as points.
         drawn = np.hstack([joints, joints[:, self._fixed] - self._pivot, *(
-            start + part * (end - start) for part in np.linspace(0.0, 1.0, 13)), *(
+            start + part * (end - start) for part in np.linspace(0.0, 1.0, 25)), *(
             np.broadcast_to(curve, (len(joints), len(curve))) for curve in curves)])
         for text, index, distance, wider in zip(
                 self.artists, self._index, self._distances, self._wider):
             offsets = distance * self.DIRECTIONS + wider * self.DIRECTIONS.real
             tried = joints[:, [index]] + offsets
-            room = np.min([abs(tried[..., None] + end - drawn[:, None]).min(axis=2)
+            room = np.min([np.fmin.reduce(abs(tried[..., None] + end - drawn[:, None]), axis=2)
                            for end in {-wider, 0.0, wider}], axis=0)
             room = np.nan_to_num(np.minimum(room, distance))
             best = offsets[room.mean(axis=0).argmax()]

@@ -57,15 +57,14 @@ def sections(path: str) -> Sections:
         raise SceneError(f'{path} is not a valid ROS parameter file: {reason}') from None
 
 
-def overrides(found: Sections, node: str) -> Optional[dict[str, Any]]:
+def overrides(sections_: Sections, node: str) -> dict[str, Any]:
     """
     Return the values for a node, by parameter name; later sections override earlier ones.
 
-    `node` is its full name, such as '/kinematics'. None means that no section matches it.
+    `node` is its full name, such as '/kinematics'.
     """
-    matching = [values for name, values in found.items() if _pattern(name).fullmatch(node)]
-    return {name: value for values in matching
-            for name, value in values.items()} if matching else None
+    return {name: value for section, values in sections_.items()
+            if _pattern(section).fullmatch(node) for name, value in values.items()}
 
 
 def is_text(text: str) -> bool:
