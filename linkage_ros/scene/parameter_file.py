@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from functools import reduce
 import re
-from typing import Any, Iterator, Optional, Sequence
+from typing import Any, Iterator, Sequence
 
 from .parameters import SceneError
 from ..optional import needs
