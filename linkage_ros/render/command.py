@@ -18,9 +18,6 @@ from ..scene.scene_mechanism import IN_SPACE
 from ..words import meant
 
 STILL, MOVING = ('.png', '.svg'), ('.gif', '.mp4')
-# Options that are for some endings only.
-OPTIONS = {'angle': STILL, 'turns': MOVING, 'fps': MOVING, 'frames': MOVING,
-           'loop': ('.gif',), 'colours': ('.gif',)}
 FPS, MAX_GIF_FPS, MAX_FPS = 25.0, 50.0, 240.0
 MIN_SIDE, MAX_SIDE = 64, 8192
 MAX_FRAMES, MAX_COLOURS = 10000, 255
@@ -51,7 +48,7 @@ def parsed(args):
     if ending not in STILL + MOVING:
         raise RequestError(f'--out must end in {", ".join(STILL + MOVING)}, not {arguments.out}')
     arguments.moving = ending in MOVING
-    for option, endings in OPTIONS.items():
+    for option, (endings, *_) in OPTIONS.items():
         if getattr(arguments, option) is not None and ending not in endings:
             raise RequestError(
                 f'--{option} is for {" and ".join(endings)} only, not for {ending}')
@@ -144,22 +141,11 @@ def parser() -> Parser:
                       help=f'leave out some of {", ".join(parts.PARTS)}')
     made.add_argument('--size', metavar='WxH', type=size, default=(720, 720),
                       help='pixels (default: 720x720)')
-    still = made.add_argument_group('for .png and .svg')
-    still.add_argument('--angle', metavar='DEG', type=degrees,
-                       help="the first mechanism's crank angle, in degrees or as in pi/2 or 90deg "
-                       '(default: where it starts)')
-    moving = made.add_argument_group('for .gif and .mp4')
-    moving.add_argument('--turns', metavar='N', type=within(float, 0.001, 1000.0),
-                        help="turns of the first mechanism's crank, or periods of its oscillation "
-                        '(default: 1)')
-    moving.add_argument('--fps', metavar='N', type=within(float, 0.001, MAX_FPS),
-                        help=f'frames per second (default: {FPS:g})')
-    moving.add_argument('--frames', metavar='N', type=within(int, 1, MAX_FRAMES),
-                        help="frames in all (default: in real time, by the crank's speed)")
-    moving.add_argument('--loop', metavar='N', type=within(int, 0, 65536),
-                        help='number of times that a .gif plays (default: 0, endlessly)')
-    moving.add_argument('--colours', metavar='N', type=within(int, 2, MAX_COLOURS),
-                        help=f'colours of a .gif: fewer make it smaller (default: {MAX_COLOURS})')
+    groups = {STILL: made.add_argument_group('for .png and .svg'),
+              MOVING: made.add_argument_group('for .gif and .mp4')}
+    for option, (endings, metavar, type_, text) in OPTIONS.items():
+        groups[STILL if endings == STILL else MOVING].add_argument(
+            f'--{option}', metavar=metavar, type=type_, help=text)
     return made
 
 
@@ -207,3 +193,18 @@ def size(text):
         raise argparse.ArgumentTypeError(f'must be like 720x720, each side from {MIN_SIDE} to '
                                          f'{MAX_SIDE}, not {text}')
     return sides
+
+
+# Options that are for some endings only: these, a name of the value, its type, and what it is.
+OPTIONS = {
+    'angle': (STILL, 'DEG', degrees, "the first mechanism's crank angle, in degrees or as in pi/2 "
+              'or 90deg (default: where it starts)'),
+    'turns': (MOVING, 'N', within(float, 0.001, 1000.0), "turns of the first mechanism's crank, "
+              'or periods of its oscillation (default: 1)'),
+    'fps': (MOVING, 'N', within(float, 0.001, MAX_FPS), f'frames per second (default: {FPS:g})'),
+    'frames': (MOVING, 'N', within(int, 1, MAX_FRAMES),
+               "frames in all (default: in real time, by the crank's speed)"),
+    'loop': (('.gif',), 'N', within(int, 0, 65536),
+             'number of times that a .gif plays (default: 0, endlessly)'),
+    'colours': (('.gif',), 'N', within(int, 2, MAX_COLOURS),
+                f'colours of a .gif: fewer make it smaller (default: {MAX_COLOURS})')}
