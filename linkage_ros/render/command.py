@@ -17,7 +17,7 @@ from ..optional import needs
 from ..scene.scene_mechanism import IN_SPACE
 from ..words import meant
 
-STILL, MOVING = ('.png', '.svg'), ('.gif', '.mp4')
+IMAGES, VIDEOS = ('.png', '.svg'), ('.gif', '.mp4')
 FPS, MAX_GIF_FPS, MAX_FPS = 25.0, 50.0, 240.0
 MIN_SIDE, MAX_SIDE = 64, 8192
 MAX_FRAMES, MAX_COLOURS = 10000, 255
@@ -45,9 +45,9 @@ def parsed(args):
     """Return the options of the command line; raise RequestError if they are invalid."""
     arguments = parser().parse_args(args)
     ending = arguments.out.suffix.lower()
-    if ending not in STILL + MOVING:
-        raise RequestError(f'--out must end in {", ".join(STILL + MOVING)}, not {arguments.out}')
-    arguments.moving = ending in MOVING
+    if ending not in IMAGES + VIDEOS:
+        raise RequestError(f'--out must end in {", ".join(IMAGES + VIDEOS)}, not {arguments.out}')
+    arguments.moving = ending in VIDEOS
     for option, (endings, *_) in OPTIONS.items():
         if getattr(arguments, option) is not None and ending not in endings:
             raise RequestError(
@@ -124,7 +124,7 @@ def parser() -> Parser:
                   formatter_class=argparse.RawDescriptionHelpFormatter)
     made.add_argument('scene', metavar='SCENE', help='parameter file of the scene')
     made.add_argument('--out', metavar='FILE', type=Path, required=True,
-                      help=f'output file, which ends in {", ".join(STILL + MOVING)}')
+                      help=f'output file, which ends in {", ".join(IMAGES + VIDEOS)}')
     made.add_argument('--data', metavar='FILE', type=Path,
                       help='also write the drawn values as CSV: time [s], inputs [rad or m] and '
                       'joints [m], with all digits')
@@ -141,10 +141,10 @@ def parser() -> Parser:
                       help=f'leave out some of {", ".join(parts.PARTS)}')
     made.add_argument('--size', metavar='WxH', type=size, default=(720, 720),
                       help='pixels (default: 720x720)')
-    groups = {STILL: made.add_argument_group('for .png and .svg'),
-              MOVING: made.add_argument_group('for .gif and .mp4')}
+    groups = {IMAGES: made.add_argument_group('for .png and .svg'),
+              VIDEOS: made.add_argument_group('for .gif and .mp4')}
     for option, (endings, metavar, type_, text) in OPTIONS.items():
-        groups[STILL if endings == STILL else MOVING].add_argument(
+        groups[IMAGES if endings == IMAGES else VIDEOS].add_argument(
             f'--{option}', metavar=metavar, type=type_, help=text)
     return made
 
@@ -197,12 +197,12 @@ def size(text):
 
 # Options that are for some endings only: these, a name of the value, its type, and what it is.
 OPTIONS = {
-    'angle': (STILL, 'DEG', degrees, "the first mechanism's crank angle, in degrees or as in pi/2 "
-              'or 90deg (default: where it starts)'),
-    'turns': (MOVING, 'N', within(float, 0.001, 1000.0), "turns of the first mechanism's crank, "
-              'or periods of its oscillation (default: 1)'),
-    'fps': (MOVING, 'N', within(float, 0.001, MAX_FPS), f'frames per second (default: {FPS:g})'),
-    'frames': (MOVING, 'N', within(int, 1, MAX_FRAMES),
+    'angle': (IMAGES, 'DEG', degrees, "the first mechanism's crank angle, in degrees or as in "
+              'pi/2 or 90deg (default: where it starts)'),
+    'turns': (VIDEOS, 'N', within(float, 0.001, 1000.0), "turns of the first mechanism's crank, or "
+              'periods of its oscillation (default: 1)'),
+    'fps': (VIDEOS, 'N', within(float, 0.001, MAX_FPS), f'frames per second (default: {FPS:g})'),
+    'frames': (VIDEOS, 'N', within(int, 1, MAX_FRAMES),
                "frames in all (default: in real time, by the crank's speed)"),
     'loop': (('.gif',), 'N', within(int, 0, 65536),
              'number of times that a .gif plays (default: 0, endlessly)'),

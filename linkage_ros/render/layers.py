@@ -22,12 +22,12 @@ from .cycle import SAMPLES
 from ..palette import BAR, DARK, DRIVEN, EARTH, FLOOR, GREY, LOCUS, TRACK
 from ..robot_model import shapes
 
-FADED = 0.3  # turns after which a fading trace is gone
-STANCE = 0.06  # of a foot curve's height: below that the foot is on the ground
+FADING_TURNS = 0.3  # turns after which a fading trace is gone
+STANCE_HEIGHT = 0.06  # of a foot curve's height: below that the foot is on the ground
 MIN_STRIDE = 0.02  # of the longest bar: a foot that stands has marks, too
-CURVED = 20  # points: a line that has more is a curve
-STRAIGHT = 1e-9  # of a curve's length: largest deviation of a straight line
-WHITENED = 0.7  # how white the last of many pairs of legs is
+MIN_CURVE_POINTS = 20  # points: a line that has more is a curve
+MAX_BEND = 1e-9  # of a curve's length: largest deviation of a straight line
+MAX_WHITENESS = 0.7  # how white the last of many pairs of legs is
 
 HALO = [withStroke(linewidth=3, foreground='white')]
 PIVOT_SIZE = 13  # points, from its top to its bottom
@@ -70,7 +70,7 @@ class Trace:
             curves = self._cycle.curve(self._tracer, start, end)
             self.lines.set_segments(np.moveaxis(curves, 1, 0))
         elif self._kind == 'fading':
-            curves = self._cycle.curve(self._tracer, pose.turns - FADED, pose.turns)
+            curves = self._cycle.curve(self._tracer, pose.turns - FADING_TURNS, pose.turns)
             pieces = np.stack([curves[:-1], curves[1:]], axis=2)
             ages = np.linspace(1.0, 0.0, len(pieces))
             self.lines.set_segments(pieces.reshape(-1, 2, 2))
@@ -81,7 +81,7 @@ class Trace:
 def standing(curve):
     """Return a foot's curve (n, 2), NaN where the foot is not on the ground."""
     height = curve[:, 1] - curve[:, 1].min()
-    return np.where(height[:, None] <= STANCE * height.max(), curve, np.nan)
+    return np.where(height[:, None] <= STANCE_HEIGHT * height.max(), curve, np.nan)
 
 
 def guides(axes, mechanism, cycle, unit):
@@ -109,7 +109,7 @@ def straight(curve):
         return None
     middle = curve.mean(axis=0)
     _, sizes, directions = np.linalg.svd(curve - middle, full_matrices=False)
-    return (middle, middle + directions[0]) if sizes[1] <= STRAIGHT * sizes[0] > 0.0 else None
+    return (middle, middle + directions[0]) if sizes[1] <= MAX_BEND * sizes[0] > 0.0 else None
 
 
 def around(frame):
@@ -136,7 +136,7 @@ class Legs:
         sides = 1 + mechanism.mirrored
         thin = unit * (1.0 if len(cycle.prefixes) == 1 else 0.7)
         self.legs = [(leg, artists(
-            axes, parts, WHITENED * (leg // sides) / mechanism.leg_pairs, thin))
+            axes, parts, MAX_WHITENESS * (leg // sides) / mechanism.leg_pairs, thin))
             for leg in reversed(range(len(cycle.prefixes)))]
 
     def show(self, pose):
@@ -306,7 +306,7 @@ class Names:
         joints = self._points(poses[:, 0])
         start, end = np.moveaxis(joints[:, self._bars], -1, 0)
         curves = [self._points(line.get_xydata()[::9]) for line in self._axes.lines
-                  if len(line.get_xdata()) > CURVED]
+                  if len(line.get_xdata()) > MIN_CURVE_POINTS]
         # All that a name keeps clear of, as points.
         drawn = np.hstack([joints, joints[:, self._fixed] - self._pivot, *(
             start + part * (end - start) for part in np.linspace(0.0, 1.0, 25)), *(

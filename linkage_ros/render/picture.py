@@ -20,7 +20,7 @@ from ..scene import SceneError
 DOTS_PER_INCH = 100
 CROWDED = 'the size is too small for the drawn parts: choose a larger one, or hide a part'
 PADDING = 0.1  # inches, around everything
-READABLE = 24  # poses in which the joints' names keep clear of the links
+MAX_POSES = 24  # poses in which the joints' names keep clear of the links
 
 
 class PictureError(SceneError):
@@ -86,7 +86,7 @@ class Picture:
                 for panel in self.panels:
                     panel.fill()
         self.figure.set_layout_engine('none')
-        chosen = times[::math.ceil(len(times) / READABLE)]
+        chosen = times[::math.ceil(len(times) / MAX_POSES)]
         for panel in self.panels:
             panel.settle([self._turns(panel, turns) for turns in chosen])
 

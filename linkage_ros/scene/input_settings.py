@@ -13,7 +13,7 @@ from .parameters import DRIVER, Field, SceneError, SPEEDS, STARTS, Values
 from ..linkage import Arc, Input, Mechanism
 
 # Distance of a default sweep from each end of the reach, as a fraction of the reach.
-MARGIN = 0.01
+SWEEP_MARGIN = 0.01
 # Intervals in a message, at most: gears may have hundreds.
 MAX_ARCS = 8
 # Largest angle [rad] whose rounding error is negligible for a crank.
@@ -141,7 +141,7 @@ def read_settings(name: str, linkage: Mechanism, input_: Input, reach: tuple[Arc
             raise SceneError(f'{name}.{key}.measures: {error}') from None
     if not ends and not is_whole:
         low, high = next((arc for arc in reach if input_.holds(arc, start, start)), reach[0])
-        sweep = low + MARGIN * (high - low), high - MARGIN * (high - low)
+        sweep = low + SWEEP_MARGIN * (high - low), high - SWEEP_MARGIN * (high - low)
     return InputSettings(input_, reach, speed, default_speed, start, sweep, ends,
                          source or f'{name}_{measures or key}', take('ratio', RATIO),
                          take('offset', OFFSET), measures)

@@ -145,7 +145,7 @@ def _line(node: Any) -> str:
 
 def _checked(names: Sequence[str]) -> str:
     """Return the name of a section; raise ValueError if nodes cannot have it."""
-    name = reduce(lambda space, own: f'{space.removesuffix("/")}/{own}', names) if names else ''
+    name = reduce(lambda space, part: f'{space.removesuffix("/")}/{part}', names) if names else ''
     if not all(map(_TOKEN.fullmatch, name.removeprefix('/').split('/'))):
         raise ValueError(f'{KEY} must be below the name of a node, such as /**, not '
                          f'{quoted(name)}')

@@ -35,7 +35,7 @@ KINDS = {
 }
 
 # Relative tolerance at the ends of a range, as in rclpy.
-ROUNDED = 1e-6
+RANGE_TOLERANCE = 1e-6
 
 TEXT = re.compile(r'.{0,1000}', re.DOTALL)
 MAX_ITEMS = 10000
@@ -155,7 +155,7 @@ class Field:
         if self.low is None or self.high is None:
             return True
         return self.low <= value <= self.high or any(
-            math.isclose(value, end, rel_tol=ROUNDED) for end in (self.low, self.high))
+            math.isclose(value, end, rel_tol=RANGE_TOLERANCE) for end in (self.low, self.high))
 
 
 @cached(2048)
