@@ -139,23 +139,6 @@ def test_a_turn_is_drawn_in_the_time_it_takes(tmp_path):
     assert np.allclose(np.remainder(2.0 * np.array(times), math.tau), cranks, atol=1e-12)
 
 
-@pytest.mark.nightly
-def test_the_data_are_the_joints_as_solved_to_the_last_digit(tmp_path):
-    data = tmp_path / 'joints.csv'
-    rendered(tmp_path, '--frames', '4', '--size', '99x99', '--hide', 'axes,title',
-             '--data', str(data), config='strandbeest', ending='gif')
-    leg = mechanisms.create('jansen')
-    rows = rows_of(data)
-    assert len(rows) == 4
-    for row, (pair, side) in itertools.product(rows, itertools.product(range(6), (1, -1))):
-        theta = row['strandbeest_crank'] - math.tau * pair / 6
-        solved = leg.solve(theta if side > 0 else math.pi - theta)
-        name = f'strandbeest_{"left" if side > 0 else "right"}{pair}'
-        for joint, (x, y) in solved.items():
-            assert row[f'{name}_{joint}_x'] == side * 0.005 * x
-            assert row[f'{name}_{joint}_y'] == 0.005 * y
-
-
 @pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('type_', list(mechanisms.TYPES))
 def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):

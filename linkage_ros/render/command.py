@@ -199,8 +199,8 @@ def size(text):
 OPTIONS = {
     'angle': (IMAGES, 'DEG', degrees, "the first mechanism's crank angle, in degrees or as in "
               'pi/2 or 90deg (default: where it starts)'),
-    'turns': (VIDEOS, 'N', within(float, 0.001, 1000.0), "turns of the first mechanism's crank, or "
-              'periods of its oscillation (default: 1)'),
+    'turns': (VIDEOS, 'N', within(float, 0.001, 1000.0), "turns of the first mechanism's crank, "
+              'or periods of its oscillation (default: 1)'),
     'fps': (VIDEOS, 'N', within(float, 0.001, MAX_FPS), f'frames per second (default: {FPS:g})'),
     'frames': (VIDEOS, 'N', within(int, 1, MAX_FRAMES),
                "frames in all (default: in real time, by the crank's speed)"),
