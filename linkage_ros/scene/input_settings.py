@@ -23,6 +23,11 @@ MAX_SPEED = 100.0
 FARTHEST_START = 4.0 * math.pi
 
 
+def is_sweep(ends: tuple[float, ...]) -> bool:
+    """Return whether there is a lower and a higher end, or none."""
+    return not ends or len(ends) == 2 and -FARTHEST <= ends[0] < ends[1] <= FARTHEST
+
+
 SPEED = Field('double', 'Speed of the {0} [{unit}].', -MAX_SPEED, MAX_SPEED, readers=(DRIVER,),
               unit='{1}/s', group=SPEEDS)
 START = Field('double', 'Initial value of the {0} [{unit}]; a new value moves it there.',
@@ -30,8 +35,7 @@ START = Field('double', 'Initial value of the {0} [{unit}]; a new value moves it
 SWEEP = Field('double_array', "Ends of the {0}'s oscillation [{unit}]; empty: its reach, or full "
               'rotation.', default=(), unit='{1}',
               rule=f'the lower end and the higher end, within {FARTHEST:g} of zero, or none',
-              holds=lambda ends: not ends or (
-                  len(ends) == 2 and -FARTHEST <= ends[0] < ends[1] <= FARTHEST))
+              holds=is_sweep)
 SOURCE = Field('string', 'Source joint, whose position in messages gives the {0}; empty: '
                '<mechanism>_ and the name of the {0} or of the measured output.', default='',
                read_only=True)
