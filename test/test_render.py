@@ -335,6 +335,10 @@ def test_the_crank_is_where_it_was_asked_to_be(crank):
         assert math.remainder(cycle.pose(cycle.turns_to(angle)).inputs[0] - angle,
                               math.tau) == pytest.approx(0.0, abs=1e-12)
         assert cycle.turns_to(angle + math.tau) == pytest.approx(cycle.turns_to(angle))
+        before = [math.remainder(cycle.pose(turns).inputs[0] - angle, math.tau)
+                  for turns in np.linspace(0.0, cycle.turns_to(angle), 40)[:-1]]
+        assert not any(abs(one) < 0.1 and one * other < 0.0 for one, other in zip(
+            before, before[1:]))
 
 
 @pytest.mark.parametrize('speeds, count, ratios', [
