@@ -10,7 +10,6 @@ Compilers that are not installed are left out (apt install gcc-avr avr-libc sima
 gcc-arm-none-eabi libnewlib-arm-none-eabi). With --document the tables go into docs/c-code.md.
 """
 
-import argparse
 from itertools import chain
 from pathlib import Path
 import re
@@ -163,8 +162,7 @@ int main(void)
 
 def main():
     """Compile, run and print."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
-    parser.add_argument('--document', action='store_true', help='write the tables to docs/')
+    options = document.parser(__doc__).parse_args()
     rows = [[f'{name} {", ".join(outputs)}, {use}', target, *measured(
                 compiler, flags, name, outputs, use)]
             for target, (compiler, flags) in TARGETS.items() if shutil.which(f'{compiler}-gcc')
@@ -180,9 +178,7 @@ def main():
         [[f'{name} {", ".join(outputs)}', number, *chain.from_iterable(
             paced(name, outputs, number, use) for use in ('pose', 'inverse'))]
          for name, outputs in CASES for number in ('float', 'double')])
-    print(text)
-    if parser.parse_args().document:
-        document.write('c-code.md', text)
+    document.show(options, 'c-code.md', text)
 
 
 def measured(compiler, flags, name, outputs, use):

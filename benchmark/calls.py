@@ -10,7 +10,6 @@ The calls are read from the pages. Each is timed in turn with the call below it:
 of a pose, or the inverse. With --document the table goes into docs/design/performance.md.
 """
 
-import argparse
 import ast
 from functools import partial
 import os
@@ -116,16 +115,12 @@ def rows():
 
 def main():
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
-    parser.add_argument('--document', action='store_true', help='write it to docs/')
-    options = parser.parse_args()
+    options = document.parser(__doc__).parse_args()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         text = document.table(('page', 'call', '[us]', 'below it', '[us]', 'more [us]'), rows())
     text += '\n\n' + document.machine()
-    print(text)
-    if options.document:
-        document.write('design/performance.md', text, 'measured: calls')
+    document.show(options, 'design/performance.md', text, 'measured: calls')
 
 
 if __name__ == '__main__':

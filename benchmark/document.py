@@ -3,6 +3,7 @@
 
 """Tables, what they were measured on, and their place in the pages."""
 
+import argparse
 from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -15,6 +16,20 @@ DOCS = ROOT / 'docs'
 END = '<!-- end of what is measured -->'
 # What a measurement itself writes.
 WRITTEN = ':!docs', ':!benchmark/results'
+
+
+def parser(description):
+    """Return a parser with --document, which has `show` write to docs/."""
+    made = argparse.ArgumentParser(description=description.strip().split('\n\n')[0])
+    made.add_argument('--document', action='store_true', help='write the tables to docs/')
+    return made
+
+
+def show(options, page, text, part='measured'):
+    """Print a text and, if the options say so, write it."""
+    print(text)
+    if options.document:
+        write(page, text, part)
 
 
 def table(head, rows):

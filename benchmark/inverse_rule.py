@@ -11,7 +11,6 @@ three outputs of each at ordinary poses, next to and at ends of the reach, at ex
 points. With --document the table goes into docs/design/accuracy.md.
 """
 
-import argparse
 from collections import Counter
 from itertools import chain
 from pathlib import Path
@@ -76,10 +75,9 @@ def measure(count, minutes):
 
 def main():
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
+    parser = document.parser(__doc__)
     parser.add_argument('--linkages', type=int, default=2000, help='random linkages')
     parser.add_argument('--minutes', type=float, default=60.0, help='stop after these')
-    parser.add_argument('--document', action='store_true', help='write it to docs/')
     options = parser.parse_args()
     total, worst, used = measure(options.linkages, options.minutes)
     places = dict.fromkeys(chain.from_iterable([key[:2]] for key in sorted(total)))
@@ -90,9 +88,7 @@ def main():
              f"{worst:.2g} in units of the rule: half an ulp of the output's size, and half an "
              'ulp of the input times the rate.')
     text += '\n\n' + document.machine()
-    print(text)
-    if options.document:
-        document.write('design/accuracy.md', text, 'measured: inverse')
+    document.show(options, 'design/accuracy.md', text, 'measured: inverse')
 
 
 if __name__ == '__main__':

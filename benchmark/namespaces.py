@@ -12,7 +12,6 @@ Besides what the library needs, it takes torch, JAX and llvmlite. Times are CPU 
 calls in turn; those of a first call, which compiles, are not in it.
 """
 
-import argparse
 from collections import namedtuple
 import os
 from pathlib import Path
@@ -97,9 +96,7 @@ def timed(call):
 
 def main():
     """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
-    parser.add_argument('--document', action='store_true', help='write the table to docs/')
-    options = parser.parse_args()
+    options = document.parser(__doc__).parse_args()
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     text = document.table(
         ['CPU time of one core [ns per pose]', 'poses',
@@ -107,9 +104,7 @@ def main():
         [[task.title, size, *measured(task, size), 'not measured']
          for task in tasks() for size in SIZES])
     text += '\n\n' + document.machine('llvmlite', 'torch', 'jax')
-    if options.document:
-        document.write('how-to/training.md', text)
-    print(text)
+    document.show(options, 'how-to/training.md', text)
 
 
 if __name__ == '__main__':

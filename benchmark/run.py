@@ -10,7 +10,6 @@ All are asked for the same poses in turn, on one core; times are CPU time, media
 package is not installed is left out. With --document the table goes into docs/design/accuracy.md.
 """
 
-import argparse
 import os
 import sys
 import time
@@ -114,8 +113,7 @@ def compared(kind, budget):
 
 def main():
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
-    parser.add_argument('--document', action='store_true', help='write it to docs/')
+    parser = document.parser(__doc__)
     parser.add_argument('--budget', type=float, default=0.02, help='a sample [s]')
     options = parser.parse_args()
     np.seterr(all='ignore')
@@ -123,9 +121,7 @@ def main():
     text = document.table(['CPU time per pose [us]', *BATCHES, 'median error [uL]', 'worst [uL]',
                            'wrong'], rows)
     text += '\n\n' + document.machine('llvmlite', *peers.PEERS)
-    print(text)
-    if options.document:
-        document.write('design/accuracy.md', text, 'measured: comparison')
+    document.show(options, 'design/accuracy.md', text, 'measured: comparison')
 
 
 if __name__ == '__main__':

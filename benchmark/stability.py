@@ -12,7 +12,6 @@ that test/truth/linkage_checks.py checks. Exits with 1 if the library breaks a r
 --document the table goes into docs/design/accuracy.md.
 """
 
-import argparse
 from collections import Counter
 import math
 import multiprocessing
@@ -103,12 +102,11 @@ def tasks(options):
 
 def main():
     """Run all tasks, print the table; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
+    parser = document.parser(__doc__)
     parser.add_argument('--samples', type=int, default=2000, help='angles a linkage and set')
     parser.add_argument('--linkages', type=int, default=200, help='random linkages')
     parser.add_argument('--jobs', type=int, default=2)
     parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--document', action='store_true', help='write it to docs/')
     options = parser.parse_args()
     ratios, problems = {}, Counter()
     with multiprocessing.get_context('spawn').Pool(options.jobs) as pool:
@@ -128,9 +126,7 @@ def main():
     text = document.table(['error / sensitivity', 'results', 'largest', '99.9 % are below',
                            'beyond the rule'], lines)
     text += '\n\n' + document.machine('mpmath')
-    print(text)
-    if options.document:
-        document.write('design/accuracy.md', text, 'measured: stability')
+    document.show(options, 'design/accuracy.md', text, 'measured: stability')
     return int(any(number for (_, title), number in problems.items()
                    if title != 'original formulas'))
 

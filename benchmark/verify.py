@@ -17,7 +17,6 @@ that is missing is left out. Differences are relative to the linkage's size, of 
 the input's speed, or to the number itself where that is larger.
 """
 
-import argparse
 import csv
 import json
 import math
@@ -184,10 +183,9 @@ SOURCES = {'PMKS_Verification': pmks, 'pylinkage': pylinkage, 'MuJoCo': mujoco}
 
 def main():
     """Compare, print the table; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
+    parser = document.parser(__doc__)
     parser.add_argument('--pmks', metavar='FOLDER', help='a clone of PMKS_Verification')
     parser.add_argument('--linkages', type=int, default=100, help='of pylinkage; poses in MuJoCo')
-    parser.add_argument('--document', action='store_true', help='write it to docs/')
     options = parser.parse_args()
     rows, is_far = [], False
     for name, compare in SOURCES.items():
@@ -204,9 +202,7 @@ def main():
         rows.append([name, len(found), f'{np.nanmax(found, initial=0.0):.1e}', far])
     text = document.table(['source', 'numbers', 'largest difference', f'above {FAR:.0e}'], rows)
     text += '\n\n' + document.machine('pylinkage', 'mujoco')
-    print(text)
-    if options.document:
-        document.write('design/accuracy.md', text, 'measured: foreign')
+    document.show(options, 'design/accuracy.md', text, 'measured: foreign')
     return int(is_far)
 
 

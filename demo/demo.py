@@ -185,7 +185,7 @@ def draw(motions):
                       DEFAULT_IN_MOTION - {'axes'}, motions)
     times = np.arange(0.0, 1.0, 1.0 / (FRAMES_PER_SECOND * picture.period))
     picture.arrange(times)
-    files.gif(picture, times, FRAMES_PER_SECOND, 0, COLOURS, OUT / 'all.gif', iter)
+    files.gif(picture, times, FRAMES_PER_SECOND, 0, COLOURS, OUT / 'all.gif')
     print(*(f'  {file.name}' for file in sorted(OUT.iterdir())), sep='\n')
 
 

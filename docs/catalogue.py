@@ -317,7 +317,7 @@ def draw(type_, folder):
     frames = round(turns * SECONDS * FPS)
     times = [turns * k / frames for k in range(frames)]
     moving.arrange(times)
-    files.gif(moving, times, FPS, 0, COLOURS, folder / f'{type_}.gif', iter)
+    files.gif(moving, times, FPS, 0, COLOURS, folder / f'{type_}.gif')
     family(type_).savefig(folder / f'{type_}_dimensions.svg', metadata={'Date': None})
 
 

@@ -18,7 +18,6 @@ INSTALL = {
     'matplotlib': 'apt install python3-matplotlib, or pip install matplotlib',
     'mujoco': 'pip install mujoco',
     'PIL': 'apt install python3-pil, or pip install pillow',
-    'tqdm': 'apt install python3-tqdm, or pip install tqdm',
     'yaml': 'apt install python3-yaml, or pip install pyyaml',
 }
 

@@ -31,7 +31,7 @@ FENCE = re.compile(r'^```(\w*)\n(.*?)^```', re.MULTILINE | re.DOTALL)
 
 @pytest.fixture
 def catalogue(monkeypatch):
-    for module in ('matplotlib', 'tqdm', 'yaml'):
+    for module in ('matplotlib', 'yaml'):
         pytest.importorskip(module)
     monkeypatch.syspath_prepend(ROOT / 'docs')
     import catalogue
@@ -152,20 +152,6 @@ def test_every_word_has_its_drawing_with_the_very_lines_that_it_shows():
 def test_the_table_of_words_names_all_of_them():
     named = re.findall(r'`(\w+)`', (ROOT / 'docs' / 'which-word.md').read_text())
     assert set(joint_lines.FORMS) <= set(named)
-
-
-@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-def test_the_pictures_that_a_page_says_to_render_can_be_asked_for(page):
-    for module in ('matplotlib', 'yaml'):
-        pytest.importorskip(module)
-    from linkage_ros.render.command import parsed
-
-    for line in '\n'.join(blocks(page, 'console')).splitlines():
-        command = RENDER.match(line)
-        if command:
-            asked = parsed(shlex.split(command[1]))
-            if '/' in asked.scene:  # else the page has it
-                scene.load(ROOT / asked.scene)
 
 
 def test_the_library_in_the_readme_works_as_written():

@@ -9,7 +9,6 @@ import os
 from pathlib import Path
 import re
 import signal
-import subprocess
 import sys
 
 from linkage_ros import mechanisms, optional
@@ -32,7 +31,7 @@ WAYS = {
 SCENE = str(CONFIG / 'jansen.yaml')
 # Commands that cannot do without a package.
 COMMANDS = {
-    'render': (('matplotlib', 'PIL', 'tqdm', 'yaml'), 'render', (
+    'render': (('matplotlib', 'PIL', 'yaml'), 'render', (
         SCENE, '--out', 'a.svg', '--size', '128x128', '--hide', 'axes,title')),
     'urdf': (('yaml',), 'robot_model', (SCENE,)),
     'c_code': (('yaml',), 'c_code', (SCENE,)),
@@ -177,15 +176,14 @@ def test_a_node_moves_without_machine_code_and_says_why_once(harness, tmp_path, 
 
 
 @pytest.mark.nightly(all_but=2)
-@pytest.mark.parametrize('as_module', [False, True])
 @pytest.mark.parametrize('way', ['missing', 'OSError', 'empty'])
 @pytest.mark.parametrize('package, name', [
     ('aiohttp', 'viewer'), ('linkage_interfaces', 'servo_inverse'),
     ('linkage_interfaces', 'scene')])
 def test_a_node_that_cannot_do_without_ends_in_one_sentence(
-        harness, tmp_path, package, name, way, as_module):
+        harness, tmp_path, package, name, way):
     write(tmp_path, package, way)
-    process = harness.Process(name, SCENE, env=path(tmp_path), as_module=as_module)
+    process = harness.Process(name, SCENE, env=path(tmp_path))
     code, printed = process.end()
     said = [line for line in printed.splitlines() if '[FATAL]' in line]
     assert code == 1 and 'Traceback' not in printed, printed
@@ -200,14 +198,3 @@ def test_other_nodes_start_without_the_interfaces(harness, tmp_path, name):
     assert 'ready: ' in process.line()
     process.interrupt(signal.SIGINT)
     assert process.end()[0] == 0
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('package', ['matplotlib', 'mujoco'])
-def test_so_it_is_for_a_command_as_a_process(tmp_path, package):
-    write(tmp_path, package, 'OSError')
-    _, room, args = COMMANDS['render' if package == 'matplotlib' else 'from_robot']
-    done = subprocess.run([sys.executable, '-m', f'linkage_ros.{room}', *args], cwd=ROOT,
-                          env={**os.environ, **path(tmp_path)}, capture_output=True, text=True)
-    assert done.returncode == 1 and done.stderr.count('\n') == 1
-    assert done.stderr.endswith(optional.INSTALL[package] + '\n')

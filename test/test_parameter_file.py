@@ -111,7 +111,7 @@ def of_ros(path, name, expected):
 def of_ours(path, name):
     """Return the same of the library."""
     try:
-        return overrides(sections(str(path)), f'/{name}') or {}
+        return overrides(sections(str(path)), f'/{name}')
     except scene.SceneError as error:
         return str(error)
 

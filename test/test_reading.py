@@ -3,11 +3,9 @@
 
 """Joint states read from their bytes say what they say when they are deserialised."""
 
-from collections import Counter
 import gc
 import math
 import struct
-import sys
 from types import FunctionType, ModuleType
 
 import numpy as np
@@ -89,33 +87,6 @@ def test_what_differs_in_more_than_numbers_is_deserialised(reader, check):
     check(message(['a', 'b'], velocities=False))
     check(message(['a', 'b', 'c']))
     assert reader.looked == 5
-
-
-def test_senders_that_take_turns_are_hardly_ever_deserialised(reader, check):
-    for seed in range(20):
-        for name in ('a', 'b', 'c'):
-            check(message([name], seed=seed))
-    assert reader.looked == 3
-
-
-def test_numbers_that_are_none_are_handed_on(reader):
-    for _ in range(2):
-        _, numbers = reader.read(serialize_message(JointState(name=['a'], position=[math.nan])))
-        assert math.isnan(numbers[1])
-
-
-def test_more_names_than_positions_are_read_as_they_are(reader):
-    for _ in range(2):
-        names, numbers = reader.read(serialize_message(
-            JointState(name=['a', 'b'], position=[1.0])))
-        assert names == ['a', 'b'] and numbers[1:] == (1.0,)
-
-
-def test_what_follows_a_message_does_not_matter(reader):
-    longer = serialize_message(message(['a', 'b']))
-    for end in (bytes(8), b'anything', bytes(8)):
-        compare(reader, longer + end, message(['a', 'b']))
-    assert reader.looked == 1
 
 
 def big_endian(made):
@@ -204,20 +175,6 @@ def test_a_name_that_is_no_text_excludes_its_sender_alone(reader):
         compare(reader, good, sent)
         assert reader.read(bad)[0] == deserialize_message(bad, JointState).name
     assert reader.looked == 2
-
-
-@pytest.mark.parametrize('joints', [1, 10, 100, 1500])
-def test_what_is_learnt_grows_with_the_joints_alone(joints):
-    text = serialize_message(message([f'joint{i}' for i in range(joints)]))
-    looked, calls = [], Counter()
-    reader = joint_state_reader.Reader(lambda made: looked.append(made) or made.name)
-    sys.setprofile(lambda _, event, __: calls.update([event]))
-    try:
-        said = reader.read(text)
-    finally:
-        sys.setprofile(None)
-    assert reader.read(text) == said and len(looked) == 1
-    assert calls.total() < 600 + 20 * joints
 
 
 def outcome(said, *args):

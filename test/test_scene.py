@@ -3,7 +3,6 @@
 
 """What a scene may be, what it says about one that cannot be, and how its cranks move. No ROS."""
 
-import dataclasses
 from glob import glob
 import itertools
 import math
@@ -117,14 +116,9 @@ def test_a_linkage_of_ones_own_is_written_joint_by_joint():
     assert places['B'][1] < places['A'][1]
 
 
-def test_a_branch_is_the_assembly_sign_of_the_linkage():
-    given = {'mechanisms': ['jansen'], 'jansen.branches.F': -1}
-    assert scene.read(given).machines['jansen'].linkage.branches['F'] == -1
-
-
-def test_the_sign_0_is_the_usual_one():
-    given = {'mechanisms': ['jansen'], 'jansen.branches.E': 0, 'jansen.branches.F': 0}
-    assert scene.read(given).machines['jansen'].linkage.branches == {'C': 1, 'E': -1, 'F': 1}
+def test_a_branch_is_an_assembly_sign_and_0_the_usual_one():
+    given = {'mechanisms': ['jansen'], 'jansen.branches.E': 0, 'jansen.branches.F': -1}
+    assert scene.read(given).machines['jansen'].linkage.branches == {'C': 1, 'E': -1, 'F': -1}
 
 
 def test_only_more_than_one_pair_is_mirrored_by_default():
@@ -141,17 +135,13 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'mechanisms': None}, 'mechanisms must be'),
     ({'mechanisms': ['jansen', 'jansen']}, 'mechanisms must be .* each once'),
     ({'mechanisms': ['two words']}, 'mechanisms must be .* letters'),
-    ({'mechanisms': ['2nd'], '2nd.type': 'jansen'}, 'mechanisms must be'),
     ({'mechanisms': ['a__b'], 'a__b.type': 'jansen'}, 'mechanisms must be'),
     ({'mechanisms': 'jansen'}, 'mechanisms must be a list'),
-    ({'mechanisms': ['leg']}, "leg.type must be .*, one of water_drop, .*, not 'leg'"),
     ({'mechanisms': ['leg'], 'leg.type': 'camel'}, "leg.type must be .* one of .*, not 'camel'"),
     ({'jansen.dimensions.m': -1.0}, 'jansen.dimensions.m must be .* above 0, not -1.0'),
     ({'jansen.dimensions.m': 0.0}, 'jansen.dimensions.m must be .* above 0'),
-    ({'jansen.dimensions.m': 'long'}, "jansen.dimensions.m must be .* not 'long'"),
     ({'jansen.dimensions.m': True}, 'jansen.dimensions.m must be'),
     ({'jansen.dimensions.m': math.nan}, 'jansen.dimensions.m must be a finite'),
-    ({'jansen.dimensions.m': math.inf}, 'jansen.dimensions.m must be a finite'),
     ({'jansen.dimensions.m': 500.0}, 'jansen.dimensions must let the jansen be assembled'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 1 2 left']},
      'own.joints must let the custom be assembled at some angle$'),
@@ -161,28 +151,20 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'leg.type': 'jansen'}, r'leg.type is not a parameter .* mechanisms, .* jansen\.\*'),
     ({'jansen.branches.C': 2}, 'jansen.branches.C must be .* -1 to 1, not 2'),
     ({'jansen.branches.C': 1.0}, 'jansen.branches.C must be a whole number'),
-    ({'jansen.scale': 0.0}, 'jansen.scale must be .* above 0'),
     ({'jansen.leg_pairs': 0}, 'jansen.leg_pairs must be a whole number from 1'),
     ({'water_drop.leg_pairs': 2}, 'water_drop.leg_pairs must be 1 and mirrored false: only'),
     ({'water_drop.mirrored': True}, 'water_drop.leg_pairs must be 1 and mirrored false: only'),
-    ({'jansen.mirrored': 1}, 'jansen.mirrored must be true or false'),
     ({'jansen.points': ['G', 'Z']}, 'jansen.points must be .* some of O, .* G'),
     ({'jansen.points': []}, 'jansen.points must be'),
     ({'jansen.points': ['G', 'G']}, 'jansen.points must be .* each once'),
     ({'jansen.pose': [0.0] * 5}, 'jansen.pose must be .* six'),
-    ({'jansen.pose': [True] * 6}, 'jansen.pose must be'),
     ({'jansen.pose': [math.nan] * 6}, 'jansen.pose must be .* finite'),
-    ({'jansen.crank.speed': True}, 'jansen.crank.speed must be'),
     ({'jansen.crank.speed': 101.0}, 'jansen.crank.speed must be .* from -100 to 100'),
-    ({'jansen.crank.start': math.nan}, 'jansen.crank.start must be'),
     ({'jansen.crank.sweep': [1.0]}, 'jansen.crank.sweep must be .* lower end and the higher end'),
-    ({'jansen.crank.sweep': [1.0, 1.0]}, 'jansen.crank.sweep must be'),
     ({'jansen.crank.sweep': [1e16, 1e16 + 8.0]}, r'jansen.crank.sweep must be .* within 1e\+06'),
-    ({'jansen.crank.sweep': [-1e300, 1e300]}, r'jansen.crank.sweep must be .* within 1e\+06'),
     ({'peaucellier.crank.sweep': [-1.2, 1.0]},
      r'peaucellier.crank.sweep must be inside the reach \[-1.17137, 1.17137\] rad'),
     ({'rate': -1.0}, 'rate must be .* from 0 to 1000'),
-    ({'rate': 1001}, 'rate must be .* from 0 to 1000'),
     ({'rate': 10 ** 5000}, 'rate must be .* from 0 to 1000'),
     ({'frame_id': 3}, 'frame_id must be a text'),
     *[({'frame_id': text}, 'frame_id must be a text .* 1 to 100 characters') for text in (
@@ -204,22 +186,15 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'mechanisms': ['leg', 'leg_left0'], 'leg.type': 'jansen', 'leg.leg_pairs': 2,
       'leg_left0.type': 'jansen'}, 'leg_left0.joint_names must give .* both leg_left0_BC'),
     ({'jansen.only_named': 1}, 'jansen.only_named must be true or false'),
-    ({'mechanisms': ['jansen\n']}, 'mechanisms must be'),
     ({'mechanisms': ['j' * 65]}, 'mechanisms must be .* up to 64 letters'),
-    ({'jansen.type': 'j' * 10 ** 6}, 'jansen.type must be'),
     ({'q' * 10 ** 6: 1.0}, 'qqq.* is not a parameter of the scene'),
     ({'jansen.' + 'q' * 10 ** 6: 1.0}, 'jansen.qqq.* is not a parameter of the scene'),
-    ({'jansen.points': ['Z' * 10 ** 6]}, 'jansen.points must be a list'),
-    ({'jansen.points': ['O'] * 10 ** 6}, 'jansen.points must'),
     ({'jansen.pose': [0.0] * 10 ** 6}, 'jansen.pose must be'),
     ({'mechanisms': ['custom']}, 'custom.joints: joints must be a list of lines'),
     ({**OWN, 'own.joints': ['A qq O 1']}, 'own.joints: joint line "A qq O 1": expected NAME and'),
     ({**OWN, 'own.joints': ['A crunk O 1']},
      r".* unknown construction 'crunk'; did you mean crank\?$"),
-    ({'jansen.dimension.m': 1.0}, r'.*; did you mean jansen.dimensions.m\?$'),
     ({'jansen.Crank.speed': 1.0}, r'.*; did you mean jansen.crank.speed\?$'),
-    ({'mechanism': ['jansen']}, r'.*; did you mean mechanisms\?$'),
-    ({'mechanisms': ['jansn']}, r'.*; did you mean jansen\?$'),
     ({'jansen.joint_names': ['BCC=left_shin']}, r'.*; did you mean BC\?$'),
     ({'jansen.loads': ['EFF=2.5']}, r'.*; did you mean EF\?$'),
     ({'mechanisms': ['own'], 'own.type': 'rods', 'own.joints': [
@@ -229,13 +204,8 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O r']}, 'own.joints: .* dimension r'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1', 'B crank O 1'], 'own.mirrored': True},
      'own.leg_pairs must be 1 and mirrored false: only a linkage whose one crank'),
-    ({'five_bar.crank3.speed': 1.0, 'mechanisms': ['five_bar']},
-     'five_bar.crank3.speed is not a parameter'),
-    ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O r'], 'own.dimensions.r': 0.0},
-     'own.dimensions.r must be .* above 0'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1'], 'own.dimensions.r': 1.0},
      'own.dimensions.r is not a parameter'),
-    ({'mechanisms': ['six_bar']}, "six_bar.type must be .* one of .*, not 'six_bar'"),
     ({'jansen.joints': ['O ground 0 0']}, 'jansen.joints is not a parameter'),
 ])
 def test_a_wrong_parameter_is_named_with_what_is_allowed(given, named):
@@ -329,17 +299,6 @@ def test_every_scene_in_config_stands_above_the_floor(path):
         if file not in ('rack_steering.yaml', 'excavator.yaml', 'catalogue.yaml'):
             # Not those that are seen from above, dig, or hang on a wall.
             assert 0.0 < whole_motion(machine)[..., 1].min() < 0.2
-
-
-@pytest.mark.nightly
-def test_the_mechanisms_of_the_scene_of_all_stand_apart():
-    pytest.importorskip('yaml')
-    boxes = []
-    for machine in scene.load(os.path.join(CONFIG, 'all.yaml')).machines.values():
-        places = whole_motion(machine)
-        boxes.append((places[..., 0].min(), places[..., 0].max()))
-    boxes.sort()
-    assert all(left[1] < right[0] for left, right in zip(boxes, boxes[1:]))
 
 
 @pytest.mark.parametrize('text, reason', [
@@ -441,67 +400,15 @@ def test_the_slider_of_a_length_that_nothing_limits_changes_it_by_nine_times_its
 
 ACTUATED = {**OWN, 'own.dimensions.h': 0.0, 'own.dimensions.c': 2.0, 'own.joints': [
     'O ground 0 0', 'P ground 1 h', 'B cylinder P O 1.5 left', 'C crank O c called tilt']}
-INPUT_KEYS = {
-    'start': ('double', 0.0, 'a finite number{turns}', '[{0}]'),
-    'sweep': ('double_array', (), 'a list of finite numbers, the lower end and the higher end, '
-              'within 1e+06 of zero, or none', '[{0}]'),
-    'source': ('string', '', 'a text of up to 1000 letters', ''),
-    'measures': ('string', '', 'a text of up to 1000 letters', ''),
-    'ratio': ('double', 1.0, 'a finite number, other than zero', '[1]'),
-    'offset': ('double', 0.0, 'a finite number', '[{0}]')}
-# Kind, default, allowed values, unit. The cylinder's length is from 0.5 to 2.5.
-PARAMETERS = {
-    'mechanisms': ('string_array', ('own',), 'a list of texts of up to 1000 letters, at least '
-                   'one, each once, of up to 64 letters, digits and single underscores, a letter '
-                   'first', ''),
-    'frame_id': ('string', 'world', 'a text of up to 1000 letters, 1 to 100 characters that can '
-                 'be seen, the first a letter, digit or _', ''),
-    'rate': ('double', 50.0, 'a finite number from 0 to 1000', '[Hz]'),
-    **dict.fromkeys(('frame_prefix', 'own.frame_id'), (
-        'string', '', 'a text of up to 1000 letters, up to 100 characters that can be seen, the '
-        'first a letter, digit or _', '')),
-    'own.type': ('string', 'custom', 'a text of up to 1000 letters, one of '
-                 + ', '.join((*mechanisms.TYPES, 'custom', 'rods')), ''),
-    'own.joints': ('string_array', tuple(ACTUATED['own.joints']),
-                   'a list of texts of up to 1000 letters', ''),
-    'own.tracer': ('string', '', 'a text of up to 1000 letters', ''),
-    'own.dimensions.h': ('double', 0.0, 'a finite number', '[m]'),
-    'own.dimensions.c': ('double', 2.0, 'a finite number above 0', '[m]'),
-    'own.branches.B': ('integer', 1, 'a whole number from -1 to 1', ''),
-    'own.scale': ('double', 1.0, 'a finite number above 0', ''),
-    'own.leg_pairs': ('integer', 1, 'a whole number from 1 to 50', ''),
-    'own.mirrored': ('bool', False, 'true or false', ''),
-    'own.points': ('string_array', ('O', 'P', 'B', 'C'),
-                   'a list of texts of up to 1000 letters, some of O, P, B, C, each once', ''),
-    'own.pose': ('double_array', 6 * (0.0,), 'a list of finite numbers, six of them',
-                 '[m] [rad]'),
-    'own.only_named': ('bool', False, 'true or false', ''),
-    'own.joint_names': ('string_array', (), 'a list of texts of up to 1000 letters, such as '
-                        "'BC=left_shin', or 'EF=-left_ankle+0.35' for 0.35 minus its position",
-                        ''),
-    'own.loads': ('string_array', (), "a list of texts of up to 1000 letters, such as 'C=0 -9.81'"
-                  ", a force [N] at a joint, or 'EF=2.5', a moment [N m]", ''),
-    'own.cylinder.speed': ('double', 0.67, 'a finite number from -100 to 100', '[m/s]'),
-    'own.tilt.speed': ('double', 1.0, 'a finite number from -100 to 100', '[rad/s]'),
-    **{f'own.{name}.{key}': (kind, default, allowed.format(turns=turns), units.format(unit))
-       for name, unit, turns in (('cylinder', 'm', ''),
-                                 ('tilt', 'rad', ' from -12.5664 to 12.5664'))
-       for key, (kind, default, allowed, units) in INPUT_KEYS.items()}}
-
-
-def test_every_parameter_has_its_type_default_allowed_values_and_unit():
-    made = scene.read(ACTUATED)
-    assert {each.name: (each.field.kind, each.value, each.field.allowed, ' '.join(
-        re.findall(r'\[[^\]]*\]', each.field.meaning))) for each in made.parameters} == PARAMETERS
-    for each in made.parameters:
-        assert each.field.meaning.endswith('.') and '{' not in each.field.meaning
+def test_every_parameter_says_what_it_is_of_with_its_unit():
+    for each in scene.read(ACTUATED).parameters:
+        assert each.field.meaning.endswith('.') and '{' not in each.field.meaning + each.field.unit
         name, _, key = each.name[4:].partition('.')
-        assert name not in ('cylinder', 'tilt') or f'{name}' in each.field.meaning
+        if name in ('cylinder', 'tilt'):
+            unit = {'cylinder': 'm', 'tilt': 'rad'}[name] + '/s' * (key == 'speed')
+            assert name in each.field.meaning and each.field.unit in (unit, '')
+            assert (each.field.unit == unit) == (f'[{unit}]' in each.field.meaning)
         assert key not in ('h', 'c', 'B') or f' {key} of the custom' in each.field.meaning
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        made.rate = 1.0
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        made.machines['own'].scale = 2.0
 
 
 def test_the_nodes_that_use_a_parameter_are_those_of_the_page():
@@ -629,23 +536,18 @@ def test_the_travel_of_a_published_joint_is_that_of_its_values(offset):
         assert found is None if jumps else found == pytest.approx((values.min(), values.max()))
 
 
-def test_a_year_of_turning_loses_nothing():
+def test_a_year_of_motion_loses_nothing():
     mpmath = pytest.importorskip('mpmath')
+    low, high = -0.7, 1.1
     with mpmath.workdps(60):
-        for speed in (1.0, -2.0 / 3.0, 99.9, 1e-9):
-            for elapsed in (1, 10 ** 9 + 7, YEAR + 123456789, 50 * YEAR + 987654321):
-                truth = (mpmath.mpf(0.3) + mpmath.mpf(speed) * elapsed / 10 ** 9) % (2 * mpmath.pi)
-                angle, velocity = Motion(speed, None, 0.3, 5).at(5 + elapsed)
-                assert abs(angle - truth) < 1e-15 and velocity == speed
-
-
-def test_a_year_of_swinging_loses_nothing():
-    mpmath = pytest.importorskip('mpmath')
-    low, high, speed = -0.7, 1.1, 2.3
-    with mpmath.workdps(60):
-        for elapsed in (1, 10 ** 9 + 7, YEAR + 123456789, 50 * YEAR + 987654321):
-            width = mpmath.mpf(high) - low
-            phase = (-low + mpmath.mpf(speed) * elapsed / 10 ** 9) % (2 * width)
+        width = mpmath.mpf(high) - low
+        for speed, elapsed in itertools.product((1.0, 2.3, 99.9, 1e-9, -2.0 / 3.0), (
+                1, 10 ** 9 + 7, YEAR + 123456789, 50 * YEAR + 987654321)):
+            way = mpmath.mpf(speed) * elapsed / 10 ** 9
+            angle, velocity = Motion(speed, None, 0.3, 5).at(5 + elapsed)
+            assert abs(angle - (mpmath.mpf(0.3) + way) % (2 * mpmath.pi)) < 1e-15
+            assert velocity == speed
+            phase = (-low + way) % (2 * width)
             angle, velocity = Motion(speed, (low, high), 0.0).at(elapsed)
             assert abs(angle - (low + width - abs(width - phase))) < 1e-15
             assert velocity == (speed if phase < width else -speed)
@@ -788,27 +690,3 @@ def test_a_start_is_put_where_it_is_in_the_sweep_or_at_the_nearer_end(turns):
         assert min(abs(found - each) for each in expected) < 1e-12
         insides += len(inside) > 0
     assert 1 < insides < 180
-
-
-@pytest.mark.parametrize('start, end', [(0.0, 0.3), (0.25, 1.0), (0.1234, 0.6789), (0.9, 1.6),
-                                        (0.0, 0.0)])
-def test_a_trace_is_the_way_of_its_joint_up_to_where_it_is(start, end):
-    machine = scene.read({'mechanisms': ['jansen']}).machines['jansen']
-    foot = machine.linkage.points.index('G')
-    cycle = Cycle(machine)
-    curve = cycle.curve(foot, start, end)[:, 0]
-
-    def place(turns):
-        inputs = [drive.start for drive in machine.inputs.values()]
-        return machine.linkage.solve(inputs[0] + math.tau * turns, ('G',))['G']
-
-    np.testing.assert_allclose(curve[-1], place(end), atol=1e-12)
-
-    def steps(points):
-        return np.linalg.norm(np.diff(points, axis=0), axis=1)
-
-    way = steps(np.array([place(turns) for turns in np.linspace(start, end, 2000)])).sum()
-    longest = 1.01 * steps(cycle.curve(foot, 0.0, 1.0)[:, 0]).max()
-    # It may begin up to a sample late.
-    assert way - longest <= steps(curve).sum() <= way * (1 + 1e-9)
-    assert not len(curve[1:]) or steps(curve).max() <= longest

@@ -210,7 +210,7 @@ def test_where_the_way_leads_out_of_the_sweep_one_input_jumps_into_it():
         for jumps in (False, True):
             near(InverseRequest(machine, ['block']).command(
                 [0.5 * block], None, [near_], jumps).inputs, [expected])
-        near(machine.measured('block', 0.5 * block, near_)[0], expected)
+        near(machine.follow(['block'], [0.5 * block], [near_])[0][0], expected)
 
 
 @pytest.mark.parametrize('turn', [-1, 0])
@@ -224,7 +224,7 @@ def test_a_sensor_s_input_continues_where_another_answer_is_nearer(turn):
     last = turn * math.tau + extreme - 0.02
     fast = machine.linkage.input_for('lever', lever).max() + turn * math.tau
     assert abs(fast - last) < last - (turn * math.tau + pin - 0.7)
-    near(machine.measured('lever', lever, last)[0], turn * math.tau + pin - 0.7)
+    near(machine.follow(['lever'], [lever], [last])[0][0], turn * math.tau + pin - 0.7)
     near(InverseRequest(machine, ['lever']).command([lever], None, [last]).inputs,
          [turn * math.tau + pin - 0.7])
 

@@ -79,13 +79,6 @@ def test_the_service_answers_on_the_working_branch_wherever_the_crank_is(graph, 
         assert found.success and found.servo_angle[0] == pytest.approx(0.4, abs=1e-9)
 
 
-def test_a_change_of_the_geometry_reaches_all_three(graph, nodes):
-    kinematics, *others = nodes
-    assert graph.set(kinematics, lever__dimensions__a=90.0).successful
-    graph.until(lambda: all(
-        node.scene.machines['lever'].linkage.dimensions['a'] == 90.0 for node in others))
-
-
 @pytest.mark.nightly
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_them_quietly(number):

@@ -15,7 +15,6 @@ again. Results go to benchmark/results/nodes.json, those of a look to benchmark/
 are printed, and written into docs/design/performance.md by --document.
 """
 
-import argparse
 import json
 import os
 from pathlib import Path
@@ -48,22 +47,19 @@ def main():
     options.output.parent.mkdir(parents=True, exist_ok=True)
     is_left = False if options.tables else run(options, result)
     tables = report.document(result)
-    print(tables)
-    if options.document:
-        document.write('design/performance.md', tables)
+    document.show(options, 'design/performance.md', tables)
     return LEFT if is_left else 0
 
 
 def arguments():
     """Return what the command line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__.strip().split('\n\n')[0])
+    parser = document.parser(__doc__)
     parser.add_argument('pieces', nargs='*', metavar='PIECE', help=', '.join(PIECES))
     mode = parser.add_mutually_exclusive_group()
     mode.add_argument('--missing', action='store_true', help='what is not measured yet')
     mode.add_argument('--quick', action='store_true', help='one rate and fewer rounds')
     mode.add_argument('--tables', action='store_true', help='run nothing, show the last results')
     parser.add_argument('--plain', action='store_true', help='without llvmlite')
-    parser.add_argument('--document', action='store_true', help='write the tables to docs/')
     parser.add_argument('--rounds', type=int, help='bursts of each subject')
     parser.add_argument('--output', type=Path, metavar='JSON')
     options = parser.parse_args()

@@ -6,6 +6,7 @@
 import argparse
 import math
 from pathlib import Path
+import re
 import shutil
 
 from . import parts
@@ -16,13 +17,10 @@ from ..optional import needs
 from ..scene.scene_mechanism import IN_SPACE
 from ..words import meant
 
-STILL, MOVING = ('.png', '.svg'), ('.gif', '.mp4')
-# Options that are for some endings only.
-OPTIONS = {'angle': STILL, 'turns': MOVING, 'fps': MOVING, 'frames': MOVING,
-           'loop': ('.gif',), 'colours': ('.gif',)}
-FPS, FASTEST_GIF, FASTEST = 25.0, 50.0, 240.0
-SMALLEST, LARGEST = 64, 8192
-MOST_FRAMES, MOST_COLOURS = 10000, 255
+IMAGES, VIDEOS = ('.png', '.svg'), ('.gif', '.mp4')
+FPS, MAX_GIF_FPS, MAX_FPS = 25.0, 50.0, 240.0
+MIN_SIDE, MAX_SIDE = 64, 8192
+MAX_FRAMES, MAX_COLOURS = 10000, 255
 
 EPILOG = """\
 examples:
@@ -47,10 +45,10 @@ def parsed(args):
     """Return the options of the command line; raise RequestError if they are invalid."""
     arguments = parser().parse_args(args)
     ending = arguments.out.suffix.lower()
-    if ending not in STILL + MOVING:
-        raise RequestError(f'--out must end in {", ".join(STILL + MOVING)}, not {arguments.out}')
-    arguments.moving = ending in MOVING
-    for option, endings in OPTIONS.items():
+    if ending not in IMAGES + VIDEOS:
+        raise RequestError(f'--out must end in {", ".join(IMAGES + VIDEOS)}, not {arguments.out}')
+    arguments.moving = ending in VIDEOS
+    for option, (endings, *_) in OPTIONS.items():
         if getattr(arguments, option) is not None and ending not in endings:
             raise RequestError(
                 f'--{option} is for {" and ".join(endings)} only, not for {ending}')
@@ -59,9 +57,9 @@ def parsed(args):
     if ending == '.mp4' and not shutil.which('ffmpeg'):
         raise RequestError('ffmpeg, which writes .mp4, is not installed: apt install ffmpeg, or '
                            'choose .gif')
-    if ending == '.gif' and (arguments.fps or FPS) > FASTEST_GIF:
+    if ending == '.gif' and (arguments.fps or FPS) > MAX_GIF_FPS:
         raise RequestError(
-            f'--fps must be at most {FASTEST_GIF:g} for .gif, not {arguments.fps:g}')
+            f'--fps must be at most {MAX_GIF_FPS:g} for .gif, not {arguments.fps:g}')
     for file in filter(None, (arguments.out, arguments.data)):
         if not file.absolute().parent.is_dir():
             raise RequestError(f'{file} cannot be written: there is no folder {file.parent}')
@@ -73,43 +71,29 @@ def draw(arguments, mechanisms):
     with needs('matplotlib'):
         from matplotlib import style
 
-        from .picture import Picture, PictureError
+        from .picture import Picture
+    with needs('PIL'):
+        from . import files
 
     for mechanism in mechanisms:
         if mechanism.in_space:
             raise RequestError(f'{mechanism.name} is {IN_SPACE}')
     default = parts.DEFAULT_IN_MOTION if arguments.moving else parts.DEFAULT
+    out, fps = arguments.out, arguments.fps or FPS
     with style.context('default', after_reset=True):
         picture = Picture(mechanisms, arguments.size, arguments.trace,
                           (default | arguments.show) - arguments.hide)
         times = moments(arguments, picture)
-        try:
-            picture.arrange(times)
-        except PictureError as error:
-            raise RequestError(error) from None
-        write(arguments, picture, times)
-
-
-def write(arguments, picture, times):
-    """Write the picture and, on request, the data."""
-    with needs('tqdm'):
-        from tqdm import tqdm
-    with needs('PIL'):
-        from . import files
-
-    def progress(times):
-        return tqdm(times, arguments.out.name, unit='frame', disable=None)
-
-    fps = arguments.fps or FPS
-    if arguments.out.suffix.lower() == '.gif':
-        colours = arguments.colours or MOST_COLOURS
-        files.gif(picture, times, fps, arguments.loop or 0, colours, arguments.out, progress)
-    elif arguments.moving:
-        files.mp4(picture, times, fps, arguments.out, progress)
-    else:
-        files.still(picture, times[0], arguments.out)
-    if arguments.data:
-        files.data(picture, times, arguments.data)
+        picture.arrange(times)
+        if out.suffix.lower() == '.gif':
+            files.gif(picture, times, fps, arguments.loop or 0,
+                      arguments.colours or MAX_COLOURS, out)
+        elif arguments.moving:
+            files.mp4(picture, times, fps, out)
+        else:
+            files.still(picture, times[0], out)
+        if arguments.data:
+            files.data(picture, times, arguments.data)
 
 
 def moments(arguments, picture):
@@ -127,8 +111,8 @@ def moments(arguments, picture):
         raise RequestError(f'{first.mechanism.name}.{input_.name}.speed is 0: nothing moves')
     turns = arguments.turns or 1.0
     frames = arguments.frames or max(round(turns * picture.period * (arguments.fps or FPS)), 1)
-    if frames > MOST_FRAMES:
-        raise RequestError(f'this would be {frames} frames, more than {MOST_FRAMES}: choose '
+    if frames > MAX_FRAMES:
+        raise RequestError(f'this would be {frames} frames, more than {MAX_FRAMES}: choose '
                            'fewer with --frames, --turns or --fps')
     return [turns * k / frames for k in range(frames)]
 
@@ -140,7 +124,7 @@ def parser() -> Parser:
                   formatter_class=argparse.RawDescriptionHelpFormatter)
     made.add_argument('scene', metavar='SCENE', help='parameter file of the scene')
     made.add_argument('--out', metavar='FILE', type=Path, required=True,
-                      help=f'output file, which ends in {", ".join(STILL + MOVING)}')
+                      help=f'output file, which ends in {", ".join(IMAGES + VIDEOS)}')
     made.add_argument('--data', metavar='FILE', type=Path,
                       help='also write the drawn values as CSV: time [s], inputs [rad or m] and '
                       'joints [m], with all digits')
@@ -157,22 +141,11 @@ def parser() -> Parser:
                       help=f'leave out some of {", ".join(parts.PARTS)}')
     made.add_argument('--size', metavar='WxH', type=size, default=(720, 720),
                       help='pixels (default: 720x720)')
-    still = made.add_argument_group('for .png and .svg')
-    still.add_argument('--angle', metavar='DEG', type=degrees,
-                       help="the first mechanism's crank angle, in degrees or as in pi/2 or 90deg "
-                       '(default: where it starts)')
-    moving = made.add_argument_group('for .gif and .mp4')
-    moving.add_argument('--turns', metavar='N', type=within(float, 0.001, 1000.0),
-                        help="turns of the first mechanism's crank, or periods of its oscillation "
-                        '(default: 1)')
-    moving.add_argument('--fps', metavar='N', type=within(float, 0.001, FASTEST),
-                        help=f'frames per second (default: {FPS:g})')
-    moving.add_argument('--frames', metavar='N', type=within(int, 1, MOST_FRAMES),
-                        help="frames in all (default: in real time, by the crank's speed)")
-    moving.add_argument('--loop', metavar='N', type=within(int, 0, 65536),
-                        help='number of times that a .gif plays (default: 0, endlessly)')
-    moving.add_argument('--colours', metavar='N', type=within(int, 2, MOST_COLOURS),
-                        help=f'colours of a .gif: fewer make it smaller (default: {MOST_COLOURS})')
+    groups = {IMAGES: made.add_argument_group('for .png and .svg'),
+              VIDEOS: made.add_argument_group('for .gif and .mp4')}
+    for option, (endings, metavar, type_, text) in OPTIONS.items():
+        groups[IMAGES if endings == IMAGES else VIDEOS].add_argument(
+            f'--{option}', metavar=metavar, type=type_, help=text)
     return made
 
 
@@ -203,9 +176,24 @@ def parts_of_a_picture(text):
 
 def size(text):
     """Return width and height."""
-    sides = text.lower().split('x')
-    if len(sides) != 2 or not all(side.isdecimal() for side in sides) \
-            or not all(SMALLEST <= int(side) <= LARGEST for side in sides):
-        raise argparse.ArgumentTypeError(f'must be like 720x720, each side from {SMALLEST} to '
-                                         f'{LARGEST}, not {text}')
-    return tuple(map(int, sides))
+    match = re.fullmatch('([0-9]+)[xX]([0-9]+)', text)
+    sides = tuple(map(int, match.groups())) if match else (0,)
+    if not all(MIN_SIDE <= side <= MAX_SIDE for side in sides):
+        raise argparse.ArgumentTypeError(f'must be like 720x720, each side from {MIN_SIDE} to '
+                                         f'{MAX_SIDE}, not {text}')
+    return sides
+
+
+# Options that are for some endings only: these, a name of the value, its type, and what it is.
+OPTIONS = {
+    'angle': (IMAGES, 'DEG', degrees, "the first mechanism's crank angle, in degrees or as in "
+              'pi/2 or 90deg (default: where it starts)'),
+    'turns': (VIDEOS, 'N', within(float, 0.001, 1000.0), "turns of the first mechanism's crank, "
+              'or periods of its oscillation (default: 1)'),
+    'fps': (VIDEOS, 'N', within(float, 0.001, MAX_FPS), f'frames per second (default: {FPS:g})'),
+    'frames': (VIDEOS, 'N', within(int, 1, MAX_FRAMES),
+               "frames in all (default: in real time, by the crank's speed)"),
+    'loop': (('.gif',), 'N', within(int, 0, 65536),
+             'number of times that a .gif plays (default: 0, endlessly)'),
+    'colours': (('.gif',), 'N', within(int, 2, MAX_COLOURS),
+                f'colours of a .gif: fewer make it smaller (default: {MAX_COLOURS})')}

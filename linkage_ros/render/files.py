@@ -16,7 +16,7 @@ from PIL import Image
 PALETTE_FRAMES = 8
 # Pillow looks colours up in a palette by their upper six bits: white would become another grey.
 SIX_BITS = 0b11111100
-FINEST = 100  # the unit of time in a GIF is a hundredth of a second
+GIF_TICKS = 100  # the unit of time in a GIF is a hundredth of a second
 
 # Fonts as outlines, and names from a fixed salt: an SVG that is the same everywhere.
 SVG = {'svg.hashsalt': 'linkage_ros', 'svg.fonttype': 'path'}
@@ -35,7 +35,7 @@ def still(picture, turns, file: Path):
         picture.figure.savefig(new, format=format_, metadata=metadata)
 
 
-def gif(picture, times, fps, loop, colours, file: Path, progress):
+def gif(picture, times, fps, loop, colours, file: Path):
     """
     Write a picture at some times as a GIF, with one palette for all frames.
 
@@ -53,8 +53,6 @@ def gif(picture, times, fps, loop, colours, file: Path, progress):
         Largest number of colours.
     file : Path
         Output file.
-    progress : callable
-        Yields the times one by one.
 
     """
     def reduced(pixels):
@@ -66,18 +64,18 @@ def gif(picture, times, fps, loop, colours, file: Path, progress):
     # White is 255 again.
     shown = [255 * value // SIX_BITS for value in palette.getpalette()]
     frames = []
-    for turns in progress(times):
+    for turns in times:
         frame = reduced(picture.at(turns)).quantize(palette=palette, dither=Image.Dither.NONE)
         frame.putpalette(shown)
         frames.append(frame)
-    ends = [round(FINEST * k / fps) for k in range(len(frames) + 1)]
+    ends = [round(GIF_TICKS * k / fps) for k in range(len(frames) + 1)]
     repeats = {} if loop == 1 else {'loop': max(loop - 1, 0)}
     with replacing(file) as new:
         frames[0].save(new, 'GIF', save_all=True, append_images=frames[1:],
-                       duration=[1000 // FINEST * int(d) for d in np.diff(ends)], **repeats)
+                       duration=[1000 // GIF_TICKS * int(d) for d in np.diff(ends)], **repeats)
 
 
-def mp4(picture, times, fps, file: Path, progress):
+def mp4(picture, times, fps, file: Path):
     """Write a picture at some times as MP4; raise OSError with ffmpeg's message if it fails."""
     height, width, _ = picture.at(times[0]).shape
     with replacing(file) as new, tempfile.TemporaryFile() as messages:
@@ -89,7 +87,7 @@ def mp4(picture, times, fps, file: Path, progress):
         try:
             assert encoder.stdin
             with encoder.stdin as pipe:
-                for turns in progress(times):
+                for turns in times:
                     pipe.write(picture.at(turns).tobytes())
         except BrokenPipeError:
             pass

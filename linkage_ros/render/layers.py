@@ -4,7 +4,7 @@
 """
 The layers of a picture, drawn with Matplotlib: traces, guides, legs, floor, headline and names.
 
-Each adds artists to axes and moves them; `artists` are those that move, in drawing order.
+Each adds artists to axes and moves them.
 """
 
 import cmath
@@ -22,12 +22,12 @@ from .cycle import SAMPLES
 from ..palette import BAR, DARK, DRIVEN, EARTH, FLOOR, GREY, LOCUS, TRACK
 from ..robot_model import shapes
 
-FADED = 0.3  # turns after which a fading trace is gone
-STANCE = 0.06  # of a foot curve's height: below that the foot is on the ground
+FADING_TURNS = 0.3  # turns after which a fading trace is gone
+STANCE_HEIGHT = 0.06  # of a foot curve's height: below that the foot is on the ground
 MIN_STRIDE = 0.02  # of the longest bar: a foot that stands has marks, too
-CURVED = 20  # points: a line that has more is a curve
-STRAIGHT = 1e-9  # of a curve's length: largest deviation of a straight line
-WHITENED = 0.7  # how white the last of many pairs of legs is
+MIN_CURVE_POINTS = 20  # points: a line that has more is a curve
+MAX_BEND = 1e-9  # of a curve's length: largest deviation of a straight line
+MAX_WHITENESS = 0.7  # how white the last of many pairs of legs is
 
 HALO = [withStroke(linewidth=3, foreground='white')]
 PIVOT_SIZE = 13  # points, from its top to its bottom
@@ -53,46 +53,35 @@ class Trace:
     def __init__(self, axes, mechanism, cycle, kind, unit):
         self._cycle, self._kind = cycle, kind
         self._tracer = mechanism.linkage.points.index(mechanism.tracer)
-        self.artists = []
-        if kind in ('growing', 'fading'):
-            lines = LineCollection([], lw=3 * unit, color=LOCUS, zorder=2)
-            axes.add_collection(lines, autolim=False)
-            self.artists = [lines]
-        elif kind != 'none':
-            curve = cycle.locus(mechanism)
-            for side in (1.0, -1.0)[:1 + mechanism.mirrored] if len(curve) else ():
-                self._add_still(axes, curve * (side, 1.0), unit)
-
-    def _add_still(self, axes, curve, unit):
         bold = {'color': LOCUS, 'lw': 3 * unit, 'zorder': 2}
-        if self._kind == 'stance':
-            axes.plot(*curve.T, color=whiter(LOCUS, 0.65), lw=1.2 * unit, zorder=2)
-            curve = standing(curve)
-        axes.plot(*curve.T, **bold)
+        self.lines = axes.add_collection(LineCollection([], **bold), autolim=False)
+        curve = cycle.locus(mechanism) if kind in ('whole', 'stance') else np.empty(0)
+        for side in (1.0, -1.0)[:1 + mechanism.mirrored] if len(curve) else ():
+            foot = curve * (side, 1.0)
+            if kind == 'stance':
+                axes.plot(*foot.T, color=whiter(LOCUS, 0.65), lw=1.2 * unit, zorder=2)
+                foot = standing(foot)
+            axes.plot(*foot.T, **bold)
 
     def show(self, pose):
         """Draw the curve up to the tracer."""
         if self._kind == 'growing':
             start, end = 0.0, min(pose.turns, float(self._cycle.turns))
             curves = self._cycle.curve(self._tracer, start, end)
-            self.artists[0].set_segments(np.moveaxis(curves, 1, 0))
+            self.lines.set_segments(np.moveaxis(curves, 1, 0))
         elif self._kind == 'fading':
-            curves = self._cycle.curve(self._tracer, pose.turns - FADED, pose.turns)
+            curves = self._cycle.curve(self._tracer, pose.turns - FADING_TURNS, pose.turns)
             pieces = np.stack([curves[:-1], curves[1:]], axis=2)
             ages = np.linspace(1.0, 0.0, len(pieces))
-            self.artists[0].set_segments(pieces.reshape(-1, 2, 2))
-            self.artists[0].set_color(np.repeat([whiter(LOCUS, age) for age in ages],
-                                                pieces.shape[1], axis=0))
+            self.lines.set_segments(pieces.reshape(-1, 2, 2))
+            self.lines.set_color(np.repeat([whiter(LOCUS, age) for age in ages],
+                                           pieces.shape[1], axis=0))
 
 
 def standing(curve):
-    """Return the stance part of a foot's closed curve, shape (n, 2)."""
+    """Return a foot's curve (n, 2), NaN where the foot is not on the ground."""
     height = curve[:, 1] - curve[:, 1].min()
-    low = height[:-1] <= STANCE * height.max()
-    start = int(np.argmax(low & ~np.roll(low, 1)))
-    rolled = np.roll(low, -start)
-    length = len(low) if rolled.all() else int(np.argmin(rolled))
-    return np.roll(curve[:-1], -start, axis=0)[:length]
+    return np.where(height[:, None] <= STANCE_HEIGHT * height.max(), curve, np.nan)
 
 
 def guides(axes, mechanism, cycle, unit):
@@ -115,15 +104,12 @@ def guides(axes, mechanism, cycle, unit):
 
 
 def straight(curve):
-    """Return the ends of a curve that is a straight line, else None."""
+    """Return two points of a curve that is a straight line, else None."""
     if not len(curve):
         return None
-    first = curve[0]
-    last = curve[np.argmax(np.hypot(*(curve - first).T))]
-    along = last - first
-    length = math.hypot(*along)
-    across = np.abs((curve - first) @ (-along[1], along[0]))
-    return (first, last) if length and across.max() <= STRAIGHT * length * length else None
+    middle = curve.mean(axis=0)
+    _, sizes, directions = np.linalg.svd(curve - middle, full_matrices=False)
+    return (middle, middle + directions[0]) if sizes[1] <= MAX_BEND * sizes[0] > 0.0 else None
 
 
 def around(frame):
@@ -150,7 +136,7 @@ class Legs:
         sides = 1 + mechanism.mirrored
         thin = unit * (1.0 if len(cycle.prefixes) == 1 else 0.7)
         self.legs = [(leg, artists(
-            axes, parts, WHITENED * (leg // sides) / mechanism.leg_pairs, thin))
+            axes, parts, MAX_WHITENESS * (leg // sides) / mechanism.leg_pairs, thin))
             for leg in reversed(range(len(cycle.prefixes)))]
 
     def show(self, pose):
@@ -229,11 +215,8 @@ class Floor:
         self._tracer = tracer
         self._axes = axes
         style = {'color': FLOOR, 'zorder': 1, 'capstyle': 'round'}
-        self._line = LineCollection([], lw=3 * unit, **style)
-        self._marks = LineCollection([], lw=2 * unit, **style)
-        self.artists = [self._line, self._marks]
-        for artist in self.artists:
-            axes.add_collection(artist, autolim=False)
+        self._line, self.marks = (axes.add_collection(
+            LineCollection([], lw=width * unit, **style), autolim=False) for width in (3, 2))
 
     def show(self, pose):
         """Move the floor under the lowest foot."""
@@ -245,7 +228,7 @@ class Floor:
         first = low + (way - low) % self.spacing - self.spacing
         marks = np.arange(first, high + self.spacing, self.spacing)
         depth = 0.22 * self.spacing
-        self._marks.set_segments([[(x, level), (x - depth, level - depth)] for x in marks])
+        self.marks.set_segments([[(x, level), (x - depth, level - depth)] for x in marks])
 
 
 class Headline:
@@ -323,16 +306,16 @@ class Names:
         joints = self._points(poses[:, 0])
         start, end = np.moveaxis(joints[:, self._bars], -1, 0)
         curves = [self._points(line.get_xydata()[::9]) for line in self._axes.lines
-                  if len(line.get_xdata()) > CURVED]
+                  if len(line.get_xdata()) > MIN_CURVE_POINTS]
         # All that a name keeps clear of, as points.
         drawn = np.hstack([joints, joints[:, self._fixed] - self._pivot, *(
-            start + part * (end - start) for part in np.linspace(0.0, 1.0, 13)), *(
+            start + part * (end - start) for part in np.linspace(0.0, 1.0, 25)), *(
             np.broadcast_to(curve, (len(joints), len(curve))) for curve in curves)])
         for text, index, distance, wider in zip(
                 self.artists, self._index, self._distances, self._wider):
             offsets = distance * self.DIRECTIONS + wider * self.DIRECTIONS.real
             tried = joints[:, [index]] + offsets
-            room = np.min([abs(tried[..., None] + end - drawn[:, None]).min(axis=2)
+            room = np.min([np.fmin.reduce(abs(tried[..., None] + end - drawn[:, None]), axis=2)
                            for end in {-wider, 0.0, wider}], axis=0)
             room = np.nan_to_num(np.minimum(room, distance))
             best = offsets[room.mean(axis=0).argmax()]

@@ -15,14 +15,15 @@ from . import layers
 from .cycle import Cycle
 from .parts import DEFAULT
 from ..palette import FRAME, GRID
+from ..scene import SceneError
 
 DOTS_PER_INCH = 100
 CROWDED = 'the size is too small for the drawn parts: choose a larger one, or hide a part'
 PADDING = 0.1  # inches, around everything
-READABLE = 24  # poses in which the joints' names keep clear of the links
+MAX_POSES = 24  # poses in which the joints' names keep clear of the links
 
 
-class PictureError(ValueError):
+class PictureError(SceneError):
     """A picture that cannot be drawn; the text has the reason."""
 
 
@@ -85,7 +86,7 @@ class Picture:
                 for panel in self.panels:
                     panel.fill()
         self.figure.set_layout_engine('none')
-        chosen = times[::math.ceil(len(times) / READABLE)]
+        chosen = times[::math.ceil(len(times) / MAX_POSES)]
         for panel in self.panels:
             panel.settle([self._turns(panel, turns) for turns in chosen])
 

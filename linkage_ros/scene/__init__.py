@@ -96,10 +96,9 @@ def load(path: str) -> Scene:
     Each parameter has the value that the file gives to the parameter's owner.
     """
     all_sections = sections(path)
-    by_node = {node: overrides(all_sections, f'/{node}') for node in (*ALL, OWNER)}
-    if not any(values is not None for values in by_node.values()):
+    values = {node: overrides(all_sections, f'/{node}') for node in (*ALL, OWNER)}
+    if not any(values.values()):
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:'")
-    values = {node: part or {} for node, part in by_node.items()}
     scene = read({name: value for node in (*ALL, OWNER) for name, value in values[node].items()})
     return read({parameter.name: values[parameter.field.owner][parameter.name]
                  for parameter in scene.parameters

@@ -13,7 +13,7 @@ from .parameters import DRIVER, Field, SceneError, SPEEDS, STARTS, Values
 from ..linkage import Arc, Input, Mechanism
 
 # Distance of a default sweep from each end of the reach, as a fraction of the reach.
-MARGIN = 0.01
+SWEEP_MARGIN = 0.01
 # Intervals in a message, at most: gears may have hundreds.
 MAX_ARCS = 8
 # Largest angle [rad] whose rounding error is negligible for a crank.
@@ -23,7 +23,8 @@ MAX_SPEED = 100.0
 FARTHEST_START = 4.0 * math.pi
 
 
-def _is_sweep(ends: tuple[float, ...]) -> bool:
+def is_sweep(ends: tuple[float, ...]) -> bool:
+    """Return whether there is a lower and a higher end, or none."""
     return not ends or len(ends) == 2 and -FARTHEST <= ends[0] < ends[1] <= FARTHEST
 
 
@@ -32,8 +33,9 @@ SPEED = Field('double', 'Speed of the {0} [{unit}].', -MAX_SPEED, MAX_SPEED, rea
 START = Field('double', 'Initial value of the {0} [{unit}]; a new value moves it there.',
               default=0.0, readers=(DRIVER,), unit='{1}', group=STARTS)
 SWEEP = Field('double_array', "Ends of the {0}'s oscillation [{unit}]; empty: its reach, or full "
-              'rotation.', default=(), unit='{1}', holds=_is_sweep,
-              rule=f'the lower end and the higher end, within {FARTHEST:g} of zero, or none')
+              'rotation.', default=(), unit='{1}',
+              rule=f'the lower end and the higher end, within {FARTHEST:g} of zero, or none',
+              holds=is_sweep)
 SOURCE = Field('string', 'Source joint, whose position in messages gives the {0}; empty: '
                '<mechanism>_ and the name of the {0} or of the measured output.', default='',
                read_only=True)
@@ -143,7 +145,7 @@ def read_settings(name: str, linkage: Mechanism, input_: Input, reach: tuple[Arc
             raise SceneError(f'{name}.{key}.measures: {error}') from None
     if not ends and not is_whole:
         low, high = next((arc for arc in reach if input_.holds(arc, start, start)), reach[0])
-        sweep = low + MARGIN * (high - low), high - MARGIN * (high - low)
+        sweep = low + SWEEP_MARGIN * (high - low), high - SWEEP_MARGIN * (high - low)
     return InputSettings(input_, reach, speed, default_speed, start, sweep, ends,
                          source or f'{name}_{measures or key}', take('ratio', RATIO),
                          take('offset', OFFSET), measures)

@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Mapping, NamedTuple, Optional, Sequence
+import operator
+from typing import Any, Iterable, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -53,9 +54,9 @@ class SceneAnswer(NamedTuple):
 
 def present_inputs(mechanism: SceneMechanism, positions: Mapping[str, float]) -> list[float]:
     """Return the inputs [rad or m] at the last position of each source; inf if unknown."""
-    known = [mechanism.from_source(settings, positions[settings.source], None, None)[0]
-             if settings.source in positions else math.inf
-             for settings in mechanism.inputs.values()]
+    known = [mechanism.from_source(
+        settings, positions.get(settings.source, math.nan), None, None)[0]
+        for settings in mechanism.inputs.values()]
     return [value if math.isfinite(value) else math.inf for value in known]
 
 
@@ -107,10 +108,10 @@ class InverseRequest:
         return [ratio * position + offset
                 for (ratio, offset), position in zip(self._actuators, positions)]
 
-    def positions_of(self, inputs: Sequence[Any]) -> list[Any]:
+    def positions_of(self, inputs: Iterable[Any]) -> list[Any]:
         """Return the actuators' positions at inputs [rad or m]."""
-        return [(input_ - offset) / ratio if offset or ratio != 1.0 else input_
-                for (ratio, offset), input_ in zip(self._actuators, inputs)]
+        return [(value - offset) / ratio
+                for (ratio, offset), value in zip(self._actuators, inputs)]
 
     def positions(self, values: Sequence[Any], seed: Optional[Sequence[Any]] = None
                   ) -> tuple[list[Any], list[Any]]:
@@ -138,8 +139,8 @@ class InverseRequest:
             divided(values, self._units),
             None if seed is None else divided(self.inputs_of(seed), self._scales),
             self._mechanism.ends)
-        return (self.positions_of(_times(inputs, self._scales)),
-                _times(rates, self._rate_units))
+        return (self.positions_of(map(operator.mul, inputs, self._scales)),
+                [*map(operator.mul, rates, self._rate_units)])
 
     def command(self, values: Sequence[float], speeds: Optional[Sequence[float]],
                 seed: Sequence[float], jumps: bool = False) -> Command:
@@ -200,7 +201,10 @@ class InverseRequest:
         """Return in words why values are unreachable."""
         if not all(map(math.isfinite, values)):
             return 'a value must be finite'
-        answers = self._inverse.all(divided(values, self._units))
+        middles = [0.5 * sum(settings.ends or (2.0 * settings.start,))
+                   for settings in self._settings]
+        answers = self._inverse.all(
+            divided(values, self._units), divided(middles, self._scales))
         what = f'{listed(self.outputs)} at ' * (len(values) > 1) + listed(
             f'{value:.6g}' for value in values)
         if self._inside(answers):
@@ -209,14 +213,9 @@ class InverseRequest:
         sweeps = ', '.join(f'{settings.input.name}.sweep {in_words(settings.arcs)}'
                            for settings in limited)
         if answers and limited:
-            middles = [0.5 * sum(settings.ends or (2.0 * settings.start,))
-                       for settings in self._settings]
-            inputs = min(([settings.input.beside(value * scale, middle)
-                           for settings, value, scale, middle in zip(
-                               self._settings, answer.inputs, self._scales, middles)]
-                          for answer in answers), key=lambda inputs: math.dist(inputs, middles))
-            needed = ', '.join(f'{settings.input.name} at {value:.6g} {settings.input.unit}'
-                               for settings, value in zip(self._settings, inputs))
+            needed = ', '.join(
+                f'{settings.input.name} at {value * scale:.6g} {settings.input.unit}'
+                for settings, value, scale in zip(self._settings, answers[0].inputs, self._scales))
             return f'{what} needs the {needed}, outside {sweeps}'
         if len(values) > 1:
             return f'{what} is outside the reach'
@@ -229,10 +228,6 @@ class InverseRequest:
         return (f'{"the lever" if output == LEVER else output} reaches {reached} '
                 f'{"rad" if linkage.is_angle(output) else "m"}'
                 + f' in {sweeps}' * bool(limited))
-
-
-def _times(values: Sequence[Any], factors: Sequence[float]) -> list[Any]:
-    return [value if factor == 1.0 else value * factor for value, factor in zip(values, factors)]
 
 
 def _between_ends(settings: InputSettings, input_: Input, value: float) -> float:

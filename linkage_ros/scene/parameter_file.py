@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from functools import reduce
 import re
-from typing import Any, Iterator, Optional, Sequence
+from typing import Any, Iterator, Sequence
 
 from .parameters import SceneError
 from ..optional import needs
@@ -57,15 +57,14 @@ def sections(path: str) -> Sections:
         raise SceneError(f'{path} is not a valid ROS parameter file: {reason}') from None
 
 
-def overrides(found: Sections, node: str) -> Optional[dict[str, Any]]:
+def overrides(sections_: Sections, node: str) -> dict[str, Any]:
     """
     Return the values for a node, by parameter name; later sections override earlier ones.
 
-    `node` is its full name, such as '/kinematics'. None means that no section matches it.
+    `node` is its full name, such as '/kinematics'.
     """
-    matching = [values for name, values in found.items() if _pattern(name).fullmatch(node)]
-    return {name: value for values in matching
-            for name, value in values.items()} if matching else None
+    return {name: value for section, values in sections_.items()
+            if _pattern(section).fullmatch(node) for name, value in values.items()}
 
 
 def is_text(text: str) -> bool:
@@ -146,7 +145,7 @@ def _line(node: Any) -> str:
 
 def _checked(names: Sequence[str]) -> str:
     """Return the name of a section; raise ValueError if nodes cannot have it."""
-    name = reduce(lambda space, own: f'{space.removesuffix("/")}/{own}', names) if names else ''
+    name = reduce(lambda space, part: f'{space.removesuffix("/")}/{part}', names) if names else ''
     if not all(map(_TOKEN.fullmatch, name.removeprefix('/').split('/'))):
         raise ValueError(f'{KEY} must be below the name of a node, such as /**, not '
                          f'{quoted(name)}')

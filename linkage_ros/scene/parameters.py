@@ -9,6 +9,7 @@ from array import array
 from dataclasses import dataclass, replace
 import math
 import re
+import sys
 from typing import Any, Callable, Collection, Iterable, Mapping, NamedTuple, Optional, Sequence
 
 from ..cache import cached
@@ -34,7 +35,7 @@ KINDS = {
 }
 
 # Relative tolerance at the ends of a range, as in rclpy.
-ROUNDED = 1e-6
+RANGE_TOLERANCE = 1e-6
 
 TEXT = re.compile(r'.{0,1000}', re.DOTALL)
 MAX_ITEMS = 10000
@@ -139,17 +140,12 @@ class Field:
                          f'{meant(value, self.choices)}')
 
     def _converted(self, value: Any) -> Any:
-        try:
-            return float(value) if type(value) is int and self._type is float else value
-        except OverflowError:
-            return value
-
-    @property
-    def _type(self) -> type[Any]:
-        return KINDS[self.kind][0]
+        is_whole = type(value) is int and KINDS[self.kind][0] is float
+        return float(value) if is_whole and abs(value) <= sys.float_info.max else value
 
     def _allows(self, value: Any) -> bool:
-        if type(value) is not self._type:
+        type_: type[Any] = KINDS[self.kind][0]
+        if type(value) is not type_:
             return False
         if isinstance(value, str):
             return bool(self.pattern.fullmatch(value)) and (
@@ -159,7 +155,7 @@ class Field:
         if self.low is None or self.high is None:
             return True
         return self.low <= value <= self.high or any(
-            math.isclose(value, end, rel_tol=ROUNDED) for end in (self.low, self.high))
+            math.isclose(value, end, rel_tol=RANGE_TOLERANCE) for end in (self.low, self.high))
 
 
 @cached(2048)

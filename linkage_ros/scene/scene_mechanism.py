@@ -46,7 +46,8 @@ def is_distinct(names: Sequence[str]) -> bool:
     return 0 < len(names) == len(set(names))
 
 
-def _is_pose(numbers: Sequence[float]) -> bool:
+def is_pose(numbers: Sequence[float]) -> bool:
+    """Return whether there are six numbers."""
     return len(numbers) == 6
 
 
@@ -67,7 +68,7 @@ POINTS = Field('string_array', 'Joints that markers display.', readers=(KINEMATI
                holds=is_distinct, rule='each once')
 POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
              'x, y, z [m], roll, pitch, yaw [rad].', default=(0.0,) * 6, readers=(KINEMATICS,),
-             rule='six of them', holds=_is_pose)
+             rule='six of them', holds=is_pose)
 OWN_FRAME_ID = Field('string', "Frame that its pose is in; empty: the scene's.", default='',
                      readers=(KINEMATICS,), rule=FRAME_RULE, pattern=FRAME)
 JOINT_NAMES = Field(
@@ -161,11 +162,6 @@ class SceneMechanism:
         return [settings.ends and (settings.ends[0] / scale, settings.ends[1] / scale)
                 for settings, scale in zip(self.inputs.values(), self.scales)]
 
-    def measured(self, output: str, value: float, seed: float) -> tuple[float, float]:
-        """Return the only input by which an output has a value, and its rate; see `follow`."""
-        (input_,), (rate,) = self.follow([output], [value], [seed])
-        return input_, rate
-
     def from_source(self, settings: InputSettings, position: float, speed: Optional[float],
                     seed: Optional[float]) -> tuple[float, Optional[float]]:
         """
@@ -179,8 +175,8 @@ class SceneMechanism:
         speed = None if speed is None else settings.ratio * speed
         if not settings.measures:
             return value, speed
-        input_, rate = self.measured(
-            settings.measures, value, settings.start if seed is None else seed)
+        (input_,), (rate,) = self.follow(
+            [settings.measures], [value], [settings.start if seed is None else seed])
         return input_, None if speed is None else speed / rate if rate else math.nan
 
     def to_source(self, settings: InputSettings, value: float, speed: float
@@ -267,12 +263,8 @@ def _linkage(name: str, type_: str, values: Values) -> tuple[Mechanism, tuple[Ar
     except ValueError as error:
         raise SceneError(f'{name}.dimensions: {error}') from None
     if not reach:
-        # Changed dimensions come first, since a long list is shortened.
-        usual = sorted(dimensions, key=lambda key: dimensions[key] == design.dimensions[key])
-        lengths = listed(f'{key}={dimensions[key]:g}' for key in usual)
         raise SceneError(f'{name}.{"dimensions" if dimensions else "joints"} must let the {type_} '
-                         f'be assembled at some {linkage.inputs[0].kind}'
-                         + f', which {lengths} do not' * bool(dimensions))
+                         f'be assembled at some {linkage.inputs[0].kind}')
     return linkage, reach
 
 
