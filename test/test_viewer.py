@@ -3,7 +3,6 @@
 
 """The viewer: what its page is sent, and what requests of the page do to the nodes."""
 
-import cmath
 import gc
 import json
 import math
@@ -224,24 +223,6 @@ def test_an_input_goes_again_to_where_it_started_though_that_is_a_middle_or_an_e
         assert page.pose(f'/{name}', output='crank', value=value)['reason'] == ''
 
 
-@pytest.mark.nightly(all_but=1)
-@pytest.mark.parametrize('lengths, sign', [
-    ((80.0, 150.0, 0.0), 1.0), ((80.0, 150.0, 25.0), -1.0), ((1.0, 150.0, 0.0), 1.0)])
-def test_a_lever_that_is_dragged_beyond_its_reach_goes_to_its_end(show, lengths, sign):
-    running = show({**LEVER, **{f'lever.dimensions.{name}': length
-                                for name, length in zip('abe', lengths)}})
-    (a, b, e), page = lengths, running.page()
-    end = sign * math.asin((a - sign * e) / b)
-    for beyond in (2.0, 1.0):
-        answer = page.pose('/lever', output='lever', value=sign * beyond)
-        assert (answer['reach']['name'], answer['reach']['unit']) == ('lever', 'rad')
-        assert answer['outputs']['lever']['value'] == pytest.approx(end, abs=1e-9)
-        servo = running.value('lever.crank.start')
-        pin = 1j * a * cmath.exp(1j * servo) + 1j * b
-        slot = cmath.phase(pin / 1j) - math.asin(e / abs(pin))
-        assert slot == pytest.approx(end, abs=1e-9)
-
-
 @pytest.mark.parametrize('key, want, reason', [
     ('/gone', {}, "no mechanism '/gone'; there are: /lever, /drop"),
     ('/drop', {'output': 'lever', 'value': 0.1}, "no output 'lever'"),
@@ -250,19 +231,6 @@ def test_a_lever_that_is_dragged_beyond_its_reach_goes_to_its_end(show, lengths,
 def test_what_cannot_be_brought_about_says_why(lever, page, key, want, reason):
     assert re.search(reason, page.pose(key, **want)['reason'])
     assert lever.value('lever.crank.speed') == 1.0
-
-
-@pytest.mark.nightly
-def test_any_joint_of_any_leg_is_brought_where_it_can_be(show):
-    page = show({**RATE, 'mechanisms': ['walker'], 'walker.type': 'jansen',
-                 'walker.leg_pairs': 3, 'walker.scale': 0.01}).page()
-    # The second pair's right leg, and what its foot is asked to do.
-    lag, theta = math.tau / 3, 2.0
-    x, y = mechanisms.create('jansen').solve(math.pi - (theta - lag), ('G',))['G'] * 0.01
-    crank = page.pose('/walker', joint='G', leg=3, place=[-x, y])['inputs']['crank']
-    until(lambda: len(joints := page.drawn('/walker', 'joints')) and abs(
-        joints[4 * 8 - 1] - (-x, y, 0.0)).max() < 1e-6)
-    assert math.remainder(crank - theta, math.tau) == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.nightly

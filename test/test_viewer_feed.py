@@ -5,7 +5,6 @@
 
 import json
 import math
-import struct
 
 import numpy as np
 import pytest
@@ -69,43 +68,6 @@ def test_of_a_message_what_is_deleted_or_no_line_joint_or_triangle_is_not_drawn(
     (head, _), = read(topic)
     assert [marker['kind'] for marker in head['markers']] == [
         'joints', 'lines', 'triangles', 'locus']
-
-
-def swapped(message):
-    """Return a message as a machine of the other byte order writes it."""
-    text, size = bytearray(b'\0\0\0\0'), {'boolean': 1, 'uint8': 1, 'int32': 4,
-                                          'uint32': 4, 'float': 4, 'double': 8}
-    form = {'boolean': '?', 'uint8': 'B', 'int32': 'i', 'uint32': 'I', 'float': 'f',
-            'double': 'd'}
-
-    def number(kind, value):
-        text.extend(bytes(-(len(text) - 4) % size[kind]))
-        text.extend(struct.pack('>' + form[kind], value))
-
-    def write(kind, value):
-        if kind.startswith('sequence<'):
-            number('uint32', len(value))
-            for one in value:
-                write(kind[len('sequence<'):-1], one)
-        elif kind == 'string':
-            number('uint32', len(value) + 1)
-            text.extend(value.encode() + b'\0')
-        elif kind in size:
-            number(kind, value)
-        else:
-            for name, inner in value.get_fields_and_field_types().items():
-                write(inner, getattr(value, name))
-
-    write('', message)
-    return bytes(text)
-
-
-def test_markers_in_the_other_byte_order_are_drawn_alike():
-    topic = feed_of_a_leg()
-    for text in (walker(1), walker(2)):
-        topic.newest = swapped(deserialize_message(text, MarkerArray))
-        assert topic.newest[4:] != text[4:]
-        assert read(topic) == frame_of(markers_of(text))
 
 
 def hostile(rng, text):

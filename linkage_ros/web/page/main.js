@@ -21,7 +21,9 @@ const [views, names, workshop, arrows, whole, notice] = [
 const stored = { shown: '', from: {}, names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
 let { shown } = stored;
 let fading = 0;
+/** Whether a picture is to be drawn, and was received. */
 let scheduled = false;
+let received = false;
 
 const store = values => sessionStorage.setItem('kept', JSON.stringify(Object.assign(stored, values)));
 
@@ -103,21 +105,21 @@ connect({
       if (topic === 'markers' && mechanisms.has(key)) mechanisms.get(key).lastMarkers = performance.now();
     }
     panel.follow();
-    draw(() => tell('drawn'));
+    received = true;
+    draw();
   },
 });
 
-/** Draw once before the next refresh of the screen, then call `after`. */
-function draw(after) {
-  if (scheduled && !after) return;
+/** Draw once before the next refresh of the screen. */
+function draw() {
+  if (scheduled) return;
   scheduled = true;
   requestAnimationFrame(() => {
     scheduled = false;
-    try {
-      picture.draw();
-    } finally {
-      after?.();
-    }
+    // What cannot be drawn does not keep the next picture away.
+    if (received) tell('drawn');
+    received = false;
+    picture.draw();
   });
 }
 

@@ -90,7 +90,7 @@ export class Plot {
   /** Update the plot after a change of a parameter. */
   update(setting) {
     if (isTuned(setting)) this.refresh();
-    else this.render();
+    else if (setting.group === 'speeds') this.render();
   }
 
   async request() {
