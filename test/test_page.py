@@ -174,35 +174,28 @@ def test_a_slider_sets_the_nodes_and_a_refusal_springs_back_and_is_forgotten(loo
         until(lambda: seen.reason('lever', 'b') == '')
 
 
-def test_a_number_can_be_written_with_a_point_or_a_comma(look):
+def test_numbers_are_arithmetic_in_the_unit_that_is_shown_and_branches_are_buttons(look):
     running, seen = look(LEVER, 'lever')
-    for text, value in (('80,5', 80.5), ('81.25', 81.25), (',5e2', 50.0), ('2*(40+5)', 90.0)):
+    for text, value in (('80,5', 80.5), ('2*(40+5)', 90.0)):
         seen.type('lever', 'a', text)
         until(lambda wanted=value: running.value('lever.dimensions.a') == wanted)
         assert seen.reason('lever', 'a') == ''
-    for text in ('1,234.5', '8x', '0x50', '8--', 'b/2', 'Infinity', '1e400', 400 * '9'):
+    for text, start in (('1,234.5', '1.234.5'), ('b/2', 'b/2'), ('1e400', '1e400')):
         seen.type('lever', 'a', text)
-        start = text[:20].replace(',', '.')
-        said = until(lambda: seen.reason('lever', 'a'))
-        assert said.startswith(f"Refused: '{start}")
-        assert 'is not a number' in said or 'must be 0 or' in said
+        assert until(lambda: seen.reason('lever', 'a')).startswith(f"Refused: '{start}")
         assert seen.number('lever', 'a') == 90.0
     seen.type('lever', 'a', '')
     assert seen.number('lever', 'a') == 90.0
-    seen.click('document.getElementById("workshop")')
-    for text, angle in (('90deg', 0.5 * math.pi), ('pi/3', math.pi / 3.0), ('30', math.pi / 6),
-                        ('2*30', math.pi / 3.0)):
+    seen.value('workshop.click()')
+    for text, angle in (('90deg', 0.5 * math.pi), ('pi/3', math.pi / 3.0), ('2*15', math.pi / 6)):
         seen.type('lever', 'crank', text)
         until(lambda wanted=angle: running.value('lever.crank.start')
               == pytest.approx(wanted, abs=1e-12))
-    seen.click('document.getElementById("workshop")')
     inward = seen.button('in')
     seen.value(f'{inward}.scrollIntoView()')
     seen.click(inward)
     until(lambda: running.value('lever.branches.L') == -1)
     seen.becomes(f'{inward}.ariaPressed === "true"')
-    seen.type('lever', 'a', '91')
-    until(lambda: running.value('lever.dimensions.a') == 91.0)
 
 
 def test_a_bar_and_its_slider_light_up_and_changes_are_undone_and_saved(look, tmp_path):
@@ -629,7 +622,8 @@ import('/picture.js').then(({ Picture }) => {
 })"""
 # Mechanisms wherever they are; at a quarter of all heights (y + 18) - y < 18.
 TITLES = """
-picture.mechanisms = Array.from({ length: 16 }, (_, i) => ({ key: i, title: 'linkage'.slice(i % 5) }));
+picture.mechanisms = Array.from({ length: 16 }, (_, i) => (
+  { key: i, title: 'linkage'.slice(i % 5) }));
 const y = 4 ** (5 * random()), x = 4 ** (5 * random());
 for (const { key } of picture.mechanisms) {
   const [left, top] = [x * random(), -y * (random() < 0.5 || random())];

@@ -60,26 +60,6 @@ def node(request, graph):
 
 
 @pytest.mark.nightly
-def test_every_number_has_a_meaning_a_unit_and_its_limits_with_whole_stops(node):
-    found = list(numbers(node))
-    assert sum(range_ is not None for _, _, range_ in found) > 4
-    for parameter, about, range_ in found:
-        name = parameter.name
-        assert about.description.endswith('.') and about.additional_constraints, name
-        unit = re.search(r'\[(m|rad|rad/s|m/s|Hz|1)\]', about.description)
-        assert unit or parameter.type_ == Parameter.Type.INTEGER or name.endswith('.scale'), name
-        assert (range_ is not None) == (' from ' in about.additional_constraints), name
-        if range_ is None:
-            continue
-        assert range_.from_value <= parameter.value <= range_.to_value, name
-        assert range_.step == (1 if parameter.type_ == Parameter.Type.INTEGER else 0.0), name
-        values = stops(range_.from_value, range_.to_value,
-                       parameter.type_ == Parameter.Type.INTEGER)
-        assert values[0] == pytest.approx(range_.from_value, rel=1e-9), about.name
-        assert values[-1] == pytest.approx(range_.to_value, rel=1e-9), about.name
-
-
-@pytest.mark.nightly
 def test_every_stop_is_accepted_or_the_linkage_forbids_it(node):
     accepted = 0
     for parameter, about, range_ in numbers(node):

@@ -31,12 +31,10 @@ from rcl_interfaces.msg import (  # noqa: E402
     ParameterEvent,
     ParameterValue,
 )
-import rclpy  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from viewer_harness import (  # noqa: E402
     example,
-    EXAMPLES,
     LEG,
     LEVER,
     lever_of,
@@ -127,22 +125,6 @@ def test_a_refusal_says_why_and_changes_nothing(lever, page, values, reason):
     assert (lever.value('lever.dimensions.a'), lever.value('lever.dimensions.b')) == (80.0, 150.0)
 
 
-def test_what_nobody_announces_is_not_on_the_page(graph, show):
-    def other(**kwargs):
-        node = rclpy.create_node('a_node', **kwargs)
-        node.declare_parameter('lever.dimensions.b', 1.0)
-        node.declare_parameter('lever.spring', 1.0)
-        return node
-
-    graph.start(other)
-    running = show(LEVER)
-    page = running.page()
-    settings = page.mechanisms('/lever', '/drop')['/lever']['settings']
-    assert 'spring' not in {setting['name'] for setting in settings}
-    assert page.set('/lever', dimensions__b=152.0) == ''
-    assert running.value('lever.dimensions.b') == 152.0
-
-
 def test_announcements_that_make_no_sense_change_nothing(graph, show):
     page = show(LEVER).page()
     publisher = graph.node.create_publisher(
@@ -162,20 +144,6 @@ def test_announcements_that_make_no_sense_change_nothing(graph, show):
     json.dumps(page.messages, allow_nan=False)
     answer = page.pose('/lever')
     assert answer['reason'] == '' and 'crank' in answer['inputs']
-
-
-@pytest.mark.nightly
-def test_what_every_node_is_given_is_of_the_node_that_reads_it(show):
-    running = show({**LEG, 'leg.crank.speed': 1.0, 'rate': 30.0})
-    driver, = (node for node in running.nodes if isinstance(node, CrankDriver))
-    driver.set_parameters([Parameter('rate', value=20.0)])
-    page = running.page()
-    assert page.set('/leg', crank__speed=-2.5) == ''
-    speed, = (setting for setting in page.mechanisms('/leg')['/leg']['settings']
-              if setting['name'] == 'crank.speed')
-    assert (speed['low'], speed['high']) == (-100.0, 100.0) and '[rad/s]' in speed['meaning']
-    assert running.value('leg.crank.speed') == -2.5
-    assert 'rate: 20.0' in page.ask('export', mechanism='/leg', form='yaml')['text']
 
 
 def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
@@ -288,43 +256,16 @@ def test_what_is_saved_or_exported_is_the_mechanism_as_it_is(page):
         header.written(machine)]
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize('path', [path for path in EXAMPLES if path.parent.name == 'config'],
-                         ids=lambda path: path.stem)
-def test_a_saved_scene_names_all_that_defines_it_and_is_the_running_one(show, path, tmp_path):
-    before = scene.load(str(path))
-    page = show(example(path.stem), kinds=(CrankDriver, Kinematics)).page()
-    saved = tmp_path / 'saved.yaml'
-    saved.write_text(page.ask('save', mechanism=f'/{next(iter(before.machines))}')['text'])
-    assert scene.load(str(saved)).parameters == before.parameters
-    names = set(yaml.safe_load(saved.read_text())['/**']['ros__parameters'])
-    for name, machine in before.machines.items():
-        assert {'mechanisms', f'{name}.type', f'{name}.scale', *(
-            f'{name}.dimensions.{key}' for key in machine.linkage.dimensions)} <= names
-    assert len(names) < len(before.parameters)
-
-
 def test_the_page_is_sent_what_an_output_does_over_a_turn(page):
-    about_lever, about_drop = ([page.ask('curve', mechanism=key, kind=kind) for kind in kinds]
-                               for key, kinds in (('/lever', curves.KINDS),
-                                                  ('/drop', curves.KINDS[3:])))
-    x, step = np.array(about_lever[0]['x']), 1e-4
-    phi, before, after = (np.array([lever_of(theta + shift) for theta in x])
-                          for shift in (0.0, -step, step))
-    speed = (after - before) / (2.0 * step)
-    slope = (after - 2.0 * phi + before) / step ** 2
-    truth = phi, speed, slope, 0.5 * math.pi + 0.0 * x, 1.0 / speed
-    for curve, values in zip(about_lever, truth):
-        y = np.array(curve['y'], float)
-        known = np.isfinite(y)
-        assert known.sum() >= 357 and set(np.array(curve['x'])[known]) <= set(x)
-        np.testing.assert_allclose(y[known], values[np.isin(x, np.array(curve['x'])[known])],
-                                   rtol=2e-5, atol=2e-7)
-    assert [curve['units'][1] for curve in about_lever] == ['rad', 'rad/s', 'rad/s²', 'rad', '']
-    assert about_lever[0]['ends'] == about_lever[0]['dead'] == []
+    units = [page.ask('curve', mechanism='/lever', kind=kind)['units'] for kind in curves.KINDS]
+    assert units == [['rad', unit] for unit in ('rad', 'rad/s', 'rad/s²', 'rad', '')]
+    lever = page.ask('curve', mechanism='/lever')
+    assert len(lever['x']) == 361 and lever['ends'] == lever['dead'] == []
+    np.testing.assert_allclose(lever['y'], list(map(lever_of, lever['x'])), atol=1e-12)
     # A kite lies flat at 0 and at pi: there it may be assembled in two ways.
-    assert about_drop[0]['dead'] == [-math.pi, 0.0] and about_drop[0]['output'] == 'B'
-    assert about_drop[0]['y'][180] in (0.0, math.pi)
+    drop = page.ask('curve', mechanism='/drop', kind='transmission angle')
+    assert drop['dead'] == [-math.pi, 0.0] and drop['output'] == 'B'
+    assert drop['y'][180] in (0.0, math.pi)
 
 
 @pytest.mark.parametrize('text, answer', [
@@ -341,7 +282,7 @@ def test_arithmetic_is_read_by_the_library(page, text, answer):
         assert {**said, **answer} == said and said['reason'] == ''
 
 
-def test_a_node_that_is_silent_at_first_is_waited_for_and_not_guessed(graph, show):
+def test_nodes_that_come_later_or_in_a_namespace_are_waited_for_and_not_guessed(graph, show):
     # Whoever will announce its parameters there has not done so.
     graph.node.create_publisher(MarkerArray, 'leg/markers', 1)
     graph.node.create_publisher(Marker, 'leg/locus', LATCHED)
@@ -350,21 +291,15 @@ def test_a_node_that_is_silent_at_first_is_waited_for_and_not_guessed(graph, sho
     page = running.page()
     assert [page.ask(op, mechanism='/leg')['reason'] for op in ('pose', 'tune', 'curve')] == [
         "there is no mechanism '/leg'; there are: "] * 3
-    running.nodes.extend(graph.start(kind, {**LEG, 'leg.scale': 0.5}) for kind in NODES)
-    page.mechanisms('/leg')
+    running.nodes.extend(graph.start(kind, {**LEG, 'leg.scale': 0.5}, namespace=space)
+                         for kind in NODES for space in ('', 'robots/left'))
+    page.mechanisms('/leg', '/robots/left/leg')
     g_x = 0.5 * mechanisms.create('jansen').solve(1.0, ('G',))['G'][0]
-    assert page.pose('/leg')['outputs']['G.x']['value'] == pytest.approx(g_x)
-
-
-def test_nodes_that_come_later_or_in_a_namespace_are_found(graph, show):
-    running = show({}, kinds=())
-    page = running.page()
-    running.nodes.extend(graph.start(kind, LEG, namespace='robots/left')
-                         for kind in (CrankDriver, Kinematics))
-    page.mechanisms('/robots/left/leg')
-    until(lambda: len(page.drawn('/robots/left/leg', 'joints')))
-    until(lambda: page.set('/robots/left/leg', crank__speed=2.0) == '')
-    assert running.value('leg.crank.speed') == 2.0
+    for key in ('/leg', '/robots/left/leg'):
+        assert page.pose(key)['outputs']['G.x']['value'] == pytest.approx(g_x)
+        until(lambda key=key: len(page.drawn(key, 'joints')))
+    assert page.set('/robots/left/leg', crank__speed=2.0) == ''
+    assert sorted(running.values('leg.crank.speed')) == [0.0, 2.0]
 
 
 def test_where_an_input_is_that_nobody_has_named_is_not_guessed(graph, show):

@@ -19,7 +19,7 @@ pytest.importorskip('rclpy')
 
 from linkage_ros import mechanisms, scene  # noqa: E402
 from linkage_ros.web import curves, poses  # noqa: E402
-from linkage_ros.web.nearest_pose import theta_of  # noqa: E402
+from linkage_ros.web.nearest_pose import nearest_inputs, theta_of  # noqa: E402
 from viewer_harness import DOUBLE, example, EXAMPLES, machine_of  # noqa: E402
 
 
@@ -261,6 +261,30 @@ def test_a_joint_moved_by_several_inputs_goes_where_it_is_wanted_within_their_en
     far = poses.reached(digger, present, {'joint': 'T', 'place': [99.0, 0.0]})[0]
     assert all(low <= value <= high for value, (low, high) in zip(far, within))
     assert tip(far)[0] > max(tip(corner)[0] for corner in itertools.product(*within)) - 1e-6
+
+
+@pytest.mark.nightly(all_but=2)
+@pytest.mark.parametrize('type_, joint, arcs', [
+    ('jansen', 'G', [(-math.pi, math.pi)]), ('jansen', 'C', [(0.5, 2.0)]),
+    ('peaucellier', 'C', None), ('water_drop', 'P', [(-1.0, 0.25)])])
+def test_no_pose_of_a_fine_scale_is_nearer_by_more_than_the_leash(type_, joint, arcs):
+    linkage = mechanisms.create(type_)
+    arcs = arcs or linkage.reach()
+    samples = np.concatenate([np.linspace(*arc, 20001) for arc in arcs])
+    path = linkage.solve(samples, (joint,))[joint]
+    width = np.ptp(path, axis=0).max()
+    rng = np.random.default_rng(16)
+    for place in path.mean(axis=0) + rng.normal(size=(40, 2)) * width:
+        theta, = nearest_inputs(linkage, joint, place, [arcs[0][0]], [arcs])
+        away = np.hypot(*(linkage.solve(float(theta), (joint,))[joint] - place))
+        assert any(low <= theta <= high for low, high in arcs)
+        assert away <= np.hypot(*(path - place).T).min() + 0.1 * width
+
+
+def test_what_cannot_be_assembled_is_not_dragged():
+    linkage = mechanisms.create('peaucellier')
+    with pytest.raises(ValueError, match='cannot be assembled'):
+        nearest_inputs(linkage, 'C', [0.0, 0.0], [3.0], [[(3.0, 3.1)]])
 
 
 def test_a_pose_of_several_inputs_is_described_whole():
