@@ -8,12 +8,11 @@ from __future__ import annotations
 import asyncio
 from concurrent.futures import Future
 from contextlib import suppress
-from importlib.resources import files
 import ipaddress
 import json
+from pathlib import Path
 import re
 import socket
-from string import Template
 from threading import Thread
 from typing import Any, Callable
 
@@ -26,14 +25,10 @@ from ..words import elided, quoted
 
 Message = dict[str, Any]
 
-PAGE = files(__package__) / 'page'
-FILES = {start + file.name: file.read_text('utf-8')
-         for start, folder in (('', PAGE), ('vendor/', PAGE / 'vendor'))
-         for file in folder.iterdir() if file.is_file()}
-KINDS = {'html': 'text/html', 'css': 'text/css', 'js': 'text/javascript', 'svg': 'image/svg+xml'}
-# Files with placeholders for the palette's colours, which are their names in lower case.
-COLOURED = 'css', 'svg'
-COLOURS = {name.lower(): colour for name, colour in vars(palette).items() if name.isupper()}
+PAGE = Path(__file__).parent / 'page'
+# The palette's colours, which are their names in lower case there.
+PALETTE = ''.join(f':root {{ --palette-{name.lower()}: {colour}; }}\n'
+                  for name, colour in vars(palette).items() if name.isupper())
 HEADERS = {
     'Content-Security-Policy':
         "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
@@ -96,8 +91,9 @@ class Server:
     async def _serve(self, port: int, started: Future[Any]) -> None:
         self._view.loop = asyncio.get_running_loop()
         app = web.Application(middlewares=[self._guard])
-        app.add_routes([web.get('/', _file), web.get('/socket', self._connect),
-                        web.get('/{name:.+}', _file)])
+        app.add_routes([web.get('/', _index), web.get('/palette.css', _palette),
+                        web.get('/socket', self._connect),
+                        web.static('/', PAGE, follow_symlinks=True)])
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=MAX_CLOSE_S)
         await runner.setup()
         try:
@@ -130,6 +126,8 @@ class Server:
         response = await handler(request)
         if not response.prepared:
             response.headers.update(HEADERS)
+            # On an open connection, pipelined requests would accumulate without limit.
+            response.force_close()
         return response
 
     def _is_own(self, host: str) -> bool:
@@ -264,14 +262,9 @@ class Client:
         await asyncio.wait_for(self._socket.send_json(message), MAX_READ_S)
 
 
-async def _file(request: web.Request) -> web.Response:
-    name = request.match_info.get('name', 'index.html')
-    if name not in FILES:
-        raise web.HTTPNotFound(text=f'There is no {name!r}.\n')
-    ending = name.rpartition('.')[2]
-    response = web.Response(
-        text=Template(FILES[name]).substitute(COLOURS) if ending in COLOURED else FILES[name],
-        charset='utf-8', content_type=KINDS.get(ending, 'text/plain'))
-    # On an open connection, pipelined requests would accumulate without limit.
-    response.force_close()
-    return response
+async def _index(_: web.Request) -> web.FileResponse:
+    return web.FileResponse(PAGE / 'index.html')
+
+
+async def _palette(_: web.Request) -> web.Response:
+    return web.Response(text=PALETTE, content_type='text/css')
