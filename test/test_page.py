@@ -596,7 +596,7 @@ def blank(lever, tmp_path_factory):
 def test_a_number_has_room_in_its_field_and_all_the_digits_that_have(blank):
     values = [sign * value * 10.0 ** power for sign in (1.0, -1.0)
               for value in (1.0, 1.234567891, 9.99999999) for power in range(-300, 300)]
-    texts = blank.value('import("/units.js").then(({ figures }) =>'
+    texts = blank.value('import("/control.js").then(({ figures }) =>'
                         f' {values}.map(value => figures(value, 6)))')
     for value, text in zip(values, texts):
         assert len(text) <= 9

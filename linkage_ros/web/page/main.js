@@ -4,12 +4,11 @@
 // The page: passes the viewer's messages to picture and panel, and requests to the viewer.
 
 import { connect, tell } from './connection.js';
-import { button, put } from './control.js';
+import { button, put, units } from './control.js';
 import { isTuned, Mechanism } from './mechanism.js';
 import { Panel } from './panel.js';
 import { Picture } from './picture.js';
 import { View } from './pointer.js';
-import { units } from './units.js';
 
 const REFUSED = 4000;
 const mechanisms = new Map();

@@ -3,8 +3,7 @@
 
 // The picture: markers to scale, seen at a right angle to the plane of the linkage.
 
-import { put } from './control.js';
-import { figures, units } from './units.js';
+import { clamp, figures, put, units } from './control.js';
 import { middle } from './pointer.js';
 
 const MARGIN = 44;
@@ -26,8 +25,6 @@ const FONT = "13px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 
 /** A colour of the style sheet. */
 export const paint = name => getComputedStyle(document.documentElement).getPropertyValue(name);
-
-const clamp = (value, low, high) => Math.max(low, Math.min(value, high));
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 

@@ -3,11 +3,10 @@
 
 // A plot of an output over a turn or a stroke of the first input; the other inputs are fixed.
 
-import { button, element, Newest, put, Reason } from './control.js';
+import { button, element, figures, Newest, put, Reason, units } from './control.js';
 import { isTuned } from './mechanism.js';
 import { beside } from './motion.js';
 import { multiples, paint } from './picture.js';
-import { figures, units } from './units.js';
 
 const FONT = "12px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 const DIGIT = 7.5;
