@@ -74,38 +74,26 @@ def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
         'excavator': DOUBLE, 'scissor_lift': {'scale': 2.0, 'carriage.start': 2.4}}.get(name, {}))
     present = [1.02 * value for value in present]
     heads, *rows = csv.reader(io.StringIO(curves.exported(machine, present, 'csv', 'world')))
-    table, linkage = np.array(rows, float).T, machine.linkage
-    input_, *others = linkage.inputs
-    outputs = {joint: 'rad' if linkage.is_angle(joint) else 'm' for joint in linkage.joints
-               if joint not in machine.inputs}
-    outputs.update((f'{point}.{axis}', 'm') for point in linkage.points
-                   if point not in linkage.grounded for axis in 'xy')
-    ratio = {'mm': '1', 'radrad': '1', 'radm': 'N·m/N', 'mrad': 'N/(N·m)'}
-    angles = {head.split()[2] for head in heads if head.startswith('transmission')}
-    assert heads == [f'{input_.name} [{input_.unit}]', *(
-        f'{kind} {output} [{unit}{per}]'
-        for kind, per in (('position', ''), ('velocity', '/s'), ('acceleration', '/s²'))
-        for output, unit in outputs.items()), *(
-        f'transmission angle {joint} [rad]' for joint in linkage.transmission_angles(
-            theta_of([drive.start / machine.scale_of(key)
-                            for key, drive in machine.inputs.items()]))), *(
-        f'force ratio {output} [{ratio[unit + input_.unit]}]'
-        for output, unit in outputs.items())]
     # Rounded, an end is outside the reach.
-    x = table[0, 1:-1]
-    own = [x / machine.scale_of(input_.name), *(
-        value / machine.scale_of(other.name) for other, value in zip(others, present[1:]))]
-    columns = dict(zip(heads, table[:, 1:-1]))
-    truth = linkage.joint_angles(theta_of(own), list(outputs))
-    sharp = linkage.transmission_angles(theta_of(own))
-    for joint in angles:
-        np.testing.assert_allclose(columns[f'transmission angle {joint} [rad]'], sharp[joint],
+    columns, linkage = dict(zip(heads, np.array(rows, float).T[:, 1:-1])), machine.linkage
+    unit_in = linkage.inputs[0].unit
+    x = columns[f'{linkage.inputs[0].name} [{unit_in}]']
+    theta = theta_of([value / scale for value, scale in zip([x, *present[1:]], machine.scales)])
+    outputs = [*(joint for joint in linkage.joints if joint not in machine.inputs), *(
+        f'{point}.{axis}' for point in linkage.points if point not in linkage.grounded
+        for axis in 'xy')]
+    angles = linkage.transmission_angles(theta)
+    assert len(heads) == 1 + 4 * len(outputs) + len(angles)
+    for joint, angle in angles.items():
+        np.testing.assert_allclose(columns[f'transmission angle {joint} [rad]'], angle,
                                    rtol=1e-9, atol=1e-9)
-    for output, unit in outputs.items():
-        position, speed, change = (columns[f'{kind} {output} [{unit}{per}]'] for kind, per in (
-            ('position', ''), ('velocity', '/s'), ('acceleration', '/s²')))
-        size = machine.scale_of(output)
-        np.testing.assert_allclose(position, size * truth[output], rtol=1e-9, atol=1e-9 * size)
+    ratio = {'mm': '1', 'radrad': '1', 'radm': 'N·m/N', 'mrad': 'N/(N·m)'}
+    for output, truth in linkage.joint_angles(theta, outputs).items():
+        unit, size = 'rad' if linkage.is_angle(output) else 'm', machine.scale_of(output)
+        position, speed, change, force = (columns[f'{kind} {output} [{form}]'] for kind, form in (
+            ('position', unit), ('velocity', f'{unit}/s'), ('acceleration', f'{unit}/s²'),
+            ('force ratio', ratio[unit + unit_in])))
+        np.testing.assert_allclose(position, size * truth, rtol=1e-9, atol=1e-9 * size)
         inner = slice(60, -60)
         for slope, values in ((speed, np.unwrap(position) if unit == 'rad' else position),
                               (change, speed)):
@@ -113,7 +101,6 @@ def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
                                        rtol=1e-2, atol=1e-9 * max(1.0, np.abs(position).max())
                                        + 1e-2 * np.abs(slope[inner]).max())
         known = np.isfinite(speed) & (np.abs(speed) > 1e-9 * np.abs(position).max())
-        force = columns[f'force ratio {output} [{ratio[unit + input_.unit]}]']
         np.testing.assert_allclose(force[known] * speed[known], 1.0, rtol=1e-9)
 
 
@@ -179,16 +166,12 @@ def test_an_input_goes_to_the_nearest_of_two_arcs_and_not_where_nothing_can_be_a
     bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'four_bar', 'bar.crank.start': 1.0, **{
         f'bar.dimensions.{name}': length for name, length in zip('abcd', (3.0, 2.0, 2.5, 3.0))}})
     bar = bar.machines['bar']
-    (low, _), (_, high) = bar.first.reach
-    for value, expected in ((3.0, high), (-3.0, low), (3.5, low), (-0.5, None), (0.01, None)):
+    (low, beside), (beyond, high) = bar.first.reach
+    for value, expected in ((3.0, high), (-3.0, low), (3.5, low), (0.01, beyond), (-0.01, beside)):
         (found,), reach = poses.reached(bar, [1.0], {'output': 'crank', 'value': value})
-        ends = [abs(math.remainder(end - value, math.tau)) for arc in bar.first.reach
-                for end in arc]
-        inside = any(one <= value <= other for one, other in bar.first.reach)
-        assert (reach is None) == inside
-        assert abs(math.remainder(found - value, math.tau)) == pytest.approx(
-            0.0 if inside else min(ends), abs=1e-12)
-        assert expected is None or found == expected
+        assert found == pytest.approx(expected, abs=1e-12) and reach['arcs'] == bar.first.reach
+    inside = 0.5 * (beyond + high)
+    assert poses.reached(bar, [1.0], {'output': 'crank', 'value': inside}) == ([inside], None)
     five, = scene.read({'mechanisms': ['five_bar']}).machines.values()
     with pytest.raises(scene.SceneError, match='^five_bar cannot be assembled there$'):
         poses.reached(five, [1.9, 1.24], {'output': 'crank2', 'value': -1.9})
