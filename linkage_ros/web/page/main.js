@@ -46,7 +46,6 @@ whole.onclick = () => picture.view.reset();
 
 /** Light up the bars of a dimension, and its slider. */
 function light(mechanism, dimension) {
-  if (picture.lit.mechanism === mechanism && picture.lit.dimension === dimension) return;
   picture.lit = { mechanism, dimension };
   panel.lit(mechanism?.key, dimension);
   draw();
