@@ -104,7 +104,7 @@ class SceneView:
         # Subscriptions and clients of services by name, feeds of markers by topic.
         self._entities: dict[str, Any] = {}
         self._feeds: dict[str, Feed] = {}
-        # The last position by topic and joint: received in the executor's thread, or moved to.
+        # The last position by topic and joint, from the executor's thread.
         self._positions: dict[tuple[str, str], float] = {}
 
     def add(self, client: Any) -> None:
@@ -192,9 +192,6 @@ class SceneView:
                 if any(drive.input.holds(arc, near, near) for arc in drive.arcs))
             values[f'{name}.speed'] = 0.0
         await self.set(shown.key, values)
-        for drive, value in zip(machine.inputs.values(), inputs):
-            position, _ = machine.to_source(drive, value, 0.0)
-            self._positions.update(((topic, drive.source), position) for topic in shown.sources)
 
     async def tune(self, mechanism: str) -> Answer:
         """Return the result of `poses.tunable`."""

@@ -99,10 +99,7 @@ export class Plot {
     if (answer.reason) this.chosen[about] = this.curve?.about === about ? this.curve.output : undefined;
     if (answer.reason || about !== this.about || !this.element.open) return;
     this.curve = { ...answer, about, kind };
-    const names = [...new Set([...answer.names, answer.output])];
-    if (names.join() !== [...this.output.options].map(({ value }) => value).join()) {
-      this.output.replaceChildren(...options(names));
-    }
+    this.output.replaceChildren(...options([...new Set([...answer.names, answer.output])]));
     this.output.value = answer.output;
     this.other.hidden = about === 'joint';
     this.draw();
