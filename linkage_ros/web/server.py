@@ -13,6 +13,7 @@ import json
 from pathlib import Path
 import re
 import socket
+from string import Template
 from threading import Thread
 from typing import Any, Callable
 
@@ -26,9 +27,9 @@ from ..words import elided, quoted
 Message = dict[str, Any]
 
 PAGE = Path(__file__).parent / 'page'
-# The palette's colours, which are their names in lower case there.
-PALETTE = ''.join(f':root {{ --palette-{name.lower()}: {colour}; }}\n'
-                  for name, colour in vars(palette).items() if name.isupper())
+# Files with placeholders for the palette's colours, which are their names in lower case.
+COLOURED = {'/style.css': 'text/css', '/icon.svg': 'image/svg+xml'}
+COLOURS = {name.lower(): colour for name, colour in vars(palette).items() if name.isupper()}
 HEADERS = {
     'Content-Security-Policy':
         "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
@@ -91,8 +92,8 @@ class Server:
     async def _serve(self, port: int, started: Future[Any]) -> None:
         self._view.loop = asyncio.get_running_loop()
         app = web.Application(middlewares=[self._guard])
-        app.add_routes([web.get('/', _index), web.get('/palette.css', _palette),
-                        web.get('/socket', self._connect),
+        app.add_routes([web.get('/', _index), web.get('/socket', self._connect),
+                        *(web.get(path, _coloured) for path in COLOURED),
                         web.static('/', PAGE, follow_symlinks=True)])
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=MAX_CLOSE_S)
         await runner.setup()
@@ -266,5 +267,7 @@ async def _index(_: web.Request) -> web.FileResponse:
     return web.FileResponse(PAGE / 'index.html')
 
 
-async def _palette(_: web.Request) -> web.Response:
-    return web.Response(text=PALETTE, content_type='text/css')
+async def _coloured(request: web.Request) -> web.Response:
+    text = (PAGE / request.path[1:]).read_text('utf-8')
+    return web.Response(text=Template(text).substitute(COLOURS),
+                        content_type=COLOURED[request.path])
