@@ -23,6 +23,7 @@ from linkage_ros.c_code import header  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
+from linkage_ros.web import curves  # noqa: E402
 from linkage_ros.web.viewer import Viewer  # noqa: E402
 from PIL import Image  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
@@ -43,7 +44,7 @@ from viewer_harness import (  # noqa: E402
 )
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
-pytestmark = needs_browser
+pytestmark = [needs_browser, pytest.mark.nightly]
 STILL_LEVER = {**LEVER, 'lever.crank.speed': 0.0}
 
 
@@ -63,18 +64,6 @@ def look(show, tmp_path):
 
 # --- the picture and the view ---
 
-@pytest.mark.nightly
-def test_the_picture_moves_and_a_click_stops_it(look):
-    running, seen = look({**LEVER, 'drop.crank.speed': 0.0, 'lever.crank.speed': 3.0}, 'lever')
-    until(lambda: len(coloured(seen.canvas(), *BLUE)) > 1000)
-    first = seen.canvas()
-    until(lambda: (seen.canvas() != first).any(axis=2).sum() > 1000)
-    seen.click(f'{seen.section("lever")}.querySelector("button")')
-    until(lambda: running.value('lever.crank.speed') == 0.0)
-    until(seen.is_still)
-
-
-@pytest.mark.nightly
 def test_a_picture_of_what_is_far_off_is_drawn_and_left(look):
     # Its locus is as large as these markers.
     running, seen = look({**LEG, 'leg.scale': 0.01}, kinds=(Kinematics,))
@@ -93,7 +82,6 @@ def test_a_picture_of_what_is_far_off_is_drawn_and_left(look):
             until(is_drawn)
 
 
-@pytest.mark.nightly
 def test_the_picture_is_zoomed_shifted_and_turned_by_keys_and_mouse(look):
     _, seen = look({**STILL_LEVER, 'lever.crank.start': 1.0}, 'lever')
 
@@ -125,37 +113,14 @@ def test_the_picture_is_zoomed_shifted_and_turned_by_keys_and_mouse(look):
     assert seen.value('document.getElementById("whole").hidden')
 
 
-@pytest.mark.nightly
-def test_a_picture_that_cannot_be_drawn_does_not_keep_the_next_one_from_being_drawn(look):
-    _, seen = look(LEVER)
-    seen.value("""(() => {
-        const context = picture.getContext('2d');
-        const { fillRect } = context;
-        window.drawn = 0;
-        context.fillRect = function (...where) {
-            window.drawn += 1;
-            if (window.drawn === 3) throw new Error('nothing can be drawn');
-            fillRect.apply(context, where);
-        };
-    })()""")
-    seen.becomes('window.drawn > 10')
-    assert len(seen.complaints) == 1
-    seen.complaints.clear()
-
-
-@pytest.mark.nightly
 def test_a_linkage_in_space_is_drawn_whole_and_says_what_the_page_does_not(look, tmp_path):
     _, seen = look({**example('ankle'), 'rate': 20.0})
 
     def is_whole():
         picture = seen.canvas()
-        places = coloured(picture, *BLUE)
-        if not len(places):
-            return False
-        height, width, _ = picture.shape
-        low, high = places.min(axis=0), places.max(axis=0)
-        return (low > 20).all() and (high < (height - 20, width - 20)).all() \
-            and high[0] - low[0] > 0.5 * height
+        places, size = coloured(picture, *BLUE), np.array(picture.shape[:2])
+        low, high = places.min(axis=0, initial=size[0]), places.max(axis=0, initial=0)
+        return (low > 20).all() and (high < size - 20).all() and high[0] - low[0] > 0.5 * size[0]
 
     until(is_whole)
     text = seen.value(f'{seen.section("ankle")}.innerText')
@@ -170,7 +135,6 @@ def test_a_linkage_in_space_is_drawn_whole_and_says_what_the_page_does_not(look,
 
 # --- tuning ---
 
-@pytest.mark.nightly
 def test_a_slider_sets_the_nodes_and_a_refusal_springs_back_and_is_forgotten(look):
     running, seen = look(LEVER, 'lever')
 
@@ -207,39 +171,30 @@ def test_a_slider_sets_the_nodes_and_a_refusal_springs_back_and_is_forgotten(loo
         until(lambda: seen.reason('lever', 'b') == '')
 
 
-@pytest.mark.nightly
-def test_a_number_can_be_written_with_a_point_or_a_comma(look):
+def test_numbers_are_arithmetic_in_the_unit_that_is_shown_and_branches_are_buttons(look):
     running, seen = look(LEVER, 'lever')
-    for text, value in (('80,5', 80.5), ('81.25', 81.25), (',5e2', 50.0), ('2*(40+5)', 90.0)):
+    for text, value in (('80,5', 80.5), ('2*(40+5)', 90.0)):
         seen.type('lever', 'a', text)
         until(lambda wanted=value: running.value('lever.dimensions.a') == wanted)
         assert seen.reason('lever', 'a') == ''
-    for text in ('1,234.5', '8x', '0x50', '8--', 'b/2', 'Infinity', '1e400', 400 * '9'):
+    for text, start in (('1,234.5', '1.234.5'), ('b/2', 'b/2'), ('1e400', '1e400')):
         seen.type('lever', 'a', text)
-        start = text[:20].replace(',', '.')
-        said = until(lambda: seen.reason('lever', 'a'))
-        assert said.startswith(f"Refused: '{start}")
-        assert 'is not a number' in said or 'must be 0 or' in said
+        assert until(lambda: seen.reason('lever', 'a')).startswith(f"Refused: '{start}")
         assert seen.number('lever', 'a') == 90.0
     seen.type('lever', 'a', '')
     assert seen.number('lever', 'a') == 90.0
-    seen.click('document.getElementById("workshop")')
-    for text, angle in (('90deg', 0.5 * math.pi), ('pi/3', math.pi / 3.0), ('30', math.pi / 6),
-                        ('2*30', math.pi / 3.0)):
+    seen.value('workshop.click()')
+    for text, angle in (('90deg', 0.5 * math.pi), ('pi/3', math.pi / 3.0), ('2*15', math.pi / 6)):
         seen.type('lever', 'crank', text)
         until(lambda wanted=angle: running.value('lever.crank.start')
               == pytest.approx(wanted, abs=1e-12))
-    seen.click('document.getElementById("workshop")')
     inward = seen.button('in')
     seen.value(f'{inward}.scrollIntoView()')
     seen.click(inward)
     until(lambda: running.value('lever.branches.L') == -1)
     seen.becomes(f'{inward}.ariaPressed === "true"')
-    seen.type('lever', 'a', '91')
-    until(lambda: running.value('lever.dimensions.a') == 91.0)
 
 
-@pytest.mark.nightly
 def test_a_bar_and_its_slider_light_up_and_changes_are_undone_and_saved(look, tmp_path):
     running, seen = look(LEG)
 
@@ -282,7 +237,6 @@ def test_a_bar_and_its_slider_light_up_and_changes_are_undone_and_saved(look, tm
 
 # --- dragging ---
 
-@pytest.mark.nightly
 def test_a_second_finger_neither_moves_the_joint_of_the_first_nor_takes_one(look):
     running, seen = look(STILL_LEVER, 'lever')
 
@@ -314,7 +268,6 @@ def test_a_second_finger_neither_moves_the_joint_of_the_first_nor_takes_one(look
     assert crank() == before
 
 
-@pytest.mark.nightly
 def test_what_is_refused_is_said_where_one_looks_and_leaves_the_picture_free(look):
     running, seen = look(
         {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}, kinds=(Kinematics,))
@@ -340,7 +293,6 @@ def test_what_is_refused_is_said_where_one_looks_and_leaves_the_picture_free(loo
     until(lambda: reason() == "Refused: 'foo' is not a number: foo is unknown")
 
 
-@pytest.mark.nightly
 def test_a_click_on_a_bar_goes_to_its_slider_and_a_drag_from_it_does_not(look):
     _, seen = look(STILL_LEVER, 'lever')
     tip, pivot = seen.upright_lever()
@@ -357,7 +309,6 @@ def test_a_click_on_a_bar_goes_to_its_slider_and_a_drag_from_it_does_not(look):
     until(is_there)
 
 
-@pytest.mark.nightly
 def test_a_joint_follows_the_mouse_and_stops_at_its_reach(look):
     running, seen = look(STILL_LEVER, 'lever')
     tip, pivot = seen.upright_lever()
@@ -379,7 +330,6 @@ def test_a_joint_follows_the_mouse_and_stops_at_its_reach(look):
     assert running.value('lever.crank.speed') == 0.0
 
 
-@pytest.mark.nightly
 def test_an_input_is_moved_with_the_keys_by_steps_and_in_degrees(look):
     running, seen = look({**LEVER, 'lever.crank.speed': 1.5}, 'lever')
 
@@ -411,7 +361,6 @@ def test_an_input_is_moved_with_the_keys_by_steps_and_in_degrees(look):
 
 # --- plots, arrows, files ---
 
-@pytest.mark.nightly
 def test_a_plot_follows_what_is_tuned_and_all_can_be_downloaded(look, tmp_path):
     given = {**LEG, 'leg.scale': 0.01, 'leg.leg_pairs': 2, 'leg.crank.speed': -2.0}
     running, seen = look(given)
@@ -460,16 +409,12 @@ def test_a_plot_follows_what_is_tuned_and_all_can_be_downloaded(look, tmp_path):
     assert list(Image.open(files[1]).size) == seen.value('[picture.width, picture.height]')
     machine = scene.read({**given, 'leg.dimensions.m': 16.0, 'leg.crank.start':
                           running.value('leg.crank.start')}).machines['leg']
-    table = np.genfromtxt(tmp_path / 'leg.csv', delimiter=',', names=True, deletechars='"')
-    theta = np.linspace(-math.pi, math.pi, 361)
-    np.testing.assert_allclose(table['crank_[rad]'], theta, atol=1e-11)
-    np.testing.assert_allclose(table['position_G.x_[m]'], 0.01 * machine.linkage.solve(
-        theta, ['G'])['G'][:, 0], rtol=1e-9, atol=1e-12)
+    assert (tmp_path / 'leg.csv').read_text() == curves.exported(
+        machine, [machine.first.start], 'csv', 'world')
     assert (tmp_path / 'leg.urdf').read_text() == urdf.describe([machine], 'world')
     assert (tmp_path / 'leg.h').read_text() == header.written(machine)
 
 
-@pytest.mark.nightly
 def test_a_plot_is_not_drawn_through_a_pole_and_fits_any_window(look):
     _, seen = look(LEG)
     section = seen.section('leg')
@@ -499,7 +444,6 @@ def test_a_plot_is_not_drawn_through_a_pole_and_fits_any_window(look):
         assert seen.value('document.fullscreenElement.scrollWidth') <= width
 
 
-@pytest.mark.nightly
 def test_arrows_are_asked_for_wherever_their_mechanism_s_part_of_the_panel_is(look):
     _, seen = look(LEVER)
     seen.resize(1200, 200, 'light')
@@ -519,7 +463,6 @@ def test_arrows_are_asked_for_wherever_their_mechanism_s_part_of_the_panel_is(lo
 
 # --- connection ---
 
-@pytest.mark.nightly
 def test_a_reload_and_another_viewer_keep_what_is_seen_and_a_lost_connection_is_said(look):
     running, seen = look({**LEVER, 'drop.scale': 0.1}, 'drop')
     url, play = running.url, f'{seen.section("drop")}.querySelector("button")'
@@ -556,7 +499,6 @@ def test_a_reload_and_another_viewer_keep_what_is_seen_and_a_lost_connection_is_
     seen.complaints.clear()
 
 
-@pytest.mark.nightly
 def test_a_phone_may_reload_the_page_as_often_as_it_likes(look):
     running, seen = look({**example('all'), 'rate': 20.0})
     seen.resize(390, 844, 'light')
@@ -568,7 +510,6 @@ def test_a_phone_may_reload_the_page_as_often_as_it_likes(look):
 
 # --- layout ---
 
-@pytest.mark.nightly
 def test_mechanisms_are_in_their_natural_order_and_those_of_one_name_told_apart(graph, look):
     for space in ('left', 'right'):
         for kind in (CrankDriver, Kinematics):
@@ -592,7 +533,6 @@ def test_mechanisms_are_in_their_natural_order_and_those_of_one_name_told_apart(
     seen.becomes(f'{titles} === "all,{shown},{shown}"')
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize('path', sorted((ROOT / 'config').glob('*.yaml')), ids=lambda p: p.stem)
 def test_the_page_is_for_everybody(look, path):
     checker = pytest.importorskip('axe_core_python')
@@ -622,7 +562,6 @@ LONG = {'mechanisms': ['m' * 64], **{f'{"m" * 64}.{name}': value for name, value
 }.items()}}
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize('scale', [1e-6, 1.0, 1e6])
 def test_nothing_is_cut_in_a_narrow_window_however_long(look, scale):
     name, = LONG['mechanisms']
@@ -648,11 +587,10 @@ def blank(lever, tmp_path_factory):
         yield page
 
 
-@pytest.mark.nightly
 def test_a_number_has_room_in_its_field_and_all_the_digits_that_have(blank):
     values = [sign * value * 10.0 ** power for sign in (1.0, -1.0)
               for value in (1.0, 1.234567891, 9.99999999) for power in range(-300, 300)]
-    texts = blank.value('import("/units.js").then(({ figures }) =>'
+    texts = blank.value('import("/control.js").then(({ figures }) =>'
                         f' {values}.map(value => figures(value, 6)))')
     for value, text in zip(values, texts):
         assert len(text) <= 9
@@ -662,80 +600,65 @@ def test_a_number_has_room_in_its_field_and_all_the_digits_that_have(blank):
             assert float(text) == float(f'{value:.6g}')
 
 
-# Titles of mechanisms wherever they are; at a quarter of all heights (y + 18) - y < 18.
-TITLES = """
-import('/picture.js').then(({ Picture }) => {
-  let seed = 1;
-  const random = () => (seed = seed * 16807 % 2147483647) / 2147483647;
-  return Array.from({ length: 2000 }, () => {
-    const picture = new Picture(document.getElementById('picture')), written = [];
-    picture.mechanisms = Array.from({ length: 16 }, (_, i) => (
-      { key: i, title: 'linkage'.slice(i % 5) }));
-    Object.assign(picture, {
-      scale: 1, middle: [0, 0], centre: [0, 0], canvas: CANVAS });
-    const y = 4 ** (5 * random()), x = 4 ** (5 * random());
-    for (const { key } of picture.mechanisms) {
-      const [left, top] = [x * random(), -y * (random() < 0.5 || random())];
-      picture.boxes.set(key, { low: [left, top], high: [left, top] });
-    }
-    picture.text = (name, x, y) => written.push([x, y, picture.context.measureText(name).width]);
-    picture.titles();
-    return written;
-  });
-})"""
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('width, height, fewest', [(1e5, 1e5, 16), (390, 380, 0)])
-def test_titles_are_written_beside_or_below_each_other_wherever_they_are(
-        blank, width, height, fewest):
-    pictures = blank.value(TITLES.replace(
-        'CANVAS', f'{{ clientWidth: {width}, clientHeight: {height} }}'))
-    assert min(map(len, pictures)) >= fewest
-    for written in filter(None, pictures):
-        x, y, wide = np.transpose(written)
-        seen = (x >= 0.0) & (x <= width)
-        assert (x - 0.5 * wide)[seen].min(initial=width) > 0.0
-        assert (x + 0.5 * wide)[seen].max(initial=0.0) < width
-        assert y.max() + 9.0 < height
-        apart = np.maximum(abs(y[:, None] - y) / 18.0,
-                           2.0 * abs(x[:, None] - x) / (wide[:, None] + wide))
-        assert apart[~np.eye(len(x), dtype=bool)].min(initial=1.0) > 1.0 - 1e-9
-
-
-# Names of joints, none on another, cut, or nearer to another's joint.
-NAMES = """
+# What is written in pictures of random places.
+LABELS = """
 import('/picture.js').then(({ Picture }) => {
   let seed = 7;
   const random = () => (seed = seed * 16807 % 2147483647) / 2147483647;
-  return Array.from({ length: 300 }, () => {
-    const picture = new Picture(document.getElementById('picture')), written = [];
-    const places = [];
-    while (places.length < 8) {
-      const [x, y] = [390 * random(), 380 * random()];
-      if (places.every(([a, b]) => Math.hypot(x - a, y - b) > 70)) places.push([x, y]);
-    }
-    const points = places.map((_, i) => 'joint'.slice(i % 4) + i);
+  return Array.from({ length: COUNT }, () => {
+    const picture = new Picture(document.getElementById('picture')), written = [], places = [];
     Object.assign(picture, { scale: 1, middle: [0, 0], centre: [0, 0],
-      canvas: { clientWidth: 390, clientHeight: 380 } });
-    picture.at = (x, y) => [x, y];
+      canvas: { clientWidth: WIDTH, clientHeight: HEIGHT } });
     picture.text = (name, x, y) => written.push([x, y, picture.context.measureText(name).width]);
-    picture.names({ mechanism: { joints: { width: 6 } },
-      seen: new Map(points.map((name, i) => [name, places[i]])) });
+    BODY
     return [places, written];
   });
 })"""
+# Mechanisms wherever they are; at a quarter of all heights (y + 18) - y < 18.
+TITLES = """
+picture.mechanisms = Array.from({ length: 16 }, (_, i) => (
+  { key: i, title: 'linkage'.slice(i % 5) }));
+const y = 4 ** (5 * random()), x = 4 ** (5 * random());
+for (const { key } of picture.mechanisms) {
+  const [left, top] = [x * random(), -y * (random() < 0.5 || random())];
+  picture.boxes.set(key, { low: [left, top], high: [left, top] });
+}
+picture.titles();"""
+NAMES = """
+while (places.length < 8) {
+  const [x, y] = [390 * random(), 380 * random()];
+  if (places.every(([a, b]) => Math.hypot(x - a, y - b) > 70)) places.push([x, y]);
+}
+picture.names({ mechanism: { joints: { width: 6 } },
+  seen: new Map(places.map((place, i) => ['joint'.slice(i % 4) + i, place])) });"""
 
 
-@pytest.mark.nightly
+def labelled(page, body, count, width, height, high):
+    """Yield joints and labels of pictures: none is cut, or on another."""
+    script = LABELS.replace('BODY', body).replace('COUNT', str(count)).replace(
+        'WIDTH', str(width)).replace('HEIGHT', str(height))
+    for places, written in page.value(script):
+        x, y, wide = np.transpose(written or np.empty((0, 3)))
+        seen = (x >= 0.0) & (x <= width)
+        assert (x - 0.5 * wide)[seen].min(initial=width) > 0.0
+        assert (x + 0.5 * wide)[seen].max(initial=0.0) < width
+        assert y.max(initial=0.0) + 0.5 * high < height
+        apart = np.maximum(abs(y[:, None] - y) / high,
+                           2.0 * abs(x[:, None] - x) / (wide[:, None] + wide))
+        assert apart[~np.eye(len(x), dtype=bool)].min(initial=1.0) > 1.0 - 1e-9
+        yield np.transpose(places), (x, y, wide)
+
+
+@pytest.mark.parametrize('width, height, fewest', [(1e5, 1e5, 16), (390, 380, 0)])
+def test_titles_are_written_beside_or_below_each_other_wherever_they_are(
+        blank, width, height, fewest):
+    for _, (x, *_) in labelled(blank, TITLES, 2000, width, height, 18.0):
+        assert len(x) >= fewest
+
+
 def test_names_of_joints_are_whole_apart_and_beside_their_own(blank):
-    for joints, written in blank.value(NAMES):
-        x, y, width = np.transpose(written)
-        assert (x - 0.5 * width).min() > 0.0 and (x + 0.5 * width).max() < 390.0
-        assert y.min() > 8.0 and y.max() < 372.0
-        apart = np.maximum(abs(y[:, None] - y) / 16.0,
-                           2.0 * abs(x[:, None] - x) / (width[:, None] + width))
-        assert apart[~np.eye(len(x), dtype=bool)].min() > 1.0 - 1e-9
+    for joints, (x, y, width) in labelled(blank, NAMES, 300, 390, 380, 16.0):
+        assert len(x) == 8
         away = np.hypot(*(np.maximum(abs(at[:, None] - of) - half, 0.0) for at, of, half in zip(
-            (x, y), np.transpose(joints), (0.5 * width[:, None], 8.0))))
+            (x, y), joints, (0.5 * width[:, None], 8.0))))
         assert (away.argmin(axis=1) == np.arange(len(x))).all()

@@ -18,7 +18,6 @@ from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 
-NUMBERS = (Parameter.Type.INTEGER, Parameter.Type.DOUBLE)
 SCENES = [
     {},
     {'mechanisms': ['walker', 'lever'], 'walker.type': 'jansen', 'walker.leg_pairs': 6,
@@ -28,68 +27,25 @@ SCENES = [
 CANNOT_BE = re.compile(r'dimensions must let the \w+ be assembled')
 
 
-def stops(low, high, whole):
-    """Return the values that the slider can send (rqt_reconfigure, param_editors.py)."""
-    if whole:
-        return list(range(low, high + 1))
-    scale = 100 / (high - low)
-    return [place / scale for place in range(round(low * scale), round(high * scale) + 1)]
-
-
-def some(values):
-    """Return the ends and every tenth between: to build a linkage anew takes its time."""
-    return sorted({*values[:2], *values[::10], *values[-2:]})
-
-
-def numbers(node):
-    """Return parameter, descriptor and range of every number, None where it has no range."""
+@pytest.mark.nightly
+@pytest.mark.parametrize('scene', SCENES, ids=range(len(SCENES)))
+@pytest.mark.parametrize('kind', [CrankDriver, Kinematics])
+def test_every_stop_is_accepted_or_the_linkage_forbids_it(graph, kind, scene):
+    node, accepted = graph.start(kind, scene), 0
     for parameter in node.get_parameters_by_prefix('').values():
-        if parameter.type_ in NUMBERS:
-            about = node.describe_parameter(parameter.name)
-            ranges = [*about.floating_point_range, *about.integer_range]
-            yield parameter, about, ranges[0] if len(ranges) == 1 else None
-
-
-@pytest.fixture(params=[(kind, i) for kind in (CrankDriver, Kinematics)
-                        for i in range(len(SCENES))],
-                ids=lambda param: f'{param[0].__name__}-{param[1]}')
-def node(request, graph):
-    """Start each node with each scene."""
-    kind, scene = request.param
-    return graph.start(kind, SCENES[scene])
-
-
-@pytest.mark.nightly
-def test_every_number_has_a_meaning_a_unit_and_its_limits_with_whole_stops(node):
-    found = list(numbers(node))
-    assert sum(range_ is not None for _, _, range_ in found) > 4
-    for parameter, about, range_ in found:
-        name = parameter.name
-        assert about.description.endswith('.') and about.additional_constraints, name
-        unit = re.search(r'\[(m|rad|rad/s|m/s|Hz|1)\]', about.description)
-        assert unit or parameter.type_ == Parameter.Type.INTEGER or name.endswith('.scale'), name
-        assert (range_ is not None) == (' from ' in about.additional_constraints), name
-        if range_ is None:
-            continue
-        assert range_.from_value <= parameter.value <= range_.to_value, name
-        assert range_.step == (1 if parameter.type_ == Parameter.Type.INTEGER else 0.0), name
-        values = stops(range_.from_value, range_.to_value,
-                       parameter.type_ == Parameter.Type.INTEGER)
-        assert values[0] == pytest.approx(range_.from_value, rel=1e-9), about.name
-        assert values[-1] == pytest.approx(range_.to_value, rel=1e-9), about.name
-
-
-@pytest.mark.nightly
-def test_every_stop_is_accepted_or_the_linkage_forbids_it(node):
-    accepted = 0
-    for parameter, about, range_ in numbers(node):
-        if about.read_only or range_ is None:
-            continue
-        values = stops(range_.from_value, range_.to_value,
-                       parameter.type_ == Parameter.Type.INTEGER)
-        for value in values if '.crank.' in about.name else some(values):
-            result, = node.set_parameters([Parameter(about.name, parameter.type_, value)])
-            assert result.successful or CANNOT_BE.search(result.reason), (value, result.reason)
-            accepted += result.successful
-        assert node.set_parameters([parameter])[0].successful
+        about = node.describe_parameter(parameter.name)
+        for ends in (*about.floating_point_range, *about.integer_range):
+            low, high = ends.from_value, ends.to_value
+            assert low <= parameter.value <= high and about.additional_constraints, about.name
+            # What the slider can send (rqt_reconfigure, param_editors.py).
+            scale = 100 / (high - low) if isinstance(low, float) else 1
+            values = [place / scale if isinstance(low, float) else place
+                      for place in range(round(low * scale), round(high * scale) + 1)]
+            # To build a linkage anew takes its time.
+            few = sorted({*values[:2], *values[::10], *values[-2:]})
+            for value in values if '.crank.' in about.name else few if not about.read_only else ():
+                result, = node.set_parameters([Parameter(about.name, parameter.type_, value)])
+                assert result.successful or CANNOT_BE.search(result.reason), (value, result.reason)
+                accepted += result.successful
+            assert about.read_only or node.set_parameters([parameter])[0].successful
     assert accepted > 15

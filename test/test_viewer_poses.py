@@ -19,13 +19,13 @@ pytest.importorskip('rclpy')
 
 from linkage_ros import mechanisms, scene  # noqa: E402
 from linkage_ros.web import curves, poses  # noqa: E402
-from linkage_ros.web.nearest_pose import theta_of  # noqa: E402
+from linkage_ros.web.nearest_pose import nearest_inputs, theta_of  # noqa: E402
 from viewer_harness import DOUBLE, example, EXAMPLES, machine_of  # noqa: E402
 
 
 @pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
 def test_the_page_is_told_what_it_draws_and_moves(path):
-    for name, machine in scene.load(str(path)).machines.items():
+    for machine in scene.load(str(path)).machines.values():
         told = json.loads(json.dumps(poses.drawn(
             machine, dict.fromkeys(machine.inputs, 2.5)), allow_nan=False))
         legs = machine.assembly().legs
@@ -34,21 +34,17 @@ def test_the_page_is_told_what_it_draws_and_moves(path):
         assert told['space'] == (machine.linkage.type == 'rods')
         assert told['points'] == list(machine.points)
         assert told['sides'].keys() == machine.linkage.branches.keys()
-        default = scene.read({'mechanisms': [name], **{
-            key: value for key, value in machine.values.items() if not key.endswith('.speed')}})
         assert told['inputs'].keys() == machine.inputs.keys()
-        for key, drive in default.machines[name].inputs.items():
-            assert told['inputs'][key]['speed'] == 2.5
-            assert drive.default_speed == drive.speed != 0.0
-            assert told['inputs'][key]['unit'] == ('rad' if drive.input.turns else 'm')
-            turn = told['inputs'][key]['turn']
-            assert (turn is not None) == drive.input.turns
-            start = [one.start for one in machine.inputs.values()]
-            other = [value + (turn or 0.0) * (one == key)
-                     for one, value in zip(machine.inputs, start)]
+        start = [drive.start for drive in machine.inputs.values()]
+        for i, (key, drive) in enumerate(machine.inputs.items()):
+            about = told['inputs'][key]
+            assert (about['speed'], about['unit']) == (2.5, drive.input.unit)
+            assert about['ends'] == [drive.arcs[0][0], drive.arcs[-1][1]]
+            assert (about['turn'] is not None) == drive.input.turns
+            other = [value + (about['turn'] or 0.0) * (j == i) for j, value in enumerate(start)]
+            after = machine.linkage.solve(theta_of(other))
             for joint, place in machine.linkage.solve(theta_of(start)).items():
-                np.testing.assert_allclose(
-                    machine.linkage.solve(theta_of(other))[joint], place, atol=1e-9)
+                np.testing.assert_allclose(after[joint], place, atol=1e-9)
 
 
 @pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
@@ -74,38 +70,26 @@ def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
         'excavator': DOUBLE, 'scissor_lift': {'scale': 2.0, 'carriage.start': 2.4}}.get(name, {}))
     present = [1.02 * value for value in present]
     heads, *rows = csv.reader(io.StringIO(curves.exported(machine, present, 'csv', 'world')))
-    table, linkage = np.array(rows, float).T, machine.linkage
-    input_, *others = linkage.inputs
-    outputs = {joint: 'rad' if linkage.is_angle(joint) else 'm' for joint in linkage.joints
-               if joint not in machine.inputs}
-    outputs.update((f'{point}.{axis}', 'm') for point in linkage.points
-                   if point not in linkage.grounded for axis in 'xy')
-    ratio = {'mm': '1', 'radrad': '1', 'radm': 'N·m/N', 'mrad': 'N/(N·m)'}
-    angles = {head.split()[2] for head in heads if head.startswith('transmission')}
-    assert heads == [f'{input_.name} [{input_.unit}]', *(
-        f'{kind} {output} [{unit}{per}]'
-        for kind, per in (('position', ''), ('velocity', '/s'), ('acceleration', '/s²'))
-        for output, unit in outputs.items()), *(
-        f'transmission angle {joint} [rad]' for joint in linkage.transmission_angles(
-            theta_of([drive.start / machine.scale_of(key)
-                            for key, drive in machine.inputs.items()]))), *(
-        f'force ratio {output} [{ratio[unit + input_.unit]}]'
-        for output, unit in outputs.items())]
     # Rounded, an end is outside the reach.
-    x = table[0, 1:-1]
-    own = [x / machine.scale_of(input_.name), *(
-        value / machine.scale_of(other.name) for other, value in zip(others, present[1:]))]
-    columns = dict(zip(heads, table[:, 1:-1]))
-    truth = linkage.joint_angles(theta_of(own), list(outputs))
-    sharp = linkage.transmission_angles(theta_of(own))
-    for joint in angles:
-        np.testing.assert_allclose(columns[f'transmission angle {joint} [rad]'], sharp[joint],
+    columns, linkage = dict(zip(heads, np.array(rows, float).T[:, 1:-1])), machine.linkage
+    unit_in = linkage.inputs[0].unit
+    x = columns[f'{linkage.inputs[0].name} [{unit_in}]']
+    theta = theta_of([value / scale for value, scale in zip([x, *present[1:]], machine.scales)])
+    outputs = [*(joint for joint in linkage.joints if joint not in machine.inputs), *(
+        f'{point}.{axis}' for point in linkage.points if point not in linkage.grounded
+        for axis in 'xy')]
+    angles = linkage.transmission_angles(theta)
+    assert len(heads) == 1 + 4 * len(outputs) + len(angles)
+    for joint, angle in angles.items():
+        np.testing.assert_allclose(columns[f'transmission angle {joint} [rad]'], angle,
                                    rtol=1e-9, atol=1e-9)
-    for output, unit in outputs.items():
-        position, speed, change = (columns[f'{kind} {output} [{unit}{per}]'] for kind, per in (
-            ('position', ''), ('velocity', '/s'), ('acceleration', '/s²')))
-        size = machine.scale_of(output)
-        np.testing.assert_allclose(position, size * truth[output], rtol=1e-9, atol=1e-9 * size)
+    ratio = {'mm': '1', 'radrad': '1', 'radm': 'N·m/N', 'mrad': 'N/(N·m)'}
+    for output, truth in linkage.joint_angles(theta, outputs).items():
+        unit, size = 'rad' if linkage.is_angle(output) else 'm', machine.scale_of(output)
+        position, speed, change, force = (columns[f'{kind} {output} [{form}]'] for kind, form in (
+            ('position', unit), ('velocity', f'{unit}/s'), ('acceleration', f'{unit}/s²'),
+            ('force ratio', ratio[unit + unit_in])))
+        np.testing.assert_allclose(position, size * truth, rtol=1e-9, atol=1e-9 * size)
         inner = slice(60, -60)
         for slope, values in ((speed, np.unwrap(position) if unit == 'rad' else position),
                               (change, speed)):
@@ -113,7 +97,6 @@ def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
                                        rtol=1e-2, atol=1e-9 * max(1.0, np.abs(position).max())
                                        + 1e-2 * np.abs(slope[inner]).max())
         known = np.isfinite(speed) & (np.abs(speed) > 1e-9 * np.abs(position).max())
-        force = columns[f'force ratio {output} [{ratio[unit + input_.unit]}]']
         np.testing.assert_allclose(force[known] * speed[known], 1.0, rtol=1e-9)
 
 
@@ -179,16 +162,12 @@ def test_an_input_goes_to_the_nearest_of_two_arcs_and_not_where_nothing_can_be_a
     bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'four_bar', 'bar.crank.start': 1.0, **{
         f'bar.dimensions.{name}': length for name, length in zip('abcd', (3.0, 2.0, 2.5, 3.0))}})
     bar = bar.machines['bar']
-    (low, _), (_, high) = bar.first.reach
-    for value, expected in ((3.0, high), (-3.0, low), (3.5, low), (-0.5, None), (0.01, None)):
+    (low, beside), (beyond, high) = bar.first.reach
+    for value, expected in ((3.0, high), (-3.0, low), (3.5, low), (0.01, beyond), (-0.01, beside)):
         (found,), reach = poses.reached(bar, [1.0], {'output': 'crank', 'value': value})
-        ends = [abs(math.remainder(end - value, math.tau)) for arc in bar.first.reach
-                for end in arc]
-        inside = any(one <= value <= other for one, other in bar.first.reach)
-        assert (reach is None) == inside
-        assert abs(math.remainder(found - value, math.tau)) == pytest.approx(
-            0.0 if inside else min(ends), abs=1e-12)
-        assert expected is None or found == expected
+        assert found == pytest.approx(expected, abs=1e-12) and reach['arcs'] == bar.first.reach
+    inside = 0.5 * (beyond + high)
+    assert poses.reached(bar, [1.0], {'output': 'crank', 'value': inside}) == ([inside], None)
     five, = scene.read({'mechanisms': ['five_bar']}).machines.values()
     with pytest.raises(scene.SceneError, match='^five_bar cannot be assembled there$'):
         poses.reached(five, [1.9, 1.24], {'output': 'crank2', 'value': -1.9})
@@ -241,11 +220,6 @@ def test_a_joint_of_any_leg_goes_where_it_is_wanted_or_as_near_as_it_gets(leg):
         (found,), reach = poses.reached(walker, [crank + 0.2], want)
         assert math.remainder(found - crank, math.tau) == pytest.approx(0.0, abs=1e-6)
         assert reach is None
-    everywhere = foot(np.linspace(-math.pi, math.pi, 20001))
-    for place in ([0.1, -1.5], [-0.9, -0.2]):
-        (found,), _ = poses.reached(walker, [0.3], {'joint': 'G', 'leg': leg, 'place': place})
-        assert math.dist(foot(np.array([found]))[0], place) == pytest.approx(
-            np.linalg.norm(everywhere - place, axis=1).min(), rel=1e-6)
 
 
 def test_a_joint_moved_by_several_inputs_goes_where_it_is_wanted_within_their_ends():
@@ -261,6 +235,30 @@ def test_a_joint_moved_by_several_inputs_goes_where_it_is_wanted_within_their_en
     far = poses.reached(digger, present, {'joint': 'T', 'place': [99.0, 0.0]})[0]
     assert all(low <= value <= high for value, (low, high) in zip(far, within))
     assert tip(far)[0] > max(tip(corner)[0] for corner in itertools.product(*within)) - 1e-6
+
+
+@pytest.mark.nightly(all_but=2)
+@pytest.mark.parametrize('type_, joint, arcs', [
+    ('jansen', 'G', [(-math.pi, math.pi)]), ('jansen', 'C', [(0.5, 2.0)]),
+    ('peaucellier', 'C', None), ('water_drop', 'P', [(-1.0, 0.25)])])
+def test_no_pose_of_a_fine_scale_is_nearer_by_more_than_the_leash(type_, joint, arcs):
+    linkage = mechanisms.create(type_)
+    arcs = arcs or linkage.reach()
+    samples = np.concatenate([np.linspace(*arc, 20001) for arc in arcs])
+    path = linkage.solve(samples, (joint,))[joint]
+    width = np.ptp(path, axis=0).max()
+    rng = np.random.default_rng(16)
+    for place in path.mean(axis=0) + rng.normal(size=(40, 2)) * width:
+        theta, = nearest_inputs(linkage, joint, place, [arcs[0][0]], [arcs])
+        away = np.hypot(*(linkage.solve(float(theta), (joint,))[joint] - place))
+        assert any(low <= theta <= high for low, high in arcs)
+        assert away <= np.hypot(*(path - place).T).min() + 0.1 * width
+
+
+def test_what_cannot_be_assembled_is_not_dragged():
+    linkage = mechanisms.create('peaucellier')
+    with pytest.raises(ValueError, match='cannot be assembled'):
+        nearest_inputs(linkage, 'C', [0.0, 0.0], [3.0], [[(3.0, 3.1)]])
 
 
 def test_a_pose_of_several_inputs_is_described_whole():

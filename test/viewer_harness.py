@@ -94,11 +94,11 @@ class Show(contextlib.ExitStack):
         page.mechanisms(*(f'/{name}' for name in self.names))
         return page
 
-    def browser(self, folder, page='section'):
+    def browser(self, folder):
         """Return what a browser sees of the page, which it has loaded."""
         seen = self.enter_context(Seen(folder, self))
         seen.open(self.url)
-        until(lambda: seen.value(f'!!document.querySelector("{page}")'))
+        seen.becomes('!!document.querySelector("section")')
         return seen
 
     def values(self, name):

@@ -16,8 +16,10 @@ from ..robot_model import urdf
 from ..scene import SceneError, SceneMechanism
 
 SAMPLES = 361
-KINDS = POSITION, VELOCITY, ACCELERATION, TRANSMISSION, FORCE = (
-    'position', 'velocity', 'acceleration', 'transmission angle', 'force ratio')
+# The quantities, and whether they are of outputs or of joints.
+KINDS = {'position': 'output', 'velocity': 'output', 'acceleration': 'output',
+         'transmission angle': 'joint', 'force ratio': 'output'}
+POSITION, VELOCITY, ACCELERATION, TRANSMISSION, FORCE = KINDS
 # By quantity: the power of the input's speed with which it grows, and what that adds to its unit.
 POWERS, PER = {VELOCITY: 1, ACCELERATION: 2}, {VELOCITY: '/s', ACCELERATION: '/s²'}
 # Units of the force ratio, by the units of output and input.
@@ -85,12 +87,6 @@ class Sweep:
             values = linkage.joint_angles(inputs, names)
         factor = 1.0 / self._size if kind == VELOCITY else 1.0
         return {name: value * factor * size(name) for name, value in values.items()}
-
-
-def plots(mechanism: SceneMechanism) -> dict[str, str]:
-    """Return of what each of KINDS is plotted: an 'output' or a 'joint'; {} for no plot."""
-    return {} if mechanism.in_space else {
-        kind: 'joint' if kind == TRANSMISSION else 'output' for kind in KINDS}
 
 
 @np.errstate(invalid='ignore')

@@ -40,9 +40,8 @@ def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],
     else:
         value, low, high = _nearest_sample(linkage, joint, goal, present[0], arcs[0])
 
-    def gap_at(inputs: np.ndarray) -> np.ndarray:
-        error: np.ndarray = goal - linkage.solve(theta_of(inputs), (joint,))[joint]
-        return error
+    def gap_at(inputs: np.ndarray) -> Any:
+        return goal - linkage.solve(theta_of(inputs), (joint,))[joint]
 
     gap = gap_at(value)
     for _ in range(GAUSS_NEWTON_STEPS):

@@ -12,7 +12,7 @@ import numpy as np
 from .nearest_pose import nearest_inputs, theta_of
 from ..linkage import Formula, Mechanism
 from ..robot_model.shapes import ground_frame
-from ..scene import InputSettings, Parameter, Scene, SceneError, SceneMechanism, slider
+from ..scene import Parameter, Scene, SceneError, SceneMechanism, slider
 from ..scene.scene_mechanism import divided
 from ..words import listed, quoted
 
@@ -62,8 +62,9 @@ def drawn(mechanism: SceneMechanism, speeds: Mapping[str, float]) -> dict[str, A
     Describe what the page needs to know of a mechanism beside its parameters and markers.
 
     `points` are the joints of a leg in markers, `legs` the number of legs, `pairs` of those on one
-    side. Each input has its unit, `ends` of its slider [rad or m], `turn` [rad] after which poses
-    repeat (None: never), and speed when it plays. `sides` are the words for a branch of +1 and -1.
+    side. Each input has its unit, `ends` of its slider [rad or m], `turn` [rad] after which its
+    poses repeat (None: never), and speed when it plays. `sides` are the words for a branch of +1
+    and of -1.
     """
     return {
         'space': mechanism.in_space, 'points': mechanism.points, 'pairs': mechanism.leg_pairs,
@@ -142,8 +143,7 @@ def number(text: str) -> dict[str, Any]:
     formula = Formula(text if '(' in text else text.replace(',', '.'))
     if formula.names:
         raise SceneError(f'{quoted(text)} is not a number: {listed(formula.names)} is unknown')
-    value = float(formula.value({}))
-    return {'value': value, 'turns': bool({'pi', 'deg'} & formula.words.keys())}
+    return {'value': float(formula.value({})), 'turns': bool({'pi', 'deg'} & formula.words.keys())}
 
 
 def reached(mechanism: SceneMechanism, present: Sequence[float],
@@ -220,12 +220,6 @@ def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, p
     return [float(lag + side * (value - start)) * size for value, size in zip(inputs, sizes)]
 
 
-def next_to(drive: InputSettings, value: float) -> float:
-    """Return a neighbour of an input's value, in the same of its allowed intervals."""
-    low, high = min(drive.arcs, key=lambda arc: max(arc[0] - value, value - arc[1]))
-    return math.nextafter(value, low if value > low else high)
-
-
 def linkage_inputs(mechanism: SceneMechanism, values: Sequence[float]) -> Any:
     """Return inputs [rad or m], or their speeds, as an argument of the unscaled linkage."""
     return theta_of(divided(values, mechanism.scales))
@@ -241,7 +235,7 @@ def tunable(scene_: Scene, name: str) -> dict[str, Any]:
     machine = scene_.machines[name]
     return {'travel': {name_in_mechanism(parameter): slider.ends(scene_, parameter)
                        for parameter in machine.parameters},
-            'fixed': list(ground_frame(machine.linkage)),
+            'fixed': list(machine.linkage.grounded),
             'bars': {f'dimensions.{key}': _bars(machine.linkage, key)
                      for key in machine.linkage.dimensions}}
 

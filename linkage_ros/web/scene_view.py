@@ -35,9 +35,8 @@ EVENTS_TYPE, INPUTS_TYPE = 'rcl_interfaces/msg/ParameterEvent', 'sensor_msgs/msg
 SETTER = 'set_parameters_atomically'
 # Between two looks at the graph; from the last page that is closed to the end of observation.
 POLL_S, LINGER_S = 1.0, 1.0
-# For the first announcement of a node, messages of an input that was moved, and a response;
-# between two looks for one of these.
-MAX_ANNOUNCE_S, MAX_MOVE_S, MAX_ANSWER_S, RETRY_S = 1.0, 1.0, 3.0, 0.005
+# For the first announcement of a node, and a response; between two looks for one of these.
+MAX_ANNOUNCE_S, MAX_ANSWER_S, RETRY_S = 1.0, 3.0, 0.005
 # Parameters that define a scene, which a saved file always has.
 DEFINES = re.compile(r'mechanisms|[^.]+\.(type|scale|dimensions\..+)')
 
@@ -99,8 +98,6 @@ class SceneView:
         self._announced: dict[str, dict[str, Any]] = {}
         self._scenes: dict[str, scene.Scene] = {}
         self._speeds: dict[str, dict[str, float]] = defaultdict(dict)
-        # Where a mechanism was moved to, and until when messages may have its inputs before.
-        self._moved: dict[str, tuple[list[float], float]] = {}
         self._news = asyncio.Event()
         self._watching: Optional[asyncio.Task[None]] = None
         self._stopping: Optional[asyncio.TimerHandle] = None
@@ -160,7 +157,6 @@ class SceneView:
                 SetParametersAtomically.Request(parameters=messages))
             if not response.result.successful:
                 raise SceneError(response.result.reason or f'{node} gives no reason')
-        self._moved.pop(mechanism, None)
         return {}
 
     async def pose(self, mechanism: str, want: Optional[Mapping[str, Any]] = None,
@@ -191,11 +187,11 @@ class SceneView:
             if f'{machine.name}.{name}.start' not in shown.nodes:
                 raise SceneError(f'the {name} cannot be moved: no crank_driver is running')
             # An input moves only to a start that differs from the last one.
-            values[f'{name}.start'] = poses.next_to(drive, value) if (
-                value == drive.start) else value
+            values[f'{name}.start'] = value if value != drive.start else next(
+                near for near in (math.nextafter(value, way) for way in (-math.inf, math.inf))
+                if any(drive.input.holds(arc, near, near) for arc in drive.arcs))
             values[f'{name}.speed'] = 0.0
         await self.set(shown.key, values)
-        self._moved[shown.key] = inputs, self.loop.time() + MAX_MOVE_S
 
     async def tune(self, mechanism: str) -> Answer:
         """Return the result of `poses.tunable`."""
@@ -258,9 +254,6 @@ class SceneView:
     def _state(self, shown: ShownMechanism) -> tuple[SceneMechanism, list[float]]:
         """Return a mechanism and its last received inputs [rad or m], or their starts."""
         machine = self._scenes[shown.owner].machines[shown.name]
-        inputs, until = self._moved.get(shown.key, ([], 0.0))
-        if self.loop.time() < until:
-            return machine, inputs
         inputs = []
         for name, drive in machine.inputs.items():
             position = next((self._positions[topic, drive.source] for topic in shown.sources
@@ -293,7 +286,8 @@ class SceneView:
     def _described(self, shown: ShownMechanism) -> Answer:
         """Describe what the page needs of a mechanism beside its markers."""
         machine = self._scenes[shown.owner].machines[shown.name]
-        return {'key': shown.key, 'name': shown.name, 'curves': curves.plots(machine),
+        return {'key': shown.key, 'name': shown.name,
+                'curves': {} if machine.in_space else curves.KINDS,
                 'settings': list(map(poses.setting, self._settings(shown))),
                 **poses.drawn(machine, self._playing(shown.owner, machine))}
 
@@ -414,13 +408,10 @@ class SceneView:
 
         def receive(raw: bytes) -> None:
             feed.newest = raw
-            self._hand_over(self._offer, feed)
+            for client in [*self.clients]:
+                self._hand_over(client.offer, feed)
 
         return self._node.create_subscription(type_, topic, receive, qos, raw=True)
-
-    def _offer(self, feed: Feed) -> None:
-        for client in self.clients:
-            client.offer(feed)
 
     def _notice(self, event: ParameterEvent) -> None:
         """Adopt announced values, and forward those that have changed to the pages."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 import asyncio
 from concurrent.futures import Future
 from contextlib import suppress
-from importlib.resources import files
 import ipaddress
 import json
+from pathlib import Path
 import re
 import socket
 from string import Template
@@ -26,13 +26,9 @@ from ..words import elided, quoted
 
 Message = dict[str, Any]
 
-PAGE = files(__package__) / 'page'
-FILES = {start + file.name: file.read_text('utf-8')
-         for start, folder in (('', PAGE), ('vendor/', PAGE / 'vendor'))
-         for file in folder.iterdir() if file.is_file()}
-KINDS = {'html': 'text/html', 'css': 'text/css', 'js': 'text/javascript', 'svg': 'image/svg+xml'}
+PAGE = Path(__file__).parent / 'page'
 # Files with placeholders for the palette's colours, which are their names in lower case.
-COLOURED = 'css', 'svg'
+COLOURED = {'/style.css': 'text/css', '/icon.svg': 'image/svg+xml'}
 COLOURS = {name.lower(): colour for name, colour in vars(palette).items() if name.isupper()}
 HEADERS = {
     'Content-Security-Policy':
@@ -96,8 +92,9 @@ class Server:
     async def _serve(self, port: int, started: Future[Any]) -> None:
         self._view.loop = asyncio.get_running_loop()
         app = web.Application(middlewares=[self._guard])
-        app.add_routes([web.get('/', _file), web.get('/socket', self._connect),
-                        web.get('/{name:.+}', _file)])
+        app.add_routes([web.get('/', _index), web.get('/socket', self._connect),
+                        *(web.get(path, _coloured) for path in COLOURED),
+                        web.static('/', PAGE, follow_symlinks=True)])
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=MAX_CLOSE_S)
         await runner.setup()
         try:
@@ -130,6 +127,8 @@ class Server:
         response = await handler(request)
         if not response.prepared:
             response.headers.update(HEADERS)
+            # On an open connection, pipelined requests would accumulate without limit.
+            response.force_close()
         return response
 
     def _is_own(self, host: str) -> bool:
@@ -264,14 +263,11 @@ class Client:
         await asyncio.wait_for(self._socket.send_json(message), MAX_READ_S)
 
 
-async def _file(request: web.Request) -> web.Response:
-    name = request.match_info.get('name', 'index.html')
-    if name not in FILES:
-        raise web.HTTPNotFound(text=f'There is no {name!r}.\n')
-    ending = name.rpartition('.')[2]
-    response = web.Response(
-        text=Template(FILES[name]).substitute(COLOURS) if ending in COLOURED else FILES[name],
-        charset='utf-8', content_type=KINDS.get(ending, 'text/plain'))
-    # On an open connection, pipelined requests would accumulate without limit.
-    response.force_close()
-    return response
+async def _index(_: web.Request) -> web.FileResponse:
+    return web.FileResponse(PAGE / 'index.html')
+
+
+async def _coloured(request: web.Request) -> web.Response:
+    text = (PAGE / request.path[1:]).read_text('utf-8')
+    return web.Response(text=Template(text).substitute(COLOURS),
+                        content_type=COLOURED[request.path])

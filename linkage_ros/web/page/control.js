@@ -1,13 +1,45 @@
 // SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// A slider with a number, and a choice; a refused value springs back, with the reason.
+// Units, a slider with a number, and a choice; a refused value springs back, with the reason.
+// Values are in radians and metres; they are displayed so, or in degrees and millimetres.
 
-import { figures, read, units } from './units.js';
+import { ask } from './connection.js';
+
+const WORKSHOP = { rad: ['°', 180 / Math.PI], m: ['mm', 1000] };
+/** How many characters a field shows. */
+const ROOM = 9;
+
+export const units = {
+  workshop: false,
+
+  /** The displayed unit for one such as 'rad', 'm/s', 'rad/m', and its factor. */
+  of(unit) {
+    if (!this.workshop || !unit) return { name: unit, factor: 1 };
+    const [over, under = ['', 1]] = unit.split('/').map(part => WORKSHOP[part] ?? [part, 1]);
+    return { name: unit.includes('/') ? `${over[0]}/${under[0]}` : over[0], factor: over[1] / under[1] };
+  },
+};
+
+/** A number of at most so many figures that has room in a field. */
+export function figures(value, most) {
+  for (let digits = most; digits > 1; digits--) {
+    const number = Number(value.toPrecision(digits));
+    const short = [String(number), number.toExponential().replace('+', '')].find(text => text.length <= ROOM);
+    if (short) return short;
+  }
+  return value.toExponential(0).replace('+', '');
+}
+
+/** The value [rad or m] of a text in a displayed unit, `factor` times smaller; or the reason why it has none. */
+export async function read(text, unit, factor) {
+  const { value, turns, reason } = await ask({ op: 'read', text });
+  return reason ? { reason } : { value: turns && unit?.startsWith('rad') ? value : value / factor };
+}
 
 const STOPS = 1000;
 
-const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+export const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
 export function element(tag, properties = {}, ...children) {
   const made = Object.assign(document.createElement(tag), properties);
@@ -54,12 +86,10 @@ export class Reason {
   say(words = '') {
     put(this.line, { textContent: words, hidden: !words });
   }
-
-  /** Say why a request was refused; an empty reason: it was not. */
-  refuse(reason) {
-    this.say(reason && `Refused: ${reason}`);
-  }
 }
+
+/** Why a request was refused; an empty reason: it was not. */
+export const refusal = reason => reason && `Refused: ${reason}`;
 
 /** A number with a slider. A gesture, an object or null, lasts from its first change to its release. */
 export class Slider {
@@ -110,7 +140,7 @@ export class Slider {
   async type(text) {
     if (!text) return;
     const { value, reason } = await read(text, this.unit, this.factor);
-    if (reason) this.explain(`Refused: ${reason}`);
+    if (reason) this.explain(refusal(reason));
     else this.offer(value);
   }
 
@@ -133,7 +163,6 @@ export class Slider {
 
   /** A node's rule with its numbers and its unit as they are displayed. */
   translated(reason) {
-    if (this.factor === 1) return reason;
     return reason.replace(/ must .*/s, rule => rule
       .replace(/(?<![\w.])-?\d+(\.\d+)?(e[-+]?\d+)?(?!\w)/g, number => this.shortened(Number(number)))
       .replace(`] ${this.unit},`, `] ${this.unitShown.textContent},`));
@@ -192,7 +221,7 @@ export class Choice {
     this.reason = new Reason();
     this.buttons = words.map(([one, word]) => [one, button(word, async () => {
       const { reason } = await request(one, {});
-      this.reason.refuse(reason);
+      this.reason.say(refusal(reason));
       if (!reason) this.update(one);
     })]);
     this.group = element('span', { className: 'choice', role: 'group', ariaLabel: label }, ...this.buttons.map(([, each]) => each));

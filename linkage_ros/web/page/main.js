@@ -4,12 +4,11 @@
 // The page: passes the viewer's messages to picture and panel, and requests to the viewer.
 
 import { connect, tell } from './connection.js';
-import { button, put } from './control.js';
+import { button, put, units } from './control.js';
 import { isTuned, Mechanism } from './mechanism.js';
 import { Panel } from './panel.js';
 import { Picture } from './picture.js';
 import { View } from './pointer.js';
-import { units } from './units.js';
 
 const REFUSED = 4000;
 const mechanisms = new Map();
@@ -21,7 +20,9 @@ const [views, names, workshop, arrows, whole, notice] = [
 const stored = { shown: '', from: {}, names: true, workshop: false, arrows: '', ...JSON.parse(sessionStorage.getItem('kept') ?? '{}') };
 let { shown } = stored;
 let fading = 0;
+/** Whether a picture is to be drawn, and was received. */
 let scheduled = false;
+let received = false;
 
 const store = values => sessionStorage.setItem('kept', JSON.stringify(Object.assign(stored, values)));
 
@@ -45,7 +46,6 @@ whole.onclick = () => picture.view.reset();
 
 /** Light up the bars of a dimension, and its slider. */
 function light(mechanism, dimension) {
-  if (picture.lit.mechanism === mechanism && picture.lit.dimension === dimension) return;
   picture.lit = { mechanism, dimension };
   panel.lit(mechanism?.key, dimension);
   draw();
@@ -103,21 +103,21 @@ connect({
       if (topic === 'markers' && mechanisms.has(key)) mechanisms.get(key).lastMarkers = performance.now();
     }
     panel.follow();
-    draw(() => tell('drawn'));
+    received = true;
+    draw();
   },
 });
 
-/** Draw once before the next refresh of the screen, then call `after`. */
-function draw(after) {
-  if (scheduled && !after) return;
+/** Draw once before the next refresh of the screen. */
+function draw() {
+  if (scheduled) return;
   scheduled = true;
   requestAnimationFrame(() => {
     scheduled = false;
-    try {
-      picture.draw();
-    } finally {
-      after?.();
-    }
+    // What cannot be drawn does not keep the next picture away.
+    if (received) tell('drawn');
+    received = false;
+    picture.draw();
   });
 }
 

@@ -4,8 +4,7 @@
 // The motion of a mechanism: a slider for each input, play and step, and its present outputs.
 
 import { isOpen } from './connection.js';
-import { button, element, Newest, put, Reason, Slider } from './control.js';
-import { figures, read, units } from './units.js';
+import { button, element, figures, Newest, put, read, Reason, refusal, Slider, units } from './control.js';
 
 const STEP = Math.PI / 180;
 const STEPS_A_STROKE = 100;
@@ -72,7 +71,7 @@ class OutputRow {
       const { value, reason } = text ? await read(text, unit, units.of(unit).factor) : {};
       this.value.blur();
       if (value !== undefined) want({ output: name, value });
-      else say(reason && `Refused: ${reason}`);
+      else say(refusal(reason));
     };
     this.value.onblur = () => this.render();
   }

@@ -3,8 +3,7 @@
 
 // The picture: markers to scale, seen at a right angle to the plane of the linkage.
 
-import { put } from './control.js';
-import { figures, units } from './units.js';
+import { clamp, figures, put, units } from './control.js';
 import { middle } from './pointer.js';
 
 const MARGIN = 44;
@@ -24,10 +23,8 @@ const MAX_LINES = 100;
 const OBLIQUE = { right: [0.8, 0.6, 0], up: [-0.168, 0.224, 0.96], out: [0.576, -0.768, 0.28] };
 const FONT = "13px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 
-/** A colour of the style sheet, which the server fills in. */
+/** A colour of the style sheet. */
 export const paint = name => getComputedStyle(document.documentElement).getPropertyValue(name);
-
-const clamp = (value, low, high) => Math.max(low, Math.min(value, high));
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 

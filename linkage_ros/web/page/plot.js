@@ -3,11 +3,10 @@
 
 // A plot of an output over a turn or a stroke of the first input; the other inputs are fixed.
 
-import { button, element, Newest, put, Reason } from './control.js';
+import { button, element, figures, Newest, put, Reason, units } from './control.js';
 import { isTuned } from './mechanism.js';
 import { beside } from './motion.js';
 import { multiples, paint } from './picture.js';
-import { figures, units } from './units.js';
 
 const FONT = "12px system-ui, 'Noto Sans', 'DejaVu Sans', sans-serif";
 const DIGIT = 7.5;
@@ -90,7 +89,7 @@ export class Plot {
   /** Update the plot after a change of a parameter. */
   update(setting) {
     if (isTuned(setting)) this.refresh();
-    else this.render();
+    else if (setting.group === 'speeds') this.render();
   }
 
   async request() {
@@ -100,10 +99,7 @@ export class Plot {
     if (answer.reason) this.chosen[about] = this.curve?.about === about ? this.curve.output : undefined;
     if (answer.reason || about !== this.about || !this.element.open) return;
     this.curve = { ...answer, about, kind };
-    const names = [...new Set([...answer.names, answer.output])];
-    if (names.join() !== [...this.output.options].map(({ value }) => value).join()) {
-      this.output.replaceChildren(...options(names));
-    }
+    this.output.replaceChildren(...options([...new Set([...answer.names, answer.output])]));
     this.output.value = answer.output;
     this.other.hidden = about === 'joint';
     this.draw();

@@ -3,6 +3,8 @@
 
 // The pointer over the picture: drags joints, finds bars, and zooms, shifts and turns the view, as keys do.
 
+import { clamp } from './control.js';
+
 const PIXELS_A_RADIAN = 200;
 const STEP = 40;
 const ZOOM = 1.2;
@@ -21,7 +23,7 @@ export const middle = points => [0, 1].map(i => points.reduce((sum, at) => sum +
 function distance([x, y], [ax, ay], [bx, by]) {
   const along = [bx - ax, by - ay];
   const part = ((x - ax) * along[0] + (y - ay) * along[1]) / (along[0] ** 2 + along[1] ** 2 || 1);
-  const nearest = Math.min(Math.max(part, 0), 1);
+  const nearest = clamp(part, 0, 1);
   return Math.hypot(x - ax - nearest * along[0], y - ay - nearest * along[1]);
 }
 
@@ -82,7 +84,7 @@ export class View {
 
   /** Zoom by a factor about a place in the canvas, by default its middle. */
   magnify(factor, at) {
-    const zoom = Math.min(Math.max(this.zoom * factor, MIN_ZOOM), MAX_ZOOM);
+    const zoom = clamp(this.zoom * factor, MIN_ZOOM, MAX_ZOOM);
     const real = zoom / this.zoom;
     const centre = [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2];
     this.shift = this.shift.map((shift, i) => ((at ?? centre)[i] - centre[i]) * (1 - real) + shift * real);
@@ -97,7 +99,7 @@ export class View {
 
   turn(x, y) {
     this.yaw -= x / PIXELS_A_RADIAN;
-    this.pitch = Math.min(Math.max(this.pitch + y / PIXELS_A_RADIAN, -Math.PI / 2), Math.PI / 2);
+    this.pitch = clamp(this.pitch + y / PIXELS_A_RADIAN, -Math.PI / 2, Math.PI / 2);
     this.changed();
   }
 

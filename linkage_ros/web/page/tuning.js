@@ -3,7 +3,7 @@
 
 // The parameters of a mechanism: a control for each, undo and reset, and files to download.
 
-import { button, Choice, element, Reason, Slider } from './control.js';
+import { button, Choice, element, Reason, refusal, Slider } from './control.js';
 
 const RESTED = 300;
 const SWITCH = [[true, 'yes'], [false, 'no']];
@@ -90,7 +90,7 @@ export class Tuning {
   /** Set several values at once; return whether they were accepted. */
   async put(values, gesture) {
     const { reason } = await this.set(values, gesture);
-    this.reason.refuse(reason);
+    this.reason.say(refusal(reason));
     for (const name of Object.keys(values)) this.controls.get(name)?.reason.say();
     return !reason;
   }
