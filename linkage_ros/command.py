@@ -30,11 +30,11 @@ class Parser(argparse.ArgumentParser):
 
     def parse_args(self, args=None, namespace=None) -> argparse.Namespace:  # type: ignore
         """Return the arguments; raise RequestError for unknown ones."""
-        found, unknown = self.parse_known_args(args, namespace)
+        arguments, unknown = self.parse_known_args(args, namespace)
         if unknown:
             options = re.findall(r'--[\w-]+', self.format_usage())
             self.error(f'unrecognized arguments: {" ".join(unknown)}{meant(unknown[0], options)}')
-        return found
+        return arguments
 
 
 def run(name: str, work: Callable, args: Optional[Sequence[str]]) -> int:

@@ -354,3 +354,13 @@ def test_motors_and_passive_joints_share_a_topic_and_nobody_hears_himself(graph)
     graph.crank(['left_knee_motor'], 'joint_states')([1.0], answers)
     assert len(answers) <= len(said)
     assert len([m for m in heard if 'no input is called' in m.msg]) == 1
+
+
+def test_what_was_heard_before_anybody_listened_is_in_the_scenes_message(graph):
+    graph.start(Kinematics, {'mechanisms': ['water_drop', 'jansen']})
+    turn = graph.crank(['water_drop_crank'])
+    turn([0.3], graph.listen(MarkerArray, 'water_drop/markers'))
+    states = graph.listen(JointState, 'joint_states')
+    state = graph.crank(['jansen_crank'])([0.5], states)
+    crank = by_name(state.position, state)
+    assert (crank['water_drop_crank'], crank['jansen_crank']) == (0.3, 0.5)

@@ -12,7 +12,7 @@ pytest.importorskip('linkage_interfaces')
 
 from linkage_interfaces.srv import ServoInverse as Service  # noqa: E402
 from linkage_ros import scene  # noqa: E402
-from linkage_ros.nodes import ownership  # noqa: E402
+from linkage_ros.nodes import log, ownership  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.ownership import LATCHED, TOPIC  # noqa: E402
@@ -160,7 +160,9 @@ def test_after_the_owner_each_keeps_what_it_has(graph):
     assert of(service) == 90.0
 
 
-def test_other_values_at_the_start_of_either_are_said_once_and_followed(graph, warned):
+def test_other_values_at_the_start_of_either_are_said_once_and_followed(
+        graph, warned, monkeypatch):
+    monkeypatch.setattr(log, 'THROTTLE_S', 0.0)
     service = graph.start(ServoInverse, {**LEVER, A: 81.0})
     owner = graph.start(Kinematics, {**LEVER, A: 82.0})
     graph.until(lambda: of(service) == 82.0)

@@ -498,4 +498,6 @@ def test_what_no_robot_model_can_have_is_refused(graph):
     before = node.scene
     refused = graph.set(node, leg__frame_id='leg_crank_link')
     assert not refused.successful and 'leg' in refused.reason and node.scene is before
+    refused = graph.set(node, leg__joint_names=['EF=leg_ground_link_fixed'])
+    assert not refused.successful and 'two joints' in refused.reason and node.scene is before
     assert graph.set(node, leg__frame_id='torso').successful

@@ -58,9 +58,9 @@ class MechanismTopics:
         # The last position of a source joint, and the last input that it gave.
         self._position = math.nan
         self._seed: Optional[float] = None
-        # Ids of the displayed markers, whether the locus is displayed, and the last robot model.
+        # Ids of the displayed markers, and the last robot model.
         self._displayed: AbstractSet[int] = frozenset()
-        self._has_locus, self._described = False, ''
+        self._described = ''
 
     def receive(self, i: int, position: float, speed: Optional[float]) -> None:
         """Set input `i` by the position of its source joint and, if known, its speed."""
@@ -136,20 +136,15 @@ class MechanismTopics:
         if description != self._described:
             self._described = description
             self._description.publish(String(data=description))
-        self._set_locus(locus)
+        self._locus.publish(locus or messages.deleted(self.name, messages.LOCUS_ID))
 
     def clear(self, deadline: float) -> None:
         """Delete markers and locus; wait for acknowledgements, up to a monotonic time [s]."""
         self._delete(self._displayed)
-        self._set_locus(None)
+        self._locus.publish(messages.deleted(self.name, messages.LOCUS_ID))
         # The end of a process would drop messages that are still on their way.
         for publisher in (self._markers.publisher, self._locus):
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, deadline - time.monotonic())))
-
-    def _set_locus(self, locus: Optional[Marker]) -> None:
-        if locus or self._has_locus:
-            self._locus.publish(locus or messages.deleted(self.name, messages.LOCUS_ID))
-        self._has_locus = bool(locus)
 
     def _delete(self, ids: AbstractSet[int]) -> None:
         if ids:

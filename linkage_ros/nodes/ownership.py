@@ -18,6 +18,7 @@ from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
+from .log import Throttle
 from .parameters import SceneParameters, typed
 from .. import scene
 from ..words import elided, listed, quoted
@@ -53,11 +54,11 @@ class Follower:
     """Adopts the values of the parameters that a node uses and does not own."""
 
     def __init__(self, node: Any, parameters: SceneParameters):
-        self._node, self._parameters, self._owner = node, parameters, ''
+        self._parameters, self._owner = parameters, ''
+        self._throttle = Throttle(node.get_logger())
         # The mechanisms whose values are adopted, and values that are not adopted yet.
         self._mechanisms: Set[str] = set()
         self._waiting: Dict[str, Any] = {}
-        self._warned: Dict[str, Sequence[str]] = {}
         node.create_subscription(
             ParameterEvent, TOPIC, node.guarded(TOPIC, self._receive), LATCHED)
 
@@ -78,10 +79,10 @@ class Follower:
         self._waiting.update((name, value) for name, value in values.items()
                              if name.partition('.')[0] in self._mechanisms
                              and not fields[name].read_only)
-        refusal = self._parameters.follow(self._waiting)
-        if not refusal:
+        if refusal := self._parameters.follow(self._waiting):
+            self._warn('values that cannot be followed', [refusal])
+        else:
             self._waiting = {}
-        self._warn('refused', [refusal] * bool(refusal), 'values that cannot be followed')
 
     def _compare(self, event: ParameterEvent, mechanisms: Iterable[str],
                  there: Mapping[str, Any]) -> None:
@@ -95,20 +96,18 @@ class Follower:
                   if fields[name].read_only and here[name] != there[name]}
         missing = present.keys() ^ set(mechanisms)
         self._mechanisms = present.keys() - missing - unlike.keys()
-        self._warn('unlike', [f'{name} is {quoted(here[name])} here and '
-                              f'{quoted(there[name])} there' for name in unlike.values()],
-                   'another mechanism, which is not followed')
-        self._warn('missing', sorted(missing), 'other mechanisms; only one of the nodes has')
+        self._warn('another mechanism, which is not followed', [
+            f'{name} is {quoted(here[name])} here and {quoted(there[name])} there'
+            for name in unlike.values()])
+        self._warn('other mechanisms; only one of the nodes has', sorted(missing))
         if event.new_parameters:
-            self._warned.pop('values', None)
-            self._warn('values', [
+            self._warn('other values, which are followed', [
                 f'{name} was {quoted(here[name])} and is now {quoted(there[name])}'
                 for name in sorted(there) if name.partition('.')[0] in self._mechanisms
-                and here[name] != there[name]], 'other values, which are followed')
+                and here[name] != there[name]])
 
-    def _warn(self, kind: str, particulars: Sequence[str], what: str) -> None:
-        """Warn that the owner has `what`; repeat it only when the particulars have changed."""
-        if particulars and particulars != self._warned.get(kind):
-            self._node.get_logger().warning(
-                f'{elided(self._owner)} has {what}: {listed(particulars, 1000)}')
-        self._warned[kind] = particulars
+    def _warn(self, what: str, particulars: Sequence[str]) -> None:
+        """Warn that the owner has `what`, if it has any; throttled."""
+        if particulars:
+            self._throttle.warn(what, lambda: (
+                f'{elided(self._owner)} has {what}: {listed(particulars, 1000)}'))
