@@ -62,32 +62,30 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
 def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Bracket
                    ) -> Optional[Row]:
     """Return the solution in a bracket, which Newton's method does not leave; None if none."""
-    low, high, x, sign, place, others = bracket
-    n, at = problem.n, problem.newton.at
+    (low, high, x, sign), at = bracket, problem.newton.at
     x = x if low <= x <= high else 0.5 * (low + high)
     best, best_x = (math.inf, math.inf), x
     for _ in range(HALVINGS):
-        trial = at(x, *others, *values)
+        trial = at(x, *values)
+        gap, following = trial[2:4]
         if trial[0] < best[0]:
             best, best_x = trial, x
         elif best[1] <= ACCEPTED:
             break
-        low, high = (x, high) if trial[2 + place] * sign < 0.0 else (low, x)
-        x = trial[2 + n]
-        if not low < x < high:
-            x = 0.5 * (low + high)
-            if x in (low, high):
-                break
+        low, high = (x, high) if gap * sign < 0.0 else (low, x)
+        x = following if low < following < high else 0.5 * (low + high)
+        if x in (low, high):
+            break
     # At a jump or in noise both sides enclose values that the output never has.
     if not best[0] <= SINGULAR:
         return None
-    if not math.isfinite(best[2 + 3 * n + place]):
+    *_, inputs, rate = best
+    if not math.isfinite(rate):
         # At an end of a segment, rates are those of the nearest float that has them.
-        around = (at(best_x + side * 2.0 ** k * math.ulp(best_x), *others, *values)
+        around = (at(best_x + side * 2.0 ** k * math.ulp(best_x), *values)[-1]
                   for k in range(HALVINGS // 2) for side in (1, -1))
-        rates = next((trial for trial in around if math.isfinite(trial[2 + 3 * n + place])), best)
-        return *best[2 + 2 * n:2 + 3 * n], *rates[2 + 3 * n:]
-    return best[2 + 2 * n:]
+        rate = next(filter(math.isfinite, around), rate)
+    return inputs, rate
 
 
 def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.ndarray
