@@ -226,13 +226,6 @@ class Segments:
         theta = ascending(theta)
         if len(theta) < 2:
             return
-        known = np.isfinite(self._curve(theta[[0, -1]])[0])
-        if not known.all():
-            # The last input inside: an end may be rounded, or an arm without length at it.
-            inside, _ = refined(lambda x: np.isfinite(self._curve(x.ravel())[0]).reshape(
-                x.shape), theta[[1, -2]], theta[[0, -1]])
-            theta[[0, -1]] = np.where(known, theta[[0, -1]], inside)
-            self._ends.update(inside)
         most = MAX_SAMPLES + 4 * len(theta)
         theta, jumped = self._divided(theta, most)
         if len(theta) > most:
