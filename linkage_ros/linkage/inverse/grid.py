@@ -79,7 +79,7 @@ class Grid:
 
     def _solved(self, q: np.ndarray, values: Sequence[float]) -> np.ndarray:
         """Return what a step of Newton's method returns, for rows of inputs."""
-        return self._problem.over(*q.T, *values)
+        return self._problem.newton.over(*q.T, *values)
 
     def _starts(self, held: dict, values: Sequence[float]) -> np.ndarray:
         """Return assembled poses all over the inputs, more where few are assembled."""

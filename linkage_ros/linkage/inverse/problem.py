@@ -98,11 +98,6 @@ class InverseProblem:
             f'[{input_.name}]': size for input_, size in zip(self.inputs, self.sizes)}}, {},
             self.linkage.is_accelerated)
 
-    @cached_property
-    def over(self) -> Any:
-        """Return the same code for arrays."""
-        return self.newton.over if self.linkage.is_accelerated else self.newton.searched
-
     def reduced(self, values: Sequence[float]) -> Sequence[float]:
         """Return values with large angles reduced to one period, exactly."""
         return [x if -turn <= x <= turn else float(_within_period(x, turn))
@@ -113,12 +108,6 @@ class InverseProblem:
         return np.stack([row if turn == math.inf else np.where(
             np.abs(row) <= turn, row, _within_period(row, turn))
                          for row, turn in zip(values, self.periods)])
-
-    def distance(self, by: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the distances of values of an input, without whole periods, in its size."""
-        gap, turn = x - y, self.turns[by]
-        return np.abs(gap - turn * np.rint(gap / turn) if turn < math.inf
-                      else gap / self.sizes[by])
 
     def nearest_equivalent(self, inputs: Sequence[float], others: Sequence[float]
                            ) -> Row:

@@ -95,7 +95,7 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
 
     The solutions have the shape (inputs and rates, m), NaN where there is none.
     """
-    n, over = problem.n, problem.over
+    n, over = problem.n, problem.newton.over
     # What closed forms lose next to a singular pose; more is another assembly.
     low, high, inputs, far = -math.inf, math.inf, candidates, SINGULAR
     if n == 1:
@@ -154,8 +154,8 @@ def distinct_arrays(problem: InverseProblem, solutions: np.ndarray) -> np.ndarra
     order = np.lexsort(solutions[:, :n].swapaxes(0, 1)[::-1], axis=0)
     solutions = np.take_along_axis(solutions, order[:, None], 0)
     pairs = np.triu_indices(len(solutions), 1)
-    apart = np.max([problem.distance(by, *(solutions[k, by] for k in pairs)) for by in range(n)],
-                   axis=0)
+    apart = np.max([input_.apart(*(solutions[k, by] for k in pairs)) / size for by, (
+        input_, size) in enumerate(zip(problem.inputs, problem.sizes))], axis=0)
     for k in np.flatnonzero((apart <= SINGULAR).any(axis=0)).tolist():
         rows = distinct(problem, [row for row in map(tuple, solutions[:, :, k].tolist())
                                   if row[0] == row[0]])

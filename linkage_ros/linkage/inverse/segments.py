@@ -207,9 +207,9 @@ class Segments:
         cut = []
         for theta, value, sign in self.all:
             places = [0]
-            for i in range(1, len(theta)):
-                if i + 1 == len(theta) or value[i + 1] - value[places[-1]] > most:
-                    places.append(i)
+            while (last := places[-1]) < len(theta) - 1:
+                farthest = int(value.searchsorted(value[last] + most, 'right')) - 1
+                places.append(max(farthest, last + 1))
             cut += [(float(theta[i]), float(theta[k]), float(sign * value[i]),
                      float(sign * value[k])) for i, k in zip(places, places[1:])]
         return cut
