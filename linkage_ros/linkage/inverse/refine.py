@@ -24,8 +24,6 @@ from ..tolerances import ONE, SINGULAR
 
 # A larger error [sizes], or a longer step [rad, sizes], leads to another solution.
 FAR = 0.1
-# Steps of arrays: what is not refined then is refined one by one.
-STEPS = 3
 
 
 def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Bracket, Row]
@@ -103,7 +101,9 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
     best = over(*inputs.clip(low, high), *values)
     left = ~np.isfinite(best).all(axis=0)
     again = np.flatnonzero((best[0] > 0.0) & (best[0] <= far))
-    for _ in range(STEPS if len(again) else 0):
+    for _ in range(HALVINGS):
+        if not len(again):
+            break
         x = best[2 + n:2 + 2 * n].clip(low, high)
         trial = over(*x[:, again], *values[:, again])
         # Steps out of the reach are shortened one by one.
