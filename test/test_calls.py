@@ -59,15 +59,6 @@ def test_results_have_the_shape_of_value_and_near(bars, shape):
                                                      else found))
 
 
-def test_all_inputs_for_one_value_are_those_of_an_array(bars, arm):
-    for output, values in (('QB', (0.75, 1.3, 9.0, math.nan)), ('P.x', (50.0, 0.0, 1e9))):
-        for value in values:
-            np.testing.assert_allclose(
-                bars.input_for(output, value), bars.input_for(output, [value])[0], rtol=1e-14)
-    np.testing.assert_allclose(arm.input_for('P.x', 0.05, others=[2.0]),
-                               arm.input_for('P.x', [0.05], others=[2.0])[0], rtol=1e-14)
-
-
 # --- values that are wrong are named ---
 
 @pytest.mark.parametrize('wrong', WRONG)

@@ -88,15 +88,6 @@ def test_next_to_an_extreme_values_have_two_solutions_or_its_own_or_none(away, a
         assert found[0].inputs == (0.0,)
 
 
-def test_a_pose_of_two_inputs_has_its_solution_where_the_margin_is_small():
-    arm, pose = mechanisms.create('five_bar'), (-0.870126, -1.881109)
-    outputs = ('angle(O,P)', 'P.y')
-    values = arm.posed((), outputs).at(*pose)
-    if np.isfinite(values).all():
-        found = arm.inverse(outputs).all(list(values))
-        assert min(math.dist(answer.inputs, pose) for answer in found) < 1e-9
-
-
 def test_a_distance_at_an_end_of_the_reach_is_answered():
     for seed in range(12):
         rng = np.random.default_rng(seed)

@@ -46,14 +46,6 @@ def test_their_rates_are_differences(type_, output):
     assert function(0.3)[1] == linkage.joint_rates(0.3, [output])[output]
 
 
-@pytest.mark.parametrize('type_, output', ASKED)
-def test_the_inverse_gives_them_back(type_, output):
-    linkage = mechanisms.create(type_)
-    for theta in (0.4, 1.9, -1.2):
-        value = float(measured(linkage, output, theta))
-        assert np.nanmin(np.abs(linkage.input_for(output, value) - theta)) < 1e-7
-
-
 @pytest.mark.parametrize('name', ['distance(A,A)', 'distance(A,Z)', 'angle(A)', 'angle(A,B,C)',
                                   'distance(A, B)', 'A.z', '', 'distance', '(A,B)', 7, None])
 def test_what_is_no_output_is_refused_by_its_name(name):

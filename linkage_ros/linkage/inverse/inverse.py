@@ -254,7 +254,8 @@ class Inverse:
         if not all(map(math.isfinite, values)):
             return []
         problem = self.problem
-        values = problem.reduced(values)
+        if any(abs(x) > turn for x, turn in zip(values, problem.periods)):
+            values = problem.reduced(np.array(values)).tolist()
         found = [row for candidate in self._source.candidates(values)
                  if (row := refine(problem, values, candidate))]
         return distinct(problem, found) if len(found) > 1 else found
@@ -274,7 +275,7 @@ class Inverse:
             for k, solutions in enumerate(lists):
                 found[:len(solutions), :, k] = solutions or math.nan
             return found
-        values = problem.reduced_arrays(values)
+        values = problem.reduced(values)
         numbers, places, candidates = self._source.candidate_arrays(values)
         found = np.full((numbers.max(initial=0) + 1, n + n * n, count), math.nan)
         found[numbers, :, places] = refine_arrays(problem, values[:, places], candidates).T
@@ -416,7 +417,7 @@ class Inverse:
         inverse, turned, own = self._around(near)
         problem, row = inverse.problem, None
         if all(map(math.isfinite, (*values, *near))):
-            row = follow(problem, problem.reduced((values - own).tolist()), (
+            row = follow(problem, problem.reduced(values - own).tolist(), (
                 near - turned[:self._n]).tolist(), inverse._source)
         found = tuple((turned + (row or math.nan)).tolist())
         return found[:self._n], found[self._n:]

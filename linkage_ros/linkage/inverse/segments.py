@@ -245,9 +245,8 @@ class Segments:
             clear = np.flatnonzero((known & (noise <= SINGULAR * self._size))[run])
             if len(clear) > 1 and theta[run[-1]] - theta[run[0]] > ROUNDING:
                 run = run[clear[0]:clear[-1] + 1]
-                steps = self._difference(np.diff(value[0, run]))
-                yield (theta[run], value[0, run[0]] + np.append(0.0, np.cumsum(steps))
-                       if self._period < math.inf else value[0, run], rate[0, run], noise[run])
+                yield (theta[run], np.unwrap(value[0, run], period=self._period) if self._period
+                       < math.inf else value[0, run], rate[0, run], noise[run])
 
     def _divided(self, theta: np.ndarray, most: int) -> Tuple[np.ndarray, np.ndarray]:
         """Return samples that explain the output, and after which of them it jumps."""
