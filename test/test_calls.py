@@ -59,15 +59,6 @@ def test_results_have_the_shape_of_value_and_near(bars, shape):
                                                      else found))
 
 
-def test_all_inputs_for_one_value_are_those_of_an_array(bars, arm):
-    for output, values in (('QB', (0.75, 1.3, 9.0, math.nan)), ('P.x', (50.0, 0.0, 1e9))):
-        for value in values:
-            np.testing.assert_allclose(
-                bars.input_for(output, value), bars.input_for(output, [value])[0], rtol=1e-14)
-    np.testing.assert_allclose(arm.input_for('P.x', 0.05, others=[2.0]),
-                               arm.input_for('P.x', [0.05], others=[2.0])[0], rtol=1e-14)
-
-
 # --- values that are wrong are named ---
 
 @pytest.mark.parametrize('wrong', WRONG)
@@ -233,14 +224,6 @@ def test_the_margin_of_a_pose_without_rates_is_zero():
 def test_wrong_dimensions_branches_and_tracers_are_named(given, problem):
     with pytest.raises(ValueError, match=problem):
         mechanisms.create('slider_crank', **given)
-
-
-def test_the_reach_of_an_offset_lever_ends_where_the_pin_is_square_to_it():
-    for e in (0.0, 10.0, -30.0):
-        lever = mechanisms.create('slotted_lever', e=e)
-        swept = lever.joint_angles(np.linspace(-math.pi, math.pi, 200001), ('lever',))['lever']
-        (low, high), = lever.lever_reach()
-        assert (low, high) == pytest.approx((np.nanmin(swept), np.nanmax(swept)), abs=1e-8)
 
 
 def test_sums_of_bars_that_differ_by_rounding_are_a_change_point():

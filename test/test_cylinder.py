@@ -146,20 +146,6 @@ def test_what_hangs_on_a_cylinder_limits_its_stroke():
     assert placed.any() and np.count_nonzero(placed != held) <= 2
 
 
-@pytest.mark.parametrize('output', ['OB', 'D.y', 'barrel', 'CD'])
-def test_the_inverse_finds_every_length_that_gives_an_output(output):
-    linkage = boom()
-    for length in strokes(linkage, 9):
-        joint, _, axis = output.rpartition('.')
-        value = (linkage.solve(length)[joint]['xy'.index(axis)] if joint
-                 else linkage.joint_angles(length)[output])
-        answers = linkage.input_for(output, value)
-        assert np.nanmin(abs(answers - length)) < 1e-9
-        near, rate = linkage.servo_for(output, value, near=length, ends=(0.4, 1.7))
-        assert near == pytest.approx(length, abs=1e-9) and rate != 0.0
-    assert np.isnan(linkage.servo_for('D.y', 99.0)[0])
-
-
 def test_several_cylinders_are_several_inputs():
     machine = scene.load('config/excavator.yaml').machines['excavator']
     assert list(machine.inputs) == ['boom', 'arm', 'bucket']

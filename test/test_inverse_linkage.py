@@ -11,7 +11,7 @@ import pickle
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
-from truth import linkage_checks, random_linkages
+from truth import random_linkages
 
 FIVE_BAR = """\
 # five_bar driven by P.x, P.y
@@ -77,75 +77,6 @@ def test_an_assembly_mode_is_a_linkage_that_has_the_pose(kind):
             found = [np.hypot(*(place[one] - place[two]).T) for place in places]
             assert np.nanmin(np.abs(np.array(found) - apart), axis=0).max() < \
                 1e-9 * linkage.longest, (output, one, two)
-
-
-def checked(linkage, inverse, poses, sure=1e-4):
-    """Check that each pose is among the answers, and that every answer has its outputs."""
-    count = 0
-    for pose in poses:
-        row = linkage.checked(inverse.outputs).at(*pose)
-        values, rates = row[:len(pose)], np.reshape(row[len(pose):], (len(pose), -1))
-        scale = np.array([1.0 if linkage.is_angle(name) else linkage.longest
-                          for name in inverse.outputs])
-        sizes = [input_.size for input_ in linkage.inputs]
-        if not np.isfinite(row).all() or np.linalg.svd(
-                (rates.T * sizes) / scale[:, None], compute_uv=False)[-1] < sure:
-            continue
-        answers = inverse.all(values)
-        count += 1
-        # Of a period of very many turns, the inverse has that of the outputs.
-        assert min((max(input_.apart(x, y) / input_.size for input_, x, y in zip(
-            inverse.inputs, answer.inputs, pose)) for answer in answers), default=9.0) < 1e-9, (
-            linkage, inverse.outputs, pose, answers)
-        for answer in answers:
-            reached = linkage.checked(inverse.outputs).at(*answer.inputs)
-            # Next to a dead point the last digit of an input may be worth more than the bound; the
-            # rule of accuracy allows four halves of it.
-            digits = 2.0 * np.abs(np.reshape(reached[len(pose):], (len(pose), -1)).T) @ np.spacing(
-                np.abs(answer.inputs))
-            for now, value, name, size, digit in zip(
-                    reached, values, inverse.outputs, scale, digits):
-                gap = math.remainder(now - value, math.tau) if linkage.is_angle(name) \
-                    else now - value
-                assert abs(gap) < max(1e-7 * size, digit), (linkage, inverse.outputs, answer)
-        many, rates = inverse.over(*np.transpose([values]))
-        np.testing.assert_allclose(many[:, 0].T, [answer.inputs for answer in answers],
-                                   rtol=1e-9, atol=1e-9)
-    return count
-
-
-@pytest.mark.parametrize('seeds', [
-    pytest.param(range(12), marks=pytest.mark.nightly),
-    pytest.param(range(12, 60), marks=pytest.mark.nightly)])
-def test_of_random_linkages_no_answer_is_missed_and_none_invented(seeds):
-    closed = count = 0
-    for _, linkage, rng in linkage_checks.assembled(seeds):
-        names = outputs_of(linkage)
-        outputs = [str(name) for name in rng.choice(names, min(3, len(names)), replace=False)]
-        for output in outputs:
-            asked = (output, *(input_.name for input_ in linkage.inputs[1:]))
-            try:
-                inverse = linkage.inverse(asked)
-            except ValueError as error:
-                # The first input does not move it, whatever its formula says.
-                assert 'do not determine all inputs' in str(error)
-                continue
-            if not inverse.closed:
-                continue
-            closed += 1
-            count += checked(linkage, inverse, [tuple(
-                rng.uniform(input_.low, input_.high) for input_ in linkage.inputs)
-                for _ in range(12)])
-    assert closed > len(seeds) / 3 and count > len(seeds)
-
-
-@pytest.mark.nightly
-def test_two_outputs_tell_two_inputs_in_closed_form():
-    linkage, rng = mechanisms.create('five_bar'), np.random.default_rng(1)
-    for outputs in (('P.x', 'P.y'), ('P.x', 'crank'), ('crank2', 'P.y')):
-        inverse = linkage.inverse(outputs)
-        assert inverse.closed
-        assert checked(linkage, inverse, rng.uniform(-math.pi, math.pi, (40, 2)).tolist()) > 10
 
 
 @pytest.mark.nightly
@@ -432,7 +363,7 @@ def test_a_jump_at_the_end_of_a_turn_is_not_passed(near):
 
 
 @pytest.mark.nightly(all_but=3)
-@pytest.mark.parametrize('seed', range(10))
+@pytest.mark.parametrize('seed', range(40))
 def test_what_is_followed_has_the_value(seed):
     rng, count = np.random.default_rng(seed), 0
     while count < 12:

@@ -254,20 +254,18 @@ def jax():
     return package
 
 
-def slopes_of_torch(torch, function, given):
+def slopes(package, xp, kind, function, given):
     """Return the derivatives (outputs, inputs, poses) of a function of arrays."""
-    given = [torch.tensor(x, requires_grad=True) for x in given]
+    if package == 'jax':
+        found = xp.vmap(xp.jacfwd(lambda *x: xp.numpy.stack(function(*x)), tuple(
+            range(len(given)))))
+        # One vectorized function, compiled unless it is long.
+        found = found if kind == 'ankle' else xp.jit(found)
+        return np.array(found(*map(xp.numpy.asarray, given))).transpose(2, 0, 1)
+    given = [xp.tensor(x, requires_grad=True) for x in given]
     return np.array([[np.zeros(len(x)) if slope is None else slope.numpy() for x, slope in zip(
-        given, torch.autograd.grad(each.nansum(), given, retain_graph=True, allow_unused=True))]
+        given, xp.autograd.grad(each.nansum(), given, retain_graph=True, allow_unused=True))]
         for each in function(*given)])
-
-
-def slopes_of_jax(jax, function, given, is_long=False):
-    """Return the same by one vectorized function, compiled unless it is long."""
-    slopes = jax.vmap(jax.jacfwd(lambda *x: jax.numpy.stack(function(*x)), tuple(
-        range(len(given)))))
-    slopes = slopes if is_long else jax.jit(slopes)
-    return np.array(slopes(*map(jax.numpy.asarray, given))).transpose(2, 0, 1)
 
 
 def check_values(kind, found, given):
@@ -296,27 +294,18 @@ def moving(kind):
 
 
 @pytest.mark.nightly
+@pytest.mark.parametrize('package', ['torch', 'jax'])
 @pytest.mark.parametrize('kind', KINDS)
-def test_torch_has_the_values_and_the_rates(kind, torch):
-    given = inputs(kind, MANY)
-    function = linkage(kind).function(*requested(kind), xp=torch)
-    for each in (function, torch.vmap(function)):
-        check_values(kind, [x.numpy() for x in each(*map(torch.tensor, given))], given)
+def test_both_have_the_values_and_the_rates(kind, package, request):
+    xp, given = request.getfixturevalue(package), inputs(kind, MANY)
+    names = xp if package == 'torch' else xp.numpy
+    function = linkage(kind).function(*requested(kind), xp=names)
+    for each in (function, xp.vmap(function)):
+        each = each if package == 'torch' else xp.jit(each)
+        check_values(kind, [np.asarray(x) for x in each(*map(names.asarray, given))], given)
     joints, given, rates = moving(kind)
-    function = linkage(kind).function((), joints, xp=torch)
-    check_slopes(slopes_of_torch(torch, function, given), rates)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('kind', KINDS)
-def test_jax_has_the_values_and_the_rates(kind, jax):
-    given = inputs(kind, MANY)
-    function = linkage(kind).function(*requested(kind), xp=jax.numpy)
-    for each in (jax.jit(function), jax.jit(jax.vmap(function))):
-        check_values(kind, each(*map(jax.numpy.asarray, given)), given)
-    joints, given, rates = moving(kind)
-    function = linkage(kind).function((), joints, xp=jax.numpy)
-    check_slopes(slopes_of_jax(jax, function, given, kind == 'ankle'), rates)
+    check_slopes(slopes(package, xp, kind, linkage(kind).function((), joints, xp=names), given),
+                 rates)
 
 
 def jacobians(kind, given):
@@ -352,10 +341,8 @@ def test_both_have_the_inverse_and_its_rates(kind, package, request):
     names = xp if package == 'torch' else xp.numpy
     function = linkage(kind).inverse(INVERSES[kind]).function(names, follows=True)
     off = errors([np.asarray(x) for x in function(*map(names.asarray, given))], rows, sizes)
-    slopes = slopes_of_torch(xp, function, given) if package == 'torch' else slopes_of_jax(
-        xp, function, given, kind == 'ankle')
-    n = len(rows)
-    assert not slopes[:, n:].any() and np.isfinite(slopes).all()
+    found, n = slopes(package, xp, kind, function, given), len(rows)
+    assert not found[:, n:].any() and np.isfinite(found).all()
     jacobian, known = jacobians(kind, rows)
     inverses = np.linalg.inv(jacobian)
     inputs_, moved = moved_by_rounding(kind, rows, inverses)
@@ -363,7 +350,7 @@ def test_both_have_the_inverse_and_its_rates(kind, package, request):
     # The rule of accuracy, for the library and for this function: 4 for values, 8 for rates.
     beyond = off[:, known] > np.maximum(EXACT, 8.0 * (inputs_ / sizes)[:, known])
     assert not beyond.any()
-    off = np.abs(slopes[:, :n].transpose(2, 0, 1) - inverses)[known]
+    off = np.abs(found[:, :n].transpose(2, 0, 1) - inverses)[known]
     room = RATED * np.maximum(1.0, np.abs(inverses))[known]
     assert not (off > room + 16.0 * moved[known]).any()
     # Next to extremes a float64 output does not say more.

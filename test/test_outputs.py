@@ -9,7 +9,6 @@ from linkage_ros import mechanisms, scene
 import mpmath
 import numpy as np
 import pytest
-from truth import linkage_checks
 
 LIFT = {'mechanisms': ['lift'], 'lift.type': 'custom', 'lift.scale': 2.0, 'lift.joints': [
     'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C line O B 1.6']}
@@ -45,14 +44,6 @@ def test_their_rates_are_differences(type_, output):
                                ahead / (2 * step), rtol=1e-6, atol=1e-6)
     function = linkage.function((), [output], [output])
     assert function(0.3)[1] == linkage.joint_rates(0.3, [output])[output]
-
-
-@pytest.mark.parametrize('type_, output', ASKED)
-def test_the_inverse_gives_them_back(type_, output):
-    linkage = mechanisms.create(type_)
-    for theta in (0.4, 1.9, -1.2):
-        value = float(measured(linkage, output, theta))
-        assert np.nanmin(np.abs(linkage.input_for(output, value) - theta)) < 1e-7
 
 
 @pytest.mark.parametrize('name', ['distance(A,A)', 'distance(A,Z)', 'angle(A)', 'angle(A,B,C)',
@@ -149,51 +140,3 @@ def test_a_source_that_cannot_be_is_refused(name, source, text):
     with pytest.raises(scene.SceneError) as refused:
         scene.read({'mechanisms': [name], f'{name}.crank.measures': source})
     assert text in str(refused.value)
-
-
-def outputs_of(linkage, rng):
-    """Return some outputs of a linkage that move by more than rounding."""
-    pairs = [rng.choice(linkage.points, 2, replace=False) for _ in range(4)]
-    asked = [*(f'{kind}({first},{second})' for kind, (first, second) in zip(
-        ('distance', 'angle') * 2, pairs)), *map(str, rng.choice(linkage.joints, 2))]
-    widest = max(linkage.reach(), key=lambda arc: arc[1] - arc[0])
-    theta = np.linspace(*widest, 202)[1:-1]
-    for output in asked:
-        size = 1.0 if linkage.is_angle(output) else linkage.longest
-        values = linkage.joint_angles(theta, [output])[output]
-        known = np.isfinite(values)
-        # A line that passes its own origin turns round, which is no motion.
-        steady = (np.unwrap(values[known], period=math.pi) if linkage.is_angle(output)
-                  else values[known])
-        if known.any() and np.ptp(steady) > 1e-6 * size:
-            yield output, size, theta[known], values[known]
-
-
-def followed(seeds):
-    """Follow outputs of random linkages all through their reach; return how many values."""
-    count = 0
-    for seed, linkage, rng in linkage_checks.assembled(seeds):
-        if len(linkage.inputs) > 1 or not linkage.reach():
-            continue
-        for output, size, theta, values in outputs_of(linkage, rng):
-            near = theta[0]
-            for true, value in zip(theta.tolist(), values.tolist()):
-                near, _ = linkage.follow(output, value, near)
-                if math.isnan(near):
-                    # Beyond a branch the nearest answer takes over.
-                    near = float(linkage.servo_for(output, value, true)[0])
-                gap = float(linkage.joint_angles(near, [output])[output]) - value
-                gap = math.remainder(gap, math.tau) if linkage.is_angle(output) else gap
-                assert abs(gap) < 1e-7 * size, (seed, output, true)
-                count += 1
-    return count
-
-
-@pytest.mark.nightly
-def test_outputs_of_random_linkages_are_followed_all_through_the_reach():
-    assert followed(range(8)) > 1000
-
-
-@pytest.mark.nightly
-def test_outputs_of_many_random_linkages_are_followed_all_through_the_reach():
-    assert followed(range(100, 200)) > 10000

@@ -166,29 +166,6 @@ def test_machine_code_takes_the_answers_that_plain_python_takes(near, ends):
     np.testing.assert_allclose(found, alone, rtol=1e-12, atol=1e-15)
 
 
-@pytest.mark.nightly(all_but=3)
-@pytest.mark.parametrize('kind, outputs', [
-    ('slotted_lever', ['lever']), ('jansen', ['DF']), ('four_bar', ['QB']),
-    ('slider_crank', ['B.x']), ('five_bar', ['P.x', 'P.y'])])
-def test_a_path_is_the_nearest_answer_to_the_last_value_after_value(kind, outputs):
-    rng = np.random.default_rng(len(kind))
-    linkage = mechanisms.create(kind)
-    inverse, n = linkage.inverse(outputs), len(outputs)
-    for ends in (None, [(-1.0, 4.5)] * n, [(-20.0, 33.0)] * n, [(0.3, 0.9)] * n):
-        # Smooth, back and forth over several turns, and anywhere; some that cannot be had.
-        theta = [np.concatenate([start + np.linspace(0.0, turns, 40), rng.uniform(-3, 3, 20)])
-                 for start, turns in zip(rng.uniform(-3, 3, n), (15.0, -9.0))]
-        values = [np.where(rng.random(60) < 0.9, each, rng.normal(scale=2.0, size=60))
-                  for each in linkage.joint_angles(theta[0] if n == 1 else theta,
-                                                   outputs).values()]
-        for near in (None, tuple(rng.uniform(-9, 9, n))):
-            inputs, rates = inverse.path(values, near, ends)
-            for k, row in enumerate(zip(*values)):
-                (one, rate) = inverse.nearest(tuple(map(float, row)), near, ends)
-                np.testing.assert_allclose([x[k] for x in (*inputs, *rates)], [*one, *rate], 1e-8)
-                near = near if one[0] != one[0] else one
-
-
 @pytest.mark.parametrize('half', [1, -1])
 def test_next_to_the_end_of_the_slot_the_lever_is_right_and_beyond_it_has_no_answer(half):
     # There the crank stands still; a value up to 1e-9 beyond the end is the end's.

@@ -198,10 +198,7 @@ def judge_several(linkage, names, rng, count=6):
             found['ordinary', 'lost at', linkage, names, tuple(pose), ()] += 1
         for answer in answers:
             there = np.array(linkage.checked(names).at(*answer.inputs)[:len(names)])
-            gaps = [abs(math.remainder(gap, math.tau)) / scale if linkage.is_angle(name)
-                    and name not in [input_.name for input_ in linkage.inputs]
-                    else abs(gap) / scale for gap, name, scale in zip(there - row, names, scales)]
-            if not max(gaps) < 1e-9 and _differ(linkage, names, there - row, scales):
+            if _differ(linkage, names, there - row, scales):
                 found['ordinary', 'invented'] += 1
                 found['ordinary', 'invented at', linkage, names, tuple(pose), ()] += 1
     return found, worst

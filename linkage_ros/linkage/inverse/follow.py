@@ -15,7 +15,7 @@ Robotics and Automation 6 (1990).
 from __future__ import annotations
 
 import math
-from typing import Optional, Sequence, Tuple
+from typing import Optional, Sequence
 
 import numpy as np
 
@@ -35,35 +35,32 @@ def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[floa
     if not start[0] < math.inf:
         return None
     gaps = [gap * scale for gap, scale in zip(start[2:], problem.scales)]
-    if isinstance(source, Segments):
-        way = source.follow(values[0], gaps[0], seed[0])
-        if not way:
-            return None
-        bracket, turns = way
-        found, seed = refine(problem, values, bracket), (turns + bracket.seed,)
-    else:
-        found, seed = _followed(problem, values, seed, gaps, start[-problem.n ** 2:])
-    return found and (*problem.nearest_equivalent(found, seed), *found[problem.n:])
+    if not isinstance(source, Segments):
+        side = _side(start[-problem.n ** 2:])
+        return _followed(problem, values, gaps, seed, side, HALVINGS) if side else None
+    way = source.follow(values[0], gaps[0], seed[0])
+    if not way:
+        return None
+    bracket, turns = way
+    found = refine(problem, values, bracket)
+    return found and (*problem.nearest_equivalent(found, (turns + bracket.seed,)), found[1])
 
 
-def _followed(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
-              gaps: Sequence[float], rates: Row) -> Tuple[Optional[Row], Sequence[float]]:
-    """Return the end of the motion, None if there is none, and inputs in its turn."""
-    side, left, part = _side(rates), 1.0, 1.0
-    for _ in range(4 * HALVINGS if side else 0):
-        rest = max(left - part, 0.0)
-        found = refine(problem, [x + rest * gap for x, gap in zip(values, gaps)], tuple(seed))
+def _followed(problem: InverseProblem, values: Sequence[float], gaps: Sequence[float],
+              seed: Sequence[float], side: float, halvings: int) -> Optional[Row]:
+    """Return the end of a motion of the outputs from `gaps` above values; None if none."""
+    if found := refine(problem, values, tuple(seed)):
+        inputs, rates = problem.nearest_equivalent(found, seed), found[problem.n:]
         # A fold is not passed, nor is the motion left for another one.
-        if found and _side(found[problem.n:]) == side and all(
-                abs(x - y) <= LONGEST * size for x, y, size in zip(
-                    problem.nearest_equivalent(found, seed), seed, problem.sizes)):
-            seed, left = problem.nearest_equivalent(found, seed), rest
-            if not left:
-                return found, seed
-            part = min(4.0 * part, left)
-        else:
-            part *= 0.25
-    return None, seed
+        if _side(rates) == side and all(abs(x - y) <= LONGEST * size for x, y, size in zip(
+                inputs, seed, problem.sizes)):
+            return *inputs, *rates
+    if not halvings:
+        return None
+    halves = [0.5 * gap for gap in gaps]
+    middle = _followed(problem, [x + gap for x, gap in zip(values, halves)], halves, seed, side,
+                       halvings - 1)
+    return middle and _followed(problem, values, halves, middle[:problem.n], side, halvings - 1)
 
 
 def _side(rates: Sequence[float]) -> float:

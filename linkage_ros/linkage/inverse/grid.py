@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Candidates of several inputs without a closed form: a search from a grid.
+Candidates of several inputs without a closed form: a search from many poses.
 
-Steps of Newton's method, shortened until the error falls, lead down from a grid over the ranges of
-the inputs, then from both sides of each solution, as solutions next to a fold come in pairs. The
-search may miss solutions.
+Steps of Newton's method, shortened until the error falls, lead to solutions from poses all over
+the ranges of the inputs. The search may miss solutions, of two next to a fold most likely.
 
 Source: Nocedal and Wright, "Numerical Optimization", sec. 11.2.
 """
@@ -15,14 +14,13 @@ from __future__ import annotations
 
 from itertools import chain, combinations
 import math
-from typing import Iterator, List, Sequence, Union
+from typing import Iterator, List, Sequence
 
 import numpy as np
 
 from .follow import LONGEST
 from .problem import ACCEPTED, InverseProblem, Row
-from .refine import distinct, refine
-from .segments import Bracket, segments_of
+from .segments import segments_of
 from ..formulas import Names
 from ..inputs import spread
 from ..kinematics import Kinematics
@@ -30,10 +28,8 @@ from ..motion.curves import HALVINGS
 from ..tolerances import CLOSE, SINGULAR
 from ...words import listed
 
-# Starts at first and, where fewer than this number of them can be assembled, then.
-COUNTS, ASSEMBLED = (1024, 8192, 65536), 250
-# Halvings of the distance at which a twin behind a fold is searched.
-TWINS = 24
+# Starts, more of them where fewer than this number can be assembled.
+COUNTS, ASSEMBLED = (4096, 65536), 500
 
 
 def check_dependence(linkage: Kinematics, outputs: Names) -> None:
@@ -68,8 +64,8 @@ class Grid:
         if not self.is_held:
             self._check_independent()
 
-    def candidates(self, values: Sequence[float]) -> Iterator[Union[Bracket, Row]]:
-        """Yield inputs, or brackets of the first, at which the outputs may have some values."""
+    def candidates(self, values: Sequence[float]) -> Iterator[Row]:
+        """Yield inputs at which the outputs may have some values."""
         problem, n = self._problem, self._problem.n
         held = {by: values[place] for by, place in self._held.items()}
         if self.is_held:
@@ -77,21 +73,13 @@ class Grid:
             others = tuple(held[by] for by in range(1, n))
             for bracket in segments_of(problem.linkage, problem.outputs[place],
                                        others).candidates(values[place:place + 1]):
-                yield bracket._replace(place=place, others=others)
-            return
-        solutions: List[Row] = []
-        starts = self._starts(held, values)
-        while len(starts):
-            known = len(solutions)
-            solutions = distinct(problem, solutions + [
-                row for q in self._descended(starts, values)
-                if (row := refine(problem, values, tuple(q)))])
-            starts = self._twins(solutions) if len(solutions) > known else starts[:0]
-        yield from (row[:n] for row in solutions)
+                yield bracket.seed, *others
+        else:
+            yield from self._descended(self._starts(held, values), values)
 
     def _solved(self, q: np.ndarray, values: Sequence[float]) -> np.ndarray:
         """Return what a step of Newton's method returns, for rows of inputs."""
-        return self._problem.over(*q.T, *values)
+        return self._problem.newton.over(*q.T, *values)
 
     def _starts(self, held: dict, values: Sequence[float]) -> np.ndarray:
         """Return assembled poses all over the inputs, more where few are assembled."""
@@ -118,7 +106,7 @@ class Grid:
                                        0.9) <= CLOSE:
             raise dependent(self._problem.outputs, range(n))
 
-    def _descended(self, q: np.ndarray, values: Sequence[float]) -> List[List[float]]:
+    def _descended(self, q: np.ndarray, values: Sequence[float]) -> List[Row]:
         """Return the inputs next to solutions that steps of Newton's method reach."""
         n, parts, reached = self._problem.n, np.ones(len(q)), [q[:0]]
         solved = self._solved(q, values)
@@ -139,13 +127,4 @@ class Grid:
             q = np.where(better[:, None], trial, q)
             solved = np.where(better, new, solved)
         # Most of those that reach one solution differ by rounding.
-        return (CLOSE * np.unique(np.round(np.concatenate(reached) / CLOSE), axis=0)).tolist()
-
-    def _twins(self, solutions: Sequence[Row]) -> np.ndarray:
-        """Return poses on both sides of solutions: a twin may lie behind a fold."""
-        n, rows = self._problem.n, np.array(solutions)
-        jacobians = self._problem.scaled(rows[:, n:].reshape(-1, n, n).swapaxes(1, 2))
-        weakest = np.linalg.svd(jacobians)[2][:, -1] * self._problem.sizes
-        away = LONGEST * np.outer([1.0, -1.0], 0.5 ** np.arange(TWINS)).ravel()
-        starts = np.repeat(rows[:, :n], len(away), axis=0) + np.kron(weakest, away[:, None])
-        return starts.clip(self._low, self._high)
+        return [*map(tuple, CLOSE * np.unique(np.round(np.concatenate(reached) / CLOSE), axis=0))]

@@ -254,7 +254,8 @@ class Inverse:
         if not all(map(math.isfinite, values)):
             return []
         problem = self.problem
-        values = problem.reduced(values)
+        if any(abs(x) > turn for x, turn in zip(values, problem.periods)):
+            values = problem.reduced(np.array(values)).tolist()
         found = [row for candidate in self._source.candidates(values)
                  if (row := refine(problem, values, candidate))]
         return distinct(problem, found) if len(found) > 1 else found
@@ -274,7 +275,7 @@ class Inverse:
             for k, solutions in enumerate(lists):
                 found[:len(solutions), :, k] = solutions or math.nan
             return found
-        values = problem.reduced_arrays(values)
+        values = problem.reduced(values)
         numbers, places, candidates = self._source.candidate_arrays(values)
         found = np.full((numbers.max(initial=0) + 1, n + n * n, count), math.nan)
         found[numbers, :, places] = refine_arrays(problem, values[:, places], candidates).T
@@ -285,11 +286,11 @@ class Inverse:
     def _numbers(self, values: Any, name: str = 'values', finite: bool = False) -> Row:
         """Return one number for each output; raise ValueError if there are not as many."""
         found = self._each(values, name)
-        if any(type(each) is not float and each.size != 1 for each in found):
+        if any(type(x) is not float and x.size != 1 for x in found):
             raise self._miscounted(values, name)
         if finite and not np.isfinite(found).all():
             raise ValueError(f'{name} must be finite, got {quoted(list(map(float, found)))}')
-        return tuple([each if type(each) is float else each.item() for each in found])
+        return tuple([x if type(x) is float else x.item() for x in found])
 
     def _each(self, values: Any, name: str = 'values') -> Tuple[Any, ...]:
         """Return a float or an array for each output; raise ValueError if they are not that."""
@@ -297,10 +298,8 @@ class Inverse:
             values = np.atleast_1d(numbers(name, values))
         if len(values) != self._n:
             raise self._miscounted(values, name)
-        if set(map(type, values)) == {float}:
-            return tuple(values)
-        found = [numbers(name, each) for each in values]
-        return tuple(each if each.ndim else float(each) for each in found)
+        found = [x if type(x) is float else numbers(name, x) for x in values]
+        return tuple(x if type(x) is float or np.ndim(x) else float(x) for x in found)
 
     def _miscounted(self, values: Any, name: str) -> ValueError:
         return ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
@@ -418,7 +417,7 @@ class Inverse:
         inverse, turned, own = self._around(near)
         problem, row = inverse.problem, None
         if all(map(math.isfinite, (*values, *near))):
-            row = follow(problem, problem.reduced((values - own).tolist()), (
+            row = follow(problem, problem.reduced(values - own).tolist(), (
                 near - turned[:self._n]).tolist(), inverse._source)
         found = tuple((turned + (row or math.nan)).tolist())
         return found[:self._n], found[self._n:]

@@ -16,7 +16,7 @@ from __future__ import annotations
 import cmath
 from itertools import product
 import math
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -102,22 +102,24 @@ class InverseLinkage(NamedTuple):
 def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
     """Return the inverse linkage of a sketch; raise ValueError if the sketch is incomplete."""
     lines = joint_lines.parse(sketch.lines)
-    # The lines that drive are in the order of what drives them.
-    drives = dict(zip((line.names[0] for line in lines if line.drives), sketch.drives))
+    # They are in the order of what drives them.
+    driven = [line for line in lines if line.drives]
     used = {name for read in sketch.reads for name in read.joints}
     for line in lines[::-1]:
         if used & {*line.names}:
             used |= {*line.depends_on}
     lines = [line for line in lines if used & {*line.names}]
-    drives = {line.names[0]: drives[line.names[0]] for line in lines if line.drives}
+    drives = {line.names[0]: drive for line, drive in zip(driven, sketch.drives) if line in lines}
     if sorted(name for name, *_ in drives.values()) != sorted(outputs):
         raise ValueError('the inputs do not depend on all of these outputs')
     branches, turns = joint_lines.branches(lines), tuple(read.turns for read in sketch.reads)
     if 2 ** len(branches) * math.prod(map(len, turns)) > MAX_MODES:
         raise ValueError(f'more than {MAX_MODES} assembly modes')
     design = Design('inverse', {}, tuple(line.text for line in lines), lines[-1].names[0])
-    modes = tuple(_mode(Structure(design, dict(zip(branches, signs))), outputs, sketch.reads)
-                  for signs in product((1, -1), repeat=len(branches)))
+    linkages = [Structure(design, dict(zip(branches, signs)))
+                for signs in product((1, -1), repeat=len(branches))]
+    modes = tuple(Mode(linkage, tuple(read.value(linkage.built) for read in sketch.reads))
+                  for linkage in linkages)
     given = [ratio * argument(outputs.index(name)) + offset
              for name, ratio, offset in drives.values()]
     # Each mode has arguments of its own.
@@ -125,26 +127,16 @@ def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
         leaf: value for mode in modes for leaf, value in zip(mode.linkage.built.arguments, given)})
 
 
-def _mode(structure: Structure, outputs: Names, reads: Sequence[_Read]) -> Mode:
-    values = (argument(outputs.index(read.name)) if read.name in outputs else
-              read.value(structure.built) for read in reads)
-    return Mode(structure, tuple(
-        (value - read.offset) / read.ratio for value, read in zip(values, reads)))
-
-
 class _Read(NamedTuple):
     """
-    The joint from which an input is read.
+    An input as it is read from the inverse linkage.
 
-    Its value is ratio * input + offset, up to `turns` of the input; `joints` are those that it
-    depends on in the inverse linkage, `value` is its function of that linkage's `Builder`.
+    `joints` are those that it depends on, `value` is its function of that linkage's `Builder`,
+    and `turns` are the angles [rad] that may be added.
     """
 
-    name: str
     joints: Tuple[str, ...]
     value: Callable[[Any], Real]
-    ratio: float
-    offset: float
     turns: Tuple[float, ...]
 
 
@@ -350,14 +342,17 @@ class _Sketch(Dyads):
         for name in (input_.name, *(self._linkage.geared_to(by) if counted else ())):
             try:
                 joints, value = self._value(self._links[name])
+                break
             except ValueError:
                 continue
-            ratio, offset = (1.0, 0.0) if name == input_.name else self._linkage.gear(name, by)
-            is_output = name in self._outputs and name == input_.name
-            count = round(abs(ratio) * input_.period) if input_.wraps and not is_output else 1
-            return _Read(name, joints, value, ratio, offset, tuple(
-                turn * math.tau / abs(ratio) for turn in range(count)))
-        raise ValueError(f'{input_.name} is not placed')
+        else:
+            raise ValueError(f'{input_.name} is not placed')
+        ratio, offset = (1.0, 0.0) if name == input_.name else self._linkage.gear(name, by)
+        is_output = name in self._outputs and name == input_.name
+        count = round(abs(ratio) * input_.period) if input_.wraps and not is_output else 1
+        output = argument(self._outputs.index(name)) if name in self._outputs else None
+        return _Read(joints, lambda built: ((output or value(built)) - offset) / ratio, tuple(
+            turn * math.tau / abs(ratio) for turn in range(count)))
 
     def _value(self, link: Link) -> Tuple[Tuple[str, ...], Callable]:
         """Return the joints that tell the position of a link on its parent, and its formula."""

@@ -35,8 +35,6 @@ class Modes:
 
     def candidate_arrays(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return numbers of modes, of values (outputs, m) that they have, and the inputs there."""
-        pose, m = self._pose, values.shape[1]
-        over = pose.over if self._problem.linkage.is_accelerated else pose.searched
-        modes = over(*values).reshape(-1, self._problem.n, m)
+        modes = self._pose.over(*values).reshape(-1, *values.shape)
         numbers, places = np.nonzero(np.isfinite(modes).all(axis=1))
         return numbers, places, modes[numbers, :, places].T

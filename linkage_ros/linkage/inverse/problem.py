@@ -13,7 +13,7 @@ from __future__ import annotations
 from functools import cached_property, partial, reduce
 from itertools import combinations
 import math
-from typing import Any, Dict, Sequence, Tuple
+from typing import Dict, Sequence, Tuple
 
 import numpy as np
 
@@ -98,27 +98,17 @@ class InverseProblem:
             f'[{input_.name}]': size for input_, size in zip(self.inputs, self.sizes)}}, {},
             self.linkage.is_accelerated)
 
-    @cached_property
-    def over(self) -> Any:
-        """Return the same code for arrays."""
-        return self.newton.over if self.linkage.is_accelerated else self.newton.searched
-
-    def reduced(self, values: Sequence[float]) -> Sequence[float]:
-        """Return values with large angles reduced to one period, exactly."""
-        return [x if -turn <= x <= turn else float(_within_period(x, turn))
-                for x, turn in zip(values, self.periods)]
-
-    def reduced_arrays(self, values: np.ndarray) -> np.ndarray:
-        """Return what `reduced` does for values (outputs, m)."""
-        return np.stack([row if turn == math.inf else np.where(
-            np.abs(row) <= turn, row, _within_period(row, turn))
-                         for row, turn in zip(values, self.periods)])
-
-    def distance(self, by: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return the distances of values of an input, without whole periods, in its size."""
-        gap, turn = x - y, self.turns[by]
-        return np.abs(gap - turn * np.rint(gap / turn) if turn < math.inf
-                      else gap / self.sizes[by])
+    def reduced(self, values: np.ndarray) -> np.ndarray:
+        """Return values (outputs, ...) with large angles reduced to one period, exactly."""
+        values = np.array(values)
+        for by, turn in enumerate(self.periods):
+            if turn < math.inf:
+                row, count = values[by], turn / math.tau
+                # Sine and cosine remove any number of whole turns without loss.
+                with np.errstate(invalid='ignore'):
+                    values[by] = np.where(np.abs(row) <= turn, row, count * np.arctan2(
+                        np.sin(row / count), np.cos(row / count)))
+        return values
 
     def nearest_equivalent(self, inputs: Sequence[float], others: Sequence[float]
                            ) -> Row:
@@ -129,12 +119,6 @@ class InverseProblem:
     def scaled(self, jacobian: np.ndarray) -> np.ndarray:
         """Return a Jacobian in units of outputs and inputs."""
         return jacobian * self.sizes / np.reshape(self.scales, (-1, 1))
-
-
-def _within_period(value: Any, turn: float) -> Any:
-    # Sine and cosine remove any number of whole turns without loss.
-    count = turn / math.tau
-    return count * np.arctan2(np.sin(value / count), np.cos(value / count))
 
 
 def nearest(x: Real, seed: Real, turn: float) -> Real:

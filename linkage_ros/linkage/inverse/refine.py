@@ -24,8 +24,6 @@ from ..tolerances import ONE, SINGULAR
 
 # A larger error [sizes], or a longer step [rad, sizes], leads to another solution.
 FAR = 0.1
-# Steps of arrays: what is not refined then is refined one by one.
-STEPS = 3
 
 
 def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Bracket, Row]
@@ -62,32 +60,30 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
 def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Bracket
                    ) -> Optional[Row]:
     """Return the solution in a bracket, which Newton's method does not leave; None if none."""
-    low, high, x, sign, place, others = bracket
-    n, at = problem.n, problem.newton.at
+    (low, high, x, sign), at = bracket, problem.newton.at
     x = x if low <= x <= high else 0.5 * (low + high)
     best, best_x = (math.inf, math.inf), x
     for _ in range(HALVINGS):
-        trial = at(x, *others, *values)
+        trial = at(x, *values)
+        gap, following = trial[2:4]
         if trial[0] < best[0]:
             best, best_x = trial, x
         elif best[1] <= ACCEPTED:
             break
-        low, high = (x, high) if trial[2 + place] * sign < 0.0 else (low, x)
-        x = trial[2 + n]
-        if not low < x < high:
-            x = 0.5 * (low + high)
-            if x in (low, high):
-                break
+        low, high = (x, high) if gap * sign < 0.0 else (low, x)
+        x = following if low < following < high else 0.5 * (low + high)
+        if x in (low, high):
+            break
     # At a jump or in noise both sides enclose values that the output never has.
     if not best[0] <= SINGULAR:
         return None
-    if not math.isfinite(best[2 + 3 * n + place]):
+    *_, inputs, rate = best
+    if not math.isfinite(rate):
         # At an end of a segment, rates are those of the nearest float that has them.
-        around = (at(best_x + side * 2.0 ** k * math.ulp(best_x), *others, *values)
+        around = (at(best_x + side * 2.0 ** k * math.ulp(best_x), *values)[-1]
                   for k in range(HALVINGS // 2) for side in (1, -1))
-        rates = next((trial for trial in around if math.isfinite(trial[2 + 3 * n + place])), best)
-        return *best[2 + 2 * n:2 + 3 * n], *rates[2 + 3 * n:]
-    return best[2 + 2 * n:]
+        rate = next(filter(math.isfinite, around), rate)
+    return inputs, rate
 
 
 def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.ndarray
@@ -97,7 +93,7 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
 
     The solutions have the shape (inputs and rates, m), NaN where there is none.
     """
-    n, over = problem.n, problem.over
+    n, over = problem.n, problem.newton.over
     # What closed forms lose next to a singular pose; more is another assembly.
     low, high, inputs, far = -math.inf, math.inf, candidates, SINGULAR
     if n == 1:
@@ -105,7 +101,9 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
     best = over(*inputs.clip(low, high), *values)
     left = ~np.isfinite(best).all(axis=0)
     again = np.flatnonzero((best[0] > 0.0) & (best[0] <= far))
-    for _ in range(STEPS if len(again) else 0):
+    for _ in range(HALVINGS):
+        if not len(again):
+            break
         x = best[2 + n:2 + 2 * n].clip(low, high)
         trial = over(*x[:, again], *values[:, again])
         # Steps out of the reach are shortened one by one.
@@ -156,8 +154,8 @@ def distinct_arrays(problem: InverseProblem, solutions: np.ndarray) -> np.ndarra
     order = np.lexsort(solutions[:, :n].swapaxes(0, 1)[::-1], axis=0)
     solutions = np.take_along_axis(solutions, order[:, None], 0)
     pairs = np.triu_indices(len(solutions), 1)
-    apart = np.max([problem.distance(by, *(solutions[k, by] for k in pairs)) for by in range(n)],
-                   axis=0)
+    apart = np.max([input_.apart(*(solutions[k, by] for k in pairs)) / size for by, (
+        input_, size) in enumerate(zip(problem.inputs, problem.sizes))], axis=0)
     for k in np.flatnonzero((apart <= SINGULAR).any(axis=0)).tolist():
         rows = distinct(problem, [row for row in map(tuple, solutions[:, :, k].tolist())
                                   if row[0] == row[0]])

@@ -35,16 +35,14 @@ class Bracket(NamedTuple):
     """
     Two values of the first input [rad or m] between which an output has a value once.
 
-    `seed` is an estimate, `sign` that of the output's rate, `place` the output's number, and
-    `others` are the values of the other inputs. The bracket of a special input has no width.
+    `seed` is an estimate, and `sign` that of the output's rate. The bracket of a special input has
+    no width.
     """
 
     low: float
     high: float
     seed: float
     sign: float
-    place: int = 0
-    others: Tuple[float, ...] = ()
 
 
 class Segment(NamedTuple):
@@ -209,9 +207,9 @@ class Segments:
         cut = []
         for theta, value, sign in self.all:
             places = [0]
-            for i in range(1, len(theta)):
-                if i + 1 == len(theta) or value[i + 1] - value[places[-1]] > most:
-                    places.append(i)
+            while (last := places[-1]) < len(theta) - 1:
+                farthest = int(value.searchsorted(value[last] + most, 'right')) - 1
+                places.append(max(farthest, last + 1))
             cut += [(float(theta[i]), float(theta[k]), float(sign * value[i]),
                      float(sign * value[k])) for i, k in zip(places, places[1:])]
         return cut
@@ -228,13 +226,6 @@ class Segments:
         theta = ascending(theta)
         if len(theta) < 2:
             return
-        known = np.isfinite(self._curve(theta[[0, -1]])[0])
-        if not known.all():
-            # The last input inside: an end may be rounded, or an arm without length at it.
-            inside, _ = refined(lambda x: np.isfinite(self._curve(x.ravel())[0]).reshape(
-                x.shape), theta[[1, -2]], theta[[0, -1]])
-            theta[[0, -1]] = np.where(known, theta[[0, -1]], inside)
-            self._ends.update(inside)
         most = MAX_SAMPLES + 4 * len(theta)
         theta, jumped = self._divided(theta, most)
         if len(theta) > most:
@@ -254,9 +245,8 @@ class Segments:
             clear = np.flatnonzero((known & (noise <= SINGULAR * self._size))[run])
             if len(clear) > 1 and theta[run[-1]] - theta[run[0]] > ROUNDING:
                 run = run[clear[0]:clear[-1] + 1]
-                steps = self._difference(np.diff(value[0, run]))
-                yield (theta[run], value[0, run[0]] + np.append(0.0, np.cumsum(steps))
-                       if self._period < math.inf else value[0, run], rate[0, run], noise[run])
+                yield (theta[run], np.unwrap(value[0, run], period=self._period) if self._period
+                       < math.inf else value[0, run], rate[0, run], noise[run])
 
     def _divided(self, theta: np.ndarray, most: int) -> Tuple[np.ndarray, np.ndarray]:
         """Return samples that explain the output, and after which of them it jumps."""
