@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import reduce
-from typing import NamedTuple, Optional, Sequence, Tuple
+from typing import Iterable, NamedTuple, Optional, Sequence, Tuple
 
 from ..tolerances import TOLERANCE
 from ...formula.expression import (
@@ -121,6 +121,13 @@ class Limit(NamedTuple):
     def root(self) -> Real:
         """Return the root of the margin."""
         return root(self.margin, self.tolerance)
+
+
+def gated_by(value: Real, limits: Iterable[Limit]) -> Real:
+    """Return a value inside limits, NaN elsewhere."""
+    for limit in limits:
+        value = gated(value, limit.margin, limit.tolerance)
+    return value
 
 
 class Arm:
@@ -485,14 +492,8 @@ def inversor(arm: Arm, long: Real, short: Real) -> Inversor:
     power = (long - short) * (long + short)
     straight = arm.inverse_of_isosceles() if isinstance(arm, CrankArm) else None
     inverse = (arm.vector * (power / arm.divisor) if straight is None else straight * power)
-    return Inversor(right, left, _where_assembled(inverse, right.limits))
-
-
-def _where_assembled(vector: Complex, limits: Sequence[Limit]) -> Complex:
-    x, y = vector.x, vector.y
-    for limit in limits:
-        x, y = (gated(part, limit.margin, limit.tolerance) for part in (x, y))
-    return Complex(x, y)
+    return Inversor(right, left, Complex(*(
+        gated_by(part, right.limits) for part in (inverse.x, inverse.y))))
 
 
 class Slot(NamedTuple):
