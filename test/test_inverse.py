@@ -238,7 +238,7 @@ def test_an_answer_beside_a_tight_turn_is_not_missed():
 
 
 def test_lengths_of_any_size_have_the_same_answers():
-    for size in (1e-28, 1e28):
+    for size in (1e-26, 1e26):
         small, plain = (mechanisms.create(kind, **{
             name: value * scale for name, value in mechanisms.defaults(kind).items()})
             for kind in ('four_bar',) for scale in (size, 1.0))

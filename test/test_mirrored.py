@@ -16,8 +16,6 @@ ALL = ('O ground 0 0', 'H ground 1 2', 'K ground 1 0', 'Q ground 1.5 -0.3', 'A c
        'N antiparallelogram Q B I', 'R V W inversor Q A 1.5 0.6', 'G line K Q 0.3',
        'F cylinder K G 0.4 left geared carriage 1 0', 'm mirrored O H')
 CARRIAGE = ('O ground 0 0', 'H ground 1 2', 'C carriage O along H 0.1 0.6')
-GRIPPER = ('O ground 0 0', 'H ground 1 0', 'S carriage O along H 0.1 0.6', 'A ground 0.2 0.4',
-           'B dyad S A 0.4 0.3 left', 'T rigid A B 0.5 0.4 left', 'm mirrored O H')
 
 
 def seen(places, first='O', second='H'):
@@ -42,17 +40,6 @@ def test_every_construction_has_its_image(up):
                 assert np.isnan(image) or abs(image - places[f'{name}m']) < 1e-13
                 count += not np.isnan(image)
     assert count > 400 and 'Om' not in linkage.points and 'Cm' not in linkage.points
-
-
-def test_what_drives_along_the_mirror_line_drives_both_fingers():
-    linkage = mechanisms.create('custom', joints=GRIPPER)
-    assert [input_.name for input_ in linkage.inputs] == ['carriage']
-    assert linkage.points == ('O', 'H', 'S', 'A', 'B', 'T', 'Am', 'Bm', 'Tm')
-    found = linkage.solve(0.3)
-    assert found['Tm'] == pytest.approx(found['T'] * (1.0, -1.0))
-    rates = linkage.velocity(0.3)
-    assert rates['Tm'] == pytest.approx(rates['T'] * (1.0, -1.0))
-    assert linkage.reach() == [(0.1, 0.6)]
 
 
 def test_an_image_may_be_mirrored_again():

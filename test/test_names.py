@@ -1,14 +1,10 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Names of any class of text are names, whoever asks first; generated code shows in tracebacks."""
+"""Names of any class of text are names, whoever asks first."""
 
 from enum import Enum
-import gc
-import inspect
 from itertools import count
-import linecache
-import traceback
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
@@ -119,26 +115,6 @@ def test_what_is_no_name_is_refused_as_ever(kind):
         linkage.input_for(CLASSES[kind]('none'), 0.5)
     with pytest.raises(ValueError, match='^O.x of custom does not move with the crank$'):
         linkage.input_for(CLASSES[kind]('O.x'), 0.5)
-
-
-def test_a_traceback_shows_generated_code():
-    linkage, _ = fresh()
-    with pytest.raises(TypeError) as failed:
-        linkage.function()('text')
-    shown = ''.join(traceback.format_exception(failed.value))
-    assert 'linkage_ros formula' in shown and '0.5 * x0' in shown
-    assert 'def pose(x0):' in inspect.getsource(linkage.function())
-
-
-@pytest.mark.nightly
-def test_the_text_of_code_is_gone_with_the_code():
-    linkage, _ = fresh()
-    file = linkage.function().__code__.co_filename
-    assert linecache.getline(file, 2).strip() == 'def pose(x0):'
-    del linkage
-    fresh_ones = [fresh()[0] for _ in range(70)]  # more than are held though nobody uses them
-    gc.collect()
-    assert fresh_ones and not linecache.getline(file, 2)
 
 
 @pytest.mark.parametrize('kind', CLASSES)

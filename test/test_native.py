@@ -124,14 +124,6 @@ def test_so_it_is_for_the_legs_of_a_walker(kind, monkeypatch, code):
     assert code.ran == 60
 
 
-def test_a_change_of_dimensions_needs_no_other_code(code):
-    linkage, thetas = mechanisms.create('peaucellier'), np.array([0.2, -0.3])
-    grown = linkage.with_dimensions(**{k: 2.0 * v for k, v in linkage.dimensions.items()})
-    before, made = by_batch(linkage, thetas), code.made
-    assert np.array_equal(by_batch(grown, thetas), 2.0 * before)
-    assert code.made == made
-
-
 def test_nobody_waits_for_the_compiler(code):
     linkage = fresh('Waited')
     code.allowed.clear()

@@ -71,11 +71,6 @@ def test_a_copy_has_the_code_of_what_it_was_copied_from(name):
     assert other.posed().variant is linkage.posed().variant
 
 
-def test_a_copy_is_as_picky_as_what_it_was_copied_from():
-    with pytest.raises(ValueError, match='dimension r must be positive'):
-        deepcopy(CRANK).with_dimensions(r=-1.0)
-
-
 def test_a_copy_of_an_accelerated_one_is_accelerated():
     pytest.importorskip('llvmlite')
     quick = mechanisms.create('jansen').accelerated()

@@ -26,8 +26,10 @@ from truth.drawing import Arithmetic, DIGITS, draw, Linkage, precisely, read
 
 WORDS = {'ground', *random_linkages.INPUTS, *random_linkages.WORDS} - {'geared'}
 LONG, BATCH = 1000, 25
-# Lengths of the linkage in which every construction moves.
-MOVING = {'a': 1.0, 'b': 3.0, 'c': 2.5, 'd': 3.2, 'e': 1.5, 'f': 2.0, 'g': 3.5, 'h': 4.0}
+# Joint lines that use every construction where it moves.
+MOVING = (
+    'O ground 0 0', 'Q ground 3.2 0', 'N ground 3.2 -4', 'A crank O 1', 'B dyad A Q 3 2.5 left',
+    'P rigid A B 1.5 2 left', 'M mirror A B P', 'S slider P 3.5 Q 0.3 out', 'L slot N P 0 out 4')
 
 
 def problems(seeds, asked):
@@ -155,19 +157,14 @@ def test_every_word_comes_up_and_a_third_is_degenerate():
 @pytest.mark.parametrize('kind', exact_poses.KINDS)
 @precisely
 def test_the_drawing_agrees_with_the_other_reference(kind):
-    if kind == 'custom':
-        joints, lengths = exact_poses.MOVING, MOVING
-    else:
-        design = mechanisms.design(kind)
-        joints, lengths = design.joints, mechanisms.create(kind).dimensions
-    linkage = Linkage(joints, lengths)
+    lengths = mechanisms.defaults(kind)
+    linkage = Linkage(mechanisms.design(kind).joints, lengths)
     way = linkage.passings()[0]
     turns = linkage.turns(linkage.numbers, way)
     rows = linkage.prepared(linkage.numbers)
     within = 1e-15 if '1.8' in linkage.literals() else 1e-50  # which is not quite nine fifths
     for theta in (0.3, -0.4, 1.2):
-        held = [theta, exact_poses.HELD][:len(linkage.inputs)]
-        found = draw(DIGITS, linkage, rows, list(map(gmpy2.mpfr, held)), way, turns)
+        found = draw(DIGITS, linkage, rows, [gmpy2.mpfr(theta)], way, turns)
         true = exact_poses.place(kind, exact_poses.exact(lengths), exact_poses.mp.mpf(theta))
         for name, place in true.points.items():
             x, y = (gmpy2.mpfr(exact_poses.mp.nstr(part, 80)) for part in (place.real, place.imag))
@@ -217,7 +214,7 @@ def test_floats_and_digits_draw_the_same():
 
 
 def test_the_measure_sees_a_flaw_in_the_last_digits_and_a_wrong_nan():
-    subject = checks.Subject(random_linkages.Design(exact_poses.MOVING, MOVING, {}),
+    subject = checks.Subject(random_linkages.Design(MOVING, {}, {}),
                              np.random.default_rng(9))
     given = np.array([[0.7, *subject.held]])
     found = drawing_accuracy.answers(subject.mechanism, given, subject.poses, True)

@@ -72,7 +72,7 @@ def _of_floats_too(name: str, xp: Any, dtype: Any) -> Callable:
 
 
 class Finite:
-    """Expressions without NaN, with the conditions of their validity as bits of an integer."""
+    """Expressions without NaN, each with the conditions of its validity."""
 
     def __init__(self) -> None:
         self._known: Dict[Real, Tuple[Real, int]] = {}

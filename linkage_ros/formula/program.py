@@ -14,15 +14,13 @@ from __future__ import annotations
 
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cached_property
-from itertools import chain, count
-import linecache
+from itertools import chain
 import math
 from operator import attrgetter
 import re
 from struct import Struct
 from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 import warnings
-from weakref import finalize
 
 import numpy as np
 
@@ -36,7 +34,7 @@ from ..optional import needs
 BLOCK_OF_POSES = 4096
 # Below this many poses the float code in a loop beats numpy's cost per call.
 FEW_POSES = 32
-_NUMBERS, _NAMED, _OPERANDS = count(), re.compile(r'\bv\d+'), attrgetter('operands')
+_NAMED, _OPERANDS = re.compile(r'\bv\d+'), attrgetter('operands')
 
 FLOATS = Dialect({name: row.python for name, row in OPERATIONS.items()}, {
     name: value for name, value in vars(math).items() if not name.startswith('_')})
@@ -100,11 +98,7 @@ def _python(listing: Listing, dialect: Dialect, arguments: int) -> Callable:
         f'def bind({"".join(f"k{n}, " for n in listing.constants)}instead=None):',
         f'    def pose({given}):', *(f'        {line}' for line in body), '    return pose'])
     scope = dict(dialect.names)
-    file = f'<linkage_ros formula {next(_NUMBERS)}>'
-    exec(compile(source, file, 'exec'), scope)
-    # For tracebacks and debuggers, as long as the code lives.
-    linecache.cache[file] = len(source), None, source.splitlines(True), file
-    finalize(scope['bind'], linecache.cache.pop, file, None).atexit = False
+    exec(compile(source, '<linkage_ros formula>', 'exec'), scope)
     return scope['bind']
 
 

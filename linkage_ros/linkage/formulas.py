@@ -14,7 +14,7 @@ import re
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
 
 from .geometry.builder import Builder
-from .geometry.planar import Arm, Limit
+from .geometry.planar import Arm, gated_by, Limit
 from .geometry.spatial import Vector
 from .text import joint_lines
 from .text.design import Design
@@ -144,11 +144,9 @@ class Structure:
 
     def checked(self, names: Names) -> List[Real]:
         """Return outputs and their rates by each input, NaN unless all joints are assembled."""
-        values = self._angles(names)
-        for limit in self.built.limits:
-            if limit.margin.varies:
-                values = [gated(value, limit.margin, limit.tolerance) for value in values]
-        return [*values, *self.parts(((), (), names))]
+        limits = [limit for limit in self.built.limits if limit.margin.varies]
+        return [*(gated_by(value, limits) for value in self._angles(names)),
+                *self.parts(((), (), names))]
 
     def _legs(self, points: Points, joints: Names, moving: Names) -> Program:
         inputs = self.built.inputs

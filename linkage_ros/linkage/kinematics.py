@@ -28,8 +28,6 @@ from ..formula.program import evaluate, Pose, Program
 from ..optional import needs
 from ..words import listed, meant, plain_text, quoted
 
-# Cached values of expressions of dimensions: some twenty times those of Jansen's leg.
-MOST_VALUES = 10000
 # Quantities of joints; all others are of links.
 OF_POINTS = 'points', 'velocities', 'point accelerations'
 
@@ -356,20 +354,13 @@ class Kinematics:
         link), the angles of `joints` [rad; a slide: m], and the velocities of the links in
         `moving`.
         """
-        return self.cache.get_or_make(('legs', points, joints, moving), lambda: self._legs(
-            points, joints, moving))
-
-    def _legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]) -> Pose:
-        lengths = dict(self.dimensions)
-        named: List[Union[str, LinkPoint]] = []
-        for i, point in enumerate(points):
-            if isinstance(point, LinkPoint):
-                names = f'[x{i}]', f'[y{i}]'
-                lengths.update(zip(names, (point.x, point.y)))
-                point = LinkPoint(point.link, *names)
-            named.append(point)
-        program = self.structure.legs(tuple(named), joints, moving)
-        return program.bind(lengths, dict(self._evaluated), self.is_accelerated)
+        named = tuple(LinkPoint(point.link, f'[x{i}]', f'[y{i}]')
+                      if isinstance(point, LinkPoint) else point for i, point in enumerate(points))
+        places = {name: value for point, names in zip(points, named)
+                  if isinstance(point, LinkPoint) for name, value in zip(names[1:], point[1:])}
+        return self.cache.get_or_make(('legs', points, joints, moving), lambda: (
+            self.structure.legs(named, joints, moving).bind(
+                {**self.dimensions, **places}, dict(self._evaluated), self.is_accelerated)))
 
     # --- outputs ---
 
@@ -423,9 +414,6 @@ class Kinematics:
 
     def bind(self, program: Program) -> Pose:
         """Return a program of its formulas as a function of its arguments."""
-        if len(self._evaluated) > MOST_VALUES:
-            # A new dictionary, since a thread may be reading the old one.
-            self._evaluated = {}
         return program.bind(self.dimensions, self._evaluated, self.is_accelerated)
 
     def bound(self, kind: str, names: Any, *by: int) -> Pose:

@@ -27,12 +27,9 @@ def effort(linkage: Kinematics, theta: Inputs, loads: Mapping[str, ArrayLike]) -
         raise ValueError('loads must be a mapping from joints to forces and from links to '
                          f'moments, got {quoted(loads)}')
     shape = np.broadcast_shapes(*map(np.shape, linkage.each_input(theta)))
-    efforts = [np.zeros(shape) for _ in linkage.inputs]
-    for by in range(len(linkage.inputs)):
-        with np.errstate(invalid='ignore', over='ignore'):
-            for power in _powers(linkage, theta, loads, by):
-                efforts[by] = efforts[by] - power
-    return np.stack(efforts, -1)
+    with np.errstate(invalid='ignore', over='ignore'):
+        return np.stack([0.0 - sum(_powers(linkage, theta, loads, by), np.zeros(shape))
+                         for by in range(len(linkage.inputs))], -1)
 
 
 def _powers(linkage: Kinematics, theta: Inputs, loads: Mapping[str, ArrayLike],

@@ -251,12 +251,6 @@ def judge(case, found, links, rates=False, exact=None) -> List[Row]:
             for index, theta in enumerate(case.thetas) for output, results in found.items()]
 
 
-def verdict(case, angle, output, result, exact):
-    """Return the `Row` of one result that depends on every closure of its truth."""
-    return row_of(case, angle, output, np.asarray(result), exact,
-                  due_of(exact.closures.values()), {})
-
-
 def _due(kind, output, closures, links):
     """Tell what is due: 'number', 'nan', 'either', or 'any' where no true pose exists nearby."""
     return due_of({closures[name] for name in _needs(kind, output, links)})
@@ -345,16 +339,6 @@ def _top_speeds(case, links, angles=24):
                 top[name] = max(top.get(name, 0.0), float(least),
                                 float(abs(value)) if reached else 0.0)
     return top
-
-
-def worst(rows):
-    """Return the row with the largest ratio of every (kind, output), in the order they came."""
-    found = {}
-    for row in rows:
-        key = row.kind, row.output
-        if key not in found or row.ratio > found[key].ratio:
-            found[key] = row
-    return list(found.values())
 
 
 def broken(rows):

@@ -175,92 +175,55 @@ class Value(NamedTuple):
     number: mpfr
     slack: mpfr
 
+    def __add__(self, other):
+        return _rounded(self.number + other.number, self.slack + other.slack)
 
-_TOKEN = re.compile(r'\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)'
-                    r'|(?P<name>[A-Za-z_]\w*)|(?P<sign>[-+*/(),]))')
+    def __sub__(self, other):
+        return self + -other
+
+    def __mul__(self, other):
+        return _rounded(self.number * other.number, abs(self.number) * other.slack
+                        + abs(other.number) * self.slack)
+
+    def __truediv__(self, other):
+        quotient = self.number / other.number
+        return _rounded(quotient, self.slack / abs(other.number)
+                        + abs(quotient / other.number) * other.slack)
+
+    def __neg__(self):
+        return Value(-self.number, self.slack)
+
+
+_TOKEN = re.compile(r'(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?P<deg>deg)?|[A-Za-z_]\w*')
 
 
 class Arithmetic:
     """
     Sums, differences, products, quotients, max() and sqrt() of numbers and dimensions.
 
-    `moved` are literals, by their text, with what is added to them.
+    They are read as Python does. `moved` are literals, by their text, with what is added to them.
     """
 
     def __init__(self, dimensions, moved=None):
-        self._dimensions = dimensions
         self._moved = moved or {}
+        self._known = {'max': max, 'sqrt': _square_root, 'literal': self._literal,
+                       **{name: Value(number, mpfr(0)) for name, number in dimensions.items()}}
 
     def value(self, text):
         """Return the `Value` of a text."""
-        self._tokens = [(match.lastgroup, match.group(match.lastgroup))
-                        for match in _TOKEN.finditer(text)]
-        self._at = 0
-        return self._sum()
+        return eval(_TOKEN.sub(lambda token: (
+            f'literal("{token["number"]}", {bool(token["deg"])})' if token['number'] else
+            token[0]), text), {**self._known, 'pi': _rounded(gmpy2.const_pi(), mpfr(0))})
 
-    def _next(self):
-        return self._tokens[self._at][1] if self._at < len(self._tokens) else ''
-
-    def _take(self):
-        self._at += 1
-        return self._tokens[self._at - 1]
-
-    def _sum(self):
-        total = self._product()
-        while self._next() in ('+', '-'):
-            _, sign = self._take()
-            other = self._product()
-            number = total.number + other.number if sign == '+' else total.number - other.number
-            total = _rounded(number, total.slack + other.slack)
-        return total
-
-    def _product(self):
-        total = self._factor()
-        while self._next() in ('*', '/'):
-            _, sign = self._take()
-            other = self._factor()
-            x, y = total.number, other.number
-            if sign == '*':
-                total = _rounded(x * y, abs(x) * other.slack + abs(y) * total.slack)
-            else:
-                total = _rounded(x / y, total.slack / abs(y) + abs(x / y / y) * other.slack)
-        return total
-
-    def _factor(self):
-        kind, text = self._take()
-        if kind == 'number':
-            return self._literal(text)
-        if text == '-':
-            inner = self._factor()
-            return Value(-inner.number, inner.slack)
-        if text == '(':
-            return self._closed(self._sum())
-        if text in ('max', 'sqrt'):
-            return self._function(text)
-        if text == 'pi':
-            return _rounded(gmpy2.const_pi(), mpfr(0))
-        return Value(self._dimensions[text], mpfr(0))
-
-    def _literal(self, text):
+    def _literal(self, text, is_in_degrees):
         number = mpfr(float(text)) + self._moved.get(text, 0)
-        if self._next() == 'deg':
-            self._take()
-            return _rounded(number * gmpy2.const_pi() / 180, mpfr(0))
-        return Value(number, mpfr(0))
+        return _rounded(number * gmpy2.const_pi() / 180, mpfr(0)) if is_in_degrees else Value(
+            number, mpfr(0))
 
-    def _function(self, name):
-        self._take()
-        first = self._sum()
-        if name == 'sqrt':
-            root = gmpy2.sqrt(first.number)
-            return self._closed(_rounded(root, first.slack / (2 * root)))
-        self._take()
-        second = self._sum()
-        return self._closed(first if first.number >= second.number else second)
 
-    def _closed(self, value):
-        self._take()
-        return value
+def _square_root(value):
+    root = gmpy2.sqrt(value.number)
+    return _rounded(root, value.slack / (2 * root))
 
 
 def _rounded(number, slack):

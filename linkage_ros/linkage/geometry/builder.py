@@ -254,9 +254,8 @@ class Builder:
 
     def _stroke(self, base: str, pivot: str, bar: Real) -> Tuple[Real, Real]:
         """Return the shortest and longest cylinder that a bar to a pivot allows."""
-        if self._are_together(base, pivot):
-            apart = self.distance(base, pivot)
-            return abs(apart - bar), apart + bar
+        if side := self._constant(base, pivot):
+            return abs(side.length - bar), side.length + bar
         return real(0.0), self.points[base].span + self.points[pivot].span + bar
 
     def image(self, name: str, point: str, first: str, second: str) -> None:
@@ -301,7 +300,7 @@ class Builder:
 
     def line(self, name: str, first: str, second: str, distance: Real) -> None:
         """Add a point on the line of a bar, a distance [m] from first, towards second."""
-        part, kite = distance / self.distance(first, second), self._kites.get((first, second))
+        part, kite = distance / self._side(first, second).length, self._kites.get((first, second))
         self._add_to_link(name, first, second, Complex(part, 0.0), abs(distance),
                           kite.beyond_kite(-part) if kite else None)
 
@@ -323,7 +322,7 @@ class Builder:
         ends = [self._side(end, point).vector for end in (second, first)]
         place, arm = self.points[point].place, self.arm(second, first, smooth=True)
         self._reflect(name, first, second, arm, place, arm.offset(place, ends[0]), ends,
-                      self.distance(first, point), self.distance(second, point))
+                      self._side(first, point).length, self._side(second, point).length)
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
             self._kites[first, name] = arm
 
@@ -421,27 +420,28 @@ class Builder:
         if self.points[name].home != GROUND:
             raise ConstructionError(f'joint {name} must be on the ground{otherwise}')
 
-    def _bar_between(self, first: str, second: str) -> _Vector:
-        """Return the vector between two joints of one link."""
-        if (first, second) not in self._vectors:
-            link = self._shared_link(first, second)
-            if not link:
-                raise ConstructionError(f'{first} and {second} are not joints of one moving link')
-            bar, frame = self._axes[link], self.frames[link]
-            across = frame[second] - frame[first]
-            self._vectors[first, second] = _Vector(
-                bar.vector * (across / bar.length), across.length(), link)
-        return self._vectors[first, second]
-
     def _side(self, first: str, second: str) -> _Vector:
         """Return the vector between two joints of one link or of the ground."""
+        if side := self._constant(first, second):
+            return side
+        raise ConstructionError(f'{first} and {second} are not joints of one moving link')
+
+    def _constant(self, first: str, second: str) -> Optional[_Vector]:
+        """Return the vector between two joints; None if they are of two links."""
         ends = self.points[first], self.points[second]
         if ends[0].home == ends[1].home == GROUND:
             vector = ends[1].place - ends[0].place
             if vector.length().value == 0.0:
                 raise ConstructionError(f'{first} and {second} are at the same place')
             return _Vector(vector, vector.length(), GROUND)
-        return self._bar_between(first, second)
+        if (first, second) not in self._vectors:
+            for link, frame in self.frames.items():
+                if first in frame and second in frame:
+                    bar, across = self._axes[link], frame[second] - frame[first]
+                    self._vectors[first, second] = _Vector(
+                        bar.vector * (across / bar.length), across.length(), link)
+                    break
+        return self._vectors.get((first, second))
 
     def spot(self, link: str, seen: Complex) -> Complex:
         """Return the place of a point that a link carries, from where it lies on the link."""
@@ -450,11 +450,6 @@ class Builder:
         axis, (joint, start) = self._axes[link], next(iter(self.frames[link].items()))
         along = planar.unit(axis.vector)
         return self.points[joint].place + along * (seen - start)
-
-    def _shared_link(self, first: str, second: str) -> Optional[str]:
-        """Return the moving link that two joints are on, None if there is none."""
-        return next((link for link, frame in self.frames.items()
-                     if first in frame and second in frame), None)
 
     def _numbered(self, word: str) -> str:
         taken = sum(link.name.rstrip('0123456789') == word for link in self.links)
@@ -485,16 +480,10 @@ class Builder:
     def _plain_arm(self, first: str, second: str) -> planar.Arm:
         """Return the arm from one joint to another by their coordinates."""
         ends = self.points[first], self.points[second]
-        if self._are_together(first, second):
-            side = self._side(first, second)
+        if side := self._constant(first, second):
             return planar.Arm(ends[0].place, side.vector, side.length, side.length)
         return planar.Arm(ends[0].place, self._between(first, second),
                           ends[0].span + ends[1].span)
-
-    def _are_together(self, first: str, second: str) -> bool:
-        """Return whether two joints are on one link or on the ground."""
-        grounded = self.points[first].home == self.points[second].home == GROUND
-        return grounded or self._shared_link(first, second) is not None
 
     def _between(self, first: str, second: str) -> Complex:
         """Return the vector between two joints; bars from a common joint are more accurate."""
@@ -505,10 +494,6 @@ class Builder:
             if len(bars) == 2:
                 return bars[1].vector - bars[0].vector
         return self.points[second].place - self.points[first].place
-
-    def distance(self, first: str, second: str) -> Real:
-        """Return the constant distance [m] of two joints of one link or of the ground."""
-        return self._side(first, second).length
 
     def _pair(self, name: str, first: str, second: str, found: planar.Dyad, to_first: Real,
               to_second: Real, place: Optional[Complex] = None) -> None:

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import reduce
-from typing import NamedTuple, Optional, Sequence, Tuple
+from typing import Iterable, NamedTuple, Optional, Sequence, Tuple
 
 from ..tolerances import TOLERANCE
 from ...formula.expression import (
@@ -123,10 +123,18 @@ class Limit(NamedTuple):
         return root(self.margin, self.tolerance)
 
 
+def gated_by(value: Real, limits: Iterable[Limit]) -> Real:
+    """Return a value inside limits, NaN elsewhere."""
+    for limit in limits:
+        value = gated(value, limit.margin, limit.tolerance)
+    return value
+
+
 class Arm:
     """The arm between two moving points; a given length is constant."""
 
-    _length: Optional[Real] = None
+    # None if it is not constant.
+    length: Optional[Real] = None
     _is_smooth = False
 
     def __init__(self, foot: Complex, vector: Complex, span: Real, length: Optional[Real] = None):
@@ -135,23 +143,18 @@ class Arm:
         # A constant would have a value even where the points cannot be assembled.
         self.square = vector.squared() if length is None else gated(
             square(length), abs(vector.x), real(0.0))
-        self._span, self._length = span, length
+        self._span, self.length = span, length
 
     @property
     def divisor(self) -> Real:
         """Its square, NaN where it has no direction."""
-        return self.square if self._length or self._is_smooth else gated(
+        return self.square if self.length or self._is_smooth else gated(
             self.square, self._clear - LEAST_SQUARE, real(0.0))
 
     @property
     def _clear(self) -> Real:
         """Return a square that is not tiny where the arm has a direction."""
         return self.square
-
-    @property
-    def length(self) -> Optional[Real]:
-        """Its length, if constant."""
-        return self._length
 
     def offset(self, point: Complex, relative: Complex) -> Real:
         """Return the cross product of the arm and a point relative to its foot."""
@@ -167,7 +170,7 @@ class Arm:
 
     def stroke(self, first: Real, second: Real, size: Real) -> Tuple[Limit, Limit]:
         """Return `within` of their sum and `beyond` of their difference; first varies."""
-        length = self._length
+        length = self.length
         if length is None:
             return self.within(first + second, size), self.beyond(first - second, size)
         # The varying length is added last: a sum that it brings next to zero is exact.
@@ -186,7 +189,7 @@ class Arm:
     def _limit(self, radius: Real, size: Real, margin: Real) -> Limit:
         # At the limit the length is the radius: an error of a length changes the square by the
         # radius times that error. A tolerance is constant: size bounds a radius that varies.
-        bound = (self._length or size) if radius.varies else abs(radius)
+        bound = (self.length or size) if radius.varies else abs(radius)
         return Limit(margin, TOLERANCE * bound * (size + self._span))
 
 
@@ -489,14 +492,8 @@ def inversor(arm: Arm, long: Real, short: Real) -> Inversor:
     power = (long - short) * (long + short)
     straight = arm.inverse_of_isosceles() if isinstance(arm, CrankArm) else None
     inverse = (arm.vector * (power / arm.divisor) if straight is None else straight * power)
-    return Inversor(right, left, _where_assembled(inverse, right.limits))
-
-
-def _where_assembled(vector: Complex, limits: Sequence[Limit]) -> Complex:
-    x, y = vector.x, vector.y
-    for limit in limits:
-        x, y = (gated(part, limit.margin, limit.tolerance) for part in (x, y))
-    return Complex(x, y)
+    return Inversor(right, left, Complex(*(
+        gated_by(part, right.limits) for part in (inverse.x, inverse.y))))
 
 
 class Slot(NamedTuple):

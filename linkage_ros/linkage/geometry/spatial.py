@@ -21,14 +21,13 @@ Sources: Chace, "Vector analysis of linkages", J. Eng. Ind. 85 (1963); Hartenber
 
 from __future__ import annotations
 
-from typing import Any, Iterable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, List, NamedTuple, Optional, Sequence, Tuple
 
 from .planar import LEAST_SQUARE, Limit, TINY
 from ..tolerances import TOLERANCE
 from ...formula.expression import (
     arctangent,
     cosine,
-    gated,
     Rate,
     Real,
     real,
@@ -378,13 +377,6 @@ def _on_circle(c: Real, s: Real) -> Tuple[Real, Real]:
     """Return a cosine and a sine corrected for the rounding of the sum of their squares."""
     by = 1.5 - 0.5 * (square(c) + square(s))
     return c * by, s * by
-
-
-def gated_by(value: Real, limits: Iterable[Limit]) -> Real:
-    """Return a value inside limits, NaN elsewhere."""
-    for limit in limits:
-        value = gated(value, limit.margin, limit.tolerance)
-    return value
 
 
 def drawn_side(hinge: Hinge, pivot: Vector, end: Vector) -> Tuple[Real, Real]:

@@ -44,14 +44,13 @@ import numpy as np
 
 from .joint_lines import check_order, formula, Line, parsed
 from ..geometry.builder import Bar, Builder, GROUND, Link, Point
-from ..geometry.planar import Limit
+from ..geometry.planar import gated_by, Limit
 from ..geometry.spatial import (
     Circle,
     drawn_ahead,
     drawn_side,
     EDGE,
     Frame,
-    gated_by,
     Hinge,
     Pivot,
     Rod,
