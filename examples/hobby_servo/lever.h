@@ -189,7 +189,9 @@ typedef struct {
     lkr_axis axis[2][LKR_MAX_INPUTS];
     /* After how much of each input the actuators or the joints repeat, or 0. */
     lkr_real turn[2][LKR_MAX_INPUTS];
-    /* Where each input starts, its sweep, and the range of its samples. */
+    /* The unit of each input, in those of the scene; where it starts, its sweep, and the range of its
+       samples. */
+    lkr_real unit[LKR_MAX_INPUTS];
     lkr_real start[LKR_MAX_INPUTS];
     lkr_real sweep[LKR_MAX_INPUTS][2];
     lkr_real range[LKR_MAX_INPUTS][2];
@@ -461,6 +463,25 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
             return 1;
         }
     }
+}
+
+/* The inputs for values of outputs, nearest to near ones, all in the scene's units. */
+static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *value, const lkr_real *near,
+    lkr_real *inputs)
+{
+    lkr_real q[LKR_MAX_INPUTS];
+    lkr_point p;
+    int i;
+    for (i = 0; i < model->inputs; i++) {
+        q[i] = near[i] / model->unit[i];
+    }
+    if (!lkr_inverse(model, LKR_JOINTS, value, q, &p)) {
+        return 0;
+    }
+    for (i = 0; i < model->inputs; i++) {
+        inputs[i] = q[i] * model->unit[i];
+    }
+    return 1;
 }
 
 /* --- actuators and joints --- */
@@ -790,29 +811,9 @@ static const lkr_model lever_model = {
     { { { 1.0f, 0.0f, 0, 1.0f, 0.0f } },
       { { 1.0f, 6.2831855f, 0, 0.0f, 0.0f } } },
     { { 0.0f }, { 6.2831855f } },
-    { 0.0f }, { { -LKR_FAR, LKR_FAR } },
+    { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } },
     { { -3.1415927f, 3.1415927f } }
 };
-
-/* Initialize the memory; returns 0 if there is no pose. */
-static inline int lever_begin(lever_memory *m)
-{
-    return lkr_begin(&lever_model, m);
-}
-
-/* From actuators to joints, see lkr_transmit; returns a status. */
-static inline int lever_actuators_to_joints(lever_memory *m, const lever_actuators *from,
-    lever_joints *to)
-{
-    return lkr_transmit(&lever_model, m, LKR_ACTUATORS, from, to);
-}
-
-/* From joints to actuators, see lkr_transmit; returns a status. */
-static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints *from,
-    lever_actuators *to)
-{
-    return lkr_transmit(&lever_model, m, LKR_JOINTS, from, to);
-}
 
 /* The inputs in each assembly mode of the inverse linkage, NAN where there is none:
      O ground 0.0 0.0
@@ -871,22 +872,36 @@ static const lkr_model lever_model_angle_lever = {
     { { { 0, 0, 0, 0, 0 } },
       { { 1.0f, 6.2831855f, 0, 0.0f, 0.0f } } },
     { { 6.2831855f }, { 6.2831855f } },
-    { 0.0f }, { { -LKR_FAR, LKR_FAR } },
+    { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } },
     { { -3.1415927f, 3.1415927f } }
 };
+
 
 /* The crank for lever [rad], nearest to `near`, whole turns included. Returns 0, and
    leaves crank alone, where there is none. */
 static inline int lever_crank_for_angle_lever(float value, float near, float *crank)
 {
-    float q[LKR_MAX_INPUTS];
-    lkr_point p;
-    q[0] = near;
-    if (!lkr_inverse(&lever_model_angle_lever, LKR_JOINTS, &value, q, &p)) {
-        return 0;
-    }
-    *crank = q[0];
-    return 1;
+    return lkr_inputs_for(&lever_model_angle_lever, &value, &near, crank);
+}
+
+/* Initialize the memory; returns 0 if there is no pose. */
+static inline int lever_begin(lever_memory *m)
+{
+    return lkr_begin(&lever_model, m);
+}
+
+/* From actuators to joints, see lkr_transmit; returns a status. */
+static inline int lever_actuators_to_joints(lever_memory *m, const lever_actuators *from,
+    lever_joints *to)
+{
+    return lkr_transmit(&lever_model, m, LKR_ACTUATORS, from, to);
+}
+
+/* From joints to actuators, see lkr_transmit; returns a status. */
+static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints *from,
+    lever_actuators *to)
+{
+    return lkr_transmit(&lever_model, m, LKR_JOINTS, from, to);
 }
 
 #endif /* LEVER_LINKAGE_H */

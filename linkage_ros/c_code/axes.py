@@ -4,7 +4,7 @@
 """The actuators and the commanded joints of a mechanism, one of each for every input."""
 
 import math
-from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -112,20 +112,18 @@ def output_of(machine: SceneMechanism, name: str) -> Optional[str]:
     return output if output != name and machine.linkage.has_output(output) else None
 
 
-def gears(linkage: Mechanism, axes: Sequence[Axis]) -> Iterator[Tuple[int, int, float, float]]:
-    """Yield the axes that count an input, maybe geared: number, input, ratio and offset."""
-    for k, each in enumerate(axes):
-        for i, input_ in enumerate(linkage.inputs):
-            if each.output == input_.name:
-                yield k, i, 1.0, 0.0
-            elif each.output in linkage.geared_to(i) and not each.wraps:
-                yield k, i, *linkage.gear(each.output, i)
+def gears(linkage: Mechanism, axes: Sequence[Axis]) -> Dict[int, Tuple[int, float, float]]:
+    """Return input, ratio and offset of the axes that count an input, maybe geared, by number."""
+    return {k: (i, 1.0, 0.0) if each.output == input_.name else (i, *linkage.gear(each.output, i))
+            for k, each in enumerate(axes) for i, input_ in enumerate(linkage.inputs)
+            if each.output == input_.name
+            or each.output in linkage.geared_to(i) and not each.wraps}
 
 
 def check_inverse(machine: SceneMechanism, axes: Sequence[Axis]) -> None:
     """Raise ValueError if positions of axes give the inputs neither in closed form nor safely."""
     linkage, names = machine.linkage, [each.output for each in axes]
-    if len(list(gears(linkage, axes))) == len(axes) or linkage.inverse(tuple(names)).closed:
+    if len(gears(linkage, axes)) == len(axes) or linkage.inverse(tuple(names)).closed:
         return
     if len(axes) > 1:
         raise ValueError(f'{listed(names)} of {machine.name} have no inverse in closed form, and '
