@@ -4,7 +4,7 @@
 """The actuators and the commanded joints of a mechanism, one of each for every input."""
 
 import math
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -82,24 +82,24 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
     if len({*outputs}) != len(machine.inputs):
         raise ValueError(f'{machine.name} has {len(machine.inputs)} inputs: as many joints are '
                          f'needed, not {listed(names)}')
-    if names and not _tell(machine, outputs, spread(machine.linkage.inputs, SPREAD)):
+    if names and not _tell(machine, outputs):
         raise ValueError(f'{listed(names)} of {machine.name} moves with none of the inputs, or '
                          'only together with another joint')
     check_inverse(machine, [axis(machine, output) for output in outputs])
-    named = [machine.joints.get(_key(machine, output)) or JointName(f'{machine.name}_{output}')
-             for output in outputs]
-    return [axis(machine, output, joint.name, joint.sign, joint.offset, joint.wraps)
-            for output, joint in zip(outputs, named)]
+    return [_joint(machine, output) for output in outputs]
 
 
 def passive(machine: SceneMechanism, commanded: Sequence[Axis]) -> List[Axis]:
     """Return the joints of the first leg's links that are not commanded."""
     outputs = [each.output for each in commanded]
-    links = [link.name for link in machine.linkage.links if link.name not in outputs]
-    named = [(link, machine.joints[_key(machine, link)]) for link in links
-             if _key(machine, link) in machine.joints]
-    return [axis(machine, link, joint.name, joint.sign, joint.offset, joint.wraps)
-            for link, joint in named]
+    return [_joint(machine, link.name) for link in machine.linkage.links
+            if link.name not in outputs and _key(machine, link.name) in machine.joints]
+
+
+def _joint(machine: SceneMechanism, output: str) -> Axis:
+    """Return the axis of an output, with the name, sign and offset of its joint."""
+    joint = machine.joints.get(_key(machine, output), JointName(f'{machine.name}_{output}'))
+    return axis(machine, output, joint.name, joint.sign, joint.offset, joint.wraps)
 
 
 def output_of(machine: SceneMechanism, name: str) -> Optional[str]:
@@ -201,18 +201,16 @@ def _chain(machine: SceneMechanism) -> List[str]:
         return list(machine.inputs)
 
 
-def _tell(machine: SceneMechanism, outputs: Sequence[str],
-          inputs: Optional[Sequence[Any]] = None) -> bool:
-    """Return whether outputs determine the inputs at any of such inputs, by default the start."""
+def _tell(machine: SceneMechanism, outputs: Sequence[str]) -> bool:
+    """Return whether outputs determine the inputs in any of many poses."""
     linkage = machine.linkage
-    own = start(machine) if inputs is None else inputs
-    pose = linkage.posed((), (), tuple(outputs))
-    rates = np.reshape(pose.over(*own), (len(linkage.inputs), len(outputs), -1))
+    rates = np.reshape(linkage.posed((), (), tuple(outputs)).over(*spread(
+        linkage.inputs, SPREAD)), (len(linkage.inputs), len(outputs), -1))
     if not np.isfinite(rates).all(axis=(0, 1)).any():
         return True
     sizes = np.array([1.0 if linkage.is_angle(each) else linkage.longest for each in outputs])
-    rates = rates * np.array([each.size for each in linkage.inputs])[:, None, None]
-    scaled = np.moveaxis(np.nan_to_num(rates / sizes[:, None]), -1, 0)
+    units = np.array([each.size for each in linkage.inputs])
+    scaled = np.moveaxis(np.nan_to_num(rates * units[:, None, None] / sizes[:, None]), -1, 0)
     values = np.linalg.svd(scaled, compute_uv=False)
     return values.shape[1] == len(outputs) and bool(
         (values[:, -1] > DEPENDENT * np.maximum(1.0, values[:, 0])).any())
