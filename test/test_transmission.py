@@ -702,9 +702,10 @@ def test_a_package_names_what_the_scene_names(files, machines):
         for side, named in zip(('actuator', 'joint'), axes):
             assert [{**each.attrib} for each in own.iter(side)] == [
                 {'name': each, 'role': role} for each, role in named.items()]
-            row, = re.findall(rf'array<Axis, size> {side}s{{{{(.*)}}}};', code)
-            assert [tuple(ast.literal_eval(f'b"{text}"').decode() for text in each)
-                    for each in re.findall(r'{"(.*?)", "(.*?)"}', row)] == [*named.items()]
+            row, = re.findall(rf'array<Axis, \w+> {side}s{{{{(.*)}}}};', code)
+            pairs = [tuple(ast.literal_eval(f'b"{text}"').decode() for text in each)
+                     for each in re.findall(r'{"(.*?)", "(.*?)"}', row)]
+            assert pairs[:len(named)] == [*named.items()]
         assert f'size = {len(axes[0])};' in code and f'model = {name}_model;' in code
         proof = files[f'test/test_{name}.cpp']
         assert f'#include "{name}.hpp"' in proof

@@ -83,14 +83,13 @@ def _values(package_name: str, class_: str, machine: SceneMechanism, commanded: 
 
     driven = dict(zip(machine.inputs, actuators(machine)))
     by_output = {axis.output: axis for axis in commanded}
-    passives = rows({axis.output: axis for axis in others})
     named = [escape(comment(', '.join(axis.name for axis in axes.values())))
              for axes in (driven, by_output)]
     return {
         'package': package_name, 'namespace': f'{package_name}_plugins', 'class': class_,
         'name': machine.name, 'n': str(len(driven)), 'actuators': rows(driven),
-        'joints': rows(by_output), 'passive': f'{{{passives}}}' if others else '',
-        'passive_count': str(len(others)),
+        'joints': rows({**by_output, **{axis.output: axis for axis in others}}),
+        'joint_count': str(len(commanded) + len(others)),
         'passive_function': f'{machine.name}_passive' if others else 'nullptr',
         'axes': ' and '.join(named),
         'lines': '\n'.join(f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(role)}/>'
