@@ -448,10 +448,8 @@ def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
     assert [each.output for each in joints(leg, ['leg_P.x', 'leg_P.y'])] == ['P.x', 'P.y']
     assert [each.name for each in joints(machines['boom'])] == ['boom_OB']
     assert [each.name for each in actuators(machines['lever'])] == ['servo']
-    for names, said in ((['knee'], "leg has no joint 'knee'; allowed: leg_crank"),
-                        (['P.x', 'P.y'], "leg has no joint 'P.x'"),
-                        (['leg_AP'], 'leg has 2 inputs'), (['leg_AP', 'leg_AP'], 'as many')):
-        with pytest.raises(ValueError, match=said):
+    for names in (['knee'], ['P.x', 'P.y'], ['leg_AP'], ['leg_AP', 'leg_AP']):
+        with pytest.raises(ValueError, match='leg has 2 inputs: as many of its joints are needed'):
             joints(leg, names)
     library = compiled(tmp_path, [leg], 'leg_P.x', 'leg_P.y')
     memory = Memory(library, 'leg', 2)

@@ -74,14 +74,11 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
         If one does not exist, they do not determine all inputs, or there is no inverse.
 
     """
-    for name in names:
-        if output_of(machine, name) is None:
-            raise ValueError(f'{machine.name} has no joint {name!r}; allowed: ' + listed(
-                (joint.name for joint in machine.joints.values()), 200))
-    outputs = [output_of(machine, name) or '' for name in names] or _chain(machine)
+    outputs = [output for name in names if (output := output_of(machine, name))
+               ] if names else _chain(machine)
     if len({*outputs}) != len(machine.inputs):
-        raise ValueError(f'{machine.name} has {len(machine.inputs)} inputs: as many joints are '
-                         f'needed, not {listed(names)}')
+        raise ValueError(f'{machine.name} has {len(machine.inputs)} inputs: as many of its joints '
+                         f'are needed, not {listed(names)}')
     if names and not _tell(machine, outputs):
         raise ValueError(f'{listed(names)} of {machine.name} moves with none of the inputs, or '
                          'only together with another joint')

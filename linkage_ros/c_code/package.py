@@ -62,8 +62,7 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
             '// Written by linkage_ros. SPDX-License-Identifier: Apache-2.0',
             *(f'#include "{part["name"]}.hpp"' for part in parts),
             '#include "pluginlib/class_list_macros.hpp"\n',
-            *(f'PLUGINLIB_EXPORT_CLASS(\n  {name}_plugins::{class_}Loader, '
-              'transmission_interface::TransmissionLoader)' for class_ in classes), '']),
+            *(filled(template('export.cpp'), part) for part in parts)]),
         'src/linkage.h': template('linkage.h')}
     texts = header.headers(requests, False, '#include "linkage.h"')
     for part, text in zip(parts, texts):

@@ -87,15 +87,13 @@ class Tables:
 
     def passive(self, axes: Sequence[Axis]) -> str:
         """Return the function for joints that are not commanded."""
-        name, number = self.machine.name, self._code.number
-        lines = [f'{name}_pose s, {", ".join(self._formulas.by)};',
+        lines = [f'{self.machine.name}_pose s, {", ".join(self._formulas.by)};',
                  f'(void){self._formulas.call()};']
         for i, each in enumerate(axes):
             lines += self._position(f'position[{i}]', each) + self._rates(f'rate[{i}]', each)
-        return '\n'.join([
-            '/* The joints that are not commanded, at inputs: positions, and rates by each. */',
-            f'static inline void {name}_passive(const {number} *q, {number} *position,',
-            f'    {number} (*rate)[LKR_MAX_INPUTS])', '{', *indented(lines), '}', ''])
+        return filled(template('passive.h.in'), {
+            'name': self.machine.name, 'number': self._code.number,
+            'body': '\n'.join(indented(lines))})
 
     # --- a pose ---
 

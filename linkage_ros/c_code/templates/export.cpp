@@ -1,0 +1,2 @@
+PLUGINLIB_EXPORT_CLASS(
+  @namespace@::@class@Loader, transmission_interface::TransmissionLoader)
