@@ -125,24 +125,17 @@ def check_inverse(machine: SceneMechanism, axes: Sequence[Axis]) -> None:
     if len(axes) > 1:
         raise ValueError(f'{listed(names)} of {machine.name} have no inverse in closed form, and '
                          'a search of several inputs may miss; choose other joints, or the inputs')
-    only = linkage.inputs[0]
-    low, high = machine.first.ends or (-math.inf, math.inf)
-    if only.is_part and not only.low <= low <= high <= only.high:
-        raise ValueError(f'{names[0]} of {machine.name} repeats after too many turns to be '
-                         f'searched: set a {machine.name}.{only.name}.sweep in '
-                         f'{only.low:.6g} to {only.high:.6g} rad')
-    if not pieces(machine, axes[0]):
+    if linkage.inputs[0].is_part:
+        raise ValueError(f'{names[0]} of {machine.name} has no inverse in closed form, and '
+                         'repeats after too many turns to be searched')
+    if not pieces(linkage, axes[0]):
         raise ValueError(f'{names[0]} of {machine.name} moves nowhere')
 
 
-def pieces(machine: SceneMechanism, axis: Axis) -> List[Tuple[float, ...]]:
+def pieces(linkage: Mechanism, axis: Axis) -> List[Tuple[float, ...]]:
     """Return parts of the reach in which an axis only rises or falls: inputs, and outputs."""
-    linkage, drive = machine.linkage, machine.first
     # In a piece an angle changes by half a turn at most, so that its gaps are known.
     parts, _ = linkage.monotone(axis.output, math.pi if axis.turn else math.inf)
-    if linkage.inputs[0].is_part and drive.ends:
-        low, high = (end / machine.scale_of(linkage.inputs[0].name) for end in drive.ends)
-        parts = [part for part in parts if part[0] <= high and low <= part[1]]
     return [part for part in parts if part[2] != part[3]]
 
 
@@ -187,14 +180,14 @@ def _chain(machine: SceneMechanism) -> List[str]:
                 link.name in barrels, link.name in machine.inputs,
                 joint.name == f'{machine.name}_{key}')
 
-    while len(chosen) < len(machine.inputs) and (candidates := [
-            link for link in links if link.name not in chosen
-            and _tell(machine, [*chosen, link.name])]):
-        chosen.append(min(candidates, key=rank).name)
     try:
+        for _ in machine.inputs:
+            chosen.append(min((link for link in links if link.name not in chosen
+                               and _tell(machine, [*chosen, link.name])), key=rank).name)
         check_inverse(machine, [axis(machine, output) for output in chosen])
         return chosen
     except ValueError:
+        # There is none, or it has no inverse.
         return list(machine.inputs)
 
 

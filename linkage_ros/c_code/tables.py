@@ -173,7 +173,7 @@ class Tables:
     def _series(self, name: str, axis: Axis) -> Tuple[int, str]:
         """Return the most inputs of a position, and the function for them by series."""
         size, code, rows = self._sizes[0], self._code, []
-        monotone = pieces(self.machine, axis)
+        monotone = pieces(self.linkage, axis)
         for piece in monotone:
             for middle, half, low, high, terms in series(self.linkage, axis.output, *piece):
                 numbers = map(code.literal, (axis.factor * middle + axis.offset,
