@@ -11,7 +11,7 @@ import runpy
 import shutil
 import subprocess
 
-from c_libraries import COMPILER, loaded
+from c_libraries import COMPILER, inverter, loaded
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import command, header
 import numpy as np
@@ -261,26 +261,16 @@ int poses(double value, double near)
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize('name, output, call', [
-    ('klann', 'CF', 'angle_CF'), ('jansen', 'G.x', 'G_x')])
-def test_a_search_misses_none_of_ten_thousand(machines, tmp_path, name, output, call):
+@pytest.mark.parametrize('name, output', [('klann', 'CF'), ('jansen', 'G.x')])
+def test_a_search_misses_none_of_ten_thousand(machines, tmp_path, name, output):
     machine, rng = machines[name], np.random.default_rng(7)
     linkage, scale = machine.linkage, machine.scale_of(output)
     assert linkage.inverse(output).closed is None
-    invert = loaded(tmp_path, header.written(machine, [output]) + f"""
-int found(double value, double near, double *crank)
-{{
-    return {name}_crank_for_{call}(value, near, crank);
-}}
-""").found
+    invert = inverter(tmp_path, machine, output)
     (low, high), = machine.first.reach
     inputs, nears = rng.uniform(low, high, 10_000), rng.uniform(-9.0, 9.0, 10_000)
     values = linkage.joint_angles(inputs, [output])[output]
-    cranks = np.full(len(inputs), np.nan)
-    for i, (value, near) in enumerate(zip(values * scale, nears)):
-        crank = ctypes.c_double()
-        assert invert(*map(ctypes.c_double, (value, near)), ctypes.byref(crank)) == 1
-        cranks[i] = crank.value
+    cranks = np.array([*map(invert, values * scale, nears)])
     gap = linkage.joint_angles(cranks, [output])[output] - values
     gap -= linkage.is_angle(output) * math.tau * np.round(gap / math.tau)
     assert np.abs(gap).max() < 1e-13 * max(1.0, linkage.longest)
@@ -372,20 +362,13 @@ STEEP = ['O ground 0 0', 'Q ground 0.5 0.25', 'A crank O 0.8',
 def test_the_input_of_an_output_is_found_from_anywhere(tmp_path, joints, output, inputs, nears):
     machine, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': joints}
                           ).machines.values()
-    text = header.written(machine, [output])
-    called, = re.findall(r'int (m_crank_for_\w+)', text)
-    invert = loaded(tmp_path, f"""{text}
-int found(double value, double near, double *crank) {{ return {called}(value, near, crank); }}
-""").found
+    invert, angles = inverter(tmp_path, machine, output), machine.linkage.joint_angles
     for value in inputs:
-        wanted = float(machine.linkage.joint_angles(value, [output])[output])
-        for near in nears:
-            found = ctypes.c_double()
-            assert invert(*map(ctypes.c_double, (wanted, near)), ctypes.byref(found)) == 1
-            assert found.value == pytest.approx(value, abs=1e-8)
-            assert machine.linkage.joint_angles(min(found.value, END) if joints is ENDING else
-                                                found.value, [output])[output] == pytest.approx(
-                wanted, abs=2e-8)
+        wanted = float(angles(value, [output])[output])
+        for answer in (invert(wanted, near) for near in nears):
+            assert answer == pytest.approx(value, abs=1e-8)
+            answer = min(answer, END) if joints is ENDING else answer
+            assert angles(answer, [output])[output] == pytest.approx(wanted, abs=2e-8)
 
 
 @pytest.mark.parametrize('kind, key, factor, output', [
@@ -394,11 +377,7 @@ def test_a_search_finds_inputs_up_to_the_ends_of_the_reach(tmp_path, kind, key, 
     length = factor * mechanisms.create(kind).dimensions[key]
     machine, = scene.read({'mechanisms': ['m'], 'm.type': kind, f'm.dimensions.{key}': length}
                           ).machines.values()
-    linkage, text = machine.linkage, header.written(machine, [output])
-    called, = re.findall(r'int (m_crank_for_\w+)', text)
-    invert = loaded(tmp_path, f"""{text}
-int found(double value, double near, double *crank) {{ return {called}(value, near, crank); }}
-""").found
+    linkage, invert = machine.linkage, inverter(tmp_path, machine, output)
     parts = np.array([0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1])
     for low, high in linkage.reach():
         for crank in low + (high - low) * np.concatenate([parts, 1.0 - parts]):
@@ -406,10 +385,9 @@ int found(double value, double near, double *crank) {{ return {called}(value, ne
             value = np.mean(linkage.joint_angles(
                 [crank, np.nextafter(crank, 0.5 * (low + high))], [output])[output])
             for near in (crank, 0.5 * (low + high)):
-                found = ctypes.c_double()
-                assert invert(*map(ctypes.c_double, (value, near)), ctypes.byref(found)) == 1
-                again = linkage.joint_angles(min(max(found.value, low), high), [output])[output]
-                assert again == pytest.approx(value, abs=1e-7 * linkage.longest)
+                answer = min(max(invert(value, near), low), high)
+                assert linkage.joint_angles(answer, [output])[output] == pytest.approx(
+                    value, abs=1e-7 * linkage.longest)
 
 
 @pytest.mark.nightly
@@ -437,86 +415,55 @@ int pose(float right, float left, float *angle)
         assert list(found) == pytest.approx([angles['pitch'], angles['roll']], abs=1e-5)
 
 
-def test_the_sketch_has_the_header_of_its_scene(tmp_path):
+def test_the_sketch_has_the_header_of_its_scene():
     sketch = ROOT / 'examples' / 'hobby_servo'
     text = (sketch / 'lever.h').read_text()
     called = set(re.findall(r'\blever_\w+(?=\()', (sketch / 'hobby_servo.ino').read_text()))
     assert called and called <= set(re.findall(r'\blever_\w+', text))
     machine, = scene.load(str(sketch / 'lever.yaml')).machines.values()
     assert text == header.written(machine, ['lever'], single=True) + '\n'
-    library = loaded(tmp_path, text + """
-int both(float crank, float *angle, float *back, float *servo)
-{
-    lever_pose p;
-    lever_memory memory;
-    lever_joints desired = { { 0 }, { 0 }, { 0 } };
-    lever_actuators found = desired;
-    if (!lever_solve(crank, &p) || !lever_begin(&memory))
-        return 0;
-    *angle = p.angle_lever;
-    desired.position[0] = p.angle_lever;
-    memory.q[0] = crank;
-    if (lever_joints_to_actuators(&memory, &desired, &found))
-        return 0;
-    *servo = found.position[LEVER_ACTUATOR_LEVER_CRANK];
-    return lever_crank_for_angle_lever(p.angle_lever, crank, back);
-}
-""")
-    for crank in np.linspace(-1.2, 1.2, 50, dtype=np.float32):
-        found = [ctypes.c_float() for _ in range(3)]
-        assert library.both(ctypes.c_float(crank), *map(ctypes.byref, found)) == 1
-        assert found[0].value == pytest.approx(
-            float(machine.linkage.joint_angles(float(crank))['lever']), abs=1e-6)
-        assert [each.value for each in found[1:]] == pytest.approx([crank, crank], abs=1e-5)
 
 
-@pytest.mark.parametrize('number, step', [('double', 1e-12), ('float', 2e-5)])
-def test_a_small_step_is_not_lost(machines, tmp_path, number, step):
-    machine = machines['slotted_lever']
-    worst = loaded(tmp_path, header.written(machine, (), number == 'float') + f"""
-double worst(void)
-{{
-    double most = 0;
-    int i;
-    slotted_lever_pose p;
-    slotted_lever_memory m;
-    lkr_side desired = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, found = desired;
-    int is_well = slotted_lever_begin(&m);
-    for (i = 0; i < 1000; i++) {{
-        const {number} crank = ({number})(0.3 + i * {step});
-        is_well = is_well && slotted_lever_solve(crank, &p);
-        desired.position[0] = p.angle_lever;
-        is_well = is_well && !slotted_lever_joints_to_actuators(&m, &desired, &found);
-        most = fmax(most, fabs((double)(found.position[0] - crank)));
-    }}
-    return is_well ? most : -1;
-}}
-""").worst
-    worst.restype = ctypes.c_double
-    assert 0.0 <= worst() <= step
-
-
-@pytest.mark.parametrize('number, beyond', [('double', 1e-11), ('float', 5e-5)])
-def test_what_is_hardly_beyond_an_extreme_is_out_of_reach(machines, tmp_path, number, beyond):
+@pytest.mark.parametrize('number, step, beyond', [('double', 1e-12, 1e-11),
+                                                  ('float', 2e-5, 5e-5)])
+def test_small_steps_up_to_an_extreme_are_not_lost(machines, tmp_path, number, step, beyond):
     machine = machines['slotted_lever']
     library = loaded(tmp_path, header.written(machine, (), number == 'float') + f"""
-int sent(double before, double value)
+static slotted_lever_memory m;
+int begun(void) {{ return slotted_lever_begin(&m); }}
+int commanded(double value, double *crank)
 {{
-    slotted_lever_memory m;
-    lkr_side desired = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, found = desired;
-    desired.position[0] = ({number})before;
-    if (!slotted_lever_begin(&m) || slotted_lever_joints_to_actuators(&m, &desired, &found) & 1)
-        return -1;
+    lkr_side desired = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, answer = desired;
+    int status;
     desired.position[0] = ({number})value;
-    return slotted_lever_joints_to_actuators(&m, &desired, &found);
+    status = slotted_lever_joints_to_actuators(&m, &desired, &answer);
+    *crank = answer.position[0];
+    return status;
+}}
+double lever(double crank)
+{{
+    slotted_lever_pose p;
+    return slotted_lever_solve(({number})crank, &p) ? p.angle_lever : LKR_NAN;
 }}
 """)
+    library.lever.restype, answer = ctypes.c_double, ctypes.c_double()
+
+    def command(value):
+        return library.commanded(ctypes.c_double(value), ctypes.byref(answer)) & 1
+
+    assert library.begun() == 1
+    kind = np.float64 if number == 'double' else np.float32
+    for crank in kind(0.3 + np.arange(1000) * step):
+        assert command(library.lever(ctypes.c_double(crank))) == 0
+        assert abs(answer.value - crank) <= step
+    # What is hardly beyond is out of reach, there, too, where it is at the extreme already.
     angles = machine.linkage.joint_angles(np.linspace(-math.pi, math.pi, 100_001), ['lever'])
     for extreme, out in ((angles['lever'].min(), -beyond), (angles['lever'].max(), beyond)):
-        # There, too, where it is at the extreme already.
         for before in (0.5 * extreme, extreme - 0.1 * out):
-            assert [library.sent(*map(ctypes.c_double, (before, extreme + part * out))) & 1
-                    for part in (-10.0, 1000.0, 10.0, 1.0)] == [0, 1, 1, 1]
+            parts = -10.0, 1000.0, 10.0, 1.0
+            for part, is_out in zip(parts, (0, 1, 1, 1)):
+                assert library.begun() == 1 and command(before) == 0
+                assert command(extreme + part * out) == is_out
 
 
 def test_a_scene_file_is_printed_as_c(capsys, monkeypatch):
