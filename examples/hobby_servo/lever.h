@@ -4,7 +4,6 @@
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * It can be assembled in [-3.14159, 3.14159] rad.
  * A call takes at most 15 poses.
- * float: joints are off by up to 1e-07 of the longest bar at 2001 poses over the reach, without its outermost hundredth.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -662,7 +661,7 @@ typedef struct {
 } lever_pose;
 
 /* The pose, and its rates by crank. Returns 0 if a limit is exceeded. */
-LKR_FORMULA int lever_formulas(float crank, lever_pose *p, lever_pose *by_crank)
+LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank)
 {
     const float length_a = 0.02f;
     const float k7 = -0.045f;
@@ -677,7 +676,7 @@ LKR_FORMULA int lever_formulas(float crank, lever_pose *p, lever_pose *by_crank)
     const float k87 = 0.0f;
     const float k89 = -0.025f;
     const float k90 = 0.09f;
-    const float x0 = crank;
+    const float x0 = crank_;
     /* O ground 0 0 */
     p->O_x = 0.0f;
     p->O_y = 0.0f;
@@ -724,19 +723,19 @@ LKR_FORMULA int lever_formulas(float crank, lever_pose *p, lever_pose *by_crank)
 }
 
 /* Place the joints. Return 0 if not all can be assembled: NaN is what cannot. */
-static inline int lever_solve(float crank, lever_pose *p)
+static inline int lever_solve(float crank_, lever_pose *p)
 {
     lever_pose by_crank;
-    (void)lever_formulas(crank, p, &by_crank);
+    (void)lever_formulas(crank_, p, &by_crank);
     return isfinite(p->O_x + p->O_y + p->Q_x + p->Q_y + p->A_x + p->A_y + p->L_x + p->L_y +
         p->angle_crank + p->angle_lever + p->slide_slide);
 }
 
 /* Differentiate all of it by crank. */
-static inline void lever_rates(float crank, lever_pose *by_crank)
+static inline void lever_rates(float crank_, lever_pose *by_crank)
 {
     lever_pose p;
-    (void)lever_formulas(crank, &p, by_crank);
+    (void)lever_formulas(crank_, &p, by_crank);
 }
 
 enum {
@@ -879,9 +878,9 @@ static const lkr_model lever_model_angle_lever = {
 
 /* The crank for lever [rad], nearest to `near`, whole turns included. Returns 0, and
    leaves crank alone, where there is none. */
-static inline int lever_crank_for_angle_lever(float value, float near, float *crank)
+static inline int lever_crank_for_angle_lever(float value, float near, float *crank_)
 {
-    return lkr_inputs_for(&lever_model_angle_lever, &value, &near, crank);
+    return lkr_inputs_for(&lever_model_angle_lever, &value, &near, crank_);
 }
 
 /* Initialize the memory; returns 0 if there is no pose. */

@@ -12,19 +12,15 @@ from __future__ import annotations
 
 from typing import Any, Dict, Iterator, List, NamedTuple, Sequence
 
-import numpy as np
-
 from .axes import actuators, Axis, axis, check_inverse, joints, loads
 from .code import Code, indented
 from .formulas import Formulas
-from .names import comment, constants, distinct, field, filled, parameter, prefix, template
+from .names import comment, constants, distinct, field, filled, prefix, template
 from .tables import Tables
 from ..linkage import Mechanism
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
-# Number of inputs at which the error of `float` is measured.
-SAMPLED = 2001
 # Poses from a solution of an inverse or from the near inputs, as in `linkage.h`: Newton's method,
 # and one without rates.
 POSES = 5
@@ -100,7 +96,6 @@ def _values(request: Request, single: bool) -> Dict[str, Any]:
         parts += [tables[-1].text(), _inverse(machine, axes, tag, code.number)]
     solutions = max(each.solutions for each in tables)
     about = [*_about(machine), f'A call takes at most {POSES * (solutions + 1)} poses.']
-    about += [_error(linkage)] if single and n == 1 else []
     whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
     return {
         'about': '\n'.join(f' * {line}' for line in about),
@@ -139,7 +134,7 @@ def _inverses(machine: SceneMechanism, texts: Sequence[str]) -> Dict[str, List[A
 def _inverse(machine: SceneMechanism, axes: Sequence[Axis], tag: str, number: str) -> str:
     """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
     n, (first, *_) = len(axes), machine.inputs
-    place = parameter(first) if n == 1 else 'inputs'
+    place = f'{first}_' if n == 1 else 'inputs'
     return filled(template('inverse.h.in'), {
         'what': first if n == 1 else place, 'name': machine.name, 'tag': tag,
         'outputs': _with_units(machine.linkage, axes),
@@ -169,15 +164,3 @@ def _enum(start: str, axes: Sequence[Axis]) -> str:
 def _with_units(linkage: Mechanism, axes: Sequence[Axis]) -> str:
     return ', '.join(f'{each.name} [{"rad" if linkage.is_angle(each.output) else "m"}]'
                      for each in axes)
-
-
-def _error(linkage: Mechanism) -> str:
-    """Describe the error of single precision over the reach of the only input."""
-    (low, high), *_ = linkage.reach()
-    edge = 0.0 if linkage.inputs[0].is_whole([(low, high)]) else 0.01 * (high - low)
-    theta = np.linspace(low + edge, high - edge, SAMPLED).astype(np.float32)
-    pose = linkage.posed(linkage.points, ())
-    exact = pose.over(theta.astype(float))
-    worst = np.nanmax(np.abs(pose.searched(theta) - exact)) / linkage.longest
-    return (f'float: joints are off by up to {worst:.1g} of the longest bar at {SAMPLED} '
-            'poses over the reach, without its outermost hundredth.')
