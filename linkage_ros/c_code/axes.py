@@ -127,7 +127,7 @@ def check_inverse(machine: SceneMechanism, axes: Sequence[Axis]) -> None:
                          'a search of several inputs may miss; choose other joints, or the inputs')
     if linkage.inputs[0].is_part:
         raise ValueError(f'{names[0]} of {machine.name} has no inverse in closed form, and '
-                         'repeats after too many turns to be searched')
+                         'repeats after too many turns for a search')
     if not pieces(linkage, axes[0]):
         raise ValueError(f'{names[0]} of {machine.name} moves nowhere')
 
