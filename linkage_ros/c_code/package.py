@@ -62,7 +62,7 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
             '// Written by linkage_ros. SPDX-License-Identifier: Apache-2.0',
             *(f'#include "{part["name"]}.hpp"' for part in parts),
             '#include "pluginlib/class_list_macros.hpp"\n',
-            *(filled(template('export.cpp'), part) for part in parts)]),
+            *(filled(template('export.cpp.in'), part) for part in parts)]),
         'src/linkage.h': template('linkage.h')}
     texts = header.headers(requests, False, '#include "linkage.h"')
     for part, text in zip(parts, texts):
