@@ -8,10 +8,12 @@ import ctypes
 import fcntl
 import os
 from pathlib import Path
+import re
 import shutil
 import subprocess
 import sys
 
+from linkage_ros.c_code import header
 import pytest
 
 STAND_IN = Path(__file__).parent / 'ros2_control'
@@ -47,3 +49,25 @@ def loaded(folder, code, *flags):
             COMPILER, '-std=c99', '-DLKR_MAX_INPUTS=3', '-DLKR_MAX_SOLUTIONS=512', *STRICT, *flags,
             '-shared', '-fPIC', source, '-o', library, '-lm'], check=True)
     return ctypes.CDLL(str(library))
+
+
+def inverter(folder, machine, output, single=False):
+    """Return the inverse of a mechanism's only input in C: value, near -> input, None: refused."""
+    number, text = 'float' if single else 'double', header.written(machine, [output], single)
+    name, = re.findall(r'int (\w+_for_\w+)', text)
+    call = loaded(folder, f"""{text}
+int inverted(double value, double near, double *input)
+{{
+    {number} answer = 0;
+    const int is_there = {name}(({number})value, ({number})near, &answer);
+    *input = answer;
+    return is_there;
+}}
+""").inverted
+    answer = ctypes.c_double()
+
+    def invert(value, near):
+        is_there = call(ctypes.c_double(value), ctypes.c_double(near), ctypes.byref(answer))
+        return answer.value if is_there else None
+
+    return invert

@@ -22,7 +22,7 @@ from xml.etree import ElementTree
 
 from c_libraries import COMPILER, loaded, ROS, shared, STAND_IN, STRICT
 from linkage_ros import mechanisms, scene
-from linkage_ros.c_code import command, header, transmission
+from linkage_ros.c_code import header, transmission
 from linkage_ros.c_code.axes import actuators, joints
 from linkage_ros.c_code.names import template
 from linkage_ros.c_code.package import package
@@ -443,31 +443,19 @@ def test_joints_by_default_have_no_barrel():
     assert [each.output for each in joints(machine)] == ['OB', 'AD', 'EG']
 
 
-def test_the_joints_are_chosen_by_their_names(machines, tmp_path):
+def test_the_joints_are_chosen_by_their_names(machines):
     leg = machines['leg']
     assert [each.output for each in joints(leg, ['leg_P.x', 'leg_P.y'])] == ['P.x', 'P.y']
     assert [each.name for each in joints(machines['boom'])] == ['boom_OB']
     assert [each.name for each in actuators(machines['lever'])] == ['servo']
-    for names, said in ((['knee'], "leg has no joint 'knee'; allowed: leg_crank"),
-                        (['P.x', 'P.y'], "leg has no joint 'P.x'"),
-                        (['leg_AP'], 'leg has 2 inputs'), (['leg_AP', 'leg_AP'], 'as many')):
-        with pytest.raises(ValueError, match=said):
+    for names in (['knee'], ['P.x', 'P.y'], ['leg_AP'], ['leg_AP', 'leg_AP']):
+        with pytest.raises(ValueError, match='leg has 2 inputs: as many of its joints are needed'):
             joints(leg, names)
-    library = compiled(tmp_path, [leg], 'leg_P.x', 'leg_P.y')
-    memory = Memory(library, 'leg', 2)
-    for inputs in states(leg, 15):
-        place = outputs(leg, inputs, ['P.x', 'P.y'])
-        memory.send(0, expected(leg, inputs)[0])
-        status, (position, *_) = memory.send(1, place)
-        assert status == 0
-        np.testing.assert_allclose(position, expected(leg, inputs)[0], atol=1e-9)
 
 
-@pytest.mark.parametrize('seeds', [
-    pytest.param(range(3), marks=pytest.mark.nightly),
-    pytest.param(range(3, 12), marks=pytest.mark.nightly),
-    pytest.param(range(12, 22), marks=pytest.mark.nightly)])
-def test_random_linkages_go_both_ways(tmp_path, seeds):
+@pytest.mark.nightly
+@pytest.mark.parametrize('seeds', [range(3), range(3, 12), range(12, 22)])
+def test_random_linkages_are_measured(tmp_path, seeds):
     machines = []
     for seed in seeds:
         drawn, name = random_linkages.design(np.random.default_rng(seed)), f'm{seed}'
@@ -476,31 +464,26 @@ def test_random_linkages_go_both_ways(tmp_path, seeds):
                     for key, value in drawn.dimensions.items()}}
         with suppress(scene.SceneError):  # of lengths that allow no pose
             machines += scene.read(given).machines.values()
-    library, back = compiled(tmp_path, machines, flags=['-O2']), 0
+    library, measured = compiled(tmp_path, machines, flags=['-O2']), 0
     rng = np.random.default_rng(1)
     for machine in machines:
-        n, sizes = len(machine.inputs), np.array([each.size for each in joints(machine)])
         if library[f'{machine.name}_started']() == 0:
             continue
-        memory = Memory(library, machine.name, n)
+        memory = Memory(library, machine.name, len(machine.inputs))
         for _ in range(40):
             inputs = [rng.uniform(*(drive.ends or drive.reach[0]))
                       for drive in machine.inputs.values()]
-            actuator, by, joint, turning = expected(machine, inputs)
+            actuator, _, joint, _ = expected(machine, inputs)
             own = [value / machine.scale_of(name) for value, name in zip(inputs, machine.inputs)]
-            places = machine.linkage.solve(own if n > 1 else own[0]).values()
-            status, (position, *motion) = memory.send(0, actuator, by @ np.ones(n), np.ones(n))
+            places = machine.linkage.solve(own if len(own) > 1 else own[0]).values()
+            status, (position, *_) = memory.send(0, actuator)
             # All of it can be assembled, or it is said that it cannot.
             assert (status & 1 == 0) == np.isfinite(list(places)).all(), (machine.name, inputs)
             if status == 0:
                 gap = np.abs(position - joint)
                 assert np.minimum(gap, np.abs(gap - math.tau)).max() < 1e-11
-                margin = np.linalg.svd(turning / sizes[:, None], compute_uv=False)
-                status, (again, *_) = memory.send(1, position, *motion)
-                if margin[-1] > 1e-3 * max(1.0, margin[0]):
-                    assert status == 0 and np.abs(again - actuator).max() < 1e-8
-                    back += 1
-    assert back > 20 * len(machines)
+                measured += 1
+    assert measured > 20 * len(machines)
 
 
 def test_all_ground_links_of_the_catalogue_but_one_are_closed_forms():
@@ -552,12 +535,6 @@ def proved(package, name, compiler, count, *flags):
     assert tried == count and good > 0.9 * count
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize('compiler', COMPILERS)
-def test_a_transmission_is_proved(tmp_path, compiler):
-    proved(written(tmp_path, ROOT / 'examples' / 'leg.yaml'), 'knee', compiler, 5000)
-
-
 @pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
 def test_sanitizers_find_nothing(machines, tmp_path):
     # A lever with sweep and loads, and a leg of two inputs; all scenes are nightly.
@@ -591,19 +568,13 @@ def test_every_scene_is_proved_at_a_hundred_thousand_states(tmp_path, path, comp
         proved(package, name, compiler, 5000, *SANITIZED)
 
 
-@pytest.mark.nightly
-@pytest.mark.skipif(not shutil.which('g++'), reason='g++ is not installed')
-def test_mechanisms_of_any_names_are_classes_of_their_own(tmp_path):
+def test_mechanisms_of_any_names_are_classes_of_their_own():
     names = ['linkage', 'a_b', 'aB', 'Arm', 'arm', 'arm2', 'class']
-    file = tmp_path / 'odd.yaml'
-    file.write_text('\n'.join([
-        '/**:', '  ros__parameters:', f'    mechanisms: [{", ".join(names)}]',
-        *(f'    {name}: {{type: four_bar}}' for name in names)]))
-    package = written(tmp_path, file)
-    (package / 'all.cpp').write_text(''.join(f'#include "{name}.hpp"\n' for name in names))
-    subprocess.run(['g++', '-std=c++17', *STRICT, '-fsyntax-only', '-Wno-unused-function',
-                    '-isystem', STAND_IN / 'include', '-I', package / 'src', '-I',
-                    package / 'include', *ROS, package / 'all.cpp'], check=True)
+    machines = scene.read({'mechanisms': names, **{f'{name}.type': 'four_bar' for name in names}}
+                          ).machines.values()
+    text = package('odd', 'odd.yaml', [(machine, []) for machine in machines])[Path('plugins.xml')]
+    assert re.findall(r'plugins::(\w+)Loader', text) == [
+        'Linkage', 'AB', 'AB_2', 'Arm', 'Arm_2', 'Arm2', 'Class']
 
 
 @pytest.mark.nightly
@@ -671,13 +642,9 @@ def test_a_package_is_complete(files):
     assert 'Linkages of a<b>* /.yaml as' in described.findtext('description')
     assert {each.text for each in described.iter('depend')} == set(re.findall(
         r'find_package\((?!ament)(\w+)', files['CMakeLists.txt']))
-    assert 'project(robot_1 ' in files['CMakeLists.txt']
     assert f'foreach(mechanism {" ".join(AXES)})' in files['CMakeLists.txt']
-    rows = [line for line in files['README.md'].splitlines() if line.startswith('| `')]
-    assert rows[0] == '| `robot_1/Leg` | leg_crank, leg_crank2 | leg_crank, leg_AP |'
-    assert rows[1] == '| `robot_1/Int` | a* / "b"/ ? ?/?%s ? | while/1:x |'
-    assert rows[2] == '| `robot_1/Boom` | boom_cylinder | boom_OB |' and len(rows) == 4
-    assert '# robot_1\n' in files['README.md'] and len(files['README.md'].splitlines()) <= 30
+    assert '| `robot_1/Leg` | leg_crank, leg_crank2 | leg_crank, leg_AP |' in files['README.md']
+    assert '| `robot_1/Int` | a* / "b"/ ? ?/?%s ? | while/1:x |' in files['README.md']
 
 
 def test_a_package_names_what_the_scene_names(files, machines):
@@ -691,46 +658,23 @@ def test_a_package_names_what_the_scene_names(files, machines):
     assert re.findall('#include "(.*).hpp"', files['src/plugins.cpp'])[:-1] == [*AXES]
     for (name, axes), plugin, own in zip(
             AXES.items(), plugins, (each for each in pasted if each.tag == 'transmission')):
-        code = files[f'src/{name}.hpp']
         assert own.get('name') == name and own.findtext('plugin') == plugin.get('name')
-        assert plugin.get('name') == f'robot_1/{name.title()}'
-        assert plugin.get('type') == f'robot_1_plugins::{name.title()}Loader'
-        assert plugin.get('base_class_type') == 'transmission_interface::TransmissionLoader'
+        assert {**plugin.attrib} == {
+            'name': f'robot_1/{name.title()}', 'type': f'robot_1_plugins::{name.title()}Loader',
+            'base_class_type': 'transmission_interface::TransmissionLoader'}
         if name != 'int':
             assert plugin.findtext('description') == (
                 f'The linkage {name} between {", ".join(axes[0])} and {", ".join(axes[1])}.')
         for side, named in zip(('actuator', 'joint'), axes):
             assert [{**each.attrib} for each in own.iter(side)] == [
                 {'name': each, 'role': role} for each, role in named.items()]
-            row, = re.findall(rf'array<Axis, size> {side}s{{{{(.*)}}}};', code)
-            assert [tuple(ast.literal_eval(f'b"{text}"').decode() for text in each)
-                    for each in re.findall(r'{"(.*?)", "(.*?)"}', row)] == [*named.items()]
-        assert f'size = {len(axes[0])};' in code and f'model = {name}_model;' in code
-        proof = files[f'test/test_{name}.cpp']
-        assert f'#include "{name}.hpp"' in proof
-        assert f'robot_1_plugins::{name.title()}Code;' in proof
-        own = files[f'src/{name}_linkage.h']
-        assert '#include "linkage.h"\n' in own and 'linkage_ros: what' not in own
-        assert '#define LKR_MAX_INPUTS 2\n' in own
+            row, = re.findall(rf'array<Axis, \w+> {side}s{{{{(.*)}}}};', files[f'src/{name}.hpp'])
+            pairs = [tuple(ast.literal_eval(f'b"{text}"').decode() for text in each)
+                     for each in re.findall(r'{"(.*?)", "(.*?)"}', row)]
+            assert pairs[:len(named)] == [*named.items()]
+        text = files[f'src/{name}_linkage.h']
+        assert '#include "linkage.h"\n' in text and '#define LKR_MAX_INPUTS 2\n' in text
     assert files['src/linkage.h'] == template('linkage.h')
-
-
-OPTIONS = ["SCENE the scene's parameter file",
-           '--mechanism NAME [NAME ...] only these mechanisms of the scene',
-           '--joints JOINT [JOINT ...] what a controller commands, by its name in the scene']
-
-
-@pytest.mark.parametrize('main, about, options', [
-    (transmission.main, 'Write the mechanisms of a scene as a ROS 2 package of transmissions', [
-        '--out DIR output folder; its name is the name of the package']),
-    (command.main, 'Print the mechanisms of a scene as C99 headers, one after another', [
-        '--output OUTPUT [OUTPUT ...] an inverse for each of these: a link, A.x, distance(A,B)',
-        '--float float instead of double'])])
-def test_options_are_described(capsys, main, about, options):
-    with pytest.raises(SystemExit, match='0'):
-        main(['--help'])
-    printed = ' '.join(capsys.readouterr().out.split())
-    assert [text for text in (about, *OPTIONS, *options) if text not in printed] == []
 
 
 @pytest.mark.parametrize('arguments, said', [
@@ -752,45 +696,40 @@ def test_what_cannot_be_written_is_one_sentence(tmp_path, capsys, arguments, sai
     assert (folder / 'notes.txt').read_text() == 'keep'
 
 
-def limits_of(path, *arguments):
+def limits_of(capsys, path, *arguments):
     """Return the limits that the command prints, by joint; None for one that turns."""
-    ended = subprocess.run([sys.executable, '-m', 'linkage_ros.c_code.transmission', str(path),
-                            '--limits', *arguments], capture_output=True, text=True)
-    assert ended.returncode == 0, ended.stderr
-    found = {}
-    for joint in ElementTree.fromstring(f'<robot>{ended.stdout}</robot>'):
+    assert transmission.main([str(path), '--limits', *arguments]) == 0
+    limits = {}
+    for joint in ElementTree.fromstring(f'<robot>{capsys.readouterr().out}</robot>'):
         limit = joint.find('limit')
-        found[joint.get('name')] = limit is not None and tuple(
+        limits[joint.get('name')] = limit is not None and tuple(
             float(limit.get(end)) for end in ('lower', 'upper'))
-    return found
+    return limits
 
 
 @pytest.mark.parametrize('path', ['examples/leg.yaml', 'config/excavator.yaml',
                                   'examples/ankle.yaml', 'config/slotted_lever.yaml'])
-def test_joint_limits_are_those_of_all_poses(path):
-    found, rng = limits_of(ROOT / path), np.random.default_rng(9)
+def test_joint_limits_are_those_of_all_poses(capsys, path):
+    limits, rng = limits_of(capsys, ROOT / path), np.random.default_rng(9)
     for machine in scene.load(ROOT / path).machines.values():
         # What the joints are at poses of the sweeps, by another way than that of the limits.
-        given = [rng.uniform(*(drive.ends or drive.reach[0]), 3000).tolist()
-                 for drive in machine.inputs.values()]
-        chosen = [each.output for each in joints(machine)]
-        prefix = next(iter(machine.assembly().legs))
-        names = [machine.joints[key if key in machine.inputs else prefix + key] for key in chosen]
-        seen = np.array([outputs(machine, row, chosen) for row in zip(*given)])
-        for name, values in zip(names, seen.T):
-            values = np.array([name.of(value) for value in values[np.isfinite(values)]])
-            low, high = found[name.name]
+        given = [rng.uniform(*(drive.ends or drive.reach[0]), 3000) / machine.scale_of(name)
+                 for name, drive in machine.inputs.items()]
+        for axis in joints(machine):
+            values = axis.factor * machine.linkage.joint_angles(
+                given if len(given) > 1 else given[0], [axis.output])[axis.output] + axis.offset
+            low, high = limits[axis.name]
             slack = 0.05 * (high - low)
-            assert low - 1e-9 <= values.min() <= low + slack
-            assert high - slack <= values.max() <= high + 1e-9
+            assert low - 1e-9 <= np.nanmin(values) <= low + slack
+            assert high - slack <= np.nanmax(values) <= high + 1e-9
 
 
-def test_a_joint_that_turns_has_no_limits(tmp_path):
+def test_a_joint_that_turns_has_no_limits(capsys, tmp_path):
     file = tmp_path / 'turning.yaml'
     file.write_text('/**: {ros__parameters: {mechanisms: [drag], drag: {type: custom, joints: ['
                     'O ground 0 0, Q ground 0.3 0, A crank O 1, B dyad A Q 0.9 1.1 left]}}}')
-    assert limits_of(file) == {'drag_QB': False}
-    assert limits_of(file, '--joints', 'drag_crank') == {'drag_crank': False}
+    assert limits_of(capsys, file) == {'drag_QB': False}
+    assert limits_of(capsys, file, '--joints', 'drag_crank') == {'drag_crank': False}
 
 
 def test_a_package_is_written_again(tmp_path, capsys, monkeypatch):

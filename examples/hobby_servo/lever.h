@@ -4,7 +4,6 @@
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * It can be assembled in [-3.14159, 3.14159] rad.
  * A call takes at most 15 poses.
- * float: joints are off by up to 1e-07 of the longest bar at 2001 poses over the reach, without its outermost hundredth.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -189,7 +188,9 @@ typedef struct {
     lkr_axis axis[2][LKR_MAX_INPUTS];
     /* After how much of each input the actuators or the joints repeat, or 0. */
     lkr_real turn[2][LKR_MAX_INPUTS];
-    /* Where each input starts, its sweep, and the range of its samples. */
+    /* The unit of each input, in those of the scene; where it starts, its sweep, and the range of its
+       samples. */
+    lkr_real unit[LKR_MAX_INPUTS];
     lkr_real start[LKR_MAX_INPUTS];
     lkr_real sweep[LKR_MAX_INPUTS][2];
     lkr_real range[LKR_MAX_INPUTS][2];
@@ -463,6 +464,25 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
     }
 }
 
+/* The inputs for values of outputs, nearest to near ones, all in the scene's units. */
+static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *value, const lkr_real *near,
+    lkr_real *inputs)
+{
+    lkr_real q[LKR_MAX_INPUTS];
+    lkr_point p;
+    int i;
+    for (i = 0; i < model->inputs; i++) {
+        q[i] = near[i] / model->unit[i];
+    }
+    if (!lkr_inverse(model, LKR_JOINTS, value, q, &p)) {
+        return 0;
+    }
+    for (i = 0; i < model->inputs; i++) {
+        inputs[i] = q[i] * model->unit[i];
+    }
+    return 1;
+}
+
 /* --- actuators and joints --- */
 
 /* Sample i of the inputs, all over their ranges. */
@@ -641,7 +661,7 @@ typedef struct {
 } lever_pose;
 
 /* The pose, and its rates by crank. Returns 0 if a limit is exceeded. */
-LKR_FORMULA int lever_formulas(float crank, lever_pose *p, lever_pose *by_crank)
+LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank)
 {
     const float length_a = 0.02f;
     const float k7 = -0.045f;
@@ -656,7 +676,7 @@ LKR_FORMULA int lever_formulas(float crank, lever_pose *p, lever_pose *by_crank)
     const float k87 = 0.0f;
     const float k89 = -0.025f;
     const float k90 = 0.09f;
-    const float x0 = crank;
+    const float x0 = crank_;
     /* O ground 0 0 */
     p->O_x = 0.0f;
     p->O_y = 0.0f;
@@ -703,19 +723,19 @@ LKR_FORMULA int lever_formulas(float crank, lever_pose *p, lever_pose *by_crank)
 }
 
 /* Place the joints. Return 0 if not all can be assembled: NaN is what cannot. */
-static inline int lever_solve(float crank, lever_pose *p)
+static inline int lever_solve(float crank_, lever_pose *p)
 {
     lever_pose by_crank;
-    (void)lever_formulas(crank, p, &by_crank);
+    (void)lever_formulas(crank_, p, &by_crank);
     return isfinite(p->O_x + p->O_y + p->Q_x + p->Q_y + p->A_x + p->A_y + p->L_x + p->L_y +
         p->angle_crank + p->angle_lever + p->slide_slide);
 }
 
 /* Differentiate all of it by crank. */
-static inline void lever_rates(float crank, lever_pose *by_crank)
+static inline void lever_rates(float crank_, lever_pose *by_crank)
 {
     lever_pose p;
-    (void)lever_formulas(crank, &p, by_crank);
+    (void)lever_formulas(crank_, &p, by_crank);
 }
 
 enum {
@@ -790,29 +810,9 @@ static const lkr_model lever_model = {
     { { { 1.0f, 0.0f, 0, 1.0f, 0.0f } },
       { { 1.0f, 6.2831855f, 0, 0.0f, 0.0f } } },
     { { 0.0f }, { 6.2831855f } },
-    { 0.0f }, { { -LKR_FAR, LKR_FAR } },
+    { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } },
     { { -3.1415927f, 3.1415927f } }
 };
-
-/* Initialize the memory; returns 0 if there is no pose. */
-static inline int lever_begin(lever_memory *m)
-{
-    return lkr_begin(&lever_model, m);
-}
-
-/* From actuators to joints, see lkr_transmit; returns a status. */
-static inline int lever_actuators_to_joints(lever_memory *m, const lever_actuators *from,
-    lever_joints *to)
-{
-    return lkr_transmit(&lever_model, m, LKR_ACTUATORS, from, to);
-}
-
-/* From joints to actuators, see lkr_transmit; returns a status. */
-static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints *from,
-    lever_actuators *to)
-{
-    return lkr_transmit(&lever_model, m, LKR_JOINTS, from, to);
-}
 
 /* The inputs in each assembly mode of the inverse linkage, NAN where there is none:
      O ground 0.0 0.0
@@ -871,22 +871,36 @@ static const lkr_model lever_model_angle_lever = {
     { { { 0, 0, 0, 0, 0 } },
       { { 1.0f, 6.2831855f, 0, 0.0f, 0.0f } } },
     { { 6.2831855f }, { 6.2831855f } },
-    { 0.0f }, { { -LKR_FAR, LKR_FAR } },
+    { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } },
     { { -3.1415927f, 3.1415927f } }
 };
 
+
 /* The crank for lever [rad], nearest to `near`, whole turns included. Returns 0, and
    leaves crank alone, where there is none. */
-static inline int lever_crank_for_angle_lever(float value, float near, float *crank)
+static inline int lever_crank_for_angle_lever(float value, float near, float *crank_)
 {
-    float q[LKR_MAX_INPUTS];
-    lkr_point p;
-    q[0] = near;
-    if (!lkr_inverse(&lever_model_angle_lever, LKR_JOINTS, &value, q, &p)) {
-        return 0;
-    }
-    *crank = q[0];
-    return 1;
+    return lkr_inputs_for(&lever_model_angle_lever, &value, &near, crank_);
+}
+
+/* Initialize the memory; returns 0 if there is no pose. */
+static inline int lever_begin(lever_memory *m)
+{
+    return lkr_begin(&lever_model, m);
+}
+
+/* From actuators to joints, see lkr_transmit; returns a status. */
+static inline int lever_actuators_to_joints(lever_memory *m, const lever_actuators *from,
+    lever_joints *to)
+{
+    return lkr_transmit(&lever_model, m, LKR_ACTUATORS, from, to);
+}
+
+/* From joints to actuators, see lkr_transmit; returns a status. */
+static inline int lever_joints_to_actuators(lever_memory *m, const lever_joints *from,
+    lever_actuators *to)
+{
+    return lkr_transmit(&lever_model, m, LKR_JOINTS, from, to);
 }
 
 #endif /* LEVER_LINKAGE_H */

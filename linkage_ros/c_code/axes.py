@@ -4,7 +4,7 @@
 """The actuators and the commanded joints of a mechanism, one of each for every input."""
 
 import math
-from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -74,32 +74,29 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
         If one does not exist, they do not determine all inputs, or there is no inverse.
 
     """
-    for name in names:
-        if output_of(machine, name) is None:
-            raise ValueError(f'{machine.name} has no joint {name!r}; allowed: ' + listed(
-                (joint.name for joint in machine.joints.values()), 200))
-    outputs = [output_of(machine, name) or '' for name in names] or _chain(machine)
+    outputs = [output for name in names if (output := output_of(machine, name))
+               ] if names else _chain(machine)
     if len({*outputs}) != len(machine.inputs):
-        raise ValueError(f'{machine.name} has {len(machine.inputs)} inputs: as many joints are '
-                         f'needed, not {listed(names)}')
-    if names and not _tell(machine, outputs, spread(machine.linkage.inputs, SPREAD)):
+        raise ValueError(f'{machine.name} has {len(machine.inputs)} inputs: as many of its joints '
+                         f'are needed, not {listed(names)}')
+    if names and not _tell(machine, outputs):
         raise ValueError(f'{listed(names)} of {machine.name} moves with none of the inputs, or '
                          'only together with another joint')
     check_inverse(machine, [axis(machine, output) for output in outputs])
-    named = [machine.joints.get(_key(machine, output)) or JointName(f'{machine.name}_{output}')
-             for output in outputs]
-    return [axis(machine, output, joint.name, joint.sign, joint.offset, joint.wraps)
-            for output, joint in zip(outputs, named)]
+    return [_joint(machine, output) for output in outputs]
 
 
 def passive(machine: SceneMechanism, commanded: Sequence[Axis]) -> List[Axis]:
     """Return the joints of the first leg's links that are not commanded."""
     outputs = [each.output for each in commanded]
-    links = [link.name for link in machine.linkage.links if link.name not in outputs]
-    named = [(link, machine.joints[_key(machine, link)]) for link in links
-             if _key(machine, link) in machine.joints]
-    return [axis(machine, link, joint.name, joint.sign, joint.offset, joint.wraps)
-            for link, joint in named]
+    return [_joint(machine, link.name) for link in machine.linkage.links
+            if link.name not in outputs and _key(machine, link.name) in machine.joints]
+
+
+def _joint(machine: SceneMechanism, output: str) -> Axis:
+    """Return the axis of an output, with the name, sign and offset of its joint."""
+    joint = machine.joints.get(_key(machine, output), JointName(f'{machine.name}_{output}'))
+    return axis(machine, output, joint.name, joint.sign, joint.offset, joint.wraps)
 
 
 def output_of(machine: SceneMechanism, name: str) -> Optional[str]:
@@ -112,42 +109,33 @@ def output_of(machine: SceneMechanism, name: str) -> Optional[str]:
     return output if output != name and machine.linkage.has_output(output) else None
 
 
-def gears(linkage: Mechanism, axes: Sequence[Axis]) -> Iterator[Tuple[int, int, float, float]]:
-    """Yield the axes that count an input, maybe geared: number, input, ratio and offset."""
-    for k, each in enumerate(axes):
-        for i, input_ in enumerate(linkage.inputs):
-            if each.output == input_.name:
-                yield k, i, 1.0, 0.0
-            elif each.output in linkage.geared_to(i) and not each.wraps:
-                yield k, i, *linkage.gear(each.output, i)
+def gears(linkage: Mechanism, axes: Sequence[Axis]) -> Dict[int, Tuple[int, float, float]]:
+    """Return input, ratio and offset of the axes that count an input, maybe geared, by number."""
+    return {k: (i, 1.0, 0.0) if each.output == input_.name else (i, *linkage.gear(each.output, i))
+            for k, each in enumerate(axes) for i, input_ in enumerate(linkage.inputs)
+            if each.output == input_.name
+            or each.output in linkage.geared_to(i) and not each.wraps}
 
 
 def check_inverse(machine: SceneMechanism, axes: Sequence[Axis]) -> None:
     """Raise ValueError if positions of axes give the inputs neither in closed form nor safely."""
     linkage, names = machine.linkage, [each.output for each in axes]
-    if len(list(gears(linkage, axes))) == len(axes) or linkage.inverse(tuple(names)).closed:
+    if len(gears(linkage, axes)) == len(axes) or linkage.inverse(tuple(names)).closed:
         return
     if len(axes) > 1:
         raise ValueError(f'{listed(names)} of {machine.name} have no inverse in closed form, and '
                          'a search of several inputs may miss; choose other joints, or the inputs')
-    only = linkage.inputs[0]
-    low, high = machine.first.ends or (-math.inf, math.inf)
-    if only.is_part and not only.low <= low <= high <= only.high:
-        raise ValueError(f'{names[0]} of {machine.name} repeats after too many turns to be '
-                         f'searched: set a {machine.name}.{only.name}.sweep in '
-                         f'{only.low:.6g} to {only.high:.6g} rad')
-    if not pieces(machine, axes[0]):
+    if linkage.inputs[0].is_part:
+        raise ValueError(f'{names[0]} of {machine.name} has no inverse in closed form, and '
+                         'repeats after too many turns for a search')
+    if not pieces(linkage, axes[0]):
         raise ValueError(f'{names[0]} of {machine.name} moves nowhere')
 
 
-def pieces(machine: SceneMechanism, axis: Axis) -> List[Tuple[float, ...]]:
+def pieces(linkage: Mechanism, axis: Axis) -> List[Tuple[float, ...]]:
     """Return parts of the reach in which an axis only rises or falls: inputs, and outputs."""
-    linkage, drive = machine.linkage, machine.first
     # In a piece an angle changes by half a turn at most, so that its gaps are known.
     parts, _ = linkage.monotone(axis.output, math.pi if axis.turn else math.inf)
-    if linkage.inputs[0].is_part and drive.ends:
-        low, high = (end / machine.scale_of(linkage.inputs[0].name) for end in drive.ends)
-        parts = [part for part in parts if part[0] <= high and low <= part[1]]
     return [part for part in parts if part[2] != part[3]]
 
 
@@ -192,29 +180,27 @@ def _chain(machine: SceneMechanism) -> List[str]:
                 link.name in barrels, link.name in machine.inputs,
                 joint.name == f'{machine.name}_{key}')
 
-    while len(chosen) < len(machine.inputs) and (candidates := [
-            link for link in links if link.name not in chosen
-            and _tell(machine, [*chosen, link.name])]):
-        chosen.append(min(candidates, key=rank).name)
     try:
+        for _ in machine.inputs:
+            chosen.append(min((link for link in links if link.name not in chosen
+                               and _tell(machine, [*chosen, link.name])), key=rank).name)
         check_inverse(machine, [axis(machine, output) for output in chosen])
         return chosen
     except ValueError:
+        # There is none, or it has no inverse.
         return list(machine.inputs)
 
 
-def _tell(machine: SceneMechanism, outputs: Sequence[str],
-          inputs: Optional[Sequence[Any]] = None) -> bool:
-    """Return whether outputs determine the inputs at any of such inputs, by default the start."""
+def _tell(machine: SceneMechanism, outputs: Sequence[str]) -> bool:
+    """Return whether outputs determine the inputs in any of many poses."""
     linkage = machine.linkage
-    own = start(machine) if inputs is None else inputs
-    pose = linkage.posed((), (), tuple(outputs))
-    rates = np.reshape(pose.over(*own), (len(linkage.inputs), len(outputs), -1))
+    rates = np.reshape(linkage.posed((), (), tuple(outputs)).over(*spread(
+        linkage.inputs, SPREAD)), (len(linkage.inputs), len(outputs), -1))
     if not np.isfinite(rates).all(axis=(0, 1)).any():
         return True
     sizes = np.array([1.0 if linkage.is_angle(each) else linkage.longest for each in outputs])
-    rates = rates * np.array([each.size for each in linkage.inputs])[:, None, None]
-    scaled = np.moveaxis(np.nan_to_num(rates / sizes[:, None]), -1, 0)
+    units = np.array([each.size for each in linkage.inputs])
+    scaled = np.moveaxis(np.nan_to_num(rates * units[:, None, None] / sizes[:, None]), -1, 0)
     values = np.linalg.svd(scaled, compute_uv=False)
     return values.shape[1] == len(outputs) and bool(
         (values[:, -1] > DEPENDENT * np.maximum(1.0, values[:, 0])).any())

@@ -33,15 +33,14 @@ def show(args: Optional[List[str]]) -> None:
 
 def with_joints(machines: Sequence[SceneMechanism], names: Sequence[str]
                 ) -> List[Tuple[SceneMechanism, List[str]]]:
-    """Return each machine with its own joints among those named."""
-    own = [(machine, [name for name in names if output_of(machine, name)])
-           for machine in machines]
-    for name in names:
-        if not any(name in chosen for _, chosen in own):
-            known = [joint.name for machine in machines for joint in machine.joints.values()]
-            raise command.RequestError(f'no mechanism has a joint {name!r}; allowed: '
-                                       f'{listed(known, 200)}{meant(name, known)}')
-    return own
+    """Return each machine with its joints among those named."""
+    chosen = [(machine, [name for name in names if output_of(machine, name)])
+              for machine in machines]
+    known = [joint.name for machine in machines for joint in machine.joints.values()]
+    for name in sorted({*names}.difference(*(joints for _, joints in chosen))):
+        raise command.RequestError(f'no mechanism has a joint {name!r}; allowed: '
+                                   f'{listed(known, 200)}{meant(name, known)}')
+    return chosen
 
 
 def parser(name: str, description: str) -> command.Parser:

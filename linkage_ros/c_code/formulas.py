@@ -9,7 +9,7 @@ from functools import partial
 from typing import Iterator, List, Sequence, Tuple
 
 from .code import Block, Code
-from .names import distinct, field, parameter
+from .names import distinct, field
 from ..scene import SceneMechanism
 
 
@@ -39,7 +39,8 @@ class Formulas:
         self._machine, self._code = machine, code
         self._linkage = linkage = machine.linkage
         self.inputs = [input_.name for input_ in linkage.inputs]
-        self.parameters = [*map(parameter, self.inputs)]
+        # No word of C and no macro ends so.
+        self.parameters = [f'{name}_' for name in self.inputs]
         self.by = [f'by_{name}' for name in self.inputs]
         # Points in space are of no use on a board.
         self._points = () if machine.in_space else linkage.points

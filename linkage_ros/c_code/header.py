@@ -12,29 +12,18 @@ from __future__ import annotations
 
 from typing import Any, Dict, Iterator, List, NamedTuple, Sequence
 
-import numpy as np
-
 from .axes import actuators, Axis, axis, check_inverse, joints, loads
 from .code import Code, indented
 from .formulas import Formulas
-from .names import comment, constants, distinct, field, filled, parameter, prefix, template
+from .names import comment, constants, distinct, field, filled, prefix, template
 from .tables import Tables
+from ..linkage import Mechanism
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
-# Number of inputs at which the error of `float` is measured.
-SAMPLED = 2001
 # Poses from a solution of an inverse or from the near inputs, as in `linkage.h`: Newton's method,
 # and one without rates.
 POSES = 5
-INVERSE = """\
-/* The @what@ for @outputs@, nearest to `near`, whole turns included. Returns 0, and
-   leaves @what@ alone, where there is none. */
-static inline int @name@_@what@_for@tag@(@parameters@)
-{
-@body@
-}
-"""
 
 
 class Request(NamedTuple):
@@ -83,125 +72,95 @@ def printed(requests: Sequence[Request], single: bool = False) -> str:
 
 def headers(requests: Sequence[Request], single: bool, common: str) -> List[str]:
     """Return the headers of mechanisms in one program, each with a text `common`."""
-    made = [_Header(request, single) for request in requests]
-    sizes = {'inputs': max(each.values['own_inputs'] for each in made),
-             'solutions': max(each.values['own_solutions'] for each in made)}
-    return [filled(template('mechanism.h.in'), {**each.values, **sizes, 'common': common})
-            for each in made]
+    values = [_values(request, single) for request in requests]
+    sizes = {size: max(each[f'own_{size}'] for each in values) for size in (
+        'inputs', 'solutions')}
+    return [filled(template('mechanism.h.in'), {**each, **sizes, 'common': common})
+            for each in values]
 
 
-class _Header:
-    """Writes one header: `values` are those of its template."""
+def _values(request: Request, single: bool) -> Dict[str, Any]:
+    """Return the values of the template of a header."""
+    machine, linkage = request.machine, request.machine.linkage
+    name, n, code = machine.name, len(linkage.inputs), Code(linkage, single)
+    sides = actuators(machine), joints(machine, request.joints)
+    inverses = _inverses(machine, request.outputs)
+    formulas = Formulas(machine, code, [
+        *(each.output for axes in (*sides, *inverses.values()) for each in axes),
+        *(output for output, _ in loads(machine))])
+    model = Tables(machine, code, formulas, sides)
+    tables = [model]
+    parts = [model.text(), model.passive(request.passive) if request.passive else '']
+    for tag, axes in inverses.items():
+        tables.append(Tables(machine, code, formulas, ([], axes), tag))
+        parts += [tables[-1].text(), _inverse(machine, axes, tag, code.number)]
+    solutions = max(each.solutions for each in tables)
+    about = [*_about(machine), f'A call takes at most {POSES * (solutions + 1)} poses.']
+    whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
+    return {
+        'about': '\n'.join(f' * {line}' for line in about),
+        'name': name, 'N': prefix(name), 'float': int(single), 'number': code.number,
+        'own_inputs': n, 'own_solutions': solutions,
+        'fields': formulas.struct(), 'pose': formulas.function(),
+        'parameters': ', '.join(f'{code.number} {each}' for each in formulas.parameters),
+        'arguments': ', '.join(formulas.parameters), 'by': ', '.join(formulas.by),
+        'by_places': ', '.join(f'&{by}' for by in formulas.by),
+        'by_pointers': ', '.join(f'{name}_pose *{by}' for by in formulas.by),
+        'inputs_named': ' and by '.join(formulas.inputs),
+        'whole': '\n'.join(indented([f'return isfinite({whole});'])),
+        'enums': '\n'.join(_enum(f'{prefix(name)}_{side}', axes) for side, axes in zip(
+            ('ACTUATOR', 'JOINT'), sides)),
+        'axes': comment('; '.join(f'{side}: {_with_units(linkage, axes)}' for side, axes in zip(
+            ('Actuators', 'joints'), sides))),
+        'model': '\n'.join(filter(None, parts))}
 
-    def __init__(self, request: Request, single: bool):
-        self.machine, self.name = request.machine, request.machine.name
-        self.linkage = linkage = request.machine.linkage
-        if self.name == 'lkr' or self.name.startswith('lkr_'):
-            raise ValueError(f'{self.name} cannot be the name of a mechanism in C: names that '
-                             'begin with lkr are those that all linkages share')
-        outputs, n = [plain_text(output) for output in request.outputs], len(linkage.inputs)
-        for output in outputs:
-            linkage.check_output(output)
-        if outputs and n > 1 and len(outputs) != n:
-            raise ValueError(f'{self.name} has {n} inputs: as many outputs are needed, '
-                             f'got {listed(outputs)}')
-        groups = [(output,) for output in outputs] if n == 1 else [tuple(outputs)] * bool(outputs)
-        inverses = [[axis(self.machine, output, output) for output in group] for group in groups]
-        for axes in inverses:
-            check_inverse(self.machine, axes)
-        sides = actuators(self.machine), joints(self.machine, request.joints)
-        code = Code(linkage, single)
-        formulas = Formulas(self.machine, code, [
-            *(each.output for axes in (*sides, *inverses) for each in axes),
-            *(output for output, _ in loads(self.machine))])
-        tags = distinct('_'.join(['', *(field(linkage, each) for each in group)])
-                        for group in groups)
-        first = Tables(self.machine, code, formulas, sides)
-        others = [Tables(self.machine, code, formulas, ([], axes), tag)
-                  for axes, tag in zip(inverses, tags)]
-        model = first.text() + (first.passive(request.passive) if request.passive else '')
-        parts = [text for each, axes, tag in zip(others, inverses, tags)
-                 for text in (each.text(), self._inverse(axes, tag, code))]
-        solutions = max(each.solutions for each in (first, *others))
-        about = [*self._about(), f'A call takes at most {POSES * (solutions + 1)} poses.',
-                 *([self._error()] if single else [])]
-        whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
-        self.values: Dict[str, Any] = {
-            'about': '\n'.join(f' * {line}' for line in about),
-            'name': self.name, 'N': prefix(self.name), 'float': int(single),
-            'number': code.number, 'own_inputs': n, 'own_solutions': solutions,
-            'fields': formulas.struct(), 'pose': formulas.function(),
-            'parameters': ', '.join(f'{code.number} {each}' for each in formulas.parameters),
-            'arguments': ', '.join(formulas.parameters), 'by': ', '.join(formulas.by),
-            'by_places': ', '.join(f'&{by}' for by in formulas.by),
-            'by_pointers': ', '.join(f'{self.name}_pose *{by}' for by in formulas.by),
-            'inputs_named': ' and by '.join(formulas.inputs),
-            'whole': '\n'.join(indented([f'return isfinite({whole});'])),
-            'enums': '\n'.join(map(self._enum, ('actuator', 'joint'), sides)),
-            'axes': comment('; '.join(f'{side}: {self._with_units(axes)}' for side, axes in zip(
-                ('Actuators', 'joints'), sides))),
-            'model': model, 'inverses': '\n'.join(parts)}
 
-    def _about(self) -> Iterator[str]:
-        linkage = self.linkage
-        lengths = ', '.join(f'{name} = {length:.9g}'
-                            for name, length in linkage.dimensions.items())
-        inputs = ', '.join(f'{input_.name} [{input_.unit}]' for input_ in linkage.inputs)
-        scale = f', times {self.machine.scale:.9g}' if self.machine.scale != 1.0 else ''
-        yield f'{self.name}: {linkage.type}, written by linkage_ros.'
-        yield f'Lengths [m]{scale}: {lengths or "those of the joint lines"}.'
-        yield f'Input: {inputs}. Angles [rad] count counterclockwise.'
-        if len(linkage.inputs) == 1 and not linkage.inputs[0].is_part:
-            arcs = ' or '.join(
-                f'[{low:.6g}, {high:.6g}]' for low, high in self.machine.first.reach)
-            yield f'It can be assembled in {arcs} {linkage.inputs[0].unit}.'
+def _inverses(machine: SceneMechanism, texts: Sequence[str]) -> Dict[str, List[Axis]]:
+    """Return the axes of each inverse, by the end of its names."""
+    outputs, n = [*map(plain_text, texts)], len(machine.inputs)
+    for output in outputs:
+        machine.linkage.check_output(output)
+    if outputs and n > 1 and len(outputs) != n:
+        raise ValueError(f'{machine.name} has {n} inputs: as many outputs are needed, '
+                         f'got {listed(outputs)}')
+    groups = [[axis(machine, output, output) for output in outputs[i:i + n]]
+              for i in range(0, len(outputs), n)]
+    for axes in groups:
+        check_inverse(machine, axes)
+    return dict(zip(distinct('_'.join(['', *(field(machine.linkage, each.output)
+                                             for each in axes)]) for axes in groups), groups))
 
-    def _enum(self, side: str, axes: Sequence[Axis]) -> str:
-        upper = f'{prefix(self.name)}_{side.upper()}'
-        return 'enum { ' + ', '.join(f'{upper}_{name} = {i}' for i, name in enumerate(
-            constants(each.name for each in axes))) + ' };'
 
-    def _with_units(self, axes: Sequence[Axis]) -> str:
-        return ', '.join(f'{each.name} [{"rad" if self.linkage.is_angle(each.output) else "m"}]'
-                         for each in axes)
+def _inverse(machine: SceneMechanism, axes: Sequence[Axis], tag: str, number: str) -> str:
+    """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
+    n, (first, *_) = len(axes), machine.inputs
+    place = f'{first}_' if n == 1 else 'inputs'
+    return filled(template('inverse.h.in'), {
+        'what': first if n == 1 else place, 'name': machine.name, 'tag': tag,
+        'outputs': _with_units(machine.linkage, axes),
+        'parameters': f'{number} value, {number} near, {number} *{place}' if n == 1 else
+        f'const {number} value[{n}], const {number} near[{n}], {number} inputs[{n}]',
+        'arguments': f'&value, &near, {place}' if n == 1 else 'value, near, inputs'})
 
-    def _inverse(self, axes: Sequence[Axis], tag: str, code: Code) -> str:
-        """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
-        n, number = len(axes), code.number
-        names = [*self.machine.inputs]
-        if n == 1:
-            what, place = names[0], parameter(names[0])
-            near, made, value = ['near'], [f'*{place}'], '&value'
-            parameters = f'{number} value, {number} near, {number} *{place}'
-        else:
-            what, value = 'inputs', 'value'
-            near, made = ([f'{name}[{i}]' for i in range(n)] for name in ('near', what))
-            parameters = ', '.join([f'const {number} value[{n}]', f'const {number} near[{n}]',
-                                    f'{number} inputs[{n}]'])
-        units = [input_.size * self.machine.scale_of(input_.name)
-                 for input_ in self.linkage.inputs]
-        lines = [
-            f'{number} q[LKR_MAX_INPUTS];', 'lkr_point p;',
-            *(f'q[{i}] = {code.times(each, 1.0 / units[i])};' for i, each in enumerate(near)),
-            f'if (!lkr_inverse(&{self.name}_model{tag}, LKR_JOINTS, {value}, q, &p)) {{',
-            '    return 0;', '}',
-            *(f'{each} = {code.times(f"q[{i}]", units[i])};' for i, each in enumerate(made)),
-            'return 1;']
-        return filled(INVERSE, {
-            'what': what, 'name': self.name, 'tag': tag,
-            'outputs': self._with_units(axes), 'parameters': parameters,
-            'body': '\n'.join(indented(lines))})
 
-    def _error(self) -> str:
-        """Describe the error of single precision over the reach."""
-        linkage = self.linkage
-        if len(linkage.inputs) > 1:
-            return 'float: how far joints are off was not measured, as there are several inputs.'
-        (low, high), *_ = linkage.reach()
-        edge = 0.0 if linkage.inputs[0].is_whole([(low, high)]) else 0.01 * (high - low)
-        theta = np.linspace(low + edge, high - edge, SAMPLED).astype(np.float32)
-        pose = linkage.posed(linkage.points, ())
-        exact = pose.over(theta.astype(float))
-        worst = np.nanmax(np.abs(pose.searched(theta) - exact)) / linkage.longest
-        return (f'float: joints are off by up to {worst:.1g} of the longest bar at {SAMPLED} '
-                'poses over the reach, without its outermost hundredth.')
+def _about(machine: SceneMechanism) -> Iterator[str]:
+    linkage = machine.linkage
+    lengths = ', '.join(f'{name} = {length:.9g}' for name, length in linkage.dimensions.items())
+    inputs = ', '.join(f'{input_.name} [{input_.unit}]' for input_ in linkage.inputs)
+    scale = f', times {machine.scale:.9g}' if machine.scale != 1.0 else ''
+    yield f'{machine.name}: {linkage.type}, written by linkage_ros.'
+    yield f'Lengths [m]{scale}: {lengths or "those of the joint lines"}.'
+    yield f'Input: {inputs}. Angles [rad] count counterclockwise.'
+    if len(linkage.inputs) == 1 and not linkage.inputs[0].is_part:
+        arcs = ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in machine.first.reach)
+        yield f'It can be assembled in {arcs} {linkage.inputs[0].unit}.'
+
+
+def _enum(start: str, axes: Sequence[Axis]) -> str:
+    return 'enum { ' + ', '.join(f'{start}_{name} = {i}' for i, name in enumerate(
+        constants(each.name for each in axes))) + ' };'
+
+
+def _with_units(linkage: Mechanism, axes: Sequence[Axis]) -> str:
+    return ', '.join(f'{each.name} [{"rad" if linkage.is_angle(each.output) else "m"}]'
+                     for each in axes)

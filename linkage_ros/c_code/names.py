@@ -10,8 +10,6 @@ from typing import Iterable, List, Mapping
 from ..linkage import Mechanism
 
 _PLACE = re.compile(r'@(\w+)@')
-# Names of inputs that a user has not chosen.
-_GIVEN = re.compile(r'(crank|cylinder|carriage)\d*')
 
 
 def template(name: str) -> str:
@@ -47,11 +45,6 @@ def constants(names: Iterable[str]) -> List[str]:
 def prefix(name: str) -> str:
     """Return the prefix of a mechanism's constants: different for arm, Arm and ARM."""
     return name.upper() if name.islower() else f'{name}_' if name.isupper() else name
-
-
-def parameter(name: str) -> str:
-    """Return the name of an input as a parameter in C, which no word of C and no macro has."""
-    return name if _GIVEN.fullmatch(name) else f'{name}_'
 
 
 def field(linkage: Mechanism, output: str) -> str:

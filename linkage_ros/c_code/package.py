@@ -40,60 +40,58 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
     classes = distinct(
         re.sub(r'(?<=[a-z])(?=[A-Z])', '_', machine.name).title().replace('_', '')
         for machine, _ in machines)
-    parts = [_values(name, class_, machine, joints(machine, chosen))
-             for class_, (machine, chosen) in zip(classes, machines)]
+    parts, requests = [], []
+    for class_, (machine, chosen) in zip(classes, machines):
+        commanded = joints(machine, chosen)
+        others = passive(machine, commanded)
+        requests.append(header.Request(machine, (), chosen, others))
+        parts.append(_values(name, class_, machine, commanded, others))
     common = {
         'package': name, 'namespace': f'{name}_plugins', 'scene': escape(comment(scene)),
         'mechanisms': ' '.join(part['name'] for part in parts),
         'table': '\n'.join(part['row'] for part in parts)}
-    files = {Path(path): filled(template(Path(path).name), common) for path in (
+    files = {path: filled(template(Path(path).name), common) for path in (
         'CMakeLists.txt', 'package.xml', 'README.md', 'src/transmission-of.hpp',
         'include/linkage_ros/linkage_transmission.hpp')}
-    files[Path('plugins.xml')] = f'<library path="{name}">\n' + ''.join(
-        filled(template('plugin.xml'), part) for part in parts) + '</library>\n'
-    files[Path('urdf/transmissions.xml')] = '<!-- Written by linkage_ros. -->\n' + ''.join(
-        filled(template('transmission.xml'), part) for part in parts)
-    files[Path('src/plugins.cpp')] = '\n'.join([
-        '// Written by linkage_ros. SPDX-License-Identifier: Apache-2.0',
-        *(f'#include "{part["name"]}.hpp"' for part in parts),
-        '#include "pluginlib/class_list_macros.hpp"\n',
-        *(f'PLUGINLIB_EXPORT_CLASS(\n  {name}_plugins::{class_}Loader, '
-          'transmission_interface::TransmissionLoader)' for class_ in classes), ''])
-    files[Path('src/linkage.h')] = template('linkage.h')
-    written = header.headers([
-        header.Request(machine, (), chosen, passive(machine, joints(machine, chosen)))
-        for machine, chosen in machines], False, '#include "linkage.h"')
-    for part, text in zip(parts, written):
+    files |= {
+        'plugins.xml': '\n'.join([f'<library path="{name}">', *(
+            filled(template('plugin.xml'), part) for part in parts), '</library>\n']),
+        'urdf/transmissions.xml': '\n'.join(['<!-- Written by linkage_ros. -->', *(
+            filled(template('transmission.xml'), part) for part in parts)]),
+        'src/plugins.cpp': '\n'.join([
+            '// Written by linkage_ros. SPDX-License-Identifier: Apache-2.0',
+            *(f'#include "{part["name"]}.hpp"' for part in parts),
+            '#include "pluginlib/class_list_macros.hpp"\n',
+            *(filled(template('export.cpp.in'), part) for part in parts)]),
+        'src/linkage.h': template('linkage.h')}
+    texts = header.headers(requests, False, '#include "linkage.h"')
+    for part, text in zip(parts, texts):
         mechanism = part['name']
-        files[Path(f'src/{mechanism}_linkage.h')] = text
-        files[Path(f'src/{mechanism}.hpp')] = filled(template('mechanism.hpp'), part)
-        files[Path(f'test/test_{mechanism}.cpp')] = filled(template('test.cpp'), part)
-    return files
+        files[f'src/{mechanism}_linkage.h'] = text
+        files[f'src/{mechanism}.hpp'] = filled(template('mechanism.hpp'), part)
+        files[f'test/test_{mechanism}.cpp'] = filled(template('test.cpp'), part)
+    return {Path(path): text for path, text in files.items()}
 
 
-def _values(package_name: str, class_: str, machine: SceneMechanism,
-            commanded: Sequence[Axis]) -> Mapping[str, str]:
-    driven, others = actuators(machine), passive(machine, commanded)
-    roles = list(machine.inputs), [axis.output for axis in commanded]
-
-    def rows(axes: Sequence[Axis], own: Sequence[str]) -> str:
+def _values(package_name: str, class_: str, machine: SceneMechanism, commanded: Sequence[Axis],
+            others: Sequence[Axis]) -> Mapping[str, str]:
+    """Return the values of a mechanism's templates."""
+    def rows(roles: Mapping[str, Axis]) -> str:
         return ', '.join(f'{{{literal(axis.name)}, {literal(role)}}}'
-                         for axis, role in zip(axes, own))
+                         for role, axis in roles.items())
 
-    def listed(axes: Sequence[Axis]) -> str:
-        return escape(comment(', '.join(axis.name for axis in axes)))
-
-    lines = [f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(role)}/>'
-             for kind, axes, own in zip(('actuator', 'joint'), (driven, commanded), roles)
-             for axis, role in zip(axes, own)]
+    driven = dict(zip(machine.inputs, actuators(machine)))
+    by_output = {axis.output: axis for axis in commanded}
+    named = [escape(comment(', '.join(axis.name for axis in axes.values())))
+             for axes in (driven, by_output)]
     return {
         'package': package_name, 'namespace': f'{package_name}_plugins', 'class': class_,
-        'name': machine.name, 'n': str(len(driven)), 'actuators': rows(driven, roles[0]),
-        'joints': rows(commanded, roles[1]),
-        'passive': rows(others, [each.output for each in others]) and '{%s}' % rows(
-            others, [each.output for each in others]),
-        'passive_count': str(len(others)),
+        'name': machine.name, 'n': str(len(driven)), 'actuators': rows(driven),
+        'joints': rows({**by_output, **{axis.output: axis for axis in others}}),
+        'joint_count': str(len(commanded) + len(others)),
         'passive_function': f'{machine.name}_passive' if others else 'nullptr',
-        'axes': f'{listed(driven)} and {listed(commanded)}',
-        'lines': '\n'.join(lines),
-        'row': f'| `{package_name}/{class_}` | {listed(driven)} | {listed(commanded)} |'}
+        'axes': ' and '.join(named),
+        'lines': '\n'.join(f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(role)}/>'
+                           for kind, axes in (('actuator', driven), ('joint', by_output))
+                           for role, axis in axes.items()),
+        'row': f'| `{package_name}/{class_}` | {named[0]} | {named[1]} |'}

@@ -169,7 +169,9 @@ typedef struct {
     lkr_axis axis[2][LKR_MAX_INPUTS];
     /* After how much of each input the actuators or the joints repeat, or 0. */
     lkr_real turn[2][LKR_MAX_INPUTS];
-    /* Where each input starts, its sweep, and the range of its samples. */
+    /* The unit of each input, in those of the scene; where it starts, its sweep, and the range of its
+       samples. */
+    lkr_real unit[LKR_MAX_INPUTS];
     lkr_real start[LKR_MAX_INPUTS];
     lkr_real sweep[LKR_MAX_INPUTS][2];
     lkr_real range[LKR_MAX_INPUTS][2];
@@ -441,6 +443,25 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
             return 1;
         }
     }
+}
+
+/* The inputs for values of outputs, nearest to near ones, all in the scene's units. */
+static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *value, const lkr_real *near,
+    lkr_real *inputs)
+{
+    lkr_real q[LKR_MAX_INPUTS];
+    lkr_point p;
+    int i;
+    for (i = 0; i < model->inputs; i++) {
+        q[i] = near[i] / model->unit[i];
+    }
+    if (!lkr_inverse(model, LKR_JOINTS, value, q, &p)) {
+        return 0;
+    }
+    for (i = 0; i < model->inputs; i++) {
+        inputs[i] = q[i] * model->unit[i];
+    }
+    return 1;
 }
 
 /* --- actuators and joints --- */

@@ -15,8 +15,8 @@ class __attribute__((visibility("default"))) LinkageTransmission
   : public transmission_interface::Transmission
 {
 public:
-  /// Bits of a status: outside the reach or the sweep, or not found by a search; a velocity or an
-  /// effort would be infinite; a value is NaN or infinite, which of a command means that there is none.
+  /// Bits of a status: outside the reach or the sweep; a velocity or an effort would be infinite; a
+  /// value is NaN or infinite, which of a command means that there is none.
   enum Status : int { OK = 0, OUT_OF_REACH = 1, SINGULAR = 2, NOT_KNOWN = 4 };
 
   /// The status of the last call of actuator_to_joint() or joint_to_actuator(), a sum of these bits.

@@ -17,9 +17,8 @@ struct @class@Code
 {
   static constexpr std::size_t size = @n@;
   static constexpr std::array<Axis, size> actuators{{@actuators@}};
-  static constexpr std::array<Axis, size> joints{{@joints@}};
-  /// Joints that are not commanded, and the function for them.
-  static constexpr std::array<Axis, @passive_count@> passive{@passive@};
+  /// The commanded joints, then the passive ones, and the function for those.
+  static constexpr std::array<Axis, @joint_count@> joints{{@joints@}};
   static constexpr Passive * at_passive = @passive_function@;
   static constexpr const lkr_model & model = @name@_model;
 };

@@ -96,8 +96,9 @@ private:
   std::thread thread_;
 };
 
-/// The handles of all actuators, or of all joints, by interface: position, velocity, effort.
-template <class Handle, std::size_t size>
+/// The handles of all actuators, or of all joints, by interface: position, velocity, effort. The
+/// first `needed` of them have to be there.
+template <class Handle, std::size_t needed, std::size_t size = needed>
 class Handles
 {
 public:
@@ -108,11 +109,12 @@ public:
   {
     using transmission_interface::Exception;
     std::string allowed;
-    for (const auto & axis : axes) {
-      allowed += std::string(" '") + axis.name + "' (role '" + axis.role + "')";
+    for (std::size_t i = 0; i < needed; ++i) {
+      allowed += std::string(" '") + axes[i].name + "' (role '" + axes[i].role + "')";
     }
     std::array<std::string, size> names;
     std::string ignored;
+    factor_.fill(1.0);
     for (const auto & info : infos) {
       std::size_t i = place(axes, info.name, info.role);
       if (i == size && is_added(info)) {
@@ -136,8 +138,11 @@ public:
       factor_[i] = is_actuator ? info.mechanical_reduction : 1.0 / info.mechanical_reduction;
     }
     for (std::size_t i = 0; i < size; ++i) {
-      if (names[i].empty()) {
+      if (names[i].empty() && i < needed) {
         throw Exception(what + " '" + axes[i].name + "' is missing; needed are" + allowed);
+      }
+      if (names[i].empty()) {
+        names[i] = axes[i].name;
       }
     }
     static const std::array<std::string, 5> kinds{"position", "velocity", "effort", "torque", "force"};
@@ -169,7 +174,7 @@ public:
   {
     const auto & own = handles_[kind];
     return static_cast<std::size_t>(std::count_if(
-      own.begin(), own.end(), [](const auto & handle) { return handle.has_value(); }));
+      own.begin(), own.begin() + needed, [](const auto & handle) { return handle.has_value(); }));
   }
 
   bool have(std::size_t kind) const { return handles_[kind][0].has_value(); }
@@ -178,7 +183,7 @@ public:
   lkr_side read() const
   {
     lkr_side values{};
-    for (std::size_t i = 0; i < size; ++i) {
+    for (std::size_t i = 0; i < needed; ++i) {
       values.position[i] = (value(0, i) - offset_[i]) / factor_[i];
       values.velocity[i] = value(1, i) / factor_[i];
       values.effort[i] = value(2, i) * factor_[i];
@@ -189,11 +194,16 @@ public:
   /// Write what is finite.
   void write(const lkr_side & values)
   {
-    for (std::size_t i = 0; i < size; ++i) {
-      set(0, i, values.position[i] * factor_[i] + offset_[i]);
-      set(1, i, values.velocity[i] * factor_[i]);
+    for (std::size_t i = 0; i < needed; ++i) {
+      write(i, values.position[i], values.velocity[i]);
       set(2, i, values.effort[i] / factor_[i]);
     }
+  }
+
+  void write(std::size_t i, double position, double velocity)
+  {
+    set(0, i, position * factor_[i] + offset_[i]);
+    set(1, i, velocity * factor_[i]);
   }
 
 private:
@@ -235,88 +245,13 @@ private:
   std::array<double, size> offset_{}, factor_{};
 };
 
-/// States of the joints that are not commanded, where the component has handles for them.
-template <class Code>
-class PassiveJoints
-{
-public:
-  static constexpr std::size_t size = Code::passive.size();
-
-  /// Take a joint of the description if its role is that of a passive joint.
-  template <class Info>
-  bool take_info(const Info & info)
-  {
-    for (std::size_t i = 0; i < size; ++i) {
-      if (info.role == Code::passive[i].role) {
-        names_[i] = info.name;
-        offset_[i] = info.offset;
-        reduction_[i] = info.mechanical_reduction;
-        return true;
-      }
-    }
-    return false;
-  }
-
-  /// Take a handle of a passive joint, by the name of the description or of the scene.
-  bool take_handle(const transmission_interface::JointHandle & handle)
-  {
-    for (std::size_t i = 0; i < size; ++i) {
-      if (handle.get_prefix_name() == (names_[i].empty() ? Code::passive[i].name : names_[i])) {
-        const bool is_velocity = handle.get_interface_name() == "velocity";
-        if (handle && (is_velocity || handle.get_interface_name() == "position")) {
-          handles_[is_velocity][i].emplace(handle);
-          ++count_;
-        }
-        return true;
-      }
-    }
-    return false;
-  }
-
-  /// Write states at the inputs of the newest measurement; they stand still if that is held.
-  void write(const lkr_memory & memory, const lkr_side & actuators, bool is_moving)
-  {
-    if constexpr (size > 0) {
-      double position[size], rate[size][LKR_MAX_INPUTS], x[LKR_MAX_INPUTS];
-      if (count_ == 0 || memory.newest != LKR_ACTUATORS) {
-        return;
-      }
-      Code::at_passive(memory.q, position, rate);
-      is_moving = is_moving && lkr_input_change(
-        &Code::model, LKR_ACTUATORS, &memory.point, LKR_SINGULAR,
-        actuators.velocity, x) != 0;
-      for (std::size_t i = 0; i < size; ++i) {
-        double velocity = 0.0;
-        for (std::size_t j = 0; is_moving && j < Code::size; ++j) {
-          velocity += rate[i][j] * x[j];
-        }
-        const double reduction = names_[i].empty() ? 1.0 : reduction_[i];
-        set(0, i, position[i] / reduction + offset_[i]);
-        set(1, i, std::isfinite(velocity) ? velocity / reduction : 0.0);
-      }
-    }
-  }
-
-private:
-  void set(std::size_t kind, std::size_t i, double value)
-  {
-    if (handles_[kind][i] && std::isfinite(value)) {
-      (void)handles_[kind][i]->set_value(value);
-    }
-  }
-
-  std::array<std::string, size> names_;
-  std::array<double, size> offset_{}, reduction_{};
-  std::array<std::array<std::optional<transmission_interface::JointHandle>, size>, 2> handles_;
-  std::size_t count_ = 0;
-};
-
 /// A linkage between actuators and joints; Code_ wraps its generated C, which is included before.
 template <class Code_>
 class TransmissionOf : public linkage_ros::LinkageTransmission
 {
 public:
   using Code = Code_;
+  static constexpr std::size_t passive_count = Code::joints.size() - Code::size;
 
   explicit TransmissionOf(const hardware_interface::TransmissionInfo & info) : info_(info) {}
 
@@ -332,14 +267,7 @@ public:
     actuators_ = {};
     joints_ = {};
     actuators_.find("actuator", Code::actuators, info_.actuators, actuator_handles);
-    passive_ = {};
-    auto infos = info_.joints;
-    infos.erase(std::remove_if(infos.begin(), infos.end(), [this](const auto & info) {
-      return passive_.take_info(info); }), infos.end());
-    auto handles = joint_handles;
-    handles.erase(std::remove_if(handles.begin(), handles.end(), [this](const auto & handle) {
-      return passive_.take_handle(handle); }), handles.end());
-    joints_.find("joint", Code::joints, infos, handles);
+    joints_.find("joint", Code::joints, info_.joints, joint_handles);
     static const std::array<const char *, 3> kinds{"position", "velocity", "effort"};
     for (std::size_t kind = 0; kind < 3; ++kind) {
       const auto count = actuators_.count(kind) + joints_.count(kind);
@@ -356,8 +284,12 @@ public:
 
   void actuator_to_joint() override
   {
-    const auto measured = transmit(LKR_ACTUATORS, actuators_, joints_);
-    passive_.write(memory_, measured, !(status_ & OUT_OF_REACH));
+    [[maybe_unused]] const auto measured = transmit(LKR_ACTUATORS, actuators_, joints_);
+    if constexpr (passive_count > 0) {
+      if (memory_.newest == LKR_ACTUATORS) {
+        write_passive(measured.velocity, !(status_ & OUT_OF_REACH));
+      }
+    }
   }
 
   void joint_to_actuator() override { transmit(LKR_JOINTS, joints_, actuators_); }
@@ -393,11 +325,26 @@ private:
     return values;
   }
 
+  /// Write states of the joints that are not commanded, at the inputs of the newest measurement.
+  void write_passive(const double * velocity, bool is_moving)
+  {
+    double position[passive_count], rate[passive_count][LKR_MAX_INPUTS], x[LKR_MAX_INPUTS];
+    Code::at_passive(memory_.q, position, rate);
+    is_moving = is_moving && lkr_input_change(
+      &Code::model, LKR_ACTUATORS, &memory_.point, LKR_SINGULAR, velocity, x) != 0;
+    for (std::size_t i = 0; i < passive_count; ++i) {
+      double sum = 0.0;
+      for (std::size_t j = 0; is_moving && j < Code::size; ++j) {
+        sum += rate[i][j] * x[j];
+      }
+      joints_.write(Code::size + i, position[i], std::isfinite(sum) ? sum : 0.0);
+    }
+  }
+
   hardware_interface::TransmissionInfo info_;
   lkr_memory memory_{};
   Handles<transmission_interface::ActuatorHandle, Code::size> actuators_;
-  Handles<transmission_interface::JointHandle, Code::size> joints_;
-  PassiveJoints<Code> passive_;
+  Handles<transmission_interface::JointHandle, Code::size, Code::joints.size()> joints_;
   int status_ = OK;
   HeldLog log_;
 };
