@@ -664,18 +664,17 @@ typedef struct {
 LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank)
 {
     const float length_a = 0.02f;
-    const float k7 = -0.045f;
-    const float k10 = -0.045f;
-    const float k29 = 0.04f;
-    const float k33 = 0.025f;
-    const float k34 = 0.000625f;
-    const float k37 = 0.0036f;
-    const float k43 = 1.0f;
-    const float k61 = 0.081f;
-    const float k80 = 0.000625f;
-    const float k87 = 0.0f;
-    const float k89 = -0.025f;
-    const float k90 = 0.09f;
+    const float k2 = -0.045f;
+    const float k22 = 0.04f;
+    const float k26 = 0.025f;
+    const float k27 = 0.000625f;
+    const float k30 = 0.0036f;
+    const float k36 = 1.0f;
+    const float k54 = 0.081f;
+    const float k73 = 0.000625f;
+    const float k80 = 0.0f;
+    const float k82 = -0.025f;
+    const float k83 = 0.09f;
     const float x0 = crank_;
     /* O ground 0 0 */
     p->O_x = 0.0f;
@@ -684,41 +683,41 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     by_crank->O_y = 0.0f;
     /* Q ground 0 -b */
     p->Q_x = 0.0f;
-    p->Q_y = k10;
+    p->Q_y = k2;
     by_crank->Q_x = 0.0f;
     by_crank->Q_y = 0.0f;
     /* A crank O a up */
-    const float v14 = (0.5f * x0);
-    const float v15 = sinf(v14);
-    const float v17 = cosf(v14);
-    const float v21 = (-(((2.0f * v15) * v17) * length_a));
-    const float v25 = ((1.0f - (2.0f * (v15 * v15))) * length_a);
-    p->A_x = v21;
-    p->A_y = v25;
+    const float v6 = (0.5f * x0);
+    const float v7 = sinf(v6);
+    const float v9 = cosf(v6);
+    const float v13 = (-(((2.0f * v7) * v9) * length_a));
+    const float v18 = ((1.0f - (2.0f * (v7 * v7))) * length_a);
+    p->A_x = v13;
+    p->A_y = v18;
     p->angle_crank = x0;
-    by_crank->A_x = (-v25);
-    by_crank->A_y = v21;
+    by_crank->A_x = (-v18);
+    by_crank->A_y = v13;
     by_crank->angle_crank = lkr_gated(1.0f, fabsf(x0), 0.0f);
     /* L slot Q A e out max(1.8*b,a+b) */
-    const float v38 = (v17 * v17);
-    const float v39 = (k37 * v38);
-    const float v40 = (k34 + v39);
-    const float v47 = lkr_gated(v40, ((v38 + k43) - 7.888609e-31f), 0.0f);
-    const float v48 = lkr_gated((-((k29 * v15) * v17)), v47, 0.0f);
-    const float v52 = lkr_gated((k33 + (k29 * v38)), v47, 0.0f);
-    const float v55 = sqrtf(((v48 * v48) + (v52 * v52)));
-    const float v56 = (v48 / v55);
-    const float v63 = (v52 / v55);
-    const float v88 = lkr_root((k80 + v39), k87);
-    const float v95 = (((length_a * (k89 + (k90 * v38))) / v40) + 0.0f);
-    p->L_x = (v56 * k61);
-    p->L_y = (k7 + (v63 * k61));
-    p->angle_lever = lkr_angle((-v56), v63);
-    p->slide_slide = v88;
-    by_crank->L_x = (-((v95 * v63) * k61));
-    by_crank->L_y = ((v95 * v56) * k61);
-    by_crank->angle_lever = v95;
-    by_crank->slide_slide = ((-((((v15 * 0.5f) * v17) * 2.0f) * k37)) / (2.0f * v88));
+    const float v31 = (v9 * v9);
+    const float v32 = (k30 * v31);
+    const float v33 = (k27 + v32);
+    const float v40 = lkr_gated(v33, ((v31 + k36) - 7.888609e-31f), 0.0f);
+    const float v41 = lkr_gated((-((k22 * v7) * v9)), v40, 0.0f);
+    const float v45 = lkr_gated((k26 + (k22 * v31)), v40, 0.0f);
+    const float v48 = sqrtf(((v41 * v41) + (v45 * v45)));
+    const float v49 = (v41 / v48);
+    const float v56 = (v45 / v48);
+    const float v81 = lkr_root((k73 + v32), k80);
+    const float v88 = (((length_a * (k82 + (k83 * v31))) / v33) + 0.0f);
+    p->L_x = (v49 * k54);
+    p->L_y = (k2 + (v56 * k54));
+    p->angle_lever = lkr_angle((-v49), v56);
+    p->slide_slide = v81;
+    by_crank->L_x = (-((v88 * v56) * k54));
+    by_crank->L_y = ((v88 * v49) * k54);
+    by_crank->angle_lever = v88;
+    by_crank->slide_slide = ((-((((v7 * 0.5f) * v9) * 2.0f) * k30)) / (2.0f * v81));
     return 1;
 }
 
@@ -760,30 +759,24 @@ typedef lkr_memory lever_memory;
 static inline int lever_solutions_joints(const float *position,
     float (*q)[LKR_MAX_INPUTS])
 {
-    const float k26 = 0.70710677f;
-    const float k33 = 0.70710677f;
     const float x0 = position[0];
     /* A left */
     const float v3 = (0.5f * x0);
     const float v4 = sinf(v3);
-    const float v6 = cosf(v3);
-    const float v9 = (((2.0f * v4) * v6) * 0.081f);
+    const float v9 = (((2.0f * v4) * cosf(v3)) * 0.081f);
     const float v15 = ((1.0f - (2.0f * (v4 * v4))) * 0.081f);
     const float v18 = sqrtf(((v9 * v9) + (v15 * v15)));
     const float v19 = (v9 / v18);
-    const float v35 = ((-(v4 * k26)) + (v6 * k33));
-    const float v43 = ((v6 * k26) + (v4 * k33));
-    const float v48 = (lkr_root((-0.025f + (0.09f * (v35 * v35))), 5.7731595e-17f) *
-        lkr_root((-0.025f + (0.09f * (v43 * v43))), 5.7731595e-17f));
-    const float v49 = (v19 * v48);
-    const float v51 = (v15 / v18);
-    const float v53 = (v19 * 0.045f);
-    const float v54 = (v51 * v53);
-    const float v58 = (-(v19 * v53));
-    const float v59 = (v51 * v48);
-    q[0][0] = lkr_angle((-((-v49) - v54)), (v58 + v59));
+    const float v22 = (v19 * 0.045f);
+    const float v27 = lkr_root(((0.02f + v22) * (0.02f - v22)), 1.154632e-18f);
+    const float v28 = (v19 * v27);
+    const float v30 = (v15 / v18);
+    const float v31 = (v30 * v22);
+    const float v35 = (-(v19 * v22));
+    const float v36 = (v30 * v27);
+    q[0][0] = lkr_angle((-((-v28) - v31)), (v35 + v36));
     /* A right */
-    q[1][0] = lkr_angle((-(v49 - v54)), (v58 - v59));
+    q[1][0] = lkr_angle((-(v28 - v31)), (v35 - v36));
     return 2;
 }
 
@@ -823,30 +816,24 @@ static const lkr_model lever_model = {
 static inline int lever_solutions_angle_lever(const float *position,
     float (*q)[LKR_MAX_INPUTS])
 {
-    const float k26 = 0.70710677f;
-    const float k33 = 0.70710677f;
     const float x0 = position[0];
     /* A left */
     const float v3 = (0.5f * x0);
     const float v4 = sinf(v3);
-    const float v6 = cosf(v3);
-    const float v9 = (((2.0f * v4) * v6) * 0.081f);
+    const float v9 = (((2.0f * v4) * cosf(v3)) * 0.081f);
     const float v15 = ((1.0f - (2.0f * (v4 * v4))) * 0.081f);
     const float v18 = sqrtf(((v9 * v9) + (v15 * v15)));
     const float v19 = (v9 / v18);
-    const float v35 = ((-(v4 * k26)) + (v6 * k33));
-    const float v43 = ((v6 * k26) + (v4 * k33));
-    const float v48 = (lkr_root((-0.025f + (0.09f * (v35 * v35))), 5.7731595e-17f) *
-        lkr_root((-0.025f + (0.09f * (v43 * v43))), 5.7731595e-17f));
-    const float v49 = (v19 * v48);
-    const float v51 = (v15 / v18);
-    const float v53 = (v19 * 0.045f);
-    const float v54 = (v51 * v53);
-    const float v58 = (-(v19 * v53));
-    const float v59 = (v51 * v48);
-    q[0][0] = lkr_angle((-((-v49) - v54)), (v58 + v59));
+    const float v22 = (v19 * 0.045f);
+    const float v27 = lkr_root(((0.02f + v22) * (0.02f - v22)), 1.154632e-18f);
+    const float v28 = (v19 * v27);
+    const float v30 = (v15 / v18);
+    const float v31 = (v30 * v22);
+    const float v35 = (-(v19 * v22));
+    const float v36 = (v30 * v27);
+    q[0][0] = lkr_angle((-((-v28) - v31)), (v35 + v36));
     /* A right */
-    q[1][0] = lkr_angle((-(v49 - v54)), (v58 - v59));
+    q[1][0] = lkr_angle((-(v28 - v31)), (v35 - v36));
     return 2;
 }
 
