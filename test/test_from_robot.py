@@ -205,13 +205,14 @@ def test_bars_that_mirror_others_have_a_word_of_their_own(word, base):
 
 # What a dialect says of a loop: its kind, and in whose frame its place and axis are.
 SAID = {'joint of Gazebo': ('hinge', 'child'), 'universal joint of Gazebo': ('hinge', 'child'),
+        'ball_constraint of Drake': ('ball', ''), 'linear_bushing_rpy of Drake': ('ball', ''),
         'frames of onshape-to-robot': ('ball', ''), 'links of example-parallel-robots': (
             'ball', ''), 'joints of example-parallel-robots': ('ball', ''),
         'balls of Robonex': ('ball', ''), 'a rod that detaches': ('fixed', 'parent'),
         'closures of solidworks_urdf_exporter2': ('hinge', 'world')}
 
 
-@pytest.mark.parametrize('dialect', [*DIALECTS, 'frames with axes'])
+@pytest.mark.parametrize('dialect', [*DIALECTS, 'frames with axes', 'a stiff bushing'])
 def test_a_loop_is_where_a_dialect_says(tmp_path, dialect):
     # The ends stand apart, as the links of the file are turned at random.
     pytest.importorskip('yaml')
@@ -221,6 +222,8 @@ def test_a_loop_is_where_a_dialect_says(tmp_path, dialect):
     if dialect == 'frames with axes':
         inside += fixed('coupler', 'closing_w_1_z', [0.3, 0.0, 0.0] + 2.0 * tilted) + fixed(
             'rocker', 'closing_w_2_z', (0.0, 2.0, 0.2))
+    if dialect == 'a stiff bushing':
+        inside = DIALECTS['linear_bushing_rpy of Drake'][0].replace('1e4 0 1e4', '1e4 1 1e4')
     (one, on_one), (two, on_two) = euler(rng), euler(rng)
     text = CUT.sub(inside, (ROBOTS / 'four_bar.urdf').read_text())
     for old, angles in (('"0 0 0.2"/><axis xyz="0 1 0"/>\n', one), ('"0.3 0 0"/><axis', two)):
@@ -234,7 +237,7 @@ def test_a_loop_is_where_a_dialect_says(tmp_path, dialect):
     cut = [joint for joint in robot.joints if joint.name not in tree and joint.kind != 'fixed'
            or '=' in joint.name][0]
     kind, where = SAID.get(dialect, ('hinge', ''))
-    kind = 'hinge' if dialect == 'frames with axes' else kind
+    kind = {'frames with axes': 'hinge', 'a stiff bushing': 'fixed'}.get(dialect, kind)
     assert cut.kind == kind and cut.bodies[0] in ('coupler', 'wrist_a', 'closing_w_1')
     ends = {'': (np.array([0.0, 0.0, 0.2]) + on_one @ [0.3, 0.0, 0.0],
                  np.array([0.3, 0.0, 0.0]) + on_two @ [0.0, 0.0, 0.2])}

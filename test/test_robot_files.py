@@ -656,6 +656,16 @@ DIALECTS = {
         '<gazebo><joint name="w" type="universal"><parent>coupler</parent><child>rocker</child>'
         '<pose>0 0 0.2 0 0 0</pose><axis><xyz>0 1 0</xyz></axis><axis2><xyz>1 0 0</xyz></axis2>'
         '</joint></gazebo>', ''),
+    'ball_constraint of Drake': (
+        '<drake:ball_constraint><drake:ball_constraint_body_A name="coupler"/>'
+        '<drake:ball_constraint_body_B name="rocker"/><drake:ball_constraint_p_AP '
+        'value="0.3 0 0"/><drake:ball_constraint_p_BQ value="0 0 0.2"/></drake:ball_constraint>',
+        ''),
+    'linear_bushing_rpy of Drake': (
+        '<frame name="f" link="coupler" xyz="0.3 0 0" rpy="0 0 0"/>'
+        '<frame name="g" link="rocker" xyz="0 0 0.2" rpy="0 0 0"/><drake:linear_bushing_rpy>'
+        '<drake:bushing_frameA name="f"/><drake:bushing_frameC name="g"/>'
+        '<drake:bushing_torque_stiffness value="1e4 0 1e4"/></drake:linear_bushing_rpy>', ''),
     'frames of onshape-to-robot': (LINKS, ''),
     'links of example-parallel-robots': (
         '', '{closed_loop: [[wrist_a, wrist_b]], type: [3d], name_mot: [motor]}'),
@@ -676,6 +686,18 @@ DIALECTS = {
         '<child_link>pin</child_link></plugin></gazebo><link name="pin"/><joint name="pin_joint" '
         'type="continuous"><parent link="rocker"/><child link="pin"/><origin xyz="0 0 0.2"/>'
         '<axis xyz="0 1 0"/></joint>', '')}
+
+
+def test_world_of_drake_is_no_second_root(imported, tmp_path):
+    plain, = imported('four_bar.urdf').values()
+    file = written(tmp_path, 'four_bar.urdf', ('<link name="base_link"/>',
+                                               '<link name="world"/><link name="base_link"/>'))
+    machine, = imported(file).values()
+    assert machine.values == plain.values and machine.frame_id == 'base_link'
+    more = written(tmp_path, 'four_bar.urdf', ('<link name="base_link"/>',
+                                               '<link name="earth"/><link name="base_link"/>'))
+    with pytest.raises(readers.RequestError, match='a URDF has one root link, not 2'):
+        readers.read(str(more))
 
 
 def rotation(angles):

@@ -4,9 +4,9 @@
 """
 Robots in URDF, with the ways in which tools write the loops that it has no word for.
 
-Sources: https://wiki.ros.org/urdf/XML; RigidBodyDynamics.jl and Isaac Sim (`loop_joint`); URDF+ of
-generalized_rbda (`loop`); Gazebo's tutorial on kinematic loops (`gazebo`); onshape-to-robot's
-documentation (`closing_`); example-parallel-robots (`closed_loop`);
+Sources: https://wiki.ros.org/urdf/XML; RigidBodyDynamics.jl, Isaac Sim and Drake (`loop_joint`,
+`drake:`); URDF+ of generalized_rbda (`loop`); Gazebo's tutorial on kinematic loops (`gazebo`);
+onshape-to-robot's documentation (`closing_`); example-parallel-robots (`closed_loop`);
 solidworks_urdf_exporter2 (`closures`); Robonex (`pin_loops`, `ball_loops`).
 """
 
@@ -35,7 +35,10 @@ def read(root: Element) -> Robot:
     links = once((link.get('name', ''), link) for link in root.findall('link'))
     joints = once((attribute(joint, 'child', 'link'), joint) for joint in root.findall('joint'))
     bases = {child: attribute(joint, 'parent', 'link') for child, joint in joints.items()}
-    roots = [link for link in links if link not in joints]
+    # Drake's ground needs no link, and a link of its name no joint.
+    grounds = {'world'}.intersection(bases.values())
+    roots = [link for link in {**links, **dict.fromkeys(grounds)}
+             if link not in joints and (link != 'world' or grounds)]
     if len(roots) != 1:
         raise RequestError(f'a URDF has one root link, not {len(roots)}')
     robot = Robot(roots[0], {roots[0]: np.eye(4)})
@@ -51,7 +54,10 @@ def read(root: Element) -> Robot:
         if mimic is not None:
             ratio, start = numbers(f'{mimic.get("multiplier", 1)} {mimic.get("offset", 0)}', 2)
             robot.follow(name, mimic.get('joint', ''), ratio, start)
+    if 'world' in links and 'world' not in robot.frames:
+        robot.hang('world', roots[0], [0.0] * 6)
     _close_by_elements(robot, root)
+    _close_by_drake(robot, root)
     _close_by_frames(robot)
     _join_by_gazebo(robot, root)
     robot.driven = [joint.get('name', '') for joint in (
@@ -82,6 +88,21 @@ def _close_by_elements(robot: Robot, root: Element) -> None:
                         (parts[0].attrib['link'], parts[1].attrib['link']),
                         [origin(part if part.find('origin') is None else part.find('origin'))
                          for part in parts], numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
+
+
+def _close_by_drake(robot: Robot, root: Element) -> None:
+    for cut in root.findall('ball_constraint'):
+        ends = [attribute(cut, f'ball_constraint_body_{end}', 'name') for end in 'AB']
+        robot.close('='.join(ends), BALL, (ends[0], ends[1]), [
+            at(numbers(attribute(cut, f'ball_constraint_p_{end}', 'value', '0 0 0')))
+            for end in ('AP', 'BQ')])
+    frames = {frame.get('name', ''): (frame.get('link', ''), origin(frame))
+              for frame in root.findall('frame')}
+    for cut in root.findall('linear_bushing_rpy'):
+        ends = [attribute(cut, f'bushing_frame{end}', 'name') for end in 'AC']
+        (link, place), (other, there) = (frames.get(end, (end, np.eye(4))) for end in ends)
+        stiff = numbers(attribute(cut, 'bushing_torque_stiffness', 'value', '0 0 0'))
+        robot.close('='.join(ends), FIXED if stiff.all() else BALL, (link, other), [place, there])
 
 
 def _close_by_frames(robot: Robot) -> None:
