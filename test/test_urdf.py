@@ -211,6 +211,16 @@ def test_the_points_that_are_drawn_as_markers_make_no_difference():
     assert description(machine('jansen', points=['G'])) == description(machine('jansen'))
 
 
+@pytest.mark.parametrize('given, named', [
+    ({'leg.leg_pairs': 2, 'leg_left0.only_named': True}, 'leg.joints.* two links leg_left0_O$'),
+    ({'leg.joint_names': ['BC=leg_O_fixed']}, 'leg.joints.* two joints leg_O_fixed$')])
+def test_names_that_meet_are_refused(given, named):
+    machines = scene.read({'mechanisms': ['leg', 'leg_left0'], 'leg.type': 'jansen',
+                           'leg_left0.type': 'jansen', **given}).machines
+    with pytest.raises(scene.SceneError, match=named):
+        urdf.describe(machines.values(), 'world')
+
+
 ARM = {'mechanisms': ['hand', 'arm'], 'arm.type': 'four_bar', 'hand.type': 'four_bar',
        'arm.pose': POSE, 'hand.pose': [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]}
 

@@ -109,8 +109,7 @@ def robot(machines: Iterable[SceneMechanism], frame_id: str,
     Raises
     ------
     SceneError
-        If two links of a mechanism would have the same name, the links would not form a tree, or
-        the longest bar is out of range.
+        If the links would not form a tree, or the longest bar is out of range.
 
     """
     models = []
@@ -138,17 +137,27 @@ def together(models: Sequence[Model]) -> Model:
     if more or root in below:
         raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
                          f'link of another one of them, not {listed(tops, 120)}')
+    roots = [part.robot.root for part in parts]
+    joints = [joint for part in parts for joint in part.robot.joints]
+    for tag, names in (('link', [root, *roots, *(joint.bodies[1] for joint in joints)]),
+                       ('joint', [*map('{}_fixed'.format, roots),
+                                  *(joint.name for joint in joints)])):
+        (name, count), = Counter(names).most_common(1)
+        if count > 1:
+            raise SceneError(f'{listed(f"{model.name}.joints" for model in models)} must have '
+                             f'other names: the robot model would have two {tag}s {name}')
     return Model('linkages' if len(models) > 1 else models[0].name, root,
                  sorted(parts, key=lambda part: len(lines[part.base])))
 
 
 def size(machine: SceneMechanism) -> float:
-    """Return the length of the longest bar [m]; raise SceneError if it is out of range."""
-    length = machine.scale * float(machine.linkage.longest)
+    """Return the length of the longest bar [m]; raise SceneError if it or a place is too far."""
+    name, length = machine.name, machine.scale * float(machine.linkage.longest)
     if not SMALLEST <= length <= LARGEST:
-        raise SceneError(
-            f'{machine.name}.scale and {machine.name}.dimensions must make the longest bar from '
-            f'{SMALLEST:g} to {LARGEST:g} m long, not {length:g}')
+        raise SceneError(f'{name}.scale and {name}.dimensions must make the longest bar from '
+                         f'{SMALLEST:g} to {LARGEST:g} m long, not {length:g}')
+    if max(map(abs, machine.pose)) > LARGEST:
+        raise SceneError(f'{name}.pose must be within {LARGEST:g} m, not {machine.pose}')
     return length
 
 
@@ -178,11 +187,6 @@ class _Tree:
             self.robot.pieces[self._body('', self._shared.name)] = [self._ball]
         for prefix, leg in legs.items():
             self._add_leg(prefix, leg)
-        names = Counter([ground, *(joint.bodies[1] for joint in self.robot.joints)])
-        (name, count), = names.most_common(1)
-        if count > 1:
-            raise SceneError(f'{machine.name}.joints must have other names: the robot model would '
-                             f'have two links {name}')
 
     def _add_leg(self, prefix: str, leg: Leg) -> None:
         robot, ends = self.robot, Counter[str]()
