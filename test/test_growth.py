@@ -28,14 +28,14 @@ def linkages(a):
 
 def test_equal_linkages_are_one_and_their_reach_and_travels_are_found_once(monkeypatch):
     found = []
-    for module, name in ((reach, 'arcs'), (bodies, 'extremes')):
+    for module, name in ((reach, '_reach'), (bodies, 'extremes')):
         find = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *args, name=name, find=find: (
             found.append(name) or find(*args)))
     first, *others = linkages(38.0625)
     assert all(other is first for other in others)
     travels = [bodies.travels(one, one.reach()) for one in (first, *others)]
-    assert found == ['arcs', 'extremes'] and travels[0] == travels[2]
+    assert found == ['_reach', 'extremes'] and travels[0] == travels[2]
     assert linkages(38.125)[0] is not first
 
 
