@@ -398,8 +398,13 @@ LONG = 'm.scale and m.dimensions must make the longest bar from 1e-30 to 1e+30 m
     ({'m.type': 'custom', 'm.joints': [line.format('0.9e30') for line in YOKE]}, ''),
     ({'m.type': 'custom', 'm.joints': [line.format('1.1e30') for line in YOKE]},
      LONG.format('1.1e+30')),
+    ({'m.pose': [0.0, -1.1e30, 0.0, 0.0, 0.0, 0.0]},
+     'm.pose must be within 1e+30 m, not (0.0, -1.1e+30, 0.0, 0.0, 0.0, 0.0)'),
     ({'m.scale': 0.99e30 / 120.0}, ''), ({'m.scale': 1.01e30 / 120.0}, LONG.format('1.01e+30')),
     ({'m.scale': 1.01e-30 / 120.0}, ''), ({'m.scale': 0.99e-30 / 120.0}, LONG.format('9.9e-31')),
+    ({'m.type': 'custom', 'm.joints': [
+        'O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'crank_link dyad A Q 3 3 left']},
+     'm.joints must have other names: the robot model would have two links m_crank_link'),
     ({'frame_id': 'm_crank_link'},
      'frame_id must be the same for all mechanisms of one robot model, or a link of another one '
      'of them, not m_crank_link')])

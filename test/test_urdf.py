@@ -63,7 +63,7 @@ MACHINES = {
     'boom and arm': lambda: machine('custom', BOOM, scale=2.0),
     'five-bar with a gear': lambda: machine(
         'custom', GEARED, scale=1.0, crank2__sweep=[-6.0, 1.0],
-        joint_names=['crank2=-m_crank2+1.0', 'crank3=m_crank3-0.4']),
+        joint_names=['crank2=-m_crank2+1.0', 'crank3=-m_crank3-0.4']),
 }
 OWN = {name: lambda case=case, pairs=2 if name == 'Cardan gears' else 1: machine(
     'custom', case.joints, leg_pairs=pairs,
@@ -209,6 +209,16 @@ def test_the_model_is_valid():
 
 def test_the_points_that_are_drawn_as_markers_make_no_difference():
     assert description(machine('jansen', points=['G'])) == description(machine('jansen'))
+
+
+@pytest.mark.parametrize('given, named', [
+    ({'leg.leg_pairs': 2, 'leg_left0.only_named': True}, 'leg.joints.* two links leg_left0_O$'),
+    ({'leg.joint_names': ['BC=leg_O_fixed']}, 'leg.joints.* two joints leg_O_fixed$')])
+def test_names_that_meet_are_refused(given, named):
+    machines = scene.read({'mechanisms': ['leg', 'leg_left0'], 'leg.type': 'jansen',
+                           'leg_left0.type': 'jansen', **given}).machines
+    with pytest.raises(scene.SceneError, match=named):
+        urdf.describe(machines.values(), 'world')
 
 
 ARM = {'mechanisms': ['hand', 'arm'], 'arm.type': 'four_bar', 'hand.type': 'four_bar',

@@ -173,9 +173,12 @@ class _Tree:
         self._machine, legs = machine, machine.assembly().legs
         self._shapes = shapes.shapes(machine)
         self._frames = {GROUND: shapes.ground_frame(machine.linkage), **machine.linkage.frames}
-        self._travels = {**_input_travels(machine), **{
+        self._travels = {
             name: (machine.scale_of(name) * low, machine.scale_of(name) * high)
-            for name, (low, high) in travels(machine.linkage, machine.reach).items()}}
+            for name, (low, high) in travels(machine.linkage, machine.reach).items()}
+        # The crank of several legs is limited by all of them.
+        if len(legs) == 1:
+            self._travels.update(_input_travels(machine))
         ground = self._body('', GROUND)
         self.robot = Robot(ground, {ground: np.eye(4)}, pieces={ground: []})
         self._shared = machine.linkage.links[0] if len(legs) > 1 else None
@@ -259,8 +262,6 @@ class _Tree:
 def _input_travels(machine: SceneMechanism) -> Dict[str, Arc]:
     """Return the outermost ends of each input's reach that is no full rotation."""
     ends: Dict[str, Arc] = {}
-    if machine.first.input.turns and len(machine.assembly().legs) > 1:
-        return ends
     for name, settings in machine.inputs.items():
         arcs, sweep = settings.reach, settings.sweep
         if not settings.input.is_whole(arcs):
