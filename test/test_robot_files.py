@@ -263,6 +263,15 @@ def compared(robot, given, **ends):
     return ' '.join([*reports, *wrong.values()])
 
 
+def test_a_source_of_several_mechanisms_is_checked_where_all_of_them_move():
+    robot = closing.closed(readers.read(str(ROBOTS / 'four_bar.urdf'))).robot
+    machines = scene.read(command.described(robot)[0]).machines
+    (report,), wrong = check.compared(robot, machines, [
+        check.Imported('motor', {}, [], ['motor'], {'motor': ends})
+        for ends in ((-1.0, 0.5), (-0.5, 1.0))])
+    assert not wrong and 'motor from -0.5 to 0.5, ' in report
+
+
 def checked(text):
     """Return in how many poses each mechanism was checked, and how far loops are open [m]."""
     return [(int(count), float(worst)) for count, worst in re.findall(

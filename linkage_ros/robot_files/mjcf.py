@@ -9,6 +9,7 @@ import re
 from typing import Any
 
 import mujoco
+from mujoco import MjSpec
 import numpy as np
 
 from .elements import turned_by
@@ -64,7 +65,7 @@ def _compiled(path: str) -> Any:
     # Warnings, which MuJoCo writes to a file, concern dynamics.
     mujoco.set_mju_user_warning(lambda text: None)
     try:
-        spec = mujoco.MjSpec.from_file(path)
+        spec = MjSpec.from_file(path)
     except ValueError as error:
         for pattern, why in _ERRORS:
             if found := re.search(pattern, str(error)):

@@ -51,9 +51,7 @@ class Rods:
         self.links: Dict[str, Joint] = {}
         self._ends: Dict[str, str] = {}
         self.rods: List[str] = []
-        # The joint that drives each input, and the input's value in the pose of the robot.
-        self.inputs: Dict[str, Joint] = {}
-        self.zeros: Dict[str, float] = {}
+        self.drives: List[check.Source] = []
         # Hinges of universal joints, whose limits do not count, and third hinges, which stay.
         self.universals: Set[str] = set()
         self.still: List[str] = []
@@ -106,7 +104,7 @@ class Rods:
         if joint.name in self._driven:
             if joint.kind != HINGE:
                 raise ValueError(f'{joint.name} drives, and is no hinge and no cylinder')
-            self.inputs[name], self.zeros[name] = joint, 0.0
+            self.drives.append(check.Source(name, joint.name, 1.0, 0.0 - joint.start, 0.0))
 
     def _end(self, joint: Joint, body: str) -> str:
         """Return the other end of a ball of a rod: its link and place."""
@@ -162,20 +160,21 @@ class Rods:
         name = self._named(half)
         self.rods.append(f'{name} cylinder ' + ' '.join(
             self._end(ball, body) for ball, body in zip(balls, half.bodies)))
-        self.inputs[name], self.zeros[name] = half, float(np.linalg.norm(way))
+        length = float(np.linalg.norm(way))
+        self.drives.append(check.Source(name, half.name, 1.0, length - half.start, length))
 
     def lines(self, limits: Mapping[str, Tuple[float, float]] = {}) -> List[str]:
         """Return the lines, with limits for some other than the file's."""
-        lines = []
+        lines, motors = [], {drive.name for drive in self.drives}
         for name, joint in self.links.items():
             within = ''
-            if name not in {*self.inputs, *self.universals}:
+            if name not in motors | self.universals:
                 # Relative to the pose of the robot.
                 low, high = limits.get(name) or (end - joint.start for end in joint.range)
                 widest = math.inf if joint.kind == SLIDE else _ANY
                 if -widest < low < high < widest:
                     within = f' within {short(low)} {short(high)}'
-            word = 'motor' if name in self.inputs else joint.kind
+            word = 'motor' if name in motors else joint.kind
             lines.append(f'{name} {word} {self._ends[name]}{within}')
         return lines + self.rods
 
@@ -188,9 +187,10 @@ def _on_bodies(joints: Sequence[Joint]) -> Dict[str, List[Joint]]:
 def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> check.Imported:
     """Return a mechanism; raise ValueError for loops that rods cannot be."""
     made = Rods(robot, group)
-    if not made.inputs:
+    if not made.drives:
         raise NotDriven('not driven: its motors must be named by --driven')
-    limits, reports = robot.limits(made.inputs.values())
+    sources = [drive.source for drive in made.drives]
+    limits, reports = robot.limits(joint for joint in robot.joints if joint.name in sources)
     lines = made.lines()
     try:
         mechanisms.create('rods', joints=lines)
@@ -208,14 +208,12 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
         low, high = joint.range
         why = joint.no_limits or f'from {low:.4g} to {high:.4g}: it has no end there' * bool(
             joint.limits and math.isinf(high - low))
-        if why and link not in {*made.inputs, *made.universals}:
+        if why and joint.name not in sources and link not in made.universals:
             reports.append(f'Left out: the limits of {joint.name}, {why}.')
-    name = check.name_beside(others, f'{next(iter(made.inputs))}_rods')
-    drives = [check.Source(link, joint.name, 1.0, made.zeros[link] - joint.start, made.zeros[link])
-              for link, joint in made.inputs.items()]
-    parameters = check.parameters(name, 'rods', lines, group.ground, drives, [
+    name = check.name_beside(others, f'{made.drives[0].name}_rods')
+    parameters = check.parameters(name, 'rods', lines, group.ground, made.drives, [
         (link, 1.0, joint.name, joint.start) for link, joint in made.links.items()
-        if link not in made.inputs and joint.position is not None])
+        if joint.name not in sources and joint.position is not None])
     machine = scene.read({'mechanisms': [name], **parameters}).machines[name]
     ends = {}
     for drive, (low, high) in zip(machine.inputs.values(), _sweeps(machine, limits)):
