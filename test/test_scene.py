@@ -151,7 +151,8 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'leg.type': 'jansen'}, r'leg.type is not a parameter .* mechanisms, .* jansen\.\*'),
     ({'jansen.branches.C': 2}, 'jansen.branches.C must be .* -1 to 1, not 2'),
     ({'jansen.branches.C': 1.0}, 'jansen.branches.C must be a whole number'),
-    ({'jansen.leg_pairs': 0}, 'jansen.leg_pairs must be a whole number from 1'),
+    ({'jansen.leg_pairs': 0}, 'jansen.leg_pairs must be a whole number from 1 to 50,'),
+    ({'jansen.crank.start': 13.0}, 'jansen.crank.start must be .* from -12.5664 to 12.5664,'),
     ({'water_drop.leg_pairs': 2}, 'water_drop.leg_pairs must be 1 and mirrored false: only'),
     ({'water_drop.mirrored': True}, 'water_drop.leg_pairs must be 1 and mirrored false: only'),
     ({'jansen.points': ['G', 'Z']}, 'jansen.points must be .* some of O, .* G'),
@@ -244,16 +245,10 @@ def test_a_whole_number_is_taken_for_the_number_that_it_is():
 def test_only_mechanisms_that_are_given_something_else_are_read_again():
     given = {'jansen.dimensions.m': 15.0, 'peaucellier.scale': 0.1}
     before = scene.read(given)
-    after = scene.read({**given, 'jansen.dimensions.m': 14.9}, before).machines
+    after = scene.changed(before, {'jansen.dimensions.m': 14.9, 'peaucellier.scale': 0.1}).machines
     assert {name for name in after if after[name] is not before.machines[name]} == {'jansen'}
-    assert [p.name for p in scene.read({**given, 'rate': 9.0}, before).changed_from(before)] == [
+    assert [p.name for p in scene.changed(before, {'rate': 9.0}).changed_from(before)] == [
         'rate']
-
-
-def test_a_value_of_another_type_that_counts_as_equal_is_read():
-    before = scene.read({'jansen.scale': 1.0})
-    with pytest.raises(scene.SceneError, match='jansen.scale must be'):
-        scene.read({'jansen.scale': True}, before)
 
 
 @pytest.mark.parametrize('given, start', [
@@ -375,7 +370,7 @@ def test_nearly_all_of_a_sliders_travel_keeps_a_crank_turning(given, stops):
         assert high - low > 1e-3 * abs(value), name
         for moved in np.linspace(low, high, stops + 2)[1:-1]:
             try:
-                after = scene.read({**given, name: float(moved)}, made)
+                after = scene.changed(made, {name: float(moved)})
             except scene.SceneError:
                 fits.append(False)
                 continue

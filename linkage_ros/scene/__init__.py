@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import re
-from typing import Any, Iterable, Mapping, Optional
+from typing import Any, Iterable, Mapping
 
 from .input_settings import FARTHEST, in_words, InputSettings
 from .joint_names import check_distinct
@@ -102,26 +102,20 @@ def load(path: str) -> Scene:
     scene = read({name: value for node in (*ALL, OWNER) for name, value in values[node].items()})
     return read({parameter.name: values[parameter.field.owner][parameter.name]
                  for parameter in scene.parameters
-                 if parameter.name in values[parameter.field.owner]}, scene)
+                 if parameter.name in values[parameter.field.owner]})
 
 
-def read(values: Mapping[str, Any], before: Optional[Scene] = None) -> Scene:
+def read(values: Mapping[str, Any]) -> Scene:
     """
-    Read a scene from parameter values; raise SceneError if one is unknown or not allowed.
+    Read a scene from values by full parameter name.
 
-    Parameters
-    ----------
-    values : mapping
-        Values by full parameter name.
-    before : Scene, optional
-        The previous scene, whose mechanisms are reused if their values are unchanged.
-
+    Raises SceneError if one is unknown or not allowed.
     """
     parts = _by_mechanism(values)
     if 'mechanisms' not in parts.get('', {}):
         for name, scale in mechanisms.CATALOGUE.items():
             parts[name] = {f'{name}.scale': scale, **parts.get(name, {})}
-    return _read(parts, before)
+    return _read(parts, {})
 
 
 def changed(before: Scene, values: Mapping[str, Any]) -> Scene:
@@ -138,15 +132,14 @@ def changed(before: Scene, values: Mapping[str, Any]) -> Scene:
         present = _values(mechanism.parameters) if mechanism else parts.get(name, {})
         if not part.items() <= present.items():
             parts[name] = {**present, **part}
-    return _read(parts, before)
+    return _read(parts, before.machines)
 
 
-def _read(parts: Mapping[str, Mapping[str, Any]], before: Optional[Scene]) -> Scene:
+def _read(parts: Mapping[str, Mapping[str, Any]], known: Mapping[str, SceneMechanism]) -> Scene:
     values = Values(parts.get('', {}))
     names, frame_id, frame_prefix, rate = (values.take(name, field) for name, field in (
         ('mechanisms', MECHANISMS), ('frame_id', FRAME_ID), ('frame_prefix', FRAME_PREFIX),
         ('rate', RATE)))
-    known = before.machines if before else {}
     machines = {name: read_mechanism(name, parts.get(name, {}), known.get(name))
                 for name in names}
     joints = {name: mechanism.joints for name, mechanism in machines.items()}

@@ -110,11 +110,6 @@ class SceneMechanism:
     values: Mapping[str, Any] = some(compare=False, repr=False)
     parameters: tuple[Parameter, ...] = some(compare=False, repr=False)
 
-    def is_from(self, values: Mapping[str, Any]) -> bool:
-        """Return whether it was read from the same objects, and so is unchanged."""
-        return self.values is values or self.values.keys() == values.keys() and all(
-            self.values[key] is value for key, value in values.items())
-
     @property
     def in_space(self) -> bool:
         """Whether the linkage is spatial; only planar ones have pictures and robot models."""
@@ -215,8 +210,8 @@ def divided(values: Sequence[Any], units: Sequence[float]) -> list[Any]:
 
 def read_mechanism(name: str, entries: Mapping[str, Any], old: Optional[SceneMechanism]
                    ) -> SceneMechanism:
-    """Read a mechanism from its values, or return `old` if they are unchanged."""
-    if old and old.is_from(entries):
+    """Read a mechanism from its values, or return `old` if it was read from them."""
+    if old and old.values is entries:
         return old
     values = Values(entries, f'{name}.')
     take = values.take

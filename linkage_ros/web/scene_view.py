@@ -368,8 +368,8 @@ class SceneView:
         nodes = {parameter.name: node for node in (*self._announced, owner)
                  if node in self._graph and _space(node) == _space(owner)
                  for parameter in before.parameters if parameter.name in self._announced[node]}
-        whole = self._scenes[owner] = scene.read(
-            {name: self._announced[node][name] for name, node in nodes.items()}, before)
+        whole = self._scenes[owner] = scene.changed(
+            before, {name: self._announced[node][name] for name, node in nodes.items()})
         self._speeds[owner].update(
             (parameter.name, parameter.value) for parameter in whole.parameters
             if parameter.field.group == 'speeds' and parameter.value)
