@@ -308,15 +308,19 @@ def by_name(numbers, state):
     return dict(zip(state.name, numbers, strict=True))
 
 
-def test_a_joint_with_a_zero_of_its_own_is_within_half_a_turn_of_it(graph):
+def test_a_joint_is_within_half_a_turn_of_its_zero_and_turns_by_its_sign(graph):
     graph.start(Kinematics, {**KNEE, 'left.joint_names': ['QB=-left_ankle+7', 'crank=motor+9']})
     states, turn = graph.listen(JointState, 'left/joint_states'), graph.crank(['left_knee_motor'])
     linkage = mechanisms.create('four_bar')
     for theta in (0.4, 3.0, 5.0):
-        at = by_name((state := turn([theta], states)).position, state)
-        angle = float(linkage.joint_angles(theta)['QB'])
-        assert at == {'left_ankle': pytest.approx(math.remainder(7.0 - angle, math.tau)),
-                      'motor': theta + 9.0}
+        state = turn([theta], states, [2.0])
+        angle, rate = (float(numbers(theta)['QB']) for numbers in (
+            linkage.joint_angles, linkage.joint_rates))
+        assert by_name(state.velocity, state) == pytest.approx(
+            {'left_ankle': -2.0 * rate, 'motor': 2.0})
+        assert by_name(state.position, state) == {
+            'left_ankle': pytest.approx(math.remainder(7.0 - angle, math.tau)),
+            'motor': theta + 9.0}
 
 
 def test_what_the_inputs_hold_against_loads_is_their_effort(graph):
