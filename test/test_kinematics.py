@@ -16,7 +16,6 @@ from linkage_ros import mechanisms, palette, scene  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from ros_harness import Graph  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
@@ -188,14 +187,7 @@ def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, g
         assert len(marker.colors) == (len(marker.points) // 3 if marker.id > 6 else 0)
 
 
-@pytest.fixture(scope='module')
-def shared():
-    """Return a graph and a bench that no test changes."""
-    with Graph() as graph:
-        yield graph, Bench(graph, 'jansen')
-
-
-@pytest.mark.parametrize('values, reason', [
+REFUSED = [
     ({'jansen.dimensions.m': -1.0}, 'jansen.dimensions.m must be .* above 0'),
     ({'jansen.dimensions.m': True}, 'jansen.dimensions.m must be'),
     ({'jansen.dimensions.m': 'long'}, "jansen.dimensions.m must be .* not 'long'"),
@@ -207,14 +199,15 @@ def shared():
     ({'jansen.leg_pairs': 0}, 'jansen.leg_pairs must be .* from 1 to 50'),
     ({'jansen.scale': 0.0}, 'jansen.scale must be .* above 0'),
     ({'water_drop.leg_pairs': 2}, 'read-only.* water_drop.leg_pairs'),
-    ({'jansen.type': 'water_drop'}, 'read-only.* jansen.type'),
-])
-def test_a_bad_value_is_refused_with_a_reason_and_the_node_runs_on(shared, values, reason):
-    graph, bench = shared
+    ({'jansen.type': 'water_drop'}, 'read-only.* jansen.type')]
+
+
+def test_a_bad_value_is_refused_with_a_reason_and_the_node_runs_on(graph):
+    bench = Bench(graph, 'jansen')
     before = bench.legs_at(0.3)[0]
-    refused = graph.set(bench.node, **values)
-    assert not refused.successful
-    assert re.search(reason, refused.reason)
+    for values, reason in REFUSED:
+        refused = graph.set(bench.node, **values)
+        assert not refused.successful and re.search(reason, refused.reason)
     after = bench.legs_at(0.3)[0]
     assert all((before[name] == after[name]).all() for name in before)
 
@@ -306,6 +299,21 @@ SHARED = ['--ros-args', '-r', 'crank_states:=joint_states']
 
 def by_name(numbers, state):
     return dict(zip(state.name, numbers, strict=True))
+
+
+def test_a_joint_is_within_half_a_turn_of_its_zero_and_turns_by_its_sign(graph):
+    graph.start(Kinematics, {**KNEE, 'left.joint_names': ['QB=-left_ankle+7', 'crank=motor+9']})
+    states, turn = graph.listen(JointState, 'left/joint_states'), graph.crank(['left_knee_motor'])
+    linkage = mechanisms.create('four_bar')
+    for theta in (0.4, 3.0, 5.0):
+        state = turn([theta], states, [2.0])
+        angle, rate = (float(numbers(theta)['QB']) for numbers in (
+            linkage.joint_angles, linkage.joint_rates))
+        assert by_name(state.velocity, state) == pytest.approx(
+            {'left_ankle': -2.0 * rate, 'motor': 2.0})
+        assert by_name(state.position, state) == {
+            'left_ankle': pytest.approx(math.remainder(7.0 - angle, math.tau)),
+            'motor': theta + 9.0}
 
 
 def test_what_the_inputs_hold_against_loads_is_their_effort(graph):

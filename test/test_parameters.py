@@ -310,6 +310,17 @@ def test_of_a_hundred_changes_each_is_answered_and_the_newest_prepared(graph):
     assert node.adopted[-1][1] == 101.0 and len(node.begun) == begun + 1
 
 
+def test_a_changed_scene_is_prepared_before_what_else_is_queued(graph):
+    node = graph.start(Slow, LEG)
+    client, begun = Client(graph, node), []
+    held_up(graph, client)
+    node.worker.queue('a locus', lambda: begun.append(len(node.begun)))
+    assert client.set(('leg.scale', 2.0))[0].successful
+    node.free.set()
+    graph.until(lambda: begun)
+    assert begun == [len(node.begun)] and node.begun[-1].machines['leg'].scale == 2.0
+
+
 def test_a_set_among_a_thousand_mechanisms_costs_what_it_changes():
     names = [f'leg{i}' for i in range(1000)]
     given = {'mechanisms': names, **{f'{name}.type': 'jansen' for name in names}}

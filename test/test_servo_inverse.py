@@ -280,13 +280,6 @@ def test_what_would_cost_an_answer_its_digits_is_refused(graph, bad):
         graph.start(ServoInverse, {**SWEPT, **bad})
 
 
-def test_a_sweep_changes_while_the_node_runs(graph):
-    node = graph.start(ServoInverse, {'mechanisms': ['slotted_lever']})
-    assert ask(node, [0.5]).success
-    graph.change(node, {'mechanisms': ['slotted_lever']}, slotted_lever__crank__sweep=(-1.3, 0.8))
-    assert not ask(node, [0.5]).success
-
-
 def test_an_answer_that_others_would_wait_for_is_refused(graph):
     response = ask(graph.start(ServoInverse), [0.1] * 10_001)
     assert not response.success
