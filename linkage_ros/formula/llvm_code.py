@@ -106,15 +106,16 @@ class Loop:
         self._engine = compiled(_module(self.kind, operations, constants, outputs))
         self.run = SIGNATURE(self._engine.get_function_address('poses'))
 
-    @staticmethod
-    def arguments(given: Sequence[np.ndarray], constants: np.ndarray, out: np.ndarray) -> tuple:
+    def bound(self, given: Sequence[np.ndarray], constants: np.ndarray, out: np.ndarray
+              ) -> Callable:
         """
-        Return the arguments of `run` after the first two, valid as long as the arrays live.
+        Return the function that solves from a first pose to another, as long as the arrays live.
 
         `given` are arrays (poses,); the results are written to `out` (outputs, poses).
         """
         places = (ctypes.c_int64 * len(given))(*map(_address, given))
-        return given[0].size, places, _address(constants), _address(out)
+        rest = given[0].size, places, _address(constants), _address(out)
+        return lambda first, last: self.run(first, last, *rest)
 
 
 class Arrays(Loop):
@@ -138,7 +139,7 @@ class Arrays(Loop):
 
         def solve_from(first: int) -> None:
             # These references keep the arrays alive while threads use them.
-            self.run(first, min(first + share, size), *self.arguments(given, constants, out))
+            self.bound(given, constants, out)(first, min(first + share, size))
 
         others = [_threads(os.getpid(), cores).submit(solve_from, first)
                   for first in range(share, size, share)]

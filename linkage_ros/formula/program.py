@@ -299,7 +299,7 @@ class Batch:
     def __init__(self, loop: Future, constants: np.ndarray, arguments: int, rows: np.ndarray):
         self.arguments = np.zeros((arguments, len(rows)))
         self._loop: Optional[Future] = loop
-        self._code: Any = None
+        self._run: Optional[Callable] = None
         self._constants, self._rows = constants, rows
         self._solved = np.empty(rows.shape[::-1])
 
@@ -310,20 +310,15 @@ class Batch:
         `shared` are the values of the first arguments if all poses have the same.
         """
         if self._loop and self._loop.done():
-            self._adopt(self._loop)
-        if self._code is None:
+            loop, self._loop = self._loop, None
+            if error := loop.exception():
+                warnings.warn(f'no machine code, plain Python is used: {error}', stacklevel=3)
+                return False
+            self._run = loop.result().bound(self.arguments, self._constants, self._solved)
+        if self._run is None:
             return False
         for row, value in zip(self.arguments, shared):
             row.fill(value)
-        self._code.run(0, len(self._rows), *self._code_arguments)
+        self._run(0, len(self._rows))
         self._rows[:] = self._solved.T
         return True
-
-    def _adopt(self, loop: Future) -> None:
-        self._loop = None
-        if error := loop.exception():
-            warnings.warn(f'no machine code, plain Python is used: {error}', stacklevel=4)
-            return
-        self._code = loop.result()
-        self._code_arguments = self._code.arguments(
-            self.arguments, self._constants, self._solved)

@@ -33,9 +33,6 @@ from typing import (
 
 from .tolerances import ROUNDING
 
-# A joint collinear with a bar is placed from it within this many bar lengths of its first end.
-BESIDE = 1.0 + ROUNDING
-
 Pin = Tuple[str, complex]
 
 
@@ -148,14 +145,19 @@ class Dyads:
     def rules(self) -> Iterator[Callable[[], bool]]:
         """Yield the rules that may place bodies next; each returns whether it did."""
         for motor in self.motors:
-            yield from (partial(self._crank, motor, way) if isinstance(motor, Hinge)
-                        else partial(self._carriage, motor, way) for way in (0, 1))
+            rule: Callable = self._crank if isinstance(motor, Hinge) else self._carriage
+            yield from (partial(rule, motor, way) for way in (0, 1) if self._carries(motor, way))
         yield from (partial(self._dyad, body) for body in self.left)
         for slide in self.slides:
-            yield from (partial(rule, slide, way) for way in (0, 1)
-                        for rule in (self._slider, self._slot, self._yoke))
+            for way in (0, 1):
+                words = (self._slider, self._yoke) if self._carries(slide, way) else (self._slot,)
+                yield from (partial(rule, slide, way) for rule in words)
         yield from (partial(self._cylinder, motor, way) for motor in self.motors
                     if isinstance(motor, Slide) for way in (0, 1))
+
+    def _carries(self, joint: Motor, way: int) -> bool:
+        """Return whether the first body of a joint is placed and the other is not."""
+        return joint.bodies[way] in self.parts and joint.bodies[1 - way] not in self.parts
 
     @property
     def left(self) -> List[str]:
@@ -225,10 +227,8 @@ class Dyads:
         if name := self.joint_at(body, place):
             return name, self.on[body][name]
         text, on, part = self.length_text, self.on[body], self.parts[body]
-        # The best bar to place it from is collinear with it and near; else the one with which it
-        # makes the least flat triangle.
-        bars = [(math.inf if abs(seen.imag * (end - start)) < self.near and abs(seen) < BESIDE
-                 else abs(seen.imag), (first, start), (second, end))
+        # The best bar to place it from is the one with which it makes the least flat triangle.
+        bars = [(abs(seen.imag), (first, start), (second, end))
                 for (first, start), (second, end) in combinations(on.items(), 2)
                 if abs(end - start) > self.near for seen in ((place - start) / (end - start),)]
         if body == self.ground:
@@ -265,16 +265,8 @@ class Dyads:
         name, end = next(((name, end) for name, end in self.on[body].items()
                           if name not in (origin, but)
                           and abs(((end - at) / axis).imag) < ROUNDING * self.size), None) \
-            or self.fixed(body, at + axis * self._length(body, at))
+            or self.fixed(body, at + axis * self.size)
         return (origin, at), name, (end - at) / abs(end - at)
-
-    def _length(self, body: str, place: complex) -> float:
-        """Return the length of a line through a place on a body that gives the least rounding."""
-        away = [abs(end - place) for end in self.on[body].values()]
-        if body == self.ground:
-            return max(away) or self.size
-        # As long as the shortest known side of the triangle, which is then the least flat.
-        return min((gap for gap in away if gap >= self.near), default=self.size)
 
     def end(self, body: str) -> Pin:
         """Return the first joint on a body."""
@@ -302,8 +294,6 @@ class Dyads:
     def _crank(self, hinge: Hinge, way: int) -> bool:
         """Place the body that a motor turns on a placed one."""
         base, body = hinge.bodies[way], hinge.bodies[1 - way]
-        if base not in self.parts or body in self.parts:
-            return False
         (centre, start), zero, along = self.fixed(base, hinge.places[way]), '', 1.0 + 0.0j
         if base != self.ground:
             mark, end = self.other(base, centre)
@@ -327,8 +317,6 @@ class Dyads:
     def _carriage(self, slide: Slide, way: int) -> bool:
         """Place the body that a motor moves along a placed one."""
         base, body = slide.bodies[way], slide.bodies[1 - way]
-        if base not in self.parts or body in self.parts:
-            return False
         place = next((pin[body] for pin in self.pins if body in pin), slide.origins[1 - way])
         ahead = (place - slide.origins[1 - way]) / slide.axes[1 - way]
         (origin, start), towards, along = self.line(
@@ -388,8 +376,6 @@ class Dyads:
 
     def _slider(self, slide: Slide, way: int) -> bool:
         base, block = slide.bodies[way], slide.bodies[1 - way]
-        if base not in self.parts or block in self.parts:
-            return False
         origin, axis = slide.origins[way], slide.axes[way]
         for rod, pin in self.rods(block):
             (joint, at), length = self.end(rod), abs(pin[rod] - self.end(rod)[1])
@@ -427,8 +413,6 @@ class Dyads:
 
     def _yoke(self, slide: Slide, way: int) -> bool:
         base, block = slide.bodies[way], slide.bodies[1 - way]
-        if base not in self.parts or block in self.parts:
-            return False
         for slot in self.slides:
             own = int(slot.bodies[1] == block)
             pin_body, along = slot.bodies[1 - own], slide.axes[1 - way]
