@@ -24,5 +24,5 @@ __all__ = ['Answer', 'Arc', 'ascending', 'bar_name', 'checked_branches', 'checke
            'CLOSE', 'Design', 'Dyads', 'extremes', 'FORMS', 'Formula',
            'GROUND', 'Hinge', 'IN_SINGLE', 'Input', 'Inverse', 'InverseLinkage', 'joint_lines',
            'Leg', 'Link', 'LinkPoint', 'loaded_links', 'Mechanism', 'Mode', 'Motor', 'Pin',
-           'reachable_arcs', 'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide', 'Solution', 'spread',
-           'TOLERANCE', 'WindowError']
+           'reachable_arcs', 'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide', 'Solution',
+           'spread', 'TOLERANCE', 'WindowError']
