@@ -264,6 +264,8 @@ def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, machines):
     actuator, _, joint, _ = expected(machine, [0.45])
     status, (position, *_) = memory.send(0, actuator)
     assert status == 0 and position == pytest.approx(joint)
+    # It cannot be commanded for all that.
+    assert memory.send(1, joint)[0] == 1
 
 
 CHOICES = [
@@ -282,7 +284,10 @@ CHOICES = [
      [(0.02 * math.cos(0.9), math.tau + 0.9)]),
     # A measured link may be beyond it.
     (SLOT, {'crank.measures': 'A.y', 'crank.start': 0.5, 'crank.sweep': [0.2, 0.8]},
-     ['crank'], 0, [(0.02 * math.cos(0.9), 0.9)])]
+     ['crank'], 0, [(0.02 * math.cos(0.9), 0.9)]),
+    # What is beyond it by more weighs ten times.
+    (SLOT, {'crank.measures': 'A.y', 'crank.start': 0.1, 'crank.sweep': [-1.0, 0.1]},
+     ['crank'], 0, [(0.02 * math.cos(0.3), -0.3)])]
 
 
 @pytest.fixture(scope='module')
