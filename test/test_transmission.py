@@ -38,7 +38,7 @@ SCENES = [*sorted((ROOT / 'config').glob('*.yaml')), ROOT / 'examples' / 'leg.ya
 
 # All that a scene may say of actuators and joints.
 SCENE = {
-    'mechanisms': ['lever', 'leg', 'boom', 'lift', 'rocker', 'beast', 'rack', 'int'],
+    'mechanisms': ['lever', 'leg', 'boom', 'lift', 'rocker', 'beast', 'rack', 'int', 'foot'],
     'lever.type': 'slotted_lever', 'lever.scale': 1e-3, 'lever.crank.source': 'servo',
     'lever.crank.ratio': -0.5, 'lever.crank.offset': 0.3, 'lever.crank.sweep': [-0.4, 0.4],
     'lever.joint_names': ['lever=-flap+0.1'],
@@ -58,6 +58,15 @@ SCENE = {
     'rack.type': 'custom', 'rack.scale': 0.5, 'rack.carriage.ratio': -0.25, 'rack.joints': [
         'O ground 0 0', 'R ground 1 0', 'A carriage O along R 0.1 0.7', 'Q ground 0 1',
         'B dyad A Q 0.9 0.6 left'], 'rack.loads': ['B=2 -5'],
+    'foot.type': 'rods', 'foot.right.sweep': [-0.25, 0.25], 'foot.left.sweep': [-0.2, 0.2],
+    'foot.joints': [
+        'pitch hinge ground at 0 0 0 axis 0 1 0 within -50deg 30deg',
+        'roll hinge pitch at 0 0 -0.0176 axis 1 0 0 within -15deg 15deg',
+        'right motor ground at 0.022 0 0.2159 axis 1 0 0',
+        'left motor ground at 0.022 0 0.1509 axis 1 0 0',
+        'R rod right 0.0395 -0.0164 0.2112 roll 0.022 -0.015 -0.0096',
+        'L rod left 0.035 0.0165 0.1469 roll 0.022 0.015 -0.0096'],
+    'foot.loads': ['L_roll=1 2 -30', 'roll=2.0'],
     'int.type': 'four_bar', 'int.crank.source': 'a*/ "b"\\ ??/\n%s é',
     'int.joint_names': ['QB=while/1:x']}
 GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
@@ -255,6 +264,8 @@ def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, machines):
     actuator, _, joint, _ = expected(machine, [0.45])
     status, (position, *_) = memory.send(0, actuator)
     assert status == 0 and position == pytest.approx(joint)
+    # It cannot be commanded for all that.
+    assert memory.send(1, joint)[0] == 1
 
 
 CHOICES = [
@@ -273,7 +284,10 @@ CHOICES = [
      [(0.02 * math.cos(0.9), math.tau + 0.9)]),
     # A measured link may be beyond it.
     (SLOT, {'crank.measures': 'A.y', 'crank.start': 0.5, 'crank.sweep': [0.2, 0.8]},
-     ['crank'], 0, [(0.02 * math.cos(0.9), 0.9)])]
+     ['crank'], 0, [(0.02 * math.cos(0.9), 0.9)]),
+    # What is beyond it by more weighs ten times.
+    (SLOT, {'crank.measures': 'A.y', 'crank.start': 0.1, 'crank.sweep': [-1.0, 0.1]},
+     ['crank'], 0, [(0.02 * math.cos(0.3), -0.3)])]
 
 
 @pytest.fixture(scope='module')

@@ -8,7 +8,7 @@ from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ..linkage import GROUND, Link, Mechanism, spread
+from ..linkage import GROUND, Link, loaded_links, Mechanism, spread
 from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion
@@ -141,15 +141,12 @@ def pieces(linkage: Mechanism, axis: Axis) -> List[Tuple[float, ...]]:
 
 def loads(machine: SceneMechanism) -> Iterator[Tuple[str, float]]:
     """Yield outputs on which the scene's loads work, with their factors."""
-    scale, links = machine.scale, {link.name: link for link in machine.linkage.links}
     for name, load in machine.loads.items():
-        if not isinstance(load, float):
-            yield from ((f'{name}.{way}', scale * part) for way, part in zip('xy', load))
-            continue
-        while name in links:
-            if links[name].kind != 'prismatic':
-                yield name, load
-            name = links[name].parent
+        if isinstance(load, float):
+            yield from ((link, load) for link in loaded_links(machine.linkage, name))
+        else:
+            yield from ((f'{name}.{direction}', machine.scale * part)
+                        for direction, part in zip(machine.linkage.axes, load))
 
 
 def start(machine: SceneMechanism) -> List[float]:

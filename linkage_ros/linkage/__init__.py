@@ -12,6 +12,7 @@ from .inverse import Answer, Inverse, InverseLinkage, Mode, Solution
 from .mechanism import Mechanism
 from .motion.curves import ascending, extremes, sampled
 from .motion.reach import reachable_arcs
+from .statics import loaded_links
 from .text import joint_lines, rod_lines
 from .text.arguments import checked_branches, checked_dimensions
 from .text.arithmetic import Formula
@@ -22,6 +23,6 @@ from .tolerances import CLOSE, ROUNDING, TOLERANCE
 __all__ = ['Answer', 'Arc', 'ascending', 'bar_name', 'checked_branches', 'checked_dimensions',
            'CLOSE', 'Design', 'Dyads', 'extremes', 'FORMS', 'Formula',
            'GROUND', 'Hinge', 'IN_SINGLE', 'Input', 'Inverse', 'InverseLinkage', 'joint_lines',
-           'Leg', 'Link', 'LinkPoint', 'Mechanism', 'Mode', 'Motor', 'Pin', 'reachable_arcs',
-           'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide', 'Solution', 'spread',
-           'TOLERANCE', 'WindowError']
+           'Leg', 'Link', 'LinkPoint', 'loaded_links', 'Mechanism', 'Mode', 'Motor', 'Pin',
+           'reachable_arcs', 'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide', 'Solution',
+           'spread', 'TOLERANCE', 'WindowError']

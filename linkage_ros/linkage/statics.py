@@ -46,7 +46,7 @@ def _powers(linkage: Kinematics, theta: Inputs, loads: Mapping[str, ArrayLike],
             # A zero load does no work, even at an infinite velocity.
             yield np.where(force == 0.0, 0.0, force * velocity).sum(axis=-1)
         elif name in linkage.joints:
-            chain = list(_chain(linkage, name))
+            chain = list(loaded_links(linkage, name))
             rates = linkage.joint_rates(theta, chain, by)
             turning = sum((rates[link] for link in chain), np.zeros(()))
             yield np.where(force == 0.0, 0.0, force * turning)
@@ -55,8 +55,8 @@ def _powers(linkage: Kinematics, theta: Inputs, loads: Mapping[str, ArrayLike],
                              f'allowed: {listed((*linkage.points, *linkage.joints))}')
 
 
-def _chain(linkage: Kinematics, name: str) -> Iterator[str]:
-    """Yield a link and its parents, down to the ground."""
+def loaded_links(linkage: Kinematics, name: str) -> Iterator[str]:
+    """Yield the links that a moment on a link works on: it and its parents, down to the ground."""
     links = {link.name: link for link in linkage.links}
     if linkage.axes != 'xy':  # each turns about its own axis, and is loaded about that
         yield name
