@@ -235,6 +235,16 @@ def test_a_joint_moved_by_several_inputs_goes_where_it_is_wanted_within_their_en
     far = poses.reached(digger, present, {'joint': 'T', 'place': [99.0, 0.0]})[0]
     assert all(low <= value <= high for value, (low, high) in zip(far, within))
     assert tip(far)[0] > max(tip(corner)[0] for corner in itertools.product(*within)) - 1e-6
+    # Wherever it is pulled, hardly any pose of a grid is nearer.
+    (low, high), rng = np.transpose(within), np.random.default_rng(1)
+    grid = np.stack(np.meshgrid(*np.linspace(low, high, 41).T)).reshape(3, -1)
+    reached = 2.0 * digger.linkage.solve([*(grid / 2.0)], ('T',))['T']
+    worse = 0
+    for want in np.nanmean(reached, axis=0) + rng.normal(size=(60, 2)) * 8.0:
+        start = rng.uniform(low, high).tolist()
+        found, _ = poses.reached(digger, start, {'joint': 'T', 'place': want.tolist()})
+        worse += math.dist(tip(found), want) > np.nanmin(np.hypot(*(reached - want).T)) + 0.02
+    assert worse < 8
 
 
 @pytest.mark.nightly(all_but=2)

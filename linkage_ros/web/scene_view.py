@@ -267,8 +267,7 @@ class SceneView:
 
     def _find(self, key: str) -> ShownMechanism:
         if key not in self._mechanisms:
-            raise SceneError(f'there is no mechanism {quoted(key)}; '
-                          f'there are: {", ".join(self._mechanisms)}')
+            raise SceneError(f'there is no mechanism {quoted(key)}')
         return self._mechanisms[key]
 
     def _show(self, client: Any) -> None:

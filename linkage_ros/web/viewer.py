@@ -16,12 +16,13 @@ from ..nodes import scene_node, shutdown
 from ..optional import needs
 
 VIEWER = 'viewer'
-PORTS = IntegerRange(from_value=0, to_value=65535, step=1)
+PORT = 8020
 # Name, default, description and ranges.
 PARAMETERS = [
     ('host', '127.0.0.1', 'Address to listen at; 127.0.0.1: for browsers on this machine alone. '
      'Whoever reaches it can move the scene.', []),
-    ('port', 8020, 'Port to listen at; 0: any that is free.', [PORTS]),
+    ('port', PORT, 'Port to listen at; 0: any that is free.', [
+        IntegerRange(from_value=0, to_value=65535, step=1)]),
     ('or_any_port', False, 'Whether to listen at any free port where that one is taken.', [])]
 
 

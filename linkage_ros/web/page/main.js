@@ -99,8 +99,12 @@ connect({
         marker.points = new Float32Array(buffer, from, count);
         from += 4 * count;
       }
-      mechanisms.get(key)?.markers.set(topic, markers);
-      if (topic === 'markers' && mechanisms.has(key)) mechanisms.get(key).lastMarkers = performance.now();
+      const mechanism = mechanisms.get(key);
+      if (!mechanism) continue;
+      // The scale does not depend on what comes first, the markers or the locus.
+      if (!mechanism.markers.has(topic)) picture.refit(key);
+      mechanism.markers.set(topic, markers);
+      if (topic === 'markers') mechanism.lastMarkers = performance.now();
     }
     panel.follow();
     received = true;
