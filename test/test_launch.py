@@ -162,7 +162,7 @@ def test_every_argument_of_the_launch_file_is_described(constants):
     assert all(f'`{name}`' in documented for name in arguments)
     viewer = (ROOT / 'linkage_ros' / 'web' / 'viewer.py').read_text()
     usual = re.search('empty: ([0-9]+), or any', arguments['port'][1])[1]
-    assert re.search(rf"'port', {usual},", viewer)
+    assert re.search(rf'^PORT = {usual}$', viewer, re.MULTILINE)
 
 
 @pytest.mark.parametrize('path', sorted(CONFIG.glob('*.yaml')), ids=lambda path: path.stem)
