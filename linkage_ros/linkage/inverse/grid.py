@@ -14,13 +14,13 @@ from __future__ import annotations
 
 from itertools import chain, combinations
 import math
-from typing import Iterator, List, Sequence
+from typing import Iterator, List, Sequence, Union
 
 import numpy as np
 
 from .follow import LONGEST
 from .problem import ACCEPTED, InverseProblem, Row
-from .segments import segments_of
+from .segments import Bracket, segments_of
 from ..formulas import Names
 from ..inputs import spread
 from ..kinematics import Kinematics
@@ -64,8 +64,8 @@ class Grid:
         if not self.is_held:
             self._check_independent()
 
-    def candidates(self, values: Sequence[float]) -> Iterator[Row]:
-        """Yield inputs at which the outputs may have some values."""
+    def candidates(self, values: Sequence[float]) -> Iterator[Union[Bracket, Row]]:
+        """Yield inputs, or brackets of the first, at which the outputs may have some values."""
         problem, n = self._problem, self._problem.n
         held = {by: values[place] for by, place in self._held.items()}
         if self.is_held:
@@ -73,7 +73,7 @@ class Grid:
             others = tuple(held[by] for by in range(1, n))
             for bracket in segments_of(problem.linkage, problem.outputs[place],
                                        others).candidates(values[place:place + 1]):
-                yield bracket.seed, *others
+                yield bracket._replace(place=place, others=others)
         else:
             yield from self._descended(self._starts(held, values), values)
 

@@ -60,12 +60,13 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
 def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Bracket
                    ) -> Optional[Row]:
     """Return the solution in a bracket, which Newton's method does not leave; None if none."""
-    (low, high, x, sign), at = bracket, problem.newton.at
+    low, high, x, sign, place, others = bracket
+    n, at = problem.n, problem.newton.at
     x = x if low <= x <= high else 0.5 * (low + high)
     best, best_x = (math.inf, math.inf), x
     for _ in range(HALVINGS):
-        trial = at(x, *values)
-        gap, following = trial[2:4]
+        trial = at(x, *others, *values)
+        gap, following = trial[2 + place], trial[2 + n]
         if trial[0] < best[0]:
             best, best_x = trial, x
         elif best[1] <= ACCEPTED:
@@ -77,13 +78,13 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Br
     # At a jump or in noise both sides enclose values that the output never has.
     if not best[0] <= SINGULAR:
         return None
-    *_, inputs, rate = best
-    if not math.isfinite(rate):
+    inputs, rates = best[2 + 2 * n:2 + 3 * n], best[2 + 3 * n:]
+    if not math.isfinite(rates[place]):
         # At an end of a segment, rates are those of the nearest float that has them.
-        around = (at(best_x + side * 2.0 ** k * math.ulp(best_x), *values)[-1]
+        around = (at(best_x + side * 2.0 ** k * math.ulp(best_x), *others, *values)[2 + 3 * n:]
                   for k in range(HALVINGS // 2) for side in (1, -1))
-        rate = next(filter(math.isfinite, around), rate)
-    return inputs, rate
+        rates = next((each for each in around if math.isfinite(each[place])), rates)
+    return *inputs, *rates
 
 
 def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.ndarray

@@ -35,14 +35,16 @@ class Bracket(NamedTuple):
     """
     Two values of the first input [rad or m] between which an output has a value once.
 
-    `seed` is an estimate, and `sign` that of the output's rate. The bracket of a special input has
-    no width.
+    `seed` is an estimate, `sign` that of the output's rate, `place` the output's number, and
+    `others` are the values of the other inputs. The bracket of a special input has no width.
     """
 
     low: float
     high: float
     seed: float
     sign: float
+    place: int = 0
+    others: Tuple[float, ...] = ()
 
 
 class Segment(NamedTuple):
