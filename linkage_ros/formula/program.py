@@ -26,7 +26,7 @@ import numpy as np
 
 from .expression import Real, substituted, unknown
 from .listing import Dialect, Listing
-from .operations import OPERATIONS
+from .operations import Operation, OPERATIONS
 from ..cache import Cache
 from ..optional import needs
 
@@ -38,6 +38,29 @@ _NAMED, _OPERANDS = re.compile(r'\bv\d+'), attrgetter('operands')
 
 FLOATS = Dialect({name: row.python for name, row in OPERATIONS.items()}, {
     name: value for name, value in vars(math).items() if not name.startswith('_')})
+
+
+def _as_ieee(row: Operation) -> Callable:
+    """Return an operation on floats that has inf or nan where Python's code of it raises."""
+    names = ', '.join(f'x{i}' for i in range(row.c.count('{}')))
+    python = eval(f'lambda {names}: {row.python.format(*names.split(", "))}', dict(FLOATS.names))
+
+    def operation(*operands: float) -> float:
+        try:
+            return python(*operands)
+        except (ArithmeticError, ValueError):
+            with np.errstate(all='ignore'):
+                return float(row.numpy(*map(np.float64, operands)))
+
+    return operation
+
+
+# Operations that Python does not compute for all floats.
+_RAISING = [OPERATIONS[name] for name in ('divide', 'sqrt', 'sin', 'cos', 'rint')]
+# As `FLOATS`, bit for bit, where that has a number.
+IEEE = Dialect({**FLOATS.templates, **{
+    row.name: f'ieee_{row.name}({", ".join(row.c.count("{}") * ["{}"])})' for row in _RAISING}}, {
+    **FLOATS.names, **{f'ieee_{row.name}': _as_ieee(row) for row in _RAISING}})
 ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
     **{name: row.numpy for name, row in OPERATIONS.items()}, 'nan': np.nan, 'inf': np.inf})
 
@@ -116,6 +139,10 @@ class _Variant:
     @cached_property
     def float(self) -> Callable:
         return _python(self.listing, FLOATS, self.arguments)
+
+    @cached_property
+    def ieee(self) -> Callable:
+        return _python(self.listing, IEEE, self.arguments)
 
     @cached_property
     def array(self) -> Callable:
@@ -201,7 +228,7 @@ class Pose:
 
     def _quietly(self, *arguments: float) -> tuple:
         """Return the outputs at one pose with inf or nan where Python's floats raise."""
-        return tuple(self.searched(*map(np.float64, arguments)).tolist())
+        return self.variant.ieee(*self.constants)(*arguments)
 
     def on(self, dialect: Dialect) -> Callable:
         """Return the function of arrays in a dialect of `ARRAYS`, which returns a tuple."""
