@@ -67,21 +67,22 @@ ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
 
 def evaluate(node: Real, dimensions: Mapping, known: dict) -> Any:
     """Evaluate an expression of dimensions alone; `known` is shared between calls."""
-    _evaluate(unknown([node], _OPERANDS, known), dimensions, known)
+    evaluate_in_order(unknown([node], _OPERANDS, known), dimensions, known)
     return known[node]
 
 
-def _evaluate(nodes: Iterable[Real], dimensions: Mapping, known: dict) -> None:
-    """Add the values of expressions to those known."""
-    for node in nodes:
-        if node in known:
-            continue
-        if node.operands:
-            known[node] = OPERATIONS[node.op].numpy(*[known[x] for x in node.operands])[()]
-        else:
-            value, = node.args
-            known[node] = np.asarray(
-                dimensions[value] if node.op == 'dimension' else value, float)[()]
+def evaluate_in_order(nodes: Iterable[Real], dimensions: Mapping, known: dict) -> None:
+    """Add the values of expressions of dimensions alone to those known, operands first."""
+    with np.errstate(all='ignore'):
+        for node in nodes:
+            if node in known:
+                continue
+            if node.operands:
+                known[node] = OPERATIONS[node.op].numpy(*[known[x] for x in node.operands])[()]
+            else:
+                value, = node.args
+                known[node] = np.asarray(
+                    dimensions[value] if node.op == 'dimension' else value, float)[()]
 
 
 def in_order(nodes: Iterable[Real], needed: Callable = _OPERANDS) -> List[Real]:
@@ -187,13 +188,12 @@ class Program:
     def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
         """Return the outputs as functions of the arguments; dimensions are floats or arrays."""
         swept = any(np.ndim(v) for v in dimensions.values())
-        with np.errstate(all='ignore'):
-            if not swept:
-                _evaluate(self._deciding, dimensions, known)
-            decisions = () if swept else tuple(bool(known[c]) for c in self._conditions)
-            variant = self._variants.get_or_make(decisions, lambda: _Variant(
-                self._outputs, dict(zip(self._conditions, decisions)), self._arguments))
-            _evaluate(variant.steps, dimensions, known)
+        if not swept:
+            evaluate_in_order(self._deciding, dimensions, known)
+        decisions = () if swept else tuple(bool(known[c]) for c in self._conditions)
+        variant = self._variants.get_or_make(decisions, lambda: _Variant(
+            self._outputs, dict(zip(self._conditions, decisions)), self._arguments))
+        evaluate_in_order(variant.steps, dimensions, known)
         constants = [known[c] for c in variant.constants]
         if not swept:
             constants = list(map(float, constants))
