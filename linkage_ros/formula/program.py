@@ -26,7 +26,7 @@ import numpy as np
 
 from .expression import Real, substituted, unknown
 from .listing import Dialect, Listing
-from .operations import Operation, OPERATIONS
+from .operations import OPERATIONS
 from ..cache import Cache
 from ..optional import needs
 
@@ -40,27 +40,24 @@ FLOATS = Dialect({name: row.python for name, row in OPERATIONS.items()}, {
     name: value for name, value in vars(math).items() if not name.startswith('_')})
 
 
-def _as_ieee(row: Operation) -> Callable:
+def _as_ieee(name: str) -> Callable:
     """Return an operation on floats that has inf or nan where Python's code of it raises."""
-    names = ', '.join(f'x{i}' for i in range(row.c.count('{}')))
-    python = eval(f'lambda {names}: {row.python.format(*names.split(", "))}', dict(FLOATS.names))
+    code = FLOATS.templates[name].format('x[0]', 'x[1]')
+    in_python = eval(f'lambda *x: {code}', dict(FLOATS.names))
 
     def operation(*operands: float) -> float:
         try:
-            return python(*operands)
+            return in_python(*operands)
         except (ArithmeticError, ValueError):
             with np.errstate(all='ignore'):
-                return float(row.numpy(*map(np.float64, operands)))
+                return float(OPERATIONS[name].numpy(*map(np.float64, operands)))
 
     return operation
 
 
-# Operations that Python does not compute for all floats.
-_RAISING = [OPERATIONS[name] for name in ('divide', 'sqrt', 'sin', 'cos', 'rint')]
 # As `FLOATS`, bit for bit, where that has a number.
-IEEE = Dialect({**FLOATS.templates, **{
-    row.name: f'ieee_{row.name}({", ".join(row.c.count("{}") * ["{}"])})' for row in _RAISING}}, {
-    **FLOATS.names, **{f'ieee_{row.name}': _as_ieee(row) for row in _RAISING}})
+IEEE = Dialect({**FLOATS.templates, 'divide': 'divide({}, {})', 'rint': 'rint({})'}, {
+    **FLOATS.names, **{name: _as_ieee(name) for name in ('divide', 'sqrt', 'sin', 'cos', 'rint')}})
 ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
     **{name: row.numpy for name, row in OPERATIONS.items()}, 'nan': np.nan, 'inf': np.inf})
 
