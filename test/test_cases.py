@@ -74,6 +74,18 @@ def test_a_dead_point_is_where_a_transmission_angle_is_flat(name):
         assert linkage.distance_to_dead_point(value, *held) == 0.0
 
 
+@pytest.mark.parametrize('name', [*CASES, *mechanisms.TYPES])
+def test_a_pose_has_the_same_bits_beside_rates_that_are_infinite(name):
+    linkage = made(name) if name in CASES else mechanisms.create(name)
+    held = poses(name)[0][1:] if name in CASES else np.zeros(len(linkage.inputs) - 1)
+    alone = linkage.function(None, linkage.joints)
+    together = linkage.function(None, linkage.joints, linkage.joints)
+    for value in {*linkage.dead_points(*held), *np.ravel(linkage.reach(*held))}:
+        inputs = float(value), *held.tolist()
+        expected = alone(*inputs)
+        assert np.array_equal(together(*inputs)[:len(expected)], expected, equal_nan=True)
+
+
 # --- what is published about them --------------------------------------------------------------
 
 def turned(linkage, theta, first, second):

@@ -38,27 +38,48 @@ _NAMED, _OPERANDS = re.compile(r'\bv\d+'), attrgetter('operands')
 
 FLOATS = Dialect({name: row.python for name, row in OPERATIONS.items()}, {
     name: value for name, value in vars(math).items() if not name.startswith('_')})
+
+
+def _as_ieee(name: str) -> Callable:
+    """Return an operation on floats that has inf or nan where Python's code of it raises."""
+    code = FLOATS.templates[name].format('x[0]', 'x[1]')
+    in_python = eval(f'lambda *x: {code}', dict(FLOATS.names))
+
+    def operation(*operands: float) -> float:
+        try:
+            return in_python(*operands)
+        except (ArithmeticError, ValueError):
+            with np.errstate(all='ignore'):
+                return float(OPERATIONS[name].numpy(*map(np.float64, operands)))
+
+    return operation
+
+
+# As `FLOATS`, bit for bit, where that has a number.
+IEEE = Dialect({**FLOATS.templates, 'divide': 'divide({}, {})', 'rint': 'rint({})'}, {
+    **FLOATS.names, **{name: _as_ieee(name) for name in ('divide', 'sqrt', 'sin', 'cos', 'rint')}})
 ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
     **{name: row.numpy for name, row in OPERATIONS.items()}, 'nan': np.nan, 'inf': np.inf})
 
 
 def evaluate(node: Real, dimensions: Mapping, known: dict) -> Any:
     """Evaluate an expression of dimensions alone; `known` is shared between calls."""
-    _evaluate(unknown([node], _OPERANDS, known), dimensions, known)
+    evaluate_in_order(unknown([node], _OPERANDS, known), dimensions, known)
     return known[node]
 
 
-def _evaluate(nodes: Iterable[Real], dimensions: Mapping, known: dict) -> None:
-    """Add the values of expressions to those known."""
-    for node in nodes:
-        if node in known:
-            continue
-        if node.operands:
-            known[node] = OPERATIONS[node.op].numpy(*[known[x] for x in node.operands])[()]
-        else:
-            value, = node.args
-            known[node] = np.asarray(
-                dimensions[value] if node.op == 'dimension' else value, float)[()]
+def evaluate_in_order(nodes: Iterable[Real], dimensions: Mapping, known: dict) -> None:
+    """Add the values of expressions of dimensions alone to those known, operands first."""
+    with np.errstate(all='ignore'):
+        for node in nodes:
+            if node in known:
+                continue
+            if node.operands:
+                known[node] = OPERATIONS[node.op].numpy(*[known[x] for x in node.operands])[()]
+            else:
+                value, = node.args
+                known[node] = np.asarray(
+                    dimensions[value] if node.op == 'dimension' else value, float)[()]
 
 
 def in_order(nodes: Iterable[Real], needed: Callable = _OPERANDS) -> List[Real]:
@@ -118,6 +139,10 @@ class _Variant:
         return _python(self.listing, FLOATS, self.arguments)
 
     @cached_property
+    def ieee(self) -> Callable:
+        return _python(self.listing, IEEE, self.arguments)
+
+    @cached_property
     def array(self) -> Callable:
         return _python(self.listing, ARRAYS, self.arguments)
 
@@ -160,13 +185,12 @@ class Program:
     def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
         """Return the outputs as functions of the arguments; dimensions are floats or arrays."""
         swept = any(np.ndim(v) for v in dimensions.values())
-        with np.errstate(all='ignore'):
-            if not swept:
-                _evaluate(self._deciding, dimensions, known)
-            decisions = () if swept else tuple(bool(known[c]) for c in self._conditions)
-            variant = self._variants.get_or_make(decisions, lambda: _Variant(
-                self._outputs, dict(zip(self._conditions, decisions)), self._arguments))
-            _evaluate(variant.steps, dimensions, known)
+        if not swept:
+            evaluate_in_order(self._deciding, dimensions, known)
+        decisions = () if swept else tuple(bool(known[c]) for c in self._conditions)
+        variant = self._variants.get_or_make(decisions, lambda: _Variant(
+            self._outputs, dict(zip(self._conditions, decisions)), self._arguments))
+        evaluate_in_order(variant.steps, dimensions, known)
         constants = [known[c] for c in variant.constants]
         if not swept:
             constants = list(map(float, constants))
@@ -201,7 +225,7 @@ class Pose:
 
     def _quietly(self, *arguments: float) -> tuple:
         """Return the outputs at one pose with inf or nan where Python's floats raise."""
-        return tuple(self.searched(*map(np.float64, arguments)).tolist())
+        return self.variant.ieee(*self.constants)(*arguments)
 
     def on(self, dialect: Dialect) -> Callable:
         """Return the function of arrays in a dialect of `ARRAYS`, which returns a tuple."""

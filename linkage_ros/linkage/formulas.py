@@ -9,6 +9,7 @@ They hold for any dimensions. Code is generated from them for the requested quan
 
 from __future__ import annotations
 
+from functools import cached_property
 from itertools import chain, cycle
 import re
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
@@ -33,7 +34,7 @@ from ..formula.expression import (
     square_root,
     unknown,
 )
-from ..formula.program import Program
+from ..formula.program import in_order, Program
 
 Names = Tuple[str, ...]
 # Outputs of two joints: their distance, and the direction from the first to the second.
@@ -83,6 +84,15 @@ class Structure:
             'output': self._output, 'checked': self.checked,
             'point accelerations': self._point_accelerations,
             'joint accelerations': self._joint_accelerations}
+
+    @cached_property
+    def constants(self) -> List[Real]:
+        """Return what any mechanism needs of its dimensions, in an order of evaluation."""
+        return in_order([
+            *(part for limit in self.built.limits if limit.ends
+              for part in (limit.tolerance, *limit.ends[:3])),
+            *(amount for _, amount, _ in self.built.demands),
+            *(link.zero for link in self.built.links)])
 
     def program(self, kind: str, names: Any, *by: int) -> Program:
         """Return the code for outputs of one kind, without operations that they do not need."""

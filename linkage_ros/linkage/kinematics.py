@@ -24,7 +24,7 @@ from .text.design import Design
 from ..cache import Cache
 from ..formula.expression import derivative, Real, real
 from ..formula.namespace import array_function
-from ..formula.program import evaluate, Pose, Program
+from ..formula.program import evaluate, evaluate_in_order, Pose, Program
 from ..optional import needs
 from ..words import listed, meant, plain_text, quoted
 
@@ -64,6 +64,7 @@ class Kinematics:
         self.bars = tuple((bar.first, bar.second) for bar in built.bars)
         self.cylinders, self.yokes = tuple(built.cylinders), dict(built.yokes)
         self._evaluated: dict = {}
+        evaluate_in_order(self.structure.constants, self.dimensions, self._evaluated)
         self._poses, self.cache = Cache(), Cache()
         self.inputs = tuple(map(self._counted_input, range(len(built.inputs)), built.inputs))
         own = {input_.name for input_ in self.inputs}
@@ -118,8 +119,9 @@ class Kinematics:
 
     def value(self, length: Real) -> Any:
         """Return the value of an expression of dimensions alone."""
-        with np.errstate(all='ignore'):
-            return evaluate(length, self.dimensions, self._evaluated)
+        if length not in self._evaluated:
+            evaluate(length, self.dimensions, self._evaluated)
+        return self._evaluated[length]
 
     def _number(self, length: Real) -> Any:
         """Return the value of an expression of dimensions alone: a float, or an array."""
@@ -133,8 +135,9 @@ class Kinematics:
         for line, amount, problem in self.structure.built.demands:
             size = self.value(amount)
             # A triangle that does not exist is NaN; a type of the catalogue then has no pose.
-            exists = np.isfinite(size) | (np.isnan(size) & (not self.design.is_written))
-            if np.any(size <= 0.0) or not np.all(exists):
+            allowed = (size > 0.0) & (size < math.inf) | (
+                np.isnan(size) & (not self.design.is_written))
+            if not allowed.all():
                 raise line.error(problem)
         for window in self.windows():
             window.check()

@@ -35,6 +35,9 @@ def checked_dimensions(design: Design, given: Mapping[str, Any]) -> dict:
 
 
 def _checked(design: Design, name: str, value: Any) -> Any:
+    if type(value) is float and SHORTEST_LENGTH <= value <= LONGEST_LENGTH:
+        return value
+
     def error(rule: str) -> ValueError:
         return ValueError(f'{design.name}: dimension {name} must {rule}, got {quoted(value)}')
 
