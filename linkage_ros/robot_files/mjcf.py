@@ -14,8 +14,7 @@ import numpy as np
 
 from .elements import turned_by
 from ..command import RequestError
-from ..robot_model.places import at
-from ..robot_model.robot import BALL, FIXED, Robot
+from ..robot_model.robot import at, BALL, FIXED, Robot
 
 # What MuJoCo says of a file, and the sentence for it.
 _ERRORS = [

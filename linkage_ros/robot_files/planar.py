@@ -22,8 +22,8 @@ from . import check, loops
 from .spatial import EXACT, TOGETHER
 from .. import mechanisms, scene
 from ..linkage import bar_name, Dyads, Hinge, Mechanism, Motor, Pin, ROUNDING, short, Slide
-from ..robot_model.places import at, coordinates
-from ..robot_model.robot import HINGE, Joint, Limits, NotDriven, plain, Robot, SLIDE
+from ..robot_model.robot import (
+    at, coordinates, HINGE, Joint, Limits, NotDriven, plain, Robot, SLIDE)
 from ..scene import FARTHEST
 
 # Loops with a smaller gap, of their size, are closed: files have rounded numbers.

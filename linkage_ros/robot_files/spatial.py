@@ -18,8 +18,8 @@ from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Sequence, Set
 import numpy as np
 
 from ..command import RequestError
-from ..robot_model.places import displacements, screws
-from ..robot_model.robot import BALL, FIXED, FREE, HINGE, Joint, Robot, SLIDE, trees
+from ..robot_model.robot import (
+    BALL, displacements, FIXED, FREE, HINGE, Joint, Robot, screws, SLIDE, trees)
 
 # The largest step of an iteration [rad, or of the size].
 MAX_STEP = 0.5
