@@ -211,7 +211,7 @@ def test_limits_of_a_joint_are_those_of_all_that_it_follows(
     machine, = imported(file).values()
     drive = machine.first
     assert drive.source == 'servo'
-    assert ('motor, servo, servo from 5 to 2.6: its loops do not reach them' in printed(
+    assert ('the limits of servo, from 5 to 2.6: its loops do not reach them' in printed(
         file)) == (ends is None)
     assert (drive.ends and sorted((end - drive.offset) / drive.ratio for end in drive.ends)) == (
         ends and pytest.approx(ends))

@@ -13,7 +13,7 @@ from typing import Dict, List, Mapping, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from .spatial import CLOSED, Component, components, DEAD_POINT, is_free
-from ..robot_model.robot import displaced, FIXED, NotDriven, posed, Robot, trees
+from ..robot_model.robot import displaced, FIXED, NotDriven, posed, Robot
 from ..words import listed
 
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
@@ -68,7 +68,7 @@ def closed(robot: Robot) -> Closed:
     if not made.faults:
         return made
     inside = {}
-    for _, joint in trees(robot)[0].values():
+    for _, joint in robot.spanning_tree()[0].values():
         low, high = joint.range
         if joint.position is not None and not low <= joint.position <= high:
             margin = INSIDE * min(high - low, 1.0)
@@ -84,7 +84,7 @@ def closed(robot: Robot) -> Closed:
 def _closed(robot: Robot) -> Closed:
     # Dependent joints are where the others say.
     robot = posed(robot, {name: ratio * robot.positions[source] + offset
-                          for _, joint in trees(robot)[0].values()
+                          for _, joint in robot.spanning_tree()[0].values()
                           if (name := joint.name) in robot.follows and joint.position is not None
                           for source, ratio, offset in [robot.source(name)]})
     made = Closed(robot, [], {})

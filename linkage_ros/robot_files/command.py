@@ -15,7 +15,7 @@ import numpy as np
 from . import check, closing, loops, model, planar, readers, rods
 from .. import command, scene
 from ..linkage import short
-from ..robot_model.robot import FARTHEST, FIXED, HINGE, NotDriven, posed, Robot, SLIDE, trees
+from ..robot_model.robot import FARTHEST, FIXED, HINGE, NotDriven, posed, Robot, SLIDE
 from ..scene.writing import in_yaml
 from ..words import elided, listed, sentence
 
@@ -115,7 +115,7 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
     for made in imported:
         parameters.update(made.parameters)
     machines = scene.read(parameters).machines
-    tree = {joint.name: joint for _, joint in trees(robot)[0].values()}
+    tree = {joint.name: joint for _, joint in robot.spanning_tree()[0].values()}
     stay = {name for made in imported for name in made.still}
     still = {name: value for name, value in robot.positions.items()
              if name in tree.keys() & stay - check.published(machines)}

@@ -11,7 +11,7 @@ from typing import List, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from .spatial import blocks, TOGETHER
-from ..robot_model.robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE, top, trees
+from ..robot_model.robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE, top
 
 # Kinds of joints in planar loops.
 FLAT = (HINGE, SLIDE, BALL)
@@ -64,7 +64,7 @@ def _parts(robot: Robot, group: Group) -> List[Group]:
 
 def _blocks(robot: Robot, joints: List[Joint]) -> List[Group]:
     """Return the loops of some joints, those that share bars together."""
-    tree, cuts = trees(replace(robot, joints=joints))
+    tree, cuts = replace(robot, joints=joints).spanning_tree()
     groups = []
     for block, closing in blocks(tree, cuts):
         edges = {tree[body][1] for body in block} | {*closing}

@@ -14,7 +14,7 @@ from .elements import parse
 from .spatial import components
 from .. import scene
 from ..robot_model import bodies
-from ..robot_model.robot import posed, Robot, trees
+from ..robot_model.robot import posed, Robot
 from ..robot_model.urdf import write
 from ..scene.joint_names import quoted_name
 
@@ -29,7 +29,7 @@ def description(path: str, loops: Optional[str] = None) -> str:
 
 def drawn(robot: Robot) -> bodies.Model:
     """Return the tree of a robot as a model that is written, its joints at zero."""
-    names = {joint.name for _, joint in trees(robot)[0].values()}
+    names = {joint.name for _, joint in robot.spanning_tree()[0].values()}
     return bodies.Model('robot', robot.root, [bodies.Part(posed(robot, {
         name: 0.0 for name in robot.positions if name in names}))])
 
