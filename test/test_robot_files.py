@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 
 from hypothesis import example, given, settings, strategies as st
 from linkage_ros import mechanisms, scene
-from linkage_ros.robot_files import check, closing, command, model, readers
+from linkage_ros.robot_files import check, closing, command, readers
 from linkage_ros.robot_model.robot import posed
 from linkage_ros.robot_model.urdf import write
 import numpy as np
@@ -348,7 +348,7 @@ def test_a_five_bar_is_closed_by_what_moves_it(imported, tmp_path, more, mimic, 
         joints = published(machine, **motors(angle))
         places = robot.places(joints, ['front_foot', 'back_foot'])
         assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
-    rest, lost = model.others(readers.read(str(file), str(loops)), {'m': machine}, {})
+    rest, lost = command.others(readers.read(str(file), str(loops)), {'m': machine}, {})
     assert not lost and [value for key, value in rest.items() if key.endswith('.source')] == [
         'front_knee'] * ('FIXED' in more) + ['mot_front'] * bool(mimic)
 
@@ -834,11 +834,11 @@ def test_a_passive_joint_of_a_loop_is_no_input(imported, tmp_path):
     # A spring beside the motor's loop leaves a second one undetermined.
     spring = sprung(tmp_path)
     machines, robot = imported(spring), readers.read(str(spring))
-    rest, lost = model.others(robot, machines, {})
+    rest, lost = command.others(robot, machines, {})
     loop = {'spring', 'right_spring_link_joint', 'right_follower_joint'}
     assert {*lost} == loop and not loop & {*map(str, rest.values())}
     assert f'Not published: {", ".join(lost)}: passive joints of loops' in printed(spring)
-    rest, lost = model.others(robot, machines, {'spring': 0.0})
+    rest, lost = command.others(robot, machines, {'spring': 0.0})
     assert {*lost} == loop - {'spring'} and 'spring' in {*map(str, rest.values())}
 
 
@@ -849,9 +849,9 @@ def test_a_joint_of_the_whole_robot_that_opens_a_loop_is_named(monkeypatch, caps
     given, _, _ = command.described(robot)
     names = [line for line in given['hip.joint_names'] if 'bell' not in line]
     machines = scene.read({**given, 'hip.joint_names': names}).machines
-    rest, lost = model.others(robot, machines, {})
+    rest, lost = command.others(robot, machines, {})
     assert lost == ['bell_joint'] and not rest
-    still, _ = model.others(robot, machines, {'bell_joint': 0.0})
+    still, _ = command.others(robot, machines, {'bell_joint': 0.0})
     wrong = scene.read({**given, **still, 'hip.joint_names': names,
                         'mechanisms': ['hip', 'others']}).machines
     ends = {'hip': (-0.2, 0.3), 'crank_motor': (-0.3, 0.3)}
@@ -874,16 +874,16 @@ def test_xacro_has_to_be_run_first(capsys, tmp_path):
 def test_all_joints_of_a_whole_robot_are_published(imported, file):
     more = ['--loops', ROBOTS / 'palletiser_loops.yaml'] * ('pallet' in file)
     machines, robot = imported(file, *more), readers.read(str(ROBOTS / file), *map(str, more[1:]))
-    rest, lost = model.others(robot, machines, {})
+    rest, lost = command.others(robot, machines, {})
     assert not lost
     names = ['others'] * bool(rest)
     if names:
-        machines = {**machines, **scene.read({'mechanisms': names, **rest}).machines}
+        machines = {**machines, **scene.read({**rest, 'mechanisms': names}).machines}
     published = {drive.source for machine in machines.values()
                  for drive in machine.inputs.values()}
     published |= {called.name for machine in machines.values()
                   for called in machine.joints.values() if called.published}
-    text = model.description(str(ROBOTS / file), *map(str, more[1:]))
+    text = readers.description(str(ROBOTS / file), robot)
     assert {*LIBRARIES[1](text).joints} <= published
 
 
@@ -895,7 +895,7 @@ def test_a_universal_joint_with_one_axis_is_refused(capsys, tmp_path):
 
 def test_a_comment_of_another_format_makes_no_urdf(tmp_path):
     file = written(tmp_path, 'four_bar.sdf', ('</sdf>', '</sdf><!-- from <robot> -->'))
-    assert model.description(str(file)).startswith('<robot')
+    assert readers.description(str(file), readers.read(str(file))).startswith('<robot')
 
 
 def test_a_motor_between_two_moving_links_drives_in_the_frame_of_one(imported):
@@ -954,7 +954,7 @@ def test_a_tree_of_mujoco_is_the_same_tree_as_urdf(tmp_path, seed):
         data.qpos[whole.joint(name).qposadr] = value
     mujoco.mj_kinematics(whole, data)
     bodies = [whole.body(i).name for i in range(1, whole.nbody)]
-    found = LIBRARIES[1](write(model.drawn(robot))).places(positions, bodies)
+    found = LIBRARIES[1](write(readers.drawn(robot))).places(positions, bodies)
     for i, body in enumerate(bodies):
         assert found[body] == pytest.approx(data.xpos[i + 1], abs=1e-13)
 

@@ -361,5 +361,5 @@ def _parameters(drawing: Drawing, name: str) -> Dict[str, Any]:
             angle = math.remainder(angle - float(np.asarray(links[link].zero)), math.tau)
         joints.append((link, sign, joint.name, joint.start - sign * angle))
     return check.parameters(
-        name, 'custom', drawing.lines, drawing.ground, drawing.drives, joints,
+        name, 'custom', drawing.lines, drawing.drives, joints, frame_id=drawing.ground,
         pose=[float(short(value)) for value in coordinates(drawing.frame)])

@@ -211,9 +211,9 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
         if why and joint.name not in sources and link not in made.universals:
             reports.append(f'Left out: the limits of {joint.name}, {why}.')
     name = check.name_beside(others, f'{made.drives[0].name}_rods')
-    parameters = check.parameters(name, 'rods', lines, group.ground, made.drives, [
+    parameters = check.parameters(name, 'rods', lines, made.drives, [
         (link, 1.0, joint.name, joint.start) for link, joint in made.links.items()
-        if joint.name not in sources and joint.position is not None])
+        if joint.name not in sources and joint.position is not None], frame_id=group.ground)
     machine = scene.read({'mechanisms': [name], **parameters}).machines[name]
     ends = {}
     for drive, (low, high) in zip(machine.inputs.values(), _sweeps(machine, limits)):
