@@ -68,7 +68,7 @@ def closed(robot: Robot) -> Closed:
     if not made.faults:
         return made
     inside = {}
-    for _, joint in robot.spanning_tree()[0].values():
+    for joint in robot.tree_joints.values():
         low, high = joint.range
         if joint.position is not None and not low <= joint.position <= high:
             margin = INSIDE * min(high - low, 1.0)
@@ -84,8 +84,8 @@ def closed(robot: Robot) -> Closed:
 def _closed(robot: Robot) -> Closed:
     # Dependent joints are where the others say.
     robot = posed(robot, {name: ratio * robot.positions[source] + offset
-                          for _, joint in robot.spanning_tree()[0].values()
-                          if (name := joint.name) in robot.follows and joint.position is not None
+                          for name, joint in robot.tree_joints.items()
+                          if name in robot.follows and joint.position is not None
                           for source, ratio, offset in [robot.source(name)]})
     made = Closed(robot, [], {})
     moves: Dict[str, np.ndarray] = {}

@@ -117,7 +117,7 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
     for made in imported:
         parameters.update(made.parameters)
     machines = scene.read(parameters).machines
-    tree = {joint.name: joint for _, joint in robot.spanning_tree()[0].values()}
+    tree = robot.tree_joints
     stay = {name for made in imported for name in made.still}
     still = {name: value for name, value in robot.positions.items()
              if name in tree.keys() & stay - check.published(machines)}

@@ -55,9 +55,8 @@ def description(path: str, robot: Robot) -> str:
 
 def drawn(robot: Robot) -> bodies.Model:
     """Return the tree of a robot as a model that is written, its joints at zero."""
-    names = {joint.name for _, joint in robot.spanning_tree()[0].values()}
-    return bodies.Model('robot', robot.root, [bodies.Part(posed(robot, {
-        name: 0.0 for name in robot.positions if name in names}))])
+    at_zero = dict.fromkeys(robot.positions.keys() & robot.tree_joints, 0.0)
+    return bodies.Model('robot', robot.root, [bodies.Part(posed(robot, at_zero))])
 
 
 @contextmanager

@@ -233,10 +233,16 @@ class Robot:
     def spanning_tree(self) -> tuple[dict[str, tuple[str, Joint]], list[Joint]]:
         """Return the parent and the joint of each body, and the joints that close loops."""
         home, cuts = {body: body for body in self.frames}, []
+
+        def joined(body: str) -> str:
+            while home[body] != body:
+                home[body] = body = home[home[body]]
+            return body
+
         near: dict[str, list[tuple[str, Joint]]] = {body: [] for body in self.frames}
         for joint in sorted(self.joints, key=lambda joint: (
                 joint.is_cut, joint.name not in self.driven, _TREE.get(joint.kind, 1))):
-            first, second = (top(home, body) for body in joint.bodies)
+            first, second = map(joined, joint.bodies)
             if joint.is_cut or first == second:
                 cuts.append(joint)
                 continue
@@ -251,11 +257,16 @@ class Robot:
                 tree[start] = self.root, Joint('', FREE, (self.root, start), places, places)
             row = [start]
             for body in row:
-                joined = [(other, joint) for other, joint in near[body]
-                          if other != self.root and other not in tree]
-                tree.update((other, (body, joint)) for other, joint in joined)
-                row += [other for other, _ in joined]
+                others = {other: (body, joint) for other, joint in near[body]
+                          if other != self.root and other not in tree}
+                tree.update(others)
+                row += others
         return tree, cuts
+
+    @property
+    def tree_joints(self) -> dict[str, Joint]:
+        """Return the joints of the spanning tree by their names."""
+        return {joint.name: joint for _, joint in self.spanning_tree()[0].values()}
 
     def join(self, name: str, kind: str, bodies: tuple[str, str], frame: np.ndarray,
              axis: Any = (0.0, 0.0, 1.0), other: Optional[np.ndarray] = None,
@@ -398,13 +409,6 @@ def _limits(limits: Sequence[Any], is_continuous: bool
     return ((low, high), '') if low < high else (None, f'{text}: they are no range')
 
 
-def top(home: dict[str, str], body: str) -> str:
-    """Return the body that represents a set of joined bodies."""
-    while home[body] != body:
-        home[body] = body = home[home[body]]
-    return body
-
-
 def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[str, float]
               ) -> Robot:
     """Return a robot with some bodies displaced on their parents, and new positions of joints."""
@@ -428,11 +432,10 @@ def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[
 def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
     """Return a robot with some joints moved; raise RequestError for an unknown joint."""
     robot.check_names(values)
-    tree, moves = robot.spanning_tree()[0], {}
-    names = {joint.name for _, joint in tree.values()}
-    if cuts := [name for name in values if name not in names]:
+    if cuts := sorted(values.keys() - robot.tree_joints):
         raise RequestError(f'{cuts[0]} closes a loop, so that other joints say where it is')
-    for body, (base, joint) in tree.items():
+    moves = {}
+    for body, (base, joint) in robot.spanning_tree()[0].items():
         if joint.name in values and joint.position is not None:
             slides, change = joint.kind == SLIDE, np.array(values[joint.name] - joint.position)
             screw = screws(joint.motion(body), joint.place(base), slides)
