@@ -97,6 +97,9 @@ POSES = ' must be JOINT=VALUE, its value in rad or m'
     ('four_bar.urdf', ['--hold', 'motor=1e9'], f"'motor=1e9'{POSES}"),
     ('four_bar.urdf', ['--hold', 'motr=1'], "there is no joint 'motr'; allowed: motor, elbow, "
      'shoulder; did you mean motor?'),
+    ('four_bar.sdf', ['--driven', 'joint_a'], "there is no joint 'joint_a'; allowed: joint_A, "
+     'joint_B, joint_C, joint_D; did you mean joint_A?'),
+    ('five_bar.urdf', [], 'no joint of this robot closes a loop'),
     ('four_bar.sdf', ['--pose', 'joint_D=1'], 'joint_D closes a loop, so that other joints say '
      'where it is')])
 def test_an_option_that_cannot_be_is_named(capsys, file, args, why):
