@@ -195,9 +195,12 @@ class Component:
         if not slopes:
             return error, np.zeros(0)
         parents = frames[:, self._parents]
-        twists = parents @ self._twists @ np.linalg.inv(parents)
-        rates = np.einsum('pcij,prsj->prsci', twists[..., :3, :], seen)
-        slope = np.einsum('prsci,rsc->pric', rates, self._signs)
+        turned, twists = parents[..., :3, :3].swapaxes(2, 3), (parents @ self._twists)[..., :3, :]
+        twists[..., :3] = twists[..., :3] @ turned
+        twists[..., 3:] -= twists[..., :3] @ parents[..., :3, 3:]
+        rates = seen.reshape(len(seen), -1, 4) @ twists.reshape(len(seen), -1, 4).swapaxes(1, 2)
+        rates = rates.reshape(len(seen), *self._signs.shape, 3) * self._signs[..., None]
+        slope = rates.sum(axis=2).swapaxes(2, 3)
         return error, slope.reshape(*error.shape, -1) * self.unit
 
     def closed(self, poses: np.ndarray, fixed: np.ndarray, count: int = 12, pull: float = 0.0,
