@@ -259,7 +259,7 @@ class _Loops:
         ways.
         """
         component, gap = self._component, float(walk.gaps[path, step])
-        poses = [self._pose, *(each[[path]] for each in walk.poses[:step])]
+        poses = [self._pose, *(pose[[path]] for pose in walk.poses[:step])]
         if math.isnan(gap) or not component.is_of([*walk.joints]).all():
             motors = {name: walk.joints[name][path, [step]] for name in self._motors}
             fixed = component.is_of([*motors])

@@ -185,9 +185,9 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], l
             if not pairs:
                 raise ValueError(f'its loops end where the file has {listed(motors)}: choose '
                                  'another pose by --pose, or mend lengths or places in the file')
-            asked = [question for poses in pairs for question in _question(
+            choices = [question for poses in pairs for question in _question(
                 component, poses, (way != 0.0) | fixed, motors)]
-            questions += asked[:1]
+            questions += choices[:1]
     if questions:
         raise _choice(questions, 'bars lie in line where the file has them, and it moves on')
 

@@ -146,6 +146,6 @@ def _check_rods(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> Non
                    if held & {*joint.bodies}} - held:
         held |= more
     for body in dict.fromkeys(end for joint in joints for end in joint.bodies):
-        own = [joint.bodies for joint in joints if body in joint.bodies]
-        if body not in held and (len(own) != 2 or not all(held & {*ends} for ends in own)):
+        ends = [joint.bodies for joint in joints if body in joint.bodies]
+        if body not in held and (len(ends) != 2 or not all(held & {*pair} for pair in ends)):
             raise ValueError(f'not planar: {body} hangs on balls alone, and is no rod')
