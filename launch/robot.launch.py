@@ -18,7 +18,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from linkage_ros import scene
-from linkage_ros.robot_files import model, readers
+from linkage_ros.robot_files import command, readers
 from linkage_ros.scene.writing import in_yaml
 
 SWITCH = ['true', 'false', 'True', 'False']
@@ -46,19 +46,18 @@ def generate_launch_description():
 
 def _started(context):
     chosen = {name: LaunchConfiguration(name).perform(context) for name, *_ in ARGUMENTS}
-    loops = chosen['loops'] or None
-    shown, robot = scene.load(chosen['scene']), readers.read(chosen['robot'], loops)
-    held = {name: float(value) for name, _, value in (
-        each.rpartition('=') for each in shlex.split(chosen['hold']))}
+    shown = scene.load(chosen['scene'])
+    robot = readers.read(chosen['robot'], chosen['loops'] or None)
+    held = command.positions(shlex.split(chosen['hold']))
     files = [chosen['scene']]
-    rest, lost = model.others(robot, shown.machines, held)
+    rest, lost = command.others(robot, shown.machines, held)
     if rest:
         # The last file says which mechanisms there are.
         file = Path(tempfile.mkdtemp()) / 'others.yaml'
-        file.write_text(in_yaml({'mechanisms': [*shown.machines, model.OTHERS], **rest}))
+        file.write_text(in_yaml(rest))
         files.append(str(file))
-    text = ParameterValue(model.description(chosen['robot'], loops), value_type=str)
-    reports = [LogInfo(msg=f'robot.launch.py: {model.not_published(lost)}')] * bool(lost)
+    text = ParameterValue(readers.description(chosen['robot'], robot), value_type=str)
+    reports = [LogInfo(msg=f'robot.launch.py: {command.not_published(lost)}')] * bool(lost)
     is_simulated = IfCondition(LaunchConfiguration('simulated')).evaluate(context)
     nodes = ('kinematics', 'crank_driver') if is_simulated else ('kinematics',)
     return [*reports,

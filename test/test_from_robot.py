@@ -10,7 +10,7 @@ import re
 import shlex
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.robot_files import closing, command, model, readers
+from linkage_ros.robot_files import closing, command, readers
 from linkage_ros.robot_model.command import main as robot_model
 from linkage_ros.robot_model.robot import posed
 import numpy as np
@@ -97,6 +97,9 @@ POSES = ' must be JOINT=VALUE, its value in rad or m'
     ('four_bar.urdf', ['--hold', 'motor=1e9'], f"'motor=1e9'{POSES}"),
     ('four_bar.urdf', ['--hold', 'motr=1'], "there is no joint 'motr'; allowed: motor, elbow, "
      'shoulder; did you mean motor?'),
+    ('four_bar.sdf', ['--driven', 'joint_a'], "there is no joint 'joint_a'; allowed: joint_A, "
+     'joint_B, joint_C, joint_D; did you mean joint_A?'),
+    ('five_bar.urdf', [], 'no joint of this robot closes a loop'),
     ('four_bar.sdf', ['--pose', 'joint_D=1'], 'joint_D closes a loop, so that other joints say '
      'where it is')])
 def test_an_option_that_cannot_be_is_named(capsys, file, args, why):
@@ -261,9 +264,10 @@ def test_joints_that_no_mechanism_publishes_are_one_of_cranks(tmp_path):
         ABC + '<link name="d"/>', '', hinge('k 2', 'b', 'c', (
             '<mimic joint="j" multiplier="-0.5" offset="0.1"/>')) + hinge('l', 'c', 'd')))
     robot = readers.read(str(file))
-    given, lost = model.others(robot, {}, {'l': 0.25, 'nobody': 1.0})
+    given, lost = command.others(robot, {}, {'l': 0.25, 'nobody': 1.0})
     assert not lost and given == {
-        'others.type': 'custom', 'others.only_named': True, 'others.joints': [
+        'mechanisms': ['others'], 'others.type': 'custom', 'others.only_named': True,
+        'others.joints': [
             'A ground 0 0', 'B1 crank A 1', 'B2 crank A 1', 'B3 crank A 1'],
         'others.joint_names': ['crank2="k 2"'], **{
             f'others.{crank}.{key}': value for crank, source, ratio, offset, start in (
@@ -271,7 +275,7 @@ def test_joints_that_no_mechanism_publishes_are_one_of_cranks(tmp_path):
                 ('crank3', 'l', 1.0, 0.0, 0.25)) for key, value in (
                     ('source', source), ('ratio', ratio), ('offset', offset), ('start', start),
                     ('speed', 0.0))}}
-    assert model.others(readers.read(str(ROBOTS / 'four_bar.sdf')), scene.read(command.described(
+    assert command.others(readers.read(str(ROBOTS / 'four_bar.sdf')), scene.read(command.described(
         readers.read(str(ROBOTS / 'four_bar.sdf')))[0]).machines, {}) == ({}, [])
 
 

@@ -14,7 +14,6 @@ import re
 from xml.sax.saxutils import quoteattr
 
 from linkage_ros.robot_files import command, readers
-from linkage_ros.robot_model.robot import trees
 import numpy as np
 import pytest
 from test_robot_files import check_comes_back, random_robot, words
@@ -51,7 +50,7 @@ class Writer:
     def __init__(self, robot, rng):
         self.robot, self.rng = robot, rng
         self.degrees, self.has_key = rng.random(2) < 0.5
-        self.tree, cuts = trees(robot)
+        self.tree, cuts = robot.spanning_tree()
         self.cuts = [joint for joint in cuts if joint.name]
         self.names = [joint.name for _, joint in self.tree.values()]
         # The position of each joint where the file has the bodies, and in its keyframe from there.

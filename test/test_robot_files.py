@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 
 from hypothesis import example, given, settings, strategies as st
 from linkage_ros import mechanisms, scene
-from linkage_ros.robot_files import check, closing, command, model, readers
+from linkage_ros.robot_files import check, closing, command, readers
 from linkage_ros.robot_model.robot import posed
 from linkage_ros.robot_model.urdf import write
 import numpy as np
@@ -211,7 +211,7 @@ def test_limits_of_a_joint_are_those_of_all_that_it_follows(
     machine, = imported(file).values()
     drive = machine.first
     assert drive.source == 'servo'
-    assert ('motor, servo, servo from 5 to 2.6: its loops do not reach them' in printed(
+    assert ('the limits of servo, from 5 to 2.6: its loops do not reach them' in printed(
         file)) == (ends is None)
     assert (drive.ends and sorted((end - drive.offset) / drive.ratio for end in drive.ends)) == (
         ends and pytest.approx(ends))
@@ -348,7 +348,7 @@ def test_a_five_bar_is_closed_by_what_moves_it(imported, tmp_path, more, mimic, 
         joints = published(machine, **motors(angle))
         places = robot.places(joints, ['front_foot', 'back_foot'])
         assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
-    rest, lost = model.others(readers.read(str(file), str(loops)), {'m': machine}, {})
+    rest, lost = command.others(readers.read(str(file), str(loops)), {'m': machine}, {})
     assert not lost and [value for key, value in rest.items() if key.endswith('.source')] == [
         'front_knee'] * ('FIXED' in more) + ['mot_front'] * bool(mimic)
 
@@ -412,16 +412,28 @@ def pin(side):
     return f'{place.real!r} 0 {place.imag!r} 0 0 0'
 
 
-def test_what_is_left_out_is_named_with_the_reason(capsys, tmp_path):
-    assert 'not planar: the axes of motor and shoulder are 11.3 degrees from it' in refused(
-        capsys, written(tmp_path, 'four_bar.urdf', ('0 -1 0', '0 -1 0.2')))
-    assert 'its loops cannot be closed: they stay open by' in refused(
-        capsys, written(tmp_path, 'four_bar.urdf', ('link="rocker" xyz="0 0 0.2"',
-                                                    'link="rocker" xyz="0 0 2.2"')))
-    assert 'no joint of this robot closes a loop' in refused(capsys, ROBOTS / 'five_bar.urdf')
-    assert refused(capsys, ROBOTS / 'four_bar.sdf', '--driven', 'joint_a') == (
-        "from_robot: there is no joint 'joint_a'; allowed: joint_A, joint_B, joint_C, joint_D; "
-        'did you mean joint_A?\n')
+WRONG = [
+    ('four_bar.urdf', '0 -1 0', '0 -1 0.2',
+     'not planar: the axes of motor and shoulder are 11.3 degrees from it'),
+    ('four_bar.urdf', 'link="rocker" xyz="0 0 0.2"', 'link="rocker" xyz="0 0 2.2"',
+     'its loops cannot be closed: they stay open by'),
+    ('four_bar.urdf', 'name="wrist" type="revolute"', 'name="wrist" type="universal"',
+     'joint wrist is universal and must have two axes'),
+    ('four_bar.xml', '<connect name="wrist" body1="coupler" body2="rocker" anchor="0.3 0 0"/>',
+     '<weld name="wrist" body1="coupler" body2="rocker"/>',
+     'it cannot move, as its joints hold each other'),
+    ('four_bar.xml', '<worldbody>', '<include file="floor.xml"/><worldbody>',
+     "four_bar.xml: it includes 'floor.xml', which is not there\n"),
+    ('four_bar.xml', '<worldbody>',
+     '<extension><plugin plugin="mujoco.none"/></extension><worldbody>',
+     "four_bar.xml: it uses the plugin 'mujoco.none', which this MuJoCo does not have: remove")]
+
+
+@pytest.mark.parametrize('file, old, new, why', WRONG, ids=range(len(WRONG)))
+def test_what_is_wrong_in_a_robot_is_named(capsys, tmp_path, file, old, new, why):
+    if file.endswith('.xml'):
+        pytest.importorskip('mujoco')
+    assert why in refused(capsys, written(tmp_path, file, (old, new)))
 
 
 BAD = [('<robot', 'is no XML: '),
@@ -431,6 +443,8 @@ BAD = [('<robot', 'is no XML: '),
         '<parent link="a"/><child link="b"/><mimic joint="kne"/></joint></robot>',
         "robot.xml: knee follows 'kne', which is no joint; did you mean knee?"),
        ('<a/>', 'must be MJCF, SDF or URDF, not <a>'),
+       ('<robot name="r"><xacro:property name="a" value="1"/></robot>',
+        'robot.xml is xacro: run xacro first, as in xacro '),
        ('<robot/>', 'a URDF has one root link, not 0'),
        ('<sdf/>', 'the SDF has no model with joints'),
        ('<mujoco><b/></mujoco>', 'Schema violation'),
@@ -578,14 +592,6 @@ def test_motors_that_hold_each_other_are_named(imported, capsys):
     assert ('motor, shoulder drive it, and hold each other, as 1 of them tell where all is'
             in refused(capsys, file, '--driven', 'motor', 'shoulder'))
     assert imported(file, '--driven', 'shoulder')['shoulder']
-
-
-def test_bodies_that_hold_each_other_are_no_linkage(capsys, tmp_path):
-    pytest.importorskip('mujoco')
-    file = written(tmp_path, 'four_bar.xml', (
-        '<connect name="wrist" body1="coupler" body2="rocker" anchor="0.3 0 0"/>',
-        '<weld name="wrist" body1="coupler" body2="rocker"/>'))
-    assert 'it cannot move, as its joints hold each other' in refused(capsys, file)
 
 
 FLAT = [f'{name}={value!r}' for name, value in (
@@ -811,16 +817,6 @@ def test_a_misfit_is_printed_and_imported_if_it_is_small(capsys, tmp_path, lean,
     assert all(worst <= max(2.0 * lean, 1e-15) for _, worst in checked(err))
 
 
-def test_what_mujoco_does_not_find_is_named(capsys, tmp_path):
-    pytest.importorskip('mujoco')
-    for more, why in (
-            ('<include file="floor.xml"/>', "it includes 'floor.xml', which is not there\n"),
-            ('<extension><plugin plugin="mujoco.none"/></extension>',
-             "it uses the plugin 'mujoco.none', which this MuJoCo does not have: remove")):
-        file = written(tmp_path, 'four_bar.xml', ('<worldbody>', f'{more}<worldbody>'))
-        assert f'four_bar.xml: {why}' in refused(capsys, file)
-
-
 @pytest.mark.parametrize('low, start', [(-0.5, 0.0), (0.2, 0.2)])
 def test_limits_of_a_motor_between_two_moving_links_are_its_sweep(imported, tmp_path, low, start):
     file = written(tmp_path, 'four_bar.urdf', (
@@ -834,11 +830,11 @@ def test_a_passive_joint_of_a_loop_is_no_input(imported, tmp_path):
     # A spring beside the motor's loop leaves a second one undetermined.
     spring = sprung(tmp_path)
     machines, robot = imported(spring), readers.read(str(spring))
-    rest, lost = model.others(robot, machines, {})
+    rest, lost = command.others(robot, machines, {})
     loop = {'spring', 'right_spring_link_joint', 'right_follower_joint'}
     assert {*lost} == loop and not loop & {*map(str, rest.values())}
     assert f'Not published: {", ".join(lost)}: passive joints of loops' in printed(spring)
-    rest, lost = model.others(robot, machines, {'spring': 0.0})
+    rest, lost = command.others(robot, machines, {'spring': 0.0})
     assert {*lost} == loop - {'spring'} and 'spring' in {*map(str, rest.values())}
 
 
@@ -849,9 +845,9 @@ def test_a_joint_of_the_whole_robot_that_opens_a_loop_is_named(monkeypatch, caps
     given, _, _ = command.described(robot)
     names = [line for line in given['hip.joint_names'] if 'bell' not in line]
     machines = scene.read({**given, 'hip.joint_names': names}).machines
-    rest, lost = model.others(robot, machines, {})
+    rest, lost = command.others(robot, machines, {})
     assert lost == ['bell_joint'] and not rest
-    still, _ = model.others(robot, machines, {'bell_joint': 0.0})
+    still, _ = command.others(robot, machines, {'bell_joint': 0.0})
     wrong = scene.read({**given, **still, 'hip.joint_names': names,
                         'mechanisms': ['hip', 'others']}).machines
     ends = {'hip': (-0.2, 0.3), 'crank_motor': (-0.3, 0.3)}
@@ -864,38 +860,26 @@ def test_a_joint_of_the_whole_robot_that_opens_a_loop_is_named(monkeypatch, caps
     assert f'Left out: hip: compared with the robot: {found[1]["hip"]}.' in refused(capsys, file)
 
 
-def test_xacro_has_to_be_run_first(capsys, tmp_path):
-    file = tmp_path / 'robot.xacro'
-    file.write_text('<robot name="r"><xacro:property name="a" value="1"/></robot>')
-    assert f'is xacro: run xacro first, as in xacro {file} > robot.urdf' in refused(capsys, file)
-
-
 @pytest.mark.parametrize('file', ['boom.urdf', 'gripper.xml', 'rack.sdf', 'palletiser.urdf'])
 def test_all_joints_of_a_whole_robot_are_published(imported, file):
     more = ['--loops', ROBOTS / 'palletiser_loops.yaml'] * ('pallet' in file)
     machines, robot = imported(file, *more), readers.read(str(ROBOTS / file), *map(str, more[1:]))
-    rest, lost = model.others(robot, machines, {})
+    rest, lost = command.others(robot, machines, {})
     assert not lost
     names = ['others'] * bool(rest)
     if names:
-        machines = {**machines, **scene.read({'mechanisms': names, **rest}).machines}
+        machines = {**machines, **scene.read({**rest, 'mechanisms': names}).machines}
     published = {drive.source for machine in machines.values()
                  for drive in machine.inputs.values()}
     published |= {called.name for machine in machines.values()
                   for called in machine.joints.values() if called.published}
-    text = model.description(str(ROBOTS / file), *map(str, more[1:]))
+    text = readers.description(str(ROBOTS / file), robot)
     assert {*LIBRARIES[1](text).joints} <= published
-
-
-def test_a_universal_joint_with_one_axis_is_refused(capsys, tmp_path):
-    file = written(tmp_path, 'four_bar.urdf', ('name="wrist" type="revolute"',
-                                               'name="wrist" type="universal"'))
-    assert 'joint wrist is universal and must have two axes' in refused(capsys, file)
 
 
 def test_a_comment_of_another_format_makes_no_urdf(tmp_path):
     file = written(tmp_path, 'four_bar.sdf', ('</sdf>', '</sdf><!-- from <robot> -->'))
-    assert model.description(str(file)).startswith('<robot')
+    assert readers.description(str(file), readers.read(str(file))).startswith('<robot')
 
 
 def test_a_motor_between_two_moving_links_drives_in_the_frame_of_one(imported):
@@ -954,7 +938,7 @@ def test_a_tree_of_mujoco_is_the_same_tree_as_urdf(tmp_path, seed):
         data.qpos[whole.joint(name).qposadr] = value
     mujoco.mj_kinematics(whole, data)
     bodies = [whole.body(i).name for i in range(1, whole.nbody)]
-    found = LIBRARIES[1](write(model.drawn(robot))).places(positions, bodies)
+    found = LIBRARIES[1](write(readers.drawn(robot))).places(positions, bodies)
     for i, body in enumerate(bodies):
         assert found[body] == pytest.approx(data.xpos[i + 1], abs=1e-13)
 

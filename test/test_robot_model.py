@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 from hypothesis import given, settings, strategies as st
 from linkage_ros import command, scene
-from linkage_ros.robot_model import bodies, mjcf, places, rviz, sdf, urdf
+from linkage_ros.robot_model import bodies, mjcf, robot, rviz, sdf, urdf
 from linkage_ros.robot_model.bodies import assembled
 from linkage_ros.robot_model.command import main, show
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, ground_frame, GUIDE, ROD, shapes
@@ -440,9 +440,9 @@ def test_what_has_no_length_is_not_drawn():
                 | st.floats(-7.0, 7.0), min_size=3, max_size=3))
 def test_coordinates_of_a_pose_give_the_pose(place, angles):
     pose = turned(*place, *angles)
-    found = places.coordinates(pose)
+    found = robot.coordinates(pose)
     assert turned(*found) == pytest.approx(pose, abs=1e-8)
-    assert places.pose(*place, *angles) == pytest.approx(pose, abs=1e-12)
+    assert robot.pose(*place, *angles) == pytest.approx(pose, abs=1e-12)
     assert all(map(math.isfinite, found)) and abs(found[4]) <= 0.5 * math.pi + 1e-12
 
 

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.robot_files import model, readers
+from linkage_ros.robot_files import readers
 from linkage_ros.robot_model import bodies, mjcf, sdf, urdf
 from linkage_ros.robot_model.bodies import assembled
 from linkage_ros.robot_model.shapes import BALL, Piece
@@ -153,7 +153,7 @@ def test_random_trees_of_a_file_come_back_in_each_format(tmp_path, seed, form):
         pytest.importorskip('mujoco')
     file = tmp_path / 'tree.urdf'
     file.write_text(random_urdf(np.random.default_rng(seed))[0])
-    drawn = model.drawn(readers.read(str(file)))
+    drawn = readers.drawn(readers.read(str(file)))
     # What moves in MuJoCo weighs something.
     drawn.parts[0].robot.pieces.update((body, [Piece(BALL, 'joint', 0.1, (0.0, 0.0), (0.1, 0.0))])
                                        for body in drawn.parts[0].robot.frames)
@@ -164,4 +164,4 @@ def test_random_trees_of_a_file_come_back_in_each_format(tmp_path, seed, form):
 @pytest.mark.parametrize('file', ['four_bar.urdf', 'boom.urdf', 'palletiser.urdf',
                                   'wheel_leg.urdf'])
 def test_a_file_is_the_same_tree_when_it_is_written_again(tmp_path, file):
-    check_read(model.drawn(readers.read(str(ROBOTS / file))), 'urdf', tmp_path)
+    check_read(readers.drawn(readers.read(str(ROBOTS / file))), 'urdf', tmp_path)

@@ -74,11 +74,10 @@ class Source(NamedTuple):
     value: float
 
 
-def parameters(mechanism: str, kind: str, lines: Sequence[str], frame_id: str,
-               drives: Sequence[Source], joints: Sequence[Tuple[str, float, str, float]],
-               **more: Any) -> Dict[str, Any]:
+def parameters(mechanism: str, kind: str, lines: Sequence[str], drives: Sequence[Source],
+               joints: Sequence[Tuple[str, float, str, float]], **more: Any) -> Dict[str, Any]:
     """Return a mechanism's; of joints the link, the sign, the robot's name and the position."""
-    values = {'type': kind, 'joints': [*lines], 'frame_id': frame_id, **more}
+    values = {'type': kind, 'joints': [*lines], **more}
     for drive in drives:
         values.update({f'{drive.name}.source': drive.source, f'{drive.name}.ratio': drive.ratio,
                        f'{drive.name}.offset': float(short(drive.offset)),
@@ -260,7 +259,7 @@ class _Loops:
         ways.
         """
         component, gap = self._component, float(walk.gaps[path, step])
-        poses = [self._pose, *(each[[path]] for each in walk.poses[:step])]
+        poses = [self._pose, *(pose[[path]] for pose in walk.poses[:step])]
         if math.isnan(gap) or not component.is_of([*walk.joints]).all():
             motors = {name: walk.joints[name][path, [step]] for name in self._motors}
             fixed = component.is_of([*motors])

@@ -13,7 +13,7 @@ from typing import Dict, List, Mapping, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from .spatial import CLOSED, Component, components, DEAD_POINT, is_free
-from ..robot_model.robot import displaced, FIXED, NotDriven, posed, Robot, trees
+from ..robot_model.robot import displaced, FIXED, NotDriven, posed, Robot
 from ..words import listed
 
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
@@ -68,7 +68,7 @@ def closed(robot: Robot) -> Closed:
     if not made.faults:
         return made
     inside = {}
-    for _, joint in trees(robot)[0].values():
+    for joint in robot.tree_joints.values():
         low, high = joint.range
         if joint.position is not None and not low <= joint.position <= high:
             margin = INSIDE * min(high - low, 1.0)
@@ -84,8 +84,8 @@ def closed(robot: Robot) -> Closed:
 def _closed(robot: Robot) -> Closed:
     # Dependent joints are where the others say.
     robot = posed(robot, {name: ratio * robot.positions[source] + offset
-                          for _, joint in trees(robot)[0].values()
-                          if (name := joint.name) in robot.follows and joint.position is not None
+                          for name, joint in robot.tree_joints.items()
+                          if name in robot.follows and joint.position is not None
                           for source, ratio, offset in [robot.source(name)]})
     made = Closed(robot, [], {})
     moves: Dict[str, np.ndarray] = {}
@@ -185,9 +185,9 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], l
             if not pairs:
                 raise ValueError(f'its loops end where the file has {listed(motors)}: choose '
                                  'another pose by --pose, or mend lengths or places in the file')
-            asked = [question for poses in pairs for question in _question(
+            choices = [question for poses in pairs for question in _question(
                 component, poses, (way != 0.0) | fixed, motors)]
-            questions += asked[:1]
+            questions += choices[:1]
     if questions:
         raise _choice(questions, 'bars lie in line where the file has them, and it moves on')
 

@@ -12,16 +12,18 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import check, closing, loops, model, planar, readers, rods
+from . import check, closing, loops, planar, readers, rods
+from .spatial import components
 from .. import command, scene
 from ..linkage import short
-from ..robot_model.robot import FARTHEST, FIXED, HINGE, NotDriven, posed, Robot, SLIDE, trees
+from ..robot_model.robot import FARTHEST, FIXED, HINGE, NotDriven, posed, Robot, SLIDE
 from ..scene.writing import in_yaml
 from ..words import elided, listed, sentence
 
 NAME = 'from_robot'
 # The report on a mechanism that differs from its robot, or could not be compared.
 WRONG = 'compared with the robot'
+OTHERS = 'others'
 
 
 def main(args: Optional[List[str]] = None) -> int:
@@ -46,8 +48,8 @@ def show(args: Optional[List[str]]) -> None:
         robot = readers.read(arguments.file, arguments.loops)
         robot.driven = arguments.driven or robot.driven
         robot.check_names(arguments.driven or ())
-        robot = posed(robot, _values(arguments.pose))
-        robot = closing.held(robot, {**robot.held, **_values(arguments.hold)})
+        robot = posed(robot, positions(arguments.pose))
+        robot = closing.held(robot, {**robot.held, **positions(arguments.hold)})
         parameters, reports, still = described(robot)
     # Unprintable characters in names of the file could end a comment.
     head = [*(elided(line, 10 ** 6) for line in (
@@ -115,21 +117,19 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
     for made in imported:
         parameters.update(made.parameters)
     machines = scene.read(parameters).machines
-    tree = {joint.name: joint for _, joint in trees(robot)[0].values()}
+    tree = robot.tree_joints
     stay = {name for made in imported for name in made.still}
     still = {name: value for name, value in robot.positions.items()
              if name in tree.keys() & stay - check.published(machines)}
-    rest, lost = model.others(robot, machines, still)
-    if rest:
-        names = [*machines, model.OTHERS]
-        machines = scene.read({**parameters, **rest, 'mechanisms': names}).machines
+    rest, lost = others(robot, machines, still)
+    machines = scene.read({**parameters, **rest}).machines
     checks, wrong = check.compared(robot, machines, imported)
     if wrong:
         return _checked(robot, [made for made in imported if made.name not in wrong], [
             *reports, *(f'Left out: {name}: {WRONG}: {why}.' for name, why in wrong.items())])
     reports = [*reports, *(report for made in imported for report in made.reports), *checks]
     if lost:
-        reports.append(model.not_published(lost))
+        reports.append(not_published(lost))
     if free := [name for name, joint in tree.items()
                 if name and joint.kind not in (HINGE, SLIDE, FIXED)]:
         reports.append(f'Not published: {", ".join(free)}: a ball or a free joint has no one '
@@ -137,7 +137,45 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
     return parameters, reports, still
 
 
-def _values(texts: Sequence[str]) -> Dict[str, float]:
+def others(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
+           held: Mapping[str, float]) -> Tuple[Dict[str, Any], List[str]]:
+    """
+    Return the parameters that add a mechanism of all joints that a scene does not publish.
+
+    Also return the joints that nothing determines: undriven ones in loops, and what follows them.
+    `held` are positions of joints that stay.
+    """
+    held = {name: value for name, value in {**robot.held, **held}.items()
+            if name in robot.positions}
+    known = check.published(machines)
+    passive = {joint.name for component in components(closing.held(robot, held))
+               for joint in component.joints}.difference(known, held, robot.driven)
+    cranks: Dict[str, check.Source] = {}
+    lost = []
+    for name in [name for name in robot.positions if name not in known]:
+        source, ratio, offset = (name, 1.0, 0.0) if name in held else robot.source(name)
+        if source in passive:
+            lost.append(name)
+            continue
+        cranks[name] = check.Source(
+            f'crank{len(cranks) + 1 if cranks else ""}', source, ratio, offset,
+            ratio * held.get(source, robot.positions[source]) + offset)
+    if not cranks:
+        return {}, lost
+    lines = ['A ground 0 0', *(f'B{i} crank A 1' for i in range(1, len(cranks) + 1))]
+    return {'mechanisms': [*machines, OTHERS], **check.parameters(
+        OTHERS, 'custom', lines, [*cranks.values()],
+        [(crank.name, 1.0, name, 0.0) for name, crank in cranks.items() if crank.source != name],
+        **{f'{crank.name}.speed': 0.0 for crank in cranks.values()})}, lost
+
+
+def not_published(names: Sequence[str]) -> str:
+    """Return the report on joints that nothing determines."""
+    return (f'Not published: {", ".join(names)}: passive joints of loops that no mechanism '
+            'determines. What they carry has no transform.')
+
+
+def positions(texts: Sequence[str]) -> Dict[str, float]:
     """Parse texts such as JOINT=VALUE; raise RequestError for an invalid one."""
     values = {}
     for text in texts:

@@ -12,8 +12,7 @@ from xml.parsers import expat
 import numpy as np
 
 from ..command import RequestError
-from ..robot_model.places import pose
-from ..robot_model.robot import FARTHEST, FIXED, Robot
+from ..robot_model.robot import FARTHEST, FIXED, pose, Robot
 
 Element = ElementTree.Element
 

@@ -11,7 +11,7 @@ from typing import List, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from .spatial import blocks, TOGETHER
-from ..robot_model.robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE, top, trees
+from ..robot_model.robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE
 
 # Kinds of joints in planar loops.
 FLAT = (HINGE, SLIDE, BALL)
@@ -31,15 +31,15 @@ class Group(NamedTuple):
 
 def groups(robot: Robot) -> List[Group]:
     """Return the loops of a robot, with their planar parts; bodies fixed to others are one."""
-    home = {body: body for body in robot.frames}
-    for joint in robot.joints:
-        if joint.kind == FIXED:
-            first, second = (top(home, body) for body in joint.bodies)
-            home[second] = first
+    # Those that close a loop fix bodies, too.
+    fixed = [replace(joint, is_cut=False) for joint in robot.joints if joint.kind == FIXED]
+    home = {robot.root: robot.root}
+    for body, (base, joint) in replace(robot, joints=fixed).spanning_tree()[0].items():
+        home[body] = home[base] if joint.kind == FIXED else body
     # Several bodies that are one have the name of the first that a joint moves.
-    names = {top(home, body): body for joint in robot.joints[::-1] if joint.kind != FIXED
+    names = {home[body]: body for joint in robot.joints[::-1] if joint.kind != FIXED
              for body in joint.bodies[::-1]}
-    home = {body: names.get(top(home, body), top(home, body)) for body in home}
+    home = {body: names.get(first, first) for body, first in home.items()}
     joints = [replace(joint, bodies=(home[joint.bodies[0]], home[joint.bodies[1]]))
               for joint in robot.joints]
     robot = replace(robot, root=home[robot.root], joints=[
@@ -64,7 +64,7 @@ def _parts(robot: Robot, group: Group) -> List[Group]:
 
 def _blocks(robot: Robot, joints: List[Joint]) -> List[Group]:
     """Return the loops of some joints, those that share bars together."""
-    tree, cuts = trees(replace(robot, joints=joints))
+    tree, cuts = replace(robot, joints=joints).spanning_tree()
     groups = []
     for block, closing in blocks(tree, cuts):
         edges = {tree[body][1] for body in block} | {*closing}
@@ -146,6 +146,6 @@ def _check_rods(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> Non
                    if held & {*joint.bodies}} - held:
         held |= more
     for body in dict.fromkeys(end for joint in joints for end in joint.bodies):
-        own = [joint.bodies for joint in joints if body in joint.bodies]
-        if body not in held and (len(own) != 2 or not all(held & {*ends} for ends in own)):
+        ends = [joint.bodies for joint in joints if body in joint.bodies]
+        if body not in held and (len(ends) != 2 or not all(held & {*pair} for pair in ends)):
             raise ValueError(f'not planar: {body} hangs on balls alone, and is no rod')

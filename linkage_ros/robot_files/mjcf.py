@@ -14,8 +14,7 @@ import numpy as np
 
 from .elements import turned_by
 from ..command import RequestError
-from ..robot_model.places import at
-from ..robot_model.robot import BALL, FIXED, Robot
+from ..robot_model.robot import at, BALL, FIXED, Robot
 
 # What MuJoCo says of a file, and the sentence for it.
 _ERRORS = [
@@ -68,8 +67,8 @@ def _compiled(path: str) -> Any:
         spec = MjSpec.from_file(path)
     except ValueError as error:
         for pattern, why in _ERRORS:
-            if found := re.search(pattern, str(error)):
-                raise RequestError(why.format(found[1])) from None
+            if match := re.search(pattern, str(error)):
+                raise RequestError(why.format(match[1])) from None
         raise
     for geom in spec.geoms:
         if geom.meshname or geom.hfieldname:

@@ -22,8 +22,7 @@ from . import check, loops
 from .spatial import EXACT, TOGETHER
 from .. import mechanisms, scene
 from ..linkage import bar_name, Dyads, Hinge, Mechanism, Motor, Pin, ROUNDING, short, Slide
-from ..robot_model.places import at, coordinates
-from ..robot_model.robot import HINGE, Joint, Limits, NotDriven, plain, Robot, SLIDE
+from ..robot_model.robot import at, coordinates, HINGE, Joint, NotDriven, plain, Robot, SLIDE
 from ..scene import FARTHEST
 
 # Loops with a smaller gap, of their size, are closed: files have rounded numbers.
@@ -271,8 +270,9 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
                 parameters[f'{name}.{drive.name}.sweep'] = [*sweep]
                 parameters[f'{name}.{drive.name}.start'] = min(max(drive.value, low), high)
             except ValueError as error:
-                reports.append('Left out: the limits of '
-                               f'{limits[drive.source].text(drive.source)}: {error}.')
+                low_limit, high_limit = limits[drive.source]
+                reports.append(f'Left out: the limits of {drive.source}, from {low_limit:.4g} to '
+                               f'{high_limit:.4g}: {error}.')
         start = min(max(drive.value, low), high)
         low, high = sorted((end - drive.offset) / drive.ratio for end in (
             max(low, start - 2.0 * around), min(high, start + 2.0 * around)))
@@ -287,12 +287,12 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
     return check.Imported(name, parameters, reports, driven, ends, slack, drawing.still)
 
 
-def _sweep(drive: check.Source, limits: Limits, settings: scene.InputSettings
+def _sweep(drive: check.Source, limits: Tuple[float, float], settings: scene.InputSettings
            ) -> Tuple[float, float]:
     """Return the limits of an input within its reach; raise ValueError if it has no such ends."""
     low, high = (float(short(end, 1e-15)) if abs(end) < FARTHEST else math.copysign(math.inf, end)
                  for end in (drive.ratio * end + drive.offset
-                             for end in limits[:2][::1 if drive.ratio > 0.0 else -1]))
+                             for end in limits[::1 if drive.ratio > 0.0 else -1]))
     for start, end in () if settings.input.is_whole(settings.reach) else settings.reach:
         turns = math.tau * math.floor((drive.value - start) / math.tau) * settings.input.turns
         if start + turns <= drive.value <= end + turns:
@@ -361,5 +361,5 @@ def _parameters(drawing: Drawing, name: str) -> Dict[str, Any]:
             angle = math.remainder(angle - float(np.asarray(links[link].zero)), math.tau)
         joints.append((link, sign, joint.name, joint.start - sign * angle))
     return check.parameters(
-        name, 'custom', drawing.lines, drawing.ground, drawing.drives, joints,
+        name, 'custom', drawing.lines, drawing.drives, joints, frame_id=drawing.ground,
         pose=[float(short(value)) for value in coordinates(drawing.frame)])

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 from collections import Counter
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Iterator, Mapping, Optional
 
 from . import sdf, urdf
 from .elements import parse
 from ..command import RequestError
 from ..optional import needs
-from ..robot_model.robot import Robot
+from ..robot_model import bodies
+from ..robot_model.robot import posed, Robot
+from ..robot_model.urdf import write
 
 
 def read(path: str, loops: Optional[str] = None) -> Robot:
@@ -43,6 +46,17 @@ def read(path: str, loops: Optional[str] = None) -> Robot:
         for name in robot.follows:
             robot.source(name)
     return robot
+
+
+def description(path: str, robot: Robot) -> str:
+    """Return a robot as robot_state_publisher takes it: its URDF as it is, else its tree."""
+    return Path(path).read_text() if parse(path).tag == 'robot' else write(drawn(robot))
+
+
+def drawn(robot: Robot) -> bodies.Model:
+    """Return the tree of a robot as a model that is written, its joints at zero."""
+    at_zero = dict.fromkeys(robot.positions.keys() & robot.tree_joints, 0.0)
+    return bodies.Model('robot', robot.root, [bodies.Part(posed(robot, at_zero))])
 
 
 @contextmanager

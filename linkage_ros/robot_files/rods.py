@@ -21,7 +21,7 @@ from . import check
 from .loops import Group
 from .. import mechanisms, scene
 from ..linkage import FORMS, short, WindowError
-from ..robot_model.robot import BALL, HINGE, Joint, Limits, NotDriven, plain, Robot, SLIDE
+from ..robot_model.robot import BALL, HINGE, Joint, NotDriven, plain, Robot, SLIDE
 from ..words import listed
 
 # A hinge with wider limits [rad] has none.
@@ -211,9 +211,9 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
         if why and joint.name not in sources and link not in made.universals:
             reports.append(f'Left out: the limits of {joint.name}, {why}.')
     name = check.name_beside(others, f'{made.drives[0].name}_rods')
-    parameters = check.parameters(name, 'rods', lines, group.ground, made.drives, [
+    parameters = check.parameters(name, 'rods', lines, made.drives, [
         (link, 1.0, joint.name, joint.start) for link, joint in made.links.items()
-        if joint.name not in sources and joint.position is not None])
+        if joint.name not in sources and joint.position is not None], frame_id=group.ground)
     machine = scene.read({'mechanisms': [name], **parameters}).machines[name]
     ends = {}
     for drive, (low, high) in zip(machine.inputs.values(), _sweeps(machine, limits)):
@@ -224,10 +224,11 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
     return check.Imported(name, parameters, reports, [*ends], ends, still=made.still)
 
 
-def _sweeps(machine: scene.SceneMechanism, limits: Mapping[str, Limits]) -> List[List[float]]:
+def _sweeps(machine: scene.SceneMechanism, limits: Mapping[str, Tuple[float, float]]
+            ) -> List[List[float]]:
     """Return the ends of the inputs: limits, made smaller until every pose in them exists."""
     drives = machine.inputs.values()
-    low, high = np.array([np.add(limits.get(drive.source, (-math.inf, math.inf))[:2], drive.offset)
+    low, high = np.array([np.add(limits.get(drive.source, (-math.inf, math.inf)), drive.offset)
                           for drive in drives]).T
     start = np.clip([drive.start for drive in drives], low, high)
     size = np.array([2.5 if drive.input.turns else 0.5 * drive.start for drive in drives])

@@ -13,8 +13,7 @@ import numpy as np
 
 from .elements import attribute, Element, numbers, once, text, turned_by, weld
 from ..command import RequestError
-from ..robot_model.places import at, pose
-from ..robot_model.robot import Robot
+from ..robot_model.robot import at, pose, Robot
 
 
 def read(root: Element) -> Robot:

@@ -18,8 +18,7 @@ from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Sequence, Set
 import numpy as np
 
 from ..command import RequestError
-from ..robot_model.places import displacements, screws
-from ..robot_model.robot import BALL, FIXED, FREE, HINGE, Joint, Robot, SLIDE, trees
+from ..robot_model.robot import BALL, exponentials, FIXED, FREE, HINGE, Joint, Robot, screws, SLIDE
 
 # The largest step of an iteration [rad, or of the size].
 MAX_STEP = 0.5
@@ -66,7 +65,7 @@ def blocks(tree: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
 
 def components(robot: Robot) -> Iterator['Component']:
     """Yield the loops of a robot; those that share joints are one component."""
-    tree, cuts = trees(robot)
+    tree, cuts = robot.spanning_tree()
     for bodies, joints in blocks(tree, cuts):
         if len(bodies) > MAX_BODIES:
             raise RequestError(f'{len(bodies)} bodies are in loops that share joints: no more '
@@ -181,7 +180,7 @@ class Component:
 
     def _frames(self, poses: np.ndarray) -> np.ndarray:
         """Return the displacement after each screw; the last is that of the root."""
-        moved = displacements(self._twists, poses, self._slides)
+        moved = exponentials(self._twists, poses, self._slides)
         frames = np.empty((len(poses), len(self._screws) + 1, 4, 4))
         frames[:, -1] = np.eye(4)
         for i, parent in enumerate(self._parents):
@@ -196,9 +195,12 @@ class Component:
         if not slopes:
             return error, np.zeros(0)
         parents = frames[:, self._parents]
-        twists = parents @ self._twists @ np.linalg.inv(parents)
-        rates = np.einsum('pcij,prsj->prsci', twists[..., :3, :], seen)
-        slope = np.einsum('prsci,rsc->pric', rates, self._signs)
+        turned, twists = parents[..., :3, :3].swapaxes(2, 3), (parents @ self._twists)[..., :3, :]
+        twists[..., :3] = twists[..., :3] @ turned
+        twists[..., 3:] -= twists[..., :3] @ parents[..., :3, 3:]
+        rates = seen.reshape(len(seen), -1, 4) @ twists.reshape(len(seen), -1, 4).swapaxes(1, 2)
+        rates = rates.reshape(len(seen), *self._signs.shape, 3) * self._signs[..., None]
+        slope = rates.sum(axis=2).swapaxes(2, 3)
         return error, slope.reshape(*error.shape, -1) * self.unit
 
     def closed(self, poses: np.ndarray, fixed: np.ndarray, count: int = 12, pull: float = 0.0,
@@ -267,7 +269,7 @@ class Component:
     def moves(self, pose: np.ndarray) -> Dict[str, np.ndarray]:
         """Return the displacement of each body on its parent in a pose."""
         moved: Dict[str, np.ndarray] = {}
-        for screw, step in zip(self._screws, displacements(self._twists, pose, self._slides)):
+        for screw, step in zip(self._screws, exponentials(self._twists, pose, self._slides)):
             moved[screw.body] = moved.get(screw.body, np.eye(4)) @ step
         return moved
 

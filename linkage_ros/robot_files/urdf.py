@@ -20,8 +20,7 @@ import numpy as np
 
 from .elements import attribute, Element, numbers, once, origin, text, weld
 from ..command import RequestError
-from ..robot_model.places import at, pose
-from ..robot_model.robot import BALL, FIXED, HINGE, Robot, UNIVERSAL
+from ..robot_model.robot import at, BALL, FIXED, HINGE, pose, Robot, UNIVERSAL
 from ..words import listed, meant, quoted
 
 # The keys of a file of loops; the last two have no effect.

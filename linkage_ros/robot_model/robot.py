@@ -16,7 +16,6 @@ from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Optional, Seque
 
 import numpy as np
 
-from .places import at, coordinates, displacements, pose, screws
 from .shapes import Piece
 from ..command import RequestError
 from ..words import listed, meant
@@ -32,21 +31,49 @@ FARTHEST = 1e9
 _TREE = {FIXED: 0, SLIDE: 1, FREE: 2, BALL: 3, HINGE: 4}
 
 
+def at(place: Any, turned: Any = ((1, 0, 0), (0, 1, 0), (0, 0, 1))) -> np.ndarray:
+    """Return a pose by its place and its rotation matrix."""
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = turned, place
+    return made
+
+
+def pose(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) -> np.ndarray:
+    """Return a pose as a matrix (4, 4), by its place [m] and its angles about fixed axes [rad]."""
+    (cr, cp, cy), (sr, sp, sy) = map(math.cos, (roll, pitch, yaw)), map(math.sin, (
+        roll, pitch, yaw))
+    return np.array([
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y],
+        [-sp, cp * sr, cp * cr, z], [0.0, 0.0, 0.0, 1.0]])
+
+
+def coordinates(matrix: np.ndarray) -> tuple[float, ...]:
+    """Return x, y, z [m], roll, pitch and yaw [rad] of a pose (4, 4)."""
+    (a, d, g, x), (b, e, h, y), (c, _, _, z), _ = matrix.tolist()
+    yaw = math.atan2(b, a) if math.hypot(a, b) > 1e-9 else 0.0
+    sin, cos = math.sin(yaw), math.cos(yaw)
+    return (x, y, z, math.atan2(sin * g - cos * h, cos * e - sin * d),
+            math.atan2(-c, cos * a + sin * b), yaw)
+
+
+def screws(axes: np.ndarray, places: np.ndarray, slides: Any = False) -> np.ndarray:
+    """Return the velocities (..., 4, 4) of unit motions about axes at places, or along them."""
+    made = np.zeros((*axes.shape[:-1], 4, 4))
+    slides = np.asarray(slides)[..., None]
+    made[..., :3, :3] = np.where(slides[..., None], 0.0, np.cross(np.eye(3), axes[..., None, :]))
+    made[..., :3, 3] = np.where(slides, axes, np.cross(places, axes))
+    return made
+
+
+def exponentials(screw: np.ndarray, by: np.ndarray, slides: Any = False) -> np.ndarray:
+    """Return displacements by positions [rad or m] of screws: their exponentials."""
+    sine, less = np.where(slides, by, np.sin(by)), 1.0 - np.cos(by)
+    return np.eye(4) + sine[..., None, None] * screw + less[..., None, None] * (screw @ screw)
+
+
 class NotDriven(ValueError):
     """The motors do not determine the poses of a loop."""
-
-
-class Limits(NamedTuple):
-    """Between which positions a joint moves [rad or m], by the limits of some joints."""
-
-    low: float
-    high: float
-    joints: tuple[str, ...]
-
-    def text(self, joint: str) -> str:
-        """Return the limits of a joint as text."""
-        name = '' if self.joints == (joint,) else f' {joint}'
-        return f'{", ".join(self.joints)},{name} from {self.low:.4g} to {self.high:.4g}'
 
 
 @dataclass(eq=False)
@@ -190,7 +217,7 @@ class Robot:
     def bodies(self) -> Iterator[Body]:
         """Yield the bodies on the root, parents first; a joint is at the origin of its body."""
         span = np.abs([frame[:3, 3] for frame in self.frames.values()]).max()
-        for name, (base, joint) in trees(self)[0].items():
+        for name, (base, joint) in self.spanning_tree()[0].items():
             frame, seen = self.frames[name], self.frames[base]
             if joint.kind in (HINGE, SLIDE) and joint.position is not None:
                 home = at(joint.place(name), frame[:3, :3])
@@ -202,6 +229,44 @@ class Robot:
                     continue
                 base, seen = f'{name}/joint', home
             yield Body(name, base, _seen(seen, frame, span))
+
+    def spanning_tree(self) -> tuple[dict[str, tuple[str, Joint]], list[Joint]]:
+        """Return the parent and the joint of each body, and the joints that close loops."""
+        home, cuts = {body: body for body in self.frames}, []
+
+        def joined(body: str) -> str:
+            while home[body] != body:
+                home[body] = body = home[home[body]]
+            return body
+
+        near: dict[str, list[tuple[str, Joint]]] = {body: [] for body in self.frames}
+        for joint in sorted(self.joints, key=lambda joint: (
+                joint.is_cut, joint.name not in self.driven, _TREE.get(joint.kind, 1))):
+            first, second = map(joined, joint.bodies)
+            if joint.is_cut or first == second:
+                cuts.append(joint)
+                continue
+            home[second] = first
+            for body, other in (joint.bodies, joint.bodies[::-1]):
+                near[body].append((other, joint))
+        tree: dict[str, tuple[str, Joint]] = {}
+        for start in (self.root, *self.frames):
+            if start != self.root and start not in tree:
+                # A body that only cuts connect.
+                places = [self.frames[start][:3, 3]] * 2
+                tree[start] = self.root, Joint('', FREE, (self.root, start), places, places)
+            row = [start]
+            for body in row:
+                others = {other: (body, joint) for other, joint in near[body]
+                          if other != self.root and other not in tree}
+                tree.update(others)
+                row += others
+        return tree, cuts
+
+    @property
+    def tree_joints(self) -> dict[str, Joint]:
+        """Return the joints of the spanning tree by their names."""
+        return {joint.name: joint for _, joint in self.spanning_tree()[0].values()}
 
     def join(self, name: str, kind: str, bodies: tuple[str, str], frame: np.ndarray,
              axis: Any = (0.0, 0.0, 1.0), other: Optional[np.ndarray] = None,
@@ -288,13 +353,14 @@ class Robot:
         """Return the joint that another depends on, or itself, with ratio and offset."""
         return self.sources(name)[-1]
 
-    def limits(self, joints: Iterable[Joint]) -> tuple[dict[str, Limits], list[str]]:
+    def limits(self, joints: Iterable[Joint]
+               ) -> tuple[dict[str, tuple[float, float]], list[str]]:
         """
         Return the limits of each source, and a report on those that do not count.
 
         They are those of joints and of all that these depend on.
         """
-        limits: dict[str, Limits] = {}
+        limits: dict[str, tuple[float, float]] = {}
         reports: dict[str, str] = {}
         named = {joint.name: joint for joint in self.joints if joint.position is not None}
         for sources in (self.sources(joint.name) for joint in joints):
@@ -304,9 +370,8 @@ class Robot:
                 if joint and joint.limits:
                     ends = sorted(factor / ratio * end + (start - offset) / ratio
                                   for end in joint.limits)
-                    low, high, names = limits.get(source, (-math.inf, math.inf, ()))
-                    limits[source] = Limits(max(low, ends[0]), min(high, ends[1]),
-                                            tuple(dict.fromkeys((*names, name))))
+                    low, high = limits.get(source, (-math.inf, math.inf))
+                    limits[source] = max(low, ends[0]), min(high, ends[1])
                 elif joint and joint.no_limits:
                     reports[name] = f'Left out: the limits of {name}, {joint.no_limits}.'
         return limits, [*reports.values()]
@@ -344,46 +409,11 @@ def _limits(limits: Sequence[Any], is_continuous: bool
     return ((low, high), '') if low < high else (None, f'{text}: they are no range')
 
 
-def top(home: dict[str, str], body: str) -> str:
-    """Return the body that represents a set of joined bodies."""
-    while home[body] != body:
-        home[body] = body = home[home[body]]
-    return body
-
-
-def trees(robot: Robot) -> tuple[dict[str, tuple[str, Joint]], list[Joint]]:
-    """Return the parent and the joint of each body, and the joints that close loops."""
-    home, cuts = {body: body for body in robot.frames}, []
-    near: dict[str, list[tuple[str, Joint]]] = {body: [] for body in robot.frames}
-    for joint in sorted(robot.joints, key=lambda joint: (
-            joint.is_cut, joint.name not in robot.driven, _TREE.get(joint.kind, 1))):
-        first, second = (top(home, body) for body in joint.bodies)
-        if joint.is_cut or first == second:
-            cuts.append(joint)
-            continue
-        home[second] = first
-        for body, other in (joint.bodies, joint.bodies[::-1]):
-            near[body].append((other, joint))
-    tree: dict[str, tuple[str, Joint]] = {}
-    for start in (robot.root, *robot.frames):
-        if start != robot.root and start not in tree:
-            # A body that only cuts connect.
-            places = [robot.frames[start][:3, 3]] * 2
-            tree[start] = robot.root, Joint('', FREE, (robot.root, start), places, places)
-        row = [start]
-        for body in row:
-            joined = [(other, joint) for other, joint in near[body]
-                      if other != robot.root and other not in tree]
-            tree.update((other, (body, joint)) for other, joint in joined)
-            row += [other for other, _ in joined]
-    return tree, cuts
-
-
 def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[str, float]
               ) -> Robot:
     """Return a robot with some bodies displaced on their parents, and new positions of joints."""
     moved = {robot.root: np.eye(4)}
-    for body, (base, _) in trees(robot)[0].items():
+    for body, (base, _) in robot.spanning_tree()[0].items():
         moved[body] = moved[base] @ moves.get(body, np.eye(4))
     joints = []
     for joint in robot.joints:
@@ -402,13 +432,12 @@ def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[
 def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
     """Return a robot with some joints moved; raise RequestError for an unknown joint."""
     robot.check_names(values)
-    tree, moves = trees(robot)[0], {}
-    names = {joint.name for _, joint in tree.values()}
-    if cuts := [name for name in values if name not in names]:
+    if cuts := sorted(values.keys() - robot.tree_joints):
         raise RequestError(f'{cuts[0]} closes a loop, so that other joints say where it is')
-    for body, (base, joint) in tree.items():
+    moves = {}
+    for body, (base, joint) in robot.spanning_tree()[0].items():
         if joint.name in values and joint.position is not None:
             slides, change = joint.kind == SLIDE, np.array(values[joint.name] - joint.position)
             screw = screws(joint.motion(body), joint.place(base), slides)
-            moves[body] = displacements(screw, change, slides)
+            moves[body] = exponentials(screw, change, slides)
     return displaced(robot, moves, values)

@@ -10,7 +10,7 @@ from typing import Any, Iterable, Mapping
 
 import numpy as np
 
-from .places import pose
+from .robot import pose
 from .shapes import input_values
 from ..scene import SceneMechanism
 
