@@ -176,8 +176,8 @@ def test_a_header_says_what_it_has(machines, name, single, times, inputs, joints
     actuators = ', '.join(f'{name}_{each}' for each in inputs.split(', '))
     assert f'/* Actuators: {actuators}; joints: {joints}. */' in text
     assert f' * Input: {inputs}. Angles' in head and f'#ifndef {name.upper()}_LINKAGE_H\n' in text
-    assert int(re.search('call takes at most (.*) poses', head)[1]) == header.POSES * int(
-        re.search(r'define LKR_MAX_SOLUTIONS (\d+)', text)[1])
+    assert int(re.search('call takes at most (.*) poses', head)[1]) == header.POSES * (
+        1 + int(re.search(r'define LKR_MAX_SOLUTIONS (\d+)', text)[1]))
     # All numbers are of one kind.
     literals = re.findall(r'(?<![\w.])(?:\d+\.\d*(?:e[-+]\d+)?|\d+e[-+]\d+)(f?)', code)
     assert set(literals) == {'f' * single}

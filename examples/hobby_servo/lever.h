@@ -3,7 +3,7 @@
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * It can be assembled in [-3.14159, 3.14159] rad.
- * A call takes at most 10 poses.
+ * A call takes at most 15 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -415,8 +415,8 @@ static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_rea
 static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *position, lkr_real *q,
     lkr_point *p)
 {
-    lkr_real x[LKR_MAX_SOLUTIONS][LKR_MAX_INPUTS];
-    lkr_real away[LKR_MAX_SOLUTIONS];
+    lkr_real x[LKR_MAX_SOLUTIONS + 1][LKR_MAX_INPUTS];
+    lkr_real away[LKR_MAX_SOLUTIONS + 1];
     lkr_real near[LKR_MAX_INPUTS];
     const int count = model->solutions[side](position, x);
     int i, k, s;
@@ -436,9 +436,12 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
     for (k = 0; k < count; k++) {
         away[k] = lkr_bring(model, side, near, x[k], q);
     }
+    /* Rounding may hide a solution next to the near inputs. */
+    memcpy(x[count], near, sizeof near);
+    away[count] = LKR_FAR;
     for (;;) {
         int nearest = -1;
-        for (k = 0; k < count; k++) {
+        for (k = 0; k <= count; k++) {
             if (away[k] >= 0 && (nearest < 0 || away[k] < away[nearest])) {
                 nearest = k;
             }

@@ -21,7 +21,8 @@ from ..linkage import Mechanism
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
-# Poses from a solution of an inverse, as in `linkage.h`: one without rates, and Newton's method.
+# Poses from a solution of an inverse or from the near inputs, as in `linkage.h`: Newton's method,
+# and one without rates.
 POSES = 5
 
 
@@ -94,7 +95,7 @@ def _values(request: Request, single: bool) -> Dict[str, Any]:
         tables.append(Tables(machine, code, formulas, ([], axes), tag))
         parts += [tables[-1].text(), _inverse(machine, axes, tag, code.number)]
     solutions = max(each.solutions for each in tables)
-    about = [*_about(machine), f'A call takes at most {POSES * solutions} poses.']
+    about = [*_about(machine), f'A call takes at most {POSES * (solutions + 1)} poses.']
     whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
     return {
         'about': '\n'.join(f' * {line}' for line in about),
