@@ -3,17 +3,16 @@
 
 """Gears of any ratio: the inverse, the reach and the motion in any turn."""
 
-import ctypes
 from fractions import Fraction
 import itertools
 import math
 
+from c_libraries import inverter
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
 from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
-from test_c_code import compiled, OUTPUTS
 
 # Ratios with their periods.
 RATIOS = {'1/64': 64, '1/80': 80, '1/100': 100, '0.31': 100, '22/7': 7, '3/7': 7, '-2.37': 100,
@@ -163,12 +162,10 @@ def test_c_goes_on_in_the_turn_of_near(tmp_path):
             'O ground 0 0', 'M crank O 0.01', f'A crank O 1 geared crank {ratio} 0']}
         ).machines[name]
         (tmp_path / name).mkdir()
-        library = compiled_for(tmp_path / name, machine, 'A.x')
+        invert = inverter(tmp_path / name, machine, 'A.x')
         for near in (0.4, 83.0, 83.0 + 320.0 * math.pi):
-            given = np.array([machine.linkage.solve(near)['A'][0], near + 1e-3])
-            found = np.zeros(2)
-            assert library(given.ctypes.data, found.ctypes.data)
-            assert found[0] == pytest.approx(near, abs=1e-9)
+            value = machine.linkage.solve(near)['A'][0]
+            assert invert(value, near + 1e-3) == pytest.approx(near, abs=1e-9)
 
 
 def test_what_cannot_be_searched_in_c_is_refused():
@@ -177,12 +174,3 @@ def test_what_cannot_be_searched_in_c_is_refused():
         'm.crank.sweep': [-1.0, 1.0]}).machines['m']
     with pytest.raises(ValueError, match='A.x of m .* repeats after too many turns'):
         header.written(machine, ['A.x'])
-
-
-def compiled_for(folder, machine, output):
-    """Return the C function for an output of a machine."""
-    OUTPUTS[machine.name] = output,
-    library = compiled(folder, [machine])
-    function = library[f'{machine.name}_crank_for_{output.replace(".", "_")}_']
-    function.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
-    return function
