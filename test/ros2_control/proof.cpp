@@ -1,7 +1,9 @@
 // SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
-// A generated transmission, its names in NAME, CLASS and NAMESPACE, the ranges of its inputs in RANGES, is proved: both ways at many states: positions there and back, velocities against differences, power, and
-// nothing allocated nor anything written that is not finite. Takes how many states.
+
+// A generated transmission, its names in NAME, CLASS and NAMESPACE and the ranges of its inputs in
+// RANGES, is proved at so many states: positions both ways, velocities against differences, power,
+// nothing allocated, and nothing written that is not finite.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
