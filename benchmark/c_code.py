@@ -20,6 +20,7 @@ import tempfile
 from linkage_ros import scene
 from linkage_ros.c_code import header
 from linkage_ros.c_code.names import field
+from linkage_ros.c_code.package import ranges
 import numpy as np
 
 from . import document
@@ -127,8 +128,10 @@ int main(void)
 """
 # Nanoseconds of each call, the least of some tries, in a controller's double precision.
 TIMES = NOW + """
+#include "{root}/test/ros2_control/sample.h"
 int main(void)
 {{
+    static const double ranges[{n}][2] = {ranges};
     static {name}_memory m;
     lkr_side last = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, b;
     {name}_begin(&m);
@@ -136,7 +139,7 @@ int main(void)
         double q[{n}], best[2] = {{ 1e30, 1e30 }};
         lkr_point p;
         lkr_side a = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, j = a;
-        lkr_sample(&{name}_model, k, q);
+        sample({n}, ranges, k, q);
         if (!{name}_at(q, 1, &p)) continue;
         for (int i = 0; i < {n}; i++) {{
             a.position[i] = p.position[0][i];
@@ -264,7 +267,8 @@ def timed():
         for name, machine in scene.load(str(root / f'{path}.yaml')).machines.items():
             with tempfile.TemporaryDirectory() as folder:
                 rows = run(folder, header.written(machine) + TIMES.format(
-                    name=name, n=len(machine.inputs), count=CALLS)).reshape(-1, 2) / 1000.0
+                    name=name, n=len(machine.inputs), count=CALLS,
+                    root=root.absolute(), ranges=ranges(machine))).reshape(-1, 2) / 1000.0
             yield name, [f'{value:.2f}' for row in rows.T
                          for value in (np.median(row), row.max())]
 

@@ -12,10 +12,11 @@ refused, and answers with another pose: not the one asked for, and farther away.
 from contextlib import suppress
 import ctypes
 
-from c_libraries import COMPILER, inverter, loaded
+from c_libraries import COMPILER, inverter, loaded, SAMPLE
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import joints
+from linkage_ros.c_code.package import ranges
 import numpy as np
 import pytest
 from truth import random_linkages
@@ -29,6 +30,7 @@ QUESTIONS = """
 void {name}_counts(long poses, long *counts)
 {{
     static const {number} slack = {slack};
+    static const double ranges[{n}][2] = {ranges};
     static {name}_memory m;
     long i;
     int k, side;
@@ -39,7 +41,7 @@ void {name}_counts(long poses, long *counts)
         lkr_point p, goal;
         lkr_side measured = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }};
         lkr_side asked = measured, found = measured;
-        lkr_sample(&{name}_model, i, q);
+        sample({n}, ranges, i, q);
         if (!{name}_at(q, 1, &p))
             continue;
         for (k = 0; k < {n}; k++)
@@ -101,9 +103,10 @@ def drawn(seeds):
 def questions(folder, cases, number):
     """Return how many questions were put to each case, and raise if there were misses."""
     folder.mkdir(parents=True, exist_ok=True)
-    library = loaded(folder, header.printed(cases, number == 'float') + ''.join(
+    library = loaded(folder, header.printed(cases, number == 'float') + SAMPLE + ''.join(
         QUESTIONS.format(name=case.machine.name, number=number, n=len(case.machine.inputs),
-                         slack='1e-2f' if number == 'float' else '1e-6') for case in cases), '-O1')
+                         slack='1e-2f' if number == 'float' else '1e-6',
+                         ranges=ranges(case.machine)) for case in cases), '-O1')
     counts = {}
     for case in cases:
         counts[case.machine.name] = (ctypes.c_long * 3)()

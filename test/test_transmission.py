@@ -20,12 +20,12 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-from c_libraries import COMPILER, loaded, ROS, shared, STAND_IN, STRICT
+from c_libraries import COMPILER, loaded, ROS, SAMPLE, shared, STAND_IN, STRICT
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header, transmission
 from linkage_ros.c_code.axes import actuators, joints
 from linkage_ros.c_code.names import template
-from linkage_ros.c_code.package import package
+from linkage_ros.c_code.package import package, ranges
 import numpy as np
 import pytest
 from truth import random_linkages
@@ -104,6 +104,7 @@ int {name}_sent(int side, const double *from, double *to)
 WALK = """
 static long {name}_walked(long states)
 {
+    static const double ranges[][2] = {ranges};
     static {name}_memory m;
     lkr_side from = { { 0 }, { 0 }, { 0 } }, to = from;
     lkr_point p;
@@ -111,7 +112,7 @@ static long {name}_walked(long states)
     long i, good = 0;
     (void){name}_begin(&m);
     for (i = 1; i <= states; i++) {
-        lkr_sample(&{name}_model, i, q);
+        sample({name}_model.inputs, ranges, i, q);
         if (!{name}_at(q, 1, &p))
             continue;
         memcpy(from.position, p.position[LKR_ACTUATORS], sizeof from.position);
@@ -534,15 +535,17 @@ def written(folder, path, *arguments):
     return made
 
 
-def proved(package, name, compiler, count, *flags):
+def proved(package, machine, compiler, count, *flags):
     """Compile the proof for a mechanism of a package and run it at so many states."""
+    name = machine.name
     code = (package / 'src' / f'{name}.hpp').read_text()
     class_, space = re.search(r'struct (\w+)Code', code)[1], re.search(r'namespace (\w+)', code)[1]
     program = package / f'proof_{name}'
     subprocess.run([compiler, '-std=c++17', *STRICT, '-O2', *flags, f'-DNAME={name}',
-                    f'-DCLASS={class_}', f'-DNAMESPACE={space}', '-isystem',
-                    STAND_IN / 'include', '-I', package / 'src', '-I', package / 'include',
-                    STAND_IN / 'proof.cpp', '-o', program, *ROS], check=True)
+                    f'-DCLASS={class_}', f'-DNAMESPACE={space}',
+                    f'-DRANGES={ranges(machine)}', '-isystem', STAND_IN / 'include',
+                    '-I', package / 'src', '-I', package / 'include', STAND_IN / 'proof.cpp',
+                    '-o', program, *ROS], check=True)
     ended = subprocess.run([program, str(count)], capture_output=True, text=True)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     tried, good = map(int, re.search(r'(\d+) states, (\d+)', ended.stdout).groups())
@@ -565,8 +568,9 @@ def test_sanitizers_find_nothing(machines, tmp_path):
         pytest.skip('no program with sanitizers is linked or runs here')
     names = ['lever', 'leg']
     printed, error = ran('walk', '#include <stdio.h>\n' + header.printed(
-        [header.Request(machines[name]) for name in names]) + ''.join(
-        WALK.replace('{name}', name) for name in names) + 'int main(void)\n{\n' + ''.join(
+        [header.Request(machines[name]) for name in names]) + SAMPLE + ''.join(
+        WALK.replace('{name}', name).replace('{ranges}', ranges(machines[name]))
+        for name in names) + 'int main(void)\n{\n' + ''.join(
             f'    printf("%ld ", {name}_walked(2000));\n' for name in names) + '}\n')
     assert printed is not None, error
     assert min(map(int, printed.split())) > 500
@@ -577,9 +581,9 @@ def test_sanitizers_find_nothing(machines, tmp_path):
 @pytest.mark.parametrize('path', SCENES, ids=lambda path: path.stem)
 def test_every_scene_is_proved_at_a_hundred_thousand_states(tmp_path, path, compiler):
     package = written(tmp_path, path)
-    for name in scene.load(path).machines:
-        proved(package, name, compiler, 100_000)
-        proved(package, name, compiler, 5000, *SANITIZED)
+    for machine in scene.load(path).machines.values():
+        proved(package, machine, compiler, 100_000)
+        proved(package, machine, compiler, 5000, *SANITIZED)
 
 
 def test_mechanisms_of_any_names_are_classes_of_their_own():

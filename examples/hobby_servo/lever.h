@@ -188,12 +188,10 @@ typedef struct {
     lkr_axis axis[2][LKR_MAX_INPUTS];
     /* After how much of each input the actuators or the joints repeat, or 0. */
     lkr_real turn[2][LKR_MAX_INPUTS];
-    /* The unit of each input, in those of the scene; where it starts, its sweep, and the range of its
-       samples. */
+    /* The unit of each input, in those of the scene; where it starts, and its sweep. */
     lkr_real unit[LKR_MAX_INPUTS];
     lkr_real start[LKR_MAX_INPUTS];
     lkr_real sweep[LKR_MAX_INPUTS][2];
-    lkr_real range[LKR_MAX_INPUTS][2];
 } lkr_model;
 
 /* A part of the reach in which a position only rises, or only falls: its middle value, half its
@@ -485,18 +483,6 @@ static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *value, 
 
 /* --- actuators and joints --- */
 
-/* Sample i of the inputs, all over their ranges. */
-static inline void lkr_sample(const lkr_model *model, long i, lkr_real *q)
-{
-    int k;
-    for (k = 0; k < model->inputs; k++) {
-        const lkr_real *range = model->range[k];
-        /* Multiples of an irrational number, without their whole parts. */
-        const lkr_real x = (lkr_real)i * LKR_MATH(sqrt)((lkr_real)((k + 1) * (k + 1) + 1));
-        q[k] = range[0] + (range[1] - range[0]) * (x - LKR_MATH(floor)(x));
-    }
-}
-
 /* Initialize the memory; returns 0 if the linkage cannot be assembled where it starts. */
 static inline int lkr_begin(const lkr_model *model, lkr_memory *m)
 {
@@ -664,17 +650,17 @@ typedef struct {
 LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank)
 {
     const float length_a = 0.02f;
-    const float k2 = -0.045f;
-    const float k22 = 0.04f;
-    const float k26 = 0.025f;
-    const float k27 = 0.000625f;
-    const float k30 = 0.0036f;
+    const float k2 = -0.045f; /* -b */
+    const float k22 = 0.04f; /* 2.0 * a */
+    const float k26 = 0.025f; /* b - a */
+    const float k27 = 0.000625f; /* (b - a) * (b - a) */
+    const float k30 = 0.0036f; /* (4.0 * b) * a */
     const float k36 = 1.0f;
-    const float k54 = 0.081f;
+    const float k54 = 0.081f; /* 1.8 * b */
     const float k73 = 0.000625f;
     const float k80 = 0.0f;
-    const float k82 = -0.025f;
-    const float k83 = 0.09f;
+    const float k82 = -0.025f; /* a - b */
+    const float k83 = 0.09f; /* 2.0 * b */
     const float x0 = crank_;
     /* O ground 0 0 */
     p->O_x = 0.0f;
@@ -687,37 +673,37 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     by_crank->Q_x = 0.0f;
     by_crank->Q_y = 0.0f;
     /* A crank O a up */
-    const float v6 = (0.5f * x0);
+    const float v6 = 0.5f * x0;
     const float v7 = sinf(v6);
     const float v9 = cosf(v6);
-    const float v13 = (-(((2.0f * v7) * v9) * length_a));
-    const float v18 = ((1.0f - (2.0f * (v7 * v7))) * length_a);
+    const float v13 = -(((2.0f * v7) * v9) * length_a);
+    const float v18 = (1.0f - (2.0f * (v7 * v7))) * length_a;
     p->A_x = v13;
     p->A_y = v18;
     p->angle_crank = x0;
-    by_crank->A_x = (-v18);
+    by_crank->A_x = -v18;
     by_crank->A_y = v13;
     by_crank->angle_crank = lkr_gated(1.0f, fabsf(x0), 0.0f);
     /* L slot Q A e out max(1.8*b,a+b) */
-    const float v31 = (v9 * v9);
-    const float v32 = (k30 * v31);
-    const float v33 = (k27 + v32);
+    const float v31 = v9 * v9;
+    const float v32 = k30 * v31;
+    const float v33 = k27 + v32;
     const float v40 = lkr_gated(v33, ((v31 + k36) - 7.888609e-31f), 0.0f);
     const float v41 = lkr_gated((-((k22 * v7) * v9)), v40, 0.0f);
     const float v45 = lkr_gated((k26 + (k22 * v31)), v40, 0.0f);
     const float v48 = sqrtf(((v41 * v41) + (v45 * v45)));
-    const float v49 = (v41 / v48);
-    const float v56 = (v45 / v48);
+    const float v49 = v41 / v48;
+    const float v56 = v45 / v48;
     const float v81 = lkr_root((k73 + v32), k80);
-    const float v88 = (((length_a * (k82 + (k83 * v31))) / v33) + 0.0f);
-    p->L_x = (v49 * k54);
-    p->L_y = (k2 + (v56 * k54));
+    const float v88 = ((length_a * (k82 + (k83 * v31))) / v33) + 0.0f;
+    p->L_x = v49 * k54;
+    p->L_y = k2 + (v56 * k54);
     p->angle_lever = lkr_angle((-v49), v56);
     p->slide_slide = v81;
-    by_crank->L_x = (-((v88 * v56) * k54));
-    by_crank->L_y = ((v88 * v49) * k54);
+    by_crank->L_x = -((v88 * v56) * k54);
+    by_crank->L_y = (v88 * v49) * k54;
     by_crank->angle_lever = v88;
-    by_crank->slide_slide = ((-((((v7 * 0.5f) * v9) * 2.0f) * k30)) / (2.0f * v81));
+    by_crank->slide_slide = (-((((v7 * 0.5f) * v9) * 2.0f) * k30)) / (2.0f * v81);
     return 1;
 }
 
@@ -761,19 +747,19 @@ static inline int lever_solutions_joints(const float *position,
 {
     const float x0 = position[0];
     /* A left */
-    const float v3 = (0.5f * x0);
+    const float v3 = 0.5f * x0;
     const float v4 = sinf(v3);
-    const float v9 = (((2.0f * v4) * cosf(v3)) * 0.081f);
-    const float v15 = ((1.0f - (2.0f * (v4 * v4))) * 0.081f);
+    const float v9 = ((2.0f * v4) * cosf(v3)) * 0.081f;
+    const float v15 = (1.0f - (2.0f * (v4 * v4))) * 0.081f;
     const float v18 = sqrtf(((v9 * v9) + (v15 * v15)));
-    const float v19 = (v9 / v18);
-    const float v22 = (v19 * 0.045f);
+    const float v19 = v9 / v18;
+    const float v22 = v19 * 0.045f;
     const float v27 = lkr_root(((0.02f + v22) * (0.02f - v22)), 1.154632e-18f);
-    const float v28 = (v19 * v27);
-    const float v30 = (v15 / v18);
-    const float v31 = (v30 * v22);
-    const float v35 = (-(v19 * v22));
-    const float v36 = (v30 * v27);
+    const float v28 = v19 * v27;
+    const float v30 = v15 / v18;
+    const float v31 = v30 * v22;
+    const float v35 = -(v19 * v22);
+    const float v36 = v30 * v27;
     q[0][0] = lkr_angle((-((-v28) - v31)), (v35 + v36));
     /* A right */
     q[1][0] = lkr_angle((-(v28 - v31)), (v35 - v36));
@@ -803,8 +789,7 @@ static const lkr_model lever_model = {
     { { { 1.0f, 0.0f, 0, 1.0f, 0.0f } },
       { { 1.0f, 6.2831855f, 0, 0.0f, 0.0f } } },
     { { 0.0f }, { 6.2831855f } },
-    { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } },
-    { { -3.1415927f, 3.1415927f } }
+    { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } }
 };
 
 /* The inputs in each assembly mode of the inverse linkage, NAN where there is none:
@@ -818,19 +803,19 @@ static inline int lever_solutions_angle_lever(const float *position,
 {
     const float x0 = position[0];
     /* A left */
-    const float v3 = (0.5f * x0);
+    const float v3 = 0.5f * x0;
     const float v4 = sinf(v3);
-    const float v9 = (((2.0f * v4) * cosf(v3)) * 0.081f);
-    const float v15 = ((1.0f - (2.0f * (v4 * v4))) * 0.081f);
+    const float v9 = ((2.0f * v4) * cosf(v3)) * 0.081f;
+    const float v15 = (1.0f - (2.0f * (v4 * v4))) * 0.081f;
     const float v18 = sqrtf(((v9 * v9) + (v15 * v15)));
-    const float v19 = (v9 / v18);
-    const float v22 = (v19 * 0.045f);
+    const float v19 = v9 / v18;
+    const float v22 = v19 * 0.045f;
     const float v27 = lkr_root(((0.02f + v22) * (0.02f - v22)), 1.154632e-18f);
-    const float v28 = (v19 * v27);
-    const float v30 = (v15 / v18);
-    const float v31 = (v30 * v22);
-    const float v35 = (-(v19 * v22));
-    const float v36 = (v30 * v27);
+    const float v28 = v19 * v27;
+    const float v30 = v15 / v18;
+    const float v31 = v30 * v22;
+    const float v35 = -(v19 * v22);
+    const float v36 = v30 * v27;
     q[0][0] = lkr_angle((-((-v28) - v31)), (v35 + v36));
     /* A right */
     q[1][0] = lkr_angle((-(v28 - v31)), (v35 - v36));
@@ -858,8 +843,7 @@ static const lkr_model lever_model_angle_lever = {
     { { { 0, 0, 0, 0, 0 } },
       { { 1.0f, 6.2831855f, 0, 0.0f, 0.0f } } },
     { { 6.2831855f }, { 6.2831855f } },
-    { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } },
-    { { -3.1415927f, 3.1415927f } }
+    { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } }
 };
 
 

@@ -23,8 +23,8 @@ from ..linkage import IN_SINGLE, Mechanism
 _NAMED = re.compile(r'\b[kx]\d+\b')
 # Expressions that are true or false.
 _CONDITIONS = ('less', 'less_equal')
-# Longest line of code.
-LINE = 100
+# Longest line of code, and longest formula of a constant in its comment.
+LINE, MAX_FORMULA = 100, 50
 
 
 class Block(NamedTuple):
@@ -75,7 +75,7 @@ class Code:
 
     def times(self, code: str, factor: float) -> str:
         """Return code times a number."""
-        return code if factor == 1.0 else f'{self.literal(factor)} * {code}'
+        return bare(code) if factor == 1.0 else f'{self.literal(factor)} * {code}'
 
     def function(self, head: str, arguments: Sequence[str], blocks: Sequence[Block],
                  replaced: Optional[Mapping[Real, Real]] = None) -> str:
@@ -96,21 +96,38 @@ class Code:
             reached = max([reached, *numbers[:n]])
             ready = [line for line in statements if int(line[0][1:]) <= reached]
             body += [f'/* {comment(about)} */'] * bool(about)
-            body += [f'const {self.number} {name} = {code};' for name, code in ready]
+            body += [f'const {self.number} {name} = {bare(code)};' for name, code in ready]
             body += ending(codes[:n])
             statements, numbers, codes = statements[len(ready):], numbers[n:], codes[n:]
+        # How constants follow from lengths, as text where that is short.
+        formulas: Dict[Real, str] = {}
+        for x in pose.variant.steps:
+            parts, text = [formulas[y] for y in x.operands], str(x.args[0])
+            if x.op == 'where':
+                text = parts[1 if exact[x.args[0]] else 2]
+            elif parts:
+                text = OPERATIONS[x.op].python.format(*parts)
+            formulas[x] = text if all(parts) and len(text) <= MAX_FORMULA else ''
+        abouts = {name: f' /* {comment(bare(formulas[node]))} */' for name, node in zip(
+            constants, pose.variant.constants) if '(' in formulas[node]}
         # Lengths have names and come first; coordinates of points on links are dimensions, too.
         names = {name: f'length_{node.args[0]}' for name, node in zip(
             constants, pose.variant.constants)
             if node.op == 'dimension' and node.args[0].isidentifier()}
-        declared = {names.get(name, name): value for name, value in constants.items()}
+        declared = {names.get(name, name): self.literal(value) + ';' + abouts.get(name, '')
+                    for name, value in constants.items()}
         text = _NAMED.sub(lambda name: names.get(name[0], name[0]), '\n'.join(body))
         used = {*_NAMED.findall(text)}
-        lines = [f'const {self.number} {name} = {self.literal(declared[name])};'
+        lines = [f'const {self.number} {name} = {declared[name]}'
                  for name in sorted(declared, key=lambda name: name.startswith('k'))]
         lines += [f'const {self.number} x{i} = {code};' if f'x{i}' in used else f'(void){code};'
                   for i, code in enumerate(arguments) if f'x{i}' in used or code.isidentifier()]
         return '\n'.join([head, '{', *indented(lines + text.split('\n')), '}', ''])
+
+
+def bare(code: str) -> str:
+    """Return code of an operation without the parentheses around it."""
+    return code[1:-1] if code.startswith('(') else code
 
 
 def indented(lines: Iterable[str]) -> List[str]:

@@ -8,6 +8,8 @@ import re
 from typing import Dict, Mapping, Sequence, Tuple
 from xml.sax.saxutils import escape, quoteattr
 
+import numpy as np
+
 from . import header
 from .axes import actuators, Axis, joints, passive
 from .names import comment, distinct, filled, literal, template
@@ -73,6 +75,14 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
     return {Path(path): text for path, text in files.items()}
 
 
+def ranges(machine: SceneMechanism) -> str:
+    """Return the sweeps or reaches of the inputs, in rad or in sizes, as an initializer of C++."""
+    arcs = [np.divide(drive.ends or max(drive.reach, key=np.ptp),
+                      input_.size * machine.scale_of(input_.name))
+            for input_, drive in zip(machine.linkage.inputs, machine.inputs.values())]
+    return '{%s}' % ', '.join('{%r, %r}' % (*arc.tolist(),) for arc in arcs)
+
+
 def _values(package_name: str, class_: str, machine: SceneMechanism, commanded: Sequence[Axis],
             others: Sequence[Axis]) -> Mapping[str, str]:
     """Return the values of a mechanism's templates."""
@@ -86,7 +96,8 @@ def _values(package_name: str, class_: str, machine: SceneMechanism, commanded: 
              for axes in (driven, by_output)]
     return {
         'package': package_name, 'namespace': f'{package_name}_plugins', 'class': class_,
-        'name': machine.name, 'n': str(len(driven)), 'actuators': rows(driven),
+        'name': machine.name, 'n': str(len(driven)), 'ranges': ranges(machine),
+        'actuators': rows(driven),
         'joints': rows({**by_output, **{axis.output: axis for axis in others}}),
         'joint_count': str(len(commanded) + len(others)),
         'passive_function': f'{machine.name}_passive' if others else 'nullptr',

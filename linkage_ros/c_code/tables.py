@@ -71,8 +71,6 @@ class Tables:
         row, inputs = self._code.row, [*zip(self.machine.inputs.values(), self._units)]
         sweeps = ['{ -LKR_FAR, LKR_FAR }' if self._tag or not drive.ends else
                   row(np.divide(drive.ends, unit)) for drive, unit in inputs]
-        ranges = [row(np.divide(drive.ends or max(
-            drive.reach, key=lambda arc: arc[1] - arc[0]), unit)) for drive, unit in inputs]
         return filled(template('model.h.in'), {
             'name': self.machine.name, 'tag': self._tag, 'number': self._code.number,
             'about': 'the inverse' if self._tag else 'the actuators and joints',
@@ -83,7 +81,7 @@ class Tables:
             'turns': ', '.join(row(self._turns(axes)) for axes in self._sides),
             'units': row(self._units), 'start': row(np.divide(
                 start(self.machine), self._sizes)),
-            'sweeps': ', '.join(sweeps), 'ranges': ', '.join(ranges)})
+            'sweeps': ', '.join(sweeps)})
 
     def passive(self, axes: Sequence[Axis]) -> str:
         """Return the function for joints that are not commanded."""

@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
-// A generated transmission, its names in NAME, CLASS and NAMESPACE, is proved: both ways at many states: positions there and back, velocities against differences, power, and
 // A hardware component that loads transmissions from libraries and calls them, with functions for
 // the tests: component_made, component_read, component_write, component_status, component_ended.
 #include <dlfcn.h>

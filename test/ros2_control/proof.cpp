@@ -1,7 +1,9 @@
 // SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
-// A generated transmission, its names in NAME, CLASS and NAMESPACE, is proved: both ways at many states: positions there and back, velocities against differences, power, and
-// nothing allocated nor anything written that is not finite. Takes how many states.
+
+// A generated transmission, its names in NAME, CLASS and NAMESPACE and the ranges of its inputs in
+// RANGES, is proved at so many states: positions both ways, velocities against differences, power,
+// nothing allocated, and nothing written that is not finite.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -14,12 +16,14 @@
 #define TEXT_(text) #text
 #define TEXT(text) TEXT_(text)
 #include TEXT(NAME.hpp)
+#include "sample.h"
 
 namespace
 {
 using Code = NAMESPACE::JOINED(CLASS, Code);
 constexpr int n = static_cast<int>(Code::size);
 constexpr const lkr_model & model = Code::model;
+constexpr double ranges[n][2] = RANGES;
 constexpr double nan_ = std::numeric_limits<double>::quiet_NaN();
 constexpr double unwritten = 0.123456789;
 constexpr double inf = std::numeric_limits<double>::infinity();
@@ -231,7 +235,7 @@ int main(int argc, char ** argv)
   may_allocate = false;
   long tried = 0;
   for (long i = 1; i <= states; ++i) {
-    lkr_sample(&model, i, q);
+    sample(n, ranges, i, q);
     tried += there_and_back(robot, q, i);
   }
   check(2 * tried > states, "most states are singular", tried);

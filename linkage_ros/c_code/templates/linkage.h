@@ -169,12 +169,10 @@ typedef struct {
     lkr_axis axis[2][LKR_MAX_INPUTS];
     /* After how much of each input the actuators or the joints repeat, or 0. */
     lkr_real turn[2][LKR_MAX_INPUTS];
-    /* The unit of each input, in those of the scene; where it starts, its sweep, and the range of its
-       samples. */
+    /* The unit of each input, in those of the scene; where it starts, and its sweep. */
     lkr_real unit[LKR_MAX_INPUTS];
     lkr_real start[LKR_MAX_INPUTS];
     lkr_real sweep[LKR_MAX_INPUTS][2];
-    lkr_real range[LKR_MAX_INPUTS][2];
 } lkr_model;
 
 /* A part of the reach in which a position only rises, or only falls: its middle value, half its
@@ -465,18 +463,6 @@ static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *value, 
 }
 
 /* --- actuators and joints --- */
-
-/* Sample i of the inputs, all over their ranges. */
-static inline void lkr_sample(const lkr_model *model, long i, lkr_real *q)
-{
-    int k;
-    for (k = 0; k < model->inputs; k++) {
-        const lkr_real *range = model->range[k];
-        /* Multiples of an irrational number, without their whole parts. */
-        const lkr_real x = (lkr_real)i * LKR_MATH(sqrt)((lkr_real)((k + 1) * (k + 1) + 1));
-        q[k] = range[0] + (range[1] - range[0]) * (x - LKR_MATH(floor)(x));
-    }
-}
 
 /* Initialize the memory; returns 0 if the linkage cannot be assembled where it starts. */
 static inline int lkr_begin(const lkr_model *model, lkr_memory *m)

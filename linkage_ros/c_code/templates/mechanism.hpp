@@ -4,11 +4,8 @@
 // Written by linkage_ros.
 #pragma once
 
-#include <memory>
-
 #include "@name@_linkage.h"
 #include "transmission-of.hpp"
-#include "transmission_interface/transmission_loader.hpp"
 
 namespace @namespace@
 {
@@ -24,14 +21,5 @@ struct @class@Code
 };
 
 using @class@Transmission = TransmissionOf<@class@Code>;
-
-class @class@Loader : public transmission_interface::TransmissionLoader
-{
-public:
-  std::shared_ptr<transmission_interface::Transmission> load(
-    const hardware_interface::TransmissionInfo & info) override
-  {
-    return std::make_shared<@class@Transmission>(info);
-  }
-};
+using @class@Loader = LoaderOf<@class@Code>;
 }  // namespace @namespace@

@@ -27,11 +27,16 @@ int main()
   @namespace@::@class@Transmission transmission(info);
   transmission.configure(joint_handles, actuator_handles);
 
+  constexpr double ranges[Code::size][2] = @ranges@;
   int tried = 0;
   for (long state = 1; state <= 2000; ++state) {
     lkr_real q[Code::size], x[Code::size], gap[Code::size];
     lkr_point p;
-    lkr_sample(&Code::model, state, q);
+    for (std::size_t i = 0; i < Code::size; ++i) {
+      // Multiples of irrational numbers, without their whole parts.
+      const double x = static_cast<double>(state) * std::sqrt(1.0 + (i + 1.0) * (i + 1.0));
+      q[i] = ranges[i][0] + (ranges[i][1] - ranges[i][0]) * (x - std::floor(x));
+    }
     if (!Code::model.at(q, 1, &p) ||
       !lkr_input_change(&Code::model, LKR_JOINTS, &p, 1e-3, p.load, x))
     {

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <cstddef>
 #include <future>
-#include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -23,6 +23,7 @@
 #include "rcutils/logging_macros.h"
 #include "transmission_interface/exception.hpp"
 #include "transmission_interface/handle.hpp"
+#include "transmission_interface/transmission_loader.hpp"
 
 namespace @namespace@
 {
@@ -113,14 +114,12 @@ public:
       allowed += std::string(" '") + axes[i].name + "' (role '" + axes[i].role + "')";
     }
     std::array<std::string, size> names;
-    std::string ignored;
     factor_.fill(1.0);
     for (const auto & info : infos) {
       std::size_t i = place(axes, info.name, info.role);
       if (i == size && is_added(info)) {
         // It is the only actuator, or one beside that of the description.
         if (!names[0].empty()) {
-          ignored = info.name;
           continue;
         }
         i = 0;
@@ -151,13 +150,8 @@ public:
         std::find(names.begin(), names.end(), handle.get_prefix_name()) - names.begin());
       const auto kind = static_cast<std::size_t>(
         std::find(kinds.begin(), kinds.end(), handle.get_interface_name()) - kinds.begin());
-      if (i == size && handle.get_prefix_name() == ignored && !ignored.empty()) {
-        continue;
-      }
-      if (i == size) {
-        throw Exception("handle '" + handle.get_prefix_name() + "' belongs to no " + what + " of" + allowed);
-      }
-      if (!handle || kind == kinds.size()) {
+      // Those of others are ignored, as by the built-in transmissions.
+      if (!handle || i == size || kind == kinds.size()) {
         continue;
       }
       auto & own = handles_[std::min<std::size_t>(kind, 2)][i];
@@ -347,5 +341,16 @@ private:
   Handles<transmission_interface::JointHandle, Code::size, Code::joints.size()> joints_;
   int status_ = OK;
   HeldLog log_;
+};
+
+template <class Code>
+class LoaderOf : public transmission_interface::TransmissionLoader
+{
+public:
+  std::shared_ptr<transmission_interface::Transmission> load(
+    const hardware_interface::TransmissionInfo & info) override
+  {
+    return std::make_shared<TransmissionOf<Code>>(info);
+  }
 };
 }  // namespace @namespace@

@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
-// A generated transmission, its names in NAME, CLASS and NAMESPACE, is proved: both ways at many states: positions there and back, velocities against differences, power, and
 #pragma once
 
 #include <type_traits>
