@@ -36,6 +36,9 @@ _FORMS = {
 _SLIDER_ALONG = 'jnjjs'
 _INPUTS = 'crank', 'cylinder', 'carriage'
 SLIDING = 'cylinder', 'carriage', 'yoke', 'slot', 'slider'
+# To which of the joints that it stands on a joint that is placed has a bar, by their numbers.
+_BARS_TO = {'crank': (0,), 'dyad': (0, 1), 'mirror': (1, 2), 'parallelogram': (1, 2),
+            'antiparallelogram': (1, 2), 'slot': (0,), 'slider': (0,), 'cylinder': (1,)}
 _SIDES = {'left': 1, 'right': -1, 'out': 1, 'in': -1}
 
 
@@ -369,40 +372,22 @@ class Linkage:
     def _links(self):
         """Note which joints are on one moving link: a line each, from bar to bar."""
         self.bodies = []
-        for i, line in enumerate(self.lines):
+        for line in self.lines:
             names, joints = line.names, line.joints
-            if line.word == 'crank':
-                self._body(i, joints[0], names[0])
-            elif line.word == 'dyad':
-                self._body(i, joints[0], names[0])
-                self._body(i, joints[1], names[0])
-            elif line.word in ('mirror', 'parallelogram', 'antiparallelogram'):
-                for joint in joints[1:]:
-                    self._body(i, joint, names[0])
+            if line.word in _BARS_TO:
+                self.bodies += [[joints[k], names[0]] for k in _BARS_TO[line.word]]
             elif line.word == 'inversor':
                 right, corner, left = names
-                for pair in ((joints[0], right), (joints[1], right), (right, corner),
-                             (joints[0], left), (joints[1], left), (left, corner)):
-                    self._body(i, *pair)
-            elif line.word in ('slot', 'slider'):
-                self._body(i, joints[0], names[0])
-            elif line.word == 'cylinder':
-                self._body(i, joints[1], names[0])
+                self.bodies += [[*ends] for side in (right, left) for ends in (
+                    (joints[0], side), (joints[1], side), (side, corner))]
             elif line.word == 'block':
-                self._on_block(i, joints[0], names[0])
+                others = [body for body in self.bodies if body[0] == joints[0]
+                          and self.placing(body[1]).word == 'block']
+                for body in others:
+                    body.append(names[0])
+                self.bodies += [] if others else [[joints[0], names[0]]]
             elif line.word in LAID and names[0] not in self.fixed:
                 self.body_of(*joints).append(names[0])
-
-    def _body(self, _, first, second):
-        self.bodies.append([first, second])
-
-    def _on_block(self, i, joint, name):
-        blocks = [body for body in self.bodies if body[0] == joint
-                  and self.placing(body[1]).word == 'block']
-        for body in blocks:
-            body.append(name)
-        if not blocks:
-            self._body(i, joint, name)
 
     def placing(self, name):
         """Return the line that places a joint."""

@@ -176,10 +176,8 @@ class _Writer:
         if step == 0.0:
             return text
         near = value * (1.0 + self._rng.choice((-1, 1)) * step)
-        literal, self._literal = self._literal, 0.0
         name = f'd{len(self._dimensions)}'
         self._dimensions[name] = float(near * self._size)
-        self._literal = literal
         return name
 
     def _name(self):
