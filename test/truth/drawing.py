@@ -499,7 +499,7 @@ class Linkage:
     def arm_of_crank(self, line):
         """Return (ground joint, crank pin) if a dyad hangs between these, else None."""
         for foot, pin in (line.joints, line.joints[::-1]):
-            if pin in self.cranks and foot in self.fixed and foot != self._crank(pin).joints[0]:
+            if pin in self.cranks and foot in self.fixed and foot != self.placing(pin).joints[0]:
                 return foot, pin
         return None
 
@@ -511,9 +511,6 @@ class Linkage:
             return ''
         arm = self.arm_of_crank(line._replace(joints=line.joints[-2:]))
         return arm[1] if arm else ''
-
-    def _crank(self, pin):
-        return next(line for line in self.lines if pin in line.names)
 
     @precisely
     def passings(self):
@@ -532,7 +529,7 @@ class Linkage:
     def _passing(self, i, line):
         if line.word == 'dyad' and self.arm_of_crank(line):
             foot, pin = self.arm_of_crank(line)
-            crank = self._crank(pin)
+            crank = self.placing(pin)
             ground = abs(self._fixed(self.numbers, crank.joints[0])
                          - self._fixed(self.numbers, foot))
             m = self.numbers[self.lines.index(crank)][0]
@@ -543,7 +540,7 @@ class Linkage:
             unsure = abs(gmpy2.sin(turn + gmpy2.const_pi() / 2)) < ROUNDING
         elif line.word == 'slider' and line.joints[0] in self.cranks \
                 and self.fixed.issuperset(line.joints[1:]):
-            crank = self._crank(line.joints[0])
+            crank = self.placing(line.joints[0])
             m = self.numbers[self.lines.index(crank)][0]
             rod, line_of = self.numbers[i][0], self._rail(self.numbers, i)
             away = (self._fixed(self.numbers, crank.joints[0])
@@ -566,7 +563,7 @@ class Linkage:
     def _turn(self, numbers, line):
         """Return the angle of the crank's zero from the ground line, foot to centre."""
         foot, pin = self.arm_of_crank(line)
-        crank = self._crank(pin)
+        crank = self.placing(pin)
         along = self._fixed(numbers, crank.joints[0]) - self._fixed(numbers, foot)
         return DIGITS.direction(self._zero(numbers, crank) * along.conjugate())
 
@@ -594,7 +591,7 @@ class Linkage:
         for i in way:
             line = self.lines[i]
             found[i] = (self._turn(numbers, line) if line.word == 'dyad' else
-                        self._turn_on_line(numbers, self._crank(line.joints[0]),
+                        self._turn_on_line(numbers, self.placing(line.joints[0]),
                                            self._rail(numbers, i)))
         return found
 
