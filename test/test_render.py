@@ -539,6 +539,7 @@ def test_the_readings_of_one_picture_are_not_written_over_those_of_another():
     assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
 
 
+@pytest.mark.nightly(all_but=7)
 @pytest.mark.parametrize('name', scene.load(str(ROOT / 'pictures' / 'words.yaml')).machines)
 def test_no_name_is_on_a_joint_or_on_another(name):
     shown = scene.load(str(ROOT / 'pictures' / 'words.yaml')).machines[name]

@@ -194,6 +194,7 @@ def test_no_pose_is_of_another_assembly(seed, count, poses):
     assert sum(found) > 0.02 * count * poses
 
 
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('turned', [1, -1])
 @pytest.mark.parametrize('robot', REAL)
 def test_the_ranges_of_real_ankles_are_proved_whatever_their_signs(robot, turned):
