@@ -338,6 +338,7 @@ def test_the_input_of_an_output_is_found_from_anywhere(tmp_path, joints, output,
             assert angles(answer, [output])[output] == pytest.approx(wanted, abs=2e-8)
 
 
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('kind, key, factor, output', [
     ('jansen', 'k', 0.8, 'G.x'), ('jansen', 'e', 1.25, 'G.y'), ('klann', 'i', 0.8, 'CF')])
 def test_a_search_finds_inputs_up_to_the_ends_of_the_reach(tmp_path, kind, key, factor, output):
@@ -500,6 +501,7 @@ def with_loads(tmp_path_factory):
     return folder
 
 
+@pytest.mark.nightly(all_but=5)
 @pytest.mark.parametrize('compiler, language', [pytest.param(
     compiler, language, marks=pytest.mark.skipif(
         not shutil.which(compiler), reason=f'{compiler} is not installed'))

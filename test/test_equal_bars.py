@@ -128,7 +128,7 @@ def test_what_stands_on_an_arm_of_no_length_has_the_limit(word, size):
     assert not [*problems(folded(word, size))]
 
 
-@pytest.mark.nightly(all_but=10)
+@pytest.mark.nightly(all_but=5)
 @pytest.mark.parametrize('seed', range(300))
 def test_random_linkages_of_equal_bars_have_limits_and_nothing_infinite(seed):
     assert not [*problems(equal_bars.design(np.random.default_rng(seed)))]

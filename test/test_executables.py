@@ -219,25 +219,11 @@ def test_a_bad_scene_ends_in_one_sentence(harness, tmp_path, name, text, named):
     assert len(said) == 1 and re.search(named, said[0])
 
 
-def without(module, code):
-    """Run code in a Python that cannot import a module."""
-    blocker = f"""
-        import sys
-
-        class Blocker:
-            def find_spec(self, name, path=None, target=None):
-                if name.split('.')[0] == {module!r}:
-                    raise ImportError('blocked: ' + name)
-
-        sys.meta_path.insert(0, Blocker())
-        """
-    return subprocess.run([sys.executable, '-c', textwrap.dedent(blocker) + textwrap.dedent(code)],
-                          cwd=ROOT, capture_output=True, text=True, timeout=60)
-
-
 @pytest.mark.nightly
 def test_the_library_works_where_there_is_no_ros():
-    done = without('rclpy', """
+    done = subprocess.run([sys.executable, '-c', textwrap.dedent("""
+        import sys
+        sys.modules['rclpy'] = None
         from linkage_ros import scene
         from linkage_ros.scene import motion
         machine = scene.read({}).machines['jansen']
@@ -246,6 +232,6 @@ def test_the_library_works_where_there_is_no_ros():
         try:
             import linkage_ros.nodes.kinematics
         except ImportError as error:
-            print(error)
-        """)
-    assert (done.returncode, done.stdout) == (0, 'blocked: rclpy\n'), done.stderr
+            print(error.name.partition('.')[0])
+        """)], cwd=ROOT, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (0, 'rclpy\n'), done.stderr

@@ -386,11 +386,12 @@ def foot():
         for name, base, body, place, turn, axis in joints] + eyes) + '</robot>'
 
 
-def test_whether_a_foot_s_two_poses_are_seen_is_no_luck(monkeypatch, tmp_path):
+@pytest.mark.parametrize('step', [600, pytest.param(100, marks=pytest.mark.nightly)])
+def test_whether_a_foot_s_two_poses_are_seen_is_no_luck(monkeypatch, tmp_path, step):
     file, random = tmp_path / 'foot.urdf', np.random.default_rng
     file.write_text(foot())
     robot = readers.read(str(file))
-    for seed in range(0, 3000, 100):
+    for seed in range(0, 3000, step):
         monkeypatch.setattr(np.random, 'default_rng', lambda more, seed=seed: random(seed + more))
         assert 'close as well with pitch=2.38 as with pitch=-2.77' in \
             str(closing.closed(robot).faults['pitch']), seed

@@ -362,7 +362,7 @@ def test_a_jump_at_the_end_of_a_turn_is_not_passed(near):
     assert math.isnan(found)
 
 
-@pytest.mark.nightly(all_but=3)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('seed', range(40))
 def test_what_is_followed_has_the_value(seed):
     rng, count = np.random.default_rng(seed), 0
@@ -391,6 +391,7 @@ def test_what_is_followed_has_the_value(seed):
                 count += 1
 
 
+@pytest.mark.nightly(all_but=6)
 @pytest.mark.parametrize('kind', [kind for kind in mechanisms.TYPES if kind != 'five_bar'])
 def test_next_to_the_seam_of_a_turn_a_solution_is_as_exact_as_elsewhere(kind):
     linkage = mechanisms.create(kind)

@@ -17,7 +17,7 @@ def counts(found, *kinds):
             if key[1] not in ('questions', 'duplicates') and key[0] in kinds}
 
 
-@pytest.mark.nightly(all_but=4)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('kind', [kind for kind in mechanisms.TYPES if kind != 'five_bar'])
 def test_of_the_catalogue_nothing_is_lost_or_invented(kind):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(5)

@@ -42,7 +42,7 @@ def given(name):
             **SCENES[name]}
 
 
-@pytest.mark.nightly(all_but=3)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('name, library', [
     *((name, Pinocchio) for name in SCENES), ('slotted_lever', Yourdfpy),
     *(pytest.param(name, Yourdfpy, marks=pytest.mark.nightly) for name in SCENES)])

@@ -529,7 +529,7 @@ def test_rviz_s_camera_sees_all_of_a_scene_square_to_the_first_plane(angles, pit
     for one in machines.values():
         ends = one.first.ends or (0.0, math.tau)
         solution = one.assembly().solution(one.linkage.points)
-        for theta in np.linspace(*ends, 201):
+        for theta in np.linspace(*ends, 51):
             solution.solve([theta])
             for x, y in solution.rows.reshape(-1, 2):
                 # A mirrored walker is shown with both of its sides in all poses.

@@ -194,6 +194,7 @@ def test_no_pose_is_of_another_assembly(seed, count, poses):
     assert sum(found) > 0.02 * count * poses
 
 
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('turned', [1, -1])
 @pytest.mark.parametrize('robot', REAL)
 def test_the_ranges_of_real_ankles_are_proved_whatever_their_signs(robot, turned):
@@ -243,10 +244,11 @@ def test_of_limits_that_are_too_wide_the_largest_that_can_be_are_named():
         made(wide)
 
 
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('seed', [1, 2])
 def test_the_two_poses_of_refused_limits_are_two_poses(seed):
     rng, found = np.random.default_rng(seed), 0
-    for _ in range(4):
+    for _ in range(2):
         ankle = rods.random_ankle(rng)
         try:
             made(ankle.within([-1.6, -1.4], [1.6, 1.4]))

@@ -94,6 +94,7 @@ def prepared(machines, form, frame_id='world'):
     return robot if form == 'urdf' else assembled(robot)
 
 
+@pytest.mark.nightly(all_but=12)
 @pytest.mark.parametrize('form', FORMATS)
 @pytest.mark.parametrize('config', CONFIGS, ids=lambda config: config.stem)
 def test_robots_of_the_shipped_scenes_come_back(tmp_path, config, form):

@@ -59,7 +59,7 @@ def turning(mechanism, name):
     return f'angle({link.joint},{link.tip})'
 
 
-@pytest.mark.nightly(all_but=10)
+@pytest.mark.nightly(all_but=6)
 @pytest.mark.parametrize('name', MADE)
 def test_efforts_balance_a_force_on_each_joint_and_a_moment_on_each_link(name):
     mechanism, rng, compared = MADE[name](), np.random.default_rng(2), 0

@@ -275,7 +275,10 @@ def test_what_is_no_arithmetic_is_refused(page, text, reason):
     assert reason in page.ask('read', text=text)['reason']
 
 
-def test_nodes_that_come_later_or_in_a_namespace_are_waited_for_and_not_guessed(graph, show):
+def test_nodes_that_come_later_or_in_a_namespace_are_waited_for_and_not_guessed(
+        graph, show, monkeypatch):
+    monkeypatch.setattr(scene_view, 'POLL_S', 0.1)
+    monkeypatch.setattr(scene_view, 'MAX_ANNOUNCE_S', 0.4)
     # Whoever will announce its parameters there has not done so.
     graph.node.create_publisher(MarkerArray, 'leg/markers', 1)
     graph.node.create_publisher(Marker, 'leg/locus', LATCHED)

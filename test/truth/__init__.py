@@ -9,7 +9,6 @@ exact_poses            the catalogue, each mechanism placed in 80 digits
 accuracy_rule          how far an answer of the catalogue may be from that, and its measure
 drawing                any linkage, drawn from its joint lines in 96 digits or for many angles
 drawing_accuracy       how far an answer of any linkage may be from its drawing
-brute_force_reach      where the first four mechanisms can be assembled, by trying
 hard_cases             angles and dimensions that are hard on the catalogue
 random_linkages        random joint lines of every word, a third of them nearly degenerate
 linkage_checks         everything that is asked of such a linkage

@@ -36,6 +36,9 @@ _FORMS = {
 _SLIDER_ALONG = 'jnjjs'
 _INPUTS = 'crank', 'cylinder', 'carriage'
 SLIDING = 'cylinder', 'carriage', 'yoke', 'slot', 'slider'
+# To which of the joints that it stands on a joint that is placed has a bar, by their numbers.
+_BARS_TO = {'crank': (0,), 'dyad': (0, 1), 'mirror': (1, 2), 'parallelogram': (1, 2),
+            'antiparallelogram': (1, 2), 'slot': (0,), 'slider': (0,), 'cylinder': (1,)}
 _SIDES = {'left': 1, 'right': -1, 'out': 1, 'in': -1}
 
 
@@ -369,40 +372,22 @@ class Linkage:
     def _links(self):
         """Note which joints are on one moving link: a line each, from bar to bar."""
         self.bodies = []
-        for i, line in enumerate(self.lines):
+        for line in self.lines:
             names, joints = line.names, line.joints
-            if line.word == 'crank':
-                self._body(i, joints[0], names[0])
-            elif line.word == 'dyad':
-                self._body(i, joints[0], names[0])
-                self._body(i, joints[1], names[0])
-            elif line.word in ('mirror', 'parallelogram', 'antiparallelogram'):
-                for joint in joints[1:]:
-                    self._body(i, joint, names[0])
+            if line.word in _BARS_TO:
+                self.bodies += [[joints[k], names[0]] for k in _BARS_TO[line.word]]
             elif line.word == 'inversor':
                 right, corner, left = names
-                for pair in ((joints[0], right), (joints[1], right), (right, corner),
-                             (joints[0], left), (joints[1], left), (left, corner)):
-                    self._body(i, *pair)
-            elif line.word in ('slot', 'slider'):
-                self._body(i, joints[0], names[0])
-            elif line.word == 'cylinder':
-                self._body(i, joints[1], names[0])
+                self.bodies += [[*ends] for side in (right, left) for ends in (
+                    (joints[0], side), (joints[1], side), (side, corner))]
             elif line.word == 'block':
-                self._on_block(i, joints[0], names[0])
+                others = [body for body in self.bodies if body[0] == joints[0]
+                          and self.placing(body[1]).word == 'block']
+                for body in others:
+                    body.append(names[0])
+                self.bodies += [] if others else [[joints[0], names[0]]]
             elif line.word in LAID and names[0] not in self.fixed:
                 self.body_of(*joints).append(names[0])
-
-    def _body(self, _, first, second):
-        self.bodies.append([first, second])
-
-    def _on_block(self, i, joint, name):
-        blocks = [body for body in self.bodies if body[0] == joint
-                  and self.placing(body[1]).word == 'block']
-        for body in blocks:
-            body.append(name)
-        if not blocks:
-            self._body(i, joint, name)
 
     def placing(self, name):
         """Return the line that places a joint."""
@@ -514,7 +499,7 @@ class Linkage:
     def arm_of_crank(self, line):
         """Return (ground joint, crank pin) if a dyad hangs between these, else None."""
         for foot, pin in (line.joints, line.joints[::-1]):
-            if pin in self.cranks and foot in self.fixed and foot != self._crank(pin).joints[0]:
+            if pin in self.cranks and foot in self.fixed and foot != self.placing(pin).joints[0]:
                 return foot, pin
         return None
 
@@ -526,9 +511,6 @@ class Linkage:
             return ''
         arm = self.arm_of_crank(line._replace(joints=line.joints[-2:]))
         return arm[1] if arm else ''
-
-    def _crank(self, pin):
-        return next(line for line in self.lines if pin in line.names)
 
     @precisely
     def passings(self):
@@ -547,7 +529,7 @@ class Linkage:
     def _passing(self, i, line):
         if line.word == 'dyad' and self.arm_of_crank(line):
             foot, pin = self.arm_of_crank(line)
-            crank = self._crank(pin)
+            crank = self.placing(pin)
             ground = abs(self._fixed(self.numbers, crank.joints[0])
                          - self._fixed(self.numbers, foot))
             m = self.numbers[self.lines.index(crank)][0]
@@ -558,7 +540,7 @@ class Linkage:
             unsure = abs(gmpy2.sin(turn + gmpy2.const_pi() / 2)) < ROUNDING
         elif line.word == 'slider' and line.joints[0] in self.cranks \
                 and self.fixed.issuperset(line.joints[1:]):
-            crank = self._crank(line.joints[0])
+            crank = self.placing(line.joints[0])
             m = self.numbers[self.lines.index(crank)][0]
             rod, line_of = self.numbers[i][0], self._rail(self.numbers, i)
             away = (self._fixed(self.numbers, crank.joints[0])
@@ -581,7 +563,7 @@ class Linkage:
     def _turn(self, numbers, line):
         """Return the angle of the crank's zero from the ground line, foot to centre."""
         foot, pin = self.arm_of_crank(line)
-        crank = self._crank(pin)
+        crank = self.placing(pin)
         along = self._fixed(numbers, crank.joints[0]) - self._fixed(numbers, foot)
         return DIGITS.direction(self._zero(numbers, crank) * along.conjugate())
 
@@ -609,7 +591,7 @@ class Linkage:
         for i in way:
             line = self.lines[i]
             found[i] = (self._turn(numbers, line) if line.word == 'dyad' else
-                        self._turn_on_line(numbers, self._crank(line.joints[0]),
+                        self._turn_on_line(numbers, self.placing(line.joints[0]),
                                            self._rail(numbers, i)))
         return found
 

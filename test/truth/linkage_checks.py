@@ -320,13 +320,13 @@ def reach(subject):
     arcs = subject.mechanism.reach(*subject.held)
     drawing, _ = subject.drawn(subject.values)
     held = subject.reachable(drawing)
-    inside = _inside(arcs, subject.values, subject.inputs[0].turn if subject.periodic else 0.0)
-    for i in _some(np.flatnonzero(held != inside)):
+    is_in = inside(arcs, subject.values, subject.inputs[0].turn if subject.periodic else 0.0)
+    for i in _some(np.flatnonzero(held != is_in)):
         value = float(subject.values[i])
         states = subject.states(value)
         if held[i] and states <= {'meets', 'undirected'}:
             yield 'reach misses', f'{value!r} can be assembled, reach {arcs}'
-        if inside[i] and 'fails' in states and 'slips' not in states:
+        if is_in[i] and 'fails' in states and 'slips' not in states:
             yield 'reach too far', f'{value!r} cannot be assembled, reach {arcs}'
     for lo, hi in arcs:
         first = subject.inputs[0]
@@ -346,7 +346,8 @@ def _with(subject, value):
     return [value, *subject.held] if subject.held else value
 
 
-def _inside(arcs, values, turn):
+def inside(arcs, values, turn):
+    """Tell which values of an input lie on arcs, whole turns aside if there are any."""
     held = np.zeros(np.shape(values), bool)
     for lo, hi in arcs:
         away = np.mod(values - lo, turn) if turn else values - lo

@@ -176,10 +176,8 @@ class _Writer:
         if step == 0.0:
             return text
         near = value * (1.0 + self._rng.choice((-1, 1)) * step)
-        literal, self._literal = self._literal, 0.0
         name = f'd{len(self._dimensions)}'
         self._dimensions[name] = float(near * self._size)
-        self._literal = literal
         return name
 
     def _name(self):
@@ -188,6 +186,13 @@ class _Writer:
 
     def _put(self, name, place, kind):
         self._place[name], self._kind[name] = place, kind
+
+    def _add(self, name, text, place, *hung_on):
+        """Write the line of a joint, which has bars to others; the line begins with its word."""
+        self._lines.append(f'{name} {text}')
+        self._put(name, place, text.split()[0])
+        for joint in hung_on:
+            self._body(joint, name)
 
     def _somewhere(self, centre=0.0, radius=1.0):
         return centre + radius * (self._rng.normal() + 1j * self._rng.normal())
@@ -228,8 +233,7 @@ class _Writer:
             place = self._somewhere(radius=1.5)
         name = self._name()
         x, y = (self._number(value, False) for value in (place.real, place.imag))
-        self._lines.append(f'{name} ground {x} {y}')
-        self._put(name, complex(self._worth(x), self._worth(y)), 'ground')
+        self._add(name, f'ground {x} {y}', complex(self._worth(x), self._worth(y)))
 
     def _worth(self, text):
         if text.startswith('-') and text not in self._texts:
@@ -321,10 +325,8 @@ class _Writer:
         gear = self._gear('cylinder', abs(place - p), geared)
         side = 'left' if ((o - p).conjugate() * (place - p)).imag > 0 else 'right'
         name = self._name()
-        self._lines.append(f'{name} cylinder {base} {pivot} {bar} {side}{gear}')
-        self._put(name, place, 'cylinder')
+        self._add(name, f'cylinder {base} {pivot} {bar} {side}{gear}', place, pivot)
         self._slide(name, place - p)
-        self._body(pivot, name)
 
     def _any_two(self):
         return map(str, self._rng.choice(list(self._place), 2, replace=False))
@@ -352,8 +354,8 @@ class _Writer:
         ends = [self._number(low, False), self._number(high, False)]
         gear = self._gear('carriage', value, geared)
         name = self._name()
-        self._lines.append(f'{name} carriage {origin} along {towards} {" ".join(ends)}{gear}')
-        self._put(name, self._place[origin] + along / abs(along) * value, 'carriage')
+        self._add(name, f'carriage {origin} along {towards} {" ".join(ends)}{gear}',
+                  self._place[origin] + along / abs(along) * value)
         self._slide(name, along)
 
     def _yoke(self):
@@ -364,8 +366,8 @@ class _Writer:
         along = self._place[towards] - self._place[origin]
         seen = (self._place[pin] - self._place[origin]) / along
         name = self._name()
-        self._lines.append(f'{name} yoke {pin} {origin} along {towards}')
-        self._put(name, self._place[origin] + along * seen.real, 'yoke')
+        self._add(name, f'yoke {pin} {origin} along {towards}',
+                  self._place[origin] + along * seen.real)
         self._slide(name, along)
 
     def _image(self):
@@ -376,9 +378,7 @@ class _Writer:
         place = p + (q - p) * ((self._place[point] - p) / (q - p)).conjugate()
         if self._distance(*line) > 1e-3 and min(
                 abs(place - other) for other in self._place.values()) > 1e-3:
-            name = self._name()
-            self._lines.append(f'{name} image {point} {" ".join(line)}')
-            self._put(name, place, 'image')
+            self._add(self._name(), f'image {point} {" ".join(line)}', place)
 
     def _slide(self, joint, along):
         """Note the direction in which a joint slides, the first one that it has."""
@@ -392,9 +392,8 @@ class _Writer:
         if self._degenerate and rng.random() < 0.5:
             parts[int(rng.integers(2))] = '0'
         name = self._name()
-        self._lines.append(f'{name} block {joint} {parts[0]} {parts[1]}')
-        self._put(name, self._place[joint] + self._along[joint] * complex(
-            *map(self._worth, parts)), 'block')
+        self._add(name, f'block {joint} {parts[0]} {parts[1]}', self._place[joint]
+                  + self._along[joint] * complex(*map(self._worth, parts)))
         for body in self._bodies:
             if body[0] == joint and self._kind[body[1]] == 'block':
                 body.append(name)
@@ -418,9 +417,8 @@ class _Writer:
         if moved.startswith('0'):
             moved = moved[2:] if sign == '+' else moved[1:]
         at = (moved, y) if where in ('right', 'left') else (x, moved)
-        self._lines.append(f'{foot} ground {at[0]} {at[1]}')
         step = {'right': g, 'left': -g, 'up': 1j * g, 'down': -1j * g}[where]
-        self._put(foot, self._place[centre] + step, 'ground')
+        self._add(foot, f'ground {at[0]} {at[1]}', self._place[centre] + step)
         kind = rng.choice(('isosceles', 'parallelogram', 'sum', 'kite', 'difference', 'crossed'))
         if kind in ('isosceles', 'kite'):
             crank, m = self._nudged(ground, g), g
@@ -434,10 +432,8 @@ class _Writer:
         name = self._name()
         b = rng.uniform(0.15, 0.85) * (g + m)
         if kind == 'crossed':
-            self._lines.append(f'{name} antiparallelogram {centre} {pair[0]} {pair[1]}')
-            self._put(name, self._somewhere(self._place[pin]), 'antiparallelogram')
-            self._body(pair[0], name)
-            self._body(pair[1], name)
+            self._add(name, f'antiparallelogram {centre} {pair[0]} {pair[1]}',
+                      self._somewhere(self._place[pin]), *pair)
         elif kind == 'isosceles':
             self._arms += [pair, pair]
         elif kind == 'parallelogram':
@@ -458,10 +454,8 @@ class _Writer:
         self._literal = literal
 
     def _finish_dyad(self, name, first, second, one, other, side):
-        self._lines.append(f'{name} dyad {first} {second} {one} {other} {side}')
-        self._put(name, self._somewhere(self._place[second]), 'dyad')
-        self._body(first, name)
-        self._body(second, name)
+        self._add(name, f'dyad {first} {second} {one} {other} {side}',
+                  self._somewhere(self._place[second]), first, second)
 
     def _dyad(self):
         rng = self._rng
@@ -501,9 +495,8 @@ class _Writer:
         other = self._nudged(one, self._texts[one]) if 0.4 < shape <= 0.8 \
             else self._number(abs(place - q))
         name = self._name()
-        self._lines.append(f'{name} rigid {first} {second} {one} {other} '
-                           f'{rng.choice(("left", "right"))}')
-        self._put(name, place, 'rigid')
+        self._add(name, f'rigid {first} {second} {one} {other} {rng.choice(("left", "right"))}',
+                  place)
         body.append(name)
 
     def _line(self):
@@ -518,8 +511,7 @@ class _Writer:
         else:
             text = self._number(rng.normal() * abs(q - p), False)
         name = self._name()
-        self._lines.append(f'{name} line {first} {second} {text}')
-        self._put(name, self._somewhere(p), 'line')
+        self._add(name, f'line {first} {second} {text}', self._somewhere(p))
         body.append(name)
 
     def _corners(self):
@@ -552,14 +544,11 @@ class _Writer:
         if self._rng.random() < 0.5:
             first, second = second, first
         o, p, q = (self._place[name] for name in (point, first, second))
-        name = self._name()
-        self._lines.append(f'{name} {word} {point} {first} {second}')
         if word != 'mirror':
             o = p + q - o
-        self._put(name, o if word == 'parallelogram' or abs(q - p) < 1e-9
-                  else p + (q - p) * ((o - p) / (q - p)).conjugate(), word)
-        self._body(first, name)
-        self._body(second, name)
+        self._add(self._name(), f'{word} {point} {first} {second}',
+                  o if word == 'parallelogram' or abs(q - p) < 1e-9
+                  else p + (q - p) * ((o - p) / (q - p)).conjugate(), first, second)
 
     def _inversor(self):
         rng = self._rng
@@ -590,11 +579,9 @@ class _Writer:
             offset = self._number(rng.uniform(-1.0, 1.0) * max(away, 0.1), False)
         name = self._name()
         length = self._number(_log_uniform(rng, 0.3, 3.0))
-        self._lines.append(f'{name} slot {pivot} {pin} {offset} {rng.choice(("out", "in"))} '
-                           f'{length}')
-        self._put(name, self._somewhere(self._place[pivot]), 'slot')
+        self._add(name, f'slot {pivot} {pin} {offset} {rng.choice(("out", "in"))} {length}',
+                  self._somewhere(self._place[pivot]), pivot)
         self._slide(pin, self._place[pin] - self._place[pivot])
-        self._body(pivot, name)
 
     def _slider(self):
         rng = self._rng
@@ -619,9 +606,7 @@ class _Writer:
         if angle and not towards and rng.random() < 0.3:
             turn = f'd{len(self._dimensions)}'
             self._dimensions[turn] = float(angle)
-        self._lines.append(f'{name} slider {pin} {rod} {origin} '
-                           f'{f"along {towards}" if towards else turn} '
-                           f'{rng.choice(("out", "in"))}')
-        self._put(name, self._place[origin] + along * seen.real, 'slider')
+        way = f'along {towards}' if towards else turn
+        self._add(name, f'slider {pin} {rod} {origin} {way} {rng.choice(("out", "in"))}',
+                  self._place[origin] + along * seen.real, pin)
         self._slide(name, along)
-        self._body(pin, name)
