@@ -185,10 +185,10 @@ def test_outputs_of_few_inputs_tell_all_together():
     (('P.x', 7), [0.1, 0.1], 'five_bar has no output 7; allowed: '),
     (({}, 'P.x'), [0.1, 0.1], 'five_bar has no output {}; allowed: '),
     (('P.x', 'P.x'), [0.1, 0.1],
-     'P.x, P.x do not determine all inputs: P.x, P.x depends on too few'),
+     'P.x, P.x do not determine all inputs: too few of them move P.x, P.x'),
     (('A.x', 'crank'), [0.1, 0.1],
-     'A.x, crank do not determine all inputs: A.x, crank depends on too few'),
-    (('P.x', 'O.x'), [0.1, 0.1], 'P.x, O.x do not determine all inputs: O.x depends on too few'),
+     'A.x, crank do not determine all inputs: too few of them move A.x, crank'),
+    (('P.x', 'O.x'), [0.1, 0.1], 'P.x, O.x do not determine all inputs: too few of them move O.x'),
     (('P.x', 'P.y'), [0.1], r'values must be as many numbers, got \[0.1\]'),
     (('P.x', 'P.y'), 'ab', "values must be a number or an array of numbers, got 'ab'")])
 def test_what_cannot_be_asked_is_refused_with_the_reason(outputs, values, reason):

@@ -43,8 +43,8 @@ def check_dependence(linkage: Kinematics, outputs: Names) -> None:
 
 def dependent(outputs: Names, rows: Sequence[int]) -> ValueError:
     """Return the error for outputs of which some depend on too few inputs."""
-    return ValueError(f'{listed(outputs)} do not determine all inputs: '
-                      f'{listed(outputs[row] for row in rows)} depends on too few')
+    return ValueError(f'{listed(outputs)} do not determine all inputs: too few of them move '
+                      f'{listed(outputs[row] for row in rows)}')
 
 
 class Grid:
