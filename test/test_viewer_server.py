@@ -271,7 +271,8 @@ def test_the_page_is_as_small_as_the_docs_say():
     assert size == pytest.approx(1000.0 * float(said[1]), rel=0.1)
 
 
-@pytest.mark.parametrize('name', ['%2e%2e%2fserver.py', 'server.py', 'none.html', 'page/main.js'])
+@pytest.mark.parametrize('name', [
+    '%2e%2e%2fserver.py', 'vendor%2f..%2f..%2fserver.py', 'server.py', 'none.html', 'page/main.js'])
 def test_only_the_page_is_served(lever, name):
     assert status(lever.url + name) == 404
 

@@ -92,9 +92,11 @@ class Server:
     async def _serve(self, port: int, started: Future[Any]) -> None:
         self._view.loop = asyncio.get_running_loop()
         app = web.Application(middlewares=[self._guard])
-        app.add_routes([web.get('/', _index), web.get('/socket', self._connect),
-                        *(web.get(path, _coloured) for path in COLOURED),
-                        web.static('/', PAGE, follow_symlinks=True)])
+        # A route for each file, so that no path leads out of the folder.
+        files = ['', *(path.relative_to(PAGE).as_posix() for path in PAGE.rglob('*')
+                       if path.is_file())]
+        app.add_routes([web.get('/socket', self._connect),
+                        *(web.get(f'/{path}', _file) for path in files)])
         runner = web.AppRunner(app, access_log=None, shutdown_timeout=MAX_CLOSE_S)
         await runner.setup()
         try:
@@ -263,11 +265,9 @@ class Client:
         await asyncio.wait_for(self._socket.send_json(message), MAX_READ_S)
 
 
-async def _index(_: web.Request) -> web.FileResponse:
-    return web.FileResponse(PAGE / 'index.html')
-
-
-async def _coloured(request: web.Request) -> web.Response:
-    text = (PAGE / request.path[1:]).read_text('utf-8')
-    return web.Response(text=Template(text).substitute(COLOURS),
+async def _file(request: web.Request) -> web.StreamResponse:
+    path = PAGE / (request.path[1:] or 'index.html')
+    if request.path not in COLOURED:
+        return web.FileResponse(path)
+    return web.Response(text=Template(path.read_text('utf-8')).substitute(COLOURS),
                         content_type=COLOURED[request.path])
