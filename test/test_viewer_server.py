@@ -272,7 +272,8 @@ def test_the_page_is_as_small_as_the_docs_say():
 
 
 @pytest.mark.parametrize('name', [
-    '%2e%2e%2fserver.py', 'vendor%2f..%2f..%2fserver.py', 'server.py', 'none.html', 'page/main.js'])
+    '%2e%2e%2fserver.py', 'vendor%2f..%2f..%2fserver.py', 'server.py', 'none.html',
+    'page/main.js'])
 def test_only_the_page_is_served(lever, name):
     assert status(lever.url + name) == 404
 
