@@ -4,11 +4,13 @@
 """What many mechanisms share, and what a change to one of them leaves alone, counted."""
 
 import gc
+from itertools import combinations, permutations
 import math
 import weakref
 
 from hypothesis import given, settings, strategies as st
-from linkage_ros import scene
+from linkage_ros import mechanisms, scene
+from linkage_ros.formula.expression import Real
 from linkage_ros.linkage.motion import reach
 from linkage_ros.robot_model import bodies
 import pytest
@@ -45,6 +47,20 @@ def test_a_linkage_that_nobody_holds_is_gone_after_some_others():
         linkages(39.0 + i / 64)
     gc.collect()
     assert gone() is None
+
+
+def test_other_outputs_leave_nothing_behind_in_a_linkage():
+    linkage = mechanisms.create('watt')
+    outputs = [f'distance({a},{b})' for a, b in permutations(linkage.points[:5], 2)]
+
+    def expressions():
+        # More pairs than a linkage caches.
+        for pair in combinations(outputs, 2):
+            linkage.joint_angles(0.3, pair)
+        gc.collect()
+        return sum(isinstance(part, Real) for part in gc.get_objects())
+
+    assert expressions() == expressions()
 
 
 # Of some parameters of the scene, values that are allowed and values that are not.

@@ -417,7 +417,8 @@ class Kinematics:
 
     def bind(self, program: Program) -> Pose:
         """Return a program of its formulas as a function of its arguments."""
-        return program.bind(self.dimensions, self._evaluated, self.is_accelerated)
+        # A copy, since what a program needs beside the constants goes with the program.
+        return program.bind(self.dimensions, dict(self._evaluated), self.is_accelerated)
 
     def bound(self, kind: str, names: Any, *by: int) -> Pose:
         """Return the code for quantities of one kind; see `Structure.program`."""
