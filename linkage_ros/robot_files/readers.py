@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from contextlib import contextmanager
+from graphlib import CycleError
 from pathlib import Path
 from typing import Any, Iterator, Mapping, Optional
 
@@ -65,7 +66,7 @@ def _blaming(path: str) -> Iterator[None]:
         yield
     except RequestError as error:
         raise RequestError(f'{path}: {error}') from None
-    except RecursionError:
+    except (RecursionError, CycleError):
         raise RequestError(f'{path} has links or frames that hang on themselves') from None
     except LookupError as error:
         raise RequestError(f'{path} names {error}, which is not there') from None
