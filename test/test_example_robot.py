@@ -36,7 +36,7 @@ MOTORS = {name for motors in BOARDS for name in motors}
 JOINTS = {joint.get('name'): joint for joint in ElementTree.fromstring(URDF).iter('joint')
           if joint.get('type') != 'fixed'}
 PASSIVE = JOINTS.keys() - MOTORS
-POSES = 15
+POSES = 40
 
 
 class Robot:

@@ -195,7 +195,7 @@ def test_both_ways_are_those_of_the_scene(library, machines, name):
     machine = machines[name]
     n = len(machine.inputs)
     memory = Memory(library, name, n)
-    for inputs in states(machine, 8):
+    for inputs in states(machine, 20):
         actuator, by, joint, turning = expected(machine, inputs)
         speeds, torques = np.arange(1.0, n + 1.0), np.arange(2.0, n + 2.0)
         loads = np.array(machine.efforts(inputs)) if machine.loads else np.zeros(n)
