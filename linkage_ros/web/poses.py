@@ -9,8 +9,8 @@ from typing import Any, Mapping, Optional, Sequence
 
 import numpy as np
 
-from .nearest_pose import nearest_inputs, theta_of
-from ..linkage import Formula, Mechanism
+from .nearest_pose import nearest_inputs
+from ..linkage import Formula, Mechanism, theta_of
 from ..robot_model.shapes import ground_frame
 from ..scene import Parameter, Scene, SceneError, SceneMechanism, slider
 from ..scene.scene_mechanism import divided
@@ -170,6 +170,8 @@ def reached(mechanism: SceneMechanism, present: Sequence[float],
     if 'joint' in want:
         return _joint_at(mechanism, present, **want), None
     name, value = want['output'], want['value']
+    if not math.isfinite(value):
+        raise SceneError(f'a value must be finite, not {value}')
     if name in mechanism.inputs:
         return _input_at(mechanism, present, name, value)
     return _output_at(mechanism, present, name, value)
