@@ -16,7 +16,7 @@ from . import check, closing, loops, planar, readers, rods
 from .spatial import components
 from .. import command, scene
 from ..linkage import short
-from ..robot_model.robot import FARTHEST, FIXED, HINGE, NotDriven, posed, Robot, SLIDE
+from ..robot_model.robot import FIXED, HINGE, MAX_NUMBER, NotDriven, posed, Robot, SLIDE
 from ..scene.writing import in_yaml
 from ..words import elided, listed, sentence
 
@@ -184,6 +184,6 @@ def positions(texts: Sequence[str]) -> Dict[str, float]:
             values[name] = float(value)
         except ValueError:
             values[name] = math.nan
-        if not name or not abs(values[name]) < FARTHEST:
+        if not name or not abs(values[name]) < MAX_NUMBER:
             raise command.RequestError(f'{text!r} must be JOINT=VALUE, its value in rad or m')
     return values

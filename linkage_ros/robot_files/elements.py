@@ -12,7 +12,7 @@ from xml.parsers import expat
 import numpy as np
 
 from ..command import RequestError
-from ..robot_model.robot import FARTHEST, FIXED, pose, Robot
+from ..robot_model.robot import FIXED, MAX_NUMBER, pose, Robot
 
 Element = ElementTree.Element
 
@@ -63,8 +63,8 @@ def text(part: Element, tag: str, otherwise: str = '') -> str:
 def numbers(values: Union[str, Sequence[Any]], count: int = 3) -> np.ndarray:
     """Return the numbers of a text or a list; raise ValueError if they are not `count`."""
     array = np.array(values.split() if isinstance(values, str) else values, float)
-    if array.shape != (count,) or not np.all(np.abs(array) < FARTHEST):
-        raise ValueError(f'{values!r} must be {count} numbers within {FARTHEST:g}')
+    if array.shape != (count,) or not np.all(np.abs(array) < MAX_NUMBER):
+        raise ValueError(f'{values!r} must be {count} numbers within {MAX_NUMBER:g}')
     return array
 
 

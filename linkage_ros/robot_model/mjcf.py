@@ -18,7 +18,7 @@ from xml.etree.ElementTree import Element, indent, tostring
 import numpy as np
 
 from .bodies import add, COLOURS, Model, numbers
-from .robot import Body, FARTHEST, HINGE, Joint, Robot
+from .robot import Body, HINGE, Joint, MAX_NUMBER, Robot
 from .shapes import BALL, BOX, CYLINDER
 
 # Time step [s] for a linkage of a metre; smaller linkages oscillate faster.
@@ -71,7 +71,7 @@ def _add_body(parent: Element, body: Body, robot: Robot) -> Element:
         moved = add(made, 'joint', name=joint.name, type=joint.kind, axis=numbers(*body.axis),
                     ref=numbers(joint.start))
         if joint.limits:
-            moved.set('range', numbers(*np.clip(joint.limits, -FARTHEST, FARTHEST)))
+            moved.set('range', numbers(*np.clip(joint.limits, -MAX_NUMBER, MAX_NUMBER)))
     for piece in robot.pieces.get(body.name, ()):
         half, thickness = 0.5 * piece.length, piece.thickness
         sizes = {CYLINDER: (thickness, half), BOX: (half, 0.5 * thickness, 0.5 * thickness),

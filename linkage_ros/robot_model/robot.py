@@ -26,7 +26,7 @@ HINGE, SLIDE, BALL, FIXED, UNIVERSAL, FREE = (
 KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical': BALL, '3d': BALL,
          '6d': FIXED, 'revolute2': UNIVERSAL, 'floating': FREE}
 # No robot has parts farther off [m], or limits [m or rad].
-FARTHEST = 1e9
+MAX_NUMBER = 1e9
 # Joints that a tree prefers, if they are not driven.
 _TREE = {FIXED: 0, SLIDE: 1, FREE: 2, BALL: 3, HINGE: 4}
 
@@ -286,8 +286,8 @@ class Robot:
         directions = axis, axis if second is None else second
         turns, places = zip(*((matrix[:3, :3], matrix[:3, 3]) for matrix in frames))
         sizes = np.linalg.norm(directions, axis=1)
-        if not np.all(np.abs((*places, *directions)) < FARTHEST):
-            raise RequestError(f'joint {name} must be within {FARTHEST:g} m')
+        if not np.all(np.abs((*places, *directions)) < MAX_NUMBER):
+            raise RequestError(f'joint {name} must be within {MAX_NUMBER:g} m')
         if kind in (HINGE, SLIDE, UNIVERSAL) and not np.all(sizes > 0.0):
             raise RequestError(f'the axis of joint {name} has no length')
         if kind != UNIVERSAL:
@@ -399,7 +399,7 @@ def _seen(base: np.ndarray, frame: np.ndarray, span: float) -> list[float]:
 def _limits(limits: Sequence[Any], is_continuous: bool
             ) -> tuple[Optional[tuple[float, float]], str]:
     """Return the limits that count, None without any, and those that do not, with the reason."""
-    low, high = (math.copysign(math.inf, end) if abs(end) >= FARTHEST else end
+    low, high = (math.copysign(math.inf, end) if abs(end) >= MAX_NUMBER else end
                  for end in map(float, limits))
     if -low == high == math.inf:
         return None, ''
