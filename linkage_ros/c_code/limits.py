@@ -31,7 +31,7 @@ def joint_limits(machine: SceneMechanism, names: Sequence[str] = ()
     """Yield the name of each commanded joint, and its limits [rad or m]; infinite: it turns."""
     linkage = machine.linkage
     # The arcs of each input, in the linkage's own units.
-    arcs = [np.divide([drive.ends] if drive.ends else drive.reach, machine.scale_of(name))
+    arcs = [np.divide(drive.arcs, machine.scale_of(name))
             for name, drive in machine.inputs.items()]
     for axis in joints(machine, names):
         if len(arcs) > 1:

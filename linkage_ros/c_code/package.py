@@ -77,7 +77,7 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
 
 def ranges(machine: SceneMechanism) -> str:
     """Return the sweeps or reaches of the inputs, in rad or in sizes, as an initializer of C++."""
-    arcs = [np.divide(drive.ends or max(drive.reach, key=np.ptp),
+    arcs = [np.divide(max(drive.arcs, key=np.ptp),
                       input_.size * machine.scale_of(input_.name))
             for input_, drive in zip(machine.linkage.inputs, machine.inputs.values())]
     return '{%s}' % ', '.join('{%r, %r}' % (*arc.tolist(),) for arc in arcs)

@@ -174,6 +174,11 @@ class Input(NamedTuple):
 CRANK = Input('crank')
 
 
+def theta_of(values: Any) -> Any:
+    """Return inputs as an argument of a linkage: a sequence only if there are several."""
+    return values if len(values) > 1 else values[0]
+
+
 def spread(inputs: Sequence[Input], count: int) -> List[np.ndarray]:
     """Return values of each input (count,): poses that fill their ranges evenly."""
     # Multiples of square roots of primes, without their whole parts.

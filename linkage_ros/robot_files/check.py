@@ -19,7 +19,7 @@ import numpy as np
 
 from .spatial import Component, components, EXACT
 from .. import scene
-from ..linkage import short
+from ..linkage import short, theta_of
 from ..robot_model.robot import Robot, SLIDE
 from ..scene.joint_names import quoted_name
 
@@ -244,7 +244,7 @@ class _Loops:
         for machine in self._machines:
             values = [drive.ratio * positions[drive.source] + drive.offset
                       for drive in machine.inputs.values()]
-            angles = machine.linkage.joint_angles(values if len(values) > 1 else values[0])
+            angles = machine.linkage.joint_angles(theta_of(values))
             positions.update((called.name, called.of(angles[link]))
                              for link, called in machine.joints.items() if called.published)
         return {name: values for name, values in positions.items()

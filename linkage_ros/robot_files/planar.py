@@ -21,7 +21,18 @@ import numpy as np
 from . import check, loops
 from .spatial import EXACT, TOGETHER
 from .. import mechanisms, scene
-from ..linkage import bar_name, Dyads, Hinge, Mechanism, Motor, Pin, ROUNDING, short, Slide
+from ..linkage import (
+    bar_name,
+    Dyads,
+    Hinge,
+    Mechanism,
+    Motor,
+    Pin,
+    ROUNDING,
+    short,
+    Slide,
+    theta_of,
+)
 from ..robot_model.robot import at, coordinates, HINGE, Joint, NotDriven, plain, Robot, SLIDE
 from ..scene import FARTHEST
 
@@ -155,7 +166,7 @@ class Drawing(Dyads):
     def apart(self, linkage: Mechanism, *names: str) -> float:
         """Return the largest distance of joints from the file's pose, of the linkage's size."""
         values = [drive.value for drive in self.drives]
-        places = linkage.solve(values if len(values) > 1 else values[0])
+        places = linkage.solve(theta_of(values))
         return float(np.max([abs(complex(*places[name]) - place) for name, place in self.places
                              if name in (names or places)])) / self.size
 

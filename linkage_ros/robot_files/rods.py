@@ -20,7 +20,7 @@ import numpy as np
 from . import check
 from .loops import Group
 from .. import mechanisms, scene
-from ..linkage import FORMS, short, WindowError
+from ..linkage import FORMS, short, theta_of, WindowError
 from ..robot_model.robot import BALL, HINGE, Joint, NotDriven, plain, Robot, SLIDE
 from ..words import listed
 
@@ -235,7 +235,7 @@ def _sweeps(machine: scene.SceneMechanism, limits: Mapping[str, Tuple[float, flo
     for share in _SMALLER ** np.arange(_TRIES):
         ends = np.clip([start - share * size, start + share * size], low, high)
         values = np.meshgrid(*np.linspace(ends[0], ends[1], _SIDE).T)
-        angles = machine.linkage.joint_angles(values if len(values) > 1 else values[0])
+        angles = machine.linkage.joint_angles(theta_of(values))
         if np.isfinite(list(angles.values())).all():
             break
     return ends.T.tolist()

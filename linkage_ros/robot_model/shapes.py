@@ -17,7 +17,7 @@ from typing import Any, Collection, Dict, List, NamedTuple, Optional, Sequence, 
 
 import numpy as np
 
-from ..linkage import GROUND, Link, LinkPoint, Mechanism
+from ..linkage import GROUND, Link, LinkPoint, Mechanism, theta_of
 from ..scene import SceneMechanism
 
 # Kinds of sliding parts.
@@ -96,7 +96,7 @@ def input_values(machine: SceneMechanism) -> Any:
     count = max(round(SAMPLES ** (1.0 / len(machine.inputs))), 2)
     values = [np.concatenate([np.linspace(*arc, count) for arc in settings.arcs])
               / machine.scale_of(name) for name, settings in machine.inputs.items()]
-    return np.meshgrid(*values) if len(values) > 1 else values[0]
+    return theta_of(np.meshgrid(*values))
 
 
 def drawn(machine: SceneMechanism, names: Collection[str]) -> List[Shape]:

@@ -28,7 +28,7 @@ from .parameters import (
 )
 from .. import mechanisms
 from ..cache import cached
-from ..linkage import Arc, Design, Mechanism
+from ..linkage import Arc, Design, Mechanism, theta_of
 from ..words import listed
 
 IN_SPACE = 'a linkage in space: pictures and robot models are of linkages in a plane'
@@ -190,7 +190,7 @@ class SceneMechanism:
         # The scale lengthens the lever arms of forces; moments do not depend on it.
         loads = {name: load if isinstance(load, float) else tuple(
             self.scale * part for part in load) for name, load in self.loads.items()}
-        efforts = self.linkage.effort(inputs if len(inputs) > 1 else inputs[0], loads)
+        efforts = self.linkage.effort(theta_of(inputs), loads)
         return tuple(divided(efforts.tolist(), self.scales))
 
     def assembly(self) -> Assembly:

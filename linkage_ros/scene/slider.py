@@ -17,7 +17,7 @@ import numpy as np
 from . import Scene, SceneMechanism
 from .parameters import Parameter
 from ..cache import cached
-from ..linkage import Arc, Mechanism
+from ..linkage import Arc, Mechanism, theta_of
 
 # Smallest and largest change of a dimension that is tried, as fractions of it, or of the longest
 # bar if it is 0; and the number of changes tried.
@@ -88,6 +88,6 @@ def _are_assembled(linkage: Mechanism, key: str, values: np.ndarray,
     theta = [grid.ravel() for grid in np.meshgrid(
         *(np.linspace(low, high, count) for low, high in ranges))]
     placed = np.ones((len(values), 1), dtype=bool)
-    for places in tried.solve(theta if len(theta) > 1 else theta[0]).values():
+    for places in tried.solve(theta_of(theta)).values():
         placed = placed & np.isfinite(places).all(axis=-1)
     return np.all(placed, axis=1) if required else np.any(placed, axis=1)

@@ -8,10 +8,9 @@ from typing import Any, Optional, Sequence
 
 import numpy as np
 
-from .nearest_pose import theta_of
 from .poses import linkage_inputs, shown
 from ..c_code import header
-from ..linkage import ascending, sampled
+from ..linkage import ascending, sampled, theta_of
 from ..robot_model import urdf
 from ..scene import SceneError, SceneMechanism
 

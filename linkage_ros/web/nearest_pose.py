@@ -9,18 +9,13 @@ from typing import Any, Sequence
 
 import numpy as np
 
-from ..linkage import Mechanism
+from ..linkage import Mechanism, theta_of
 
 DRAG_SAMPLES = 721
 # Penalty for moving the input through its whole arc, as a fraction of the path's width: where a
 # path crosses itself, the joint stays on its branch.
 LEASH = 0.1
 GAUSS_NEWTON_STEPS, STEP_HALVINGS = 60, 12
-
-
-def theta_of(values: Any) -> Any:
-    """Return the inputs as an argument of a linkage: a sequence only if there are several."""
-    return values if len(values) > 1 else values[0]
 
 
 def nearest_inputs(linkage: Mechanism, joint: str, place: Sequence[float],

@@ -28,6 +28,7 @@ from .modes import Modes
 from .problem import InverseProblem, Row
 from .refine import distinct, distinct_arrays, refine, refine_arrays
 from .segments import Segments, segments_of
+from ..inputs import theta_of
 from ..kinematics import Kinematics
 from ..text.arguments import numbers
 from ..tolerances import SINGULAR
@@ -71,7 +72,7 @@ class Solution(NamedTuple):
         linkage, inputs = self.inverse.linkage, self.inputs
         names = [input_.name for input_ in linkage.inputs if input_.turns]
         cranks = {link.name: link for link in linkage.links if link.name in names}
-        places, signs = linkage.solve(inputs if len(inputs) > 1 else inputs[0]), {}
+        places, signs = linkage.solve(theta_of(inputs)), {}
         for link in linkage.links if linkage.axes == 'xy' else ():
             crank = cranks.get(link.parent)
             if crank and link.kind == 'revolute' and link.joint != crank.joint:
