@@ -3,7 +3,8 @@
 # SPDX-License-Identifier: Apache-2.0
 
 # Makes a virtual environment of lock files, or says in one sentence what is missing. What is not in
-# them, or has another hash there, is refused; nothing else is asked for, so nothing is resolved.
+# them, or has another hash there, is refused. Lock files are complete, so pip resolves nothing
+# (--no-deps): its resolver may choose a release that is newer than the lock file.
 #
 #   about='what it is' wheels/install.sh [--to-compile | --from-source] PYTHON FOLDER LOCK...
 #
@@ -43,7 +44,8 @@ mkdir -p "$folder"
   || stop "The virtual environment $folder cannot be made: $(tail -n 1 "$log")"
 for file; do files+=(-r "$file"); done
 install() {
-  "$folder/bin/python" -m pip install -q --require-hashes --no-build-isolation "$@" >"$log" 2>&1
+  "$folder/bin/python" -m pip install -q --no-deps --require-hashes --no-build-isolation "$@" \
+    >"$log" 2>&1
 }
 [ "$source" ] && install -r "${0%/*}/lock/source.txt"
 install "${files[@]}" && exit
