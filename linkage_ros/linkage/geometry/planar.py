@@ -93,9 +93,7 @@ def unit(vector: Complex) -> Complex:
 
 def turned(along: Complex, theta: Real, length: Real) -> Complex:
     """Return a bar of a length [m], turned from a direction by an angle [rad]."""
-    turning = spin(along)
-    return with_spin(along * Complex(cosine(theta), sine(theta)) * length, Rate(
-        (theta, *turning.of), lambda rate, *rates: rate + turning.formula(*rates)))
+    return along * Complex(cosine(theta), sine(theta)) * length
 
 
 def on_line(along: Complex, place: Real) -> Complex:
