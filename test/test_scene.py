@@ -422,7 +422,7 @@ def test_the_nodes_that_use_a_parameter_are_those_of_the_page():
         still = key in ('leg_pairs', 'mirrored') and name[0] not in ('jansen', 'peaucellier')
         found.setdefault(key, (set(each.field.readers), each.field.read_only and not still))
         assert each.field.owner in each.field.readers
-        assert each.field.owner == scene.OWNER or scene.OWNER not in each.field.readers
+        assert each.field.owner == scene.KINEMATICS or scene.KINEMATICS not in each.field.readers
         assert each.field.read_only == (written[key][1] or still), each.name
     assert found == written
 

@@ -243,7 +243,7 @@ def test_what_is_saved_or_exported_is_the_mechanism_as_it_is(page):
     machine = scene.read(LEVER).machines['lever']
     assert [page.ask('export', mechanism='/lever', form=form)['text']
             for form in ('csv', 'urdf', 'h')] == [
-        curves.exported(machine, [0.0], 'csv', ''), urdf.describe([machine], 'world'),
+        curves.table(machine, [0.0]), urdf.describe([machine], 'world'),
         header.written(machine)]
 
 

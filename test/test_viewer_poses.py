@@ -69,7 +69,7 @@ def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
     machine, present = machine_of(name, **{
         'excavator': DOUBLE, 'scissor_lift': {'scale': 2.0, 'carriage.start': 2.4}}.get(name, {}))
     present = [1.02 * value for value in present]
-    heads, *rows = csv.reader(io.StringIO(curves.exported(machine, present, 'csv', 'world')))
+    heads, *rows = csv.reader(io.StringIO(curves.table(machine, present)))
     # Rounded, an end is outside the reach.
     columns, linkage = dict(zip(heads, np.array(rows, float).T[:, 1:-1])), machine.linkage
     unit_in = linkage.inputs[0].unit

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Curves of outputs over a turn or a stroke, and export of mechanisms, for the page."""
+"""Curves of outputs over a turn or a stroke, for the page, and as a table."""
 
 import io
 from typing import Any, Optional, Sequence
@@ -9,9 +9,7 @@ from typing import Any, Optional, Sequence
 import numpy as np
 
 from .poses import linkage_inputs, shown
-from ..c_code import header
 from ..linkage import ascending, sampled, theta_of
-from ..robot_model import urdf
 from ..scene import SceneError, SceneMechanism
 
 SAMPLES = 361
@@ -59,7 +57,7 @@ class Sweep:
         linkage = self.linkage
         if kind == TRANSMISSION:
             return list(linkage.transmission_angles(self._inputs))
-        return [*(name for name in linkage.joints if name not in self._mechanism.inputs),
+        return [*self._mechanism.assembly().joints,
                 *(f'{joint}.{axis}' for joint in linkage.points if joint not in linkage.grounded
                   for axis in 'xy')]
 
@@ -118,12 +116,8 @@ def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSIT
             'ends': sweep.ends.tolist(), 'dead': sweep.dead.tolist()}
 
 
-def exported(mechanism: SceneMechanism, present: Sequence[float], form: str, frame_id: str) -> str:
-    """Return a text: 'csv', all kinds of all outputs in rad and m; 'urdf'; or 'h', of C."""
-    if form == 'urdf':
-        return urdf.describe([mechanism], mechanism.frame_id or frame_id)
-    if form == 'h':
-        return header.written(mechanism)
+def table(mechanism: SceneMechanism, present: Sequence[float]) -> str:
+    """Return all kinds of all outputs over the first input as CSV, in rad and m."""
     sweep, text = Sweep(mechanism, present), io.StringIO()
     columns = {f'{sweep.input.name} [{sweep.input.unit}]': sweep.values, **{
         f'{kind} {name} [{sweep.unit(kind, name) or 1}]': values for kind in KINDS

@@ -85,9 +85,8 @@ def described(mechanism: SceneMechanism, present: Sequence[float]) -> dict[str, 
     Each input has its value; each output of the first leg has value, unit, and d output / d input
     for each input, zero where it is rounding.
     """
-    linkage, names = mechanism.linkage, [
-        *(name for name in mechanism.linkage.joints if name not in mechanism.inputs),
-        *(f'{mechanism.tracer}.{axis}' for axis in 'xy')]
+    linkage, tracer = mechanism.linkage, mechanism.tracer
+    names = [*mechanism.assembly().joints, f'{tracer}.x', f'{tracer}.y']
     theta = linkage_inputs(mechanism, present)
     values = linkage.joint_angles(theta, names)
     rates = {input_: linkage.joint_rates(theta, names, i)
@@ -197,15 +196,12 @@ def _output_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
     solution, _ = mechanism.follow((name,), (value,), present)
     if math.isfinite(solution[0]):
         return solution, None
-    linkage, size, (scale,) = mechanism.linkage, mechanism.scale_of(name), mechanism.scales
-    spans = linkage.extremes(name, [(low / scale, high / scale)
-                                    for low, high in mechanism.first.arcs])
-    turn = math.tau if linkage.is_angle(name) else math.inf
-    _, nearest = min((abs(math.remainder(extreme - value / size, turn)), at)
+    spans, is_angle = mechanism.extremes(name), mechanism.linkage.is_angle(name)
+    turn = math.tau if is_angle else math.inf
+    _, nearest = min((abs(math.remainder(extreme - value, turn)), at)
                      for span in spans for extreme, at in span)
-    return [nearest * scale], {
-        'name': name, 'unit': 'rad' if linkage.is_angle(name) else 'm',
-        'arcs': [(low * size, high * size) for (low, _), (high, _) in spans]}
+    return [nearest], {'name': name, 'unit': 'rad' if is_angle else 'm',
+                       'arcs': [(low, high) for (low, _), (high, _) in spans]}
 
 
 def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, place: Any,

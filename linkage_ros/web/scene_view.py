@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections import defaultdict
+from collections import ChainMap, defaultdict
 from contextlib import suppress
 from functools import partial
 import math
@@ -25,10 +25,13 @@ from visualization_msgs.msg import Marker, MarkerArray
 from . import curves, poses
 from .feed import Feed
 from .. import scene
+from ..c_code import header
 from ..nodes import ownership
 from ..nodes.log import Throttle
 from ..nodes.parameters import typed
+from ..robot_model import urdf
 from ..scene import SceneError, SceneMechanism, writing
+from ..scene.inverse_request import present_inputs
 from ..words import quoted
 
 EVENTS_TYPE, INPUTS_TYPE = 'rcl_interfaces/msg/ParameterEvent', 'sensor_msgs/msg/JointState'
@@ -104,8 +107,8 @@ class SceneView:
         # Subscriptions and clients of services by name, feeds of markers by topic.
         self._entities: dict[str, Any] = {}
         self._feeds: dict[str, Feed] = {}
-        # The last position by topic and joint, from the executor's thread.
-        self._positions: dict[tuple[str, str], float] = {}
+        # The last position by topic, then by joint, from the executor's thread.
+        self._positions: dict[str, dict[str, float]] = defaultdict(dict)
 
     def add(self, client: Any) -> None:
         """Add a client; the first one starts the observation of the graph."""
@@ -175,8 +178,7 @@ class SceneView:
             await self._hold(shown, machine, inputs)
         answer = {**poses.described(machine, inputs), 'reach': reach}
         if arrows:
-            answer['arrows'] = poses.arrows(
-                machine, inputs, arrows, self._playing(shown.owner, machine))
+            answer['arrows'] = poses.arrows(machine, inputs, arrows, self._playing(shown))
         return answer
 
     async def _hold(self, shown: ShownMechanism, machine: SceneMechanism,
@@ -204,14 +206,14 @@ class SceneView:
             curves.curve, *self._state(self._find(mechanism)), **about)
 
     async def export(self, mechanism: str, form: str) -> Answer:
-        """Return the result of `curves.exported`, or as 'yaml' the mechanism's scene."""
+        """Return a file's text: 'yaml', the scene; 'csv', all outputs; 'urdf'; or 'h', of C."""
         shown = self._find(mechanism)
-        whole = self._scenes[shown.owner]
-        if form == 'yaml':
-            return {'text': await asyncio.to_thread(self._saved, shown.owner)}
-        state = (whole.machines[shown.name], []) if form == 'h' else self._state(shown)
-        return {'text': await asyncio.to_thread(
-            curves.exported, *state, form, whole.frame_id)}
+        machine, frame_id = self._machine(shown), self._scenes[shown.owner].frame_id
+        write = {'yaml': lambda: self._saved(shown.owner),
+                 'csv': lambda: curves.table(*self._state(shown)),
+                 'urdf': lambda: urdf.describe([machine], machine.frame_id or frame_id),
+                 'h': lambda: header.written(machine)}[form]
+        return {'text': await asyncio.to_thread(write)}
 
     def _saved(self, owner: str) -> str:
         """Return a parameter file of a node's scene: its definition and changed values."""
@@ -253,17 +255,19 @@ class SceneView:
 
     def _state(self, shown: ShownMechanism) -> tuple[SceneMechanism, list[float]]:
         """Return a mechanism and its last received inputs [rad or m], or their starts."""
-        machine = self._scenes[shown.owner].machines[shown.name]
-        inputs = []
-        for name, drive in machine.inputs.items():
-            position = next((self._positions[topic, drive.source] for topic in shown.sources
-                             if (topic, drive.source) in self._positions), None)
-            if position is None and f'{machine.name}.{name}.start' not in shown.nodes:
-                raise SceneError(f'the {name} is not known yet: no message names {drive.source}')
-            value = drive.start if position is None else machine.from_source(
-                drive, position, None, None)[0]
-            inputs.append(value if math.isfinite(value) else drive.start)
-        return machine, inputs
+        machine = self._machine(shown)
+        positions = ChainMap(*(self._positions[topic] for topic in shown.sources))
+        for name, settings in machine.inputs.items():
+            if settings.source not in positions and (
+                    f'{shown.name}.{name}.start' not in shown.nodes):
+                raise SceneError(
+                    f'the {name} is not known yet: no message names {settings.source}')
+        return machine, [value if math.isfinite(value) else settings.start
+                         for value, settings in zip(present_inputs(machine, positions),
+                                                    machine.inputs.values())]
+
+    def _machine(self, shown: ShownMechanism) -> SceneMechanism:
+        return self._scenes[shown.owner].machines[shown.name]
 
     def _find(self, key: str) -> ShownMechanism:
         if key not in self._mechanisms:
@@ -278,22 +282,22 @@ class SceneView:
 
     def _settings(self, shown: ShownMechanism) -> list[scene.Parameter]:
         """Return the announced parameters of a mechanism."""
-        return [parameter
-                for parameter in self._scenes[shown.owner].machines[shown.name].parameters
+        return [parameter for parameter in self._machine(shown).parameters
                 if parameter.name in shown.nodes]
 
     def _described(self, shown: ShownMechanism) -> Answer:
         """Describe what the page needs of a mechanism beside its markers."""
-        machine = self._scenes[shown.owner].machines[shown.name]
+        machine = self._machine(shown)
         return {'key': shown.key, 'name': shown.name,
                 'curves': {} if machine.in_space else curves.KINDS,
                 'settings': list(map(poses.setting, self._settings(shown))),
-                **poses.drawn(machine, self._playing(shown.owner, machine))}
+                **poses.drawn(machine, self._playing(shown))}
 
-    def _playing(self, owner: str, machine: SceneMechanism) -> dict[str, float]:
+    def _playing(self, shown: ShownMechanism) -> dict[str, float]:
         """Return the speeds of a mechanism when it plays: the last ones that were not zero."""
-        return {name: self._speeds[owner].get(f'{machine.name}.{name}.speed', drive.default_speed)
-                for name, drive in machine.inputs.items()}
+        return {name: self._speeds[shown.owner].get(
+            f'{shown.name}.{name}.speed', settings.default_speed)
+            for name, settings in self._machine(shown).inputs.items()}
 
     async def _watch(self) -> None:
         while True:
@@ -396,9 +400,9 @@ class SceneView:
 
     def _follow(self, topic: str) -> Any:
         def store(message: JointState) -> None:
-            self._positions.update(
-                ((topic, name), position) for name, position in zip(
-                    message.name, message.position) if math.isfinite(position))
+            self._positions[topic].update(
+                (name, position) for name, position in zip(message.name, message.position)
+                if math.isfinite(position))
 
         return self._node.create_subscription(JointState, topic, store, NEWEST)
 
@@ -419,7 +423,7 @@ class SceneView:
         for parameter in (*event.new_parameters, *event.changed_parameters):
             # Any node may announce values of unknown types.
             with suppress(RuntimeError):
-                values[parameter.name] = scene.plain(parameter_value_to_python(parameter.value))
+                values[parameter.name] = parameter_value_to_python(parameter.value)
         self._announced[event.node] = values
         if values.keys() != before.keys():
             self._is_stale = True
