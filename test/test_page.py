@@ -451,8 +451,8 @@ def test_arrows_are_asked_for_wherever_their_mechanism_s_part_of_the_panel_is(lo
         const { send } = WebSocket.prototype;
         window.requested = new Set();
         WebSocket.prototype.send = function (text) {
-            const { mechanism, arrows } = JSON.parse(text);
-            if (arrows) window.requested.add(mechanism);
+            const { key, arrows } = JSON.parse(text);
+            if (arrows) window.requested.add(key);
             send.call(this, text);
         };
         document.getElementById('arrows').value = 'velocity';

@@ -61,7 +61,7 @@ def test_a_bar_follows_a_dimension_that_can_only_become_shorter():
     bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'custom', 'bar.dimensions.p': 4.0,
                       'bar.joints': ['O ground 0 0', 'Q ground 4 0', 'A crank O 1',
                                      'B dyad A Q 3 3 left', 'C rigid A B p 1 left']})
-    assert poses.tunable(bar, 'bar')['bars'] == {'dimensions.p': [('A', 'C')]}
+    assert poses.tunable(bar.machines['bar'])['bars'] == {'dimensions.p': [('A', 'C')]}
 
 
 @pytest.mark.parametrize('name', ['excavator', 'jansen', 'peaucellier', 'scissor_lift'])

@@ -18,7 +18,7 @@ from typing import Any, Iterable, Mapping
 from .input_settings import FARTHEST, in_words, InputSettings
 from .joint_names import check_distinct
 from .parameter_file import overrides, sections
-from .parameters import ALL, DRIVER, Field, INVERSE, KINEMATICS, Parameter, plain, SceneError, Values
+from .parameters import DRIVER, Field, INVERSE, KINEMATICS, Parameter, plain, SceneError, Values
 from .scene_mechanism import FRAME, is_distinct, read_mechanism, SceneMechanism
 from .. import mechanisms
 from ..words import plain_text, quoted
@@ -79,10 +79,10 @@ def load(path: str) -> Scene:
     Each parameter has the value that the file gives to the parameter's owner.
     """
     all_sections = sections(path)
-    values = {node: overrides(all_sections, f'/{node}') for node in ALL}
+    values = {node: overrides(all_sections, f'/{node}') for node in (DRIVER, INVERSE, KINEMATICS)}
     if not any(values.values()):
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:'")
-    scene = read({name: value for node in ALL for name, value in values[node].items()})
+    scene = read({name: value for part in values.values() for name, value in part.items()})
     return read({parameter.name: values[parameter.field.owner][parameter.name]
                  for parameter in scene.parameters
                  if parameter.name in values[parameter.field.owner]})

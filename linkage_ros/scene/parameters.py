@@ -15,7 +15,7 @@ from typing import Any, Callable, Collection, Iterable, Mapping, NamedTuple, Opt
 from ..cache import cached
 from ..words import elided, listed, meant, MESSAGE, quoted
 
-# The nodes that use parameters; KINEMATICS, the last, owns each that it uses.
+# The nodes that use parameters; KINEMATICS owns each that it uses.
 DRIVER, INVERSE, KINEMATICS = ALL = 'crank_driver', 'servo_inverse', 'kinematics'
 
 # Parameters that rclpy declares.

@@ -144,9 +144,9 @@ class SceneMechanism:
         """
         (scale,), unit, first = self.scales, self.scale_of(output), self.first.input
         turn = first.turn if first.wraps else math.inf
+        arcs = [(low / scale, min(high, low + turn) / scale) for low, high in self.first.arcs]
         return [((least * unit, low * scale), (greatest * unit, high * scale))
-                for (least, low), (greatest, high) in self.linkage.extremes(output, [
-                    (low / scale, min(high, low + turn) / scale) for low, high in self.first.arcs])]
+                for (least, low), (greatest, high) in self.linkage.extremes(output, arcs)]
 
     @cached_property
     def ends(self) -> list[Optional[Arc]]:

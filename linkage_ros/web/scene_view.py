@@ -9,6 +9,7 @@ import asyncio
 from collections import ChainMap, defaultdict
 from contextlib import suppress
 from functools import partial
+from itertools import starmap
 import math
 import re
 from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence
@@ -135,7 +136,7 @@ class SceneView:
         self._is_stale = True
         self._keep({})
 
-    async def set(self, mechanism: str, values: Mapping[str, Any]) -> Answer:
+    async def set(self, key: str, values: Mapping[str, Any]) -> Answer:
         """
         Set parameters of a mechanism, those of one node all or none.
 
@@ -145,12 +146,10 @@ class SceneView:
             With the node's reason.
 
         """
-        shown = self._find(mechanism)
-        parameters = {poses.name_in_mechanism(parameter): parameter
-                      for parameter in self._settings(shown)}
-        requests: dict[str, list[Any]] = defaultdict(list)
-        for key, value in values.items():
-            parameter = parameters[key]
+        shown = self._find(key)
+        parameters, requests = self._settings(shown), defaultdict(list)
+        for name, value in values.items():
+            parameter = parameters[name]
             checked = parameter.field.checked(parameter.name, value)
             requests[shown.nodes[parameter.name]].append(
                 typed(parameter._replace(value=checked)).to_parameter_msg())
@@ -162,7 +161,7 @@ class SceneView:
                 raise SceneError(response.result.reason or f'{node} gives no reason')
         return {}
 
-    async def pose(self, mechanism: str, want: Optional[Mapping[str, Any]] = None,
+    async def pose(self, key: str, want: Optional[Mapping[str, Any]] = None,
                    arrows: str = '') -> Answer:
         """
         Describe a mechanism's pose; with a request, move it there first and hold it.
@@ -171,48 +170,46 @@ class SceneView:
         The result is that of `poses.described`, with requested arrows, and what is reached if the
         request is not met exactly.
         """
-        shown = self._find(mechanism)
-        (machine, inputs), reach = self._state(shown), None
+        shown = self._find(key)
+        (mechanism, inputs), reach = self._state(shown), None
         if want is not None:
-            inputs, reach = poses.reached(machine, inputs, dict(want))
-            await self._hold(shown, machine, inputs)
-        answer = {**poses.described(machine, inputs), 'reach': reach}
+            inputs, reach = poses.reached(mechanism, inputs, dict(want))
+            await self._hold(shown, mechanism, inputs)
+        answer = {**poses.described(mechanism, inputs), 'reach': reach}
         if arrows:
-            answer['arrows'] = poses.arrows(machine, inputs, arrows, self._playing(shown))
+            answer['arrows'] = poses.arrows(mechanism, inputs, arrows, self._playing(shown))
         return answer
 
-    async def _hold(self, shown: ShownMechanism, machine: SceneMechanism,
+    async def _hold(self, shown: ShownMechanism, mechanism: SceneMechanism,
                     inputs: list[float]) -> None:
         """Stop the inputs at requested values."""
         values = {}
-        for (name, drive), value in zip(machine.inputs.items(), inputs):
-            if f'{machine.name}.{name}.start' not in shown.nodes:
+        for (name, settings), value in zip(mechanism.inputs.items(), inputs):
+            if f'{mechanism.name}.{name}.start' not in shown.nodes:
                 raise SceneError(f'the {name} cannot be moved: no crank_driver is running')
             # An input moves only to a start that differs from the last one.
-            values[f'{name}.start'] = value if value != drive.start else next(
+            values[f'{name}.start'] = value if value != settings.start else next(
                 near for near in (math.nextafter(value, way) for way in (-math.inf, math.inf))
-                if any(drive.input.holds(arc, near, near) for arc in drive.arcs))
+                if any(settings.input.holds(arc, near, near) for arc in settings.arcs))
             values[f'{name}.speed'] = 0.0
         await self.set(shown.key, values)
 
-    async def tune(self, mechanism: str) -> Answer:
+    async def tune(self, key: str) -> Answer:
         """Return the result of `poses.tunable`."""
-        shown = self._find(mechanism)
-        return await asyncio.to_thread(poses.tunable, self._scenes[shown.owner], shown.name)
+        return await asyncio.to_thread(poses.tunable, self._mechanism(self._find(key)))
 
-    async def curve(self, mechanism: str, **about: Any) -> Answer:
+    async def curve(self, key: str, **about: Any) -> Answer:
         """Return the result of `curves.curve`."""
-        return await asyncio.to_thread(
-            curves.curve, *self._state(self._find(mechanism)), **about)
+        return await asyncio.to_thread(curves.curve, *self._state(self._find(key)), **about)
 
-    async def export(self, mechanism: str, form: str) -> Answer:
+    async def export(self, key: str, form: str) -> Answer:
         """Return a file's text: 'yaml', the scene; 'csv', all outputs; 'urdf'; or 'h', of C."""
-        shown = self._find(mechanism)
-        machine, frame_id = self._machine(shown), self._scenes[shown.owner].frame_id
+        shown = self._find(key)
+        mechanism, frame_id = self._mechanism(shown), self._scenes[shown.owner].frame_id
         write = {'yaml': lambda: self._saved(shown.owner),
                  'csv': lambda: curves.table(*self._state(shown)),
-                 'urdf': lambda: urdf.describe([machine], machine.frame_id or frame_id),
-                 'h': lambda: header.written(machine)}[form]
+                 'urdf': lambda: urdf.describe([mechanism], mechanism.frame_id or frame_id),
+                 'h': lambda: header.written(mechanism)}[form]
         return {'text': await asyncio.to_thread(write)}
 
     def _saved(self, owner: str) -> str:
@@ -221,8 +218,7 @@ class SceneView:
         names = {parameter.name for parameter in whole.parameters}
         # An input that was stopped is saved with the speed that it had.
         speeds = {name: speed for name, speed in self._speeds[owner].items() if name in names}
-        return writing.in_yaml(writing.without_defaults(
-            scene.changed(whole, speeds), DEFINES))
+        return writing.in_yaml(writing.without_defaults(scene.changed(whole, speeds), DEFINES))
 
     async def read(self, text: str) -> Answer:
         """Return the result of `poses.number`."""
@@ -255,18 +251,18 @@ class SceneView:
 
     def _state(self, shown: ShownMechanism) -> tuple[SceneMechanism, list[float]]:
         """Return a mechanism and its last received inputs [rad or m], or their starts."""
-        machine = self._machine(shown)
+        mechanism = self._mechanism(shown)
         positions = ChainMap(*(self._positions[topic] for topic in shown.sources))
-        for name, settings in machine.inputs.items():
+        for name, settings in mechanism.inputs.items():
             if settings.source not in positions and (
                     f'{shown.name}.{name}.start' not in shown.nodes):
                 raise SceneError(
                     f'the {name} is not known yet: no message names {settings.source}')
-        return machine, [value if math.isfinite(value) else settings.start
-                         for value, settings in zip(present_inputs(machine, positions),
-                                                    machine.inputs.values())]
+        return mechanism, [
+            value if math.isfinite(value) else settings.start for value, settings in zip(
+                present_inputs(mechanism, positions), mechanism.inputs.values())]
 
-    def _machine(self, shown: ShownMechanism) -> SceneMechanism:
+    def _mechanism(self, shown: ShownMechanism) -> SceneMechanism:
         return self._scenes[shown.owner].machines[shown.name]
 
     def _find(self, key: str) -> ShownMechanism:
@@ -280,24 +276,25 @@ class SceneView:
         for feed in [*self._feeds.values()]:
             client.offer(feed)
 
-    def _settings(self, shown: ShownMechanism) -> list[scene.Parameter]:
-        """Return the announced parameters of a mechanism."""
-        return [parameter for parameter in self._machine(shown).parameters
-                if parameter.name in shown.nodes]
+    def _settings(self, shown: ShownMechanism) -> dict[str, scene.Parameter]:
+        """Return the announced parameters of a mechanism, by their names in it."""
+        return {parameter.name.partition('.')[2]: parameter
+                for parameter in self._mechanism(shown).parameters
+                if parameter.name in shown.nodes}
 
     def _described(self, shown: ShownMechanism) -> Answer:
         """Describe what the page needs of a mechanism beside its markers."""
-        machine = self._machine(shown)
+        mechanism = self._mechanism(shown)
         return {'key': shown.key, 'name': shown.name,
-                'curves': {} if machine.in_space else curves.KINDS,
-                'settings': list(map(poses.setting, self._settings(shown))),
-                **poses.drawn(machine, self._playing(shown))}
+                'curves': {} if mechanism.in_space else curves.KINDS,
+                'settings': list(starmap(poses.setting, self._settings(shown).items())),
+                **poses.drawn(mechanism, self._playing(shown))}
 
     def _playing(self, shown: ShownMechanism) -> dict[str, float]:
         """Return the speeds of a mechanism when it plays: the last ones that were not zero."""
         return {name: self._speeds[shown.owner].get(
             f'{shown.name}.{name}.speed', settings.default_speed)
-            for name, settings in self._machine(shown).inputs.items()}
+            for name, settings in self._mechanism(shown).inputs.items()}
 
     async def _watch(self) -> None:
         while True:
