@@ -80,7 +80,7 @@ def test_a_dimension_set_on_the_owner_is_everybodys_within_half_a_second(graph, 
 
 @pytest.mark.parametrize('namespace', ['', '/left'])
 def test_an_owner_announces_all_its_values_and_then_each_change(graph, monkeypatch, namespace):
-    monkeypatch.setattr(ownership, 'DEPTH', 3)
+    monkeypatch.setattr(LATCHED, 'depth', 3)
     heard = graph.listen(ParameterEvent, f'{namespace}/{TOPIC}', LATCHED)
     before = graph.node.get_clock().now().nanoseconds
     owner = graph.start(Kinematics, LEVER, namespace=namespace)
