@@ -317,9 +317,9 @@ def tested(copy, job):
                              seconds=START + SLOWER * seconds)
     finally:
         path.write_text(source)
-    killer = re.search('^(?:FAILED|ERROR) (.*)$', output, re.M)
-    return {**mutant, 'tests': len(files), 'by': killer.group(1)[:200] if killer else output[-200:],
-            'state': 'hung or crashed' if status < 0 else 'killed' if status else 'survived'}
+    state = 'hung or crashed' if status < 0 else 'killed' if status else 'survived'
+    killers = re.findall('^(?:FAILED|ERROR) (.*)$', output, re.M)
+    return {**mutant, 'state': state, 'tests': len(files), 'by': killers or output[-200:]}
 
 
 def placed(mutant):

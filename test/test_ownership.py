@@ -12,7 +12,7 @@ pytest.importorskip('linkage_interfaces')
 
 from linkage_interfaces.srv import ServoInverse as Service  # noqa: E402
 from linkage_ros import scene  # noqa: E402
-from linkage_ros.nodes import log, ownership  # noqa: E402
+from linkage_ros.nodes import log  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.ownership import LATCHED, TOPIC  # noqa: E402

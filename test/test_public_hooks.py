@@ -12,8 +12,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from rclpy import (  # noqa: E402
-    client, clock, executors, node, publisher, service, subscription, timer)
+from rclpy import client, clock, executors, node, publisher, service, subscription, timer  # noqa: E402
 
 PACKAGE = Path(__file__).parents[1] / 'linkage_ros'
 SOURCES = [path for room in ('nodes', 'web') for path in sorted((PACKAGE / room).glob('*.py'))]
