@@ -109,11 +109,9 @@ class Input(NamedTuple):
         """Return the whole periods [rad] by which a value is out of [low, high)."""
         return self.turn * math.floor(value / self.turn + 0.5) if self.wraps else 0.0
 
-    def beside(self, value: Any, near: Any) -> Any:
-        """Return values plus the whole turns that bring them closest to others."""
-        if not self.wraps:
-            return value + 0.0 * near
-        return value + self.turn * np.round((near - value) / self.turn)
+    def nearest_equivalent(self, value: float, seed: float) -> float:
+        """Return a value plus the whole turns that bring it closest to another one."""
+        return value + self.turn * round((seed - value) / self.turn) if self.wraps else value
 
     def apart(self, value: Any, other: Any) -> Any:
         """Return the differences of values and others, without whole turns."""
