@@ -100,7 +100,13 @@ class InverseProblem:
             f'[{input_.name}]': size for input_, size in zip(self.inputs, self.sizes)}}, {},
             self.linkage.is_accelerated)
 
-    def reduced(self, values: np.ndarray) -> np.ndarray:
+    def reduced(self, values: Row) -> Row:
+        """Return values with large angles reduced to one period, exactly."""
+        if all([abs(x) <= turn for x, turn in zip(values, self.periods)]):
+            return values
+        return tuple(self.reduced_arrays(np.array(values)).tolist())
+
+    def reduced_arrays(self, values: np.ndarray) -> np.ndarray:
         """Return values (outputs, ...) with large angles reduced to one period, exactly."""
         values = np.array(values)
         for by, turn in enumerate(self.periods):

@@ -113,7 +113,8 @@ class Segments:
                  input_: Input, period: float, size: float):
         self._curve, self._period, self._size = curve, period, size
         self._input, self._unit = input_, input_.step
-        self._rounding, counted = TOLERANCE * size, input_.counted()
+        self._rounding = TOLERANCE * size
+        self._counted = counted = input_.counted()
         special = distinct((near.value for near in near_zeros if near.gap <= near.rounding),
                            counted)
         marks = distinct((near.value for near in near_zeros if near.gap <= NEAR * near.size),
@@ -137,9 +138,9 @@ class Segments:
         least, greatest = float(value[0] - slack[0]), float(value[-1] + slack[1])
         # Values so near to an end of the segment are the end's.
         near = np.minimum(slack, ONE * self._size)
-        # At an end of the reach there is a pose also when whole turns are added.
-        start, end = (x + side * 2.0 * math.ulp(max(abs(x), math.pi)) * (x in self._ends)
-                      for x, side in zip(theta[[0, -1]].tolist(), (1.0, -1.0)))
+        # At an end of the reach there is a pose also when a period is added.
+        start, end = (x + side * 2.0 * math.ulp(max(abs(x), self._counted.high)) * (
+            x in self._ends) for x, side in zip(theta[[0, -1]].tolist(), (1.0, -1.0)))
         theta = np.array([start, *theta.clip(start, end), end]) * self._unit
         value = np.pad(value.clip(value[0] + near[0], value[-1] - near[1]), 1, 'edge')
         return Table(least, greatest, sign, theta.tolist(), value.tolist())
