@@ -100,7 +100,8 @@ class CrankDriver(scene_node.SceneNode):
         now = self._follow_clock()
         if self._publisher.has_subscribers:
             positions, speeds = zip(*[self._position(*sent, now) for sent in self._sent])
-            self._message.publish(pack_time(now), positions + speeds)
+            for publish, data in self._message.patched(pack_time(now), positions + speeds):
+                publish(data)
 
     def _position(self, key: Tuple[str, str], settings: scene.InputSettings,
                   now: int) -> Tuple[float, float]:

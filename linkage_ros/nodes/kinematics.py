@@ -154,12 +154,14 @@ class Kinematics(scene_node.SceneNode):
     def _publish(self, moved: Iterable[MechanismTopics]) -> None:
         """Publish mechanisms at their present inputs, and the joint states of the scene."""
         in_scene = self._scene_joint_states.has_subscribers
-        for mechanism in moved:
-            mechanism.publish(in_scene)
+        # Solving all before publishing any takes less time: the caches of the CPU are small.
+        outgoing = [message for mechanism in moved for message in mechanism.messages(in_scene)]
         if in_scene:
-            self._scene_joint_states.publish(self._stamp, tuple(
+            outgoing += self._scene_joint_states.messages(self._stamp, tuple(
                 (mechanism.model, state) for mechanism in self._mechanisms.values()
                 if (state := mechanism.solved(in_scene))))
+        for publish, data in outgoing:
+            publish(data)
 
     def _interpret(self, message: JointState) -> Routes:
         """Return the inputs that a sender's messages set, and the mechanisms that they move."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import AbstractSet, Any, List, Optional, Sequence, Tuple
+from typing import AbstractSet, Any, Callable, Iterable, List, Optional, Sequence, Tuple
 
 import numpy as np
 from rclpy.duration import Duration
@@ -72,14 +72,19 @@ class MechanismTopics:
         if math.isfinite(value):
             self._seed = value
 
-    def publish(self, in_scene: bool) -> None:
-        """Solve for the subscribers, and for the scene's joint states if `in_scene`; publish."""
+    def messages(self, in_scene: bool) -> Iterable[Tuple[Callable, bytes]]:
+        """Solve for the subscribers; return publish functions and serialised messages."""
         topics = self._subscribed()
-        if (in_scene or any(topics)) and (state := self.solved(in_scene)) and any(topics):
-            self.model.publishers[state, topics].publish(self.stamp, state.solution.values)
+        if any(topics) and (state := self.solved(in_scene)):
+            return self.model.publishers[state, topics].patched(self.stamp, state.solution.values)
+        return ()
 
     def solved(self, in_scene: bool) -> Optional[AssemblyState]:
-        """Return the state at the present inputs; None without assembled legs."""
+        """
+        Return the state at the present inputs; None without assembled legs.
+
+        It is solved for the subscribers, and for the scene's joint states if `in_scene`.
+        """
         if None in self.inputs:
             return None
         regular, state = self._regular(self.model, self._subscribed(), in_scene), self.state

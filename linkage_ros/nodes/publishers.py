@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Callable, Sequence, Tuple
+from typing import Any, Callable, Iterable, Sequence, Tuple
 
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
@@ -45,7 +45,7 @@ class TrackedPublisher:
 
 class PatchedPublisher:
     """
-    Publishes messages again and again with new values.
+    Serialises the messages of several publishers again and again with new values.
 
     `parts` are, for each message, its publisher and its builder; builders and `count` are as for
     Template.
@@ -56,7 +56,6 @@ class PatchedPublisher:
         self._publish = [publisher.publish for publisher in publishers]
         self._template = Template(builders, count)
 
-    def publish(self, stamp: bytes, values: Any) -> None:
-        """Publish the messages with a packed stamp and values (count,)."""
-        for publish, data in zip(self._publish, self._template.patched(stamp, values)):
-            publish(data)
+    def patched(self, stamp: bytes, values: Any) -> Iterable[Tuple[Callable, bytes]]:
+        """Return, for each message, its publish function and its bytes, as Template patches."""
+        return zip(self._publish, self._template.patched(stamp, values))

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, Iterable, Tuple
+from typing import Any, Callable, Iterable, Tuple
 
 import numpy as np
 from sensor_msgs.msg import JointState
@@ -52,11 +52,10 @@ class SceneJointStates:
             self._description = urdf
             self._descriptions.publish(String(data=urdf))
 
-    def publish(self, stamp: bytes, parts: Parts) -> None:
-        """Publish the joints of assembled mechanisms with a packed stamp; nothing if none is."""
-        if parts:
-            self._publishers[parts].publish(
-                stamp, np.concatenate([state.solution.values for _, state in parts]))
+    def messages(self, stamp: bytes, parts: Parts) -> Iterable[Tuple[Callable, bytes]]:
+        """Return the joints of assembled mechanisms, as `MechanismTopics.messages` does."""
+        return self._publishers[parts].patched(
+            stamp, np.concatenate([state.solution.values for _, state in parts])) if parts else ()
 
     def _publisher(self, parts: Parts) -> PatchedPublisher:
         return PatchedPublisher([(self._joint_states.publisher, partial(self._build, parts))],
