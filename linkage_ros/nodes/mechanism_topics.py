@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import AbstractSet, Any, Callable, Iterable, List, Optional, Sequence, Tuple
+from typing import AbstractSet, Any, List, Optional, Sequence, Tuple
 
 import numpy as np
 from rclpy.duration import Duration
@@ -18,7 +18,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from . import messages
 from .log import Throttle
 from .mechanism_model import AssemblyState, MechanismModel
-from .message_layout import NEVER
+from .message_layout import NEVER, Outgoing
 from .publishers import LATCHED, TrackedPublisher
 from .. import scene
 
@@ -72,11 +72,12 @@ class MechanismTopics:
         if math.isfinite(value):
             self._seed = value
 
-    def messages(self, in_scene: bool) -> Iterable[Tuple[Callable, bytes]]:
-        """Solve for the subscribers; return publish functions and serialised messages."""
+    def outgoing(self, in_scene: bool) -> Sequence[Outgoing]:
+        """Solve for the subscribers; return the messages to publish."""
         topics = self._subscribed()
         if any(topics) and (state := self.solved(in_scene)):
-            return self.model.publishers[state, topics].patched(self.stamp, state.solution.values)
+            return self.model.patched_messages[state, topics].patched(
+                self.stamp, state.solution.values)
         return ()
 
     def solved(self, in_scene: bool) -> Optional[AssemblyState]:
@@ -127,7 +128,7 @@ class MechanismTopics:
             regular.solution.solve(inputs, [0.0] * len(inputs))
             if any(topics):
                 # Building its messages takes longest.
-                model.publishers[regular, topics]
+                model.patched_messages[regular, topics]
         return model
 
     def adopt(self, model: MechanismModel) -> None:

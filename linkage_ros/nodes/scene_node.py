@@ -72,12 +72,11 @@ class SceneNode(Node):
         self.guarded, self.report = incidents.guarded, incidents.report
         self.worker = Worker(self, incidents.guarded)
         self._announcer: Optional[Announcer] = None
-        self._adopted: Optional[scenes.Scene] = None
         # Numbers of requests to set parameters: answered, and waiting.
         self._answered = self._waiting = 0
-        # The scene that was passed to the worker last.
-        self._passed: Optional[scenes.Scene] = None
         self._parameters_of_scene = SceneParameters(self, name, self.check, self._pass_scene)
+        # The scenes that were adopted, and passed to the worker, last.
+        self._adopted = self._passed = self.scene
         # The Field of each parameter that the node owns, by name; whether it was started with any
         # parameters of a scene.
         self.fields: Mapping[str, scenes.Field] = self._parameters_of_scene.fields
@@ -99,7 +98,6 @@ class SceneNode(Node):
 
     def begin(self) -> None:
         """Adopt the first scene; then announce the node's parameters, and follow the others."""
-        self._passed = self.scene
         self.check(self.scene)
         self._adopt(self.scene, self.prepare(self.scene))
         if self.fields:
