@@ -231,7 +231,7 @@ def test_the_files_of_a_journey_are_those_that_run(graph, heading):
     page = (ROOT / 'docs' / 'design' / 'architecture.md').read_text()
     steps = re.findall(r'^\d\. .*(?:\n   .*)*', page.partition(f'## {heading}')[2].partition(
         '\n## ')[0], re.MULTILINE)
-    named = {file for step in steps for file in re.findall(r'`((?:nodes|linkage)/\w+\.py)`', step)}
+    named = {file for step in steps for file in re.findall(r'`((?:nodes|scene)/\w+\.py)`', step)}
     node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': 'jansen'})
     crank, heard = graph.crank(['m_crank']), graph.listen(JointState, 'm/joint_states')
     announced = graph.listen(ParameterEvent, ownership.TOPIC, ownership.LATCHED)
@@ -253,8 +253,7 @@ def test_the_files_of_a_journey_are_those_that_run(graph, heading):
         sys.setprofile(None)
     assert len(named) >= 5 and named <= ran, named - ran
     if heading == 'The life of a crank message':
-        assert {file for file in ran if file.startswith('nodes/')} <= named | {
-            'nodes/scene_joint_states.py'}
+        assert ran == named
 
 
 def test_every_file_that_the_architecture_names_is_there():
