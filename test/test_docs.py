@@ -215,8 +215,8 @@ def test_what_is_measured_is_of_a_commit():
 
 
 JOURNEYS = {
-    'The life of a crank message': lambda graph, node, crank, heard: crank([0.4], heard),
-    'A change of a parameter': lambda graph, node, crank, heard: graph.set(node, m__scale=2.0)}
+    'The life of a crank message': lambda graph, node, crank, received: crank([0.4], received),
+    'A change of a parameter': lambda graph, node, crank, received: graph.set(node, m__scale=2.0)}
 
 
 @pytest.mark.parametrize('heading', JOURNEYS)
@@ -233,13 +233,13 @@ def test_the_files_of_a_journey_are_those_that_run(graph, heading):
         '\n## ')[0], re.MULTILINE)
     named = {file for step in steps for file in re.findall(r'`((?:nodes|scene)/\w+\.py)`', step)}
     node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': 'jansen'})
-    crank, heard = graph.crank(['m_crank']), graph.listen(JointState, 'm/joint_states')
+    crank, received = graph.crank(['m_crank']), graph.listen(JointState, 'm/joint_states')
     announced = graph.listen(ParameterEvent, ownership.TOPIC, ownership.LATCHED)
     # The last that the worker does at a start.
     described = graph.listen(String, 'robot_description', ownership.LATCHED)
     graph.until(lambda: announced and described)
     for angle in (0.2, 0.3):
-        crank([angle], heard)
+        crank([angle], received)
     ran, room = set(), str(ROOT / 'linkage_ros') + '/'
 
     def called(frame, event, _):
@@ -248,7 +248,7 @@ def test_the_files_of_a_journey_are_those_that_run(graph, heading):
 
     sys.setprofile(called)
     try:
-        JOURNEYS[heading](graph, node, crank, heard)
+        JOURNEYS[heading](graph, node, crank, received)
     finally:
         sys.setprofile(None)
     assert len(named) >= 5 and named <= ran, named - ran

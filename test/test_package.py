@@ -23,7 +23,7 @@ import setuptools
 ROOT = Path(__file__).parents[1]
 
 
-def handed(monkeypatch, *command):
+def setup_arguments(monkeypatch, *command):
     """Return what setup.py hands to setup() in a command."""
     found = {}
     monkeypatch.chdir(ROOT)
@@ -137,7 +137,7 @@ def test_a_robot_without_a_screen_installs_nothing_to_look_at_it_with():
 
 def test_every_executable_can_be_called(monkeypatch):
     pytest.importorskip('rclpy')
-    lines = handed(monkeypatch, 'install')['entry_points']['console_scripts']
+    lines = setup_arguments(monkeypatch, 'install')['entry_points']['console_scripts']
     executables = [EntryPoint(*re.split(r'\s*=\s*', line), 'console_scripts') for line in lines]
     assert {'crank_driver', 'kinematics', 'servo_inverse'} <= {e.name for e in executables}
     assert all(callable(e.load()) for e in executables)
@@ -145,7 +145,7 @@ def test_every_executable_can_be_called(monkeypatch):
 
 @pytest.mark.parametrize('command', ['bdist_wheel', 'dist_info', 'editable_wheel'])
 def test_pip_puts_no_command_on_the_path(monkeypatch, command):
-    assert handed(monkeypatch, command)['entry_points'] == {'console_scripts': []}
+    assert setup_arguments(monkeypatch, command)['entry_points'] == {'console_scripts': []}
 
 
 @pytest.fixture
