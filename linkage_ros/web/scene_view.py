@@ -11,7 +11,6 @@ from contextlib import suppress
 from functools import partial
 from itertools import starmap
 import math
-import re
 from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence
 
 from rcl_interfaces.msg import ParameterEvent
@@ -41,8 +40,6 @@ SETTER = 'set_parameters_atomically'
 POLL_S, LINGER_S = 1.0, 1.0
 # For the first announcement of a node, and a response; between two looks for one of these.
 MAX_ANNOUNCE_S, MAX_ANSWER_S, RETRY_S = 1.0, 3.0, 0.005
-# Parameters that define a scene, which a saved file always has.
-DEFINES = re.compile(r'mechanisms|[^.]+\.(type|scale|dimensions\..+)')
 
 Answer = dict[str, Any]
 
@@ -52,20 +49,16 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 class ShownMechanism(NamedTuple):
     """
-    A mechanism on the page: prefix of its topics, node, and topics of its inputs.
+    A mechanism on the page: prefix of its topics, name, node, and topics of its inputs.
 
     `nodes` has the node that announces a parameter, by full name.
     """
 
     key: str
+    name: str
     owner: str
     sources: Sequence[str]
     nodes: Mapping[str, str]
-
-    @property
-    def name(self) -> str:
-        """Its name in its scene."""
-        return self.key.rsplit('/', 1)[1]
 
 
 class SceneView:
@@ -218,7 +211,7 @@ class SceneView:
         names = {parameter.name for parameter in whole.parameters}
         # An input that was stopped is saved with the speed that it had.
         speeds = {name: speed for name, speed in self._speeds[owner].items() if name in names}
-        return writing.in_yaml(writing.without_defaults(scene.changed(whole, speeds), DEFINES))
+        return writing.in_yaml(writing.without_defaults(scene.changed(whole, speeds)))
 
     async def read(self, text: str) -> Answer:
         """Return the result of `poses.number`."""
@@ -347,7 +340,7 @@ class SceneView:
                 nodes = self._read(owner)
                 for name in self._scenes[owner].machines:
                     key = f'{_space(owner)}/{name}'
-                    self._mechanisms[key] = ShownMechanism(key, owner, sources, nodes)
+                    self._mechanisms[key] = ShownMechanism(key, name, owner, sources, nodes)
                     wanted.update(dict.fromkeys(sources, self._follow))
                     wanted[f'{key}/markers'] = partial(self._draw, key, MarkerArray, NEWEST)
                     wanted[f'{key}/locus'] = partial(self._draw, key, Marker, LATCHED)
