@@ -260,22 +260,6 @@ def test_the_page_is_sent_what_an_output_does_over_a_turn(page):
     assert drop['y'][180] in (0.0, math.pi)
 
 
-@pytest.mark.parametrize('text, value', [
-    ('90deg', math.pi / 2.0), ('pi/2', math.pi / 2.0), ('2*(3+4)', 14.0), ('80,5', 80.5)])
-def test_arithmetic_is_read_by_the_library(page, text, value):
-    answer = page.ask('read', text=text)
-    assert (answer['value'], answer['reason']) == (value, '')
-    assert answer['turns'] == ('pi' in text or 'deg' in text)
-
-
-@pytest.mark.parametrize('text, reason', [
-    ('1/0', 'must be 0 or between'), ('a+1', 'a is unknown'), ('__import__', 'not a number'),
-    ('', 'not a number'), ('1,234.5', 'not a number'), ('0x50', 'not a number'),
-    ('Infinity', 'not a number'), (400 * '9', 'must be 0 or between')])
-def test_what_is_no_arithmetic_is_refused(page, text, reason):
-    assert reason in page.ask('read', text=text)['reason']
-
-
 def test_nodes_that_come_later_or_in_a_namespace_are_waited_for_and_not_guessed(
         graph, show, monkeypatch):
     monkeypatch.setattr(scene_view, 'POLL_S', 0.1)

@@ -223,12 +223,12 @@ def tunable(mechanism: SceneMechanism) -> dict[str, Any]:
     Return the `travel` of a mechanism's parameters, and `bars` that follow its dimensions.
 
     By parameter, these are the ends of its slider, or None, and pairs of joints. `fixed` are the
-    joints that do not move. This is slow.
+    joints that cannot be dragged. This is slow.
     """
     linkage = mechanism.linkage
     return {'travel': {parameter.name.partition('.')[2]: slider.ends(mechanism, parameter)
                        for parameter in mechanism.parameters},
-            'fixed': list(linkage.grounded),
+            'fixed': mechanism.points if mechanism.in_space else linkage.grounded,
             'bars': {f'dimensions.{key}': _bars(linkage, key) for key in linkage.dimensions}}
 
 

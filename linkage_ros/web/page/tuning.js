@@ -132,7 +132,7 @@ export class Tuning {
       if (tunable.reason) return;
       this.mechanism.tunable = tunable;
       for (const [name, ends] of Object.entries(tunable.travel)) {
-        if (ends) this.controls.get(name)?.bound(...ends);
+        if (ends) this.controls.get(name)?.bound?.(...ends);
       }
     }, RESTED);
   }
@@ -152,7 +152,7 @@ export class Tuning {
 
   /** Light up the slider of a dimension. */
   lit(name) {
-    for (const [own, { row }] of this.controls) row.classList.toggle('lit', own === name);
+    for (const [key, { row }] of this.controls) row.classList.toggle('lit', key === name);
   }
 
   /** Go to the slider of a dimension. */
@@ -165,6 +165,6 @@ export class Tuning {
   }
 
   render() {
-    for (const control of this.controls.values()) control.render();
+    for (const control of this.controls.values()) control.render?.();
   }
 }
