@@ -251,6 +251,11 @@ def test_only_mechanisms_that_are_given_something_else_are_read_again():
         'rate']
 
 
+def test_what_is_not_changed_stays_though_its_default_depends_on_it():
+    before = scene.read({'jansen.leg_pairs': 1})
+    assert not scene.changed(before, {'jansen.leg_pairs': 3}).machines['jansen'].mirrored
+
+
 @pytest.mark.parametrize('given, start', [
     ({'mechanisms': ['jansen'], 'jansen.crank.sweep': [2.0, 3.0], 'jansen.crank.start': 0.5}, 2.0),
     ({**CELL, 'cell.crank.start': 1.5}, 0.98 * 1.171371)])
