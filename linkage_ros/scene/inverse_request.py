@@ -229,5 +229,5 @@ def _between_ends(settings: InputSettings, value: float) -> float:
     """Return an input between its ends, a crank after whole periods if needed; else NaN."""
     low, high = settings.ends or (value, value)
     if not low <= value <= high:
-        value = float(settings.input.beside(value, 0.5 * (low + high)))
+        value = float(settings.input.nearest_equivalent(value, 0.5 * (low + high)))
     return value if low <= value <= high else math.nan

@@ -174,10 +174,13 @@ def reached(mechanism: SceneMechanism, present: Sequence[float],
 def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
               value: float) -> Reached:
     settings, ends = mechanism.inputs[name], mechanism.inputs[name].arcs
-    near = min((min(max(float(settings.input.beside(value, (low + high) / 2.0)), low), high)
-                for low, high in ends), key=lambda end: settings.input.apart(end, value))
-    whole = settings.input.is_whole(ends)
-    new = float(settings.input.wrapped(value)) if whole else near
+    input_ = settings.input
+    middles = ((low + high) / 2.0 for low, high in ends)
+    near = min((min(max(float(input_.nearest_equivalent(value, middle)), low), high)
+                for middle, (low, high) in zip(middles, ends)),
+               key=lambda end: input_.apart(end, value))
+    whole = input_.is_whole(ends)
+    new = float(input_.wrapped(value)) if whole else near
     inputs = [new if key == name else old for key, old in zip(mechanism.inputs, present)]
     places = mechanism.linkage.solve(linkage_inputs(mechanism, inputs))
     if not all(math.isfinite(part) for place in places.values() for part in place):
