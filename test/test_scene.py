@@ -81,7 +81,8 @@ def test_a_list_of_nothing_is_not_written_as_ros_reads_none(tmp_path):
     assert '[]' not in text and 'joint_names' not in text and 'loads' not in text
 
 
-@pytest.mark.parametrize('name', ['my thigh', 'Hüfte', 'toe 1/2 "left" <a&b>', "o'k: #3", '大腿'])
+@pytest.mark.parametrize('name', ['my thigh', 'Hüfte', 'toe 1/2 "left" <a&b>', "o'k: #3", '大腿',
+                                  100 * 'w'])
 def test_a_frame_is_called_as_links_of_robots_are(tmp_path, name):
     before = scene.read({'mechanisms': ['jansen'], 'frame_id': name, 'jansen.frame_id': name})
     again = tmp_path / 'again.yaml'

@@ -62,6 +62,11 @@ def test_what_is_no_arithmetic_is_refused(text, reason):
         poses.number(text)
 
 
+def test_no_joint_of_a_linkage_in_space_is_dragged():
+    ankle, _ = machine_of('ankle')
+    assert poses.tunable(ankle)['fixed'] == ankle.points
+
+
 def test_a_bar_follows_a_dimension_that_can_only_become_shorter():
     # Longer, A, B and C are no triangle.
     bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'custom', 'bar.dimensions.p': 4.0,

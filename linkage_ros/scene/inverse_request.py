@@ -160,8 +160,8 @@ class InverseRequest:
         """
         inputs, rates = self._mechanism.follow(
             self.outputs, values, seed, jumps or len(seed) == 1)
-        return ActuatorCommand(inputs, self.positions_of(inputs),
-                       self._speeds(speeds, rates) if speeds else ())
+        return ActuatorCommand(
+            inputs, self.positions_of(inputs), self._speeds(speeds, rates) if speeds else ())
 
     def _speeds(self, speeds: Sequence[float], rates: Sequence[float]) -> list[float]:
         """Return the actuators' speeds for speeds of the outputs, at rates by the inputs."""

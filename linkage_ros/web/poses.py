@@ -173,20 +173,18 @@ def reached(mechanism: SceneMechanism, present: Sequence[float],
 
 def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
               value: float) -> Reached:
-    settings, ends = mechanism.inputs[name], mechanism.inputs[name].arcs
-    input_ = settings.input
-    middles = ((low + high) / 2.0 for low, high in ends)
-    near = min((min(max(float(input_.nearest_equivalent(value, middle)), low), high)
-                for middle, (low, high) in zip(middles, ends)),
-               key=lambda end: input_.apart(end, value))
-    whole = input_.is_whole(ends)
-    new = float(input_.wrapped(value)) if whole else near
+    arcs, input_ = mechanism.inputs[name].arcs, mechanism.inputs[name].input
+    is_whole = input_.is_whole(arcs)
+    nearest = [float(input_.wrapped(value))] if is_whole else [
+        min(max(float(input_.nearest_equivalent(value, 0.5 * (low + high))), low), high)
+        for low, high in arcs]
+    new = min(nearest, key=lambda end: input_.apart(end, value))
     inputs = [new if key == name else old for key, old in zip(mechanism.inputs, present)]
     places = mechanism.linkage.solve(linkage_inputs(mechanism, inputs))
     if not all(math.isfinite(part) for place in places.values() for part in place):
         raise SceneError(f'{mechanism.name} cannot be assembled there')
-    missed = not whole and settings.input.apart(near, value) > CLOSE * settings.input.size
-    return inputs, {'name': name, 'arcs': ends, 'unit': settings.input.unit} if missed else None
+    is_missed = not is_whole and input_.apart(new, value) > CLOSE * input_.size
+    return inputs, {'name': name, 'arcs': arcs, 'unit': input_.unit} if is_missed else None
 
 
 def _output_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
