@@ -18,7 +18,6 @@ from ..words import listed, quoted
 
 ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
 _, ACCELERATION, FORCE = ARROWS
-SIGNS = '+1', '−1'
 # Kinds of parameters with a control.
 CONTROLLED = 'double', 'integer', 'bool'
 # Change of a dimension that detects dependent bars, as a fraction of the longest bar.
@@ -64,7 +63,7 @@ def drawn(mechanism: SceneMechanism, speeds: Mapping[str, float]) -> dict[str, A
     return {
         'space': mechanism.in_space, 'points': mechanism.points, 'pairs': mechanism.leg_pairs,
         'legs': mechanism.leg_pairs * (1 + mechanism.mirrored),
-        'sides': {name: mechanism.linkage.line_of(name).sides or SIGNS
+        'sides': {name: mechanism.linkage.line_of(name).sides or ('+1', '−1')
                   for name in mechanism.linkage.branches},
         'inputs': {name: {
             'unit': settings.input.unit, 'speed': speeds[name],

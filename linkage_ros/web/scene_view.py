@@ -97,7 +97,6 @@ class SceneView:
         self._speeds: dict[str, dict[str, float]] = defaultdict(dict)
         self._news = asyncio.Event()
         self._watching: Optional[asyncio.Task[None]] = None
-        self._stopping: Optional[asyncio.TimerHandle] = None
         # Subscriptions and clients of services by name, feeds of markers by topic.
         self._entities: dict[str, Any] = {}
         self._feeds: dict[str, Feed] = {}
@@ -107,27 +106,15 @@ class SceneView:
     def add(self, client: Any) -> None:
         """Add a client; the first one starts the observation of the graph."""
         self.clients.append(client)
-        if self._stopping:
-            self._stopping.cancel()
-        if self._watching is None:
+        if self._watching:
+            self._show(client)
+        else:
             self._watching = asyncio.create_task(self._watch())
-            return
-        self._show(client)
 
     def remove(self, client: Any) -> None:
         """Remove a client; after the last one the observation ends, unless it was a reload."""
         self.clients.remove(client)
-        if not self.clients:
-            # Requests in progress would wait for a client that has left.
-            self._stopping = self.loop.call_later(LINGER_S, self._stop)
-
-    def _stop(self) -> None:
-        if self._watching:
-            self._watching.cancel()
-        self._watching = self._stopping = None
-        self._graph, self._mechanisms, self._announced, self._scenes = {}, {}, {}, {}
-        self._is_stale = True
-        self._keep({})
+        self._news.set()
 
     async def set(self, key: str, values: Mapping[str, Any]) -> Answer:
         """
@@ -290,7 +277,8 @@ class SceneView:
             for name, settings in self._mechanism(shown).inputs.items()}
 
     async def _watch(self) -> None:
-        while True:
+        """Observe the graph until the last page is closed."""
+        while self.clients or await self._until(lambda: bool(self.clients), LINGER_S):
             try:
                 graph = self._find_announcers()
                 if graph != self._graph or self._is_stale:
@@ -302,6 +290,9 @@ class SceneView:
             with suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(self._news.wait(), POLL_S)
             self._news.clear()
+        self._graph, self._mechanisms, self._announced, self._scenes = {}, {}, {}, {}
+        self._is_stale, self._watching = True, None
+        self._keep({})
 
     def _find_announcers(self) -> dict[str, tuple[str, list[str]]]:
         """Return, by node that announces parameters, that topic and the topics of its inputs."""
@@ -329,7 +320,8 @@ class SceneView:
         self._graph, self._is_stale = graph, False
         wanted: dict[str, Callable[[str], Any]] = {
             **dict.fromkeys((topic for topic, _ in graph.values()), self._listen),
-            **dict.fromkeys((f'{node}/{SETTER}' for node in graph), self._setter)}
+            **dict.fromkeys((f'{node}/{SETTER}' for node in graph),
+                            partial(self._node.create_client, SetParametersAtomically))}
         present = dict.fromkeys(self._entities, self._listen)
         self._keep({**present, **wanted})
         await self._until(lambda: self._announced.keys() >= graph.keys(), MAX_ANNOUNCE_S)
@@ -379,9 +371,6 @@ class SceneView:
                 self._node.destroy_subscription(entity)
         for name in wanted.keys() - self._entities.keys():
             self._entities[name] = wanted[name](name)
-
-    def _setter(self, service: str) -> Any:
-        return self._node.create_client(SetParametersAtomically, service)
 
     def _listen(self, topic: str) -> Any:
         return self._node.create_subscription(
