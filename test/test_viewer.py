@@ -97,6 +97,9 @@ def test_a_slider_sets_the_node_that_owns_the_parameter_and_others_changes_are_s
     more = page.setting('/leg', 'leg_pairs', 3)
     page.setting('/leg', 'crank.speed', -2.5)
     assert (running.value('leg.leg_pairs'), running.value('leg.crank.speed')) == (3, -2.5)
+    assert page.set('/leg', crank__speed=0.0) == ''
+    # It plays as fast as before.
+    assert running.page().mechanisms('/leg')['/leg']['inputs']['crank']['speed'] == -2.5
     running.set('leg.mirrored', True)
     both = page.setting('/leg', 'mirrored', True)
     assert [(told['legs'], told['pairs']) for told in (first, more, both)] == [
@@ -272,13 +275,15 @@ def test_nodes_that_come_later_or_in_a_namespace_are_waited_for_and_not_guessed(
     page = running.page()
     assert [page.ask(op, key='/leg')['reason'] for op in ('pose', 'tune', 'curve')] == [
         "there is no mechanism '/leg'"] * 3
-    running.nodes.extend(graph.start(kind, {**LEG, 'leg.scale': 0.5}, namespace=space)
+    given = {**LEG, 'leg.scale': 0.5, 'leg.frame_id': 'bench'}
+    running.nodes.extend(graph.start(kind, given, namespace=space)
                          for kind in NODES for space in ('', 'robots/left'))
     page.mechanisms('/leg', '/robots/left/leg')
     g_x = 0.5 * mechanisms.create('jansen').solve(1.0, ('G',))['G'][0]
     for key in ('/leg', '/robots/left/leg'):
         assert page.pose(key)['outputs']['G.x']['value'] == pytest.approx(g_x)
         until(lambda key=key: len(page.drawn(key, 'joints')))
+    assert '<link name="bench" />' in page.ask('export', key='/leg', form='urdf')['text']
     assert page.set('/robots/left/leg', crank__speed=2.0) == ''
     assert sorted(running.values('leg.crank.speed')) == [0.0, 2.0]
 
@@ -348,7 +353,6 @@ def test_a_node_that_does_not_answer_is_named(graph, show, monkeypatch):
     assert running.value('leg.scale') == 1.0
 
 
-@pytest.mark.nightly
 def test_a_browser_that_has_not_drawn_is_sent_no_more(show):
     running = show({**LEG, 'leg.crank.speed': 1.0, 'rate': 200.0})
     markers = running.graph.listen(MarkerArray, 'leg/markers')

@@ -276,6 +276,14 @@ def test_no_pose_of_a_fine_scale_is_nearer_by_more_than_the_leash(type_, joint, 
         assert away <= np.hypot(*(path - place).T).min() + 0.1 * width
 
 
+def test_a_rocker_that_is_dragged_stays_at_the_angle_of_its_crank_of_two_that_it_has():
+    bar = mechanisms.create('four_bar')
+    for crank in np.linspace(-3.0, 3.0, 13):
+        place = bar.solve(crank + 0.03, ('B',))['B']
+        found, = nearest_inputs(bar, 'B', place, [crank], [[(-math.pi, math.pi)]])
+        assert abs(found - crank) < 0.1
+
+
 def test_what_cannot_be_assembled_is_not_dragged():
     linkage = mechanisms.create('peaucellier')
     with pytest.raises(ValueError, match='cannot be assembled'):

@@ -41,6 +41,9 @@ POLL_S, LINGER_S = 1.0, 1.0
 # For the first announcement of a node, and a response; between two looks for one of these.
 MAX_ANNOUNCE_S, MAX_ANSWER_S, RETRY_S = 1.0, 3.0, 0.005
 
+# Downloads, the last two of linkages in a plane only; the page itself draws 'png'.
+FORMS = 'yaml', 'png', 'h', 'csv', 'urdf'
+
 Answer = dict[str, Any]
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -265,8 +268,8 @@ class SceneView:
     def _described(self, shown: ShownMechanism) -> Answer:
         """Describe what the page needs of a mechanism beside its markers."""
         mechanism = self._mechanism(shown)
-        return {'key': shown.key, 'name': shown.name,
-                'curves': {} if mechanism.in_space else curves.KINDS,
+        forms, kinds = (FORMS[:3], {}) if mechanism.in_space else (FORMS, curves.KINDS)
+        return {'key': shown.key, 'name': shown.name, 'forms': forms, 'curves': kinds,
                 'settings': list(starmap(poses.setting, self._settings(shown).items())),
                 **poses.drawn(mechanism, self._playing(shown))}
 

@@ -14,8 +14,6 @@ const FORMS = {
   URDF: ['urdf', 'The robot model'],
   C: ['h', 'A C99 header for a microcontroller'],
 };
-/** What there is not of a linkage in space. */
-const PLANAR = ['csv', 'urdf'];
 
 const picture = () => new Promise(done => { document.getElementById('picture').toBlob(done); });
 
@@ -108,7 +106,7 @@ export class Tuning {
 
   /** The buttons that download. */
   files() {
-    const forms = Object.entries(FORMS).filter(([, [form]]) => !this.mechanism.space || !PLANAR.includes(form));
+    const forms = Object.entries(FORMS).filter(([, [form]]) => this.mechanism.forms.includes(form));
     return element('div', { className: 'tools' }, element('span', { className: 'about', textContent: 'Download' }),
       ...forms.map(([name, [form, title]]) => button(name, () => this.download(form), { title })));
   }
