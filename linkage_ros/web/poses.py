@@ -180,7 +180,7 @@ def reached(mechanism: SceneMechanism, present: Sequence[float],
 def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
               value: float) -> Reached:
     drive, ends = mechanism.inputs[name], mechanism.inputs[name].arcs
-    near = min((min(max(float(drive.input.nearest_equivalent(value, (low + high) / 2.0)), low), high)
+    near = min((min(max(drive.input.nearest_equivalent(value, (low + high) / 2.0), low), high)
                 for low, high in ends), key=lambda end: drive.input.apart(end, value))
     whole = drive.input.is_whole(ends)
     new = float(drive.input.wrapped(value)) if whole else near

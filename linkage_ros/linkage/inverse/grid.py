@@ -18,7 +18,7 @@ from typing import Iterator, List, Sequence, Union
 
 import numpy as np
 
-from .follow import LONGEST
+from .follow import MAX_STEP
 from .problem import ACCEPTED, InverseProblem, Row
 from .segments import Bracket, segments_of
 from ..formulas import Names
@@ -119,7 +119,7 @@ class Grid:
             q, solved, parts = q[going], solved[:, going], parts[going]
             step = solved[2 + n:2 + 2 * n].T - q
             longest = np.abs(step / self._steps).max(axis=1)
-            step *= (parts * LONGEST / np.maximum(longest, LONGEST))[:, None]
+            step *= (parts * MAX_STEP / np.maximum(longest, MAX_STEP))[:, None]
             trial = (q + step).clip(self._low, self._high)
             new = self._solved(trial, values)
             better = new[0] < solved[0]
