@@ -5,12 +5,12 @@
 The solution that is continuous from given inputs.
 
 The outputs go straight from their present values to others, and a step of this motion has one
-candidate. Only the length of a step differs. Of one input, segments know every special input
-beforehand: all of the motion is one step, along the segments. Of several inputs, nothing is known
+candidate. Only the length of a step differs. Of one input, segments know all special inputs
+beforehand: the motion is one step, along the segments. Of several inputs, nothing is known
 beforehand: the candidate is the present inputs, and a step is halved if Newton's method does not
-end nearby, on the same side of all folds. For one input, too, this would lose motions that begin at
-a special input, where there is no rate: 103 of 272 in the catalogue and 40 random linkages, in
-which segments lose 6 (measured at commit aebd2314).
+end nearby, on the same side of all folds. With one input this would lose motions that begin at a
+special input, where there is no rate: 103 of 272 in the catalogue and 40 random linkages, of which
+segments lose 6 (measured at commit aebd2314).
 
 Source: Gosselin and Angeles, "Singularity analysis of closed-loop kinematic chains", IEEE Trans.
 Robotics and Automation 6 (1990).

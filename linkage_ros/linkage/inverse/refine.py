@@ -24,6 +24,8 @@ from ..tolerances import ONE, SINGULAR
 
 # A larger error [sizes], or a longer step [rad, sizes], leads to another solution.
 FAR = 0.1
+# Steps of arrays: from samples of a segment, three reach rounding nearly everywhere.
+ARRAY_STEPS = 3
 
 
 def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Bracket, Row]
@@ -98,19 +100,13 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
         low, high, inputs, far = *candidates[:2], candidates[2:3], math.inf
     best = over(*inputs.clip(low, high), *values)
     left = ~np.isfinite(best).all(axis=0)
-    again = np.flatnonzero((best[1] > ROUNDED) & (best[0] <= far))
-    for _ in range(HALVINGS):
-        if not len(again):
-            break
-        x = best[2 + n:2 + 2 * n].clip(low, high)
-        trial = over(*x[:, again], *values[:, again])
-        better = trial[0] < best[0, again]
-        again = again[better]
-        best[:, again] = trial[:, better]
-        again = again[best[1, again] > ROUNDED]
-    solutions = best[2 + 2 * n:]
+    for _ in range(ARRAY_STEPS):
+        trial = over(*best[2 + n:2 + 2 * n].clip(low, high), *values)
+        better = (best[1] > ROUNDED) & (best[0] <= far) & (trial[0] < best[0])
+        best[:, better] = trial[:, better]
+    # What is left is refined one by one.
     left = (left | ~(best[1] <= ACCEPTED)) & ~(best[0] > far)
-    solutions[:, ~(best[1] <= ACCEPTED)] = math.nan
+    solutions = np.where(best[1] <= ACCEPTED, best[2 + 2 * n:], math.nan)
     for k in np.flatnonzero(left).tolist():
         candidate = candidates[:, k].tolist()
         row = refine(problem, values[:, k].tolist(),
