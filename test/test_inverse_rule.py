@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from truth import inverse_judge, linkage_checks
 
-
 FOUR_BAR_OUTPUTS = 'P.x', 'P.y', 'B.x', 'B.y', 'QB', 'AB'
 EVERYWHERE = np.linspace(-3.1, 3.1, 40)
 TIGHT = math.atan2(-0.8, 0.6)
