@@ -42,9 +42,9 @@ def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[floa
     if not isinstance(source, Segments):
         side = _side(start[-problem.n ** 2:])
         return _followed(problem, values, residuals, seed, side, HALVINGS) if side else None
-    candidate = source.follow(values[0], residuals[0], seed[0])
-    solution = candidate and refine(problem, values, candidate[0])
-    return solution and (*problem.nearest_equivalent(solution, candidate[1]), solution[1])
+    bracket, estimate = source.follow(values[0], residuals[0], seed[0]) or (None, ())
+    solution = bracket and refine(problem, values, bracket)
+    return solution and (*problem.nearest_equivalent(solution, estimate), solution[1])
 
 
 def _followed(problem: InverseProblem, values: Sequence[float], residuals: Sequence[float],
