@@ -15,7 +15,7 @@ pytest.importorskip('linkage_interfaces')
 
 from effort import few_calls
 from linkage_ros import scene
-from linkage_ros.nodes import scene_node as nodes
+from linkage_ros.nodes import ownership, scene_node as nodes
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
@@ -24,6 +24,7 @@ from rcl_interfaces.msg import (
     IntegerRange,  # noqa: E402
     Parameter as ParameterMessage,  # noqa: E402
     ParameterDescriptor,  # noqa: E402
+    ParameterEvent,  # noqa: E402
     ParameterValue,  # noqa: E402
     SetParametersResult,  # noqa: E402
 )
@@ -295,7 +296,8 @@ def test_a_change_is_answered_and_messages_are_handled_while_it_is_prepared(grap
     assert node.adopted[-1][1] == 1.5
 
 
-def test_of_a_hundred_changes_each_is_answered_and_the_newest_prepared(graph):
+def test_of_a_hundred_changes_each_is_answered_and_the_newest_prepared_and_announced(graph):
+    announced = graph.listen(ParameterEvent, ownership.TOPIC, ownership.LATCHED)
     node = graph.start(Slow, LEG)
     client = Client(graph, node)
     held_up(graph, client)
@@ -308,6 +310,10 @@ def test_of_a_hundred_changes_each_is_answered_and_the_newest_prepared(graph):
     node.free.set()
     settled(graph, node)
     assert node.adopted[-1][1] == 101.0 and len(node.begun) == begun + 1
+    # First all parameters, then the scale that held up the worker, and the last one.
+    graph.until(lambda: len(announced) > 2)
+    assert [one.value.double_value for event in announced for one in event.changed_parameters] == [
+        1.5, 101.0]
 
 
 def test_a_changed_scene_is_prepared_before_what_else_is_queued(graph):
@@ -333,13 +339,14 @@ def test_a_set_among_a_thousand_mechanisms_costs_what_it_changes():
 def test_each_of_many_sets_gets_its_own_answer(graph):
     node = graph.start(Slow, LEG)
     wanted = [('leg.scale', 2.0), ('leg.scale', -1.0), ('leg.scale', 'wide'),
-              ('leg.branches.C', 7), ('frame_id', 'map')]
+              ('leg.branches.C', 7), ('frame_id', 'map'), ('leg.type', 'klann')]
     client = Client(graph, node)
     results = client.set(*wanted)
     # Each value is valid by itself or not; the valid ones are set together or not at all.
-    assert [r.successful for r in results] == [True, False, False, False, True]
-    for (name, _), result in zip(wanted, results):
+    assert [r.successful for r in results] == [True, False, False, False, True, False]
+    for (name, _), result in zip(wanted[:-1], results):
         assert result.successful or result.reason.startswith(f'{name} must')
+    assert 'read-only parameter: leg.type' in results[-1].reason
     before = node.scene
     assert (before.machines['leg'].scale, before.frame_id) == (2.0, 'map')
     for other in ('leg.loads', ['Z=1 2']), ('leg.scale', 1300.0):
