@@ -102,7 +102,7 @@ class SceneNode(Node):
         self._adopt(self.scene, self.prepare(self.scene))
         if self.fields:
             self._announcer = Announcer(self)
-        if self._role != scenes.OWNER:
+        if self._role != scenes.KINEMATICS:
             Follower(self, self._parameters_of_scene)
         self._namesakes = self.create_timer(
             NAMESAKE_CHECK_PERIOD_S, self.guarded('a check of names', self._warn_of_namesake),
