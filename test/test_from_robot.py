@@ -182,7 +182,8 @@ def test_all_that_is_printed_of_a_robot(capsys, file):
                        re.sub(r'\b\de-1\d m', '0 m', each)) for each in capsys.readouterr())
     assert out == (
         f'# From {ROBOTS}/{file}. Its joints on /joint_states, and its model:\n# ros2 launch '
-        f'linkage_ros robot.launch.py robot:={ROBOTS}/{file} scene:=SCENE.yaml{more}{text}')
+        f'linkage_ros robot.launch.py robot:={ROBOTS}/{file} scene:=SCENE.yaml{more}\n'
+        f'# joint_names: QB=-knee+0.6 is to be read as knee = 0.6 - angle of QB.{text}')
     assert err == ''.join(f'from_robot: {line[2:]}\n' for line in text.splitlines()
                           if line.startswith('# '))
 
@@ -408,8 +409,8 @@ def test_no_answer_depends_on_the_starts_of_a_search(tmp_path, name, seeds):
         faults = {re.sub(r'-?\d+\.\d+', lambda found: f'{float(found[0]):.2f}', str(why))
                   for why in made.faults.values()}
         # A rod on balls spins freely.
-        return faults, made.report, {joint: position for joint, position in
-                                     made.robot.positions.items() if joint[1] != '_' and not faults}
+        return faults, made.report, {} if faults else {
+            name: value for name, value in made.robot.positions.items() if name[1] != '_'}
 
     faults, report, positions = answer(0)
     assert all(question in why for why in faults) and bool(faults) == bool(question)
