@@ -129,29 +129,23 @@ def reader(graph, capsys, monkeypatch, tmp_path):
     return Reader(graph, capsys)
 
 
-@pytest.fixture
-def follow(reader):
-    """Return a function that follows a page."""
-    return reader.follow
-
-
 def test_every_page_of_this_kind_is_tried():
-    tried = re.findall(r"follow\('(.*?)'\)", Path(__file__).read_text())
-    assert sorted(tried) == sorted(FOLLOWED)
+    text = Path(__file__).read_text()
+    assert not [page for page in FOLLOWED if f"reader.follow('{page}')" not in text]
 
 
-def test_the_first_ten_minutes(follow):
+def test_the_first_ten_minutes(reader):
     pytest.importorskip('matplotlib')
-    answer = follow('first-ten-minutes')
+    answer = reader.follow('first-ten-minutes')
     assert answer.success and len(answer.servo_angle) == 1
     assert Path('walker.png').stat().st_size > 10_000
 
 
 @pytest.mark.nightly
 @pytest.mark.skipif(not shutil.which('cc'), reason='there is no C compiler')
-def test_the_gripper_of_the_tutorial(follow):
+def test_the_gripper_of_the_tutorial(reader):
     pytest.importorskip('matplotlib')
-    assert follow('tutorial').endswith('out of reach\n')
+    assert reader.follow('tutorial').endswith('out of reach\n')
     assert Path('gripper.png').stat().st_size > 10_000
     # The picture at its head is of what it ends with.
     written, drawn = (yaml.safe_load(file.read_text())
@@ -159,9 +153,9 @@ def test_the_gripper_of_the_tutorial(follow):
     assert written == drawn
 
 
-def test_an_encoder_behind_a_belt(graph, follow):
+def test_an_encoder_behind_a_belt(graph, reader):
     states = graph.listen(JointState, 'joint_states', 100)
-    follow('how-to/encoder')
+    reader.follow('how-to/encoder')
 
     graph.until(lambda: {name for state in states for name in state.name} >= {
         'belt_encoder', 'press_QB'})
@@ -169,8 +163,8 @@ def test_an_encoder_behind_a_belt(graph, follow):
     assert 0.6 <= min(crank) <= max(crank) <= 2.6
 
 
-def test_a_knee_under_a_trajectory_controller(follow):
-    follow('how-to/transmission')
+def test_a_knee_under_a_trajectory_controller(reader):
+    reader.follow('how-to/transmission')
     control = ElementTree.parse('control.urdf')
     pasted = ElementTree.fromstring(
         f'<all>{Path("leg_transmissions/urdf/transmissions.xml").read_text()}</all>')
@@ -181,8 +175,8 @@ def test_a_knee_under_a_trajectory_controller(follow):
     assert joints == [joint.get('name') for joint in control.getroot().findall('joint')]
 
 
-def test_a_flap_is_put_where_a_planner_wants_it(reader, follow):
-    controlled = follow('commands')
+def test_a_flap_is_put_where_a_planner_wants_it(reader):
+    controlled = reader.follow('commands')
     command = reader.heard[0]
     assert command.name == ['servo']
     crank = 0.5 * command.position[0]
@@ -195,54 +189,52 @@ def test_a_flap_is_put_where_a_planner_wants_it(reader, follow):
 
 
 @pytest.mark.nightly
-def test_an_ankle_on_two_rods(graph, follow):
+def test_an_ankle_on_two_rods(graph, reader):
     states = graph.listen(JointState, 'joint_states', 100)
-    assert 'ankle_joints_to_actuators' in follow('how-to/ankle')
+    assert 'ankle_joints_to_actuators' in reader.follow('how-to/ankle')
     graph.until(lambda: {name for state in states for name in state.name} >= {
         'ankle_pitch', 'ankle_roll', 'motor_left', 'motor_right'})
 
 
 @pytest.mark.nightly
-def test_an_ankle_in_a_training_loop(follow, capsys):
+def test_an_ankle_in_a_training_loop(reader, capsys):
     pytest.importorskip('torch', reason='torch is not installed')
-    follow('how-to/training')
+    reader.follow('how-to/training')
     assert capsys.readouterr().out == 'zeros of the encoders [rad]: 0.013 -0.007\n'
 
 
-def test_a_boom_on_a_cylinder(graph, follow):
+def test_a_boom_on_a_cylinder(graph, reader):
     states = graph.listen(JointState, 'joint_states', 100)
-    command = follow('how-to/cylinder')
+    command = reader.follow('how-to/cylinder')
     assert command.name == ['boom_stroke'] and 0.0 <= command.position[0] <= 0.6
 
-    # The driver speaks for the sensor: the law of cosines has the boom's angle to O -> P.
-    def told():
-        told = {}
-        for state in states:
-            told.setdefault(state.header.stamp.nanosec, {}).update(zip(state.name, state.position))
-        return [joints for joints in told.values() if {'boom_stroke', 'boom_OB'} <= {*joints}]
+    # Sensor and boom, by their common stamp: the law of cosines has the boom's angle to O -> P.
+    def pairs():
+        strokes, booms = ({state.header.stamp.nanosec: state.position[state.name.index(name)]
+                           for state in states if name in state.name}
+                          for name in ('boom_stroke', 'boom_OB'))
+        return [(strokes[stamp], booms[stamp]) for stamp in strokes.keys() & booms.keys()]
 
-    graph.until(lambda: len(told()) > 9)
+    graph.until(lambda: len(pairs()) > 9)
     base = math.hypot(0.5, 0.2)
-    for joints in told():
-        length = joints['boom_stroke'] + 0.9
-        corner = math.acos((base ** 2 + 1.1 ** 2 - length ** 2) / (2.0 * base * 1.1))
-        assert joints['boom_OB'] == pytest.approx(math.atan2(-0.2, 0.5) + corner, abs=1e-12)
+    for stroke, angle in pairs():
+        corner = math.acos((base**2 + 1.1**2 - (stroke + 0.9)**2) / (2.0 * base * 1.1))
+        assert angle == pytest.approx(math.atan2(-0.2, 0.5) + corner, abs=1e-12)
 
 
-def test_two_robots_of_one_kind(graph, follow):
+def test_two_robots_of_one_kind(graph, reader):
     from visualization_msgs.msg import MarkerArray
 
     sides = 'left', 'right'
     marked = {side: graph.listen(MarkerArray, f'/{side}/arm/markers') for side in sides}
-    follow('how-to/several-robots')
+    reader.follow('how-to/several-robots')
     graph.until(lambda: all(marked.values()))
-    for side in sides:
-        assert marked[side][0].markers[0].header.frame_id == f'{side}/base'
+    assert all(marked[side][0].markers[0].header.frame_id == f'{side}/base' for side in sides)
 
 
-def test_robots_of_each_format(follow):
+def test_robots_of_each_format(reader):
     pytest.importorskip('mujoco')
-    follow('robot-files')
+    reader.follow('robot-files')
     lid = scene.load('lid.yaml').machines['motor']
     # The lid is closed in the pose of its file, in which all joints are at zero.
     angles = lid.linkage.joint_angles(lid.first.offset)
@@ -252,26 +244,26 @@ def test_robots_of_each_format(follow):
 
 
 @pytest.mark.nightly
-def test_the_scene_of_a_whole_robot(follow):
-    follow('how-to/whole-robot')
+def test_the_scene_of_a_whole_robot(reader):
+    reader.follow('how-to/whole-robot')
     shown = scene.load('robot.yaml')
     assert len(shown.machines) == 2
     line = Path('robot.yaml').read_text().splitlines()[1]
     assert line.startswith('# ros2 launch linkage_ros robot.launch.py robot:=examples/leg.urdf')
 
 
-def test_coordinates_of_a_drawing(follow):
-    robot = LIBRARIES[0](follow('how-to/cad-export'))
-    machine = scene.load('export.yaml').machines['lid']
-    angles = machine.linkage.joint_angles(machine.first.start)
+def test_coordinates_of_a_drawing(reader):
+    robot = LIBRARIES[0](reader.follow('how-to/cad-export'))
+    lid = scene.load('export.yaml').machines['lid']
+    angles = lid.linkage.joint_angles(lid.first.start)
     places = robot.places({f'lid_{name}': angle for name, angle in angles.items()},
                           ['lid_A', 'lid_B'])
     assert places['lid_A'] == pytest.approx([0.012, 0.0, 0.04], abs=1e-12)
     assert places['lid_B'] == pytest.approx([0.1, 0.0, 0.07], abs=1e-12)
 
 
-def test_ros2_control_moves_the_motors_of_the_scene(graph, follow):
-    machines = follow('how-to/ros2-control').scene.machines
+def test_ros2_control_moves_the_motors_of_the_scene(graph, reader):
+    machines = reader.follow('how-to/ros2-control').scene.machines
     sources = {name: [machine.first.source] for name, machine in machines.items()}
     motors = [motor for listed in sources.values() for motor in listed]
     controllers = yaml.safe_load(Path('controllers.yaml').read_text())

@@ -45,6 +45,8 @@ typedef float lkr_real;
 #define LKR_ENOUGH 2e-6f
 #define LKR_CLOSE 4e-6f
 #define LKR_STEEPEST 1e3f
+/* Terms of a series. */
+#define LKR_TERMS 8
 #else
 #if DBL_MANT_DIG < 53
 #error "double is a float on this machine: print the header again with --float"
@@ -56,10 +58,9 @@ typedef double lkr_real;
 #define LKR_ENOUGH 1e-14
 #define LKR_CLOSE 1e-13
 #define LKR_STEEPEST 4e6
+#define LKR_TERMS 20
 #endif
 
-/* Terms of a series. */
-#define LKR_TERMS 16
 /* Steps of Newton's method from a solution that rounding has moved. */
 #define LKR_MAX_STEPS 3
 #define LKR_NAN ((lkr_real)NAN)
@@ -67,7 +68,6 @@ typedef double lkr_real;
 /* A solution that misses by more than this belongs to another assembly [rad, sizes]. */
 #define LKR_OTHER ((lkr_real)0.01)
 #define LKR_HALF ((lkr_real)0.5)
-#define LKR_PI ((lkr_real)3.14159265358979323846)
 
 /* Formulas are inlined wherever a pose is needed, so that only what is used there is computed. */
 #ifdef __GNUC__
@@ -82,10 +82,10 @@ typedef double lkr_real;
 #ifdef __AVR__
 #include <avr/pgmspace.h>
 #define LKR_IN_FLASH PROGMEM
-#define lkr_copy_of_flash memcpy_P
+#define LKR_FROM_FLASH(number) pgm_read_float(&(number))
 #else
 #define LKR_IN_FLASH
-#define lkr_copy_of_flash memcpy
+#define LKR_FROM_FLASH(number) (number)
 #endif
 
 /* --- numbers --- */
@@ -166,14 +166,13 @@ typedef struct {
     lkr_real load[LKR_MAX_INPUTS];
 } lkr_point;
 
-/* The place of an actuator or a joint in a linkage. */
+/* An actuator or a joint: its position is factor * value + offset. */
 typedef struct {
     /* One over the size of its position, and what it may change by without effect, or 0. */
     lkr_real scale, turn;
-    /* If it counts the turns of an input: the input, the rate by it, and the position where that is 0.
-       Otherwise the rate is 0. */
+    /* The input whose value it has, whole turns included; -1 if it has that of an output. */
     int input;
-    lkr_real rate, zero;
+    lkr_real factor, offset;
 } lkr_axis;
 
 /* A linkage. Inputs q are in rad or in sizes. */
@@ -183,8 +182,9 @@ typedef struct {
     int is_rated;
     /* The pose at inputs, with rates and loads or without; 0 if it cannot be assembled. */
     int (*at)(const lkr_real *q, int is_rated, lkr_point *p);
-    /* All inputs that positions of a side may have, NaN where there is none; returns their number. */
-    int (*solutions[2])(const lkr_real *position, lkr_real (*q)[LKR_MAX_INPUTS]);
+    /* All inputs that a side's outputs may have, NaN where there is none; returns their number. 0 where
+       the axes count all inputs. */
+    int (*solutions[2])(const lkr_real *value, lkr_real (*q)[LKR_MAX_INPUTS]);
     lkr_axis axis[2][LKR_MAX_INPUTS];
     /* After how much of each input the actuators or the joints repeat, or 0. */
     lkr_real turn[2][LKR_MAX_INPUTS];
@@ -194,20 +194,22 @@ typedef struct {
     lkr_real sweep[LKR_MAX_INPUTS][2];
 } lkr_model;
 
-/* A part of the reach in which a position only rises, or only falls: its middle value, half its
-   change, the inputs at its ends, and the input as a series of Chebyshev polynomials of the position's
-   arcsine, which is smooth at an extreme and at an end of the reach. */
+/* A part of the reach in which an output only rises, or only falls: the middle of its values and how
+   far it goes from there; the inputs at its ends; the input as a series of Chebyshev polynomials of
+   sqrt((value - middle) * scale + shift) - center, which is in [-1, 1]. */
 typedef struct {
-    lkr_real middle, half, low, high;
+    lkr_real middle, reach, low, high, scale, shift, center;
     lkr_real term[LKR_TERMS];
 } lkr_piece;
 
 /* The state between calls: the last pose and its inputs, the side that it follows from, and what is
    held: the positions of the actuators where they were last commanded or measured, whichever is newer,
-   of the joints where they were last measured, NaN before; the last efforts. */
+   of the joints where they were last measured, NaN before; the last efforts. The inputs' speeds are
+   those of the last call. */
 typedef struct {
     lkr_point point;
     lkr_real q[LKR_MAX_INPUTS];
+    lkr_real speed[LKR_MAX_INPUTS];
     int newest;
     lkr_side held[2];
 } lkr_memory;
@@ -289,39 +291,31 @@ static inline int lkr_input_change(const lkr_model *model, int side, const lkr_p
 
 /* --- the inverse --- */
 
-/* The inputs are those that the axes count. */
-static inline int lkr_counted(const lkr_real *position, lkr_real (*q)[LKR_MAX_INPUTS])
-{
-    (void)position;
-    memset(q, 0, sizeof *q);
-    return 1;
-}
-
-/* The input in each piece of the reach that has a position, of such a size and with such a period. */
+/* The input in each piece of the reach that has a value of an output, of such a size and period. */
 static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, lkr_real turn,
-    lkr_real position, lkr_real (*q)[LKR_MAX_INPUTS])
+    lkr_real value, lkr_real (*q)[LKR_MAX_INPUTS])
 {
     int i, k, solutions = 0;
     for (k = 0; k < count && solutions < LKR_MAX_SOLUTIONS; k++) {
-        lkr_piece part;
-        lkr_real gap;
-        lkr_copy_of_flash(&part, &piece[k], sizeof part);
-        gap = position - part.middle;
+        const lkr_piece *part = &piece[k];
+        lkr_real gap = value - LKR_FROM_FLASH(part->middle);
         gap -= lkr_turns(gap, turn);
-        if (LKR_MATH(fabs)(gap) <= LKR_MATH(fabs)(part.half) + LKR_CLOSE * size) {
-            const lkr_real sine = gap / part.half;
-            const lkr_real cosine = LKR_MATH(sqrt)(lkr_max(0, (1 - sine) * (1 + sine)));
-            const lkr_real x = lkr_angle(sine, cosine) / (LKR_PI / 2);
+        if (LKR_MATH(fabs)(gap) <= LKR_FROM_FLASH(part->reach) + LKR_CLOSE * size) {
+            const lkr_real square =
+                gap * LKR_FROM_FLASH(part->scale) + LKR_FROM_FLASH(part->shift);
+            const lkr_real x =
+                LKR_MATH(sqrt)(lkr_max(0, square)) - LKR_FROM_FLASH(part->center);
             lkr_real sum = 0;
             lkr_real before = 0;
             /* Clenshaw's recurrence. */
             for (i = LKR_TERMS - 1; i > 0; i--) {
-                const lkr_real next = 2 * x * sum - before + part.term[i];
+                const lkr_real next = 2 * x * sum - before + LKR_FROM_FLASH(part->term[i]);
                 before = sum;
                 sum = next;
             }
-            sum = x * sum - before + part.term[0];
-            q[solutions][0] = lkr_min(lkr_max(sum, part.low), part.high);
+            sum = x * sum - before + LKR_FROM_FLASH(part->term[0]);
+            q[solutions][0] = lkr_min(
+                lkr_max(sum, LKR_FROM_FLASH(part->low)), LKR_FROM_FLASH(part->high));
             solutions++;
         }
     }
@@ -415,20 +409,25 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
 {
     lkr_real x[LKR_MAX_SOLUTIONS + 1][LKR_MAX_INPUTS];
     lkr_real away[LKR_MAX_SOLUTIONS + 1];
-    lkr_real near[LKR_MAX_INPUTS];
-    const int count = model->solutions[side](position, x);
+    lkr_real near[LKR_MAX_INPUTS], value[LKR_MAX_INPUTS];
     int i, k, s;
+    int count = 1;
     if (!lkr_are_finite(model->inputs, position)) {
         return 0;
     }
     for (i = 0; i < model->inputs; i++) {
+        const lkr_axis *axis = &model->axis[side][i];
+        value[i] = (position[i] - axis->offset) / axis->factor;
         near[i] = q[i];
     }
+    if (model->solutions[side]) {
+        count = model->solutions[side](value, x);
+    }
     for (i = 0; i < model->inputs; i++) {
-        const lkr_axis *axis = &model->axis[side][i];
-        for (k = 0; k < count && axis->rate != 0; k++) {
-            near[axis->input] = (position[i] - axis->zero) / axis->rate;
-            x[k][axis->input] = near[axis->input];
+        const int input = model->axis[side][i].input;
+        for (k = 0; k < count && input >= 0; k++) {
+            near[input] = value[i];
+            x[k][input] = value[i];
         }
     }
     for (k = 0; k < count; k++) {
@@ -454,7 +453,10 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
             for (s = LKR_ACTUATORS; s <= LKR_JOINTS; s++) {
                 for (i = 0; i < model->inputs; i++) {
                     const lkr_axis *axis = &model->axis[s][i];
-                    p->position[s][i] += axis->rate * (q[axis->input] - x[nearest][axis->input]);
+                    if (axis->input >= 0) {
+                        p->position[s][i] += axis->factor
+                            * (q[axis->input] - x[nearest][axis->input]);
+                    }
                 }
             }
             return 1;
@@ -537,27 +539,22 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
     return LKR_OK;
 }
 
-/* Velocities of the other side at a pose, 0 where they are not OK; returns a status. */
+/* The speeds of the inputs at a pose, and the velocities of the other side; returns a status. */
 static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int side,
-    const lkr_real *velocity, lkr_real *other)
+    const lkr_real *velocity, lkr_real *speed, lkr_real *other)
 {
-    lkr_real x[LKR_MAX_INPUTS];
     int i, j, is_regular;
-    memset(other, 0, sizeof x);
     if (!lkr_are_finite(model->inputs, velocity)) {
         return LKR_NOT_KNOWN;
     }
-    is_regular = lkr_input_change(model, side, p, LKR_SINGULAR, velocity, x);
+    is_regular = lkr_input_change(model, side, p, LKR_SINGULAR, velocity, speed);
     for (i = 0; i < model->inputs; i++) {
+        other[i] = 0;
         for (j = 0; j < model->inputs; j++) {
-            other[i] += p->rate[1 - side][i][j] * x[j];
+            other[i] += p->rate[1 - side][i][j] * speed[j];
         }
     }
-    if (!is_regular || !lkr_are_finite(model->inputs, other)) {
-        memset(other, 0, sizeof x);
-        return LKR_SINGULAR_POSE;
-    }
-    return LKR_OK;
+    return is_regular && lkr_are_finite(model->inputs, other) ? LKR_OK : LKR_SINGULAR_POSE;
 }
 
 /* The same for efforts. The power of the actuators is that of the joints less that of the loads. */
@@ -602,15 +599,17 @@ static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, 
     }
     position = lkr_move(model, m, side, from->position);
     effort = lkr_efforts(model, is_here ? &here : &m->point, side, from->effort, made.effort);
-    velocity = lkr_velocities(model, &m->point, side, from->velocity, held->velocity);
-    if (position == LKR_OUT_OF_REACH) {
-        velocity &= LKR_NOT_KNOWN;
-        memset(held->velocity, 0, sizeof held->velocity);
-    }
+    velocity = lkr_velocities(model, &m->point, side, from->velocity, m->speed, held->velocity);
     if (m->newest == LKR_NEITHER) {
         velocity = LKR_NOT_KNOWN;
         effort = LKR_NOT_KNOWN;
+    }
+    if (velocity != LKR_OK || position == LKR_OUT_OF_REACH) {
+        memset(m->speed, 0, sizeof m->speed);
         memset(held->velocity, 0, sizeof held->velocity);
+    }
+    if (position == LKR_OUT_OF_REACH) {
+        velocity &= LKR_NOT_KNOWN;
     }
     if (effort == LKR_OK) {
         memcpy(held->effort, made.effort, sizeof made.effort);
@@ -742,10 +741,10 @@ typedef lkr_memory lever_memory;
      X crank Q 0.081 up
      A slider O 0.02 Q along X out
 */
-static inline int lever_solutions_joints(const float *position,
+static inline int lever_solutions_angle_lever(const float *value,
     float (*q)[LKR_MAX_INPUTS])
 {
-    const float x0 = position[0];
+    const float x0 = value[0];
     /* A left */
     const float v3 = 0.5f * x0;
     const float v4 = sinf(v3);
@@ -785,42 +784,12 @@ static inline int lever_at(const float *q, int is_rated, lkr_point *p)
 
 /* Tables of the actuators and joints, see lkr_model. */
 static const lkr_model lever_model = {
-    1, 1, lever_at, { lkr_counted, lever_solutions_joints },
+    1, 1, lever_at, { 0, lever_solutions_angle_lever },
     { { { 1.0f, 0.0f, 0, 1.0f, 0.0f } },
-      { { 1.0f, 6.2831855f, 0, 0.0f, 0.0f } } },
+      { { 1.0f, 6.2831855f, -1, 1.0f, 0.0f } } },
     { { 0.0f }, { 6.2831855f } },
     { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } }
 };
-
-/* The inputs in each assembly mode of the inverse linkage, NAN where there is none:
-     O ground 0.0 0.0
-     Q ground 0.0 -0.045
-     X crank Q 0.081 up
-     A slider O 0.02 Q along X out
-*/
-static inline int lever_solutions_angle_lever(const float *position,
-    float (*q)[LKR_MAX_INPUTS])
-{
-    const float x0 = position[0];
-    /* A left */
-    const float v3 = 0.5f * x0;
-    const float v4 = sinf(v3);
-    const float v9 = ((2.0f * v4) * cosf(v3)) * 0.081f;
-    const float v15 = (1.0f - (2.0f * (v4 * v4))) * 0.081f;
-    const float v18 = sqrtf(((v9 * v9) + (v15 * v15)));
-    const float v19 = v9 / v18;
-    const float v22 = v19 * 0.045f;
-    const float v27 = lkr_root(((0.02f + v22) * (0.02f - v22)), 1.154632e-18f);
-    const float v28 = v19 * v27;
-    const float v30 = v15 / v18;
-    const float v31 = v30 * v22;
-    const float v35 = -(v19 * v22);
-    const float v36 = v30 * v27;
-    q[0][0] = lkr_angle((-((-v28) - v31)), (v35 + v36));
-    /* A right */
-    q[1][0] = lkr_angle((-(v28 - v31)), (v35 - v36));
-    return 2;
-}
 
 /* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be assembled. */
 static inline int lever_at_angle_lever(const float *q, int is_rated, lkr_point *p)
@@ -840,8 +809,8 @@ static inline int lever_at_angle_lever(const float *q, int is_rated, lkr_point *
 /* Tables of the inverse, see lkr_model. */
 static const lkr_model lever_model_angle_lever = {
     1, 0, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
-    { { { 0, 0, 0, 0, 0 } },
-      { { 1.0f, 6.2831855f, 0, 0.0f, 0.0f } } },
+    { { { 0, 0, -1, 0, 0 } },
+      { { 1.0f, 6.2831855f, -1, 1.0f, 0.0f } } },
     { { 6.2831855f }, { 6.2831855f } },
     { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } }
 };

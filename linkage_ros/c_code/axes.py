@@ -128,14 +128,14 @@ def check_inverse(machine: SceneMechanism, axes: Sequence[Axis]) -> None:
     if linkage.inputs[0].is_part:
         raise ValueError(f'{names[0]} of {machine.name} has no inverse in closed form, and '
                          'repeats after too many turns for a search')
-    if not pieces(linkage, axes[0]):
+    if not pieces(linkage, names[0]):
         raise ValueError(f'{names[0]} of {machine.name} moves nowhere')
 
 
-def pieces(linkage: Mechanism, axis: Axis) -> List[Tuple[float, ...]]:
+def pieces(linkage: Mechanism, output: str) -> List[Tuple[float, ...]]:
     """Return parts of the reach in which an axis only rises or falls: inputs, and outputs."""
     # In a piece an angle changes by half a turn at most, so that its gaps are known.
-    parts, _ = linkage.monotone(axis.output, math.pi if axis.turn else math.inf)
+    parts, _ = linkage.monotone(output, math.pi if linkage.is_angle(output) else math.inf)
     return [part for part in parts if part[2] != part[3]]
 
 

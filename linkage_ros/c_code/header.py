@@ -88,19 +88,16 @@ def _values(request: Request, single: bool) -> Dict[str, Any]:
     formulas = Formulas(machine, code, [
         *(each.output for axes in (*sides, *inverses.values()) for each in axes),
         *(output for output, _ in loads(machine))])
-    model = Tables(machine, code, formulas, sides)
-    tables = [model]
-    parts = [model.text(), model.passive(request.passive) if request.passive else '']
+    tables = Tables(machine, code, formulas)
+    parts = [tables.text(sides), tables.passive(request.passive) if request.passive else '']
     for tag, axes in inverses.items():
-        tables.append(Tables(machine, code, formulas, ([], axes), tag))
-        parts += [tables[-1].text(), _inverse(machine, axes, tag, code.number)]
-    solutions = max(each.solutions for each in tables)
-    about = [*_about(machine), f'A call takes at most {POSES * (solutions + 1)} poses.']
+        parts += [tables.text(([], axes), tag), _inverse(machine, axes, tag, code.number)]
+    about = [*_about(machine), f'A call takes at most {POSES * (tables.solutions + 1)} poses.']
     whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
     return {
         'about': '\n'.join(f' * {line}' for line in about),
         'name': name, 'N': prefix(name), 'float': int(single), 'number': code.number,
-        'own_inputs': n, 'own_solutions': solutions,
+        'own_inputs': n, 'own_solutions': tables.solutions,
         'fields': formulas.struct(), 'pose': formulas.function(),
         'parameters': ', '.join(f'{code.number} {each}' for each in formulas.parameters),
         'arguments': ', '.join(formulas.parameters), 'by': ', '.join(formulas.by),

@@ -4,57 +4,82 @@
 """Inverses without a closed form, as series of Chebyshev polynomials in parts of the reach."""
 
 import math
-from typing import Any, Iterator, Tuple
+from typing import Iterator, NamedTuple, Sequence
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 from ..linkage import Mechanism
 
-# Terms of a series, as in `linkage.h`; how far it may miss an output [rad, longest bar], and the
-# shortest piece of an input [rad, sizes], next to an end of the reach.
-TERMS, CLOSE, SHORTEST = 16, 1e-7, 1e-5
+# Terms of a series in double and in single precision, as in `linkage.h`, and how far it may miss
+# an output [rad, longest bar]: so little that its pose needs no correction.
+TERMS, CLOSE = (20, 8), (4e-15, 1e-7)
+# Where rounding of the poses allows no less, a short piece may miss by more, which Newton's method
+# corrects; the shortest one is next to an end of the reach.
+CORRECTED, SHORT, SHORTEST = 1e-9, 1.0 / 32.0, 1e-5
 # Halvings of a piece that bring an input to its rounding.
 HALVINGS = 60
 
 
-def series(linkage: Mechanism, output: str, low: float, high: float, first: float, last: float
-           ) -> Iterator[Tuple[float, float, float, float, np.ndarray]]:
+class Piece(NamedTuple):
     """
-    Yield the middle and half the change of an output, both ends of the input, and the terms.
+    The input between `low` and `high`, by an output within `reach` of `middle`.
 
-    From one input to the other the output only rises or only falls, from `first` to `last`. The
-    series is one of the output's arcsine, which is smooth where the output is at an extreme and
-    at an end of the reach.
+    It is a series of Chebyshev polynomials of sqrt((output - middle) * scale + shift) - center,
+    which is in [-1, 1]. The root makes it smooth where the output has an extreme.
     """
+
+    middle: float
+    reach: float
+    low: float
+    high: float
+    scale: float
+    shift: float
+    center: float
+    terms: np.ndarray
+
+
+def series(linkage: Mechanism, output: str, part: Sequence[float], single: bool
+           ) -> Iterator[Piece]:
+    """Yield the pieces of a part: two inputs, and an output there."""
+    low, high, first, last = part
     pose, is_angle = linkage.posed((), (output,)), linkage.is_angle(output)
-    middle, half = 0.5 * (first + last), 0.5 * (last - first)
+    size, terms, close = 1.0 if is_angle else linkage.longest, TERMS[single], CLOSE[single]
+    nodes = chebyshev.chebpts1(terms)
+    # Ever denser towards both ends.
+    checked = np.tanh(np.linspace(-18.0, 18.0, 129))
 
-    def change(inputs: np.ndarray) -> np.ndarray:
-        """Return how far the output is from its middle value."""
-        gap = pose.over(inputs)[0] - middle
-        return gap - math.tau * np.round(gap / math.tau) if is_angle else gap
+    def parts(inputs: np.ndarray, end: float, change: float) -> np.ndarray:
+        """Return which parts of a change from an end the output has behind it."""
+        gap = pose.over(inputs)[0] - end
+        return (gap - is_angle * math.tau * np.round((gap - 0.5 * change) / math.tau)) / change
 
-    def inverse(x: np.ndarray) -> Any:
-        """Return where the output has parts of its arcsine, from the middle input, by halving."""
-        below, above = np.full(x.shape, low), np.full(x.shape, high)
+    def halved(wanted: np.ndarray, start: float, stop: float, *change: float) -> np.ndarray:
+        """Return where parts are wanted ones, by halving."""
+        below, above = np.full_like(wanted, start), np.full_like(wanted, stop)
         for _ in range(HALVINGS):
             inputs = 0.5 * (below + above)
-            is_below = change(inputs) / half < np.sin(0.5 * math.pi * x)
+            is_below = parts(inputs, *change) < wanted
             below, above = np.where(is_below, inputs, below), np.where(is_below, above, inputs)
-        return below - cut
+        return below
 
-    cut = 0.5 * (low + high)
-    terms = chebyshev.chebinterpolate(inverse, TERMS - 1)
-    terms[0] += cut
-    # Ever denser towards both ends.
-    x = np.tanh(np.linspace(-18.0, 18.0, 8 * TERMS + 1))
-    missed = change(chebyshev.chebval(x, terms).clip(low, high)) - half * np.sin(
-        0.5 * math.pi * x)
-    size = 1.0 if is_angle else linkage.longest
-    if np.abs(missed).max() <= CLOSE * size or high - low < SHORTEST * linkage.inputs[0].size:
-        yield middle, half, low, high, terms
-        return
-    value = middle + float(change(np.array([cut]))[0])
-    yield from series(linkage, output, low, cut, first, value)
-    yield from series(linkage, output, cut, high, value, last)
+    cut, = halved(np.array([0.5]), low, high, first, last - first)
+    for start, end in ((low, first), (high, last)):
+        change, roots = 0.5 * (first + last) - end, [(0.0, 1.0)]
+        while roots:
+            before, after = roots.pop()
+            center, half = 0.5 * (before + after), 0.5 * (after - before)
+            fitted = chebyshev.chebfit(nodes, halved(
+                (center + half * nodes) ** 2, start, cut, end, change), terms - 1)
+            inputs = chebyshev.chebval(checked, fitted).clip(*sorted((start, cut)))
+            missed = np.abs(parts(inputs, end, change) - (center + half * checked) ** 2).max()
+            enough = close if half > SHORT else max(close, CORRECTED)
+            if missed * abs(change) <= enough * size or half < SHORTEST:
+                squares = np.square([before, after])
+                middle, reach = change * squares.mean(), 0.5 * abs(change) * np.ptp(squares)
+                left, right = sorted(halved(squares, start, cut, end, change))
+                scale = 1.0 / (change * half * half)
+                yield Piece(end + middle, reach, left, right, scale, middle * scale,
+                            center / half, fitted)
+            else:
+                roots += [(center, after), (before, center)]

@@ -13,7 +13,7 @@ from __future__ import annotations
 from functools import partial
 from itertools import product
 import math
-from typing import Iterator, List, Sequence, Tuple
+from typing import Iterator, List, Sequence, Set, Tuple
 
 import numpy as np
 
@@ -34,7 +34,7 @@ ALIKE = 1e-6
 
 class Tables:
     """
-    Writes the pose, the tables and the solutions of actuators and joints.
+    Writes the poses, the tables and the solutions of actuators and joints.
 
     Parameters
     ----------
@@ -42,10 +42,6 @@ class Tables:
         Its first leg is used.
     code, formulas
         Write its C.
-    sides : pair of (sequence of Axis)
-        The actuators and the joints; no actuators for an inverse alone.
-    tag : str
-        End of the names of an inverse alone.
 
     Attributes
     ----------
@@ -54,31 +50,35 @@ class Tables:
 
     """
 
-    def __init__(self, machine: SceneMechanism, code: Code, formulas: Formulas,
-                 sides: Tuple[Sequence[Axis], Sequence[Axis]], tag: str = ''):
+    def __init__(self, machine: SceneMechanism, code: Code, formulas: Formulas):
         self.machine, self.linkage, self._code, self._formulas = (
             machine, machine.linkage, code, formulas)
-        self._sides, self._tag = sides, tag
         self._sizes = [input_.size for input_ in machine.linkage.inputs]
         # The sizes of the inputs in the scene's units.
         self._units = [size * machine.scale_of(name)
                        for name, size in zip(machine.inputs, self._sizes)]
+        self._written: Set[str] = set()
         self.solutions = 1
 
-    def text(self) -> str:
-        """Return the functions for solutions and for a pose, and the table."""
-        names, functions = zip(*map(self._solutions, ('_actuators', '_joints'), self._sides))
+    def text(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], tag: str = '') -> str:
+        """
+        Return the functions for solutions and for a pose, and the table.
+
+        `sides` are the actuators and the joints; an inverse alone has no actuators, and a `tag`
+        at the end of its names.
+        """
+        names, functions = zip(*map(self._solutions, sides))
         row, inputs = self._code.row, [*zip(self.machine.inputs.values(), self._units)]
-        sweeps = ['{ -LKR_FAR, LKR_FAR }' if self._tag or not drive.ends else
+        sweeps = ['{ -LKR_FAR, LKR_FAR }' if tag or not drive.ends else
                   row(np.divide(drive.ends, unit)) for drive, unit in inputs]
         return filled(template('model.h.in'), {
-            'name': self.machine.name, 'tag': self._tag, 'number': self._code.number,
-            'about': 'the inverse' if self._tag else 'the actuators and joints',
-            'n': len(self._sizes), 'is_rated': int(not self._tag), 'names': ', '.join(names),
+            'name': self.machine.name, 'tag': tag, 'number': self._code.number,
+            'about': 'the inverse' if tag else 'the actuators and joints',
+            'n': len(self._sizes), 'is_rated': int(not tag), 'names': ', '.join(names),
             'solutions': '\n'.join(filter(None, functions)),
-            'at': '\n'.join(indented(self._at())),
-            'actuators': self._rows(self._sides[0]), 'joints': self._rows(self._sides[1]),
-            'turns': ', '.join(row(self._turns(axes)) for axes in self._sides),
+            'at': '\n'.join(indented(self._at(sides))),
+            'actuators': self._rows(sides[0]), 'joints': self._rows(sides[1]),
+            'turns': ', '.join(row(self._turns(axes)) for axes in sides),
             'units': row(self._units), 'start': row(np.divide(
                 start(self.machine), self._sizes)),
             'sweeps': ', '.join(sweeps)})
@@ -95,10 +95,10 @@ class Tables:
 
     # --- a pose ---
 
-    def _at(self) -> Iterator[str]:
+    def _at(self, sides: Tuple[Sequence[Axis], Sequence[Axis]]) -> Iterator[str]:
         """Yield the statements for positions, rates by each input, and loads."""
         code, formulas = self._code, self._formulas
-        places = {f'[{side}][{i}]': each for side, axes in enumerate(self._sides)
+        places = {f'[{side}][{i}]': each for side, axes in enumerate(sides)
                   for i, each in enumerate(axes)}
         yield f'{self.machine.name}_pose s, {", ".join(formulas.by)};'
         yield from (f'if (!{formulas.call()}) {{', '    return 0;', '}')
@@ -107,7 +107,8 @@ class Tables:
         yield 'if (is_rated) {'
         for place, each in places.items():
             yield from (f'    {line}' for line in self._rates(f'p->rate{place}', each))
-        powers = [] if self._tag else [*loads(self.machine)]
+        # An inverse alone needs no efforts.
+        powers = [*loads(self.machine)] if sides[0] else []
         for j, (by, unit) in enumerate(zip(formulas.by, self._units)):
             terms = [code.times(f'{by}.{formulas.fields[output]}',
                                 -load * unit / self.machine.scale_of(output))
@@ -137,12 +138,14 @@ class Tables:
         """Return the rows of a side's axes."""
         rows, counted = [], gears(self.linkage, axes)
         for k, each in enumerate(axes):
-            i, ratio, offset = counted.get(k, (0, 0.0, 0.0))
-            scale, turn, rate, zero = map(self._code.literal, (
-                1.0 / each.size, each.turn, each.factor * ratio * self._sizes[i],
-                each.factor * offset + each.offset if ratio else 0.0))
-            rows.append(f'{{ {scale}, {turn}, {i}, {rate}, {zero} }}')
-        return ', '.join(rows) or '{ 0, 0, 0, 0, 0 }'
+            i, factor, offset = -1, each.factor, each.offset
+            if k in counted:
+                i, ratio, shift = counted[k]
+                factor, offset = factor * ratio * self._sizes[i], factor * shift + offset
+            scale, turn, *line = map(self._code.literal, (
+                1.0 / each.size, each.turn, factor, offset))
+            rows.append(f'{{ {scale}, {turn}, {i}, {", ".join(line)} }}')
+        return ', '.join(rows) or '{ 0, 0, -1, 0, 0 }'
 
     def _turns(self, axes: Sequence[Axis]) -> List[float]:
         """Return after how much of each input the positions of axes are the same, or 0."""
@@ -155,44 +158,48 @@ class Tables:
 
     # --- inverses ---
 
-    def _solutions(self, side: str, axes: Sequence[Axis]) -> Tuple[str, str]:
-        """Return the name of the function for all inputs of positions, and the function."""
-        if not axes:
-            return '0', ''
+    def _solutions(self, axes: Sequence[Axis]) -> Tuple[str, str]:
+        """Return the name of the function for all inputs of outputs, and it, if it is new."""
+        outputs = tuple(each.output for each in axes)
         if len(gears(self.linkage, axes)) == len(axes):
-            return 'lkr_counted', ''
-        name = f'{self.machine.name}_solutions{self._tag or side}'
-        closed = self.linkage.inverse(tuple(each.output for each in axes)).closed
-        count, function = self._closed(name, closed, axes) if closed else (
-            self._series(name, *axes))
+            return '0', ''
+        name = '_'.join([f'{self.machine.name}_solutions', *(
+            self._formulas.fields[output] for output in outputs)])
+        if name in self._written:
+            return name, ''
+        self._written.add(name)
+        closed = self.linkage.inverse(outputs).closed
+        count, function = self._closed(name, closed, outputs) if closed else (
+            self._series(name, *outputs))
         self.solutions = max(self.solutions, count)
         return name, function
 
-    def _series(self, name: str, axis: Axis) -> Tuple[int, str]:
-        """Return the most inputs of a position, and the function for them by series."""
+    def _series(self, name: str, output: str) -> Tuple[int, str]:
+        """Return the most inputs of an output, and the function for them by series."""
         size, code, rows = self._sizes[0], self._code, []
-        monotone = pieces(self.linkage, axis)
-        for piece in monotone:
-            for middle, half, low, high, terms in series(self.linkage, axis.output, *piece):
-                numbers = map(code.literal, (axis.factor * middle + axis.offset,
-                                             axis.factor * half, low / size, high / size))
-                rows.append(f'    {{ {", ".join(numbers)}, '
-                            f'{code.row(np.round(terms / size, 17))} }},')
+        monotone = pieces(self.linkage, output)
+        for part in monotone:
+            for piece in series(self.linkage, output, part, code.single):
+                own = piece._replace(low=piece.low / size, high=piece.high / size)
+                rows.append(f'    {{ {", ".join(map(code.literal, own[:-1]))}, '
+                            f'{code.row(np.round(own.terms / size, 17))} }},')
+        is_angle = self.linkage.is_angle(output)
+        sizes = map(code.literal, (1.0 if is_angle else self.linkage.longest,
+                                   math.tau if is_angle else 0.0))
         # Where two pieces of a monotone part meet, both have the input.
         return min(len(rows), 2 * len(monotone)), '\n'.join([
-            f'/* The inputs of a position, in each of {len(rows)} pieces of the reach. */',
-            f'static inline int {name}(const {code.number} *position,',
+            f'/* The inputs of an output, in each of {len(rows)} pieces of the reach. */',
+            f'static inline int {name}(const {code.number} *value,',
             f'    {code.number} (*q)[LKR_MAX_INPUTS])', '{',
             f'    static const lkr_piece piece[{len(rows)}] LKR_IN_FLASH = {{',
             *indented(rows), '    };',
-            f'    return lkr_series({len(rows)}, piece, {code.literal(axis.size)}, '
-            f'{code.literal(axis.turn)}, position[0], q);', '}'])
+            f'    return lkr_series({len(rows)}, piece, {", ".join(sizes)}, value[0], q);', '}'])
 
-    def _closed(self, name: str, closed: InverseLinkage, axes: Sequence[Axis]
+    def _closed(self, name: str, closed: InverseLinkage, outputs: Sequence[str]
                 ) -> Tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
         code = self._code
-        modes = self._modes_in_reach(axes[0].output, closed)
+        modes = self._modes_in_reach(outputs[0], closed)
         # If an input has a period of several turns, each turn has its own pose.
         turns = [*product(*closed.turns)]
 
@@ -207,14 +214,12 @@ class Tables:
             for joint in closed.branches), mode.inputs, partial(assigned, k * len(turns)))
             for k, mode in enumerate(modes)]
         count = len(modes) * len(turns)
-        values = [code.times(f'(position[{i}] - {code.literal(each.offset)})' if each.offset
-                             else f'position[{i}]', 1.0 / each.factor)
-                  for i, each in enumerate(axes)]
         lines = '\n'.join(f'     {comment(line)}' for line in closed.lines)
         return count, code.function(
             f'/* The inputs in each assembly mode of the inverse linkage, NAN where there is '
-            f'none:\n{lines}\n*/\nstatic inline int {name}(const {code.number} *position,\n'
-            f'    {code.number} (*q)[LKR_MAX_INPUTS])', values,
+            f'none:\n{lines}\n*/\nstatic inline int {name}(const {code.number} *value,\n'
+            f'    {code.number} (*q)[LKR_MAX_INPUTS])',
+            [f'value[{i}]' for i in range(len(outputs))],
             [*blocks, Block('', (), lambda _: [f'return {count};'])], closed.arguments)
 
     def _modes_in_reach(self, output: str, closed: InverseLinkage) -> Sequence[Mode]:

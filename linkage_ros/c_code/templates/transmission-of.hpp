@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <future>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <thread>
@@ -278,10 +279,10 @@ public:
 
   void actuator_to_joint() override
   {
-    [[maybe_unused]] const auto measured = transmit(LKR_ACTUATORS, actuators_, joints_);
+    transmit(LKR_ACTUATORS, actuators_, joints_);
     if constexpr (passive_count > 0) {
       if (memory_.newest == LKR_ACTUATORS) {
-        write_passive(measured.velocity, !(status_ & OUT_OF_REACH));
+        write_passive();
       }
     }
   }
@@ -300,9 +301,9 @@ private:
     throw transmission_interface::Exception("transmission '" + info_.name + "': " + why);
   }
 
-  /// From the handles of one side to those of the other; return the values of the first.
+  /// From the handles of one side to those of the other.
   template <class From, class To>
-  lkr_side transmit(int side, const From & from, To & to)
+  void transmit(int side, const From & from, To & to)
   {
     const auto values = from.read();
     lkr_side result;
@@ -316,22 +317,17 @@ private:
     }
     log_.note(status_, side == LKR_JOINTS);
     to.write(result);
-    return values;
   }
 
   /// Write states of the joints that are not commanded, at the inputs of the newest measurement.
-  void write_passive(const double * velocity, bool is_moving)
+  void write_passive()
   {
-    double position[passive_count], rate[passive_count][LKR_MAX_INPUTS], x[LKR_MAX_INPUTS];
+    double position[passive_count], rate[passive_count][LKR_MAX_INPUTS];
     Code::at_passive(memory_.q, position, rate);
-    is_moving = is_moving && lkr_input_change(
-      &Code::model, LKR_ACTUATORS, &memory_.point, LKR_SINGULAR, velocity, x) != 0;
     for (std::size_t i = 0; i < passive_count; ++i) {
-      double sum = 0.0;
-      for (std::size_t j = 0; is_moving && j < Code::size; ++j) {
-        sum += rate[i][j] * x[j];
-      }
-      joints_.write(Code::size + i, position[i], std::isfinite(sum) ? sum : 0.0);
+      const double velocity = std::inner_product(
+        rate[i], rate[i] + Code::size, memory_.speed, 0.0);
+      joints_.write(Code::size + i, position[i], std::isfinite(velocity) ? velocity : 0.0);
     }
   }
 
