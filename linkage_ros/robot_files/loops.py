@@ -81,9 +81,8 @@ def _groups(robot: Robot, joints: List[Joint]) -> List[Group]:
 
 def _with_balls(robot: Robot) -> List[Joint]:
     """Return the joints with a ball in place of two or three hinges that cross in a point."""
-    joints, bodies = robot.joints, [*robot.frames]
-    while bodies:
-        body = bodies.pop()
+    joints = robot.joints
+    for body in reversed(robot.frames):
         held = [joint for joint in joints if body in joint.bodies]
         if body == robot.root or len(held) != 2 or any(
                 joint.name in robot.driven or joint.kind not in (HINGE, BALL) for joint in held):
@@ -97,7 +96,6 @@ def _with_balls(robot: Robot) -> List[Joint]:
             ball = Joint(f'{first.name}+{second.name}', BALL, ends, places, first.axes,
                          parts=(first, second))
             joints = [*(joint for joint in joints if joint not in held), ball]
-            bodies += ends
     return joints
 
 
