@@ -384,6 +384,23 @@ def test_a_five_bar_is_closed_by_what_moves_it(imported, tmp_path, more, mimic, 
         'front_knee'] * ('FIXED' in more) + ['mot_front'] * bool(mimic)
 
 
+def test_a_ring_that_spins_on_a_pin_is_no_dead_point(imported, tmp_path):
+    # Its halves are welded: where they are apart, that holds them in more ways.
+    loops = tmp_path / 'loops.yaml'
+    loops.write_text('{closed_loop: [[ring_a, ring_b]], type: [6d], '
+                     'name_mot: [mot_front, mot_back]}')
+    file = written(tmp_path, 'five_bar.urdf', ('</robot>', ''.join(
+        f'<link name="{ring}"/><joint name="{ring}_pin" type="continuous"><parent link="{foot}"/>'
+        f'<child link="{ring}"/><axis xyz="0 1 0"/></joint>'
+        for ring, foot in (('ring_a', 'front_foot'), ('ring_b', 'back_foot'))) + '</robot>'))
+    machine, = imported(file, '--loops', loops).values()
+    assert 'Not published: ring_a_pin, ring_b_pin: ' in printed(file, '--loops', loops)
+    joints = published(machine, mot_front=0.3, mot_back=0.1)
+    places = LIBRARIES[1]((ROBOTS / 'five_bar.urdf').read_text()).places(
+        joints, ['front_foot', 'back_foot'])
+    assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
+
+
 def test_pins_that_are_apart_by_rounding_are_one(imported, tmp_path):
     plain, = imported('wheel_leg.urdf').values()
     file = written(tmp_path, 'wheel_leg.urdf', (
