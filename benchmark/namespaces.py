@@ -6,7 +6,7 @@
 Arrays of poses by torch and JAX, beside numpy and machine code, on one core.
 
     python -m benchmark.namespaces               prints the table, within two minutes
-    python -m benchmark.namespaces --document    writes it to docs/how-to/training.md, too
+    python -m benchmark.namespaces --document    writes it to docs/design/performance.md, too
 
 Besides what the library needs, it takes torch, JAX and llvmlite. Times are CPU times, medians of
 calls in turn; those of a first call, which compiles, are not in it.
@@ -104,7 +104,7 @@ def main():
         [[task.title, size, *measured(task, size), 'not measured']
          for task in tasks() for size in SIZES])
     text += '\n\n' + document.machine('llvmlite', 'torch', 'jax')
-    document.show(options, 'how-to/training.md', text)
+    document.show(options, 'design/performance.md', text, 'measured: namespaces')
 
 
 if __name__ == '__main__':

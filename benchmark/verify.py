@@ -164,8 +164,6 @@ def mujoco(_, count):
         outputs = [name.removeprefix('m_') for name in names]
         if not set(outputs) <= set(linkage.joints):
             continue
-        pairs = [each for each, type_ in zip(zip(model.eq_obj1id, model.eq_obj2id), model.eq_type)
-                 if type_ == mj.mjtEq.mjEQ_CONNECT]
         rng = np.random.default_rng(1)
         given = [rng.uniform(input_.low, input_.high, count) for input_ in linkage.inputs]
         found = linkage.joint_angles(given if len(given) > 1 else given[0], outputs)
@@ -173,9 +171,8 @@ def mujoco(_, count):
             if np.isfinite(row).all():
                 for name, value in zip(names, row):
                     data.joint(name).qpos = value
-                mj.mj_kinematics(model, data)
-                for one, other in pairs:
-                    yield np.linalg.norm(data.site_xpos[one] - data.site_xpos[other]) / size
+                mj.mj_fwdPosition(model, data)
+                yield from np.abs(data.efc_pos[:data.ne]) / size
 
 
 SOURCES = {'PMKS_Verification': pmks, 'pylinkage': pylinkage, 'MuJoCo': mujoco}

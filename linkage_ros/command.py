@@ -37,6 +37,13 @@ class Parser(argparse.ArgumentParser):
         return arguments
 
 
+def add_scene(parser: argparse.ArgumentParser, **scene: Any) -> None:
+    """Add the arguments SCENE, with what is said of it, and --mechanism, which `chosen` reads."""
+    parser.add_argument('scene', metavar='SCENE', **scene)
+    parser.add_argument('--mechanism', nargs='+', default=[], metavar='NAME',
+                        help='only these mechanisms of the scene')
+
+
 def run(name: str, work: Callable, args: Optional[Sequence[str]]) -> int:
     """
     Run a command; return the exit code.

@@ -8,26 +8,27 @@ Cosmic Ray makes the bugs, and a few operators below make those that it lacks. T
 docstring, no annotation and no text but single words, which are keys and names. A line is chosen
 first and then one bug in it, so that no line counts more than another.
 
-The tests run in copies of the checkout. For a bug only those files of tests run that execute its
-line; their tests that do so come first. What is executed when a module is imported, and what no
-test executes as far as coverage.py can see, is tested by all files that execute any function of
-the module. Which test executes what is measured once for a state of the checkout.
+The tests run in copies of the checkout: for a bug those files that execute its line, the fastest
+first. For what runs when a module is imported, or never as far as coverage.py can see, all files
+run that call any function of the module. What each file executes is measured when it has changed.
 """
 
 import argparse
 import ast
 from collections import Counter, defaultdict
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 import difflib
 from glob import glob
 import hashlib
-from itertools import chain
+from itertools import islice
 import json
-import multiprocessing
+import math
 import os
 from pathlib import Path
+from queue import SimpleQueue
 import random
 import re
-import resource
 import shutil
 import signal
 import subprocess
@@ -36,9 +37,6 @@ import time
 import warnings
 
 from coverage import CoverageData
-import hypothesis  # noqa: F401, what the processes of the tests have imported when they start
-import pytest
-import rclpy.node  # noqa: F401
 
 sys.path.extend(glob('.venv-mutants/lib/python*/site-packages'))
 
@@ -50,18 +48,25 @@ from parso.python.tree import Name
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = 'linkage_ros'
-SIGNATURES = ('parameters', 'lambdef')
 WORKERS = 2
-# Of a worker [byte]: a bug may ask for all memory.
+# Of a run of the tests [byte]: a bug may ask for all memory.
 MEMORY = 12 << 30
-# What the start of the tests takes at most [s of the processor], and how much slower than measured
-# they may be; how much longer all of it may take where the machine has more to do.
+# What the start of the tests takes at most [s of the processor], how much slower than measured
+# they may be, and how much longer all of it may take where the machine has more to do.
 START, SLOWER, BUSY = 20.0, 4.0, 4.0
 CHOSEN = re.compile(
     '.*_(Add_Sub|Sub_Add|Mul_Div|Div_Mul|Mul_Add|FloorDiv_Div|Mod_FloorDiv|Pow_Mul|BitAnd_BitOr'
     '|BitOr_BitAnd|Lt_LtE|LtE_Lt|Gt_GtE|GtE_Gt|Lt_Gt|Gt_Lt|LtE_GtE|GtE_LtE|Eq_NotEq|NotEq_Eq'
     '|Is_IsNot|IsNot_Is|Delete_USub|Delete_Not|Delete_Invert)'
     '|AddNot|ZeroIteration.*|Replace[TFAOBC][a-z]+With.*|ExceptionReplacer|NumberReplacer')
+CONFIGURATION = """
+[run]
+source = linkage_ros
+patch = subprocess, _exit
+core = ctrace
+relative_files = true
+disable_warnings = no-data-collected, module-not-imported
+"""
 
 
 class Own(Operator):
@@ -155,117 +160,84 @@ def operators():
         own() for own in Own.__subclasses__()]
 
 
-def changes(before, after):
-    """Return line, removed and added lines of a change, or None if it is not one of code."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter('ignore')
-            if ast.dump(ast.parse(after)) == ast.dump(ast.parse(before)):
-                return None
-    except SyntaxError:
-        return None
-    before, after = before.splitlines(), after.splitlines()
-    codes = [code for code in difflib.SequenceMatcher(None, before, after, False).get_opcodes()
-             if code[0] != 'equal']
-    (_, a, _, c, _), (_, _, b, _, d) = codes[0], codes[-1]
-    return a + 1, before[a:b], after[c:d]
+def code(source):
+    """Return what a source computes: annotations are not."""
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')
+        tree = ast.parse(source)
+    for node in ast.walk(tree):
+        for name in {'annotation', 'returns'} & {*node._fields}:
+            setattr(node, name, None)
+    return ast.dump(tree)
 
 
-def candidates(module):
-    """Return the bugs that a module can have, as (line, operator, occurrence)."""
+def bug(module, operator, occurrence):
+    """Return what an operator changes in a module, or None if that is nothing."""
     source = (ROOT / module).read_text()
-    # Annotations are not computed.
-    no_code = [(node.lineno, node.col_offset, node.end_lineno, node.end_col_offset)
-               for owner in ast.walk(ast.parse(source))
-               for node in (getattr(owner, 'annotation', None), getattr(owner, 'returns', None))
-               if node]
-    nodes = list(ast_nodes(get_ast(source)))
-    found = []
-    for operator in operators():
-        positions = [(node, start) for node in nodes
-                     for start, _ in operator.mutation_positions(node)]
-        found += [(start[0], operator, i) for i, (node, start) in enumerate(positions)
-                  # Nor is the asterisk of a signature.
-                  if not (node.type == 'operator' and node.parent.type in SIGNATURES)
-                  and not any(n[:2] <= start < n[2:] for n in no_code)]
-    return found
+    try:
+        changed = mutate_code(source, operator, occurrence)
+        if code(changed) == code(source):
+            return None
+    # Cosmic Ray replaces no exception with a dotted name.
+    except (AttributeError, SyntaxError):
+        return None
+    before, after = source.splitlines(), changed.splitlines()
+    codes = [each for each in difflib.SequenceMatcher(None, before, after, False).get_opcodes()
+             if each[0] != 'equal']
+    (_, a, _, c, _), (_, _, b, _, d) = codes[0], codes[-1]
+    return {'file': module, 'line': a + 1, 'operator': type(operator).__name__,
+            'before': before[a:b], 'after': after[c:d]}
 
 
 def sample(room, count, seed):
     """Return random bugs, one on a line."""
-    folder = ROOT / PACKAGE
-    modules = sorted(str(path.relative_to(ROOT)) for path in (
-        folder.glob('*.py') if room == 'top' else (folder / room).rglob('*.py')))
-    lines = defaultdict(list)
-    for module in modules:
-        for line, operator, occurrence in candidates(module):
-            lines[module, line].append((operator, occurrence))
-    chance = random.Random(f'{room} {seed}')
+    folder, lines, chance = ROOT / PACKAGE, defaultdict(list), random.Random(f'{room} {seed}')
+    for path in sorted(folder.glob('*.py') if room == 'top' else (folder / room).rglob('*.py')):
+        nodes = [*ast_nodes(get_ast(path.read_text()))]
+        for operator in operators():
+            positions = (start for node in nodes
+                         for start, _ in operator.mutation_positions(node))
+            for i, (line, _) in enumerate(positions):
+                lines[str(path.relative_to(ROOT)), line].append((operator, i))
     order = sorted(lines)
     chance.shuffle(order)
-    for module, line in order:
-        operator, occurrence = chance.choice(lines[module, line])
-        source = (ROOT / module).read_text()
+    bugs = (bug(module, *chance.choice(lines[module, line])) for module, line in order)
+    return [*islice(filter(None, bugs), count)]
+
+
+def run(copy, *arguments, seconds=None, **environment):
+    """Run tests in a copy; return the exit code, below 0 if they have no end, and the output."""
+    limits = ['prlimit', f'--as={MEMORY}', f'--cpu={round(seconds)}'] if seconds else []
+    with open(copy / 'output.txt', 'w+', encoding='utf-8', errors='replace') as output:
+        process = subprocess.Popen(
+            [*limits, sys.executable, '-m', 'pytest', '-m', 'not nightly', *arguments], cwd=copy,
+            stdout=output, stderr=output, start_new_session=True,
+            env={**os.environ, 'PYTHONDONTWRITEBYTECODE': '1', **environment,
+                 'PYTHONPATH': os.pathsep.join([str(copy), os.environ.get('PYTHONPATH', '')])})
         try:
-            changed = changes(source, mutate_code(source, operator, occurrence))
-        except AttributeError:
-            # Cosmic Ray replaces no exception with a dotted name.
-            continue
-        if changed and count:
-            count -= 1
-            first, before, after = changed
-            yield {'file': module, 'line': first, 'operator': type(operator).__name__,
-                   'before': before, 'after': after}
+            status = process.wait(BUSY * seconds if seconds else None)
+        except subprocess.TimeoutExpired:
+            status = -signal.SIGALRM
+        # And all that it has started.
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        output.seek(0)
+        return status, output.read()
 
 
-def start(folder):
-    """Make a worker of this process, in a copy of the checkout of its own."""
-    number = int(multiprocessing.current_process().name.rpartition('-')[2])
-    here = folder / f'copy{number % WORKERS}'
-    os.chdir(here)
-    sys.path[:1] = [str(here), str(here / 'test')]
-    os.environ['PYTHONPATH'] = os.pathsep.join([str(here), os.environ.get('PYTHONPATH', '')])
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-
-
-def pool(folder):
-    """Return the workers."""
-    return multiprocessing.get_context('fork').Pool(WORKERS, start, (folder,))
-
-
-def measured(test_file):
-    """Return what the tests of a file take [s], and which of them executes which lines."""
-    data = Path('coverage') / Path(test_file).stem
-    environment = {**os.environ, 'COVERAGE_FILE': str(data.absolute())}
-    output = subprocess.run(
-        [sys.executable, '-m', 'pytest', test_file, '-m', 'not nightly', '--cov',
-         '--cov-context=test', '--cov-config=coverage.ini', '--cov-report=', '--durations=0',
-         '-vv', '-rfE'],
-        env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True).stdout
-    tests = defaultdict(float)
-    for seconds, name in re.findall(r'^([\d.]+)s (?:setup|call|teardown) +(.*)$', output, re.M):
-        tests[name] += float(seconds)
-    for failed in re.findall(r'^(?:FAILED|ERROR) (.*?)(?: - .*)?$', output, re.M):
-        print(f'fails without a bug, and is left out: {failed}', flush=True)
-        tests.pop(failed, None)
+def measured(copy, file):
+    """Return how long the tests of a file take [s], and the lines of modules that they execute."""
+    start, data = time.monotonic(), copy / 'coverage' / Path(file).stem
+    status, output = run(copy, file, '-q', '--cov', '--cov-config=coverage.ini', '--cov-report=',
+                         COVERAGE_FILE=str(data))
+    if status:
+        print(f'{file} is left out: its tests fail without a bug.\n{output[-500:]}', flush=True)
+        return math.inf, {}
     database = CoverageData(str(data))
     database.read()
-    # What has no test's name runs in a process, in a fixture, or when tests are collected.
-    number = {'': -1, **{name: i for i, name in enumerate(tests)}}
-    return dict(tests), {module: {line: sorted({
-        number[name] for name in (context.rpartition('|')[0] for context in contexts)
-        if name in number}) for line, contexts in database.contexts_by_lineno(module).items()}
-        for module in database.measured_files()}
-
-
-CONFIGURATION = """
-[run]
-source = linkage_ros
-patch = subprocess, _exit
-core = ctrace
-relative_files = true
-disable_warnings = no-data-collected, module-not-imported
-"""
+    return time.monotonic() - start, {
+        module: database.lines(module) for module in database.measured_files()}
 
 
 def prepare(folder):
@@ -273,136 +245,81 @@ def prepare(folder):
     names = subprocess.run(['git', 'ls-files', '-z'], cwd=ROOT, check=True, stdout=subprocess.PIPE,
                            text=True).stdout.split('\0')
     paths = [name for name in names if (ROOT / name).is_file()]
-    files = [path for path in paths if re.fullmatch(r'test/test_\w+\.py', path)]
-    for number in range(WORKERS):
+    copies = [folder / f'copy{number}' for number in range(WORKERS)]
+    for copy in copies:
         for path in paths:
-            copy = folder / f'copy{number}' / path
-            copy.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(ROOT / path, copy)
-        (folder / f'copy{number}' / 'coverage.ini').write_text(CONFIGURATION)
-        (folder / f'copy{number}' / 'coverage').mkdir(exist_ok=True)
+            (copy / path).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / path, copy / path)
+        (copy / 'coverage.ini').write_text(CONFIGURATION)
+        (copy / 'coverage').mkdir(exist_ok=True)
     common = hashlib.sha256()
     for path in paths:
         if re.match(rf'{PACKAGE}/|test/(?!test_|mutants|equivalent)', path):
             common.update(path.encode() + (ROOT / path).read_bytes())
     states = {file: hashlib.sha256(common.digest() + (ROOT / file).read_bytes()).hexdigest()
-              for file in files}
+              for file in paths if re.fullmatch(r'test/test_\w+\.py', file)}
     stored = folder / 'measured.json'
     known = json.loads(stored.read_text()) if stored.exists() else {}
-    missing = [file for file in files if known.get(file, [None])[0] != states[file]]
+    known = {file: known[file] for file in states if known.get(file, [None])[0] == states[file]}
+    missing = [file for file in states if file not in known]
     if missing:
         print(f'Measuring what the tests of {len(missing)} files execute.', flush=True)
-    with pool(folder) as workers:
-        for file, found in zip(missing, workers.imap(measured, missing)):
-            known[file] = [states[file], *found]
-            stored.write_text(json.dumps(known))
-    known = json.loads(stored.read_text())
-    return {file: known[file][1:] for file in files}
+    for file, found in zip(missing, in_copies(copies, measured, missing)):
+        known[file] = [states[file], *found]
+        stored.write_text(json.dumps(known))
+    return copies, {file: found[1:] for file, found in known.items()}
 
 
-def statement(mutant):
-    """Return the lines whose execution executes a bug; none where an import does."""
-    last = mutant['line'] + max(len(mutant['before']), 1) - 1
-    inner, in_function = None, False
+def in_copies(copies, work, jobs):
+    """Yield the results of jobs, each done in one of the copies, in their order."""
+    free = SimpleQueue()
+    for copy in copies:
+        free.put(copy)
+
+    def do(job):
+        copy = free.get()
+        try:
+            return work(copy, job)
+        finally:
+            free.put(copy)
+
+    with ThreadPoolExecutor(len(copies)) as workers:
+        yield from workers.map(do, jobs)
+
+
+def tests(mutant, measurement):
+    """Return the files of tests that execute a bug, and those that call its module otherwise."""
+    statements, functions = set(), set()
+    first, last = mutant['line'], mutant['line'] + max(len(mutant['before']), 1) - 1
     for node in ast.walk(ast.parse((ROOT / mutant['file']).read_text())):
-        if isinstance(node, ast.stmt) and node.lineno <= mutant['line'] <= node.end_lineno:
-            inner = node
-            if (isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
-                    and mutant['line'] >= node.body[0].lineno):
-                in_function = True
-    return [str(line) for line in range(inner.lineno, last + 1)] if inner and in_function else []
-
-
-def functions(module):
-    """Return the lines of a module that run when its functions are called."""
-    return {str(line) for node in ast.walk(ast.parse((ROOT / module).read_text()))
-            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
-            for line in range(node.body[0].lineno, node.end_lineno + 1)}
-
-
-def batches(mutant, measurement):
-    """Yield the tests that may find a bug, in three batches; the most promising come first."""
-    wanted = statement(mutant)
-    for where in (wanted, functions(mutant['file']), None):
-        ranked = []
-        for tests, lines in measurement.values():
-            found = lines.get(mutant['file'], {})
-            names = [*tests]
-            hits = {test for line in (found if where is None else where)
-                    for test in found.get(line, ())}
-            covering = {names[test] for test in hits if test >= 0}
-            first = sorted(tests if -1 in hits else covering,
-                           key=lambda test: (test not in covering, tests[test]))
-            if first:
-                cost = sum(map(tests.get, first))
-                ranked.append((len(first) / (1.0 + cost), first, [*tests.keys() - {*first}]))
-        if ranked:
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            functions.update(range(node.body[0].lineno, node.end_lineno + 1))
+        if isinstance(node, ast.stmt) and node.lineno <= first <= node.end_lineno:
+            statements = {*range(node.lineno, last + 1)}
+    for lines in (statements & functions, functions):
+        files = [file for file, (_, executed) in measurement.items()
+                 if lines & {*executed.get(mutant['file'], ())}]
+        if files:
             break
-    ranked.sort(key=lambda rank: -rank[0])
-    duration = {name: time for tests, _ in measurement.values() for name, time in tests.items()}
-    covering, rest = ([rank[i] for rank in ranked] for i in (1, 2))
-    for part in (covering[:1], covering[1:4], covering[4:] + rest):
-        if batch := [*chain(*part)]:
-            yield batch, round(START + SLOWER * sum(map(duration.get, batch)))
+    return sorted(files or measurement, key=lambda file: measurement[file][0])
 
 
-def passed(arguments, limit):
-    """Return whether tests pass, None if they have no end, and what they print."""
-    process = os.fork()
-    if not process:
-        os.setsid()
-        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
-        output = os.open('output.txt', os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-        os.dup2(output, 1)
-        os.dup2(output, 2)
-        # What is compiled now is of no use later.
-        sys.dont_write_bytecode, os.environ['PYTHONDONTWRITEBYTECODE'] = True, '1'
-        code = pytest.main(arguments)
-        sys.stdout.flush()
-        os._exit(code)
-    deadline, ended = time.monotonic() + BUSY * limit, 0
-    while not ended and time.monotonic() < deadline:
-        time.sleep(0.02)
-        ended, status = os.waitpid(process, os.WNOHANG)
-    # And all that it has started.
-    try:
-        os.killpg(process, signal.SIGKILL)
-    except ProcessLookupError:
-        pass
-    if not ended:
-        os.waitpid(process, 0)
-    crashed = not ended or os.WIFSIGNALED(status)
-    return None if crashed else not status, Path('output.txt').read_text(errors='replace')
-
-
-def tested(job):
+def tested(copy, job):
     """Return a bug with what the tests say to it."""
-    mutant, tests = job
-    path = Path(mutant['file'])
-    source, times = path.read_text(), path.stat()
+    mutant, files, seconds = job
+    path = copy / mutant['file']
+    source = path.read_text()
     lines = source.splitlines()
     lines[mutant['line'] - 1:mutant['line'] - 1 + len(mutant['before'])] = mutant['after']
     path.write_text('\n'.join(lines) + '\n')
-    mutant = {**mutant, 'state': 'survived', 'tests': 0}
-    options = '-x -q --no-header -p no:cacheprovider -p no:cov --tb=no -rfE'.split()
     try:
-        for names, limit in tests:
-            Path('tests.txt').write_text('\n'.join(names))
-            mutant['tests'] += len(names)
-            found, output = passed([*options, '@tests.txt'], limit)
-            if 'ERROR: not found' in output:
-                # The bug has changed the names of tests.
-                files = {name.partition('::')[0] for name in names}
-                found, output = passed([*options, '-m', 'not nightly', *files], limit)
-            if not found:
-                killer = re.search('^(?:FAILED|ERROR) (.*)$', output, re.M)
-                mutant['state'] = 'hung or crashed' if found is None else 'killed'
-                mutant['by'] = killer.group(1)[:200] if killer else output[-200:]
-                break
+        status, output = run(copy, *files, *'-x -q -p no:cacheprovider -p no:cov --tb=no'.split(),
+                             seconds=START + SLOWER * seconds)
     finally:
         path.write_text(source)
-        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
-    return mutant
+    state = 'hung or crashed' if status < 0 else 'killed' if status else 'survived'
+    killers = re.findall('^(?:FAILED|ERROR) (.*)$', output, re.M)
+    return {**mutant, 'state': state, 'tests': len(files), 'by': killers or output[-200:]}
 
 
 def placed(mutant):
@@ -434,25 +351,25 @@ def main():
     parser.add_argument('--again', type=Path, help='a file of an earlier run: its survivors only')
     parser.add_argument('--out', type=Path, required=True, help='the folder of the results')
     options = parser.parse_args()
-    equivalent = {key(block) for block in
-                  (ROOT / 'test' / 'equivalent_mutants.txt').read_text().split('\n\n')}
-    folder = options.out.absolute() / 'work'
-    measurement = prepare(folder)
+    equivalent = {*map(key, (
+        ROOT / 'test' / 'equivalent_mutants.txt').read_text().split('\n\n'))}
+    copies, measurement = prepare(options.out.absolute() / 'work')
     for room in options.room.split():
         chosen = [*filter(None, (
             placed(mutant) for mutant in json.loads(options.again.read_text())
-            if mutant['state'] == 'survived'))] if options.again else [
-                *sample(room, options.count, options.seed)]
+            if mutant['state'] == 'survived'))] if options.again else sample(
+                room, options.count, options.seed)
         mutants = [mutant for mutant in chosen if key(diff(mutant)) not in equivalent]
-        jobs = ((mutant, [*batches(mutant, measurement)]) for mutant in mutants)
-        results = []
-        out = options.out / f'{room}-again.json' if options.again else options.out / f'{room}.json'
-        with pool(folder) as workers:
-            for result in workers.imap_unordered(tested, jobs):
-                results.append(result)
-                out.write_text(json.dumps(results, indent=1))
-                if result['state'] == 'survived':
-                    print(f'\n{diff(result)}\n# {result["tests"]} tests', flush=True)
+        jobs = []
+        for mutant in mutants:
+            files = tests(mutant, measurement)
+            jobs.append((mutant, files, sum(measurement[file][0] for file in files)))
+        results, out = [], options.out / f'{room}{"-again" if options.again else ""}.json'
+        for result in in_copies(copies, tested, jobs):
+            results.append(result)
+            out.write_text(json.dumps(results, indent=1))
+            if result['state'] == 'survived':
+                print(f'\n{diff(result)}\n# {result["tests"]} files of tests', flush=True)
         states = Counter(mutant['state'] for mutant in results)
         states['equivalent'] = len(chosen) - len(mutants)
         caught = states['killed'] + states['hung or crashed']

@@ -156,8 +156,9 @@ def test_its_parameters_say_metres_and_have_sliders():
     read = scene.read(SCENE)
     about = {parameter.name: parameter for parameter in read.parameters}
     assert about['boom.cylinder.speed'].field.meaning == 'Speed of the cylinder [m/s].'
-    low, high = slider.ends(read, about['boom.cylinder.start'])
-    (least, greatest), = read.machines['boom'].first.reach
+    boom = read.machines['boom']
+    low, high = slider.ends(boom, about['boom.cylinder.start'])
+    (least, greatest), = boom.first.reach
     assert low <= least and high == pytest.approx(greatest, abs=0.03)
 
 

@@ -54,25 +54,25 @@ class Reader:
     def __init__(self, graph, capsys):
         self._graph, self._capsys = graph, capsys
         self._nodes, self._python = {}, {}
-        self.heard = []
+        self.received = []
 
     def follow(self, page):
-        """Save the files of a page, run its commands; return what the last one gave back."""
-        gave = None
+        """Save the files of a page, run its commands; return the result of the last one."""
+        result = None
         for file, language, text in BLOCK.findall((DOCS / f'{page}.md').read_text()):
             if file:
                 Path(file).write_text(text)
             if language == 'console':
                 text = re.sub(r'\\\n *', '', text)
                 for line, printed in re.findall(r'^\$ (.*)\n((?:[^$].*\n)*)', text, re.MULTILINE):
-                    gave = self._type(line, printed)
+                    result = self._type(line, printed)
             elif language == 'python' and '>>>' in text:
                 test = doctest.DocTestParser().get_doctest(text, self._python, page, page, 0)
                 assert not doctest.DocTestRunner().run(test, clear_globs=False).failed
                 self._python = test.globs
             elif language == 'python':
                 exec(compile(text, page, 'exec'), {})
-        return gave
+        return result
 
     def _type(self, line, printed):
         line, _, file = line.replace('$PWD', str(Path.cwd())).partition(' > ')
@@ -84,38 +84,40 @@ class Reader:
                 return self._echo(topic, wait=not line.endswith('&'))
             case ['ros2', 'topic', 'pub', '--once', topic, type_, text] | \
                     ['ros2', 'topic', 'pub', '-r', _, topic, type_, text]:
-                publisher = self._graph.node.create_publisher(found(type_), topic, 10)
-                message = found(type_)(**yaml.safe_load(text))
-                return self._graph.until(lambda: self.heard or publisher.publish(message))[0]
+                publisher = self._graph.node.create_publisher(message_type(type_), topic, 10)
+                message = message_type(type_)(**yaml.safe_load(text))
+                return self._graph.until(lambda: self.received or publisher.publish(message))[0]
             case ['ros2', 'param', 'set', node, name, value]:
                 result = self._graph.set(self._nodes[node], **{name: yaml.safe_load(value)})
                 assert result.successful, result.reason
                 return result
             case ['ros2', 'service', 'call', name, type_, text]:
-                client = self._graph.node.create_client(found(type_), name)
-                return self._graph.call(client, found(type_).Request(**yaml.safe_load(text)))
+                service = message_type(type_)
+                client = self._graph.node.create_client(service, name)
+                return self._graph.call(client, service.Request(**yaml.safe_load(text)))
             case ['ros2', 'run', 'linkage_ros', name, *args] if name in NODES:
                 node = self._graph.start(NODES[name], cli_args=args)
                 self._nodes[node.get_fully_qualified_name()] = node
                 return node
             case ['ros2', 'run', 'linkage_ros', name, *args] | ['python', '-m', name, *args]:
                 assert COMMANDS[name](args) == 0
-                said = self._capsys.readouterr().out
+                output = self._capsys.readouterr().out
                 if file:
-                    Path(file).write_text(said)
-                return said
-        said = subprocess.run(words, check=True, timeout=60, text=True, stdout=subprocess.PIPE)
-        assert said.stdout == printed
-        return said.stdout
+                    Path(file).write_text(output)
+                return output
+        output = subprocess.run(
+            words, check=True, timeout=60, text=True, stdout=subprocess.PIPE).stdout
+        assert output == printed
+        return output
 
     def _echo(self, topic, wait):
         types = self._graph.until(
             lambda: dict(self._graph.node.get_topic_names_and_types()).get(topic))
-        self.heard = self._graph.listen(found(types[0]), topic)
-        return self._graph.until(lambda: self.heard)[0] if wait else None
+        self.received = self._graph.listen(message_type(types[0]), topic)
+        return self._graph.until(lambda: self.received)[0] if wait else None
 
 
-def found(type_):
+def message_type(type_):
     """Return a type of messages or services by its name."""
     package, kind, name = type_.split('/')
     return getattr(import_module(f'{package}.{kind}'), name)
@@ -129,29 +131,23 @@ def reader(graph, capsys, monkeypatch, tmp_path):
     return Reader(graph, capsys)
 
 
-@pytest.fixture
-def follow(reader):
-    """Return a function that follows a page."""
-    return reader.follow
-
-
 def test_every_page_of_this_kind_is_tried():
-    tried = re.findall(r"follow\('(.*?)'\)", Path(__file__).read_text())
-    assert sorted(tried) == sorted(FOLLOWED)
+    text = Path(__file__).read_text()
+    assert not [page for page in FOLLOWED if f"reader.follow('{page}')" not in text]
 
 
-def test_the_first_ten_minutes(follow):
+def test_the_first_ten_minutes(reader):
     pytest.importorskip('matplotlib')
-    answer = follow('first-ten-minutes')
+    answer = reader.follow('first-ten-minutes')
     assert answer.success and len(answer.servo_angle) == 1
     assert Path('walker.png').stat().st_size > 10_000
 
 
 @pytest.mark.nightly
 @pytest.mark.skipif(not shutil.which('cc'), reason='there is no C compiler')
-def test_the_gripper_of_the_tutorial(follow):
+def test_the_gripper_of_the_tutorial(reader):
     pytest.importorskip('matplotlib')
-    assert follow('tutorial').endswith('out of reach\n')
+    assert reader.follow('tutorial').endswith('out of reach\n')
     assert Path('gripper.png').stat().st_size > 10_000
     # The picture at its head is of what it ends with.
     written, drawn = (yaml.safe_load(file.read_text())
@@ -159,9 +155,9 @@ def test_the_gripper_of_the_tutorial(follow):
     assert written == drawn
 
 
-def test_an_encoder_behind_a_belt(graph, follow):
+def test_an_encoder_behind_a_belt(graph, reader):
     states = graph.listen(JointState, 'joint_states', 100)
-    follow('how-to/encoder')
+    reader.follow('how-to/encoder')
 
     graph.until(lambda: {name for state in states for name in state.name} >= {
         'belt_encoder', 'press_QB'})
@@ -169,8 +165,8 @@ def test_an_encoder_behind_a_belt(graph, follow):
     assert 0.6 <= min(crank) <= max(crank) <= 2.6
 
 
-def test_a_knee_under_a_trajectory_controller(follow):
-    follow('how-to/transmission')
+def test_a_knee_under_a_trajectory_controller(reader):
+    reader.follow('how-to/transmission')
     control = ElementTree.parse('control.urdf')
     pasted = ElementTree.fromstring(
         f'<all>{Path("leg_transmissions/urdf/transmissions.xml").read_text()}</all>')
@@ -181,9 +177,9 @@ def test_a_knee_under_a_trajectory_controller(follow):
     assert joints == [joint.get('name') for joint in control.getroot().findall('joint')]
 
 
-def test_a_flap_is_put_where_a_planner_wants_it(reader, follow):
-    controlled = follow('commands')
-    command = reader.heard[0]
+def test_a_flap_is_put_where_a_planner_wants_it(reader):
+    controlled = reader.follow('commands')
+    command = reader.received[0]
     assert command.name == ['servo']
     crank = 0.5 * command.position[0]
     lever = math.atan2(80.0 * math.sin(crank), 150.0 + 80.0 * math.cos(crank))
@@ -195,54 +191,52 @@ def test_a_flap_is_put_where_a_planner_wants_it(reader, follow):
 
 
 @pytest.mark.nightly
-def test_an_ankle_on_two_rods(graph, follow):
+def test_an_ankle_on_two_rods(graph, reader):
     states = graph.listen(JointState, 'joint_states', 100)
-    assert 'ankle_joints_to_actuators' in follow('how-to/ankle')
+    assert 'ankle_joints_to_actuators' in reader.follow('how-to/ankle')
     graph.until(lambda: {name for state in states for name in state.name} >= {
         'ankle_pitch', 'ankle_roll', 'motor_left', 'motor_right'})
 
 
 @pytest.mark.nightly
-def test_an_ankle_in_a_training_loop(follow, capsys):
+def test_an_ankle_in_a_training_loop(reader, capsys):
     pytest.importorskip('torch', reason='torch is not installed')
-    follow('how-to/training')
+    reader.follow('how-to/training')
     assert capsys.readouterr().out == 'zeros of the encoders [rad]: 0.013 -0.007\n'
 
 
-def test_a_boom_on_a_cylinder(graph, follow):
+def test_a_boom_on_a_cylinder(graph, reader):
     states = graph.listen(JointState, 'joint_states', 100)
-    command = follow('how-to/cylinder')
+    command = reader.follow('how-to/cylinder')
     assert command.name == ['boom_stroke'] and 0.0 <= command.position[0] <= 0.6
 
-    # The driver speaks for the sensor: the law of cosines has the boom's angle to O -> P.
-    def told():
-        told = {}
-        for state in states:
-            told.setdefault(state.header.stamp.nanosec, {}).update(zip(state.name, state.position))
-        return [joints for joints in told.values() if {'boom_stroke', 'boom_OB'} <= {*joints}]
+    # Sensor and boom, by their common stamp: the law of cosines has the boom's angle to O -> P.
+    def pairs():
+        strokes, booms = ({state.header.stamp.nanosec: state.position[state.name.index(name)]
+                           for state in states if name in state.name}
+                          for name in ('boom_stroke', 'boom_OB'))
+        return [(strokes[stamp], booms[stamp]) for stamp in strokes.keys() & booms.keys()]
 
-    graph.until(lambda: len(told()) > 9)
+    graph.until(lambda: len(pairs()) > 9)
     base = math.hypot(0.5, 0.2)
-    for joints in told():
-        length = joints['boom_stroke'] + 0.9
-        corner = math.acos((base ** 2 + 1.1 ** 2 - length ** 2) / (2.0 * base * 1.1))
-        assert joints['boom_OB'] == pytest.approx(math.atan2(-0.2, 0.5) + corner, abs=1e-12)
+    for stroke, angle in pairs():
+        corner = math.acos((base**2 + 1.1**2 - (stroke + 0.9)**2) / (2.0 * base * 1.1))
+        assert angle == pytest.approx(math.atan2(-0.2, 0.5) + corner, abs=1e-12)
 
 
-def test_two_robots_of_one_kind(graph, follow):
+def test_two_robots_of_one_kind(graph, reader):
     from visualization_msgs.msg import MarkerArray
 
     sides = 'left', 'right'
     marked = {side: graph.listen(MarkerArray, f'/{side}/arm/markers') for side in sides}
-    follow('how-to/several-robots')
+    reader.follow('how-to/several-robots')
     graph.until(lambda: all(marked.values()))
-    for side in sides:
-        assert marked[side][0].markers[0].header.frame_id == f'{side}/base'
+    assert all(marked[side][0].markers[0].header.frame_id == f'{side}/base' for side in sides)
 
 
-def test_robots_of_each_format(follow):
+def test_robots_of_each_format(reader):
     pytest.importorskip('mujoco')
-    follow('robot-files')
+    reader.follow('robot-files')
     lid = scene.load('lid.yaml').machines['motor']
     # The lid is closed in the pose of its file, in which all joints are at zero.
     angles = lid.linkage.joint_angles(lid.first.offset)
@@ -252,26 +246,26 @@ def test_robots_of_each_format(follow):
 
 
 @pytest.mark.nightly
-def test_the_scene_of_a_whole_robot(follow):
-    follow('how-to/whole-robot')
+def test_the_scene_of_a_whole_robot(reader):
+    reader.follow('how-to/whole-robot')
     shown = scene.load('robot.yaml')
     assert len(shown.machines) == 2
     line = Path('robot.yaml').read_text().splitlines()[1]
     assert line.startswith('# ros2 launch linkage_ros robot.launch.py robot:=examples/leg.urdf')
 
 
-def test_coordinates_of_a_drawing(follow):
-    robot = LIBRARIES[0](follow('how-to/cad-export'))
-    machine = scene.load('export.yaml').machines['lid']
-    angles = machine.linkage.joint_angles(machine.first.start)
+def test_coordinates_of_a_drawing(reader):
+    robot = LIBRARIES[0](reader.follow('how-to/cad-export'))
+    lid = scene.load('export.yaml').machines['lid']
+    angles = lid.linkage.joint_angles(lid.first.start)
     places = robot.places({f'lid_{name}': angle for name, angle in angles.items()},
                           ['lid_A', 'lid_B'])
     assert places['lid_A'] == pytest.approx([0.012, 0.0, 0.04], abs=1e-12)
     assert places['lid_B'] == pytest.approx([0.1, 0.0, 0.07], abs=1e-12)
 
 
-def test_ros2_control_moves_the_motors_of_the_scene(graph, follow):
-    machines = follow('how-to/ros2-control').scene.machines
+def test_ros2_control_moves_the_motors_of_the_scene(graph, reader):
+    machines = reader.follow('how-to/ros2-control').scene.machines
     sources = {name: [machine.first.source] for name, machine in machines.items()}
     motors = [motor for listed in sources.values() for motor in listed]
     controllers = yaml.safe_load(Path('controllers.yaml').read_text())

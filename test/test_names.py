@@ -21,7 +21,7 @@ def member(text):
     return Enum('Joint', {'ONE': text}, type=str).ONE
 
 
-CLASSES = {'numpy': np.str_, 'enum': member}
+of_any_class = pytest.mark.parametrize('made', [np.str_, member])
 
 
 def fresh(kind=str):
@@ -33,11 +33,12 @@ def fresh(kind=str):
                              tracer=kind(last), branches={kind('B'): -1}), last
 
 
-def answers(linkage, points, links, output):
-    """Return what a linkage is asked by names, in every way it can be."""
+def answers(kind, linkage, last):
+    """Yield what a linkage is asked by names of a class, in every way it can be."""
+    points, links, output = [kind('B'), kind(last)], (kind('QB'), kind('AB')), kind(f'{last}.x')
     near = linkage.joint_angles(0.7)['QB']
     yield linkage.solve(0.5, points)
-    yield linkage.solve(0.5, list(points))
+    yield linkage.solve(0.5, tuple(points))
     yield linkage.solve(0.5, points[0])
     yield linkage.solve(THETA, points)
     yield linkage.velocity(THETA, points)
@@ -59,77 +60,59 @@ def answers(linkage, points, links, output):
     yield {'walker': solution.values}
 
 
-def same(found, expected):
-    """Hold that answers are the same, and have names that are plain text."""
-    for one, other in zip(found, expected, strict=True):
-        assert list(one) == list(other) and {type(name) for name in one} == {str}
-        for name, values in other.items():
-            assert np.array_equal(one[name], values, equal_nan=True), name
+@pytest.mark.nightly(all_but=3)
+@pytest.mark.parametrize('texts', [str, np.str_, member])
+@pytest.mark.parametrize('names', [np.str_, member])
+def test_text_of_any_class_is_a_name_and_later_callers_are_not_harmed(texts, names):
+    linkage, last = fresh(texts)
+    assert type(linkage.tracer) is type(linkage.type) is str
+    assert (linkage.type, linkage.tracer, linkage.branches) == ('custom', last, {'B': -1})
+    for found, later, expected in zip(answers(names, linkage, last), answers(str, linkage, last),
+                                      answers(str, *fresh()), strict=True):
+        assert [*found] == [*later] and {*map(type, found)} == {str}
+        for values in zip(found.values(), later.values(), expected.values(), strict=True):
+            assert all(np.array_equal(value, values[0], equal_nan=True) for value in values)
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize('kind', CLASSES)
-def test_text_of_any_class_is_a_name_and_later_callers_are_not_harmed(kind):
-    known, last = fresh()
-    names = ('B', last), ('QB', 'AB'), f'{last}.x'
-    expected = list(answers(known, *names))
-    for made in (str, CLASSES[kind]):
-        linkage, last = fresh(made)
-        assert type(linkage.tracer) is type(linkage.type) is str
-        assert (linkage.type, linkage.tracer, linkage.branches) == ('custom', last, {'B': -1})
-        points, links, output = ('B', last), ('QB', 'AB'), f'{last}.x'
-        odd = [tuple(map(CLASSES[kind], each)) for each in (points, links)]
-        found = list(answers(linkage, *odd, CLASSES[kind](output)))
-        assert found[0].keys() == {'B', last}
-        renamed = [{last if name == names[0][1] else f'{last}.x' if name == names[2] else name:
-                    values for name, values in each.items()} for each in expected]
-        same(found, renamed)
-        same(answers(linkage, points, links, output), renamed)
-        again, _ = fresh()
-        assert again.solve(0.5, 'B')['B'].tolist() == known.solve(0.5, 'B')['B'].tolist()
-
-
-@pytest.mark.parametrize('kind', CLASSES)
-def test_dimensions_and_types_have_such_names_too(kind):
-    made = CLASSES[kind]
+@of_any_class
+def test_dimensions_and_types_have_such_names_too(made):
     leg = mechanisms.create(made('jansen'), **{made('m'): 14.0})
     assert type(leg.type) is str and set(map(type, leg.dimensions)) == {str}
     other = mechanisms.create('jansen').with_dimensions(**{made('m'): 14.0})
     assert leg.dimensions == other.dimensions == {**mechanisms.defaults(made('jansen')), 'm': 14.0}
 
 
-@pytest.mark.parametrize('kind', CLASSES)
-def test_a_header_is_the_same_for_outputs_of_any_class(kind):
+@of_any_class
+def test_a_header_is_the_same_for_outputs_of_any_class(made):
     given = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
     machine = scene.read(given).machines['lever']
-    assert header.written(machine, [CLASSES[kind]('lever')]) == header.written(machine, ['lever'])
+    assert header.written(machine, [made('lever')]) == header.written(machine, ['lever'])
 
 
-@pytest.mark.parametrize('kind', CLASSES)
-def test_what_is_no_name_is_refused_as_ever(kind):
+@of_any_class
+def test_what_is_no_name_is_refused_as_ever(made):
     linkage, _ = fresh()
     for ask in (linkage.solve, linkage.joint_angles, linkage.velocity):
         with pytest.raises(ValueError, match='custom has no (point|joint).*; allowed: '):
-            ask(0.5, (CLASSES[kind]('none'),))
+            ask(0.5, (made('none'),))
     with pytest.raises(ValueError, match='has no output .*; allowed: '):
-        linkage.input_for(CLASSES[kind]('none'), 0.5)
+        linkage.input_for(made('none'), 0.5)
     with pytest.raises(ValueError, match='^O.x of custom does not move with the crank$'):
-        linkage.input_for(CLASSES[kind]('O.x'), 0.5)
+        linkage.input_for(made('O.x'), 0.5)
 
 
-@pytest.mark.parametrize('kind', CLASSES)
-def test_several_outputs_have_such_names_too(kind):
+@of_any_class
+def test_several_outputs_have_such_names_too(made):
     linkage, outputs = mechanisms.create('five_bar'), ('P.x', 'P.y')
     wanted = [linkage.solve((0.5, 2.0), 'P')['P'][axis] for axis in (0, 1)]
-    odd = list(map(CLASSES[kind], outputs))
+    odd = list(map(made, outputs))
     assert linkage.inputs_for(odd, wanted) == linkage.inputs_for(outputs, wanted) != []
     with pytest.raises(ValueError, match='five_bar has no output'):
-        linkage.inputs_for([CLASSES[kind]('none'), 'C.x'], wanted)
+        linkage.inputs_for([made('none'), 'C.x'], wanted)
 
 
-@pytest.mark.parametrize('kind', CLASSES)
-def test_parameters_have_such_names_too(kind):
-    made = CLASSES[kind]
+@of_any_class
+def test_parameters_have_such_names_too(made):
     given = {'mechanisms': ['leg'], 'leg.type': 'jansen', 'leg.dimensions.m': 14.0}
     read = scene.read({made(name): value for name, value in given.items()})
     assert read.parameters == scene.read(given).parameters

@@ -12,7 +12,7 @@ pytest.importorskip('linkage_interfaces')
 
 from linkage_interfaces.srv import ServoInverse as Service  # noqa: E402
 from linkage_ros import scene  # noqa: E402
-from linkage_ros.nodes import log, ownership  # noqa: E402
+from linkage_ros.nodes import log  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.ownership import LATCHED, TOPIC  # noqa: E402
@@ -80,7 +80,7 @@ def test_a_dimension_set_on_the_owner_is_everybodys_within_half_a_second(graph, 
 
 @pytest.mark.parametrize('namespace', ['', '/left'])
 def test_an_owner_announces_all_its_values_and_then_each_change(graph, monkeypatch, namespace):
-    monkeypatch.setattr(ownership, 'DEPTH', 3)
+    monkeypatch.setattr(LATCHED, 'depth', 3)
     heard = graph.listen(ParameterEvent, f'{namespace}/{TOPIC}', LATCHED)
     before = graph.node.get_clock().now().nanoseconds
     owner = graph.start(Kinematics, LEVER, namespace=namespace)

@@ -409,8 +409,8 @@ def test_a_plot_follows_what_is_tuned_and_all_can_be_downloaded(look, tmp_path):
     assert list(Image.open(files[1]).size) == seen.value('[picture.width, picture.height]')
     machine = scene.read({**given, 'leg.dimensions.m': 16.0, 'leg.crank.start':
                           running.value('leg.crank.start')}).machines['leg']
-    assert (tmp_path / 'leg.csv').read_text() == curves.exported(
-        machine, [machine.first.start], 'csv', 'world')
+    assert (tmp_path / 'leg.csv').read_text() == curves.table(
+        machine, [machine.first.start])
     assert (tmp_path / 'leg.urdf').read_text() == urdf.describe([machine], 'world')
     assert (tmp_path / 'leg.h').read_text() == header.written(machine)
 
@@ -451,8 +451,8 @@ def test_arrows_are_asked_for_wherever_their_mechanism_s_part_of_the_panel_is(lo
         const { send } = WebSocket.prototype;
         window.requested = new Set();
         WebSocket.prototype.send = function (text) {
-            const { mechanism, arrows } = JSON.parse(text);
-            if (arrows) window.requested.add(mechanism);
+            const { key, arrows } = JSON.parse(text);
+            if (arrows) window.requested.add(key);
             send.call(this, text);
         };
         document.getElementById('arrows').value = 'velocity';

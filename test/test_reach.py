@@ -69,6 +69,16 @@ def test_every_end_of_the_reach_is_a_limit_to_the_last_digits(kind, count):
     assert ends > 20
 
 
+@pytest.mark.parametrize('kind', ['peaucellier', 'slotted_lever'])
+def test_a_joint_that_never_ends_the_reach_moves_no_end_of_it(kind):
+    for mechanism in drawn(kind, 8, 8):
+        ground, rod = mechanism.grounded[0], 100.0 * sum(map(abs, mechanism.dimensions.values()))
+        larger = mechanisms.create('custom', branches=mechanism.branches, joints=(
+            *map(str, mechanism.design.joints), f'ZZ slider {mechanism.tracer} {rod!r} {ground} 0'
+            ' out'), **mechanism.dimensions)
+        assert larger.reach() == mechanism.reach(), told(mechanism)
+
+
 def test_an_inversor_turns_fully_only_with_equal_arms_and_a_short_crank():
     for mechanism in drawn('peaucellier', 5, 100):
         r, a, b = (Fraction(mechanism.dimensions[name]) for name in 'rab')

@@ -14,6 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / 'docs' / 'design' / 'architecture.md'
+TITLES = ['A mechanism', 'A construction']
 # What is made, or belongs to no release.
 MADE = re.compile(r'\..*|__pycache__|(build|install|log)(-.*)?|out|_build')
 
@@ -37,17 +38,22 @@ def follow(folder, text, language, code):
         for command in code.splitlines():
             run(folder, shlex.split(command.removeprefix('$ ')))
         return
+    file, lines, at = place(folder, text)
+    space = '\n\n' if code.startswith('def ') else '\n' if 'def ' in code else ''
+    lines.insert(at, f'\n\n{code}' if lines and at == len(lines) else code + space)
+    file.write_text(''.join(lines))
+
+
+def place(folder, text):
+    """Return the file of a step, its lines, and before which of them the code belongs."""
     file = folder / re.match('`(.*?)`', text)[1]
+    lines = file.read_text().splitlines(keepends=True) if file.exists() else []
     where = re.search('(before|after) `(.*?)`', text, re.IGNORECASE)
     if not where:
-        assert not file.exists(), f'{text}: the file is there, so where does the code belong?'
-        file.write_text(code)
-        return
-    lines = file.read_text().splitlines(keepends=True)
+        assert not lines or 'at the end' in text, f'{text}: where in it does the code belong?'
+        return file, lines, len(lines)
     at, = [i for i, line in enumerate(lines) if where[2] in line]
-    space = '\n\n' if code.startswith('def ') else '\n' if 'def ' in code else ''
-    lines.insert(at + (where[1].lower() == 'after'), code + space)
-    file.write_text(''.join(lines))
+    return file, lines, at + (where[1].lower() == 'after')
 
 
 def run(folder, command):
@@ -59,8 +65,14 @@ def run(folder, command):
     return ended.stdout
 
 
+@pytest.mark.parametrize('title', TITLES)
+def test_the_code_of_every_step_has_its_place(title):
+    for text, language, _ in steps(title):
+        assert language == 'console' or place(ROOT, text)
+
+
 @pytest.mark.nightly
-@pytest.mark.parametrize('title', ['A mechanism', 'A construction'])
+@pytest.mark.parametrize('title', TITLES)
 def test_a_recipe_can_be_followed_to_the_letter(tmp_path, title):
     copy = shutil.copytree(ROOT, tmp_path / 'copy', ignore=lambda _, names: [
         name for name in names if MADE.fullmatch(name)])

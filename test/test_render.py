@@ -384,18 +384,20 @@ def test_machines_side_by_side_have_one_time():
 
 def test_options_have_these_defaults_and_limits(tmp_path):
     from linkage_ros.render.command import parsed
-    given = {'scene': 'a', 'data': None, 'mechanisms': [], 'trace': 'whole', 'show': frozenset(),
+    given = {'scene': 'a', 'data': None, 'mechanism': [], 'trace': 'whole', 'show': frozenset(),
              'hide': frozenset(), 'size': (720, 720), 'angle': None, 'turns': None, 'fps': None,
              'frames': None, 'loop': None, 'colours': None}
     still, moving = tmp_path / 'a.SVG', tmp_path / 'a.gif'
     assert vars(parsed(['a', '--out', str(still)])) == {**given, 'out': still, 'moving': False}
     args = ['--turns', '1000', '--fps', '50', '--frames', '10000', '--loop', '65536', '--colours',
-            '2', '--size', '64x8192', '--mechanisms', 'b,c', '--show', 'floor', '--hide',
+            '2', '--size', '64x8192', '--mechanism', 'b', 'c', '--show', 'floor', '--hide',
             'axes,title', '--data', str(still)]
     assert vars(parsed(['a', '--out', str(moving), *args])) == {
         **given, 'out': moving, 'moving': True, 'turns': 1000.0, 'fps': 50.0, 'frames': 10000,
-        'loop': 65536, 'colours': 2, 'size': (64, 8192), 'mechanisms': ['b', 'c'],
+        'loop': 65536, 'colours': 2, 'size': (64, 8192), 'mechanism': ['b', 'c'],
         'show': {'floor'}, 'hide': {'axes', 'title'}, 'data': still}
+    # As 0.1.0 has it.
+    assert parsed(['a', '--out', str(still), '--mechanisms', 'b,c']).mechanism == ['b', 'c']
 
 
 def shapes_of(file):
@@ -485,7 +487,7 @@ def test_an_svg_has_every_part_in_its_order_where_it_was_solved(tmp_path, size, 
     (['all.yaml', '--out', 'a.png', '--size', '99x99'], 'size is too small'),
     (['jansen.yaml', '--out', 'a.png', '--hide', 'legs'], 'unknown part legs'),
     (['jansen.yaml', '--out', 'a.png', '--trace', 'x'], 'growing'),
-    (['jansen.yaml', '--out', 'a.png', '--mechanisms', 'x'], 'allowed: jansen'),
+    (['jansen.yaml', '--out', 'a.png', '--mechanism', 'x'], 'allowed: jansen'),
     (['peaucellier.yaml', '--out', 'a.png', '--angle', '180'], 'stays inside'),
     (['jansen.yaml', '--out', 'a.png', '--angle', 'r/2'], 'such as 30, pi/6 or 30deg, not r/2'),
     (['jansen.yaml', '--out', 'a.png', '--angle', 'inf'], 'such as 30, pi/6 or 30deg, not inf'),

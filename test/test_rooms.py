@@ -28,7 +28,9 @@ ROS = ('rclpy', 'builtin_interfaces', 'geometry_msgs', 'rcl_interfaces', 'sensor
        'trajectory_msgs', 'visualization_msgs', 'linkage_interfaces')
 MODULES = sorted(PACKAGE.rglob('*.py'))
 PAGE = PACKAGE / 'web' / 'page'
-OUTSIDE = sorted([*(ROOT / 'test').rglob('*.py'), *(ROOT / 'benchmark').rglob('*.py')])
+# Who uses what everybody may.
+GUESTS = [path for folder in ('test', 'benchmark', 'linkage_ros/nodes', 'linkage_ros/web')
+          for path in sorted((ROOT / folder).rglob('*.py'))]
 # Public for all their underscores.
 PUBLIC = ('_replace', '_asdict', '_fields', '_make', '_exit')
 
@@ -39,33 +41,34 @@ def parsed(module):
     return ast.parse(module.read_text())
 
 
-@cache
-def words(module):
-    """Return all words of a module."""
-    return set(re.findall(r'\w+', module.read_text()))
-
-
 def room(module):
     """Return the room that a module is in, '' for the package itself."""
     first = module.relative_to(PACKAGE).with_suffix('').parts[0]
     return '' if first == '__init__' else first
 
 
-def imported(module):
-    """Yield what a module imports, at once or later, as full names."""
-    here = ('linkage_ros', *module.relative_to(PACKAGE).parent.parts)
+@cache
+def imports(module):
+    """Return what a module imports, at once or later, as full names: whether inside `needs`."""
+    guarded = {each for node in ast.walk(parsed(module)) if isinstance(node, ast.With)
+               and ast.unparse(node.items[0].context_expr).startswith('needs(')
+               for each in ast.walk(node)}
+    here, found = ['linkage_ros', *module.relative_to(PACKAGE).parent.parts], {}
     for node in ast.walk(parsed(module)):
         if isinstance(node, (ast.Import, ast.ImportFrom)):
-            yield from named(node, here)
+            level = getattr(node, 'level', 0)
+            base = [*(here[:len(here) - level + 1] if level else []),
+                    *filter(None, [getattr(node, 'module', None)])]
+            for alias in node.names:
+                name = '.'.join([*base, alias.name])
+                found[name] = node in guarded and found.get(name, True)
+    return found
 
 
-def named(node, here):
-    """Yield the full names in an import of a module in the package `here`."""
-    base = ()
-    if isinstance(node, ast.ImportFrom):
-        base = here[:len(here) - node.level + 1] if node.level else ()
-        base += tuple((node.module or '').split('.')) if node.module else ()
-    yield from ('.'.join((*base, alias.name)) for alias in node.names)
+def file_of(name):
+    """Return the file of a module of a full name, whether it exists or not."""
+    path = ROOT.joinpath(*name.split('.'))
+    return path / '__init__.py' if path.is_dir() else path.with_suffix('.py')
 
 
 def test_every_module_has_its_room():
@@ -75,7 +78,7 @@ def test_every_module_has_its_room():
 def test_a_module_imports_nothing_from_above():
     for module in MODULES:
         own = room(module)
-        for name in imported(module):
+        for name in imports(module):
             top, *below = name.split('.')
             if top == 'linkage_ros' and own:
                 assert ROOMS.index(below[0]) <= ROOMS.index(own), f'{module.name} imports {name}'
@@ -86,7 +89,7 @@ def test_other_rooms_import_the_core_by_its_public_names():
     public = ast.literal_eval(next(node.value for node in parsed(CORE / '__init__.py').body
                                    if ast.unparse(node).startswith('__all__')))
     for module in MODULES:
-        for name in imported(module) if room(module) != 'linkage' else ():
+        for name in imports(module) if room(module) != 'linkage' else ():
             core, _, below = name.partition('linkage_ros.linkage.')
             assert core or below in public, f'{module.name} imports {name}'
 
@@ -99,7 +102,7 @@ def test_there_are_all_names_that_a_room_makes_public(room_):
 def test_the_floors_of_the_core_stand_on_each_other():
     modules = [module for module in MODULES if CORE in module.parents]
     used = {module: {next(filter(modules.__contains__, map(file_of, (
-        name, name.rpartition('.')[0]))), None) for name in imported(module)} - {None}
+        name, name.rpartition('.')[0]))), None) for name in imports(module)} - {None}
         for module in modules}
     floor = {module: FLOORS.index(module.relative_to(CORE).with_suffix('').parts[0])
              for module in modules}
@@ -112,54 +115,34 @@ def test_the_floors_of_the_core_stand_on_each_other():
     assert not used, f'in a circle, or above one: {[module.name for module in used]}'
 
 
-def file_of(name):
-    """Return the file of a module of a full name, whether it exists or not."""
-    path = ROOT.joinpath(*name.split('.'))
-    return path / '__init__.py' if path.is_dir() else path.with_suffix('.py')
-
-
-def unguarded(module):
-    """Yield what a module imports outside `needs`, at once or later, as full names."""
-    guarded = {id(each) for node in ast.walk(parsed(module)) if isinstance(node, ast.With)
-               and ast.unparse(node.items[0].context_expr).startswith('needs(')
-               for each in ast.walk(node)}
-    here = ('linkage_ros', *module.relative_to(PACKAGE).parent.parts)
-    for node in ast.walk(parsed(module)):
-        if id(node) not in guarded and isinstance(node, (ast.Import, ast.ImportFrom)):
-            yield from named(node, here)
-
-
 def test_whoever_starts_without_an_optional_package_imports_it_inside_needs():
-    imports = {'.'.join(('linkage_ros', *module.relative_to(PACKAGE).with_suffix('').parts)): [
-        *unguarded(module)] for module in MODULES}
+    needed = {'.'.join(module.relative_to(ROOT).with_suffix('').parts): [
+        name for name, guarded in imports(module).items() if not guarded] for module in MODULES}
     # Those that cannot be imported without one, and those that import them.
     without, before = set(optional.INSTALL), None
     while without != before:
         before = set(without)
-        without |= {name for name, others in imports.items() for other in others
+        without |= {name for name, others in needed.items() for other in others
                     if {other, other.rpartition('.')[0], other.partition('.')[0]} & without}
     assert {name.rpartition('.')[2] for name in without - {*optional.INSTALL}} == {
-        'llvm_code', 'mjcf', 'files', 'layers',
-        'picture', 'server'}
+        'llvm_code', 'mjcf', 'files', 'layers', 'picture', 'server'}
 
 
 def test_every_foreign_package_is_declared():
     manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
     declared = {one.text.removeprefix('python3-') for one in manifest.iter('exec_depend')}
     for module in MODULES:
-        tops = {name.partition('.')[0] for name in imported(module)}
+        tops = {name.partition('.')[0] for name in imports(module)}
         foreign = tops - {'linkage_ros', '__future__'} - sys.stdlib_module_names
         assert foreign <= declared | {*optional.INSTALL}, module
 
 
-def test_who_tests_or_measures_uses_what_everybody_may():
-    for module in OUTSIDE:
-        if not re.search(r'(?<!self)\._[a-z]', module.read_text()):
-            continue
+def test_nothing_private_of_others_is_used():
+    for module in GUESTS:
         for node in ast.walk(parsed(module)):
-            if isinstance(node, ast.Attribute) and node.attr not in PUBLIC:
-                private = node.attr.startswith('_') and not node.attr.endswith('__')
-                assert not private or ast.unparse(node.value) == 'self', f'{module}:{node.lineno}'
+            if isinstance(node, ast.Attribute) and re.match('_(?!.*__$)', node.attr):
+                assert node.attr in PUBLIC or ast.unparse(node.value) in ('self', 'cls'), (
+                    f'{module}:{node.lineno}')
 
 
 def test_a_module_begins_with_what_it_is_for():
@@ -175,15 +158,11 @@ def test_every_colour_is_in_the_palette():
 
 
 def test_what_other_folders_import_from_the_package_is_there():
-    others = [file for folder in ('benchmark', 'demo', 'docs', 'examples')
-              for file in (ROOT / folder).rglob('*.py')]
-    for file in others:
+    for file in (path for folder in ('benchmark', 'demo', 'docs', 'examples')
+                 for path in (ROOT / folder).rglob('*.py')):
         for node in ast.walk(parsed(file)):
-            if not isinstance(node, ast.ImportFrom) or not f'{node.module}.'.startswith(
-                    f'{PACKAGE.name}.'):
-                continue
-            path = ROOT.joinpath(*node.module.split('.'))
-            module = path / '__init__.py' if path.is_dir() else path.with_suffix('.py')
-            for name in (alias.name for alias in node.names):
-                assert name in words(module) or (path / name).is_dir() or (
-                    path / f'{name}.py').exists(), (file, node.module, name)
+            if isinstance(node, ast.ImportFrom) and f'{node.module}.'.startswith('linkage_ros.'):
+                module = file_of(node.module)
+                for name in (alias.name for alias in node.names):
+                    assert file_of(f'{node.module}.{name}').exists() or re.search(
+                        rf'\b{name}\b', module.read_text()), (file, node.module, name)

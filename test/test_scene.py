@@ -331,7 +331,8 @@ SWEPT = {**SIGNED, 'own.dimensions.r': 3.0, 'own.crank.sweep': [-0.5, 0.5]}
 def lengths(given):
     """Return the scene, and name, value and slider of each length."""
     made = scene.read(given)
-    return made, [(p.name, p.value, slider.ends(made, p)) for p in made.parameters
+    return made, [(p.name, p.value, slider.ends(mechanism, p))
+                  for mechanism in made.machines.values() for p in mechanism.parameters
                   if '.dimensions.' in p.name]
 
 
@@ -340,10 +341,10 @@ def lengths(given):
                                    {'jansen.scale': 1e308}],
                          ids=[*TYPES, 'small', 'signed', 'swept', 'least', 'most'])
 def test_every_slider_has_its_value_between_finite_ends(given):
-    made = scene.read(given)
-    numbers = [p for p in made.parameters if p.field.kind == 'double']
-    for parameter in numbers:
-        low, high = slider.ends(made, parameter)
+    numbers = [(mechanism, p) for mechanism in scene.read(given).machines.values()
+               for p in mechanism.parameters if p.field.kind == 'double']
+    for mechanism, parameter in numbers:
+        low, high = slider.ends(mechanism, parameter)
         assert low < high and low <= parameter.value <= high or 'scale' in parameter.name
         assert math.isfinite(low) and math.isfinite(high)
     assert len(numbers) > 3
@@ -351,8 +352,8 @@ def test_every_slider_has_its_value_between_finite_ends(given):
 
 @pytest.mark.parametrize('ratio', [-2.0, 1.0])
 def test_the_sliders_of_ratio_and_offset_move_an_input(ratio):
-    made = scene.read({**SIGNED, 'own.crank.ratio': ratio})
-    found = {p.name: slider.ends(made, p) for p in made.parameters
+    own = scene.read({**SIGNED, 'own.crank.ratio': ratio}).machines['own']
+    found = {p.name: slider.ends(own, p) for p in own.parameters
              if p.name in ('own.crank.ratio', 'own.crank.offset')}
     assert found['own.crank.ratio'] == pytest.approx(sorted((0.1 * ratio, 10.1 * ratio)), abs=0.2)
     assert found['own.crank.offset'] == pytest.approx((-math.pi, math.pi), abs=0.1)
@@ -422,7 +423,7 @@ def test_the_nodes_that_use_a_parameter_are_those_of_the_page():
         still = key in ('leg_pairs', 'mirrored') and name[0] not in ('jansen', 'peaucellier')
         found.setdefault(key, (set(each.field.readers), each.field.read_only and not still))
         assert each.field.owner in each.field.readers
-        assert each.field.owner == scene.OWNER or scene.OWNER not in each.field.readers
+        assert each.field.owner == scene.KINEMATICS or scene.KINEMATICS not in each.field.readers
         assert each.field.read_only == (written[key][1] or still), each.name
     assert found == written
 

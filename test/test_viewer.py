@@ -209,7 +209,7 @@ def test_what_is_saved_starts_the_tuned_scene_again(show, tmp_path):
     lever = again.mechanisms('/lever', '/drop')['/lever']
     assert lever['inputs']['crank']['speed'] == 2.0
     file = tmp_path / 'tuned.yaml'
-    file.write_text(again.ask('export', mechanism='/lever', form='yaml')['text'])
+    file.write_text(again.ask('export', key='/lever', form='yaml')['text'])
     lever, drop = scene.load(str(file)).machines.values()
     assert (lever.linkage.dimensions['a'], lever.scale) == (81.25, 0.01)
     assert (lever.first.start, lever.first.speed) == (0.75, 2.0)
@@ -224,9 +224,10 @@ def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(page):
     for name, fixed, bars in (
             ('lever', 'OQ', {'a': ['OA'], 'b': ['OQ', 'QL'], 'e': []}),
             ('drop', 'OC', {'a': 'OC OA AB AP BP CB'.split()})):
-        answer = page.ask('tune', mechanism=f'/{name}')
-        ends = {parameter.name.partition('.')[2]: slider.ends(whole, parameter)
-                for parameter in whole.machines[name].parameters}
+        answer = page.ask('tune', key=f'/{name}')
+        mechanism = whole.machines[name]
+        ends = {parameter.name.partition('.')[2]: slider.ends(mechanism, parameter)
+                for parameter in mechanism.parameters}
         assert {**answer, 'id': 0} == {
             'op': 'answer', 'id': 0, 'reason': '', 'fixed': list(fixed),
             'bars': {f'dimensions.{key}': [list(pair) for pair in pairs]
@@ -238,23 +239,23 @@ def test_what_is_saved_or_exported_is_the_mechanism_as_it_is(page):
     defined = {'lever.scale': 1.0, 'drop.scale': 1.0, **{
         parameter.name: parameter.value for parameter in scene.read(LEVER).parameters
         if '.dimensions.' in parameter.name}}
-    saved = yaml.safe_load(page.ask('export', mechanism='/drop', form='yaml')['text'])
+    saved = yaml.safe_load(page.ask('export', key='/drop', form='yaml')['text'])
     assert saved == {'/**': {'ros__parameters': {**LEVER, **defined}}}
     machine = scene.read(LEVER).machines['lever']
-    assert [page.ask('export', mechanism='/lever', form=form)['text']
+    assert [page.ask('export', key='/lever', form=form)['text']
             for form in ('csv', 'urdf', 'h')] == [
-        curves.exported(machine, [0.0], 'csv', ''), urdf.describe([machine], 'world'),
+        curves.table(machine, [0.0]), urdf.describe([machine], 'world'),
         header.written(machine)]
 
 
 def test_the_page_is_sent_what_an_output_does_over_a_turn(page):
-    units = [page.ask('curve', mechanism='/lever', kind=kind)['units'] for kind in curves.KINDS]
+    units = [page.ask('curve', key='/lever', kind=kind)['units'] for kind in curves.KINDS]
     assert units == [['rad', unit] for unit in ('rad', 'rad/s', 'rad/s²', 'rad', '')]
-    lever = page.ask('curve', mechanism='/lever')
+    lever = page.ask('curve', key='/lever')
     assert len(lever['x']) == 361 and lever['ends'] == lever['dead'] == []
     np.testing.assert_allclose(lever['y'], list(map(lever_of, lever['x'])), atol=1e-12)
     # A kite lies flat at 0 and at pi: there it may be assembled in two ways.
-    drop = page.ask('curve', mechanism='/drop', kind='transmission angle')
+    drop = page.ask('curve', key='/drop', kind='transmission angle')
     assert drop['dead'] == [-math.pi, 0.0] and drop['output'] == 'B'
     assert drop['y'][180] in (0.0, math.pi)
 
@@ -285,7 +286,7 @@ def test_nodes_that_come_later_or_in_a_namespace_are_waited_for_and_not_guessed(
     graph.node.create_publisher(ParameterEvent, ownership.TOPIC, ownership.LATCHED)
     running = show({}, kinds=())
     page = running.page()
-    assert [page.ask(op, mechanism='/leg')['reason'] for op in ('pose', 'tune', 'curve')] == [
+    assert [page.ask(op, key='/leg')['reason'] for op in ('pose', 'tune', 'curve')] == [
         "there is no mechanism '/leg'"] * 3
     running.nodes.extend(graph.start(kind, {**LEG, 'leg.scale': 0.5}, namespace=space)
                          for kind in NODES for space in ('', 'robots/left'))
@@ -301,10 +302,10 @@ def test_nodes_that_come_later_or_in_a_namespace_are_waited_for_and_not_guessed(
 def test_where_an_input_is_that_nobody_has_named_is_not_guessed(graph, show):
     page = show(LEG, kinds=(Kinematics,)).page()
     crank_states = graph.node.create_publisher(JointState, 'crank_states', 10)
-    assert [page.ask(op, mechanism='/leg', **more)['reason'] for op, more in (
+    assert [page.ask(op, key='/leg', **more)['reason'] for op, more in (
         ('pose', {}), ('curve', {}), ('export', {'form': 'csv'}))] == [
         'the crank is not known yet: no message names leg_crank'] * 3
-    assert page.ask('export', mechanism='/leg', form='h')['reason'] == ''
+    assert page.ask('export', key='/leg', form='h')['reason'] == ''
 
     def inputs():
         crank_states.publish(JointState(name=['leg_crank'], position=[2.0]))

@@ -20,7 +20,7 @@ from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
 def frame_of(markers):
     """Return the frame of some markers, part by part, as the page reads it."""
-    return [({'mechanism': '/leg', 'topic': 'markers', 'markers': [
+    return [({'key': '/leg', 'topic': 'markers', 'markers': [
         {'kind': {Marker.LINE_LIST: 'lines', Marker.LINE_STRIP: 'locus', Marker.SPHERE_LIST:
                   'joints', Marker.TRIANGLE_LIST: 'triangles'}[marker.type],
          'piece': {Marker.LINE_LIST: 2, Marker.SPHERE_LIST: 1, Marker.TRIANGLE_LIST: 3}.get(

@@ -61,7 +61,7 @@ def test_a_bar_follows_a_dimension_that_can_only_become_shorter():
     bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'custom', 'bar.dimensions.p': 4.0,
                       'bar.joints': ['O ground 0 0', 'Q ground 4 0', 'A crank O 1',
                                      'B dyad A Q 3 3 left', 'C rigid A B p 1 left']})
-    assert poses.tunable(bar, 'bar')['bars'] == {'dimensions.p': [('A', 'C')]}
+    assert poses.tunable(bar.machines['bar'])['bars'] == {'dimensions.p': [('A', 'C')]}
 
 
 @pytest.mark.parametrize('name', ['excavator', 'jansen', 'peaucellier', 'scissor_lift'])
@@ -69,7 +69,7 @@ def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
     machine, present = machine_of(name, **{
         'excavator': DOUBLE, 'scissor_lift': {'scale': 2.0, 'carriage.start': 2.4}}.get(name, {}))
     present = [1.02 * value for value in present]
-    heads, *rows = csv.reader(io.StringIO(curves.exported(machine, present, 'csv', 'world')))
+    heads, *rows = csv.reader(io.StringIO(curves.table(machine, present)))
     # Rounded, an end is outside the reach.
     columns, linkage = dict(zip(heads, np.array(rows, float).T[:, 1:-1])), machine.linkage
     unit_in = linkage.inputs[0].unit

@@ -59,7 +59,7 @@ REQUESTS = [
       for name, value, shown in VALUES),
     *(('set', f'"values": {values}', 'the request fails') for values in (
         f'{{"{50000 * "x"}": 1}}', '{"\\ud800": 1}', '3', '[[[], 1]]')),
-    ('set', '"values": {}, "mechanism": {}', 'the request fails'),
+    ('set', '"values": {}, "key": {}', 'the request fails'),
     ('set', '"a": 1', 'the request fails'),
     *(('pose', f'"want": {want}', '.') for want in (
         '{"output": "crank", "value": 1e400}', '{"output": "crank", "value": NaN}',
@@ -67,7 +67,7 @@ REQUESTS = [
         '{"output": [], "value": 1}', '{"output": "Z", "value": 1}',
         '{"joint": [], "place": [1, 2]}', '{"joint": "A", "up": 2}',
         '{"joint": "A", "place": [1]}', '{"joint": "A", "place": [1, 2], "leg": 1}')),
-    ('pose', '"mechanism": []', 'the request fails'), ('tune', '"mechanism": ""', 'there is no'),
+    ('pose', '"key": []', 'the request fails'), ('tune', '"key": ""', 'there is no'),
     ('curve', '"output": "Z.x"', "slotted_lever has no output 'Z.x'; allowed: .*"),
     ('curve', '"kind": "transmission angle", "output": "L.x"', 'lever'),
     ('curve', '"colour": 1', 'the request fails'), ('export', '"a": 1', 'the request fails'),
@@ -78,7 +78,7 @@ REQUESTS = [
 
 def test_a_request_is_answered_whatever_it_holds(lever, page):
     for number, (op, fields, reason) in enumerate(REQUESTS):
-        page.send(f'{{"op": "{op}", "id": "{number}", "mechanism": "/lever", {fields}}}')
+        page.send(f'{{"op": "{op}", "id": "{number}", "key": "/lever", {fields}}}')
         answer = page.message('answer', id=str(number))
         assert re.search(reason, answer['reason']), (op[:20], reason, answer['reason'])
         assert len(answer['reason']) < 300 and answer.keys() == {'op', 'id', 'reason'}
@@ -93,7 +93,7 @@ def test_a_request_that_fails_is_answered_and_logged(page, monkeypatch, capfd):
 def test_of_many_requests_at_once_each_is_answered(lever):
     with Page(lever.url) as page:
         for number in range(500):
-            page.send(json.dumps({'op': 'set', 'mechanism': '/lever', 'values': {}, 'id': number}))
+            page.send(json.dumps({'op': 'set', 'key': '/lever', 'values': {}, 'id': number}))
         assert {page.message('answer', id=number)['reason'] for number in range(500)} <= {
             '', "there is no mechanism '/lever'"}
 
@@ -159,7 +159,7 @@ class Deaf:
 
 FLOODS = {
     'answers': Deaf.frame(b'{"op": "fly", "id": "' + b'x' * 60000 + b'"}'),
-    'settings': Deaf.frame(b'{"op": "set", "mechanism": "/leg", "values": '
+    'settings': Deaf.frame(b'{"op": "set", "key": "/leg", "values": '
                            b'{"crank.speed": 1}, "id": 1}') * 100,
     'pings': Deaf.frame(b'x' * 125, kind=9) * 500,
     'drawn': Deaf.frame(b'"drawn"') * 1000,

@@ -171,3 +171,6 @@ def test_a_package_that_another_one_needs_is_the_one_at_fault():
         with pytest.raises(ImportError, match=f'^{fault} is installed but'):
             with needs('matplotlib'):
                 raise error
+    with pytest.raises(ImportError, match='^PIL is installed but'):
+        with needs('matplotlib'), needs('PIL'):
+            raise OSError

@@ -172,10 +172,10 @@ def test_a_patched_message_reads_like_one_that_is_built(count):
 
     for build, kind, size in ((drawn, MarkerArray, 2 * count if count == 1 else 4 * count),
                               (joined, JointState, count), (joined, JointState, 2 * count)):
-        template = message_layout.Template([build], size)
+        template = message_layout.PatchedMessages([(None, build)], size)
         for values in (random.normal(size=size), np.zeros(size), -np.arange(size) * 1e300):
             stamp = Time(sec=int(random.integers(2 ** 31)), nanosec=int(random.integers(10 ** 9)))
-            patched, = template.patched(message_layout.pack(stamp), values)
+            (_, patched), = template.patched(message_layout.pack(stamp), values)
             assert deserialize_message(patched, kind) == deserialize_message(
                 serialize_message(build(stamp, values)), kind)
 
@@ -193,7 +193,7 @@ def test_bytes_between_fields_are_taken_for_no_value():
         def drawn(stamp, values, markers=markers, count=count):
             return markers.message(stamp, values.reshape(1, count, 2))
 
-        patched, = message_layout.Template([drawn], 2 * count).patched(
+        (_, patched), = message_layout.PatchedMessages([(None, drawn)], 2 * count).patched(
             message_layout.pack(stamp), values)
         assert deserialize_message(patched, MarkerArray) == deserialize_message(
             serialize_message(drawn(stamp, values)), MarkerArray)

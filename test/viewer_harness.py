@@ -156,7 +156,7 @@ class Page:
                 self.messages.append(message.json())
                 continue
             for head, points in framed(message.data):
-                self.frames[head['mechanism'], head['topic']] = head['markers'], points
+                self.frames[head['key'], head['topic']] = head['markers'], points
             self.pictures += 1
             if not self._lazy:
                 await self._socket.send_json('drawn')
@@ -196,11 +196,11 @@ class Page:
 
     def pose(self, key, **want):
         """Return the answer to a request for a pose: by output and value, or joint and place."""
-        return self.ask('pose', mechanism=key, **({'want': want} if want else {}))
+        return self.ask('pose', key=key, **({'want': want} if want else {}))
 
     def set(self, key, **values):
         """Set parameters, __ for a point; return the reason of a refusal, or nothing."""
-        return self.ask('set', mechanism=key, values={
+        return self.ask('set', key=key, values={
             name.replace('__', '.'): value for name, value in values.items()})['reason']
 
     def drawn(self, key, kind):

@@ -46,9 +46,7 @@ def with_joints(machines: Sequence[SceneMechanism], names: Sequence[str]
 def parser(name: str, description: str) -> command.Parser:
     """Return the parser of a command on the mechanisms of a scene."""
     made = command.Parser(name, description=description)
-    made.add_argument('scene', metavar='SCENE', help="the scene's parameter file")
-    made.add_argument('--mechanism', nargs='+', default=[], metavar='NAME',
-                      help='only these mechanisms of the scene')
+    command.add_scene(made, help="the scene's parameter file")
     made.add_argument('--joints', nargs='+', default=[], metavar='JOINT',
                       help='what a controller commands, by its name in the scene')
     return made

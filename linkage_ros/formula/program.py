@@ -40,24 +40,6 @@ FLOATS = Dialect({name: row.python for name, row in OPERATIONS.items()}, {
     name: value for name, value in vars(math).items() if not name.startswith('_')})
 
 
-def _as_ieee(name: str) -> Callable:
-    """Return an operation on floats that has inf or nan where Python's code of it raises."""
-    code = FLOATS.templates[name].format('x[0]', 'x[1]')
-    in_python = eval(f'lambda *x: {code}', dict(FLOATS.names))
-
-    def operation(*operands: float) -> float:
-        try:
-            return in_python(*operands)
-        except (ArithmeticError, ValueError):
-            with np.errstate(all='ignore'):
-                return float(OPERATIONS[name].numpy(*map(np.float64, operands)))
-
-    return operation
-
-
-# As `FLOATS`, bit for bit, where that has a number.
-IEEE = Dialect({**FLOATS.templates, 'divide': 'divide({}, {})', 'rint': 'rint({})'}, {
-    **FLOATS.names, **{name: _as_ieee(name) for name in ('divide', 'sqrt', 'sin', 'cos', 'rint')}})
 ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
     **{name: row.numpy for name, row in OPERATIONS.items()}, 'nan': np.nan, 'inf': np.inf})
 
@@ -137,10 +119,6 @@ class _Variant:
     @cached_property
     def float(self) -> Callable:
         return _python(self.listing, FLOATS, self.arguments)
-
-    @cached_property
-    def ieee(self) -> Callable:
-        return _python(self.listing, IEEE, self.arguments)
 
     @cached_property
     def array(self) -> Callable:
@@ -225,7 +203,9 @@ class Pose:
 
     def _quietly(self, *arguments: float) -> tuple:
         """Return the outputs at one pose with inf or nan where Python's floats raise."""
-        return self.variant.ieee(*self.constants)(*arguments)
+        with np.errstate(all='ignore'):
+            return tuple(map(float, self.variant.array(*self.constants)(
+                *map(np.float64, arguments))))
 
     def on(self, dialect: Dialect) -> Callable:
         """Return the function of arrays in a dialect of `ARRAYS`, which returns a tuple."""

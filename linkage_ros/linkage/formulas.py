@@ -77,6 +77,8 @@ class Structure:
             design.dimensions, design.signed), branches, **given)
         self.branches = dict(branches)
         self._programs, self._moving = Cache(), Cache()
+        # Derivatives by each input, which several programs need.
+        self._derivatives: Dict[int, Dict[Real, Real]] = {}
         self._outputs: Mapping[str, Callable] = {
             'points': self._points, 'velocities': self._velocities, 'angles': self._angles,
             'rates': self._rates, 'parts': self.parts, 'margins': self._margins,
@@ -183,8 +185,9 @@ class Structure:
         return any(x.name == name and x.kind == 'prismatic' for x in self.built.links)
 
     def _rates(self, names: Names, by: int = 0) -> List[Real]:
+        known = self._derivatives.setdefault(by, {})
         return [self._gated_rate(rate, self.output(name))
-                for name, rate in zip(names, self._turning(names, {by: 1.0}))]
+                for name, rate in zip(names, self._turning(names, {by: 1.0}, known))]
 
     def _point_accelerations(self, names: Names) -> List[Real]:
         known: Dict[Real, Real] = {}
@@ -192,7 +195,7 @@ class Structure:
         return self._changing([derivative(part, speeds, known) for part in self._points(names)])
 
     def _joint_accelerations(self, names: Names) -> List[Real]:
-        return self._changing(self._turning(names, self._speeds()))
+        return self._changing(self._turning(names, self._speeds(), {}))
 
     def _speeds(self) -> Dict[int, Number]:
         n = len(self.built.inputs)
@@ -205,10 +208,9 @@ class Structure:
         moving: Dict[int, Number] = {i: argument(n + i) for i in range(2 * n)}
         return [derivative(rate, moving, known) for rate in rates]
 
-    def _turning(self, names: Names, speeds: Dict[int, Number]) -> List[Real]:
-        """Return the speeds of outputs at speeds of the inputs."""
-        known: Dict[Real, Real] = {}
-
+    def _turning(self, names: Names, speeds: Dict[int, Number], known: Dict[Real, Real]
+                 ) -> List[Real]:
+        """Return the speeds of outputs at speeds of the inputs; `known` are other derivatives."""
         def d(expression: Real) -> Real:
             return derivative(expression, speeds, known)
 
@@ -245,7 +247,7 @@ class Structure:
 
     def _closures(self, _: Names) -> List[Real]:
         """Return each closure and its rate by the first input."""
-        known: Dict[Real, Real] = {}
+        known = self._derivatives.setdefault(0, {})
         return [part for limit in self.closures
                 for part in (limit.margin, derivative(limit.margin, {0: 1.0}, known))]
 

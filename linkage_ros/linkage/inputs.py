@@ -82,13 +82,13 @@ class Input(NamedTuple):
         """Whether it is an angle of which only a part of the period is computed."""
         return self.turns and not self.wraps
 
-    def whole_turns(self, near: Any) -> Any:
+    def whole_turns(self, near: float) -> float:
         """Return the turns around which values are computed, if not those around zero."""
         if not self.is_part:
-            return 0.0 * near
+            return 0.0
         # Half of what is computed lies on both sides of a value by at least a quarter of it.
         half = math.floor((self.high - self.low) / (2.0 * math.tau))
-        return half * np.round(near / (half * math.tau))
+        return float(half * round(near / (half * math.tau)))
 
     @property
     def step(self) -> float:
@@ -109,11 +109,9 @@ class Input(NamedTuple):
         """Return the whole periods [rad] by which a value is out of [low, high)."""
         return self.turn * math.floor(value / self.turn + 0.5) if self.wraps else 0.0
 
-    def beside(self, value: Any, near: Any) -> Any:
-        """Return values plus the whole turns that bring them closest to others."""
-        if not self.wraps:
-            return value + 0.0 * near
-        return value + self.turn * np.round((near - value) / self.turn)
+    def nearest_equivalent(self, value: float, seed: float) -> float:
+        """Return a value plus the whole turns that bring it closest to another one."""
+        return value + self.turn * round((seed - value) / self.turn) if self.wraps else value
 
     def apart(self, value: Any, other: Any) -> Any:
         """Return the differences of values and others, without whole turns."""

@@ -12,9 +12,9 @@ from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 
 from . import scene_node, shutdown
-from .message_layout import pack_time
+from .message_layout import pack_time, PatchedMessages
 from .messages import joint_states
-from .publishers import PatchedPublisher, TrackedPublisher
+from .publishers import TrackedPublisher
 from .. import scene
 from ..scene.motion import Motion
 
@@ -44,8 +44,8 @@ class CrankDriver(scene_node.SceneNode):
             settings.source for mechanism in self.scene.machines.values()
             for settings in mechanism.inputs.values()))
         n = len(sources)
-        self._message = PatchedPublisher(
-            [(self._publisher.publisher, lambda stamp, values: joint_states(
+        self._message = PatchedMessages(
+            [(self._publisher.publish, lambda stamp, values: joint_states(
                 stamp, sources, values[:n], values[n:]))], 2 * n)
         # After system time is set back, a timer on it would sleep until the old time returns.
         clock = self.get_clock()
@@ -100,7 +100,8 @@ class CrankDriver(scene_node.SceneNode):
         now = self._follow_clock()
         if self._publisher.has_subscribers:
             positions, speeds = zip(*[self._position(*sent, now) for sent in self._sent])
-            self._message.publish(pack_time(now), positions + speeds)
+            for publish, data in self._message.patched(pack_time(now), positions + speeds):
+                publish(data)
 
     def _position(self, key: Tuple[str, str], settings: scene.InputSettings,
                   now: int) -> Tuple[float, float]:

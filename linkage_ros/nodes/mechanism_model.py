@@ -15,15 +15,15 @@ from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
 from . import messages
-from .publishers import PatchedPublisher
+from .message_layout import PatchedMessages
 from .. import scene
 from ..cache import Cache
 from ..linkage import LinkPoint
 from ..robot_model import bodies, shapes, urdf
 from ..scene.legs import Solution
 
-# Cached publishers: a walker's legs may leave their reach one by one, each with another message.
-MAX_PUBLISHERS = 128
+# Cached messages: a walker's legs may leave their reach one by one, each with another message.
+MAX_MESSAGES = 128
 
 
 class AssemblyState(NamedTuple):
@@ -63,8 +63,8 @@ class MechanismModel:
     ----------
     regular : Cache
         The regular state of a solution, by what this contains: joints, markers, velocities (bool).
-    publishers : Cache
-        The publisher of a state, by the state and the topics of joint states and of markers; a
+    patched_messages : Cache
+        The messages of a state, by the state and the topics of joint states and of markers; a
         topic is an rclpy publisher, or None if its message is left out.
 
     """
@@ -82,7 +82,7 @@ class MechanismModel:
         self._drawn = *drawn, bodies.size(mechanism), shown
         self._conversions = Cache(self._conversion)
         self.regular = Cache(self._regular)
-        self.publishers = Cache(self._publisher, MAX_PUBLISHERS)
+        self.patched_messages = Cache(self._patched_messages, MAX_MESSAGES)
 
     @cached_property
     def marker_array(self) -> messages.Markers:
@@ -165,12 +165,12 @@ class MechanismModel:
         positions, velocities, efforts = (part.astype(int) for part in places)
         return positions, velocities, efforts
 
-    def _publisher(self, key: Tuple[AssemblyState, Tuple[Any, Any]]) -> PatchedPublisher:
+    def _patched_messages(self, key: Tuple[AssemblyState, Tuple[Any, Any]]) -> PatchedMessages:
         state, topics = key
         builders = self.joint_message, self.marker_message
-        return PatchedPublisher(
-            [(topic, partial(build, state)) for topic, build in zip(topics, builders) if topic],
-            state.solution.values.size)
+        return PatchedMessages(
+            [(topic.publish, partial(build, state)) for topic, build in zip(topics, builders)
+             if topic], state.solution.values.size)
 
     def joint_message(self, state: AssemblyState, stamp: Any, values: np.ndarray) -> JointState:
         """Build the joint states of the assembled legs from a solution's values."""
@@ -203,8 +203,9 @@ class MechanismModel:
 def _shown(mechanism: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
     """Return the markers' points and, by marker id, the point indices of each line or plate."""
     linkage, names = mechanism.linkage, mechanism.points
-    cranks, plates, marks, drawn = ([], [], [], []) if mechanism.in_space else (
-        shapes.cranks(linkage), shapes.plates(linkage, names), shapes.marks(linkage, names),
+    cranks = shapes.cranks(linkage)
+    plates, marks, drawn = ([], [], []) if mechanism.in_space else (
+        shapes.plates(linkage, names), shapes.marks(linkage, names),
         shapes.drawn(mechanism, names))
     # The edges of a plate are not drawn as bars, too: the message is smaller.
     edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}

@@ -18,7 +18,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from . import messages
 from .log import Throttle
 from .mechanism_model import AssemblyState, MechanismModel
-from .message_layout import NEVER
+from .message_layout import NEVER, Outgoing
 from .publishers import LATCHED, TrackedPublisher
 from .. import scene
 
@@ -72,14 +72,20 @@ class MechanismTopics:
         if math.isfinite(value):
             self._seed = value
 
-    def publish(self, in_scene: bool) -> None:
-        """Solve for the subscribers, and for the scene's joint states if `in_scene`; publish."""
+    def outgoing(self, in_scene: bool) -> Sequence[Outgoing]:
+        """Solve for the subscribers; return the messages to publish."""
         topics = self._subscribed()
-        if (in_scene or any(topics)) and (state := self.solved(in_scene)) and any(topics):
-            self.model.publishers[state, topics].publish(self.stamp, state.solution.values)
+        if any(topics) and (state := self.solved(in_scene)):
+            return self.model.patched_messages[state, topics].patched(
+                self.stamp, state.solution.values)
+        return ()
 
     def solved(self, in_scene: bool) -> Optional[AssemblyState]:
-        """Return the state at the present inputs; None without assembled legs."""
+        """
+        Return the state at the present inputs; None without assembled legs.
+
+        It is solved for the subscribers, and for the scene's joint states if `in_scene`.
+        """
         if None in self.inputs:
             return None
         regular, state = self._regular(self.model, self._subscribed(), in_scene), self.state
@@ -122,7 +128,7 @@ class MechanismTopics:
             regular.solution.solve(inputs, [0.0] * len(inputs))
             if any(topics):
                 # Building its messages takes longest.
-                model.publishers[regular, topics]
+                model.patched_messages[regular, topics]
         return model
 
     def adopt(self, model: MechanismModel) -> None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 import struct
-from typing import Any, Callable, List, Sequence
+from typing import Any, Callable, List, Sequence, Tuple
 
 from builtin_interfaces.msg import Time
 import numpy as np
@@ -32,6 +32,9 @@ NEVER = bytes(8)
 MARKED_STAMP, MARKED_VALUE = Time(sec=0x2C83A6F1, nanosec=0x1E94B7D5), 0x01708A3D5A1C3E77
 
 _STAMP = struct.Struct('<iI')
+
+# A function of a publisher, and the serialised message that it publishes.
+Outgoing = Tuple[Callable[[bytes], None], bytes]
 
 
 def pack(stamp: Time) -> bytes:
@@ -65,18 +68,19 @@ def deserialized(data: bytes, kind: type) -> Any:
         raise Unreadable(' '.join(str(error).split())[:200]) from None
 
 
-class Template:
+class PatchedMessages:
     """
     Serialised messages whose stamps and float64 values are patched in place.
 
-    Each of `builds` makes a message of a Time and an array (count,), whose values it only copies.
+    `parts` are, for each message, the function that publishes it, and one that builds it of a Time
+    and an array (count,), whose values it only copies.
     """
 
-    def __init__(self, builds: Sequence[Callable], count: int):
+    def __init__(self, parts: Sequence[Tuple[Callable, Callable]], count: int):
         # In messages of a stamp and values that no others have, these mark their places.
         marks = (MARKED_VALUE + np.arange(count)).view(float)
         self._bytes, places = bytearray(), []
-        for build in builds:
+        for _, build in parts:
             data = serialize_message(build(MARKED_STAMP, marks))
             # Numbers are aligned to 8 bytes after the header; LEAD aligns them in memory, too.
             start = len(self._bytes) + len(LEAD)
@@ -84,9 +88,10 @@ class Template:
             places.append(slice(start, start + len(data)))
         self._stamps = [slice(*match.span()) for match in re.finditer(
             re.escape(pack(MARKED_STAMP)), self._bytes)]
-        if len(self._stamps) < len(builds):
+        if len(self._stamps) < len(parts):
             raise RuntimeError('the middleware does not serialise to little-endian CDR')
-        self._messages = [memoryview(self._bytes)[place] for place in places]
+        self._messages = [(publish, memoryview(self._bytes)[place])
+                          for (publish, _), place in zip(parts, places)]
         self._numbers = np.frombuffer(self._bytes, float)
         # The values, then all eight-byte words of the messages.
         self._table = np.concatenate([marks, self._numbers])
@@ -95,11 +100,11 @@ class Template:
         self._sources = np.where((0 <= indices) & (indices < count), indices,
                                  np.arange(count, len(self._table)))
 
-    def patched(self, stamp: bytes, values: Any) -> List[bytes]:
-        """Return the serialised messages with a packed stamp and values (count,)."""
+    def patched(self, stamp: bytes, values: Any) -> List[Outgoing]:
+        """Return the messages with a packed stamp and values (count,), and what publishes each."""
         self._values[:] = values
         self._table.take(self._sources, None, self._numbers, 'clip')
         data = self._bytes
         for place in self._stamps:
             data[place] = stamp
-        return [bytes(message) for message in self._messages]
+        return [(publish, bytes(message)) for publish, message in self._messages]

@@ -24,8 +24,7 @@ from .. import scene
 from ..words import elided, listed, quoted
 
 TOPIC = 'scene_parameters'
-DEPTH = 500
-LATCHED = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED = QoSProfile(depth=500, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Announcer:
@@ -37,8 +36,8 @@ class Announcer:
 
     def announce(self, changed: Iterable[scene.Parameter] = ()) -> None:
         """Publish those changed values that the node owns; the first time all values."""
-        # A late subscriber receives DEPTH messages, and needs the full one among them.
-        is_full = self._count % DEPTH == 0
+        # A late subscriber receives the last `depth` messages, and needs a full one among them.
+        is_full = self._count % LATCHED.depth == 0
         values = [typed(parameter).to_parameter_msg()
                   for parameter in (self._node.scene.parameters if is_full else changed)
                   if parameter.name in self._node.fields]

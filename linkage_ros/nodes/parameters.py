@@ -35,8 +35,8 @@ class SceneParameters:
 
     The `node` is created with `automatically_declare_parameters_from_overrides`. `role`, one of
     scenes.ALL, selects its parameters. `check(scene)` raises SceneError for a scene that the node
-    does not support. `changed(parameters)` is called with the changed ones, after `scene` is
-    replaced. Raises SceneError if the node's initial values are invalid.
+    does not support. `changed()` is called after `scene` is replaced. Raises SceneError if the
+    node's initial values are invalid.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class SceneParameters:
     """
 
     def __init__(self, node: Any, role: str, check: Callable[[scenes.Scene], None],
-                 changed: Callable[[list[scenes.Parameter]], None]):
+                 changed: Callable[[], None]):
         self._node, self._check, self._changed = node, check, changed
         # An empty list in a parameter file has neither type nor value.
         values = {name: () if parameter.value is None else scenes.plain(parameter.value)
@@ -176,9 +176,9 @@ class SceneParameters:
         return any(parameter.name in self.fields for parameter in parameters)
 
     def _adopt(self, changed: scenes.Scene) -> None:
-        if difference := changed.changed_from(self.scene):
+        if changed is not self.scene:
             self.scene = changed
-            self._changed(difference)
+            self._changed()
 
 
 def _kind(field: Any) -> Parameter.Type:

@@ -1,17 +1,15 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Publishers that track whether they have subscribers, and publishers that patch a message."""
+"""Publishers that track whether they have subscribers."""
 
 from __future__ import annotations
 
-from typing import Any, Callable, Sequence, Tuple
+from typing import Any
 
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-
-from .message_layout import Template
 
 # Later subscribers receive the last message, too.
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -41,22 +39,3 @@ class TrackedPublisher:
     def _count(self, _: Any) -> None:
         self.has_subscribers = self.publisher.get_subscription_count() > self._ignored
         self.subscribed = self.publisher if self.has_subscribers else None
-
-
-class PatchedPublisher:
-    """
-    Publishes messages again and again with new values.
-
-    `parts` are, for each message, its publisher and its builder; builders and `count` are as for
-    Template.
-    """
-
-    def __init__(self, parts: Sequence[Tuple[Any, Callable]], count: int):
-        publishers, builders = zip(*parts)
-        self._publish = [publisher.publish for publisher in publishers]
-        self._template = Template(builders, count)
-
-    def publish(self, stamp: bytes, values: Any) -> None:
-        """Publish the messages with a packed stamp and values (count,)."""
-        for publish, data in zip(self._publish, self._template.patched(stamp, values)):
-            publish(data)

@@ -6,19 +6,20 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, Iterable, Tuple
+from typing import Any, Iterable, Sequence, Tuple
 
 import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from .mechanism_model import AssemblyState, MechanismModel
+from .message_layout import Outgoing, PatchedMessages
 from .messages import joint_states
-from .publishers import LATCHED, PatchedPublisher, TrackedPublisher
+from .publishers import LATCHED, TrackedPublisher
 from ..cache import Cache
 
-# Cached publishers: the legs of walkers may leave their reach one by one.
-MAX_PUBLISHERS = 16
+# Cached messages: the legs of walkers may leave their reach one by one.
+MAX_MESSAGES = 16
 
 # The model and the state of each mechanism in a message.
 Parts = Tuple[Tuple[MechanismModel, AssemblyState], ...]
@@ -30,21 +31,22 @@ class SceneJointStates:
 
     If `crank_states` is remapped to `joint_states`, the source joints `sources` are on that topic
     already, and are not published again.
+
+    Attributes
+    ----------
+    joint_states : TrackedPublisher
+        Its subscribers are those other than the node itself.
+
     """
 
     def __init__(self, node: Any, sources: Iterable[str]):
         same = node.resolve_topic_name('joint_states') == node.resolve_topic_name('crank_states')
         # If the topics are the same, the node's own subscription does not count.
-        self._joint_states = TrackedPublisher(node, JointState, 'joint_states', 10, int(same))
+        self.joint_states = TrackedPublisher(node, JointState, 'joint_states', 10, int(same))
         self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
         self._omitted = frozenset(sources if same else ())
-        self._publishers = Cache(self._publisher, MAX_PUBLISHERS)
+        self._patched = Cache(self._patched_messages, MAX_MESSAGES)
         self._description = ''
-
-    @property
-    def has_subscribers(self) -> bool:
-        """Whether `joint_states` has subscribers other than the node itself."""
-        return self._joint_states.has_subscribers
 
     def describe(self, urdf: str) -> None:
         """Publish a robot model, unless it is empty or unchanged."""
@@ -52,15 +54,14 @@ class SceneJointStates:
             self._description = urdf
             self._descriptions.publish(String(data=urdf))
 
-    def publish(self, stamp: bytes, parts: Parts) -> None:
-        """Publish the joints of assembled mechanisms with a packed stamp; nothing if none is."""
-        if parts:
-            self._publishers[parts].publish(
-                stamp, np.concatenate([state.solution.values for _, state in parts]))
+    def outgoing(self, stamp: bytes, parts: Parts) -> Sequence[Outgoing]:
+        """Return the message to publish, the joints of assembled mechanisms; none without any."""
+        return self._patched[parts].patched(
+            stamp, np.concatenate([state.solution.values for _, state in parts])) if parts else ()
 
-    def _publisher(self, parts: Parts) -> PatchedPublisher:
-        return PatchedPublisher([(self._joint_states.publisher, partial(self._build, parts))],
-                                sum(state.solution.values.size for _, state in parts))
+    def _patched_messages(self, parts: Parts) -> PatchedMessages:
+        return PatchedMessages([(self.joint_states.publish, partial(self._build, parts))],
+                               sum(state.solution.values.size for _, state in parts))
 
     def _build(self, parts: Parts, stamp: Any, values: np.ndarray) -> JointState:
         """Build the message from the consecutive values of the solutions."""

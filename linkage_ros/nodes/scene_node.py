@@ -72,12 +72,11 @@ class SceneNode(Node):
         self.guarded, self.report = incidents.guarded, incidents.report
         self.worker = Worker(self, incidents.guarded)
         self._announcer: Optional[Announcer] = None
-        self._adopted: Optional[scenes.Scene] = None
         # Numbers of requests to set parameters: answered, and waiting.
         self._answered = self._waiting = 0
-        # The scene that was passed to the worker last.
-        self._passed: Optional[scenes.Scene] = None
-        self._parameters_of_scene = SceneParameters(self, name, self.check, self._changed)
+        self._parameters_of_scene = SceneParameters(self, name, self.check, self._pass_scene)
+        # The scenes that were adopted, and passed to the worker, last.
+        self._adopted = self._passed = self.scene
         # The Field of each parameter that the node owns, by name; whether it was started with any
         # parameters of a scene.
         self.fields: Mapping[str, scenes.Field] = self._parameters_of_scene.fields
@@ -99,12 +98,11 @@ class SceneNode(Node):
 
     def begin(self) -> None:
         """Adopt the first scene; then announce the node's parameters, and follow the others."""
-        self._passed = self.scene
         self.check(self.scene)
         self._adopt(self.scene, self.prepare(self.scene))
         if self.fields:
             self._announcer = Announcer(self)
-        if self._role != scenes.OWNER:
+        if self._role != scenes.KINEMATICS:
             Follower(self, self._parameters_of_scene)
         self._namesakes = self.create_timer(
             NAMESAKE_CHECK_PERIOD_S, self.guarded('a check of names', self._warn_of_namesake),
@@ -167,8 +165,9 @@ class SceneNode(Node):
         while answered != self._answered:
             answered = self._answered
             await _turn()
-        self._answered, self._waiting = self._answered + 1, self._waiting - 1
+        self._answered += 1
         response = self._respond(callback, request, response)
+        self._waiting -= 1
         self._pass_scene()
         return response
 
@@ -182,12 +181,6 @@ class SceneNode(Node):
         response.results = [results[i] for i in range(len(results))]
         return response
 
-    def _changed(self, changed: List[scenes.Parameter]) -> None:
-        """Pass the changed scene on, and announce the changed parameters."""
-        self._pass_scene()
-        if self._announcer:
-            self._announcer.announce(changed)
-
     def _pass_scene(self) -> None:
         """Have the newest scene prepared and adopted, unless waiting requests may change it."""
         new = self.scene
@@ -200,8 +193,11 @@ class SceneNode(Node):
                     self._adopt, new, self.prepare(new)), is_next=True)
 
     def _adopt(self, new: scenes.Scene, prepared: Any) -> None:
-        self._adopted = new
+        """Adopt a prepared scene, then announce what has changed."""
+        old, self._adopted = self._adopted, new
         self.adopt(prepared)
+        if self._announcer:
+            self._announcer.announce(new.changed_from(old))
 
     def _start(self) -> None:
         """Do what would delay the start."""

@@ -11,7 +11,7 @@ import shutil
 
 from . import parts
 from .. import scene
-from ..command import chosen, Parser, RequestError, run, within
+from ..command import add_scene, chosen, Parser, RequestError, run, within
 from ..linkage import Formula
 from ..optional import needs
 from ..scene.scene_mechanism import IN_SPACE
@@ -38,7 +38,7 @@ def main(args=None) -> int:
 
 def _draw(args):
     arguments = parsed(args)
-    draw(arguments, chosen(scene.load(arguments.scene).machines, arguments.mechanisms))
+    draw(arguments, chosen(scene.load(arguments.scene).machines, arguments.mechanism))
 
 
 def parsed(args):
@@ -122,14 +122,14 @@ def parser() -> Parser:
     made = Parser('render', description='Draw a scene: a picture (.png, .svg) or an animation '
                   '(.gif, .mp4).', epilog=EPILOG,
                   formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument('scene', metavar='SCENE', help='parameter file of the scene')
+    add_scene(made, help="the scene's parameter file")
+    # As 0.1.0 has it.
+    made.add_argument('--mechanisms', dest='mechanism', type=words, help=argparse.SUPPRESS)
     made.add_argument('--out', metavar='FILE', type=Path, required=True,
                       help=f'output file, which ends in {", ".join(IMAGES + VIDEOS)}')
     made.add_argument('--data', metavar='FILE', type=Path,
                       help='also write the drawn values as CSV: time [s], inputs [rad or m] and '
                       'joints [m], with all digits')
-    made.add_argument('--mechanisms', metavar='NAME,...', type=words, default=[],
-                      help='draw only these of the scene')
     made.add_argument('--trace', choices=parts.TRACES, default='whole',
                       help="the traced joint's curve: whole (default), growing in the first turn, "
                       'fading after 0.3 turns, stance (whole, and bold where the foot is on the '

@@ -24,6 +24,8 @@ STARTS, SCREWS = 96, 1400
 # Two poses are equally near if their distances differ by less than this factor and this [rad];
 # they are different if a joint differs by this [rad].
 ALIKE, ALIKE_LENGTH, DISTINCT = 1.2, 1e-3, 1e-3
+# Part of the distances that also counts hinges of balls.
+NEARLY = 1e-6
 # A step of motors away from a dead point [rad, or of the size].
 ASIDE = 0.1
 # How far inside its limits a joint starts, as a part of its range.
@@ -58,13 +60,14 @@ class Closed(NamedTuple):
 Question = Tuple[str, Mapping[str, str], Mapping[str, str]]
 
 
-def closed(robot: Robot) -> Closed:
+def closed(robot: Robot, seed: int = 0) -> Closed:
     """
     Close the loops of a robot; its motors keep their positions if possible.
 
-    If that does not determine a pose, joints outside their limits start inside them.
+    If that does not determine a pose, joints outside their limits start inside them. The `seed`
+    is that of the starts of a search, on which no answer may depend.
     """
-    made = _closed(robot)
+    made = _closed(robot, seed)
     if not made.faults:
         return made
     inside = {}
@@ -73,7 +76,7 @@ def closed(robot: Robot) -> Closed:
         if joint.position is not None and not low <= joint.position <= high:
             margin = INSIDE * min(high - low, 1.0)
             inside[joint.name] = low + margin if joint.position < low else high - margin
-    other = _closed(posed(robot, inside))
+    other = _closed(posed(robot, inside), seed)
     if len(other.faults) >= len(made.faults):
         return made
     where = ', '.join(f'{name} at {value:.4g}' for name, value in inside.items())
@@ -81,7 +84,7 @@ def closed(robot: Robot) -> Closed:
         f'Started inside the limits of the file: {where}.', *other.report])
 
 
-def _closed(robot: Robot) -> Closed:
+def _closed(robot: Robot, seed: int) -> Closed:
     # Dependent joints are where the others say.
     robot = posed(robot, {name: ratio * robot.positions[source] + offset
                           for name, joint in robot.tree_joints.items()
@@ -94,7 +97,7 @@ def _closed(robot: Robot) -> Closed:
         motors, followers = ([name for name in component.positions if name in names]
                              for names in (robot.driven, robot.follows))
         try:
-            pose, report = nearest(component, motors, followers)
+            pose, report = nearest(component, motors, followers, seed)
             made.report.extend([report] * bool(report))
             moves.update(component.moves(pose))
             positions.update((name, float(value[0]))
@@ -152,10 +155,12 @@ def _choice(questions: Sequence[Question], why: str) -> ValueError:
 def _question(component: Component, poses: np.ndarray, which: np.ndarray,
               motors: Sequence[str] = ()) -> List[Question]:
     """Return the choice of two poses by the joint that differs most, if they are different."""
-    apart = np.abs(component.away(poses[0] - poses[1])) * which
+    # Of joints that differ alike the first.
+    apart = np.round(np.abs(component.away(poses[0] - poses[1])) * which, 4)
     name = max(component.named, key=lambda name: apart[component.named[name]], default='')
     if not name or apart[component.named[name]] < DISTINCT:
         return []
+    poses = poses[np.argsort(component.read(poses)[name])]
     first, second = component.read(poses)[name]
     side, other = (component.texts(pose, which) for pose in poses)
     where = ''.join(f'{motor}={side[motor]} ' for motor in motors)
@@ -192,7 +197,7 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], l
         raise _choice(questions, 'bars lie in line where the file has them, and it moves on')
 
 
-def nearest(component: Component, motors: List[str], followers: List[str]
+def nearest(component: Component, motors: List[str], followers: List[str], seed: int
             ) -> Tuple[np.ndarray, str]:
     """
     Return the closed pose that is nearest to the file's, and a report if motors had to move.
@@ -213,7 +218,7 @@ def nearest(component: Component, motors: List[str], followers: List[str]
     # If the loops cannot be closed otherwise, followers move, and then motors.
     candidates, still, open_by = start, motors, math.inf
     for names in [motors + followers] * bool(followers) + [motors] + [[]] * bool(motors):
-        others = _searched(component, component.is_of(names))
+        others = _searched(component, component.is_of(names), seed)
         smallest = max(component.gap(others, rows).min()
                        for _, rows in component.independent(component.is_of(names)))
         if smallest < 0.9 * open_by:
@@ -232,7 +237,8 @@ def nearest(component: Component, motors: List[str], followers: List[str]
         determined = which & ~is_free(component.free_ways(some[0], fixed | ~which)) \
             if still else which
         distances = np.linalg.norm(component.away(some) * determined, axis=1)
-        first, *more = np.argsort(distances, kind='stable')
+        # A ball of three hinges has two positions in each of its poses.
+        first, *more = np.argsort(distances + NEARLY * np.linalg.norm(some, axis=1))
         pose[which] = some[first, which]
         for i in more:
             alike = distances[i] < ALIKE * distances[first] + ALIKE_LENGTH
@@ -244,9 +250,13 @@ def nearest(component: Component, motors: List[str], followers: List[str]
     return pose, report
 
 
-def _searched(component: Component, fixed: np.ndarray, pull: float = 1e-2) -> np.ndarray:
+def _searched(component: Component, fixed: np.ndarray, seed: int) -> np.ndarray:
     """Return poses of random starts, the first that of the file, closed as far as they can be."""
     count = min(STARTS, SCREWS // max(len(fixed), 1))
     spread = np.linspace(0.0, math.pi, count)[:, None] * ~fixed * component.unit
-    poses = spread * np.random.default_rng(0).uniform(-1.0, 1.0, (count, len(fixed)))
-    return component.closed(component.closed(poses, fixed, 40, pull), fixed, 12)
+    poses = spread * np.random.default_rng(seed).uniform(-1.0, 1.0, (count, len(fixed)))
+    poses = component.closed(component.closed(poses, fixed, 40, 1e-2), fixed, 12)
+    # Where motors move, there is always a nearer pose beside some others.
+    steps = component.away(component.closed(poses, fixed, 1, 1e-9) - poses)
+    at_rest = np.max(np.abs(steps), axis=1) < DISTINCT
+    return poses[at_rest] if at_rest.any() else poses

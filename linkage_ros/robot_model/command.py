@@ -39,10 +39,8 @@ def parser() -> command.Parser:
         epilog='`ros2 run linkage_ros urdf` also accepts the scene as a node does: '
                '--ros-args --params-file SCENE')
     positive = command.within(float, bodies.SMALLEST, bodies.LARGEST)
-    made.add_argument('scene', metavar='SCENE', nargs='?',
-                      help="the scene's parameter file (default: the catalogue's linkages)")
-    made.add_argument('--mechanism', nargs='+', default=[], metavar='NAME',
-                      help='only these mechanisms of the scene')
+    command.add_scene(made, nargs='?', help="the scene's parameter file (default: the "
+                                            "catalogue's linkages)")
     made.add_argument('--format', choices=('urdf', 'sdf', 'mjcf'), default='urdf',
                       help='a tree for robot_state_publisher, or closed loops for Gazebo or '
                            'MuJoCo (default: urdf)')

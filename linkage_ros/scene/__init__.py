@@ -11,55 +11,38 @@ raises an error that names the wrong parameter and its allowed values. Nodes dec
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import re
 from typing import Any, Iterable, Mapping
 
 from .input_settings import FARTHEST, in_words, InputSettings
 from .joint_names import check_distinct
 from .parameter_file import overrides, sections
-from .parameters import (
-    ALL,
-    DRIVER,
-    Field,
-    INVERSE,
-    KINEMATICS,
-    OWNER,
-    Parameter,
-    plain,
-    SceneError,
-    Values,
-)
-from .scene_mechanism import (
-    FRAME,
-    FRAME_NAME,
-    FRAME_RULE,
-    is_distinct,
-    read_mechanism,
-    SceneMechanism,
-)
+from .parameters import DRIVER, Field, INVERSE, KINEMATICS, Parameter, plain, SceneError, Values
+from .scene_mechanism import FRAME, is_distinct, read_mechanism, SceneMechanism
 from .. import mechanisms
 from ..words import plain_text, quoted
 
 __all__ = ['changed', 'InputSettings', 'DRIVER', 'FARTHEST', 'Field', 'in_words', 'INVERSE',
-           'KINEMATICS', 'load', 'SceneMechanism', 'OWNER', 'Parameter', 'plain', 'read', 'Scene',
+           'KINEMATICS', 'load', 'SceneMechanism', 'Parameter', 'plain', 'read', 'Scene',
            'SceneError']
 
 _NAME = re.compile(r'(?=.{1,64}$)[A-Za-z](_?[A-Za-z0-9])*')
 
-MECHANISMS = Field(
-    'string_array', 'Names of the mechanisms in the scene.', default=(*mechanisms.CATALOGUE,),
-    read_only=True, pattern=_NAME, holds=is_distinct,
-    rule='at least one, each once, of up to 64 letters, digits and single underscores, '
-         'a letter first')
-FRAME_ID = Field('string', 'Frame of the poses.', default='world', readers=(KINEMATICS,),
-                 rule='1 to 100 characters that can be seen, the first a letter, digit or _',
-                 pattern=re.compile(FRAME_NAME))
-FRAME_PREFIX = Field(
-    'string', 'Prefix of the frames of markers and loci, as in robot_state_publisher.',
-    default='', readers=(KINEMATICS,), rule=FRAME_RULE, pattern=FRAME)
-RATE = Field('double', 'Rate of crank messages [Hz]; 0: none.', 0.0, 1000.0, default=50.0,
-             readers=(DRIVER,), unit='Hz')
+# The parameters that belong to no mechanism.
+GENERAL = {
+    'mechanisms': Field(
+        'string_array', 'Names of the mechanisms in the scene.', default=(*mechanisms.CATALOGUE,),
+        read_only=True, pattern=_NAME, holds=is_distinct,
+        rule='at least one, each once, of up to 64 letters, digits and single underscores, '
+             'a letter first'),
+    'frame_id': replace(
+        FRAME, meaning='Frame of the poses.', default='world', holds=bool,
+        rule='1 to 100 characters that can be seen, the first a letter, digit or _'),
+    'frame_prefix': replace(FRAME, meaning='Prefix of the frames of markers and loci, as in '
+                                           'robot_state_publisher.'),
+    'rate': Field('double', 'Rate of crank messages [Hz]; 0: none.', 0.0, 1000.0, default=50.0,
+                  readers=(DRIVER,), unit='Hz')}
 
 
 @dataclass(frozen=True)
@@ -96,10 +79,10 @@ def load(path: str) -> Scene:
     Each parameter has the value that the file gives to the parameter's owner.
     """
     all_sections = sections(path)
-    values = {node: overrides(all_sections, f'/{node}') for node in (*ALL, OWNER)}
+    values = {node: overrides(all_sections, f'/{node}') for node in (DRIVER, INVERSE, KINEMATICS)}
     if not any(values.values()):
         raise SceneError(f"{path} must be YAML with '/**:' and below it 'ros__parameters:'")
-    scene = read({name: value for node in (*ALL, OWNER) for name, value in values[node].items()})
+    scene = read({name: value for part in values.values() for name, value in part.items()})
     return read({parameter.name: values[parameter.field.owner][parameter.name]
                  for parameter in scene.parameters
                  if parameter.name in values[parameter.field.owner]})
@@ -137,16 +120,14 @@ def changed(before: Scene, values: Mapping[str, Any]) -> Scene:
 
 def _read(parts: Mapping[str, Mapping[str, Any]], known: Mapping[str, SceneMechanism]) -> Scene:
     values = Values(parts.get('', {}))
-    names, frame_id, frame_prefix, rate = (values.take(name, field) for name, field in (
-        ('mechanisms', MECHANISMS), ('frame_id', FRAME_ID), ('frame_prefix', FRAME_PREFIX),
-        ('rate', RATE)))
+    names, frame_id, frame_prefix, rate = (
+        values.take(name, field) for name, field in GENERAL.items())
     machines = {name: read_mechanism(name, parts.get(name, {}), known.get(name))
                 for name in names}
     joints = {name: mechanism.joints for name, mechanism in machines.items()}
     if joints != {name: mechanism.joints for name, mechanism in known.items()}:
         check_distinct(joints)
-    allowed = [*(parameter.name for parameter in values.parameters),
-               *(f'{name}.*' for name in names)]
+    allowed = [*GENERAL, *(f'{name}.*' for name in names)]
     for rest in (values, *(Values(parts[name]) for name in parts if name not in ('', *names))):
         rest.refuse_unknown(allowed)
     return Scene(machines, frame_id, frame_prefix, rate, tuple(values.parameters))
@@ -164,5 +145,5 @@ def _by_mechanism(values: Any) -> dict[str, dict[str, Any]]:
     parts: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         mechanism, dot, _ = name.partition('.')
-        parts.setdefault(mechanism if dot else '', {})[plain_text(name)] = value
+        parts.setdefault(mechanism if dot else '', {})[plain_text(name)] = plain(value)
     return parts

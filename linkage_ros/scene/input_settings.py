@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import math
 from typing import Any, Iterable, Optional
 
-from .parameters import DRIVER, Field, SceneError, SPEEDS, STARTS, Values
+from .parameters import DRIVER, Field, SceneError, Values
 from ..linkage import Arc, Input, Mechanism
 
 # Distance of a default sweep from each end of the reach, as a fraction of the reach.
@@ -29,9 +29,9 @@ def is_sweep(ends: tuple[float, ...]) -> bool:
 
 
 SPEED = Field('double', 'Speed of the {0} [{unit}].', -MAX_SPEED, MAX_SPEED, readers=(DRIVER,),
-              unit='{1}/s', group=SPEEDS)
+              unit='{1}/s', group='speeds')
 START = Field('double', 'Initial value of the {0} [{unit}]; a new value moves it there.',
-              default=0.0, readers=(DRIVER,), unit='{1}', group=STARTS)
+              default=0.0, readers=(DRIVER,), unit='{1}', group='starts')
 SWEEP = Field('double_array', "Ends of the {0}'s oscillation [{unit}]; empty: its reach, or full "
               'rotation.', default=(), unit='{1}',
               rule=f'the lower end and the higher end, within {FARTHEST:g} of zero, or none',

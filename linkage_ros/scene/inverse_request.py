@@ -13,7 +13,7 @@ import numpy as np
 
 from .input_settings import in_words, InputSettings
 from .scene_mechanism import divided, SceneMechanism
-from ..linkage import Input, Solution
+from ..linkage import Solution
 from ..words import listed
 
 LEVER = 'lever'
@@ -190,9 +190,8 @@ class InverseRequest:
         """Return those of the linkage's answers that lie inside the sweeps."""
         inside = []
         for answer in answers:
-            inputs = [_between_ends(settings, input_, value * scale)
-                      for settings, input_, value, scale in zip(
-                          self._settings, self._inverse.inputs, answer.inputs, self._scales)]
+            inputs = [_between_ends(settings, value * scale) for settings, value, scale in zip(
+                self._settings, answer.inputs, self._scales)]
             if not any(map(math.isnan, inputs)):
                 inside.append(SceneAnswer(tuple(inputs), answer.mode, answer.is_singular))
         return inside
@@ -219,22 +218,16 @@ class InverseRequest:
             return f'{what} needs the {needed}, outside {sweeps}'
         if len(values) > 1:
             return f'{what} is outside the reach'
-        (unit,), (output,), (scale,) = self._units, self.outputs, self._scales
-        turn = self._settings[0].input.turn if self._settings[0].input.wraps else math.inf
-        linkage = self._mechanism.linkage
-        spans = linkage.extremes(output, [
-            (low / scale, min(high, low + turn) / scale) for low, high in self._settings[0].arcs])
-        reached = in_words((low * unit, high * unit) for (low, _), (high, _) in spans)
+        output, = self.outputs
+        reached = in_words((low, high) for (low, _), (high, _) in self._mechanism.extremes(output))
         return (f'{"the lever" if output == LEVER else output} reaches {reached} '
-                f'{"rad" if linkage.is_angle(output) else "m"}'
+                f'{"rad" if self._mechanism.linkage.is_angle(output) else "m"}'
                 + f' in {sweeps}' * bool(limited))
 
 
-def _between_ends(settings: InputSettings, input_: Input, value: float) -> float:
+def _between_ends(settings: InputSettings, value: float) -> float:
     """Return an input between its ends, a crank after whole periods if needed; else NaN."""
     low, high = settings.ends or (value, value)
-    if input_.wraps and not low <= value <= high:
-        turn = input_.turn
-        value += turn * (math.ceil((low - value) / turn) if value < low else
-                         math.floor((high - value) / turn))
+    if not low <= value <= high:
+        value = float(settings.input.nearest_equivalent(value, 0.5 * (low + high)))
     return value if low <= value <= high else math.nan

@@ -15,11 +15,8 @@ from typing import Any, Callable, Collection, Iterable, Mapping, NamedTuple, Opt
 from ..cache import cached
 from ..words import elided, listed, meant, MESSAGE, quoted
 
-# The nodes that use parameters; OWNER owns each that it uses.
-DRIVER, KINEMATICS, INVERSE = ALL = 'crank_driver', 'kinematics', 'servo_inverse'
-OWNER = KINEMATICS
-
-GROUPS = DIMENSIONS, BRANCHES, SPEEDS, STARTS = 'dimensions', 'branches', 'speeds', 'starts'
+# The nodes that use parameters; KINEMATICS owns each that it uses.
+DRIVER, INVERSE, KINEMATICS = ALL = 'crank_driver', 'servo_inverse', 'kinematics'
 
 # Parameters that rclpy declares.
 _ROS = re.compile(r'(use_sim_time|start_type_description_service)$')
@@ -80,7 +77,8 @@ class Field:
     unit : str
         Unit of its numbers; empty: none.
     group : str
-        Kind of the parameter where there are many of one kind: one of GROUPS, or empty.
+        Kind of the parameter where there are many of one kind: 'dimensions', 'branches', 'speeds',
+        'starts', or empty.
 
     """
 
@@ -108,7 +106,7 @@ class Field:
     @property
     def owner(self) -> str:
         """Return the node that declares the parameter and announces its value to the others."""
-        return OWNER if OWNER in self.readers else self.readers[0]
+        return KINEMATICS if KINEMATICS in self.readers else self.readers[0]
 
     @property
     def allowed(self) -> str:

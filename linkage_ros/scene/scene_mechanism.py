@@ -16,16 +16,7 @@ from .input_settings import InputSettings, read_settings
 from .joint_names import JointName, read_joint_names
 from .legs import Assembly
 from .loads import Load, read_loads
-from .parameters import (
-    BRANCHES,
-    DIMENSIONS,
-    Field,
-    INVERSE,
-    KINEMATICS,
-    Parameter,
-    SceneError,
-    Values,
-)
+from .parameters import Field, INVERSE, KINEMATICS, Parameter, SceneError, Values
 from .. import mechanisms
 from ..cache import cached
 from ..linkage import Arc, Design, Mechanism, theta_of
@@ -34,21 +25,10 @@ from ..words import listed
 IN_SPACE = 'a linkage in space: pictures and robot models are of linkages in a plane'
 TYPES = (*mechanisms.TYPES, *mechanisms.WRITTEN)
 
-# Frame names are as free as link names in URDF; tf2 forbids a leading slash.
-FRAME_NAME = (r'\w[^\x00-\x1f\x7f-\xa0\u200b-\u200f\u2028-\u202f\u2060-\u206f'
-              r'\ud800-\udfff\ufeff]{0,99}')
-FRAME = re.compile(f'({FRAME_NAME})?')
-FRAME_RULE = 'up to 100 characters that can be seen, the first a letter, digit or _'
-
 
 def is_distinct(names: Sequence[str]) -> bool:
     """Return whether there are names, each of them once."""
     return 0 < len(names) == len(set(names))
-
-
-def is_pose(numbers: Sequence[float]) -> bool:
-    """Return whether there are six numbers."""
-    return len(numbers) == 6
 
 
 TYPE = Field('string', 'Type of the mechanism.', read_only=True, choices=TYPES,
@@ -57,8 +37,9 @@ JOINTS = Field('string_array', 'The linkage, one line per joint.', default=(), r
 TRACER = Field('string', 'Joint whose curve is the locus; empty: the last.', default='',
                read_only=True)
 DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [{unit}].', unit='m',
-                  group=DIMENSIONS)
-BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1, group=BRANCHES)
+                  group='dimensions')
+BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1,
+               group='branches')
 SCALE = Field('double', 'Factor of every length.', default=1.0, positive=True)
 LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
                   default=1, readers=(KINEMATICS,))
@@ -68,9 +49,13 @@ POINTS = Field('string_array', 'Joints that markers display.', readers=(KINEMATI
                holds=is_distinct, rule='each once')
 POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
              'x, y, z [m], roll, pitch, yaw [rad].', default=(0.0,) * 6, readers=(KINEMATICS,),
-             rule='six of them', holds=is_pose)
-OWN_FRAME_ID = Field('string', "Frame that its pose is in; empty: the scene's.", default='',
-                     readers=(KINEMATICS,), rule=FRAME_RULE, pattern=FRAME)
+             rule='six of them', holds=lambda numbers: len(numbers) == 6)
+# Names of frames are as free as those of links in URDF; tf2 forbids a leading slash.
+FRAME = Field(
+    'string', "Frame that its pose is in; empty: the scene's.", default='', readers=(KINEMATICS,),
+    rule='up to 100 characters that can be seen, the first a letter, digit or _',
+    pattern=re.compile(r'(\w[^\x00-\x1f\x7f-\xa0\u200b-\u200f\u2028-\u202f\u2060-\u206f'
+                       r'\ud800-\udfff\ufeff]{0,99})?'))
 JOINT_NAMES = Field(
     'string_array', "The robot's own names of joints; a joint that is not listed keeps its name.",
     default=(), readers=(KINEMATICS, INVERSE),
@@ -151,6 +136,18 @@ class SceneMechanism:
                 [rate * unit / scale for rate, (scale, unit) in zip(
                     rates, product(scales, units))])
 
+    def extremes(self, output: str) -> list[tuple[Arc, Arc]]:
+        """
+        Return the extremes of an output on the arcs of the only input, of a long one on a turn.
+
+        Each arc has the minimum and the input there, then the maximum [rad or m].
+        """
+        (scale,), unit, first = self.scales, self.scale_of(output), self.first.input
+        turn = first.turn if first.wraps else math.inf
+        arcs = [(low / scale, min(high, low + turn) / scale) for low, high in self.first.arcs]
+        return [((least * unit, low * scale), (greatest * unit, high * scale))
+                for (least, low), (greatest, high) in self.linkage.extremes(output, arcs)]
+
     @cached_property
     def ends(self) -> list[Optional[Arc]]:
         """Return the sweeps that a user has set, before scale; None: no limit but the reach."""
@@ -223,13 +220,9 @@ def read_mechanism(name: str, entries: Mapping[str, Any], old: Optional[SceneMec
     pose = take('pose', POSE)
     inputs = {input_.name: read_settings(name, linkage, input_, reach, scale, values)
               for input_ in linkage.inputs}
-    frame_id, only_named = take('frame_id', OWN_FRAME_ID), take('only_named', ONLY_NAMED)
-    assembly = Assembly(linkage, leg_pairs, mirrored, scale, reach)
-    angles = [linkage.is_angle(joint) for joint in assembly.joints]
-    joints = read_joint_names(
-        name, {**dict.fromkeys(inputs, False),
-               **dict(zip(assembly.all_joints, len(assembly.legs) * angles))},
-        take('joint_names', JOINT_NAMES), only_named)
+    frame_id, only_named = take('frame_id', FRAME), take('only_named', ONLY_NAMED)
+    joints = _joint_names(name, linkage, reach, leg_pairs, mirrored,
+                          take('joint_names', JOINT_NAMES), only_named)
     loads = read_loads(name, linkage, take('loads', LOADS))
     if loads and (leg_pairs > 1 or mirrored):
         raise SceneError(f'{name}.loads must be empty for more than one leg')
@@ -269,6 +262,19 @@ def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
     lines: dict[str, Any] = {} if design.name in mechanisms.TYPES else {
         'joints': design.joints, 'tracer': design.tracer}
     return mechanisms.create(design.name, branches=dict(branches), **lines, **dict(dimensions))
+
+
+@cached(16)
+def _joint_names(name: str, linkage: Mechanism, reach: tuple[Arc, ...], leg_pairs: int,
+                 mirrored: bool, lines: tuple[str, ...], only_named: bool
+                 ) -> Mapping[str, JointName]:
+    """Read the names of all joints; most changes of a mechanism leave them as they are."""
+    assembly = Assembly(linkage, leg_pairs, mirrored, reach=reach)
+    angles = [linkage.is_angle(joint) for joint in assembly.joints]
+    return read_joint_names(
+        name, {**{input_.name: False for input_ in linkage.inputs},
+               **dict(zip(assembly.all_joints, len(assembly.legs) * angles))},
+        lines, only_named)
 
 
 def _legs(name: str, linkage: Mechanism, values: Values) -> tuple[int, bool]:

@@ -14,7 +14,7 @@ from typing import Optional
 
 import numpy as np
 
-from . import Scene, SceneMechanism
+from . import SceneMechanism
 from .parameters import Parameter
 from ..cache import cached
 from ..linkage import Arc, Mechanism, theta_of
@@ -28,20 +28,20 @@ MAX_END = 1e300
 ANGLES, FEW_ANGLES = 91, 13
 
 
-def ends(scene: Scene, parameter: Parameter) -> Optional[Arc]:
-    """Return the lower and upper end of a parameter's slider; None if it has no slider."""
+def ends(mechanism: SceneMechanism, parameter: Parameter) -> Optional[Arc]:
+    """Return the ends of the slider of a mechanism's parameter; None if it has no slider."""
     field, value = parameter.field, parameter.value
     if field.low is not None and field.high is not None:
         return field.low, field.high
     if field.kind != 'double':
         return None
-    name, what, key = (parameter.name.split('.') + ['', ''])[:3]
-    mechanism = scene.machines.get(name)
-    if mechanism and what == 'dimensions':
-        return _dimension_ends(mechanism.linkage, key, field.positive, _required_range(mechanism))
-    if mechanism and what in mechanism.inputs and key == 'start':
+    _, what, key = [*parameter.name.split('.'), ''][:3]
+    if what == 'dimensions':
+        return _dimension_ends(
+            mechanism.linkage, key, field.positive, _required_range(mechanism))
+    if key == 'start':
         tried = [value, *(end for arc in mechanism.inputs[what].reach for end in arc)]
-    elif mechanism and key == 'offset':
+    elif key == 'offset':
         half = math.pi * mechanism.inputs[what].input.size
         tried = [value - half, value + half]
     else:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Curves of outputs over a turn or a stroke, and export of mechanisms, for the page."""
+"""Curves of outputs over a turn or a stroke, for the page, and as a table."""
 
 import io
 from typing import Any, Optional, Sequence
@@ -9,12 +9,12 @@ from typing import Any, Optional, Sequence
 import numpy as np
 
 from .poses import linkage_inputs, shown
-from ..c_code import header
 from ..linkage import ascending, sampled, theta_of
-from ..robot_model import urdf
 from ..scene import SceneError, SceneMechanism
 
 SAMPLES = 361
+# Tolerance of an end of the reach that is a dead point, as a fraction of a turn or a stroke.
+CLOSE = 1e-6
 # The quantities, and whether they are of outputs or of joints.
 KINDS = {'position': 'output', 'velocity': 'output', 'acceleration': 'output',
          'transmission angle': 'joint', 'force ratio': 'output'}
@@ -51,15 +51,17 @@ class Sweep:
         self._inputs, self._speeds, self._still = map(theta_of, (
             [values, *others], [1.0 / self._size, *still], [0.0, *still]))
         self.values, self.dead = values * self._size, np.multiply(dead, self._size)
-        # A full rotation has no ends.
-        self.ends = np.multiply([] if is_whole else np.ravel(reach), self._size)
+        # A full rotation has no ends, and an end that is a dead point is named as that.
+        self.ends = self._size * np.array([
+            end for end in np.ravel([] if is_whole else reach)
+            if not any(self.input.apart(end, point) < CLOSE * self.input.size for point in dead)])
 
     def names(self, kind: str) -> list[str]:
         """Return the joints with a transmission angle, or the outputs."""
         linkage = self.linkage
         if kind == TRANSMISSION:
             return list(linkage.transmission_angles(self._inputs))
-        return [*(name for name in linkage.joints if name not in self._mechanism.inputs),
+        return [*self._mechanism.assembly().joints,
                 *(f'{joint}.{axis}' for joint in linkage.points if joint not in linkage.grounded
                   for axis in 'xy')]
 
@@ -94,7 +96,7 @@ def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSIT
     """
     Return one of KINDS over the first input: x and y in `units`, y None where it has none.
 
-    `dead` are the dead points, `ends` those of the reach; y grows with the `power` of the
+    `dead` are the dead points, `ends` the other ends of the reach; y grows with the `power` of the
     input's speed.
     """
     sweep = Sweep(mechanism, present, dense_ends=True)
@@ -118,12 +120,8 @@ def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSIT
             'ends': sweep.ends.tolist(), 'dead': sweep.dead.tolist()}
 
 
-def exported(mechanism: SceneMechanism, present: Sequence[float], form: str, frame_id: str) -> str:
-    """Return a text: 'csv', all kinds of all outputs in rad and m; 'urdf'; or 'h', of C."""
-    if form == 'urdf':
-        return urdf.describe([mechanism], mechanism.frame_id or frame_id)
-    if form == 'h':
-        return header.written(mechanism)
+def table(mechanism: SceneMechanism, present: Sequence[float]) -> str:
+    """Return all kinds of all outputs over the first input as CSV, in rad and m."""
     sweep, text = Sweep(mechanism, present), io.StringIO()
     columns = {f'{sweep.input.name} [{sweep.input.unit}]': sweep.values, **{
         f'{kind} {name} [{sweep.unit(kind, name) or 1}]': values for kind in KINDS

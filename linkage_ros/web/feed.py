@@ -30,7 +30,7 @@ class Feed:
 
     Parameters
     ----------
-    mechanism : str
+    key : str
         Mechanism of the markers.
     topic : str
         Topic of the messages, which begins with the mechanism.
@@ -41,10 +41,10 @@ class Feed:
 
     """
 
-    def __init__(self, mechanism: str, topic: str, type_: type,
+    def __init__(self, key: str, topic: str, type_: type,
                  warn: Callable[[str, str], None]) -> None:
         self.newest: Optional[bytes] = None
-        self._mechanism, self._topic, self._type = mechanism, topic, type_
+        self._key, self._topic, self._type = key, topic, type_
         self._warn = warn
         self._converted: Optional[bytes] = None
         self._frame = b''
@@ -53,7 +53,7 @@ class Feed:
         """
         Return the markers of the newest message for the page.
 
-        A frame has the length of a header [bytes], uint32; the header, JSON: mechanism, topic and,
+        A frame has the length of a header [bytes], uint32; the header, JSON: key, topic and,
         for each of its `markers`, kind, points a piece, frame, pose (x, y, z, qx, qy, qz, qw),
         width [m], colour and number of points; then all points, float32 x, y, z. Numbers are
         little-endian.
@@ -76,7 +76,7 @@ class Feed:
         if not np.isfinite(points).all():
             raise ValueError('a number in it is not finite, or too large to be drawn')
         header = json.dumps({
-            'mechanism': self._mechanism, 'topic': self._topic[len(self._mechanism) + 1:],
+            'key': self._key, 'topic': self._topic[len(self._key) + 1:],
             'markers': list(map(_described, markers))}, allow_nan=False).encode()
         # The points are aligned.
         header += b' ' * (-len(header) % points.itemsize)

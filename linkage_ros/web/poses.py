@@ -12,7 +12,7 @@ import numpy as np
 from .nearest_pose import nearest_inputs
 from ..linkage import Formula, Mechanism, theta_of
 from ..robot_model.shapes import ground_frame
-from ..scene import Parameter, Scene, SceneError, SceneMechanism, slider
+from ..scene import Parameter, SceneError, SceneMechanism, slider
 from ..scene.scene_mechanism import divided
 from ..words import listed, quoted
 
@@ -39,22 +39,17 @@ def shown(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def name_in_mechanism(parameter: Parameter) -> str:
-    """Return the name of a parameter without its mechanism."""
-    return parameter.name.partition('.')[2]
-
-
-def setting(parameter: Parameter) -> dict[str, Any]:
+def setting(name: str, parameter: Parameter) -> dict[str, Any]:
     """
-    Describe a parameter for the page.
+    Describe a parameter for the page, by its name in its mechanism.
 
     The page has a control for it in a `group`, or none if that is empty.
     """
     field = parameter.field
     has_control = not field.read_only and field.kind in CONTROLLED
-    return {'name': name_in_mechanism(parameter), 'value': parameter.value,
-            'kind': field.kind, 'meaning': field.meaning, 'allowed': field.allowed,
-            'unit': field.unit, 'group': (field.group or 'more') if has_control else ''}
+    return {'name': name, 'value': parameter.value, 'kind': field.kind,
+            'meaning': field.meaning, 'allowed': field.allowed, 'unit': field.unit,
+            'group': (field.group or 'more') if has_control else ''}
 
 
 def drawn(mechanism: SceneMechanism, speeds: Mapping[str, float]) -> dict[str, Any]:
@@ -72,10 +67,10 @@ def drawn(mechanism: SceneMechanism, speeds: Mapping[str, float]) -> dict[str, A
         'sides': {name: mechanism.linkage.line_of(name).sides or SIGNS
                   for name in mechanism.linkage.branches},
         'inputs': {name: {
-            'unit': drive.input.unit, 'speed': speeds[name],
-            'ends': [min(low for low, _ in drive.arcs), max(high for _, high in drive.arcs)],
-            'turn': drive.input.turn if drive.input.wraps else None}
-            for name, drive in mechanism.inputs.items()}}
+            'unit': settings.input.unit, 'speed': speeds[name],
+            'ends': [min(low for low, _ in settings.arcs), max(high for _, high in settings.arcs)],
+            'turn': settings.input.turn if settings.input.wraps else None}
+            for name, settings in mechanism.inputs.items()}}
 
 
 def described(mechanism: SceneMechanism, present: Sequence[float]) -> dict[str, Any]:
@@ -85,9 +80,8 @@ def described(mechanism: SceneMechanism, present: Sequence[float]) -> dict[str, 
     Each input has its value; each output of the first leg has value, unit, and d output / d input
     for each input, zero where it is rounding.
     """
-    linkage, names = mechanism.linkage, [
-        *(name for name in mechanism.linkage.joints if name not in mechanism.inputs),
-        *(f'{mechanism.tracer}.{axis}' for axis in 'xy')]
+    linkage, tracer = mechanism.linkage, mechanism.tracer
+    names = [*mechanism.assembly().joints, f'{tracer}.x', f'{tracer}.y']
     theta = linkage_inputs(mechanism, present)
     values = linkage.joint_angles(theta, names)
     rates = {input_: linkage.joint_rates(theta, names, i)
@@ -122,8 +116,8 @@ def arrows(mechanism: SceneMechanism, present: Sequence[float], kind: str,
         efforts = mechanism.efforts(present) if mechanism.loads else ()
         return {'unit': 'N', 'at': {
             name: load for name, load in mechanism.loads.items() if not isinstance(load, float)},
-            'efforts': {name: [shown(effort), 'N·m' if drive.input.turns else 'N']
-                        for (name, drive), effort in zip(mechanism.inputs.items(), efforts)}}
+            'efforts': {name: [shown(effort), 'N·m' if settings.input.turns else 'N']
+                        for (name, settings), effort in zip(mechanism.inputs.items(), efforts)}}
     linkage, theta = mechanism.linkage, linkage_inputs(mechanism, present)
     rates = linkage_inputs(mechanism, [speeds[name] for name in mechanism.inputs])
     if kind == ACCELERATION:
@@ -179,17 +173,20 @@ def reached(mechanism: SceneMechanism, present: Sequence[float],
 
 def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
               value: float) -> Reached:
-    drive, ends = mechanism.inputs[name], mechanism.inputs[name].arcs
-    near = min((min(max(float(drive.input.beside(value, (low + high) / 2.0)), low), high)
-                for low, high in ends), key=lambda end: drive.input.apart(end, value))
-    whole = drive.input.is_whole(ends)
-    new = float(drive.input.wrapped(value)) if whole else near
+    settings, ends = mechanism.inputs[name], mechanism.inputs[name].arcs
+    input_ = settings.input
+    middles = ((low + high) / 2.0 for low, high in ends)
+    near = min((min(max(float(input_.nearest_equivalent(value, middle)), low), high)
+                for middle, (low, high) in zip(middles, ends)),
+               key=lambda end: input_.apart(end, value))
+    whole = input_.is_whole(ends)
+    new = float(input_.wrapped(value)) if whole else near
     inputs = [new if key == name else old for key, old in zip(mechanism.inputs, present)]
     places = mechanism.linkage.solve(linkage_inputs(mechanism, inputs))
     if not all(math.isfinite(part) for place in places.values() for part in place):
         raise SceneError(f'{mechanism.name} cannot be assembled there')
-    missed = not whole and drive.input.apart(near, value) > CLOSE * drive.input.size
-    return inputs, {'name': name, 'arcs': ends, 'unit': drive.input.unit} if missed else None
+    missed = not whole and settings.input.apart(near, value) > CLOSE * settings.input.size
+    return inputs, {'name': name, 'arcs': ends, 'unit': settings.input.unit} if missed else None
 
 
 def _output_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
@@ -197,15 +194,12 @@ def _output_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
     solution, _ = mechanism.follow((name,), (value,), present)
     if math.isfinite(solution[0]):
         return solution, None
-    linkage, size, (scale,) = mechanism.linkage, mechanism.scale_of(name), mechanism.scales
-    spans = linkage.extremes(name, [(low / scale, high / scale)
-                                    for low, high in mechanism.first.arcs])
-    turn = math.tau if linkage.is_angle(name) else math.inf
-    _, nearest = min((abs(math.remainder(extreme - value / size, turn)), at)
+    spans, is_angle = mechanism.extremes(name), mechanism.linkage.is_angle(name)
+    turn = math.tau if is_angle else math.inf
+    _, nearest = min((abs(math.remainder(extreme - value, turn)), at)
                      for span in spans for extreme, at in span)
-    return [nearest * scale], {
-        'name': name, 'unit': 'rad' if linkage.is_angle(name) else 'm',
-        'arcs': [(low * size, high * size) for (low, _), (high, _) in spans]}
+    return [nearest], {'name': name, 'unit': 'rad' if is_angle else 'm',
+                       'arcs': [(low, high) for (low, _), (high, _) in spans]}
 
 
 def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, place: Any,
@@ -217,8 +211,8 @@ def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, p
         mechanism.linkage, joint,
         [side * place[0] / mechanism.scale, place[1] / mechanism.scale],
         [start + side * (value / size - lag) for value, size in zip(present, sizes)],
-        [[sorted(start + side * (end / size - lag) for end in arc) for arc in drive.arcs]
-         for drive, size in zip(mechanism.inputs.values(), sizes)])
+        [[sorted(start + side * (end / size - lag) for end in arc) for arc in settings.arcs]
+         for settings, size in zip(mechanism.inputs.values(), sizes)])
     return [float(lag + side * (value - start)) * size for value, size in zip(inputs, sizes)]
 
 
@@ -227,19 +221,18 @@ def linkage_inputs(mechanism: SceneMechanism, values: Sequence[float]) -> Any:
     return theta_of(divided(values, mechanism.scales))
 
 
-def tunable(scene_: Scene, name: str) -> dict[str, Any]:
+def tunable(mechanism: SceneMechanism) -> dict[str, Any]:
     """
     Return the `travel` of a mechanism's parameters, and `bars` that follow its dimensions.
 
     By parameter, these are the ends of its slider, or None, and pairs of joints. `fixed` are the
     joints that do not move. This is slow.
     """
-    machine = scene_.machines[name]
-    return {'travel': {name_in_mechanism(parameter): slider.ends(scene_, parameter)
-                       for parameter in machine.parameters},
-            'fixed': list(machine.linkage.grounded),
-            'bars': {f'dimensions.{key}': _bars(machine.linkage, key)
-                     for key in machine.linkage.dimensions}}
+    linkage = mechanism.linkage
+    return {'travel': {parameter.name.partition('.')[2]: slider.ends(mechanism, parameter)
+                       for parameter in mechanism.parameters},
+            'fixed': list(linkage.grounded),
+            'bars': {f'dimensions.{key}': _bars(linkage, key) for key in linkage.dimensions}}
 
 
 def _bars(linkage: Mechanism, key: str) -> list[tuple[str, str]]:

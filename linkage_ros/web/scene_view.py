@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 import asyncio
-from collections import defaultdict
+from collections import ChainMap, defaultdict
 from contextlib import suppress
 from functools import partial
+from itertools import starmap
 import math
 import re
 from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence
@@ -25,10 +26,13 @@ from visualization_msgs.msg import Marker, MarkerArray
 from . import curves, poses
 from .feed import Feed
 from .. import scene
+from ..c_code import header
 from ..nodes import ownership
 from ..nodes.log import Throttle
 from ..nodes.parameters import typed
+from ..robot_model import urdf
 from ..scene import SceneError, SceneMechanism, writing
+from ..scene.inverse_request import present_inputs
 from ..words import quoted
 
 EVENTS_TYPE, INPUTS_TYPE = 'rcl_interfaces/msg/ParameterEvent', 'sensor_msgs/msg/JointState'
@@ -104,8 +108,8 @@ class SceneView:
         # Subscriptions and clients of services by name, feeds of markers by topic.
         self._entities: dict[str, Any] = {}
         self._feeds: dict[str, Feed] = {}
-        # The last position by topic and joint, from the executor's thread.
-        self._positions: dict[tuple[str, str], float] = {}
+        # The last position by topic, then by joint, from the executor's thread.
+        self._positions: dict[str, dict[str, float]] = defaultdict(dict)
 
     def add(self, client: Any) -> None:
         """Add a client; the first one starts the observation of the graph."""
@@ -132,7 +136,7 @@ class SceneView:
         self._is_stale = True
         self._keep({})
 
-    async def set(self, mechanism: str, values: Mapping[str, Any]) -> Answer:
+    async def set(self, key: str, values: Mapping[str, Any]) -> Answer:
         """
         Set parameters of a mechanism, those of one node all or none.
 
@@ -142,12 +146,10 @@ class SceneView:
             With the node's reason.
 
         """
-        shown = self._find(mechanism)
-        parameters = {poses.name_in_mechanism(parameter): parameter
-                      for parameter in self._settings(shown)}
-        requests: dict[str, list[Any]] = defaultdict(list)
-        for key, value in values.items():
-            parameter = parameters[key]
+        shown = self._find(key)
+        parameters, requests = self._settings(shown), defaultdict(list)
+        for name, value in values.items():
+            parameter = parameters[name]
             checked = parameter.field.checked(parameter.name, value)
             requests[shown.nodes[parameter.name]].append(
                 typed(parameter._replace(value=checked)).to_parameter_msg())
@@ -159,7 +161,7 @@ class SceneView:
                 raise SceneError(response.result.reason or f'{node} gives no reason')
         return {}
 
-    async def pose(self, mechanism: str, want: Optional[Mapping[str, Any]] = None,
+    async def pose(self, key: str, want: Optional[Mapping[str, Any]] = None,
                    arrows: str = '') -> Answer:
         """
         Describe a mechanism's pose; with a request, move it there first and hold it.
@@ -168,50 +170,47 @@ class SceneView:
         The result is that of `poses.described`, with requested arrows, and what is reached if the
         request is not met exactly.
         """
-        shown = self._find(mechanism)
-        (machine, inputs), reach = self._state(shown), None
+        shown = self._find(key)
+        (mechanism, inputs), reach = self._state(shown), None
         if want is not None:
-            inputs, reach = poses.reached(machine, inputs, dict(want))
-            await self._hold(shown, machine, inputs)
-        answer = {**poses.described(machine, inputs), 'reach': reach}
+            inputs, reach = poses.reached(mechanism, inputs, dict(want))
+            await self._hold(shown, mechanism, inputs)
+        answer = {**poses.described(mechanism, inputs), 'reach': reach}
         if arrows:
-            answer['arrows'] = poses.arrows(
-                machine, inputs, arrows, self._playing(shown.owner, machine))
+            answer['arrows'] = poses.arrows(mechanism, inputs, arrows, self._playing(shown))
         return answer
 
-    async def _hold(self, shown: ShownMechanism, machine: SceneMechanism,
+    async def _hold(self, shown: ShownMechanism, mechanism: SceneMechanism,
                     inputs: list[float]) -> None:
         """Stop the inputs at requested values."""
         values = {}
-        for (name, drive), value in zip(machine.inputs.items(), inputs):
-            if f'{machine.name}.{name}.start' not in shown.nodes:
+        for (name, settings), value in zip(mechanism.inputs.items(), inputs):
+            if f'{mechanism.name}.{name}.start' not in shown.nodes:
                 raise SceneError(f'the {name} cannot be moved: no crank_driver is running')
             # An input moves only to a start that differs from the last one.
-            values[f'{name}.start'] = value if value != drive.start else next(
+            values[f'{name}.start'] = value if value != settings.start else next(
                 near for near in (math.nextafter(value, way) for way in (-math.inf, math.inf))
-                if any(drive.input.holds(arc, near, near) for arc in drive.arcs))
+                if any(settings.input.holds(arc, near, near) for arc in settings.arcs))
             values[f'{name}.speed'] = 0.0
         await self.set(shown.key, values)
 
-    async def tune(self, mechanism: str) -> Answer:
+    async def tune(self, key: str) -> Answer:
         """Return the result of `poses.tunable`."""
-        shown = self._find(mechanism)
-        return await asyncio.to_thread(poses.tunable, self._scenes[shown.owner], shown.name)
+        return await asyncio.to_thread(poses.tunable, self._mechanism(self._find(key)))
 
-    async def curve(self, mechanism: str, **about: Any) -> Answer:
+    async def curve(self, key: str, **about: Any) -> Answer:
         """Return the result of `curves.curve`."""
-        return await asyncio.to_thread(
-            curves.curve, *self._state(self._find(mechanism)), **about)
+        return await asyncio.to_thread(curves.curve, *self._state(self._find(key)), **about)
 
-    async def export(self, mechanism: str, form: str) -> Answer:
-        """Return the result of `curves.exported`, or as 'yaml' the mechanism's scene."""
-        shown = self._find(mechanism)
-        whole = self._scenes[shown.owner]
-        if form == 'yaml':
-            return {'text': await asyncio.to_thread(self._saved, shown.owner)}
-        state = (whole.machines[shown.name], []) if form == 'h' else self._state(shown)
-        return {'text': await asyncio.to_thread(
-            curves.exported, *state, form, whole.frame_id)}
+    async def export(self, key: str, form: str) -> Answer:
+        """Return a file's text: 'yaml', the scene; 'csv', all outputs; 'urdf'; or 'h', of C."""
+        shown = self._find(key)
+        mechanism, frame_id = self._mechanism(shown), self._scenes[shown.owner].frame_id
+        write = {'yaml': lambda: self._saved(shown.owner),
+                 'csv': lambda: curves.table(*self._state(shown)),
+                 'urdf': lambda: urdf.describe([mechanism], mechanism.frame_id or frame_id),
+                 'h': lambda: header.written(mechanism)}[form]
+        return {'text': await asyncio.to_thread(write)}
 
     def _saved(self, owner: str) -> str:
         """Return a parameter file of a node's scene: its definition and changed values."""
@@ -219,8 +218,7 @@ class SceneView:
         names = {parameter.name for parameter in whole.parameters}
         # An input that was stopped is saved with the speed that it had.
         speeds = {name: speed for name, speed in self._speeds[owner].items() if name in names}
-        return writing.in_yaml(writing.without_defaults(
-            scene.changed(whole, speeds), DEFINES))
+        return writing.in_yaml(writing.without_defaults(scene.changed(whole, speeds), DEFINES))
 
     async def read(self, text: str) -> Answer:
         """Return the result of `poses.number`."""
@@ -253,17 +251,19 @@ class SceneView:
 
     def _state(self, shown: ShownMechanism) -> tuple[SceneMechanism, list[float]]:
         """Return a mechanism and its last received inputs [rad or m], or their starts."""
-        machine = self._scenes[shown.owner].machines[shown.name]
-        inputs = []
-        for name, drive in machine.inputs.items():
-            position = next((self._positions[topic, drive.source] for topic in shown.sources
-                             if (topic, drive.source) in self._positions), None)
-            if position is None and f'{machine.name}.{name}.start' not in shown.nodes:
-                raise SceneError(f'the {name} is not known yet: no message names {drive.source}')
-            value = drive.start if position is None else machine.from_source(
-                drive, position, None, None)[0]
-            inputs.append(value if math.isfinite(value) else drive.start)
-        return machine, inputs
+        mechanism = self._mechanism(shown)
+        positions = ChainMap(*(self._positions[topic] for topic in shown.sources))
+        for name, settings in mechanism.inputs.items():
+            if settings.source not in positions and (
+                    f'{shown.name}.{name}.start' not in shown.nodes):
+                raise SceneError(
+                    f'the {name} is not known yet: no message names {settings.source}')
+        return mechanism, [
+            value if math.isfinite(value) else settings.start for value, settings in zip(
+                present_inputs(mechanism, positions), mechanism.inputs.values())]
+
+    def _mechanism(self, shown: ShownMechanism) -> SceneMechanism:
+        return self._scenes[shown.owner].machines[shown.name]
 
     def _find(self, key: str) -> ShownMechanism:
         if key not in self._mechanisms:
@@ -276,24 +276,25 @@ class SceneView:
         for feed in [*self._feeds.values()]:
             client.offer(feed)
 
-    def _settings(self, shown: ShownMechanism) -> list[scene.Parameter]:
-        """Return the announced parameters of a mechanism."""
-        return [parameter
-                for parameter in self._scenes[shown.owner].machines[shown.name].parameters
-                if parameter.name in shown.nodes]
+    def _settings(self, shown: ShownMechanism) -> dict[str, scene.Parameter]:
+        """Return the announced parameters of a mechanism, by their names in it."""
+        return {parameter.name.partition('.')[2]: parameter
+                for parameter in self._mechanism(shown).parameters
+                if parameter.name in shown.nodes}
 
     def _described(self, shown: ShownMechanism) -> Answer:
         """Describe what the page needs of a mechanism beside its markers."""
-        machine = self._scenes[shown.owner].machines[shown.name]
+        mechanism = self._mechanism(shown)
         return {'key': shown.key, 'name': shown.name,
-                'curves': {} if machine.in_space else curves.KINDS,
-                'settings': list(map(poses.setting, self._settings(shown))),
-                **poses.drawn(machine, self._playing(shown.owner, machine))}
+                'curves': {} if mechanism.in_space else curves.KINDS,
+                'settings': list(starmap(poses.setting, self._settings(shown).items())),
+                **poses.drawn(mechanism, self._playing(shown))}
 
-    def _playing(self, owner: str, machine: SceneMechanism) -> dict[str, float]:
+    def _playing(self, shown: ShownMechanism) -> dict[str, float]:
         """Return the speeds of a mechanism when it plays: the last ones that were not zero."""
-        return {name: self._speeds[owner].get(f'{machine.name}.{name}.speed', drive.default_speed)
-                for name, drive in machine.inputs.items()}
+        return {name: self._speeds[shown.owner].get(
+            f'{shown.name}.{name}.speed', settings.default_speed)
+            for name, settings in self._mechanism(shown).inputs.items()}
 
     async def _watch(self) -> None:
         while True:
@@ -396,9 +397,9 @@ class SceneView:
 
     def _follow(self, topic: str) -> Any:
         def store(message: JointState) -> None:
-            self._positions.update(
-                ((topic, name), position) for name, position in zip(
-                    message.name, message.position) if math.isfinite(position))
+            self._positions[topic].update(
+                (name, position) for name, position in zip(message.name, message.position)
+                if math.isfinite(position))
 
         return self._node.create_subscription(JointState, topic, store, NEWEST)
 
@@ -419,7 +420,7 @@ class SceneView:
         for parameter in (*event.new_parameters, *event.changed_parameters):
             # Any node may announce values of unknown types.
             with suppress(RuntimeError):
-                values[parameter.name] = scene.plain(parameter_value_to_python(parameter.value))
+                values[parameter.name] = parameter_value_to_python(parameter.value)
         self._announced[event.node] = values
         if values.keys() != before.keys():
             self._is_stale = True

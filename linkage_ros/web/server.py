@@ -22,7 +22,7 @@ from aiohttp import web, WSCloseCode
 from .feed import Feed
 from .scene_view import SceneView
 from .. import palette
-from ..words import elided, quoted
+from ..words import elided, MESSAGE, quoted
 
 Message = dict[str, Any]
 
@@ -43,7 +43,6 @@ DRAWN = '"drawn"'
 REQUESTS = 'set', 'pose', 'tune', 'curve', 'export', 'read'
 # Size of a request; requests that wait; time in which a browser reads a message, and closes.
 MAX_BYTES, MAX_WAITING, MAX_READ_S, MAX_CLOSE_S = 1 << 16, 64, 10.0, 1.0
-MAX_REASON = 299
 
 
 class Server:
@@ -241,7 +240,7 @@ class Client:
                     raise ValueError(f'unknown request {quoted(op)}')
                 answer = await getattr(self._view, op)(**request)
             except ValueError as reason:
-                answer = {'reason': elided(str(reason), MAX_REASON)}
+                answer = {'reason': elided(str(reason), MESSAGE)}
             except Exception as error:
                 # Without an answer the browser would wait forever.
                 answer = {'reason': f'the request fails: {elided(repr(error), 200)}'}

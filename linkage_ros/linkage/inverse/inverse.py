@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from functools import cached_property
 import math
+from operator import add, sub
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -33,10 +34,8 @@ from ..kinematics import Kinematics
 from ..text.arguments import numbers
 from ..tolerances import SINGULAR
 from ...formula.namespace import array_function
+from ...formula.program import FEW_POSES
 from ...words import listed, plain_text, quoted
-
-# Few values are solved as floats.
-FEW = 32
 
 Ends = Optional[Sequence[Optional[Tuple[float, float]]]]
 
@@ -208,26 +207,13 @@ class Inverse:
 
         """
         seed = () if near is None else self._numbers(near, 'near', finite=True)
-        found = [row[:self._n] for row in self._all(self._numbers(values), seed)]
+        solutions = [row[:self._n] for row in self._all(self._numbers(values), seed)]
         if seed:
-            found = sorted(
-                (self.problem.nearest_equivalent(inputs, seed) for inputs in found),
-                key=lambda x: sum(((a - b) / size) ** 2 for a, b, size in zip(
-                    x, seed, self.problem.sizes)))
-        return [Solution(inputs, self) for inputs in found]
-
-    def _around(self, near: Sequence[float]) -> Tuple[Inverse, np.ndarray, np.ndarray]:
-        """
-        Return the inverse in the turns of some inputs, and these turns.
-
-        These are the angles [rad] of each input with zeros for its rates, and of each output.
-        """
-        turns = [float(input_.whole_turns(x)) if math.isfinite(x) else 0.0
-                 for input_, x in zip(self.inputs, near or [0.0] * self._n)]
-        start = {input_.name: math.tau * count for input_, count in zip(self.inputs, turns)}
-        return (inverse_of(self.linkage.turned(*turns), self.outputs) if any(turns) else self,
-                np.array([*start.values(), *[0.0] * self._n ** 2]),
-                np.array([start.get(name, 0.0) for name in self.outputs]))
+            solutions = sorted(
+                (self.problem.nearest_equivalent(inputs, seed) for inputs in solutions),
+                key=lambda inputs: sum(((x - y) / size) ** 2 for x, y, size in zip(
+                    inputs, seed, self.problem.sizes)))
+        return [Solution(inputs, self) for inputs in solutions]
 
     def over(self, *values: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
         """
@@ -241,57 +227,81 @@ class Inverse:
 
         """
         rows = np.broadcast_arrays(*self._each(values))
-        found = self._all_arrays(np.stack([row.ravel() for row in rows]))
-        found = np.moveaxis(found, 0, -1).reshape(len(found[0]), *rows[0].shape, len(found))
-        return found[:self._n], found[self._n:]
+        solutions = self._all_arrays(np.stack([row.ravel() for row in rows]))
+        solutions = np.moveaxis(solutions, 0, -1).reshape(
+            solutions.shape[1], *rows[0].shape, len(solutions))
+        return solutions[:self._n], solutions[self._n:]
 
-    def _all(self, values: Sequence[float], near: Sequence[float] = ()) -> List[Row]:
+    def _all(self, values: Row, seed: Row = ()) -> List[Row]:
+        """Return all solutions in order, those in the turns around `seed` if these are many."""
+        if seed and self._is_part:
+            return self._in_turns(values, seed, Inverse._solved)
+        return self._solved(values)
+
+    def _in_turns(self, values: Row, seed: Row, solve: Callable) -> List[Row]:
+        """
+        Return solve(inverse, values, seed) for the inverse in the turns around a seed.
+
+        Of an input with very many turns, an inverse has the solutions of those around zero.
+        """
+        if not all(map(math.isfinite, (*values, *seed))):
+            return []
+        turns = [input_.whole_turns(x) for input_, x in zip(self.inputs, seed)]
+        if not any(turns):
+            return solve(self, values, seed)
+        offsets = {input_.name: math.tau * count for input_, count in zip(self.inputs, turns)}
+        rows = solve(
+            inverse_of(self.linkage.turned(*turns), self.outputs),
+            tuple([x - offsets.get(name, 0.0) for name, x in zip(self.outputs, values)]),
+            tuple(map(sub, seed, offsets.values())))
+        return [(*map(add, row, offsets.values()), *row[self._n:]) for row in rows]
+
+    def _solved(self, values: Row, _: Row = ()) -> List[Row]:
         """Return all solutions in order, none for values that are not finite."""
-        if near and self._is_part:
-            inverse, turned, own = self._around(near)
-            if inverse is not self:
-                return [tuple((turned + row).tolist()) for row in inverse._all(
-                    (values - own).tolist())]
         if not all(map(math.isfinite, values)):
             return []
         problem = self.problem
-        if any(abs(x) > turn for x, turn in zip(values, problem.periods)):
-            values = problem.reduced(np.array(values)).tolist()
-        found = [row for candidate in self._source.candidates(values)
-                 if (row := refine(problem, values, candidate))]
-        return distinct(problem, found) if len(found) > 1 else found
+        values = problem.reduced(values)
+        return distinct(problem, [row for candidate in self._source.candidates(values)
+                                  if (row := refine(problem, values, candidate))])
 
-    def _all_arrays(self, values: np.ndarray, near: Any = ()) -> np.ndarray:
+    def _continued(self, values: Row, seed: Row) -> List[Row]:
+        """Return the solution that is continuous from a seed, if there is one."""
+        row = follow(self.problem, self.problem.reduced(values), seed, self._source)
+        return [row] if row else []
+
+    def _all_arrays(self, values: np.ndarray, seed: Any = ()) -> np.ndarray:
         """
         Return all solutions for values (outputs, m) in order, padded with NaN.
 
-        Each has the solutions of the turns around its `near` (inputs, m), if these are many.
+        Each has the solutions of the turns around its `seed` (inputs, m), if these are many.
         Their shape is (solutions, inputs and rates, m), with one solution at least.
         """
         problem, n, count = self.problem, self._n, values.shape[1]
-        if count <= FEW or isinstance(self._source, Grid) or self._is_part and len(near):
-            lists = [self._all(column[:n], column[n:])
-                     for column in np.vstack([values, *near]).T.tolist()]
-            found = np.full((max(map(len, lists), default=0) or 1, n + n * n, count), math.nan)
-            for k, solutions in enumerate(lists):
-                found[:len(solutions), :, k] = solutions or math.nan
-            return found
-        values = problem.reduced(values)
+        if count <= FEW_POSES or isinstance(self._source, Grid) or self._is_part and len(seed):
+            rows = [self._all(column[:n], column[n:])
+                    for column in map(tuple, np.vstack([values, *seed]).T.tolist())]
+            solutions = np.full((max(map(len, rows), default=0) or 1, n + n * n, count), math.nan)
+            for k, row in enumerate(rows):
+                solutions[:len(row), :, k] = row or math.nan
+            return solutions
+        values = problem.reduced_arrays(values)
         numbers, places, candidates = self._source.candidate_arrays(values)
-        found = np.full((numbers.max(initial=0) + 1, n + n * n, count), math.nan)
-        found[numbers, :, places] = refine_arrays(problem, values[:, places], candidates).T
-        return distinct_arrays(problem, found)
+        solutions = np.full((numbers.max(initial=0) + 1, n + n * n, count), math.nan)
+        solutions[numbers, :, places] = refine_arrays(problem, values[:, places], candidates).T
+        return distinct_arrays(problem, solutions)
 
     # --- arguments ---
 
     def _numbers(self, values: Any, name: str = 'values', finite: bool = False) -> Row:
         """Return one number for each output; raise ValueError if there are not as many."""
-        found = self._each(values, name)
-        if any(type(x) is not float and x.size != 1 for x in found):
+        parts = self._each(values, name)
+        if any(type(x) is not float and x.size != 1 for x in parts):
             raise self._miscounted(values, name)
-        if finite and not np.isfinite(found).all():
-            raise ValueError(f'{name} must be finite, got {quoted(list(map(float, found)))}')
-        return tuple([x if type(x) is float else x.item() for x in found])
+        row = tuple([x if type(x) is float else x.item() for x in parts])
+        if finite and not all(map(math.isfinite, row)):
+            raise ValueError(f'{name} must be finite, got {quoted([*row])}')
+        return row
 
     def _each(self, values: Any, name: str = 'values') -> Tuple[Any, ...]:
         """Return a float or an array for each output; raise ValueError if they are not that."""
@@ -299,8 +309,8 @@ class Inverse:
             values = np.atleast_1d(numbers(name, values))
         if len(values) != self._n:
             raise self._miscounted(values, name)
-        found = [x if type(x) is float else numbers(name, x) for x in values]
-        return tuple(x if type(x) is float or np.ndim(x) else float(x) for x in found)
+        parts = [x if type(x) is float else numbers(name, x) for x in values]
+        return tuple([x if type(x) is float or np.ndim(x) else float(x) for x in parts])
 
     def _miscounted(self, values: Any, name: str) -> ValueError:
         return ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
@@ -311,16 +321,15 @@ class Inverse:
         if ends is None:
             return ((),) * self._n
         try:
-            limits = tuple(
-                () if pair is None else tuple(map(float, pair)) for pair in ends)
-            if len(limits) == self._n and all(
-                    len(pair) == 2 and -math.inf < pair[0] <= pair[1] < math.inf
-                    for pair in limits if pair):
-                return limits
+            limits = tuple(() if pair is None else tuple(map(float, pair)) for pair in ends)
         except (TypeError, ValueError):
-            pass
-        raise ValueError('ends must be two finite numbers in order, or None, for each input, got '
-                         + quoted(ends))
+            limits = ()
+        if len(limits) != self._n or any(
+                len(pair) != 2 or not -math.inf < pair[0] <= pair[1] < math.inf
+                for pair in limits if pair):
+            raise ValueError('ends must be two finite numbers in order, or None, for each input, '
+                             'got ' + quoted(ends))
+        return limits
 
     # --- one of the solutions ---
 
@@ -361,9 +370,9 @@ class Inverse:
             return tuple(row[:n]), tuple(row[n:])
         rows = np.broadcast_arrays(*(*values, *seed))
         flat = np.stack([row.ravel() for row in rows])
-        chosen = self._choice.of(self._all_arrays(flat[:n], flat[n:]), flat[n:], limits)
-        found = [row.reshape(rows[0].shape) for row in chosen]
-        return tuple(found[:n]), tuple(found[n:])
+        chosen = [row.reshape(rows[0].shape) for row in self._choice.of(
+            self._all_arrays(flat[:n], flat[n:]), flat[n:], limits)]
+        return tuple(chosen[:n]), tuple(chosen[n:])
 
     def path(self, values: Sequence[ArrayLike], near: Optional[ArrayLike] = None,
              ends: Ends = None) -> Tuple[Any, Any]:
@@ -391,8 +400,8 @@ class Inverse:
             raise self._miscounted(values, 'values')
         solutions = self._all_arrays(np.stack(rows), np.repeat(
             np.reshape(seed, (-1, 1)), len(rows[0]), axis=1))
-        found = self._choice.along(solutions, seed, limits)
-        return tuple(found[:self._n]), tuple(found[self._n:])
+        chosen = self._choice.along(solutions, seed, limits)
+        return tuple(chosen[:self._n]), tuple(chosen[self._n:])
 
     def follow(self, values: ArrayLike, near: ArrayLike) -> Tuple[Row, Row]:
         """
@@ -414,14 +423,10 @@ class Inverse:
             leaves the reach.
 
         """
-        values, near = self._numbers(values), self._numbers(near, 'near')
-        inverse, turned, own = self._around(near)
-        problem, row = inverse.problem, None
-        if all(map(math.isfinite, (*values, *near))):
-            row = follow(problem, problem.reduced(values - own).tolist(), (
-                near - turned[:self._n]).tolist(), inverse._source)
-        found = tuple((turned + (row or math.nan)).tolist())
-        return found[:self._n], found[self._n:]
+        rows = self._in_turns(self._numbers(values), self._numbers(near, 'near'),
+                              Inverse._continued)
+        row, = rows or [(math.nan,) * (self._n + self._n ** 2)]
+        return row[:self._n], row[self._n:]
 
     # --- arrays of other packages ---
 

@@ -26,8 +26,10 @@ from ...cache import cached
 from ...formula.expression import argument, dimension, greater, nearest_integer, Real, real, where
 from ...formula.program import Pose, Program
 
-# The largest error of a solution, relative to rounding of outputs, and of inputs times rates.
-ACCEPTED = 64.0 * 2.0 ** -53
+# Errors of a solution, relative to rounding of outputs, and of inputs times rates: one rounding,
+# which no step betters, and the largest that is accepted.
+ROUNDED = 2.0 ** -53
+ACCEPTED = 64.0 * ROUNDED
 
 # The dimension of this name is the unit of lengths [m]; those of inputs' names are their units.
 LONGEST_BAR = '[longest bar]'
@@ -98,7 +100,13 @@ class InverseProblem:
             f'[{input_.name}]': size for input_, size in zip(self.inputs, self.sizes)}}, {},
             self.linkage.is_accelerated)
 
-    def reduced(self, values: np.ndarray) -> np.ndarray:
+    def reduced(self, values: Row) -> Row:
+        """Return values with large angles reduced to one period, exactly."""
+        if all([abs(x) <= turn for x, turn in zip(values, self.periods)]):
+            return values
+        return tuple(self.reduced_arrays(np.array(values)).tolist())
+
+    def reduced_arrays(self, values: np.ndarray) -> np.ndarray:
         """Return values (outputs, ...) with large angles reduced to one period, exactly."""
         values = np.array(values)
         for by, turn in enumerate(self.periods):
@@ -110,11 +118,10 @@ class InverseProblem:
                         np.sin(row / count), np.cos(row / count)))
         return values
 
-    def nearest_equivalent(self, inputs: Sequence[float], others: Sequence[float]
-                           ) -> Row:
+    def nearest_equivalent(self, inputs: Sequence[float], seed: Sequence[float]) -> Row:
         """Return inputs plus the whole periods that bring them closest to others."""
-        return tuple([x if turn == math.inf else x + turn * round((y - x) / turn)
-                      for x, y, turn in zip(inputs, others, self.turns)])
+        return tuple([input_.nearest_equivalent(x, y)
+                      for input_, x, y in zip(self.inputs, inputs, seed)])
 
     def scaled(self, jacobian: np.ndarray) -> np.ndarray:
         """Return a Jacobian in units of outputs and inputs."""

@@ -17,7 +17,7 @@ from typing import List, Optional, Sequence, Union
 
 import numpy as np
 
-from .problem import ACCEPTED, InverseProblem, Row
+from .problem import ACCEPTED, InverseProblem, ROUNDED, Row
 from .segments import Bracket
 from ..motion.curves import HALVINGS
 from ..tolerances import ONE, SINGULAR
@@ -41,7 +41,7 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
         best = at(*inputs, *values)
     for _ in range(HALVINGS):
         following = best[2 + n:2 + 2 * n]
-        if not (0.0 < best[0] <= FAR and sum([abs(x - y) / size for x, y, size in zip(
+        if best[1] <= ROUNDED or not (best[0] <= FAR and sum([abs(x - y) / size for x, y, size in zip(
                 following, inputs, problem.sizes)]) <= FAR):
             break
         trial = at(*following, *values)
@@ -70,6 +70,8 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Br
         if trial[0] < best[0]:
             best, best_x = trial, x
         elif best[1] <= ACCEPTED:
+            break
+        if best[1] <= ROUNDED:
             break
         low, high = (x, high) if gap * sign < 0.0 else (low, x)
         x = following if low < following < high else 0.5 * (low + high)
@@ -101,7 +103,7 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
         low, high, inputs, far = *candidates[:2], candidates[2:3], math.inf
     best = over(*inputs.clip(low, high), *values)
     left = ~np.isfinite(best).all(axis=0)
-    again = np.flatnonzero((best[0] > 0.0) & (best[0] <= far))
+    again = np.flatnonzero((best[1] > ROUNDED) & (best[0] <= far))
     for _ in range(HALVINGS):
         if not len(again):
             break
@@ -112,6 +114,7 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
         better = trial[0] < best[0, again]
         again = again[better]
         best[:, again] = trial[:, better]
+        again = again[best[1, again] > ROUNDED]
     solutions = best[2 + 2 * n:]
     left = (left | ~(best[1] <= ACCEPTED)) & ~(best[0] > far)
     solutions[:, ~(best[1] <= ACCEPTED)] = math.nan
@@ -130,10 +133,12 @@ def _same(problem: InverseProblem, one: Row, other: Row) -> bool:
     They are if they are as near as ONE, or if they are nearly as near as half of all digits and
     the rates say that the outputs differ by no more than ONE.
     """
-    n = problem.n
-    steps = [math.remainder(x - y, turn) for x, y, turn in zip(one, other, problem.turns)]
-    away = max([abs(step) / size for step, size in zip(steps, problem.sizes)])
-    return away <= ONE or away <= SINGULAR and any(
+    n, steps = problem.n, []
+    for x, y, turn, size in zip(one, other, problem.turns, problem.sizes):
+        steps.append(math.remainder(x - y, turn))
+        if not abs(steps[-1]) <= SINGULAR * size:
+            return False
+    return all(abs(step) <= ONE * size for step, size in zip(steps, problem.sizes)) or any(
         all(abs(sum(rate * step for rate, step in zip(row[n + i::n], steps))) <= ONE * scale
             for i, scale in enumerate(problem.scales)) for row in (one, other))
 
@@ -143,7 +148,7 @@ def distinct(problem: InverseProblem, solutions: Sequence[Row]) -> List[Row]:
     distinct: List[Row] = []
     for row in sorted(solutions):
         # Of one input only neighbours can be one, a turn apart too.
-        others = distinct if problem.n > 1 else distinct[-1:] + distinct[:1]
+        others = distinct if problem.n > 1 else {*distinct[-1:], *distinct[:1]}
         if not any(_same(problem, row, other) for other in others):
             distinct.append(row)
     return distinct

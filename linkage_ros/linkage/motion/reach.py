@@ -63,7 +63,11 @@ def _reach(linkage: Kinematics, others: Tuple[float, ...]) -> List[Arc]:
         # The linkage may be assembled differently a turn later: the arcs then end at -pi and pi.
         ends.append(input_.low)
     if any(x.margin.varies and x not in closed for x in limits):
-        ends += [end for arc in input_.between(ends) for end in _limits(margins, *arc)]
+        # Beyond an end in closed form the limit holds for its tolerance, which moves no end.
+        rows = [i for i, limit in enumerate(limits) if limit in closed]
+        ends += [end for lo, hi in input_.between(ends)
+                 if (margins(np.array([lo + INSIDE * (hi - lo)]))[rows] >= 0.0).all()
+                 for end in _limits(margins, lo, hi)]
     arcs = reachable_arcs(ends, assembled, input_, lambda: is_periodic(
         over_first(linkage, 'points', linkage.points, others), input_))
     if not input_.is_whole(arcs):

@@ -92,7 +92,7 @@ connect({
   picture(buffer) {
     for (let from = 0; from < buffer.byteLength;) {
       const length = new DataView(buffer).getUint32(from, true);
-      const { mechanism: key, topic, markers } = JSON.parse(text.decode(new Uint8Array(buffer, from + 4, length)));
+      const { key, topic, markers } = JSON.parse(text.decode(new Uint8Array(buffer, from + 4, length)));
       from += 4 + length;
       for (const marker of markers) {
         const count = 3 * marker.points;
@@ -138,6 +138,7 @@ function show(key) {
   picture.show(selected);
   panel.show(selected, several && !key);
   names.parentElement.hidden = selected.length !== 1 || selected[0].legs > 1;
+  arrows.parentElement.hidden = selected.every(({ space }) => space);
   draw();
 }
 

@@ -35,7 +35,7 @@ export class Mechanism {
 
   /** Request something of the mechanism; return the answer. */
   ask(op, fields) {
-    return ask({ op, mechanism: this.key, ...fields });
+    return ask({ op, key: this.key, ...fields });
   }
 
   value(name) {
