@@ -31,6 +31,11 @@ def is_distinct(names: Sequence[str]) -> bool:
     return 0 < len(names) == len(set(names))
 
 
+def is_pose(numbers: Sequence[float]) -> bool:
+    """Return whether there are the six numbers of a pose."""
+    return len(numbers) == 6
+
+
 TYPE = Field('string', 'Type of the mechanism.', read_only=True, choices=TYPES,
              rule=f'one of {", ".join(TYPES)}')
 JOINTS = Field('string_array', 'The linkage, one line per joint.', default=(), read_only=True)
@@ -49,7 +54,7 @@ POINTS = Field('string_array', 'Joints that markers display.', readers=(KINEMATI
                holds=is_distinct, rule='each once')
 POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
              'x, y, z [m], roll, pitch, yaw [rad].', default=(0.0,) * 6, readers=(KINEMATICS,),
-             rule='six of them', holds=lambda numbers: len(numbers) == 6)
+             rule='six of them', holds=is_pose)
 # Names of frames are as free as those of links in URDF; tf2 forbids a leading slash.
 FRAME = Field(
     'string', "Frame that its pose is in; empty: the scene's.", default='', readers=(KINEMATICS,),
