@@ -8,7 +8,6 @@ import json
 from pathlib import Path
 import pkgutil
 import re
-import shlex
 import shutil
 import subprocess
 import sys
@@ -25,7 +24,6 @@ PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').glob('*.md'), *(
 MADE = {ROOT / 'docs' / 'mechanisms' / f'{name}.md'
         for name in ('index', 'constructions', *mechanisms.TYPES)}
 LINK = re.compile(r'!?\[[^]]*\]\(([^)\s]+)\)')
-RENDER = re.compile(r'\$ (?:python -m linkage_ros\.render|ros2 run linkage_ros render) (.*)')
 FENCE = re.compile(r'^```(\w*)\n(.*?)^```', re.MULTILINE | re.DOTALL)
 
 
@@ -68,53 +66,29 @@ def test_every_link_inside_the_repository_leads_somewhere(page, kept):
             assert not place or target.suffix != '.md' or place in anchors(target), link
 
 
-COMMAND = re.compile(
-    r'^ *(?:\$ )?((?:timeout \d+ )?(?:ros2|python3?|make|pip|colcon|rosdep|apt|sudo|source|rviz2'
-    r'|git|cd|cc|sed|\./\w+)\b [^=\n].*)', re.MULTILINE)
-# Programs of others: what is asked of them cannot be looked up here.
-FOREIGN = {'pip', 'colcon', 'rosdep', 'sudo', 'source', 'rviz2', 'git', 'cd', 'cc', 'sed', 'apt',
-           './jaw'}
-OTHERS = {'robot_state_publisher', 'rqt_reconfigure', 'ros_gz_sim'}
-
-
-def typed():
-    """Yield a page and the words of each command that it says to type."""
-    for page in PAGES:
-        fenced = '\n'.join(blocks(page, 'console'))
-        indented = '\n'.join(re.findall(r'^    .*', FENCE.sub('', page.read_text()), re.MULTILINE))
-        for line in COMMAND.findall(re.sub(r'\\\n *', ' ', f'{fenced}\n{indented}')):
-            words = shlex.split(line.partition(' #')[0].partition(' > ')[0])
-            yield page, words[2:] if words[0] == 'timeout' else words
-
-
 def test_what_a_page_says_to_type_is_there():
-    targets = set(re.findall(r'^([a-z]+):', (ROOT / 'Makefile').read_text(), re.MULTILINE))
-    executables = set(re.findall(r"'(\w+)': '[\w.]+:\w+'", (ROOT / 'setup.py').read_text()))
-    launched = {file.name for file in (*ROOT.glob('launch/*'), *ROOT.glob('examples/*'))}
-    for page, words in typed():
-        match words:
-            case ['make', *rest]:
-                assert {word for word in rest if '=' not in word} <= targets, (page, words)
-            case ['ros2', 'run', package, executable, *_]:
-                assert package in OTHERS or executable in executables, (page, words)
-            case ['ros2', 'launch', 'linkage_ros', file, *rest]:
-                assert file in launched, (page, words)
-                sources = ''.join(f.read_text() for f in ROOT.glob('*/*.launch.py'))
-                for argument in rest:
-                    assert f"'{argument.partition(':=')[0]}'" in sources, (page, words)
-            case ['ros2', 'topic' | 'param' | 'service', *_]:
-                pass
-            case ['python' | 'python3', '-m', module, *_]:
-                path = ROOT / module.replace('.', '/')
-                assert (path.with_suffix('.py').exists() or (path / '__main__.py').exists()
-                        or module == 'pytest'), (page, words)
-            case ['python', file, *_]:
-                assert (ROOT / file).exists(), (page, words)
-            case [program, *_]:
-                assert program in FOREIGN, (page, words)
-        for word, file in zip(words, words[1:]):
-            if word == '--params-file' and file.startswith(('config/', 'examples/')):
-                assert (ROOT / file).exists(), (page, words)
+    def files(*patterns):
+        return {str(file.relative_to(ROOT)) for each in patterns for file in ROOT.glob(each)}
+
+    makefile, setup = ((ROOT / name).read_text() for name in ('Makefile', 'setup.py'))
+    launch = files('launch/*.launch.py', 'examples/*.launch.py')
+    modules = {re.sub(r'(/__main__|/__init__)?\.py$', '', file).replace('/', '.')
+               for file in files('linkage_ros/**/*.py', 'benchmark/**/*.py')}
+    there = {
+        r'(?:^ +|`|[$&] )make ([a-z]+)': re.findall(r'^([a-z]+):', makefile, re.MULTILINE),
+        r'ros2 run linkage_ros ([a-z]\w*)': re.findall(r"'(\w+)': '[\w.]+:\w+'", setup),
+        r'ros2 launch linkage_ros (\S+)': {Path(file).name for file in launch},
+        r'(?<!-[rp]) (\w+):=': re.findall(
+            r"'(\w+)'", ''.join((ROOT / file).read_text() for file in launch)),
+        r'python3? -m ((?:linkage_ros|benchmark)[\w.]*)': modules,
+        r'python3? (\w+/\S+\.py)': files('*/*.py'),
+        # A recipe writes one of them.
+        r'((?:config|examples)/[\w/]+(?:\.[a-z]+)+)': files('config/*', 'examples/**/*') | {
+            'config/roberts.yaml'}}
+    for page in PAGES:
+        for what, known in there.items():
+            typed = set(re.findall(what, page.read_text(), re.MULTILINE))
+            assert typed <= set(known), (page, what, typed - set(known))
 
 
 def test_the_first_pages_and_the_head_of_all_say_what_to_type_without_ros2():
@@ -191,14 +165,6 @@ def test_the_example_of_a_scene_file_is_a_scene(page):
     assert list(scene.read(given).machines) == given['mechanisms']
 
 
-def test_every_page_is_in_the_navigation():
-    listed = {(index.parent / name).resolve() for index in PAGES if index.stem == 'index'
-              for tree in re.findall(r'^```{toctree}\n(.*?)^```', index.read_text(),
-                                     re.MULTILINE | re.DOTALL) for name in tree.split()}
-    pages = {page.with_suffix('') for page in PAGES if page.parent != ROOT}
-    assert pages - {ROOT / 'docs' / 'index'} <= listed
-
-
 @pytest.mark.parametrize('type_', list(mechanisms.TYPES))
 def test_the_page_of_a_mechanism_has_all_of_it(catalogue, type_):
     page, linkage = catalogue.page(type_), mechanisms.create(type_)
@@ -238,9 +204,8 @@ def measured(monkeypatch):
 
 def test_what_a_scene_costs_is_what_was_measured(measured):
     results = json.loads((ROOT / 'benchmark' / 'results' / 'nodes.json').read_text())
-    benchmark = measured
-    assert benchmark.document.written('design/performance.md') == benchmark.nodes.report.document(
-        results).strip()
+    made = measured.nodes.report.document(results).strip()
+    assert measured.document.written('design/performance.md') == made
 
 
 def test_what_is_measured_is_of_a_commit():
@@ -250,8 +215,8 @@ def test_what_is_measured_is_of_a_commit():
 
 
 JOURNEYS = {
-    'The life of a crank message': lambda graph, node, crank, heard: crank([0.4], heard),
-    'A change of a parameter': lambda graph, node, crank, heard: graph.set(node, m__scale=2.0)}
+    'The life of a crank message': lambda graph, node, crank, received: crank([0.4], received),
+    'A change of a parameter': lambda graph, node, crank, received: graph.set(node, m__scale=2.0)}
 
 
 @pytest.mark.parametrize('heading', JOURNEYS)
@@ -268,13 +233,13 @@ def test_the_files_of_a_journey_are_those_that_run(graph, heading):
         '\n## ')[0], re.MULTILINE)
     named = {file for step in steps for file in re.findall(r'`((?:nodes|scene)/\w+\.py)`', step)}
     node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': 'jansen'})
-    crank, heard = graph.crank(['m_crank']), graph.listen(JointState, 'm/joint_states')
+    crank, received = graph.crank(['m_crank']), graph.listen(JointState, 'm/joint_states')
     announced = graph.listen(ParameterEvent, ownership.TOPIC, ownership.LATCHED)
     # The last that the worker does at a start.
     described = graph.listen(String, 'robot_description', ownership.LATCHED)
     graph.until(lambda: announced and described)
     for angle in (0.2, 0.3):
-        crank([angle], heard)
+        crank([angle], received)
     ran, room = set(), str(ROOT / 'linkage_ros') + '/'
 
     def called(frame, event, _):
@@ -283,7 +248,7 @@ def test_the_files_of_a_journey_are_those_that_run(graph, heading):
 
     sys.setprofile(called)
     try:
-        JOURNEYS[heading](graph, node, crank, heard)
+        JOURNEYS[heading](graph, node, crank, received)
     finally:
         sys.setprofile(None)
     assert len(named) >= 5 and named <= ran, named - ran
@@ -307,14 +272,3 @@ def test_every_call_that_the_pages_show_is_timed(measured, tmp_path, monkeypatch
     timed = [re.split(r' ?\| ', line)[1:3] for line in document.written(
         'design/performance.md', 'measured: calls').splitlines()[2:] if line.startswith('|')]
     assert timed == shown and len(shown) > 20
-
-
-def test_a_broken_link_is_found(tmp_path):
-    (tmp_path / 'a.html').write_text('<p id="x"><a href="b.html#y"><a href="#x"><a href="#z">'
-                                     '<img src="c.png"><a href="https://example.org/d">')
-    (tmp_path / 'b.html').write_text('<p id="y"><a href="a.html#x">')
-    ended = subprocess.run([sys.executable, str(ROOT / 'docs' / 'links.py'), str(tmp_path)],
-                           capture_output=True, text=True, timeout=60)
-    assert ended.returncode == 1
-    said = [line.split(': ')[1].split()[0] for line in ended.stderr.splitlines()]
-    assert said == ['#z', 'c.png']

@@ -54,25 +54,25 @@ class Reader:
     def __init__(self, graph, capsys):
         self._graph, self._capsys = graph, capsys
         self._nodes, self._python = {}, {}
-        self.heard = []
+        self.received = []
 
     def follow(self, page):
-        """Save the files of a page, run its commands; return what the last one gave back."""
-        gave = None
+        """Save the files of a page, run its commands; return the result of the last one."""
+        result = None
         for file, language, text in BLOCK.findall((DOCS / f'{page}.md').read_text()):
             if file:
                 Path(file).write_text(text)
             if language == 'console':
                 text = re.sub(r'\\\n *', '', text)
                 for line, printed in re.findall(r'^\$ (.*)\n((?:[^$].*\n)*)', text, re.MULTILINE):
-                    gave = self._type(line, printed)
+                    result = self._type(line, printed)
             elif language == 'python' and '>>>' in text:
                 test = doctest.DocTestParser().get_doctest(text, self._python, page, page, 0)
                 assert not doctest.DocTestRunner().run(test, clear_globs=False).failed
                 self._python = test.globs
             elif language == 'python':
                 exec(compile(text, page, 'exec'), {})
-        return gave
+        return result
 
     def _type(self, line, printed):
         line, _, file = line.replace('$PWD', str(Path.cwd())).partition(' > ')
@@ -84,38 +84,40 @@ class Reader:
                 return self._echo(topic, wait=not line.endswith('&'))
             case ['ros2', 'topic', 'pub', '--once', topic, type_, text] | \
                     ['ros2', 'topic', 'pub', '-r', _, topic, type_, text]:
-                publisher = self._graph.node.create_publisher(found(type_), topic, 10)
-                message = found(type_)(**yaml.safe_load(text))
-                return self._graph.until(lambda: self.heard or publisher.publish(message))[0]
+                publisher = self._graph.node.create_publisher(message_type(type_), topic, 10)
+                message = message_type(type_)(**yaml.safe_load(text))
+                return self._graph.until(lambda: self.received or publisher.publish(message))[0]
             case ['ros2', 'param', 'set', node, name, value]:
                 result = self._graph.set(self._nodes[node], **{name: yaml.safe_load(value)})
                 assert result.successful, result.reason
                 return result
             case ['ros2', 'service', 'call', name, type_, text]:
-                client = self._graph.node.create_client(found(type_), name)
-                return self._graph.call(client, found(type_).Request(**yaml.safe_load(text)))
+                service = message_type(type_)
+                client = self._graph.node.create_client(service, name)
+                return self._graph.call(client, service.Request(**yaml.safe_load(text)))
             case ['ros2', 'run', 'linkage_ros', name, *args] if name in NODES:
                 node = self._graph.start(NODES[name], cli_args=args)
                 self._nodes[node.get_fully_qualified_name()] = node
                 return node
             case ['ros2', 'run', 'linkage_ros', name, *args] | ['python', '-m', name, *args]:
                 assert COMMANDS[name](args) == 0
-                said = self._capsys.readouterr().out
+                output = self._capsys.readouterr().out
                 if file:
-                    Path(file).write_text(said)
-                return said
-        said = subprocess.run(words, check=True, timeout=60, text=True, stdout=subprocess.PIPE)
-        assert said.stdout == printed
-        return said.stdout
+                    Path(file).write_text(output)
+                return output
+        output = subprocess.run(
+            words, check=True, timeout=60, text=True, stdout=subprocess.PIPE).stdout
+        assert output == printed
+        return output
 
     def _echo(self, topic, wait):
         types = self._graph.until(
             lambda: dict(self._graph.node.get_topic_names_and_types()).get(topic))
-        self.heard = self._graph.listen(found(types[0]), topic)
-        return self._graph.until(lambda: self.heard)[0] if wait else None
+        self.received = self._graph.listen(message_type(types[0]), topic)
+        return self._graph.until(lambda: self.received)[0] if wait else None
 
 
-def found(type_):
+def message_type(type_):
     """Return a type of messages or services by its name."""
     package, kind, name = type_.split('/')
     return getattr(import_module(f'{package}.{kind}'), name)
@@ -177,7 +179,7 @@ def test_a_knee_under_a_trajectory_controller(reader):
 
 def test_a_flap_is_put_where_a_planner_wants_it(reader):
     controlled = reader.follow('commands')
-    command = reader.heard[0]
+    command = reader.received[0]
     assert command.name == ['servo']
     crank = 0.5 * command.position[0]
     lever = math.atan2(80.0 * math.sin(crank), 150.0 + 80.0 * math.cos(crank))

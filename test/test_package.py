@@ -23,7 +23,7 @@ import setuptools
 ROOT = Path(__file__).parents[1]
 
 
-def handed(monkeypatch, *command):
+def setup_arguments(monkeypatch, *command):
     """Return what setup.py hands to setup() in a command."""
     found = {}
     monkeypatch.chdir(ROOT)
@@ -104,31 +104,23 @@ def test_the_workflow_runs_what_has_to_be_green():
 
 
 def pins(file):
-    """Return {package: {versions}} of a requirement file, and what of it has no hash."""
-    lines = file.read_text().replace('\\\n', ' ').splitlines()
-    found, bare = {}, []
-    for line in lines:
-        if line.strip() and not line.lstrip().startswith('#'):
-            name, version = re.match(r'([\w.-]+)(?:\[\w+\])?==([\w.+!]+)', line).groups()
-            found.setdefault(name.lower(), set()).add(version)
-            if not re.search(r'--hash=sha256:[0-9a-f]{64}', line):
-                bare.append(line)
-    return found, bare
+    """Return (package, version, whether there is a hash) of each line of a requirement file."""
+    pin = re.compile(r'([\w.-]+)(?:\[\w+\])?==([\w.+!]+)(.*--hash=sha256:[0-9a-f]{64})?')
+    lines = without_comments(file.read_text()).replace('\\\n', ' ').splitlines()
+    found = [pin.match(line).groups() for line in lines if line.strip()]
+    return [(name.lower(), version, bool(hashed)) for name, version, hashed in found]
 
 
 def test_all_that_make_installs_is_locked_with_hashes():
     makefile, script = ((ROOT / name).read_text() for name in ('Makefile', 'wheels/install.sh'))
     assert not re.search(r'pip\b.* install', makefile)
     assert len(re.findall(r'pip install', script)) == 1 and '--require-hashes' in script
-    locked = set()
-    for file in (ROOT / 'wheels' / 'lock').glob('*.txt'):
-        found, bare = pins(file)
-        assert found and not bare
-        locked |= {(name, version) for name in found for version in found[name]}
-    asked = [*(ROOT / 'wheels').glob('*.txt'), ROOT / 'docs' / 'requirements.txt',
-             *(ROOT / 'benchmark').glob('*.txt')]
-    assert {(name, version) for file in asked for name, versions in pins(file)[0].items()
-            for version in versions} <= locked
+    locked = {file: pins(file) for file in (ROOT / 'wheels' / 'lock').glob('*.txt')}
+    assert all(found and all(hashed for *_, hashed in found) for found in locked.values())
+    direct = [*(ROOT / 'wheels').glob('*.txt'), ROOT / 'docs' / 'requirements.txt',
+              *(ROOT / 'benchmark').glob('*.txt')]
+    assert {pin[:2] for file in direct for pin in pins(file)} <= {
+        pin[:2] for found in locked.values() for pin in found}
 
 
 def test_actions_are_pinned_by_commit():
@@ -145,7 +137,7 @@ def test_a_robot_without_a_screen_installs_nothing_to_look_at_it_with():
 
 def test_every_executable_can_be_called(monkeypatch):
     pytest.importorskip('rclpy')
-    lines = handed(monkeypatch, 'install')['entry_points']['console_scripts']
+    lines = setup_arguments(monkeypatch, 'install')['entry_points']['console_scripts']
     executables = [EntryPoint(*re.split(r'\s*=\s*', line), 'console_scripts') for line in lines]
     assert {'crank_driver', 'kinematics', 'servo_inverse'} <= {e.name for e in executables}
     assert all(callable(e.load()) for e in executables)
@@ -153,7 +145,7 @@ def test_every_executable_can_be_called(monkeypatch):
 
 @pytest.mark.parametrize('command', ['bdist_wheel', 'dist_info', 'editable_wheel'])
 def test_pip_puts_no_command_on_the_path(monkeypatch, command):
-    assert handed(monkeypatch, command)['entry_points'] == {'console_scripts': []}
+    assert setup_arguments(monkeypatch, command)['entry_points'] == {'console_scripts': []}
 
 
 @pytest.fixture
@@ -178,10 +170,9 @@ def test_a_wheel_has_the_library_and_the_page_and_no_commands(copy, tmp_path):
     wheel, = tmp_path.glob('*.whl')
     with zipfile.ZipFile(wheel) as packed:
         names = packed.namelist()
-    assert 'linkage_ros/mechanisms/jansen.py' in names
-    assert 'linkage_ros/web/page/vendor/LICENSE' in names
-    assert 'linkage_ros/py.typed' in names
-    assert any(name.startswith('linkage_ros/web/page/') for name in names)
+    assert {f'linkage_ros/{name}' for name in (
+        'mechanisms/jansen.py', 'web/page/index.html', 'web/page/vendor/LICENSE', 'py.typed',
+    )} <= set(names)
     assert not any(name.endswith('entry_points.txt') or 'scripts/' in name for name in names)
 
 

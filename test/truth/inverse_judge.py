@@ -52,7 +52,8 @@ class Output:
         inputs = [theta, *(np.full_like(theta, other) for other in self.others)]
         value = self.linkage.joint_angles(inputs if self.others else theta, (self.name,))[
             self.name]
-        margins = self.linkage.margins(*(each.ravel() for each in inputs))
+        margins = self.linkage.bound('margins', ()).searched(
+            *(each.ravel() for each in inputs))
         return np.where((margins >= 0.0).all(axis=0).reshape(theta.shape), value, np.nan)
 
     def away(self, value, other):
