@@ -568,6 +568,11 @@ def test_a_larger_picture_has_wider_lines_and_all_have_equal_margins():
     assert margins['h_pad'] == margins['w_pad'] > 0.0
 
 
+def test_the_grid_has_its_colour_of_the_palette():
+    axes, = picture_of(machine('four_bar'), parts=frozenset({'axes'})).figure.axes
+    assert {line.get_color() for line in axes.get_xgridlines()} == {palette.GRID}
+
+
 def test_the_joints_of_a_plate_are_in_their_order_around_it():
     corners = [(3.0, 2.0), (5.0, 2.2), (5.3, 4.0), (4.1, 5.0), (2.7, 3.6)]
     for order in itertools.permutations(range(5)):

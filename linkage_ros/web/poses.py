@@ -175,7 +175,7 @@ def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
     arcs, input_ = mechanism.inputs[name].arcs, mechanism.inputs[name].input
     is_whole = input_.is_whole(arcs)
     nearest = [float(input_.wrapped(value))] if is_whole else [
-        min(max(float(input_.nearest_equivalent(value, 0.5 * (low + high))), low), high)
+        min(max(input_.nearest_equivalent(value, 0.5 * (low + high)), low), high)
         for low, high in arcs]
     new = min(nearest, key=lambda end: input_.apart(end, value))
     inputs = [new if key == name else old for key, old in zip(mechanism.inputs, present)]

@@ -102,7 +102,7 @@ class InverseProblem:
 
     def reduced(self, values: Row) -> Row:
         """Return values with large angles reduced to one period, exactly."""
-        if all([abs(x) <= turn for x, turn in zip(values, self.periods)]):
+        if all(abs(x) <= turn for x, turn in zip(values, self.periods)):
             return values
         return tuple(self.reduced_arrays(np.array(values)).tolist())
 
