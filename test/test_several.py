@@ -141,6 +141,7 @@ def test_next_to_a_fold_both_searched_solutions_are_found_and_at_it_one():
         values = [*map(float, linkage.joint_angles((first, second), inverse.outputs).values())]
         assert min(math.dist(answer.inputs, (first, second)) for answer in inverse.all(
             values)) < 1e-9
+    assert {type(x) for answer in inverse.all(values) for x in answer.inputs} == {float}
     # Where the height is greatest, at a given direction.
     low, high = -1.7716184764128091, -1.7514567660906157
     for _ in range(60):
