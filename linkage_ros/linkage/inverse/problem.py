@@ -24,7 +24,7 @@ from ..motion.curves import LEAST
 from ..tolerances import SINGULAR
 from ...cache import cached
 from ...formula.expression import argument, dimension, greater, nearest_integer, Real, real, where
-from ...formula.program import Pose, Program
+from ...formula.program import CompiledFunction, Program
 
 # Errors of a solution, relative to rounding of outputs, and of inputs times rates: one rounding,
 # which no step betters, and the largest that is accepted.
@@ -92,7 +92,7 @@ class InverseProblem:
                                for row, angular, scale in rows])
 
     @cached_property
-    def newton(self) -> Pose:
+    def newton(self) -> CompiledFunction:
         """Return the code for a step of Newton's method; see `newton`."""
         program = newton(self.linkage.structure, self.outputs, tuple(self.periods),
                          tuple(self.turns))
