@@ -128,7 +128,7 @@ class Kinematics(scene_node.SceneNode):
                   if model.robot and not model.mechanism.only_named]
         text = ''
         try:
-            text = urdf.write(bodies.together(robots)) if robots else ''
+            text = urdf.write(bodies.merged(robots)) if robots else ''
         except scene.SceneError as error:
             self.get_logger().info(f'the whole scene has no robot_description: {error}', once=True)
         return partial(self._scene_joint_states.describe, text)

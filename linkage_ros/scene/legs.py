@@ -15,7 +15,7 @@ from typing import Any, List, Optional, Sequence, Union
 
 import numpy as np
 
-from ..formula.program import Batch, Pose
+from ..formula.program import Batch, CompiledFunction
 from ..linkage import Leg, LinkPoint, Mechanism, sampled
 
 # Even samples of a locus: no corner is seen, unless bars fold flat but for some 1e-5 of them.
@@ -38,7 +38,7 @@ class Solution:
 
     """
 
-    def __init__(self, legs: Sequence[Leg], function: Pose, inputs: int,
+    def __init__(self, legs: Sequence[Leg], function: CompiledFunction, inputs: int,
                  sizes: Sequence[int], speeds: int, efforts: int):
         parts = [(part, float, (size,)) for part, size in zip(
             ('coordinates', 'angles', 'rates'), sizes)]
