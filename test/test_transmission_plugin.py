@@ -425,7 +425,7 @@ def test_passive_joints_have_states_where_there_are_handles(plugins, name, renam
     before = component.extra.copy()
     component.write(poses(machine, *INPUTS[name][0])[1], 1.0)
     assert np.array_equal(component.extra, before)
-    component.read(actuator)
+    component.read(actuator, speeds / ratios)
     status, _ = component.read(NAN)
     assert status & NOT_KNOWN and np.array_equal(component.extra[0], before[0])
     assert not component.extra[1].any()
