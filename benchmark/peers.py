@@ -12,6 +12,7 @@ array of theirs has equal steps.
 
 import cmath
 import ctypes
+from itertools import combinations
 import math
 from pathlib import Path
 import platform
@@ -19,9 +20,11 @@ import subprocess
 import tempfile
 from typing import Callable, NamedTuple, Optional
 
+from gmpy2 import mpfr
 from linkage_ros import mechanisms
 import numpy as np
-from truth import exact_poses, original_formulas
+from truth import original_formulas
+from truth.drawing import DIGITS, draw, Linkage, precisely
 
 LEG = 'jansen'
 POINTS = {'water_drop': 'ABP', LEG: 'ACDEFG', 'peaucellier': 'ABCD', 'slotted_lever': 'AL'}
@@ -45,10 +48,17 @@ class Method(NamedTuple):
     follows: bool = False
 
 
+@precisely
 def truth(kind, theta):
     """Return the true places at a crank angle, {point: complex of many digits}."""
-    return exact_poses.place(kind, exact_poses.exact(DIMENSIONS[kind]),
-                             exact_poses.mp.mpf(theta)).points
+    linkage = Linkage(mechanisms.design(kind).joints, DIMENSIONS[kind])
+    return draw(DIGITS, linkage, linkage.prepared(linkage.numbers), [mpfr(theta)]).points
+
+
+def longest(kind):
+    """Return the greatest distance of two points of one link [m]."""
+    return max(math.dist(*ends) for frame in mechanisms.create(kind).frames.values()
+               for ends in combinations(frame.values(), 2))
 
 
 def ours(kind):

@@ -19,6 +19,7 @@ for library in ('OMP', 'OPENBLAS', 'MKL', 'NUMEXPR'):
     os.environ.setdefault(f'{library}_NUM_THREADS', '1')
 os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
 
+from gmpy2 import mpc  # noqa: E402
 import numpy as np  # noqa: E402
 
 from . import document, peers  # noqa: E402
@@ -45,7 +46,7 @@ def errors(method, theta, places, size):
         try:
             answer = method.one(value) if method.one else method.many(np.array([value]))
             row = np.reshape(method.rows(answer), (-1, 2))
-            error = max(float(abs(peers.exact_poses.mp.mpc(x, y) - place))
+            error = max(float(abs(mpc(x, y) - place))
                         for (x, y), place in zip(row.tolist(), true))
         except (ValueError, ArithmeticError, RuntimeError):  # no pose
             error = np.inf
@@ -92,9 +93,9 @@ def _try(solve, theta):
 def compared(kind, budget):
     """Yield the rows of a linkage."""
     theta = angles(kind)
-    true = [[peers.truth(kind, value)[name] for name in peers.POINTS[kind]]
-            for value in theta.tolist()]
-    size = float(max(peers.exact_poses.bars(kind, peers.DIMENSIONS[kind]).values()))
+    true = [[places[name] for name in peers.POINTS[kind]]
+            for places in (peers.truth(kind, value) for value in theta.tolist())]
+    size = peers.longest(kind)
     methods = [method for make in peers.KINDS for method in make(kind)]
     if kind == peers.LEG:
         for package, make in peers.PEERS.items():

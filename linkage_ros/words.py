@@ -8,12 +8,12 @@ import reprlib
 from typing import Any, Iterable
 
 # Maximum number of letters of a quoted value, of a whole message, and of a line in a terminal.
-LONGEST, MESSAGE, LINE = 60, 299, 4000
+MAX_QUOTED, MESSAGE, MAX_LINE = 60, 299, 4000
 
 _short = reprlib.Repr()
-_short.maxstring = _short.maxother = _short.maxlong = LONGEST
+_short.maxstring = _short.maxother = _short.maxlong = MAX_QUOTED
 _short.maxlevel = 3
-_short.maxlist = _short.maxtuple = _short.maxdict = LONGEST // 3
+_short.maxlist = _short.maxtuple = _short.maxdict = MAX_QUOTED // 3
 
 
 def plain_text(value: Any) -> Any:
@@ -21,7 +21,7 @@ def plain_text(value: Any) -> Any:
     return str.__str__(value) if isinstance(value, str) else value
 
 
-def elided(text: str, most: int = LONGEST) -> str:
+def elided(text: str, most: int = MAX_QUOTED) -> str:
     """Return a text as one line of limited length, with unprintable letters escaped."""
     start = ''.join(c if c.isprintable() else ascii(c)[1:-1] for c in text[:most + 1])
     return start if len(start) <= most else start[:most - 3] + '...'
@@ -29,27 +29,27 @@ def elided(text: str, most: int = LONGEST) -> str:
 
 def sentence(text: Any) -> str:
     """Return a text for a terminal: one line of limited length, as is each of its words."""
-    return elided(' '.join(elided(word, MESSAGE) for word in str(text).split()), LINE)
+    return elided(' '.join(elided(word, MESSAGE) for word in str(text).split()), MAX_LINE)
 
 
 def quoted(value: Any) -> str:
-    """Return a value as Python writes it, at most LONGEST letters of it."""
+    """Return a value as Python writes it, at most MAX_QUOTED letters of it."""
     try:
         return elided(_short.repr(value))
     except Exception:
         # An integer of more digits than Python writes, or a class that cannot write itself.
-        return f'a {elided(type(value).__name__, LONGEST - 2)}'
+        return f'a {elided(type(value).__name__, MAX_QUOTED - 2)}'
 
 
 def meant(word: Any, names: Iterable[str]) -> str:
     """Return a suggestion, to end a sentence, of the name most similar to a word; '' if none."""
     by_case = {name.lower(): name for name in names}
-    text = word[:LONGEST].lower() if isinstance(word, str) else ''
+    text = word[:MAX_QUOTED].lower() if isinstance(word, str) else ''
     near = get_close_matches(text, by_case, 1, 0.7)
     return ''.join(f'; did you mean {elided(by_case[name])}?' for name in near)
 
 
-def listed(names: Iterable[str], most: int = LONGEST) -> str:
+def listed(names: Iterable[str], most: int = MAX_QUOTED) -> str:
     """Return names separated by commas; of many, the first ones and the number of all."""
     names = list(names)
     shown, text = [], ''

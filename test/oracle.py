@@ -218,7 +218,7 @@ class Model:
         self.descriptions = {name: urdf.write(robot) for name, robot in robots.items()}
         own = [robots[name] for name, machine in new.machines.items() if not machine.only_named]
         try:
-            whole = urdf.write(bodies.together(own)) if own else ''
+            whole = urdf.write(bodies.merged(own)) if own else ''
         except scene.SceneError:
             whole = ''
         # What is latched stays where a change leaves no robot of one root.

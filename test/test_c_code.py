@@ -226,8 +226,8 @@ int poses(double value, double near)
     taken = [library.poses(*map(ctypes.c_double, (value, near))) for value, near in zip(
         [*values, *rng.uniform(-7.0, 7.0, 200)], rng.uniform(-9.0, 9.0, 402))]
     assert max(taken) <= int(said)
-    # Inside the reach a closed form is checked, not searched.
-    assert machine.linkage.inverse(output).closed is None or max(taken[:200]) == 1
+    # Inside the reach a closed form is checked, and so is a series: neither is corrected.
+    assert max(taken[:200]) == 1
 
 
 @pytest.mark.nightly
@@ -301,13 +301,13 @@ def test_single_precision_is_as_good_as_the_page_says(machines, tmp_path, name):
         1.0, size))
 
 
-@pytest.mark.parametrize('turns', [100, 10_000])
-def test_an_inverse_is_found_after_any_number_of_turns(machines, tmp_path, turns):
-    whole, machine = math.tau * turns, machines['slotted_lever']
+def test_an_inverse_is_found_after_any_number_of_turns(machines, tmp_path):
+    machine = machines['slotted_lever']
     invert = inverter(tmp_path, machine, 'lever')
-    for value in np.linspace(-0.4, 0.4, 50):
-        assert invert(value, whole) - whole == pytest.approx(
-            machine.linkage.input_for('lever', value, 0.0), abs=1e-15 * whole)
+    for whole in (math.tau * 100, math.tau * 10_000):
+        for value in np.linspace(-0.4, 0.4, 50):
+            assert invert(value, whole) - whole == pytest.approx(
+                machine.linkage.input_for('lever', value, 0.0), abs=1e-15 * whole)
 
 
 GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
@@ -450,8 +450,7 @@ def test_a_scene_file_is_printed_as_c(capsys, monkeypatch):
     assert capsys.readouterr().out == header.written(machines['peaucellier'], ['PB', 'BC']) + '\n'
 
 
-@pytest.mark.parametrize('language', ['c', 'c++'])
-def test_any_names_of_a_scene_are_names_in_c(tmp_path, language):
+def test_any_names_of_a_scene_are_names_in_c(tmp_path):
     inputs = ['q', 'p', 'near', 'value', 'x0', 'new', 'for', 'sin', 'double', 'NAN', 'linux']
     given = {'mechanisms': [
         'Arm', 'arm', 'ARM', 'linkage', 'LKR', 'Lkr', 'rail',
@@ -471,10 +470,11 @@ def test_any_names_of_a_scene_are_names_in_c(tmp_path, language):
                             for name, machine in scene.read(given).machines.items()))
     text = file.read_text()
     assert 'Arm_crank_for_angle_Arm_Tip_2(' in text and 'slide_x_2;' in text
-    ended = subprocess.run([COMPILER, '-x', language, '-fsyntax-only', '-Wall', '-Wextra',
-                            '-Werror', '-Wno-unused-function', file],
-                           capture_output=True, text=True)
-    assert not ended.returncode, ended.stderr[:2000]
+    for language in ('c', 'c++'):
+        ended = subprocess.run([COMPILER, '-x', language, '-fsyntax-only', '-Wall', '-Wextra',
+                                '-Werror', '-Wno-unused-function', file],
+                               capture_output=True, text=True)
+        assert not ended.returncode, ended.stderr[:2000]
 
 
 LOADED = [['B=0 -9.81'], ['B=3 0', 'A=0 1', 'QB=0'], ['C=1 2', 'AB=-0.0', 'B=0 0']]

@@ -83,6 +83,22 @@ def test_what_is_no_number_is_refused_with_its_name(bars, arm, wrong):
             ask()
 
 
+@pytest.mark.parametrize('wrong', ['x', None, {}, object(), [[1.0], 'x'], True, math.nan])
+def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong):
+    ankle = mechanisms.create('rods', joints=(
+        'O motor ground at 0 0 0 axis 0 0 1', 'S slide ground at 1 0 0 axis 1 0 0',
+        'R rod O 0.5 0 0 S 1.5 0 0.1'))
+    assert not bars.has_output(wrong) and not bars.moves(wrong)
+    for ask, text in (
+            (lambda: bars.is_angle(wrong), 'has no output'),
+            (lambda: bars.extremes(wrong), 'has no output'),
+            (lambda: bars.extremes('QB', [wrong]), 'arcs must be'),
+            (lambda: bars.function(xp=wrong or 'x'), 'xp must be a package'),
+            (lambda: ankle.driven_by(wrong), 'can be driven by 1 of O, S, not by')):
+        with pytest.raises(ValueError, match=text):
+            ask()
+
+
 def test_there_are_as_many_numbers_as_inputs(bars, arm):
     one, two = bars.inverse('QB'), arm.inverse(('P.x', 'P.y'))
     for linkage, name, asks in (

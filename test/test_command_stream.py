@@ -160,7 +160,7 @@ def test_of_a_name_twice_the_last_counts_as_in_crank_states(stream):
 
 
 def test_names_that_somebody_makes_up_do_not_fill_the_log(stream, capfd):
-    for number in range(60):
+    for number in range(log.MAX_NAMES + 5):
         stream.want(['flap', f'wing{number}'], [flap(0.2), 1.0])
     said = [line for line in capfd.readouterr().err.splitlines() if 'no output is called' in line]
     assert 'called wing0;' in said[0] and len(said) == log.MAX_NAMES

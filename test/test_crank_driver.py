@@ -6,6 +6,7 @@
 import math
 
 import pytest
+from pytest import approx
 
 pytest.importorskip('rclpy')
 
@@ -54,15 +55,51 @@ class Driver:
         return self._graph.set(self.node, **values)
 
 
-def test_a_crank_with_one_change_point_a_turn_counts_two_turns(graph):
+BAR = {'mechanisms': ['bar'], 'bar.type': 'four_bar', 'bar.crank.speed': 1.0,
+       'use_sim_time': True, **{f'bar.dimensions.{name}': length for name, length in zip(
+           'abcd', (1.0, 2.0, 3.0, 4.0))}}
+END = 0.98 * REACH
+# Parameters; then times [s] with the position and the speed at that time, a time to which the
+# clock goes back, or what is set.
+MOTIONS = {
+    'start plus speed times time, a turn taken off': (
+        {**DROP, 'drop.crank.speed': 2.0, 'drop.crank.start': 0.5},
+        (5, (0.5, 2.0)), (6, (2.5, 2.0)), (9, (approx(8.5 - math.tau, abs=1e-15), 2.0))),
     # After one turn the linkage is on its other branch: there 0 would be another pose.
-    driver = Driver(graph, {
-        'mechanisms': ['bar'], 'bar.type': 'four_bar', 'bar.crank.speed': 1.0,
-        'use_sim_time': True, **{f'bar.dimensions.{name}': length for name, length in zip(
-            'abcd', (1.0, 2.0, 3.0, 4.0))}})
-    driver.at(SECOND)
-    assert driver.at(8 * SECOND) == pytest.approx((7.0, 1.0))
-    assert driver.at(14 * SECOND) == pytest.approx((13.0 - 4.0 * math.pi, 1.0))
+    'two turns with one change point a turn': (
+        BAR, (1, (0.0, 1.0)), (8, approx((7.0, 1.0))),
+        (14, approx((13.0 - 4.0 * math.pi, 1.0)))),
+    'a swing within the reach of a crank that cannot turn': (
+        CELL, (1, (0.0, 1.0)), (2, (1.0, 1.0)), (3, (approx(2.0 * END - 2.0, abs=1e-12), -1.0)),
+        (5, (approx(4.0 - 4.0 * END, abs=1e-12), 1.0))),
+    'a sweep is a triangle wave': (
+        {**DROP, 'drop.crank.sweep': [-0.5, 1.0], 'drop.crank.speed': -1.0}, (1, (0.0, -1.0)),
+        (1.25, (-0.25, -1.0)), (1.75, (-0.25, 1.0)), (3.25, (0.75, -1.0))),
+    'a change of speed makes no jump': (
+        DROP, (1, (0.0, 1.0)), (3, (2.0, 1.0)), {'drop__crank__speed': -0.5}, (4, (1.5, -0.5)),
+        (5, (1.0, -0.5))),
+    'a new start puts the crank there': (
+        {**DROP, 'drop.crank.speed': 0.0}, (1, (0.0, 0.0)), {'drop__crank__start': 1.25},
+        (2, (1.25, 0.0))),
+    'simulated time may leap ahead': (
+        DROP, (1, (0.0, 1.0)), (3601, (approx(3600.0 % math.tau, abs=1e-12), 1.0))),
+    'time that goes back makes no jump': (
+        DROP, (100, (0.0, 1.0)), (102, (2.0, 1.0)), 50, (51, (2.0, 1.0)), (52, (3.0, 1.0))),
+    **{f'a rate of {rate:g}': ({**DROP, 'rate': rate}, {'rate': 100.0}, (1, (0.0, 1.0)))
+       for rate in (5e-324, 1e-300, 1e-9)}}
+
+
+@pytest.mark.parametrize('parameters, steps', [(first, rest) for first, *rest in MOTIONS.values()],
+                         ids=MOTIONS)
+def test_the_crank_moves_as_the_parameters_say(graph, parameters, steps):
+    driver = Driver(graph, parameters)
+    for step in steps:
+        if isinstance(step, dict):
+            assert driver.set(**step).successful
+        elif isinstance(step, int):
+            driver.back_to(step * SECOND)
+        else:
+            assert driver.at(round(step[0] * SECOND)) == step[1]
 
 
 def test_all_cranks_of_the_catalogue_turn_on_system_time(graph):
@@ -79,13 +116,6 @@ def test_all_cranks_of_the_catalogue_turn_on_system_time(graph):
     assert last.position[0] - first.position[0] == pytest.approx(elapsed, abs=1e-12)
 
 
-def test_the_angle_is_start_plus_speed_times_time_a_turn_taken_off(graph):
-    driver = Driver(graph, {**DROP, 'drop.crank.speed': 2.0, 'drop.crank.start': 0.5})
-    assert driver.at(5 * SECOND) == (0.5, 2.0)
-    assert driver.at(6 * SECOND) == (2.5, 2.0)
-    assert driver.at(9 * SECOND) == (pytest.approx(8.5 - math.tau, abs=1e-15), 2.0)
-
-
 def test_years_of_turning_lose_nothing(graph):
     mpmath = pytest.importorskip('mpmath')
     driver = Driver(graph, {**DROP, 'drop.crank.speed': 3.7})
@@ -94,32 +124,6 @@ def test_years_of_turning_lose_nothing(graph):
     with mpmath.workdps(50):
         truth = mpmath.mpf(3.7) * (later - SECOND) / SECOND % (2 * mpmath.pi)
         assert abs(driver.at(later)[0] - truth) < 1e-15
-
-
-def test_a_crank_that_cannot_turn_swings_within_its_reach(graph):
-    driver = Driver(graph, CELL)
-    end = 0.98 * REACH
-    assert driver.at(SECOND) == (0.0, 1.0)
-    assert driver.at(2 * SECOND) == (1.0, 1.0)
-    assert driver.at(3 * SECOND) == (pytest.approx(2.0 * end - 2.0, abs=1e-12), -1.0)
-    assert driver.at(5 * SECOND) == (pytest.approx(4.0 - 4.0 * end, abs=1e-12), 1.0)
-
-
-def test_a_sweep_is_a_triangle_wave(graph):
-    driver = Driver(graph, {**DROP, 'drop.crank.sweep': [-0.5, 1.0], 'drop.crank.speed': -1.0})
-    assert driver.at(SECOND) == (0.0, -1.0)
-    assert driver.at(SECOND * 5 // 4) == (-0.25, -1.0)
-    assert driver.at(SECOND * 7 // 4) == (-0.25, 1.0)
-    assert driver.at(SECOND * 13 // 4) == (0.75, -1.0)
-
-
-def test_a_change_of_speed_makes_no_jump(graph):
-    driver = Driver(graph, DROP)
-    driver.at(SECOND)
-    assert driver.at(3 * SECOND) == (2.0, 1.0)
-    assert driver.set(drop__crank__speed=-0.5).successful
-    assert driver.at(4 * SECOND) == (1.5, -0.5)
-    assert driver.at(5 * SECOND) == (1.0, -0.5)
 
 
 def test_a_new_sweep_takes_the_crank_where_it_is(graph):
@@ -131,13 +135,6 @@ def test_a_new_sweep_takes_the_crank_where_it_is(graph):
     assert driver.at(3 * SECOND) == (1.0, -1.0)
     graph.change(driver.node, DROP, drop__crank__sweep=())
     assert driver.at(5 * SECOND) == (3.0, 1.0)
-
-
-def test_a_new_start_puts_the_crank_there(graph):
-    driver = Driver(graph, {**DROP, 'drop.crank.speed': 0.0})
-    assert driver.at(SECOND) == (0.0, 0.0)
-    assert driver.set(drop__crank__start=1.25).successful
-    assert driver.at(2 * SECOND) == (1.25, 0.0)
 
 
 def test_a_new_dimension_keeps_the_crank_in_its_new_reach(graph):
@@ -173,21 +170,6 @@ def test_a_rate_of_0_sends_nothing_until_it_is_changed(graph):
     assert driver.set(rate=0.0).successful and timer.is_canceled()
     assert driver.set(rate=100.0).successful
     assert driver.at(3 * SECOND) == (2.0, 1.0)
-
-
-def test_time_that_goes_back_makes_no_jump(graph):
-    driver = Driver(graph, DROP)
-    driver.at(100 * SECOND)
-    assert driver.at(102 * SECOND) == (2.0, 1.0)
-    driver.back_to(50 * SECOND)
-    assert driver.at(51 * SECOND) == (2.0, 1.0)
-    assert driver.at(52 * SECOND) == (3.0, 1.0)
-
-
-def test_simulated_time_may_leap_ahead(graph):
-    driver = Driver(graph, DROP)
-    driver.at(SECOND)
-    assert driver.at(3601 * SECOND) == (pytest.approx(3600.0 % math.tau, abs=1e-12), 1.0)
 
 
 class OnSystemTime(CrankDriver):
@@ -246,13 +228,6 @@ def test_a_change_amid_a_leap_of_system_time_makes_no_jump_either(graph, on_syst
     message = after(graph, node, heard)[-1]
     assert 0.0 <= (message.position[0] - before) % math.tau < 2.0
     assert message.velocity[0] == 0.5
-
-
-@pytest.mark.parametrize('rate', [5e-324, 1e-300, 1e-9])
-def test_a_rate_may_be_as_low_as_one_likes(graph, rate):
-    driver = Driver(graph, {**DROP, 'rate': rate})
-    assert driver.set(rate=100.0).successful
-    assert driver.at(SECOND) == (0.0, 1.0)
 
 
 def test_no_timer_waits_for_a_time_that_system_time_was_set_back_from(on_system_time):

@@ -4,12 +4,14 @@
 """Facts of a robot's file, each as it is read, printed or refused."""
 
 import ast
+from dataclasses import replace
 import math
 from pathlib import Path
 import re
 import shlex
 
 from linkage_ros import mechanisms, scene
+from linkage_ros.command import RequestError
 from linkage_ros.robot_files import closing, command, readers
 from linkage_ros.robot_model.command import main as robot_model
 from linkage_ros.robot_model.robot import posed
@@ -22,6 +24,7 @@ from test_robot_files import (
     euler,
     fixed,
     published,
+    random_robot,
     refused,
     robot_of,
     ROBOTS,
@@ -182,7 +185,8 @@ def test_all_that_is_printed_of_a_robot(capsys, file):
                        re.sub(r'\b\de-1\d m', '0 m', each)) for each in capsys.readouterr())
     assert out == (
         f'# From {ROBOTS}/{file}. Its joints on /joint_states, and its model:\n# ros2 launch '
-        f'linkage_ros robot.launch.py robot:={ROBOTS}/{file} scene:=SCENE.yaml{more}{text}')
+        f'linkage_ros robot.launch.py robot:={ROBOTS}/{file} scene:=SCENE.yaml{more}\n'
+        f'# joint_names: QB=-knee+0.6 is to be read as knee = 0.6 - angle of QB.{text}')
     assert err == ''.join(f'from_robot: {line[2:]}\n' for line in text.splitlines()
                           if line.startswith('# '))
 
@@ -193,6 +197,13 @@ def test_a_motor_that_had_to_move_is_named(capsys):
     assert capsys.readouterr().err.startswith(
         'from_robot: boom_cylinder moved: their loops cannot be closed where the file has them.\n'
         'from_robot: Checked: boom_cylinder: in 240 poses of the robot, boom_cylinder from -0.3')
+
+
+def test_a_motor_never_closes_a_loop_of_the_tree(capsys):
+    # Of hinges the last closes it, as joint_D does where it does not drive.
+    assert command.main([str(ROBOTS / 'four_bar.sdf'), '--driven', 'joint_D', '--pose',
+                         'joint_D=0.1']) == 0
+    assert 'Checked: joint_D: in 240 poses' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize('word', ['parallelogram', 'antiparallelogram', 'mirror'])
@@ -408,8 +419,8 @@ def test_no_answer_depends_on_the_starts_of_a_search(tmp_path, name, seeds):
         faults = {re.sub(r'-?\d+\.\d+', lambda found: f'{float(found[0]):.2f}', str(why))
                   for why in made.faults.values()}
         # A rod on balls spins freely.
-        return faults, made.report, {joint: position for joint, position in
-                                     made.robot.positions.items() if joint[1] != '_' and not faults}
+        return faults, made.report, {} if faults else {
+            name: value for name, value in made.robot.positions.items() if name[1] != '_'}
 
     faults, report, positions = answer(0)
     assert all(question in why for why in faults) and bool(faults) == bool(question)
@@ -458,6 +469,53 @@ def test_what_is_not_driven_is_imported_with_the_line_that_is_printed(capsys, tm
         assert command.main([str(file), '--loops', str(loops), *more]) == 0
         assert 'Checked: mot_front' in capsys.readouterr().err
     assert len(choices(line)) == 2
+
+
+def answer(robot, *lines):
+    """Return what is said of a robot with lines that were pasted, as the command reads them."""
+    more = {'--driven': robot.driven, '--pose': [], '--hold': []}
+    for option, *values in lines:
+        more[option] = values if option == '--driven' else more[option] + values
+    robot = posed(replace(robot, driven=more['--driven']), command.positions(more['--pose']))
+    try:
+        return '', *command.described(closing.held(robot, command.positions(more['--hold'])))[1]
+    except RequestError as error:
+        return str(error),
+
+
+def undecided(seed):
+    """Return a random robot with a motor too few or too many, or with its loops open, or None."""
+    made, rng = random_robot(seed), np.random.default_rng(seed)
+    if made is None:
+        return None
+    robot, kind = made[2], rng.integers(3)
+    if kind == 0:
+        robot.driven = robot.driven[1:] + [*robot.positions][:not robot.driven[1:]]
+    if kind == 1:
+        robot.driven = [*dict.fromkeys([*robot.driven, *rng.permutation([*robot.positions])[:1]])]
+    return posed(robot, {name: float(rng.uniform(-0.5, 0.5)) for name in robot.tree_joints
+                         if kind == 2 and name in robot.positions})
+
+
+@pytest.mark.parametrize('seeds', [
+    range(12), pytest.param(range(12, 120), marks=pytest.mark.nightly)], ids=['', 'more'])
+def test_a_line_that_is_pasted_leads_on(seeds):
+    pasted = 0
+    for robot in filter(None, map(undecided, seeds)):
+        lines, said = [], [answer(robot)]
+        while offered := choices('\n'.join([*said[-1], ''])):
+            lines.append(offered[-1])
+            said.append(answer(robot, *lines))
+            assert said[-1] not in said[:-1], said
+            pasted += 1
+    assert pasted > len(seeds) / 5
+
+
+def test_two_hinges_that_cross_between_two_bodies_hold_them(capsys, tmp_path):
+    file = tmp_path / 'robot.urdf'
+    file.write_text(TREE(AB, '', '<loop_joint name="k" type="revolute"><link1 link="a"/>'
+                         '<link2 link="b"/><axis xyz="0 1 0"/></loop_joint>'))
+    assert 'it cannot move, as its joints hold each other' in refused(capsys, file)
 
 
 def test_what_has_no_one_position_is_named(capsys):
@@ -531,7 +589,7 @@ CYLINDER = """<mujoco><compiler angle="radian"/><worldbody><body name="shin">
   <body name="foot" pos="0 0 0.1"><joint name="pitch" axis="0 1 0" range="{ends}"/>{mass}
     <site name="eye" pos="{eye}"/></body>
   <body name="barrel" pos="{base}"><joint name="ball" type="ball"/>{mass}
-    <body name="rod"><joint name="ram" type="slide" axis="{way}"/>{mass}
+    <body name="rod"><joint name="ram" type="slide" ref="0.3" axis="{way}"/>{mass}
       <site name="end" pos="{way}"/></body></body></body></worldbody>
   <equality><connect site1="end" site2="eye"/></equality>
   <actuator><motor joint="ram"/></actuator></mujoco>"""
@@ -557,8 +615,8 @@ def test_a_cylinder_in_space_turns_a_foot(tmp_path, capsys, ends, within):
     assert f'- pitch hinge ground at 0 0 0.1 axis 0 1 0{within} - ram' in ' '.join(out.split())
     for angle in np.linspace(-0.39, 0.49, 9):
         length = np.linalg.norm(pivot + rotation((0.0, angle, 0.0)) @ eye - base)
-        assert published(machine, ram=length - np.linalg.norm(way)) == pytest.approx({
-            'pitch': angle, 'ram': length - np.linalg.norm(way)}, abs=1e-9)
+        ram = 0.3 + length - np.linalg.norm(way)
+        assert published(machine, ram=ram) == pytest.approx({'pitch': angle, 'ram': ram}, abs=1e-9)
 
 
 @pytest.mark.parametrize('old, new, why', [

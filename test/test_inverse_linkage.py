@@ -79,41 +79,6 @@ def test_an_assembly_mode_is_a_linkage_that_has_the_pose(kind):
                 1e-9 * linkage.longest, (output, one, two)
 
 
-@pytest.mark.nightly
-def test_an_input_that_comes_round_after_two_turns_is_answered_in_both():
-    linkage = custom('O ground 0 0', 'Q ground 4 0', 'A crank O 1',
-                     'D crank Q 2 geared crank 1/2 0', 'B dyad A D 2.2 2 left')
-    (low, high), = linkage.reach()
-    assert linkage.period() == 2 and 4.2 < low < 4.31 < 8.26 < high < 8.27
-    for theta in np.linspace(low + 1e-3, high - 1e-3, 40):
-        for output in ('B.x', 'crank2', 'AB'):
-            value = float(linkage.joint_angles(theta, (output,))[output])
-            answers = linkage.input_for(output, value)
-            assert np.nanmin(linkage.inputs[0].apart(answers, theta)) < 1e-7
-            assert linkage.input_for(output, value, near=theta) == pytest.approx(theta, abs=1e-7)
-
-
-def test_an_input_is_read_from_a_gear_that_has_no_place_where_the_input_is_zero():
-    # At a cylinder of no length the carriage would be beyond its way.
-    linkage = custom('A ground 0 0', 'B ground 0.4 0', 'C cylinder A B 0.3 left',
-                     'D carriage B along A -0.7 -0.2 geared cylinder -1.5 0.2 called drive',
-                     'E dyad D A 0.6 0.5 left')
-    inverse = linkage.inverse('AE')
-    assert inverse.closed and 'carriage' not in str(inverse)
-    for length in np.linspace(*linkage.reach()[0], 7)[1:-1]:
-        angle = linkage.joint_angles(length, ['AE'])['AE']
-        assert linkage.input_for('AE', angle, near=length) == pytest.approx(length, rel=1e-12)
-
-
-def test_an_angle_that_jumps_where_its_ends_meet_is_answered_on_both_sides():
-    linkage = custom('O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'L slot Q A 0 out 2.2')
-    for theta in np.linspace(-3.1, 3.1, 63):
-        value = float(linkage.joint_angles(theta, ('angle(A,L)',))['angle(A,L)'])
-        assert np.nanmin(np.abs(linkage.input_for('angle(A,L)', value) - theta)) < 1e-6
-    for (least, _), (greatest, _) in linkage.extremes('angle(A,L)'):
-        assert greatest - least < math.pi + 1e-9
-
-
 @pytest.mark.parametrize('by', [-1, 2, 'crank2', 1.0, None, True])
 def test_an_input_that_there_is_not_is_refused(by):
     linkage = mechanisms.create('five_bar')
@@ -297,27 +262,6 @@ def test_a_value_at_which_equal_bars_of_the_inverse_lie_on_each_other_is_answere
     assert drop.servo_for('B.x', 0.0, 0.1)[0] == 0.0
 
 
-def test_next_to_where_two_joints_meet_their_direction_is_noise():
-    linkage = custom('O ground -0.2 -0.22', 'Q ground 2.03 -0.4', 'A crank O 0.05',
-                     'B dyad A Q 1 1.65 left', 'S slider O 1 A along B out')
-    for at in np.linspace(-3.1, 3.1, 40).tolist():
-        value = float(linkage.joint_angles(at, ['angle(S,B)'])['angle(S,B)'])
-        found = linkage.input_for('angle(S,B)', value)
-        assert np.nanmin(abs(found - at)) < 1e-9
-        back = linkage.joint_angles(found[np.isfinite(found)], ['angle(S,B)'])['angle(S,B)']
-        assert max(abs(math.remainder(each - value, math.tau)) for each in back) < 1e-9
-    assert all(high - low < 0.12 for (low, _), (high, _) in linkage.extremes('angle(S,B)'))
-
-
-def test_an_extreme_as_the_library_says_it_has_an_answer():
-    leg = mechanisms.create('jansen')
-    for output in ('distance(O,G)', 'G.x', 'G.y', 'BC'):
-        for extremes in leg.extremes(output):
-            for value, at in extremes:
-                found = leg.input_for(output, value)
-                assert np.nanmin(abs(found - at), initial=9.0) < 1e-6, (output, value)
-
-
 def test_the_rate_next_to_an_end_is_not_that_of_a_mode_that_ends_there():
     cell = mechanisms.create('peaucellier')
     at = cell.reach()[0][0] + 1e-13
@@ -325,27 +269,6 @@ def test_the_rate_next_to_an_end_is_not_that_of_a_mode_that_ends_there():
     (inputs,), (rates,) = cell.inverse('DC').over(value)
     assert inputs[0] == pytest.approx(at, abs=1e-14)
     assert rates[0] == pytest.approx(float(cell.joint_rates(at, ('DC',))['DC']), rel=0.05)
-
-
-def test_a_coordinate_is_not_answered_at_a_point_where_its_line_has_no_direction():
-    linkage = custom(
-        'A ground 0 0', 'B ground -2.1604150371152997 -1.8587897168211125',
-        'C ground 0 0.378002153336404', 'D crank A 0.29639043443440444',
-        'E antiparallelogram A D C', 'F image C A B', 'G mirror C A E', 'H mirror A F G',
-        'J yoke D H along G')
-    found = linkage.input_for('J.x', 0.09335359724163826)
-    back = linkage.solve(found)['J'][:, 0]
-    np.testing.assert_allclose(back, 0.09335359724163826, atol=1e-12)
-    assert len(found) == 2
-
-
-def test_newton_s_method_does_not_lead_to_answers_far_away():
-    # At B.x two modes have both joints of a dyad in one point, where nothing has a direction.
-    rhombus = mechanisms.create('four_bar', a=2.0, b=2.0, c=2.0, d=2.0)
-    for at in np.linspace(0.05, 1.5, 30).tolist():
-        value = float(rhombus.solve(at)['B'][0])
-        for answer in rhombus.inverse('B.x').all(value):
-            assert rhombus.solve(answer.inputs[0])['B'][0] == pytest.approx(value, abs=1e-12)
 
 
 @pytest.mark.parametrize('near', [3.0, -3.0, 3.0 + math.tau])

@@ -3,6 +3,7 @@
 
 """The kinematics node: what arrives on its topics is the linkage."""
 
+from functools import partial
 import math
 from pathlib import Path
 import re
@@ -15,6 +16,7 @@ pytest.importorskip('rclpy')
 from linkage_ros import mechanisms, palette, scene  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
+from linkage_ros.nodes.publishers import TrackedPublisher  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
@@ -362,6 +364,17 @@ def test_motors_and_passive_joints_share_a_topic_and_nobody_hears_himself(graph)
     graph.crank(['left_knee_motor'], 'joint_states')([1.0], answers)
     assert len(answers) <= len(said)
     assert len([m for m in heard if 'no input is called' in m.msg]) == 1
+
+
+def test_the_subscription_of_the_node_itself_does_not_count(graph):
+    hear = partial(graph.node.create_subscription, JointState, 'joint_states', print, 1)
+    hear()
+    tracked = TrackedPublisher(graph.node, JointState, 'joint_states', 10, ignored=1)
+    other = hear()
+    graph.until(lambda: tracked.has_subscribers)
+    graph.node.destroy_subscription(other)
+    graph.until(lambda: not tracked.has_subscribers)
+    assert tracked.publisher.get_subscription_count() == 1
 
 
 def test_what_was_heard_before_anybody_listened_is_in_the_scenes_message(graph):

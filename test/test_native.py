@@ -115,7 +115,7 @@ def test_so_it_is_for_the_legs_of_a_walker(kind, monkeypatch, code):
         raise ImportError
 
     with monkeypatch.context() as without:
-        without.setattr(program.Pose, 'batch', refuse)
+        without.setattr(program.CompiledFunction, 'batch', refuse)
         solutions.append(assembly.solution(linkage.points, assembly.joints, assembly.joints))
     for theta in angles(linkage)[:60].tolist():
         finite = {solution.solve([theta], [-2.5]) for solution in solutions}

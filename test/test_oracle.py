@@ -58,12 +58,22 @@ def test_a_message_that_sets_nothing_off_ends_nothing(graph, parameters, steps):
     Bench(graph, parameters).run(steps)
 
 
+def test_markers_that_a_change_leaves_nothing_of_are_deleted(graph):
+    Bench(graph, LEG).run([
+        *everything(LEG), message({'m_crank': 0.5}), ('set', {'m.points': ['O', 'G']})])
+
+
 LOADED = {
     'a lever': {'mechanisms': ['a', 'b'], 'a.type': 'slotted_lever', 'b.type': 'jansen',
                 'a.loads': ['L=0 -9.81']},
     'a cylinder': {'mechanisms': ['a', 'b'], 'b.type': 'jansen', 'a.type': 'custom', 'a.joints': [
         'O ground 0 0', 'Q ground 3 0', 'A cylinder O Q 1.5 left'], 'a.loads': ['A=1 -2'],
-        'a.cylinder.source': 'a_crank'}}
+        'a.cylinder.source': 'a_crank'},
+    # Where its two bars lie in one line, no force of the cylinder is large enough.
+    'one of two without bound': {
+        'mechanisms': ['a', 'b'], 'b.type': 'slotted_lever', 'b.loads': ['L=0 -9.81'],
+        'a.type': 'custom', 'a.joints': ['O ground 0 0', 'P ground 1 0', 'B cylinder P O 1 left'],
+        'a.loads': ['OB=-1.0'], 'a.cylinder.source': 'a_crank'}}
 
 
 @pytest.mark.parametrize('parameters', LOADED.values(), ids=LOADED)

@@ -12,7 +12,7 @@ pytest.importorskip('linkage_interfaces')
 
 from linkage_interfaces.srv import ServoInverse as Service  # noqa: E402
 from linkage_ros import scene  # noqa: E402
-from linkage_ros.nodes import log  # noqa: E402
+from linkage_ros.nodes import log, scene_node  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.ownership import LATCHED, TOPIC  # noqa: E402
@@ -290,16 +290,19 @@ def test_what_a_follower_refused_is_followed_with_the_value_that_it_waits_for(gr
     assert (of(service, e), of(service, b)) == (700.0, 170.0)
 
 
-@pytest.mark.nightly
 def test_a_second_node_of_the_same_name_is_noticed_once(graph, warned):
-    graph.start(CrankDriver, LEVER)
-    graph.start(CrankDriver, LEVER, namespace='other')
-    for _ in range(2):
-        graph.until(lambda: graph.node.count_publishers('crank_states') == 1)
-    assert not warned
-    graph.start(CrankDriver, LEVER)
+    def look_often(**kwargs):
+        node = graph.start(CrankDriver, LEVER, **kwargs)
+        timer, = (timer for timer in node.timers
+                  if timer.timer_period_ns == 1e9 * scene_node.NAMESAKE_CHECK_PERIOD_S)
+        timer.timer_period_ns = 10 ** 7
+        timer.reset()
+        return timer
+
+    timers = [look_often(**kwargs) for kwargs in ({}, {'namespace': 'other'}, {})]
     graph.until(lambda: len(warned) == 2)
     assert all('there is another node /crank_driver' in text for text in warned)
+    assert [timer.is_canceled() for timer in timers] == [True, False, True]
 
 
 @pytest.mark.nightly

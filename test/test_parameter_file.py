@@ -143,12 +143,19 @@ def check(path, text):
     return True
 
 
-@pytest.mark.nightly(all_but=12)
-@pytest.mark.parametrize('value', VALUES)
-def test_a_value_is_the_same_to_the_library_and_to_a_node(ros, tmp_path, value):
-    accepted = check(tmp_path / 'file.yaml',
-                     f'/**:\n  ros__parameters:\n    a: {value}\n    b: 1\n')
-    assert accepted == (value not in REFUSED)
+def test_every_value_is_the_same_to_the_library_and_to_a_node(ros, tmp_path):
+    accepted = [value for value in VALUES if value not in REFUSED]
+    # A node with an empty list can be asked for parameters by their names only.
+    for values in ([value for value in accepted if value != '[]'], ['[]']):
+        lines = [f'    a{i}: {value}\n' for i, value in enumerate(values)]
+        assert check(tmp_path / 'file.yaml', '/**:\n  ros__parameters:\n' + ''.join(lines))
+
+
+def test_a_value_that_ros_refuses_or_reads_in_a_surprising_way_is_refused(tmp_path):
+    path = tmp_path / 'file.yaml'
+    for value in REFUSED:
+        path.write_text(f'/**:\n  ros__parameters:\n    a: {value}\n    b: 1\n')
+        assert 'is not a valid ROS parameter file' in of_ours(path, 'kinematics'), value
 
 
 @pytest.mark.parametrize('first', [0, *(pytest.param(n, marks=pytest.mark.nightly)

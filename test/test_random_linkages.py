@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 from truth import (
     drawing_accuracy,
-    exact_poses,
     linkage_checks as checks,
     random_linkages,
 )
@@ -152,23 +151,6 @@ def test_every_word_comes_up_and_a_third_is_degenerate():
     assert words.keys() == WORDS
     assert min(words.values()) > 40
     assert refused < 0.1 * count
-
-
-@pytest.mark.parametrize('kind', exact_poses.KINDS)
-@precisely
-def test_the_drawing_agrees_with_the_other_reference(kind):
-    lengths = mechanisms.defaults(kind)
-    linkage = Linkage(mechanisms.design(kind).joints, lengths)
-    way = linkage.passings()[0]
-    turns = linkage.turns(linkage.numbers, way)
-    rows = linkage.prepared(linkage.numbers)
-    within = 1e-15 if '1.8' in linkage.literals() else 1e-50  # which is not quite nine fifths
-    for theta in (0.3, -0.4, 1.2):
-        found = draw(DIGITS, linkage, rows, [gmpy2.mpfr(theta)], way, turns)
-        true = exact_poses.place(kind, exact_poses.exact(lengths), exact_poses.mp.mpf(theta))
-        for name, place in true.points.items():
-            x, y = (gmpy2.mpfr(exact_poses.mp.nstr(part, 80)) for part in (place.real, place.imag))
-            assert abs(found.points[name] - gmpy2.mpc(x, y)) < within * linkage.longest, name
 
 
 @precisely

@@ -9,8 +9,7 @@ import math
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
-from truth import exact_poses, hard_cases, linkage_checks
-from truth.accuracy_rule import Case, truth
+from truth import drawing_accuracy, hard_cases, linkage_checks
 from truth.random_linkages import Design
 
 KINDS = list(hard_cases.CATALOGUE)
@@ -21,7 +20,7 @@ def drawn(kind, seed, count):
     """Yield random mechanisms of a kind, on random branches."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
-        branches = {name: int(rng.choice((-1, 1))) for name in exact_poses.KINDS[kind].branches}
+        branches = {name: int(rng.choice((-1, 1))) for name in mechanisms.design(kind).branches}
         yield mechanisms.create(kind, branches=branches, **hard_cases.dimensions(kind, rng))
 
 
@@ -61,11 +60,11 @@ def test_the_reach_is_what_brute_force_finds_and_has_all_poses(kind, count):
 def test_every_end_of_the_reach_is_a_limit_to_the_last_digits(kind, count):
     ends = 0
     for mechanism in drawn(kind, 3, count):
-        case = Case(kind, mechanism.dimensions, [], mechanism.branches)
+        measure = drawing_accuracy.strict(mechanism)
         for end in (end for arc in mechanism.reach() if [arc] != TURN for end in arc):
             ends += 1
-            closures = truth(case, end, ()).closures
-            assert {'grazes', 'slips'} & {*closures.values()}, told(mechanism, end, closures)
+            states = measure.at([end]).states
+            assert {'grazes', 'slips'} & {*states.values()}, told(mechanism, end, states)
     assert ends > 20
 
 
@@ -105,15 +104,6 @@ def test_the_inversor_of_the_original_document_ends_at_its_published_angle():
     assert hi == -lo == pytest.approx(2 * math.acos(5 / 6), rel=1e-15)
 
 
-def lever_gap(dimensions, lever, half):
-    """Return the smallest gap at lever angles [rad]: the slot cuts the circle on its own half."""
-    a, b, e = (dimensions[name] for name in 'abe')
-    offset = e + b * np.sin(lever)
-    height = np.sqrt(np.maximum(a * a - offset * offset, 0.0))
-    ahead = half * b * np.cos(lever) + height
-    return np.minimum(a - np.abs(offset), ahead) / (a + b + abs(e))
-
-
 @pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('count', [25, pytest.param(300, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize('half', [1, -1])
@@ -122,7 +112,7 @@ def test_the_lever_reach_is_what_brute_force_finds(half, count):
     for mechanism in drawn('slotted_lever', 7, count):
         mechanism = mechanisms.create('slotted_lever', branches={'L': half},
                                       **mechanism.dimensions)
-        gap = lever_gap(mechanism.dimensions, lever, half)
+        gap = hard_cases.lever_gap(mechanism.dimensions, lever, half)
         held = linkage_checks.inside(mechanism.lever_reach(), lever, math.tau)
         wrong = (np.abs(gap) > 1e-9) & (held != (gap > 0.0))
         assert not wrong.any(), told(mechanism, lever[wrong])

@@ -286,6 +286,21 @@ def test_a_scene_is_held_against_its_robot_over_the_range_of_its_motor(tmp_path,
     assert count >= 200 and worst < 1e-12 and 'motor from -1.2 to 1.2' in text
 
 
+def test_of_a_wide_range_two_turns_are_checked(tmp_path):
+    text = printed(written(tmp_path, 'four_bar.urdf', (LIMIT, 'lower="-40" upper="40"')))
+    assert 'motor from -6.283 to 6.283,' in text and 'sweep: [-4' in text
+
+
+def test_a_range_is_checked_up_to_where_loops_end(tmp_path):
+    # The crank reaches from 35.6 to 112.8 degrees, by the cosine rule, and stands at 90.
+    text = printed(written(tmp_path, 'four_bar.urdf', (LIMIT, ''), (
+        '<link2 link="rocker" xyz="0 0 0.2"/>', '<link2 link="rocker" xyz="0 0 0.12"/>')))
+    (count, worst), = checked(text)
+    low, high = map(float, re.search('motor from (.*) to (.*), its', text).groups())
+    assert count >= 200 and worst < 1e-12 and 'not beyond where its loops end' in text
+    assert -0.40 < low < -0.35 and 0.85 < high < 0.95
+
+
 @pytest.mark.parametrize('old, new, why', [
     (' parallelogram', ' antiparallelogram', 'elbow is off by 1'),
     ('ground 0.3 0', 'ground 0.3 1e-8', 'its loops stand open by 1e-08 m'),
@@ -303,26 +318,42 @@ def test_a_mechanism_that_differs_from_its_robot_is_refused(old, new, why):
     assert re.match(f'with motor at .* {why}', compared(robot, given, motor=(-1.2, 1.2)))
 
 
+BALL = ('<link name="a"/><link name="b"/><joint name="elbow_y" type="continuous">'
+        '<parent link="crank"/><child link="a"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>'
+        '</joint><joint name="elbow_x" type="continuous"><parent link="a"/><child link="b"/>'
+        '<axis xyz="1 0 0"/></joint><joint name="elbow" type="continuous">'
+        '<parent link="b"/><child link="coupler"/><axis xyz="0 0 1"/>')
+PIN_OF_ROD = ('<joint name="elbow" type="continuous">\n    <parent link="crank"/><child link='
+         '"coupler"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>')
+ROD = [(PIN_OF_ROD, BALL), ('name="wrist" type="revolute"', 'name="wrist" type="spherical"')]
+
+
 def test_hinges_that_cross_at_the_end_of_a_rod_are_a_ball(imported, capsys, tmp_path):
-    ball = ('<link name="a"/><link name="b"/><joint name="elbow_y" type="continuous">'
-            '<parent link="crank"/><child link="a"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>'
-            '</joint><joint name="elbow_x" type="continuous"><parent link="a"/><child link="b"/>'
-            '<axis xyz="1 0 0"/></joint><joint name="elbow" type="continuous">'
-            '<parent link="b"/><child link="coupler"/><axis xyz="0 0 1"/>')
-    hinge = ('<joint name="elbow" type="continuous">\n    <parent link="crank"/><child link='
-             '"coupler"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>')
-    rod = [(hinge, ball), ('name="wrist" type="revolute"', 'name="wrist" type="spherical"')]
-    file = written(tmp_path, 'four_bar.urdf', *rod)
+    file = written(tmp_path, 'four_bar.urdf', *ROD)
     assert "hold:='elbow_x=0 elbow=0'" in printed(file) and 'Not published' not in printed(file)
     machine, = imported(file).values()
     # About the normal of the plane first, so that the rod's other hinges stay.
     for angle in (-1.1, 0.4, 1.2):
         assert published(machine, motor=angle) == pytest.approx(
             {'motor': angle, 'shoulder': -angle, 'elbow_y': -angle}, abs=1e-14)
-    loose = written(tmp_path, 'four_bar.urdf', *rod, (
+    loose = written(tmp_path, 'four_bar.urdf', *ROD, (
         'name="shoulder" type="continuous"', 'name="shoulder" type="spherical"'))
     assert 'not planar: coupler hangs on balls alone, and is no rod' in re.sub(
         'rocker hangs', 'coupler hangs', refused(capsys, loose))
+
+
+def test_hinges_of_a_rod_that_its_other_end_needs_do_not_stay(imported, tmp_path):
+    # A universal joint does not let the rod turn in the plane alone: it spins, too.
+    file = written(tmp_path, 'four_bar.urdf', *ROD, (
+        '</robot>', '<link name="cross"/><joint name="wrist_1" type="continuous">'
+        '<parent link="rocker"/><child link="cross"/><origin xyz="0 0 0.2"/><axis xyz="0 1 1"/>'
+        '</joint></robot>'), (
+        '"wrist" type="spherical"', '"wrist" type="revolute"'), (
+        '<link2 link="rocker" xyz="0 0 0.2"/>', '<link2 link="cross" xyz="0 0 0"/>'), (
+        '<axis xyz="0 1 0"/>\n  </loop_joint>', '<axis xyz="0 1 -1"/>\n  </loop_joint>'))
+    machine, = imported(file).values()
+    assert published(machine, motor=0.4) == pytest.approx({'motor': 0.4, 'shoulder': -0.4})
+    assert 'Not published: elbow_y, elbow_x, elbow, wrist_1: passive joints' in printed(file)
 
 
 # A motor at the knee; a motor that follows the other; a knee that stays, as on a four-bar.
@@ -351,6 +382,31 @@ def test_a_five_bar_is_closed_by_what_moves_it(imported, tmp_path, more, mimic, 
     rest, lost = command.others(readers.read(str(file), str(loops)), {'m': machine}, {})
     assert not lost and [value for key, value in rest.items() if key.endswith('.source')] == [
         'front_knee'] * ('FIXED' in more) + ['mot_front'] * bool(mimic)
+
+
+def test_a_ring_that_spins_on_a_pin_is_no_dead_point(imported, tmp_path):
+    # Its halves are welded: where they are apart, that holds them in more ways.
+    loops = tmp_path / 'loops.yaml'
+    loops.write_text('{closed_loop: [[ring_a, ring_b]], type: [6d], '
+                     'name_mot: [mot_front, mot_back]}')
+    file = written(tmp_path, 'five_bar.urdf', ('</robot>', ''.join(
+        f'<link name="{ring}"/><joint name="{ring}_pin" type="continuous"><parent link="{foot}"/>'
+        f'<child link="{ring}"/><axis xyz="0 1 0"/></joint>'
+        for ring, foot in (('ring_a', 'front_foot'), ('ring_b', 'back_foot'))) + '</robot>'))
+    machine, = imported(file, '--loops', loops).values()
+    assert 'Not published: ring_a_pin, ring_b_pin: ' in printed(file, '--loops', loops)
+    joints = published(machine, mot_front=0.3, mot_back=0.1)
+    places = LIBRARIES[1]((ROBOTS / 'five_bar.urdf').read_text()).places(
+        joints, ['front_foot', 'back_foot'])
+    assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
+
+
+def test_pins_that_are_apart_by_rounding_are_one(imported, tmp_path):
+    plain, = imported('wheel_leg.urdf').values()
+    file = written(tmp_path, 'wheel_leg.urdf', (
+        '<child link="bell"/><axis', '<child link="bell"/><origin xyz="1e-13 0 0"/><axis'))
+    machine, = imported(file).values()
+    assert machine.linkage.points == plain.linkage.points
 
 
 def test_angles_that_are_rounded_in_the_file_are_in_one_plane(imported, tmp_path):

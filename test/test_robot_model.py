@@ -5,12 +5,12 @@
 
 import copy
 import math
-from types import SimpleNamespace
 from unittest.mock import ANY
 from xml.etree import ElementTree
 
 from hypothesis import given, settings, strategies as st
 from linkage_ros import command, scene
+from linkage_ros.robot_files import readers
 from linkage_ros.robot_model import bodies, mjcf, robot, rviz, sdf, urdf
 from linkage_ros.robot_model.bodies import assembled
 from linkage_ros.robot_model.command import main, show
@@ -54,140 +54,41 @@ def seen(shape, colour, sizes, pose):
     return row(shape, colour, thickness, pose[:3, 3] - along, pose[:3, 3] + along)
 
 
-class Read(SimpleNamespace):
-    """
-    What a file says.
-
-    Attributes
-    ----------
-    poses : dict
-        Of each link in space, as a matrix.
-    seen : dict
-        Of each link its visuals, in space.
-    joints : dict
-        Of each joint kind, parent, child and axis.
-
-    """
-
-    def __init__(self):
-        super().__init__(poses={}, seen={}, joints={})
-
-    def check(self, other):
-        """Check that another file has the same links and joints."""
-        assert self.poses.keys() == other.poses.keys() and self.joints == other.joints
-        for name, pose in self.poses.items():
-            assert pose == pytest.approx(other.poses[name], abs=1e-9), name
-        check_seen(self.seen, other.seen)
-
-
 def check_seen(found, wanted):
     assert {name for name in found if found[name]} == {name for name in wanted if wanted[name]}
     for name, rows in found.items():
         assert np.array(sorted(rows)) == pytest.approx(np.array(sorted(wanted[name])), abs=1e-6)
 
 
-def read_urdf(text, positions):
-    """Return what a URDF says where its joints have positions."""
-    root, found = ElementTree.fromstring(text), Read()
-    assert {each.tag for each in root} == {'material', 'link', 'joint'}
+def visual(part, colours):
+    """Return shape, colour, sizes and pose of what is seen in a URDF, an SDF or an MJCF."""
+    if part.tag == 'geom':
+        kind = part.get('type')
+        sizes = np.multiply(numbers(part.get('size')), {
+            'box': 2.0, 'sphere': 1.0, 'cylinder': [1.0, 2.0]}[kind])
+        return kind, numbers(part.get('rgba')), sizes, turned(
+            *numbers(part.get('pos')), *numbers(part.get('euler')))
+    (shape,), material, place = part.find('geometry'), part.find('material'), part.find('origin')
+    if name := material.get('name'):
+        sizes = numbers(' '.join(filter(None, map(shape.get, ('size', 'radius', 'length')))))
+        return shape.tag, colours[name], sizes, np.eye(4) if place is None else turned(
+            *numbers(place.get('xyz')), *numbers(place.get('rpy')))
+    ambient, diffuse = (numbers(material.findtext(way)) for way in ('ambient', 'diffuse'))
+    assert ambient == diffuse
+    return shape.tag, ambient, [value for size in shape for value in numbers(size.text)], turned(
+        *numbers(part.findtext('pose')))
+
+
+def visuals(text, frames):
+    """Return what a file shows of each link, in space, where the links have these poses."""
+    root = ElementTree.fromstring(text)
     colours = {each.get('name'): numbers(each.find('color').get('rgba'))
                for each in root.findall('material')}
-    joints = {joint.find('child').get('link'): joint for joint in root.iter('joint')}
-    first, *links = root.findall('link')
-    poses = {first.get('name'): np.eye(4)}
-    for link in links:
-        name, joint = link.get('name'), joints[link.get('name')]
-        parent, kind = joint.find('parent').get('link'), joint.get('type')
-        pose, axis = poses[parent] @ origin(joint), None
-        if kind != 'fixed':
-            limit = joint.find('limit')
-            assert (kind == 'continuous') == (limit is None) and (limit is None or (
-                limit.get('effort'), limit.get('velocity')) == ('0', '0'))
-            kind = 'prismatic' if kind == 'prismatic' else 'revolute'
-            axis = numbers(joint.find('axis').get('xyz'))
-            moved, still = np.array(axis) * positions[joint.get('name')], (0, 0, 0)
-            pose = pose @ turned(*moved, *still) if kind == 'prismatic' else (
-                pose @ turned(*still, *moved))
-        poses[name] = found.poses[name] = pose
-        found.joints[joint.get('name')] = kind, parent, name, axis
-        found.seen[name] = []
-        for visual in link.iter('visual'):
-            shape, = visual.find('geometry')
-            sizes = numbers(' '.join(filter(None, map(shape.get, ('size', 'radius', 'length')))))
-            found.seen[name].append(seen(
-                shape.tag, colours[visual.find('material').get('name')], sizes,
-                pose @ origin(visual)))
-    return found
-
-
-def origin(element):
-    at = element.find('origin')
-    return np.eye(4) if at is None else turned(*numbers(at.get('xyz')), *numbers(at.get('rpy')))
-
-
-def read_sdf(text):
-    """Return what an SDF says, where a loop was cut what it is closed to, and the masses."""
-    root, found, masses = ElementTree.fromstring(text)[0], Read(), {}
-    for link in root.findall('link'):
-        name, base = link.get('name'), link.find('pose').get('relative_to')
-        pose = turned(*numbers(link.findtext('pose')))
-        found.poses[name] = pose if base == '__model__' else found.poses[base] @ pose
-        found.seen[name] = []
-        for i, visual in enumerate(link.findall('visual')):
-            assert visual.get('name') == f'{name}_{i}'
-            shape, = visual.find('geometry')
-            ambient, diffuse = (numbers(visual.findtext(f'material/{way}'))
-                                for way in ('ambient', 'diffuse'))
-            assert ambient == diffuse
-            found.seen[name].append(seen(
-                shape.tag, ambient, [value for size in shape for value in numbers(size.text)],
-                found.poses[name] @ turned(*numbers(visual.findtext('pose')))))
-        if (inertial := link.find('inertial')) is not None:
-            masses[name] = float(inertial.findtext('mass'))
-    for joint in root.findall('joint'):
-        axis = joint.findtext('axis/xyz')
-        found.joints[joint.get('name')] = (
-            joint.get('type'), joint.findtext('parent'), joint.findtext('child'),
-            axis and numbers(axis))
-    closed = {name: found.joints.pop(f'{name}_closed') for name in found.poses
-              if f'{name}_closed' in found.joints}
-    for name, (kind, _, child, _) in closed.items():
-        turns, parent, pin, axis = found.joints.pop(f'{name}_hinge')
-        assert (turns, axis, kind) == ('revolute', [0.0, 0.0, 1.0], 'fixed')
-        assert pin == child == name
-        found.joints[f'{name}_fixed'] = 'fixed', parent, name, None
-    return found, root, {name: met for name, (_, met, *_) in closed.items()}, masses
-
-
-def read_mjcf(text):
-    """Return what an MJCF says of its bodies, and the positions of its joints."""
-    root, found, positions = ElementTree.fromstring(text), Read(), {}
-    compiler = root.find('compiler')
-    assert compiler.attrib == {'angle': 'radian', 'eulerseq': 'XYZ'}
-
-    def pose(element):
-        return turned(*numbers(element.get('pos')), *numbers(element.get('euler') or '0 0 0'))
-
-    def read(body, parent, at):
-        for child in body.findall('body'):
-            name = child.get('name')
-            found.poses[name] = there = at @ pose(child)
-            found.seen[name] = []
-            joint, moves = f'{name}_fixed', ('fixed', parent, name, None)
-            for each in child.findall('joint'):
-                joint, kind = each.get('name'), {'slide': 'prismatic', 'hinge': 'revolute'}
-                moves = kind[each.get('type')], parent, name, numbers(each.get('axis'))
-                positions[joint] = float(each.get('ref'))
-            found.joints[joint] = moves
-            for geom in child.findall('geom'):
-                shape, sizes = geom.get('type'), np.array(numbers(geom.get('size')))
-                sizes *= {'box': 2.0, 'sphere': 1.0, 'cylinder': [1.0, 2.0]}[shape]
-                found.seen[name].append(seen(
-                    shape, numbers(geom.get('rgba')), sizes, there @ pose(geom)))
-            read(child, name, there)
-
-    read(root.find('worldbody'), 'world', np.eye(4))
-    return found, root, positions
+    return {link.get('name'): [
+        seen(*looks, frames[link.get('name')] @ pose)
+        for part in (*link.findall('visual'), *link.findall('geom'))
+        for *looks, pose in [visual(part, colours)]]
+        for link in (*root.iter('link'), *root.iter('body')) if link.get('name') in frames}
 
 
 def scene_seen(one, thetas, width):
@@ -235,65 +136,60 @@ def bare(name):
 
 
 @pytest.mark.parametrize('name', some_quick([*MACHINES, *OWN], QUICK))
-def test_three_formats_say_what_the_scene_has(name):
+def test_three_formats_show_what_the_scene_has(name):
+    # That their links and joints are those of the model is held where they are read again.
     one = simulated(name)
     width = WIDTHS.get(name)
     robot = bodies.robot([one], 'world', width)
     built, width = assembled(robot, DENSITY), width or bodies.size(one) / 40
     starts = np.array([np.clip(drive.start, *drive.sweep or (-math.inf, math.inf))
                        for drive in one.inputs.values()])
-    positions, places = posed(one, starts)
-    tree = read_urdf(urdf.write(robot), positions)
+    places, moved = posed(one, starts)[1], built.parts[0].robot
+    frames = {body: turned(*one.pose) @ frame for body, frame in moved.frames.items()}
+    homes = {joint.bodies[1]: joint.bodies[0] for joint in moved.joints}
+    texts = urdf.write(robot), mjcf.write(built), sdf.write(built)
+    # People read it: a line for each element.
+    assert all(text.count('\n') >= text.count('/>') + text.count('</') - 1 for text in texts)
+    tree, loops, gazebo = (visuals(text, frames) for text in texts)
     wanted, points = scene_seen(one, starts, width)
-    for link, rows in tree.seen.items():
+    for link, rows in tree.items():
         if link.endswith('_link'):
             # A moving link of which nothing else is seen is a ball at its own joint.
-            place = tree.poses[link][:3, 3]
+            place = frames[link][:3, 3]
             check_seen({link: rows}, {link: wanted.get(link) or [
                 row('sphere', GREY, width, place, place)] * (link != 'm_ground_link')})
     for link, balls in points.items():
-        on = {bare(child): tree.seen[child] for _, parent, child, _ in tree.joints.values()
-              if parent == link and not child.endswith('_link')}
-        check_seen(on, balls)
-    texts = mjcf.write(built), sdf.write(built)
-    # People read it: a line for each element.
-    assert all(text.count('\n') >= text.count('/>') + text.count('</') - 1 for text in texts)
-    (loops, simulator, at), (gazebo, root, closed, masses) = (
-        read_mjcf(texts[0]), read_sdf(texts[1]))
-    loops.check(gazebo)
-    # That files say so of gears and of limits, too, is held where they are read again.
-    assert {name: (other, ratio) for name, (other, ratio, _) in
-            built.parts[0].robot.follows.items()} == {
+        check_seen({bare(child): tree[child] for child in tree
+                    if homes.get(child) == link and not child.endswith('_link')}, balls)
+    assert {name: (other, ratio) for name, (other, ratio, _) in moved.follows.items()} == {
         name: (other, pytest.approx(ratio, abs=1e-6))
         for name, (other, ratio) in gears(one, starts).items()}
-    homes = {child: parent for _, parent, child, _ in gazebo.joints.values()}
-    assert closed == {cut: homes[met] for cut, met in cuts(one, gazebo).items()}
-    assert {each.get('name'): (each.get('body1'), each.get('body2'))
-            for each in simulator.findall('equality/connect')} == {
-        cut: (body, homes[cut]) for cut, body in closed.items()}
-    for each in simulator.findall('equality/connect'):
-        place = loops.poses[each.get('body1')] @ [*numbers(each.get('anchor')), 1.0]
-        assert place[:3] == pytest.approx(loops.poses[each.get('name')][:3, 3], abs=1e-9)
-    assert masses.keys() == {name for name in gazebo.seen if gazebo.seen[name]}
+    limits = ElementTree.fromstring(texts[0]).iter('limit')
+    assert {(each.get('effort'), each.get('velocity')) for each in limits} <= {('0', '0')}
+    simulator, (root,) = map(ElementTree.fromstring, texts[1:])
+    masses = {link.get('name'): float(link.findtext('inertial/mass'))
+              for link in root.iter('link') if link.find('inertial') is not None}
+    assert masses.keys() == {name for name in gazebo if gazebo[name]}
     check_mjcf(one, simulator, starts, places, 9.81 * sum(
         mass for body, mass in masses.items() if body != 'm_ground_link'
         and (body.endswith('_link') or homes[body] != 'm_ground_link')))
-    check_sdf(one, root, closed)
+    assert moved.meets == cuts(one, frames)
+    check_sdf(one, root, {cut: homes[met] for cut, met in moved.meets.items()})
     # What runs in a yoke's slot hangs on the yoke, with a pin where the point in the slot is.
     for prefix in one.assembly().legs:
         for link, pin in one.linkage.yokes.items():
             slot, end = f'm_{prefix}{link}_slot', f'm_{prefix}{link}_pin'
             place = in_space(one.pose, places[f'm_{prefix}{pin}'])
             for name in f'{slot}_link', end:
-                assert loops.poses.pop(name)[:3, 3] == pytest.approx(place)
-                check_seen({'': loops.seen.pop(name)},
-                           {'': [row('sphere', GREY, width, place, place)]})
-            assert loops.joints.pop(slot) == (
-                'prismatic', f'm_{prefix}{link}_link', f'{slot}_link', [1.0, 0.0, 0.0])
-            assert loops.joints.pop(f'{end}_fixed') == ('fixed', f'{slot}_link', end, None)
-            assert at.pop(slot) == 0.0
-    loops.check(tree)
-    assert at == pytest.approx(positions)
+                assert frames[name][:3, 3] == pytest.approx(place)
+                for file in loops, gazebo:
+                    check_seen({'': file.pop(name)},
+                               {'': [row('sphere', GREY, width, place, place)]})
+            assert homes[f'{slot}_link'] == f'm_{prefix}{link}_link'
+            assert homes[end] == f'{slot}_link'
+            assert moved.positions[slot] == 0.0
+    check_seen(loops, tree)
+    check_seen(gazebo, tree)
 
 
 def check_mjcf(one, root, starts, places, weight):
@@ -344,11 +240,11 @@ def check_sdf(one, root, closed):
         for file, name, values in plugins), key=repr)
 
 
-def cuts(one, file):
+def cuts(one, frames):
     """Return the points that coincide with another one, by name."""
     yokes = {f'm_{prefix}{link}_pin': f'm_{prefix}{pin}' for prefix in one.assembly().legs
              for link, pin in one.linkage.yokes.items()}
-    return {**{name: bare(name) for name in file.poses if '_cut' in name}, **yokes}
+    return {**{name: bare(name) for name in frames if '_cut' in name}, **yokes}
 
 
 def gears(one, starts):
@@ -368,26 +264,6 @@ def gears(one, starts):
 
 def swept(joint, drive):
     return sorted(map(joint.of, drive.sweep or ()))
-
-
-ARM = {'mechanisms': ['hand', 'arm'], 'arm.type': 'four_bar', 'hand.type': 'four_bar',
-       'hand.pose': [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]}
-
-
-@pytest.mark.parametrize('link', ['AB_link', 'B', 'B_cut'])
-def test_a_hand_on_an_arm_is_the_same_in_three_formats(link):
-    machines = scene.read({**ARM, 'hand.frame_id': f'arm_{link}'}).machines.values()
-    built = model(machines)
-    positions = {one.joints[name].name: one.joints[name].of(angle) for one in machines
-                 for name, angle in one.linkage.joint_angles(one.first.start).items()}
-    loops, root, at = read_mjcf(mjcf.write(built))
-    gazebo, robot, _, masses = read_sdf(sdf.write(built))
-    loops.check(gazebo)
-    loops.check(read_urdf(urdf.describe(machines, 'world'), positions))
-    assert at == pytest.approx(positions)
-    assert masses.keys() == {name for name in gazebo.seen if gazebo.seen[name]}
-    assert root.get('model') == robot.get('name') == 'linkages'
-    assert len(root.find('actuator')) == 2 and len(root.find('equality')) == 2
 
 
 YOKE = ['O ground 0 0', 'X ground 1 0', 'A crank O 1', 'C yoke A O along X', 'D block C {} 0']
@@ -446,15 +322,15 @@ def test_coordinates_of_a_pose_give_the_pose(place, angles):
     assert all(map(math.isfinite, found)) and abs(found[4]) <= 0.5 * math.pi + 1e-12
 
 
-def test_names_with_signs_of_xml_come_back():
+def test_names_with_signs_of_xml_come_back(tmp_path):
     frame, joint = """x<y> & "it's" é""", "a<b>& c'd"
     found = scene.read({'mechanisms': ['m'], 'm.type': 'four_bar', 'm.frame_id': frame,
                         'm.joint_names': [f'AB="{joint}"']})
-    text = urdf.describe(found.machines.values(), 'world')
-    tree = read_urdf(text, {'m_crank': 0.0, joint: 0.0, 'm_QB': 0.0})
-    assert ElementTree.fromstring(text).find('link').get('name') == frame
-    assert tree.joints['m_ground_link_fixed'][1] == frame
-    assert tree.joints[joint][:3] == ('revolute', 'm_crank_link', 'm_AB_link')
+    file = tmp_path / 'robot.urdf'
+    file.write_text(urdf.describe(found.machines.values(), 'world'), encoding='utf-8')
+    read = readers.read(str(file))
+    assert read.root == frame
+    assert read.tree_joints[joint].bodies == ('m_crank_link', 'm_AB_link')
 
 
 def test_the_command_prints_what_its_options_ask_for(tmp_path, capsys):

@@ -184,6 +184,30 @@ def test_hinges_of_rods_are_published(tmp_path, capsys, seed, count):
     assert closed > 8
 
 
+def test_of_a_rod_on_three_hinges_and_two_the_three_do_not_stay(tmp_path, capsys):
+    # Three hinges at one end and two at the other all move: none of the three stays.
+    ankle, pins, file = turning(1), [], tmp_path / 'robot.xml'
+    written = mjcf(ankle, ([-0.15, -0.12], [0.15, 0.12]), pins=[np.eye(3)] * 2)
+    for i, end in enumerate(ankle.ends):
+        first = np.cross(np.subtract(end, ankle.pivots[i]), [1.0, 0.2, 0.1])
+        second = np.cross(np.subtract(end, ankle.pivots[i]), first)
+        pins = ''.join(f'<joint name="eye {i} {k}" axis="{text(axis)}"/>'
+                       for k, axis in enumerate((first, second)))
+        site = f'<site name="pin {i}" pos="{less(end, ankle.second)}"/>'
+        tie = f'<connect site1="eye {i}" site2="pin {i}"/>'
+        assert site in written and tie in written
+        written = written.replace(site, f'<body name="eye {i}" pos="{less(end, ankle.second)}">'
+                                  f'{pins}{LIGHT}</body>').replace(
+            tie, f'<weld body1="rod {i}" body2="eye {i}"/>')
+    file.write_text(written)
+    assert from_robot([str(file)]) == 0
+    out, said = capsys.readouterr()
+    assert 'in 240 poses' in said and 'Left out' not in said
+    assert 'Not published: pin 0 0, pin 0 1, pin 0 2, pin 1 0, pin 1 1, pin 1 2: ' in said
+    assert all(f'="eye {i} {k}"' in out for i in (0, 1) for k in (0, 1))
+    assert '="pin' not in out and 'hold:=' not in out
+
+
 @pytest.mark.parametrize('left, right, sweep', [
     ('-0.1 0.08', '0.02 0.1', (0.02, 0.1)), ('-0.1 0.08', '-inf 0.02', None)])
 def test_limits_of_its_motors_are_sweeps(tmp_path, capsys, left, right, sweep):

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from test_robot_files import random_urdf, ROBOTS
 from test_robot_model import turned
+from test_urdf import ARM
 from truth import random_linkages
 
 CONFIGS = sorted(Path(__file__).parents[1].glob('config/*.yaml'))
@@ -25,10 +26,11 @@ def check_read(model, form, folder):
     """Write a model and compare all that is read of it: the same bodies, joints, motors, gears."""
     file = folder / 'robot.xml'
     file.write_text(FORMATS[form](model), encoding='utf-8')
-    read, (part,) = readers.read(str(file)), model.parts
-    robot, root = part.robot, {'urdf': model.root}.get(form, 'world')
-    stands = turned(*part.pose) if part.base else np.eye(4)
-    frames = {name: stands @ frame for name, frame in robot.frames.items()}
+    read, root = readers.read(str(file)), {'urdf': model.root}.get(form, 'world')
+    frames, stands = {model.root: np.eye(4)}, []
+    for part in model.parts:
+        stands.append(frames[part.base] @ turned(*part.pose) if part.base else np.eye(4))
+        frames.update((name, stands[-1] @ frame) for name, frame in part.robot.frames.items())
     assert read.root == root and {*frames} - {model.root} <= read.frames.keys()
     size = max(1e-3, *(np.abs(frame[:3, 3]).max() for frame in frames.values()))
     for name, frame in read.frames.items():
@@ -37,6 +39,18 @@ def check_read(model, form, folder):
                 frames[name][:3, :3], abs=1e-12)
             assert frame[:3, 3] == pytest.approx(frames[name][:3, 3], abs=1e-12 * size)
     joints = {joint.name: joint for joint in read.joints}
+    for part, base in zip(model.parts, stands):
+        check_part(part.robot, base, form, read, joints, (model.root, root), size)
+        if form != 'urdf':
+            check_loops(part.robot, form, joints, frames, size)
+    assert {joint.kind for joint in joints.values()} <= {'fixed'}
+    robots = [part.robot for part in model.parts] if form != 'urdf' else []
+    assert read.driven == [name for robot in robots for name in robot.driven]
+    assert read.follows.keys() == {name for robot in robots for name in robot.follows}
+
+
+def check_part(robot, stands, form, read, joints, roots, size):
+    """Check the joints that move in one robot of a model, whose root stands in a pose."""
     # In an SDF all positions are 0 where it starts.
     starts = robot.positions
     zeros = {name: 0.0 if form == 'sdf' else start for name, start in starts.items()}
@@ -45,7 +59,8 @@ def check_read(model, form, folder):
             continue
         found = joints.pop(joint.name)
         assert found.kind == joint.kind
-        assert found.bodies == tuple(root if body == model.root else body for body in joint.bodies)
+        assert found.bodies == tuple(roots[1] if body == roots[0] else body
+                                     for body in joint.bodies)
         for place, way in zip(found.places, found.axes):
             assert place == pytest.approx(
                 (stands @ [*joint.places[1], 1.0])[:3], abs=1e-12 * size)
@@ -57,15 +72,10 @@ def check_read(model, form, folder):
             limits = (-1e3, 1e3)
         assert found.limits == (pytest.approx(tuple(end + shift for end in limits), rel=1e-12)
                                 if limits else None)
-    if form == 'urdf':
-        assert {joint.kind for joint in joints.values()} <= {'fixed'}
-        return
-    assert read.driven == robot.driven and read.follows.keys() == robot.follows.keys()
-    for name, (other, ratio, offset) in robot.follows.items():
+    for name, (other, ratio, offset) in robot.follows.items() if form != 'urdf' else ():
         offset += ratio * (starts[other] - zeros[other]) - (starts[name] - zeros[name])
         assert read.follows[name] == (other, pytest.approx(ratio), pytest.approx(
             offset, abs=1e-12))
-    check_loops(robot, form, joints, frames, size)
 
 
 def check_loops(robot, form, joints, frames, size):
@@ -86,7 +96,6 @@ def check_loops(robot, form, joints, frames, size):
             places = closed.places[0], hinge.places[0]
         for place, name in zip(places, (met, cut)):
             assert place == pytest.approx(frames[name][:3, 3], abs=1e-9 * size)
-    assert {joint.kind for joint in joints.values()} <= {'fixed'}
 
 
 def prepared(machines, form, frame_id='world'):
@@ -104,6 +113,15 @@ def test_robots_of_the_shipped_scenes_come_back(tmp_path, config, form):
     for machine in given.machines.values():
         if not machine.in_space:
             check_read(prepared([machine], form, given.frame_id), form, tmp_path)
+
+
+@pytest.mark.parametrize('form', FORMATS)
+@pytest.mark.parametrize('link', ['AB_link', 'B', 'B_cut'])
+def test_a_hand_on_an_arm_comes_back(tmp_path, link, form):
+    if form == 'mjcf':
+        pytest.importorskip('mujoco')
+    machines = scene.read({**ARM, 'hand.frame_id': f'arm_{link}'}).machines.values()
+    check_read(prepared(machines, form), form, tmp_path)
 
 
 def random_machine(seed):

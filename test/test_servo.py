@@ -3,98 +3,108 @@
 
 """A lever's servo angle and reduction: one closed form, right to the last digits everywhere."""
 
-from functools import partial
 import math
 
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
-from truth import accuracy_rule, hard_cases
-from truth.accuracy_rule import broken, Case, mp, STEP, summary
+from truth import drawing_accuracy, hard_cases
+from truth.drawing import DIGITS, precisely
 
-# Levers: the lines, crank centre and pivot as complex numbers, and whether the crank's zero is up.
+# The lines of levers; their angles are those of `slotted_lever` plus a turn.
 PIVOT_BELOW = ('O ground 0 0', 'Q ground 0 -b', 'A crank O a up',
                'L slot Q A e out max(1.8*b,a+b)')
 LEVERS = {
-    'slotted_lever': (None, lambda a, b, e: (0, mp.mpc(0, -b)), True),
-    'written': (PIVOT_BELOW, lambda a, b, e: (0, mp.mpc(0, -b)), True),
-    'with a ram': ((*PIVOT_BELOW, 'R slider L 50*a+50*b Q 0 out'),
-                   lambda a, b, e: (0, mp.mpc(0, -b)), True),
-    'turned': (('O ground 0 0', 'Q ground b 0', 'A crank O a', 'L slot Q A e out a'),
-               lambda a, b, e: (0, mp.mpc(b)), False),
-    'oblique': (('O ground x y', 'Q ground p q', 'A crank O a', 'L slot Q A e out a'),
-                lambda a, e, x, y, p, q: (mp.mpc(x, y), mp.mpc(p, q)), False),
-}
+    'slotted_lever': None, 'written': PIVOT_BELOW,
+    'with a ram': (*PIVOT_BELOW, 'R slider L 50*a+50*b Q 0 out'),
+    'turned': ('O ground 0 0', 'Q ground b 0', 'A crank O a', 'L slot Q A e out a'),
+    'oblique': ('O ground x y', 'Q ground p q', 'A crank O a', 'L slot Q A e out a')}
 
 
 def random_levers(kind, seed, count):
-    """Yield levers, some nearly degenerate, each with awkward lever angles."""
+    """Yield levers, some nearly degenerate, awkward crank angles, and their lengths and turn."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
         lengths, half = hard_cases.dimensions('slotted_lever', rng), int(rng.choice((-1, 1)))
         own = mechanisms.create('slotted_lever', branches={'L': half}, **lengths)
-        ends = [end for arc in own.reach() for end in arc]
-        limits = [end for arc in own.lever_reach() for end in arc]
-        limits += [x for x in own.joint_angles(np.array(ends))['lever'] if x == x]
+        arcs, given = own.reach(), dict(lengths)
+        spots = [end for arc in arcs for end in arc] + [
+            at for pair in own.extremes('lever') for _, at in pair]
         turn = {'turned': math.pi / 2, 'oblique': rng.uniform(-3.0, 3.0)}.get(kind, 0.0)
         if kind == 'oblique':
-            b, (x, y) = lengths.pop('b'), rng.uniform(-1.0, 1.0, 2)
-            lengths.update(x=x, y=y, p=x + b * math.sin(turn), q=y - b * math.cos(turn))
-        joints = LEVERS[kind][0]
-        made = own if joints is None else mechanisms.create(
-            'custom', joints=joints, branches={'L': half}, **lengths)
-        yield made, hard_cases.angles(rng, 4, limits, turns=1.0) + turn
+            b, (x, y) = given.pop('b'), rng.uniform(-1.0, 1.0, 2)
+            given.update(x=x, y=y, p=x + b * math.sin(turn), q=y - b * math.cos(turn))
+        made = own if LEVERS[kind] is None else mechanisms.create(
+            'custom', joints=LEVERS[kind], branches={'L': half}, **given)
+        yield made, hard_cases.angles(rng, 4, spots, turns=1.0) + turn, lengths, turn
 
 
-def truth_of(kind, linkage, angle, cut):
-    """Return the truth of a lever's inverse on one cut of its slot with the crank circle."""
-    _, places, upright = LEVERS[kind]
-    half = linkage.branches['L']
+class Lever:
+    """What `servo_for` answers beside the true angle of a lever and its rate."""
 
-    def cut_at(length, angle):
-        centre, pivot = places(**length)
-        slot = mp.mpc(0, 1) * mp.expj(angle)
-        foot = pivot + mp.mpc(0, 1) * slot * length['e'] - centre
-        seen = foot * mp.conj(slot)
-        gap = length['a'] ** 2 - seen.imag ** 2
-        slide = cut * mp.sqrt(max(gap, mp.zero)) - seen.real
-        return (foot + slide * slot) / (mp.mpc(0, 1) if upright else 1), slide, gap
+    def __init__(self, linkage):
+        self.linkage, self.measure = linkage, drawing_accuracy.strict(linkage)
+        self.angle = next(out for out in self.measure.poses if str(out) == 'angle lever')
 
-    def evaluate(length, angle):
-        pin, slide, gap = cut_at(length, angle)
-        after, before = (cut_at(length, angle + step)[0] for step in (STEP, -STEP))
-        turned = mp.arg(after / before)
-        return ({'angle servo': pin / abs(pin),
-                 'rate servo': 2 * STEP / turned if turned else mp.zero},
-                {'servo': gap, 'slide': half * slide})
+    @precisely
+    def at(self, theta):
+        """Return the true angle at a crank angle, what rounding does to it, and the truth."""
+        truth, i = self.measure.at([theta], True), self.measure.poses.index(self.angle)
+        return DIGITS.direction(truth.values[i]), truth.sensitivity[i], truth
 
-    return accuracy_rule.truth_of(evaluate, linkage.dimensions, float(angle))
-
-
-def rows_of(kind, linkage, angles):
-    """Return how right the servo angles and reductions are, each asked for as the nearest."""
-    length = linkage.dimensions
-    case = Case('slotted_lever', length, angles, linkage.branches, kind)
-    top = {'rate servo': length['a'] / length.get('b', length['a'])}
-    return [row for angle in angles for row in accuracy_rule.servo_rows(
-        case, linkage, angle, partial(truth_of, kind, linkage), top)]
+    @precisely
+    def problem(self, value, theta, rate):
+        """Return what is wrong with an answer; up to 1e-13 from an end's value is the end."""
+        angle, spread, truth = self.at(theta)
+        error = abs(float(DIGITS.direction(DIGITS.turned(angle - value))))
+        if not error <= max(4.0 * spread + np.spacing(math.pi), 1e-13):
+            return f'{theta} has not the value {value}: {error:.2g} off, sensitivity {spread:.2g}'
+        # Next to an end the rate is that of the nearest float that has one.
+        rows = drawing_accuracy.judge(self.measure, [[theta]], {
+            self.angle._replace(by=0): [rate]}, True, [truth]) if math.isfinite(
+                self.linkage.joint_rates(theta, ('lever',))['lever']) else ()
+        return drawing_accuracy.summary(self.linkage, rows) if drawing_accuracy.broken(
+            rows) else ''
 
 
 @pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('levers', [3, pytest.param(12, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize('kind', LEVERS)
 def test_servo_angles_and_reductions_of_any_lever_are_right(kind, levers):
-    rows = []
-    for linkage, angles in random_levers(kind, 1, levers):
-        rows += rows_of(kind, linkage, angles)
-    assert len(rows) > 4 * levers
-    assert not broken(rows), summary(rows)
+    judged = 0
+    for linkage, thetas, _, _ in random_levers(kind, 1, levers):
+        lever = Lever(linkage)
+        for theta in thetas.tolist():
+            angle, _, truth = lever.at(theta)
+            rate = truth.values[len(lever.measure.poses) + lever.measure.poses.index(lever.angle)]
+            # Steeper it is a jump: no crank's angle that is a float has the value.
+            if lever.measure.due(lever.angle, truth.states) == 'number' \
+                    and abs(rate) * np.spacing(math.pi) < 1e-6:
+                judged += 1
+                found, rate = linkage.servo_for('lever', float(angle), theta)
+                assert abs(found - theta) < 1e-6, (linkage, theta, found)
+                problem = lever.problem(float(angle), found, rate)
+                assert not problem, (linkage, theta, problem)
+    assert judged > levers
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize('kind', LEVERS)
 def test_servo_angles_and_reductions_of_many_levers_are_right(kind):
     test_servo_angles_and_reductions_of_any_lever_are_right(kind, 250)
+
+
+@pytest.mark.parametrize('kind', LEVERS)
+def test_a_lever_has_an_answer_just_where_the_slot_cuts_the_circle_of_the_crank(kind):
+    angles = np.random.default_rng(2).uniform(-math.pi, math.pi, 40)
+    for linkage, _, lengths, turn in random_levers(kind, 3, 5):
+        gap = hard_cases.lever_gap(lengths, angles, linkage.branches['L'])
+        found, rates = linkage.servo_for('lever', angles + turn)
+        clear = np.abs(gap) > 1e-9
+        assert (np.isfinite(found) == (gap > 0.0))[clear].all(), linkage
+        lever = Lever(linkage)
+        for value, *answer in list(zip(angles + turn, found, rates))[:6]:
+            assert math.isnan(answer[0]) or not lever.problem(float(value), *map(float, answer))
 
 
 @pytest.mark.parametrize('half', [1, -1])
@@ -105,7 +115,7 @@ def test_a_lever_is_one_computation_whatever_it_is_asked_by(half):
         lever = mechanisms.create('slotted_lever', branches={'L': half}, **lengths)
         for written in ('slotted_lever', 'written', 'with a ram'):
             linkage = lever if written == 'slotted_lever' else mechanisms.create(
-                'custom', joints=LEVERS[written][0], branches={'L': half}, **lengths)
+                'custom', joints=LEVERS[written], branches={'L': half}, **lengths)
             # Other lines of the same lever are rounded in other places.
             for found, expected in ((linkage.input_for('lever', wanted, near),
                                      lever.servo_angle(wanted, near)),
@@ -169,11 +179,13 @@ def test_machine_code_takes_the_answers_that_plain_python_takes(near, ends):
 @pytest.mark.parametrize('half', [1, -1])
 def test_next_to_the_end_of_the_slot_the_lever_is_right_and_beyond_it_has_no_answer(half):
     # There the crank stands still; a value up to 1e-9 beyond the end is the end's.
-    lever = mechanisms.create('slotted_lever', a=80.0, b=150.0, e=100.0, branches={'L': half})
-    rows = []
-    for end, inside in zip(lever.lever_reach()[0], (1.0, -1.0)):
-        rows += accuracy_rule.measure_servo(lever, [
-            end + inside * away for away in (1e-12, 1e-9, 1e-6, 1e-3, -1e-6, -1e-3)])
-    # Rates are those of the pose at the rounded input, which an ulp of it changes here.
-    rows = [row for row in rows if row.output == 'angle servo']
-    assert len(rows) > 10 and not broken(rows), summary(rows)
+    linkage = mechanisms.create('slotted_lever', a=80.0, b=150.0, e=100.0, branches={'L': half})
+    lever = Lever(linkage)
+    for end, inside in zip(linkage.lever_reach()[0], (1.0, -1.0)):
+        for away in (1e-12, 1e-9, 1e-6, 1e-3):
+            value = end + inside * away
+            for near in (-0.5 * math.pi, 0.5 * math.pi):
+                problem = lever.problem(value, *linkage.servo_for('lever', value, near))
+                assert 'has not the value' not in problem
+        for away in (1e-6, 1e-3):
+            assert math.isnan(linkage.servo_angle(end - inside * away))

@@ -7,6 +7,7 @@ from itertools import product
 import math
 
 from linkage_ros import mechanisms, scene
+from linkage_ros.linkage import Solution
 from linkage_ros.scene.inverse_request import InverseRequest
 import numpy as np
 import pytest
@@ -102,6 +103,50 @@ def test_whole_turns_are_kept_and_a_singular_pose_is_not_passed():
         assert linkage.inputs_for(outputs, (0.6, beyond)) == []
     back, _ = linkage.inverse(outputs).follow(foot, inputs)
     np.testing.assert_allclose(back, near, atol=1e-9)
+
+
+@pytest.mark.nightly(all_but=2)
+@pytest.mark.parametrize('seed', range(12))
+def test_what_is_followed_passes_no_fold(seed):
+    rng, reached = np.random.default_rng(seed), 0
+    linkage = mechanisms.create('five_bar', **dict(zip('abcdf', rng.uniform(0.4, 2.0, 5))))
+    inverse = linkage.inverse(('P.x', 'P.y'))
+    for near in rng.uniform(-3.0, 3.0, (40, 2)).tolist():
+        foot = linkage.solve(near, ('P',))['P'] + rng.normal(0.0, 0.3, 2)
+        there, rates = inverse.follow(foot, near)
+        if math.isfinite(sum(there)):
+            before = Solution(tuple(near), inverse).jacobian
+            assert np.linalg.det(np.reshape(rates, (2, 2))) * np.linalg.det(before) > 0.0
+            np.testing.assert_allclose(linkage.solve(there, ('P',))['P'], foot, atol=1e-12)
+            reached += 1
+    assert reached
+
+
+def test_next_to_a_fold_both_searched_solutions_are_found_and_at_it_one():
+    numbers = {'a': 1.218914599520411, 'b': 1.9207419141214968, 'c': 0.630655380351414,
+               'd': 1.9178391154195902, 'f': 0.8989303232167768}
+    linkage = mechanisms.create('five_bar', **numbers)
+    inverse, first = linkage.inverse(('P.y', 'angle(O,P)')), -0.5884821153872412
+    for second in (-1.7514567660906157, -1.7716184764128091):
+        values = [*map(float, linkage.joint_angles((first, second), inverse.outputs).values())]
+        assert min(math.dist(answer.inputs, (first, second)) for answer in inverse.all(
+            values)) < 1e-9
+    # Where the height is greatest, at a given direction.
+    low, high = -1.7716184764128091, -1.7514567660906157
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        rates = Solution((first, middle), inverse).jacobian
+        low, high = (middle, high) if np.linalg.det(rates) * np.linalg.det(
+            Solution((first, low), inverse).jacobian) > 0.0 else (low, middle)
+    values = [*map(float, linkage.joint_angles((first, low), inverse.outputs).values())]
+    assert sum(math.dist(answer.inputs, (first, low)) < 1e-5
+               for answer in inverse.all(values)) == 1
+    # From next to the fold one goes away from it on the same side, or not at all.
+    for away, side in product((1e-5, 1e-4, 1e-3, 3e-3), (1.0, -1.0)):
+        values = [*map(float, linkage.joint_angles(
+            (first, low + 2.0 * side * away), inverse.outputs).values())]
+        (_, there), _ = inverse.follow(values, (first, low + side * away))
+        assert there == pytest.approx(low + 2.0 * side * away, abs=1e-9)
 
 
 @pytest.mark.nightly(all_but=1)
@@ -224,25 +269,6 @@ def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
     assert wanted.reason(0.05, 0.15) == (
         'P.x, P.y at 0.05, 0.15 needs the crank at 1.74732 rad, crank2 at 1.58104 rad, outside '
         'crank.sweep [3, 3.5]')
-
-
-def test_the_first_input_is_searched_between_extremes_though_others_are_held():
-    # The search from a grid of starts lost the answer at -2.918, in a dip that is narrow.
-    linkage = mechanisms.create('custom', joints=(
-        'A ground 0 d0', 'C ground 0 0', 'D ground d2 d3', 'E ground d4 d0',
-        'F crank A d4', 'H cylinder A E d6 right called drive', 'J cylinder A D d7 left',
-        'M crank E 1.61647764 geared crank -1.4142135623730951 2.126382185616789',
-        'Q crank A d8 zero F geared crank 0.5 2.7858724600516447',
-        'S yoke Q E along M', 'T dyad A S d9 d9 right', 'U dyad D T 1.98*d4 d11 left'),
-        d0=-1.762594673546186, d2=0.9406278808795444, d3=-2.0360794015855532,
-        d4=0.48005269328993794, d6=0.48005269328993794, d7=2.000439796809586,
-        d8=0.9913469646839709, d9=0.7074825569292732, d11=0.9505043327140761)
-    others = {'drive': 0.36644083620826373, 'cylinder': 2.7087582548332376}
-    others = [others[input_.name] for input_ in linkage.inputs[1:]]
-    for theta in (-2.91832579816524, 0.31779205):
-        value = float(linkage.joint_angles((theta, *others), ('U.x',))['U.x'])
-        found = linkage.input_for('U.x', value, None, others)
-        assert np.nanmin(np.abs(found - theta)) < 1e-9
 
 
 def test_an_output_that_stands_still_in_most_poses_is_answered_where_it_moves():

@@ -216,13 +216,6 @@ def test_bodies_weigh_in_an_sdf_what_mujoco_finds_their_shapes_to_weigh(name):
             np.array([[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, zz]]), abs=1e-9 * zz)
 
 
-def test_the_servo_of_a_slide_yields_by_a_part_of_the_longest_bar():
-    one = MACHINES['boom']()
-    servo, = ElementTree.fromstring(mjcf.write(model([one]))).iter('position')
-    strength = float(servo.get('forcerange').split()[1])
-    assert float(servo.get('kp')) == pytest.approx(strength / 10.0 / (1e-3 * bodies.size(one)))
-
-
 def test_a_start_out_of_reach_is_refused():
     with pytest.raises(scene.SceneError, match='m.cylinder.start and .* must be where m can be'):
         model([OWN['excavator']()])

@@ -313,54 +313,58 @@ def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
         assert status == 0 and found[0] == pytest.approx(expected_, rel=1e-12)
 
 
-@pytest.mark.parametrize('name', ['leg', 'boom', 'beast', 'rocker'])
-def test_a_new_position_takes_one_pose(machines, tmp_path, name):
+def test_a_new_position_takes_one_pose(machines, tmp_path):
     """Actuators count inputs, and these joints have closed forms."""
-    machine = machines[name]
-    text = re.sub(rf'(int {name}_at\([^;]*?\)\n{{\n)', r'\1    taken++;\n',
-                  header.written(machine))
-    code = f'static int taken;\n{text}' + CALLER.format(name=name, n=len(machine.inputs)) + (
-        'int poses(void) { int before = taken; taken = 0; return before; }\n')
-    library = loaded(tmp_path, code)
-    memory, (first, second, *_) = Memory(library, name, len(machine.inputs)), states(machine, 4)
-    for inputs in (first, second, first):
-        actuator, _, joint, _ = expected(machine, inputs)
-        library.poses()
-        assert memory.send(0, actuator)[0] & 1 == 0 and library.poses() == 1
-        memory.send(0, expected(machine, second if inputs is first else first)[0])
-        library.poses()
-        assert memory.send(1, joint)[0] & 1 == 0 and library.poses() == 1
+    chosen = [machines[name] for name in ('leg', 'boom', 'beast', 'rocker')]
+    text = re.sub(r'(int \w+_at\([^;]*?\)\n{\n)', r'\1    taken++;\n', header.printed(
+        [header.Request(machine) for machine in chosen]))
+    library = loaded(tmp_path, f'static int taken;\n{text}' + ''.join(
+        CALLER.format(name=machine.name, n=len(machine.inputs)) for machine in chosen) + (
+        'int poses(void) { int before = taken; taken = 0; return before; }\n'))
+    for machine in chosen:
+        memory = Memory(library, machine.name, len(machine.inputs))
+        first, second, *_ = states(machine, 4)
+        for inputs in (first, second, first):
+            actuator, _, joint, _ = expected(machine, inputs)
+            library.poses()
+            assert memory.send(0, actuator)[0] & 1 == 0 and library.poses() == 1
+            memory.send(0, expected(machine, second if inputs is first else first)[0])
+            library.poses()
+            assert memory.send(1, joint)[0] & 1 == 0 and library.poses() == 1
 
 
-@pytest.mark.parametrize('ratio', [-2.0, 0.25])
-def test_a_sensor_repeats_after_a_turn_of_what_it_measures(tmp_path, ratio):
-    machines = scene.read({
-        'mechanisms': ['lift', 'wheel'], 'lift.type': 'custom', 'lift.joints': [
-            'O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left'],
-        'wheel.type': 'custom', 'wheel.joints': GEARED, 'wheel.crank.measures': 'crank2',
-        **{f'lift.crank.{key}': value for key, value in {
-            'measures': 'QB', 'ratio': ratio, 'offset': 0.1, 'start': 0.5}.items()},
-        'wheel.crank.ratio': ratio}).machines
-    lift, wheel = machines.values()
+def test_a_sensor_repeats_after_a_turn_of_what_it_measures(tmp_path):
+    ratios = {'2': -2.0, '4': 0.25}
+    machines = scene.read({'mechanisms': [f'{kind}{end}' for kind in ('lift', 'wheel')
+                                          for end in ratios], **{
+        f'{kind}{end}.{key}': value for end, ratio in ratios.items() for kind, given in (
+            ('lift', {'joints': ['O ground 0 0', 'Q ground 1 0', 'A crank O 0.3',
+                                 'B dyad A Q 1 0.6 left'], 'crank.measures': 'QB',
+                      'crank.offset': 0.1, 'crank.start': 0.5}),
+            ('wheel', {'joints': GEARED, 'crank.measures': 'crank2'}))
+        for key, value in {'type': 'custom', 'crank.ratio': ratio, **given}.items()}}).machines
     library = loaded(tmp_path, ''.join(
         header.written(machine, joints=[f'{name}_crank']) + CALLER.format(name=name, n=1)
         for name, machine in machines.items()))
-    memory, (reading, *_) = Memory(library, 'lift', 1), expected(lift, [0.5])
-    for turns in (0, 1, -1, 3, -100):
-        status, (crank, *_) = memory.send(0, reading + turns * math.tau / abs(ratio))
-        assert status == 0 and crank == pytest.approx(0.5, abs=1e-10)
-    # Less than a turn is another pose, or none.
-    status, (crank, *_) = memory.send(0, reading + 0.25 * math.tau / abs(ratio))
-    assert status == 1 or crank != pytest.approx(0.5, abs=1e-3)
-    # A geared input counts its turns, through any gear.
-    memory = Memory(library, 'wheel', 1)
-    for crank in (0.4, 7.0, -300.0):
-        reading = -2.0 * crank / ratio
-        status, (position, velocity, _) = memory.send(0, [reading], [1.0])
-        assert status == 0 and position == pytest.approx(crank, rel=1e-12)
-        assert velocity == pytest.approx(ratio / -2.0, rel=1e-12)
-        status, (position, *_) = memory.send(1, [crank + 20.0])
-        assert status == 0 and position == pytest.approx(-2.0 * (crank + 20.0) / ratio, rel=1e-12)
+    for end, ratio in ratios.items():
+        memory = Memory(library, f'lift{end}', 1)
+        (reading, *_) = expected(machines[f'lift{end}'], [0.5])
+        for turns in (0, 1, -1, 3, -100):
+            status, (crank, *_) = memory.send(0, reading + turns * math.tau / abs(ratio))
+            assert status == 0 and crank == pytest.approx(0.5, abs=1e-10)
+        # Less than a turn is another pose, or none.
+        status, (crank, *_) = memory.send(0, reading + 0.25 * math.tau / abs(ratio))
+        assert status == 1 or crank != pytest.approx(0.5, abs=1e-3)
+        # A geared input counts its turns, through any gear.
+        memory = Memory(library, f'wheel{end}', 1)
+        for crank in (0.4, 7.0, -300.0):
+            reading = -2.0 * crank / ratio
+            status, (position, velocity, _) = memory.send(0, [reading], [1.0])
+            assert status == 0 and position == pytest.approx(crank, rel=1e-12)
+            assert velocity == pytest.approx(ratio / -2.0, rel=1e-12)
+            status, (position, *_) = memory.send(1, [crank + 20.0])
+            assert status == 0 and position == pytest.approx(
+                -2.0 * (crank + 20.0) / ratio, rel=1e-12)
 
 
 def test_joints_that_move_with_no_input_are_refused():

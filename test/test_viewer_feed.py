@@ -67,6 +67,16 @@ def test_of_a_message_what_is_deleted_or_no_line_joint_or_triangle_is_not_drawn(
         'joints', 'lines', 'triangles', 'locus']
 
 
+@pytest.mark.parametrize('type_, id_, kind', [
+    (Marker.LINE_LIST, 0, 'lines'), (Marker.LINE_LIST, 2, 'locus'), (Marker.LINE_LIST, 3, 'slots'),
+    (Marker.TRIANGLE_LIST, 7, 'plates'), (Marker.TRIANGLE_LIST, 8, 'triangles')])
+def test_lines_and_triangles_are_told_apart_by_their_ids(type_, id_, kind):
+    topic = feed_of_a_leg()
+    topic.newest = serialize_message(MarkerArray(markers=[Marker(type=type_, id=id_)]))
+    (head, _), = read(topic)
+    assert head['markers'][0]['kind'] == kind
+
+
 def hostile(rng, text):
     """Yield bytes that are no message, or one with other numbers than were written."""
     yield from (b'', b'\0', b'\0\1\0\0', b'\xff' * 64, text[:4] + b'\xff' * 500)

@@ -9,7 +9,6 @@ import io
 import itertools
 import json
 import math
-import re
 
 import numpy as np
 import pytest
@@ -47,13 +46,25 @@ def test_the_page_is_told_what_it_draws_and_moves(path):
                 np.testing.assert_allclose(after[joint], place, atol=1e-9)
 
 
-@pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
-def test_the_unit_of_a_parameter_is_that_of_its_description(path):
-    for one in scene.load(str(path)).parameters:
-        said = re.findall(r'\[(.*?)\]', one.field.meaning)
-        assert '{' not in one.field.meaning + one.field.unit
-        if one.field.kind == 'double':
-            assert one.field.unit == ''.join(said).replace('1', ''), one.name
+@pytest.mark.parametrize('text, value, is_angle', [
+    ('90deg', math.pi / 2.0, True), ('pi/2', math.pi / 2.0, True), ('2*(3+4)', 14.0, False),
+    ('80,5', 80.5, False)])
+def test_arithmetic_is_read_by_the_library(text, value, is_angle):
+    assert poses.number(text) == {'value': value, 'turns': is_angle}
+
+
+@pytest.mark.parametrize('text, reason', [
+    ('1/0', 'must be 0 or between'), ('a+1', 'a is unknown'), ('__import__', 'not a number'),
+    ('', 'not a number'), ('1,234.5', 'not a number'), ('0x50', 'not a number'),
+    ('Infinity', 'not a number'), (400 * '9', 'must be 0 or between')])
+def test_what_is_no_arithmetic_is_refused(text, reason):
+    with pytest.raises(ValueError, match=reason):
+        poses.number(text)
+
+
+def test_no_joint_of_a_linkage_in_space_is_dragged():
+    ankle, _ = machine_of('ankle')
+    assert poses.tunable(ankle)['fixed'] == ankle.points
 
 
 def test_a_bar_follows_a_dimension_that_can_only_become_shorter():
@@ -263,6 +274,14 @@ def test_no_pose_of_a_fine_scale_is_nearer_by_more_than_the_leash(type_, joint, 
         away = np.hypot(*(linkage.solve(float(theta), (joint,))[joint] - place))
         assert any(low <= theta <= high for low, high in arcs)
         assert away <= np.hypot(*(path - place).T).min() + 0.1 * width
+
+
+def test_a_rocker_that_is_dragged_stays_at_the_angle_of_its_crank_of_two_that_it_has():
+    bar = mechanisms.create('four_bar')
+    for crank in np.linspace(-3.0, 3.0, 13):
+        place = bar.solve(crank + 0.03, ('B',))['B']
+        found, = nearest_inputs(bar, 'B', place, [crank], [[(-math.pi, math.pi)]])
+        assert abs(found - crank) < 0.1
 
 
 def test_what_cannot_be_assembled_is_not_dragged():

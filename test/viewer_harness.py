@@ -94,13 +94,6 @@ class Show(contextlib.ExitStack):
         page.mechanisms(*(f'/{name}' for name in self.names))
         return page
 
-    def browser(self, folder):
-        """Return what a browser sees of the page, which it has loaded."""
-        seen = self.enter_context(Seen(folder, self))
-        seen.open(self.url)
-        seen.becomes('!!document.querySelector("section")')
-        return seen
-
     def values(self, name):
         """Return the value of a parameter on each node that has it."""
         return [node.get_parameter(name).value for node in self.nodes if node.has_parameter(name)]
@@ -236,17 +229,23 @@ def coloured(picture, red, green, blue):
 class Seen(browser.Browser):
     """What a browser shows of the page."""
 
-    def __init__(self, folder, show):
-        super().__init__(folder)
-        self._show = show
+    def visit(self, url):
+        """Load the page of a viewer, as one who has not seen it."""
+        self.complaints.clear()
+        self.requests.clear()
+        self._url = url
+        self.resize(1200, 900, 'light')
+        self.open(url)
+        self.becomes('!!document.querySelector("section")')
 
-    def __exit__(self, *_):
-        try:
-            assert self.complaints == [], str(self.complaints)[:3000]
-            assert all(url.startswith((self._show.url, 'ws://127.0.0.1:', 'blob:', 'about:'))
-                       for url in self.requests)
-        finally:
-            super().__exit__()
+    def leave(self):
+        """Check that nothing went wrong, and nothing came from elsewhere."""
+        complaints, requests = [*self.complaints], [*self.requests]
+        self.value('sessionStorage.clear()')
+        self.open('about:blank')
+        assert complaints == [], str(complaints)[:3000]
+        assert all(url.startswith((self._url, 'ws://127.0.0.1:', 'blob:', 'about:'))
+                   for url in requests)
 
     def becomes(self, expression):
         """Wait until an expression of the page is true; return it."""

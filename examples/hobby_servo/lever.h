@@ -687,17 +687,17 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     const float v31 = v9 * v9;
     const float v32 = k30 * v31;
     const float v33 = k27 + v32;
-    const float v40 = lkr_gated(v33, ((v31 + k36) - 7.888609e-31f), 0.0f);
-    const float v41 = lkr_gated((-((k22 * v7) * v9)), v40, 0.0f);
-    const float v45 = lkr_gated((k26 + (k22 * v31)), v40, 0.0f);
-    const float v48 = sqrtf(((v41 * v41) + (v45 * v45)));
+    const float v40 = lkr_gated(v33, (v31 + k36) - 7.888609e-31f, 0.0f);
+    const float v41 = lkr_gated(-((k22 * v7) * v9), v40, 0.0f);
+    const float v45 = lkr_gated(k26 + (k22 * v31), v40, 0.0f);
+    const float v48 = sqrtf((v41 * v41) + (v45 * v45));
     const float v49 = v41 / v48;
     const float v56 = v45 / v48;
-    const float v81 = lkr_root((k73 + v32), k80);
+    const float v81 = lkr_root(k73 + v32, k80);
     const float v88 = ((length_a * (k82 + (k83 * v31))) / v33) + 0.0f;
     p->L_x = v49 * k54;
     p->L_y = k2 + (v56 * k54);
-    p->angle_lever = lkr_angle((-v49), v56);
+    p->angle_lever = lkr_angle(-v49, v56);
     p->slide_slide = v81;
     by_crank->L_x = -((v88 * v56) * k54);
     by_crank->L_y = (v88 * v49) * k54;
@@ -750,18 +750,18 @@ static inline int lever_solutions_angle_lever(const float *value,
     const float v4 = sinf(v3);
     const float v9 = ((2.0f * v4) * cosf(v3)) * 0.081f;
     const float v15 = (1.0f - (2.0f * (v4 * v4))) * 0.081f;
-    const float v18 = sqrtf(((v9 * v9) + (v15 * v15)));
+    const float v18 = sqrtf((v9 * v9) + (v15 * v15));
     const float v19 = v9 / v18;
     const float v22 = v19 * 0.045f;
-    const float v27 = lkr_root(((0.02f + v22) * (0.02f - v22)), 1.154632e-18f);
+    const float v27 = lkr_root((0.02f + v22) * (0.02f - v22), 1.154632e-18f);
     const float v28 = v19 * v27;
     const float v30 = v15 / v18;
     const float v31 = v30 * v22;
     const float v35 = -(v19 * v22);
     const float v36 = v30 * v27;
-    q[0][0] = lkr_angle((-((-v28) - v31)), (v35 + v36));
+    q[0][0] = lkr_angle(-((-v28) - v31), v35 + v36);
     /* A right */
-    q[1][0] = lkr_angle((-(v28 - v31)), (v35 - v36));
+    q[1][0] = lkr_angle(-(v28 - v31), v35 - v36);
     return 2;
 }
 
@@ -785,9 +785,11 @@ static inline int lever_at(const float *q, int is_rated, lkr_point *p)
 /* Tables of the actuators and joints, see lkr_model. */
 static const lkr_model lever_model = {
     1, 1, lever_at, { 0, lever_solutions_angle_lever },
+    /* The actuators, the joints, and after how much of each input they repeat. */
     { { { 1.0f, 0.0f, 0, 1.0f, 0.0f } },
       { { 1.0f, 6.2831855f, -1, 1.0f, 0.0f } } },
     { { 0.0f }, { 6.2831855f } },
+    /* Of the inputs: units, start, sweeps. */
     { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } }
 };
 
@@ -809,12 +811,13 @@ static inline int lever_at_angle_lever(const float *q, int is_rated, lkr_point *
 /* Tables of the inverse, see lkr_model. */
 static const lkr_model lever_model_angle_lever = {
     1, 0, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
+    /* The actuators, the joints, and after how much of each input they repeat. */
     { { { 0, 0, -1, 0, 0 } },
       { { 1.0f, 6.2831855f, -1, 1.0f, 0.0f } } },
     { { 6.2831855f }, { 6.2831855f } },
+    /* Of the inputs: units, start, sweeps. */
     { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } }
 };
-
 
 /* The crank for lever [rad], nearest to `near`, whole turns included. Returns 0, and
    leaves crank alone, where there is none. */

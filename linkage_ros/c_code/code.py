@@ -35,6 +35,13 @@ class Block(NamedTuple):
     ending: Callable[[List[str]], List[str]]
 
 
+class _Call(str):
+    """The template of a call, whose arguments need no parentheses."""
+
+    def format(self, *args: Any, **kwargs: Any) -> str:
+        return super().format(*map(bare, args), **kwargs)
+
+
 class Code:
     """
     Writes C for one linkage.
@@ -54,9 +61,11 @@ class Code:
         # Tolerances have the rounding of the type.
         self._rounding: Mapping[Any, float] = IN_SINGLE if single else {}
         templates = {operation: row.c.replace('{f}', suffix).replace('{name}', 'lkr')
-                     for operation, row in OPERATIONS.items()}
-        self._dialect = Dialect({**templates, 'atan2': 'lkr_angle({}, {})'}, {}, lambda value:
-                                self.literal(self._rounding.get(value, value)))
+                     for operation, row in OPERATIONS.items()} | {'atan2': 'lkr_angle({}, {})'}
+        self._dialect = Dialect({
+            operation: code if code.startswith('(') else _Call(code)
+            for operation, code in templates.items()}, {}, lambda value:
+                self.literal(self._rounding.get(value, value)))
 
     def literal(self, value: float) -> str:
         """Return a number in C."""

@@ -10,7 +10,8 @@ library's sine, cosine and arctangent. What all mechanisms have in common is `li
 
 from __future__ import annotations
 
-from typing import Any, Dict, Iterator, List, NamedTuple, Sequence
+from itertools import chain, repeat
+from typing import Any, Dict, Iterable, Iterator, List, NamedTuple, Sequence
 
 from .axes import actuators, Axis, axis, check_inverse, joints, loads
 from .code import Code, indented
@@ -65,18 +66,16 @@ def written(machine: SceneMechanism, outputs: Sequence[str] = (), single: bool =
 
 def printed(requests: Sequence[Request], single: bool = False) -> str:
     """Return the headers of mechanisms, one after another, and what they have in common."""
-    first, *others = headers(requests, single, '@common@')
-    return '\n'.join([first.replace('@common@', template('linkage.h').rstrip()), *(
-        other.replace('@common@\n', '') for other in others)])
+    return '\n'.join(headers(requests, single, [template('linkage.h').rstrip()]))
 
 
-def headers(requests: Sequence[Request], single: bool, common: str) -> List[str]:
-    """Return the headers of mechanisms in one program, each with a text `common`."""
+def headers(requests: Sequence[Request], single: bool, common: Iterable[str]) -> List[str]:
+    """Return the headers of mechanisms in one program, the first with the texts of `common`."""
     values = [_values(request, single) for request in requests]
     sizes = {size: max(each[f'own_{size}'] for each in values) for size in (
         'inputs', 'solutions')}
-    return [filled(template('mechanism.h.in'), {**each, **sizes, 'common': common})
-            for each in values]
+    return [filled(template('mechanism.h.in'), {**each, **sizes, 'common': text})
+            for each, text in zip(values, chain(common, repeat('')))]
 
 
 def _values(request: Request, single: bool) -> Dict[str, Any]:

@@ -3,6 +3,7 @@
 
 """A ROS 2 package with mechanisms of a scene as transmissions of ros2_control."""
 
+from itertools import repeat
 from pathlib import Path
 import re
 from typing import Dict, Mapping, Sequence, Tuple
@@ -66,7 +67,7 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
             '#include "pluginlib/class_list_macros.hpp"\n',
             *(filled(template('export.cpp.in'), part) for part in parts)]),
         'src/linkage.h': template('linkage.h')}
-    texts = header.headers(requests, False, '#include "linkage.h"')
+    texts = header.headers(requests, False, repeat('#include "linkage.h"'))
     for part, text in zip(parts, texts):
         mechanism = part['name']
         files[f'src/{mechanism}_linkage.h'] = text

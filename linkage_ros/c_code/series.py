@@ -4,7 +4,7 @@
 """Inverses without a closed form, as series of Chebyshev polynomials in parts of the reach."""
 
 import math
-from typing import Iterator, NamedTuple, Sequence
+from typing import Iterator, Sequence, Tuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -21,28 +21,16 @@ CORRECTED, SHORT, SHORTEST = 1e-9, 1.0 / 32.0, 1e-5
 HALVINGS = 60
 
 
-class Piece(NamedTuple):
-    """
-    The input between `low` and `high`, by an output within `reach` of `middle`.
-
-    It is a series of Chebyshev polynomials of sqrt((output - middle) * scale + shift) - center,
-    which is in [-1, 1]. The root makes it smooth where the output has an extreme.
-    """
-
-    middle: float
-    reach: float
-    low: float
-    high: float
-    scale: float
-    shift: float
-    center: float
-    terms: np.ndarray
-
-
 def series(linkage: Mechanism, output: str, part: Sequence[float], single: bool
-           ) -> Iterator[Piece]:
-    """Yield the pieces of a part: two inputs, and an output there."""
-    low, high, first, last = part
+           ) -> Iterator[Tuple[np.ndarray, np.ndarray]]:
+    """
+    Yield the pieces of a part, in which an output only rises or only falls: inputs and outputs.
+
+    Each is an `lkr_piece` of `linkage.h`, with inputs in their sizes: the numbers before its
+    terms, and the terms. The root in it makes the input smooth where the output has an extreme.
+    """
+    unit = linkage.inputs[0].size
+    low, high, first, last = np.divide(part, [unit, unit, 1.0, 1.0])
     pose, is_angle = linkage.posed((), (output,)), linkage.is_angle(output)
     size, terms, close = 1.0 if is_angle else linkage.longest, TERMS[single], CLOSE[single]
     nodes = chebyshev.chebpts1(terms)
@@ -51,7 +39,7 @@ def series(linkage: Mechanism, output: str, part: Sequence[float], single: bool
 
     def parts(inputs: np.ndarray, end: float, change: float) -> np.ndarray:
         """Return which parts of a change from an end the output has behind it."""
-        gap = pose.over(inputs)[0] - end
+        gap = pose.over(unit * inputs)[0] - end
         return (gap - is_angle * math.tau * np.round((gap - 0.5 * change) / math.tau)) / change
 
     def halved(wanted: np.ndarray, start: float, stop: float, *change: float) -> np.ndarray:
@@ -79,7 +67,7 @@ def series(linkage: Mechanism, output: str, part: Sequence[float], single: bool
                 middle, reach = change * squares.mean(), 0.5 * abs(change) * np.ptp(squares)
                 left, right = sorted(halved(squares, start, cut, end, change))
                 scale = 1.0 / (change * half * half)
-                yield Piece(end + middle, reach, left, right, scale, middle * scale,
-                            center / half, fitted)
+                yield np.array([end + middle, reach, left, right, scale, middle * scale,
+                                center / half]), fitted
             else:
                 roots += [(center, after), (before, center)]

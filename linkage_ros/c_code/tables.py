@@ -176,13 +176,10 @@ class Tables:
 
     def _series(self, name: str, output: str) -> Tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""
-        size, code, rows = self._sizes[0], self._code, []
-        monotone = pieces(self.linkage, output)
-        for part in monotone:
-            for piece in series(self.linkage, output, part, code.single):
-                own = piece._replace(low=piece.low / size, high=piece.high / size)
-                rows.append(f'    {{ {", ".join(map(code.literal, own[:-1]))}, '
-                            f'{code.row(np.round(own.terms / size, 17))} }},')
+        code, monotone = self._code, pieces(self.linkage, output)
+        rows = [f'    {{ {", ".join(map(code.literal, numbers))}, '
+                f'{code.row(np.round(terms, 17))} }},' for part in monotone
+                for numbers, terms in series(self.linkage, output, part, code.single)]
         is_angle = self.linkage.is_angle(output)
         sizes = map(code.literal, (1.0 if is_angle else self.linkage.longest,
                                    math.tau if is_angle else 0.0))

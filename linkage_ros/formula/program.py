@@ -160,7 +160,7 @@ class Program:
         self._deciding = in_order(self._conditions)
         self._variants = Cache()
 
-    def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> Pose:
+    def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> CompiledFunction:
         """Return the outputs as functions of the arguments; dimensions are floats or arrays."""
         swept = any(np.ndim(v) for v in dimensions.values())
         if not swept:
@@ -173,7 +173,7 @@ class Program:
         if not swept:
             constants = list(map(float, constants))
         shape = np.broadcast_shapes(*map(np.shape, constants)) if swept else ()
-        return Pose(variant, constants, shape, accelerate)
+        return CompiledFunction(variant, constants, shape, accelerate)
 
 
 def _conditions(outputs: Iterable[Real]) -> list:
@@ -183,7 +183,7 @@ def _conditions(outputs: Iterable[Real]) -> list:
                               and node.op == 'where' and not node.args[0].varies))
 
 
-class Pose:
+class CompiledFunction:
     """The outputs of a program as a function of the arguments, for given dimensions."""
 
     def __init__(self, variant: _Variant, constants: Sequence, shape: tuple, accelerate: bool):

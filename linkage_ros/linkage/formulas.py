@@ -17,7 +17,6 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tup
 from .geometry.builder import Builder
 from .geometry.planar import Arm, gated_by, Limit
 from .geometry.spatial import Vector
-from .text import joint_lines
 from .text.design import Design
 from ..cache import Cache, cached
 from ..formula.expression import (
@@ -72,9 +71,10 @@ class Structure:
 
     def __init__(self, design: Design, branches: Mapping[str, Any]):
         self.built = Builder(dict(design.turned))
+        symbols = {name: dimension(name, positive=name not in design.signed)
+                   for name in design.dimensions}
         given = {'inputs': design.inputs} if design.inputs else {}
-        design.words.draw(self.built, design.lines, joint_lines.symbols_of(
-            design.dimensions, design.signed), branches, **given)
+        design.words.draw(self.built, design.lines, symbols, branches, **given)
         self.branches = dict(branches)
         self._programs, self._moving = Cache(), Cache()
         # Derivatives by each input, which several programs need.

@@ -24,7 +24,7 @@ from .text.design import Design
 from ..cache import Cache
 from ..formula.expression import derivative, Real, real
 from ..formula.namespace import array_function
-from ..formula.program import evaluate, evaluate_in_order, Pose, Program
+from ..formula.program import CompiledFunction, evaluate, evaluate_in_order, Program
 from ..optional import needs
 from ..words import listed, meant, plain_text, quoted
 
@@ -113,10 +113,6 @@ class Kinematics:
             return expressions
         return getattr(expressions, '_make', tuple)(map(self.constants, expressions))
 
-    def windows(self) -> list:
-        """Return the links on two hinges in a row with two rods, and their limits."""
-        return [self.constants(window) for window in self.structure.built.windows]
-
     def value(self, length: Real) -> Any:
         """Return the value of an expression of dimensions alone."""
         if length not in self._evaluated:
@@ -139,8 +135,8 @@ class Kinematics:
                 np.isnan(size) & (not self.design.is_written))
             if not allowed.all():
                 raise line.error(problem)
-        for window in self.windows():
-            window.check()
+        for window in self.structure.built.windows:
+            self.constants(window).check()
         for by, input_ in enumerate(self.inputs):
             for name in self.geared if input_.speed > FASTEST else ():
                 if abs(ratio := self.gear(name, by)[0]) > FASTEST:
@@ -167,7 +163,7 @@ class Kinematics:
         if self.axes != 'xyz' or unknown or len({*outputs}) != len(self.inputs):
             raise ValueError(f'{self.type} can be driven by {len(self.inputs)} of '
                              f'{listed(self.joints if self.axes == "xyz" else ())}, '
-                             f'not by {listed(outputs)}')
+                             f'not by {quoted(list(outputs))}')
         sides = {**self.branches, **(branches or {})}
         made = self.cache.get_or_make(('driven by', outputs, *sides.values()), lambda: type(self)(
             replace(self.design, inputs=outputs), self.dimensions, sides, self.is_accelerated))
@@ -335,11 +331,13 @@ class Kinematics:
             return self.posed(points, joints, rates).at
         if any(map(np.ndim, self.dimensions.values())):
             raise ValueError('xp is for one set of dimensions, not for arrays')
+        if not hasattr(xp, 'float64'):
+            raise ValueError(f"xp must be a package with Python's array API, got {quoted(xp)}")
         outputs = self.structure.parts(self._requested(points, joints, rates))
         return array_function(outputs, len(self.inputs), xp, self.dimensions, IN_SINGLE)
 
     def posed(self, points: Names = None, joints: Sequence[str] = (),
-              rates: Sequence[str] = ()) -> Pose:
+              rates: Sequence[str] = ()) -> CompiledFunction:
         """Return the code behind `function`."""
         return self.bound('parts', self._requested(points, joints, rates))
 
@@ -348,7 +346,8 @@ class Kinematics:
         return tuple(self._names(kind, _hashable(requested))
                      for kind, requested in zip(('points', 'angles', 'rates'), names))
 
-    def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]) -> Pose:
+    def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]
+             ) -> CompiledFunction:
         """
         Return the function that solves a leg like this one.
 
@@ -378,11 +377,12 @@ class Kinematics:
 
     def is_angle(self, output: str) -> bool:
         """Return whether an output is an angle [rad], not a length [m]."""
+        self.check_there(output)
         return self.structure.turns(output)
 
     def moves(self, output: str, by: int = 0) -> bool:
         """Return whether an output depends on one of the inputs."""
-        return self.structure.moves(output, by)
+        return isinstance(output, str) and self.structure.moves(output, self._checked_by(by))
 
     def check_output(self, output: str) -> None:
         """Raise ValueError if an output does not exist or does not move."""
@@ -415,22 +415,18 @@ class Kinematics:
 
     # --- its code ---
 
-    def bind(self, program: Program) -> Pose:
+    def bind(self, program: Program) -> CompiledFunction:
         """Return a program of its formulas as a function of its arguments."""
         # A copy, since what a program needs beside the constants goes with the program.
         return program.bind(self.dimensions, dict(self._evaluated), self.is_accelerated)
 
-    def bound(self, kind: str, names: Any, *by: int) -> Pose:
+    def bound(self, kind: str, names: Any, *by: int) -> CompiledFunction:
         """Return the code for quantities of one kind; see `Structure.program`."""
         return self.bind(self.structure.program(kind, names, *by))
 
-    def checked(self, outputs: Tuple[str, ...]) -> Pose:
+    def checked(self, outputs: Tuple[str, ...]) -> CompiledFunction:
         """Return the code for outputs and their rates, NaN unless all joints are assembled."""
         return self.bound('checked', outputs)
-
-    def margins(self, *inputs: np.ndarray) -> np.ndarray:
-        """Return each limit's margin (limits, n), nonnegative where the limit is satisfied."""
-        return self.bound('margins', ()).searched(*inputs)
 
     def _vectors(self, kind: str, theta: Inputs, points: Any, *by: int) -> dict:
         names, pose = self._ready(kind, points, *by)
@@ -462,9 +458,10 @@ class Kinematics:
                              f'{len(self.inputs) - 1}, got {quoted(by)}')
         return int(by)
 
-    def _ready(self, kind: str, requested: Any, *by: int) -> Tuple[Tuple[str, ...], Pose]:
+    def _ready(self, kind: str, requested: Any, *by: int
+               ) -> Tuple[Tuple[str, ...], CompiledFunction]:
         """Return the requested names and the function that computes them."""
-        def make() -> Tuple[Tuple[str, ...], Pose]:
+        def make() -> Tuple[Tuple[str, ...], CompiledFunction]:
             names = self._names(kind, requested)
             return names, self.bound(kind, names, *by)
 

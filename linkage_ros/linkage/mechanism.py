@@ -18,7 +18,7 @@ from .kinematics import Inputs, Kinematics
 from .motion.reach import reach_of
 from .motion.singularities import Analysis
 from .text.arguments import numbers
-from ..formula.program import Pose
+from ..formula.program import CompiledFunction
 from ..words import quoted
 
 
@@ -197,10 +197,12 @@ class Mechanism(Kinematics):
         past -pi and pi. By default an arc in which the output jumps, as an angle may where its
         ends meet, counts as several.
         """
+        if arcs is not None and np.shape(numbers('arcs', arcs))[1:] != (2,):
+            raise ValueError(f'arcs must be pairs of two numbers, got {quoted(arcs)}')
         return extremes_of(self, output, arcs, self._fixed(others))
 
     def monotone(self, output: str, most: float, others: Sequence[float] = ()
-                 ) -> Tuple[List[Tuple[float, ...]], Pose]:
+                 ) -> Tuple[List[Tuple[float, ...]], CompiledFunction]:
         """
         Return pieces of the first input's reach on which an output is monotone, and its code.
 

@@ -18,7 +18,7 @@ from .log import MAX_NAMES, Once, Throttle
 from .message_layout import unpack
 from .messages import joint_states
 from .publishers import TrackedPublisher
-from ..scene.inverse_request import Command, InverseRequest
+from ..scene.inverse_request import ActuatorCommand, InverseRequest
 from ..scene.joint_names import JointName
 from ..scene.scene_mechanism import SceneMechanism
 from ..words import elided, listed
@@ -45,14 +45,14 @@ class Target(NamedTuple):
                 else settings.source for settings in self.mechanism.inputs.values()]
 
     def command(self, positions: Sequence[float], speeds: Optional[Sequence[float]],
-                seed: Sequence[float], jumps: bool) -> Command:
+                seed: Sequence[float], jumps: bool) -> ActuatorCommand:
         """Solve for the positions and speeds in a message; see `InverseRequest.command`."""
         return self.request.command(
             self._values(positions),
             speeds and [name.sign * speeds[i] for name, i in zip(self.names, self.indices)],
             seed, jumps)
 
-    def efforts(self, command: Command) -> list[float]:
+    def efforts(self, command: ActuatorCommand) -> list[float]:
         """Return the static efforts of the actuators that balance the loads [N m or N]."""
         if not self.mechanism.loads:
             return [0.0] * len(command.inputs)
@@ -90,7 +90,7 @@ class CommandStream:
         self._trajectories = TrackedPublisher(node, JointTrajectory, 'servo_trajectory', 10)
         self._throttle, self._reasons = Throttle(self._logger), Once(MAX_NAMES)
         self._mechanisms: Mapping[str, SceneMechanism] = {}
-        self._last: dict[str, Command] = {}
+        self._last: dict[str, ActuatorCommand] = {}
         self._worker, self._newest = node.worker, JointTrajectory()
         self._reader = joint_state_reader.subscribe(
             node, 'wanted_states', self._interpret, self._receive)
@@ -176,7 +176,7 @@ class CommandStream:
                                               target.mechanism.inputs.values())]
 
     def _command(self, target: Target, positions: Sequence[float],
-                 speeds: Optional[Sequence[float]]) -> Optional[Command]:
+                 speeds: Optional[Sequence[float]]) -> Optional[ActuatorCommand]:
         """Return the command for a target or, out of reach, the last valid one, if any."""
         name, seed = target.mechanism.name, self._seed(target)
         last, is_quick = self._last.get(name), len(seed) == 1 or target.request.is_closed
@@ -189,7 +189,7 @@ class CommandStream:
             target.named, lambda: f'wanted_states: {target.reason(positions, is_quick)}')
         return last and last._replace(speeds=[0.0] * len(last.inputs))
 
-    def _send(self, stamp: bytes, commands: Sequence[tuple[Target, Command]]) -> None:
+    def _send(self, stamp: bytes, commands: Sequence[tuple[Target, ActuatorCommand]]) -> None:
         if self._commands.has_subscribers:
             speeds = [speed for _, command in commands for speed in command.speeds or [math.nan]]
             efforts = [effort for target, command in commands for effort in target.efforts(command)

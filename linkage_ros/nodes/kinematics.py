@@ -119,8 +119,7 @@ class Kinematics(scene_node.SceneNode):
 
     def _latched(self, topics: MechanismTopics, model: MechanismModel) -> Callable[[], None]:
         """Build a mechanism's latched messages; return a function to publish them."""
-        latched = model.latched()
-        return lambda: topics.publish_latched(latched) if topics.model is model else None
+        return partial(topics.publish_latched, *model.latched())
 
     def _robot(self, models: Dict[str, MechanismModel]) -> Callable[[], None]:
         """Build the scene's robot model; return a function to publish it."""
@@ -129,10 +128,10 @@ class Kinematics(scene_node.SceneNode):
                   if model.robot and not model.mechanism.only_named]
         text = ''
         try:
-            text = urdf.write(bodies.together(robots)) if robots else ''
+            text = urdf.write(bodies.merged(robots)) if robots else ''
         except scene.SceneError as error:
             self.get_logger().info(f'the whole scene has no robot_description: {error}', once=True)
-        return lambda: self._scene_joint_states.describe(text) if models is self._models else None
+        return partial(self._scene_joint_states.describe, text)
 
     def delete_displayed(self) -> None:
         """Delete all markers and loci."""

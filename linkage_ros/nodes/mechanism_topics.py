@@ -136,9 +136,8 @@ class MechanismTopics:
         self.model, self.state = model, None
         self._delete(self._displayed - model.marker_array.ids)
 
-    def publish_latched(self, latched: Tuple[str, Optional[Marker]]) -> None:
+    def publish_latched(self, description: str, locus: Optional[Marker]) -> None:
         """Publish the robot model if it has changed; publish the locus, or delete it if None."""
-        description, locus = latched
         if description != self._described:
             self._described = description
             self._description.publish(String(data=description))

@@ -33,12 +33,7 @@ examples:
 
 def main(args=None) -> int:
     """Run the command line; return the exit code."""
-    return run('render', _draw, args)
-
-
-def _draw(args):
-    arguments = parsed(args)
-    draw(arguments, chosen(scene.load(arguments.scene).machines, arguments.mechanism))
+    return run('render', draw, args)
 
 
 def parsed(args):
@@ -66,8 +61,10 @@ def parsed(args):
     return arguments
 
 
-def draw(arguments, mechanisms):
-    """Write the files."""
+def draw(args):
+    """Write the files that a command line requests."""
+    arguments = parsed(args)
+    mechanisms = chosen(scene.load(arguments.scene).machines, arguments.mechanism)
     with needs('matplotlib'):
         from matplotlib import style
 

@@ -47,6 +47,11 @@ def whiter(colour, part: float):
     return tuple(np.array(to_rgb(colour)) * (1.0 - part) + part)
 
 
+def indices(linkage, names):
+    """Return the indices of joints among those of a linkage."""
+    return [linkage.points.index(name) for name in names]
+
+
 class Trace:
     """The curve of the tracer: whole, growing, fading, or the part that a foot stands on."""
 
@@ -91,7 +96,7 @@ def guides(axes, mechanism, cycle, unit):
     dashed = {'color': GREY, 'lw': 1.6 * unit, 'ls': (0, (6, 4)), 'zorder': 1}
     around = np.exp(1j * np.linspace(0.0, math.tau, 361))
     for bar in shapes.cranks(linkage, 'ground'):
-        centre, pin = (first_leg[0, linkage.points.index(name)] for name in bar)
+        centre, pin = first_leg[0, indices(linkage, bar)]
         circle = centre @ (1, 1j) + around * math.dist(centre, pin)
         axes.plot(circle.real, circle.imag, **dashed)
     line = straight(cycle.locus(mechanism))
@@ -124,15 +129,14 @@ class Legs:
 
     def __init__(self, axes, mechanism, cycle, parts, unit):
         linkage, shown = mechanism.linkage, set(mechanism.points)
-        joints = np.array([linkage.points.index(name) for name in mechanism.points])
+        joints = np.array(indices(linkage, mechanism.points))
         plates = [around(frame) for frame in linkage.frames.values() if len(frame) > 2]
         # The indices of all that is drawn of a leg, by part.
         self._indices = {
             **lines_of(mechanism, cycle), 'joints': joints,
             'pivots': joints[fixed(cycle.course)[joints]],
-            'tracer': [linkage.points.index(mechanism.tracer)],
-            'plates': [[linkage.points.index(name) for name in plate]
-                       for plate in plates if shown.issuperset(plate)]}
+            'tracer': indices(linkage, [mechanism.tracer]),
+            'plates': [indices(linkage, plate) for plate in plates if shown.issuperset(plate)]}
         sides = 1 + mechanism.mirrored
         thin = unit * (1.0 if len(cycle.prefixes) == 1 else 0.7)
         self.legs = [(leg, artists(
@@ -160,8 +164,7 @@ def lines_of(mechanism, cycle):
     lines: dict[str, list] = {part: [] for part in LINES}
     for part, bars in (('cranks', cranks), ('rods', linkage.cylinders),
                        ('bars', [bar for bar in linkage.bars if bar not in cranks])):
-        lines[part] = [[linkage.points.index(name) for name in bar]
-                       for bar in bars if shown.issuperset(bar)]
+        lines[part] = [indices(linkage, bar) for bar in bars if shown.issuperset(bar)]
     for shape, ends in cycle.slides:
         part = 'slots' if shape.kind == shapes.GUIDE else (
             'driven' if shape.slide.name in mechanism.inputs else 'bodies')
@@ -287,9 +290,9 @@ class Names:
     def __init__(self, axes, mechanism, cycle, unit):
         linkage = mechanism.linkage
         self._axes = axes
-        self._index = [linkage.points.index(name) for name in mechanism.points]
+        self._index = indices(linkage, mechanism.points)
         lines = *linkage.bars, *((link.joint, link.tip) for link in linkage.links)
-        self._bars = np.array([[linkage.points.index(name) for name in line] for line in lines])
+        self._bars = np.array([indices(linkage, line) for line in lines])
         self._fixed, self._pivot = np.flatnonzero(fixed(cycle.course)), 1j * PIVOT_SIZE * unit
         in_slots = {link.tip for link in linkage.links if link.kind == 'prismatic'}
         # Distance from the joint [points], and half of what the name is wider than one letter.

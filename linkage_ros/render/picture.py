@@ -119,7 +119,7 @@ class Panel:
         self.mechanism, self.cycle = mechanism, cycle
         self._axes = axes
         self._margin = 14 + 30 * unit  # pixels, for pivots, slots and names
-        self._joints = [mechanism.linkage.points.index(name) for name in mechanism.points]
+        self._joints = layers.indices(mechanism.linkage, mechanism.points)
         moving: list = [layers.Trace(axes, mechanism, self.cycle, trace, unit)]
         if 'floor' in parts:
             moving.append(layers.Floor(axes, mechanism, self.cycle, unit))

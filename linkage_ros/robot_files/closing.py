@@ -182,14 +182,19 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], l
     steps = sorted((pose + ahead * component.unit * fixed for ahead in (ASIDE, -ASIDE)),
                    key=lambda step: not component.within(step[None], fixed)[0])
     for which, rows in component.independent(fixed):
-        motions = component.free_ways(pose, fixed | ~which, least)
-        for way in motions if len(motions) > component.nullity(fixed | ~which) else ():
+        still = fixed | ~which
+        motions = component.free_ways(pose, still, least)
+        for way in motions if len(motions) > component.nullity(still) else ():
             aside = 3.0 * ASIDE * component.unit * np.array([way, -way])
             pairs = [component.closed(step + aside, fixed, 40) for step in steps]
             pairs = [poses for poses in pairs if np.max(component.gap(poses, rows)) < CLOSED]
             if not pairs:
                 raise ValueError(f'its loops end where the file has {listed(motors)}: choose '
                                  'another pose by --pose, or mend lengths or places in the file')
+            # What moves as freely beside it, such as a ring on two pins, is no dead point.
+            if min(len(component.free_ways(beside, still, least))
+                   for poses in pairs for beside in poses) == len(motions):
+                continue
             choices = [question for poses in pairs for question in _question(
                 component, poses, (way != 0.0) | fixed, motors)]
             questions += choices[:1]

@@ -24,6 +24,7 @@ NAME = 'from_robot'
 # The report on a mechanism that differs from its robot, or could not be compared.
 WRONG = 'compared with the robot'
 OTHERS = 'others'
+READING = 'joint_names: QB=-knee+0.6 is to be read as knee = 0.6 - angle of QB.'
 
 
 def main(args: Optional[List[str]] = None) -> int:
@@ -52,11 +53,12 @@ def show(args: Optional[List[str]]) -> None:
         robot = closing.held(robot, {**robot.held, **positions(arguments.hold)})
         parameters, reports, still = described(robot)
     # Unprintable characters in names of the file could end a comment.
-    head = [*(elided(line, 10 ** 6) for line in (
+    head = [elided(line, 10 ** 6) for line in (
         f'From {arguments.file}. Its joints on /joint_states, and its model:',
-        _launch(arguments, still))), *map(sentence, reports)]
-    print(*(f'# {line}' for line in head), in_yaml(parameters), sep='\n', end='')
-    print(*(f'{NAME}: {line}' for line in head[2:]), sep='\n', file=sys.stderr)
+        _launch(arguments, still), READING)]
+    lines = [*map(sentence, reports)]
+    print(*(f'# {line}' for line in head + lines), in_yaml(parameters), sep='\n', end='')
+    print(*(f'{NAME}: {line}' for line in lines), sep='\n', file=sys.stderr)
     if wrong := [line for line in reports if WRONG in line]:
         raise command.RequestError(f'{len(wrong)} mechanisms are left out, as they differ from '
                                    'the robot or could not be compared with it')

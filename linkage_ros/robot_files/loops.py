@@ -10,7 +10,7 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .spatial import blocks, TOGETHER
+from .spatial import CROSSING, loops_of
 from ..robot_model.robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE
 
 # Kinds of joints in planar loops.
@@ -46,7 +46,7 @@ def groups(robot: Robot) -> List[Group]:
         joint for joint in joints if len({*joint.bodies}) == 2], frames={
         body: robot.frames[body] for body in home.values()})
     return [group._replace(parts=_parts(robot, group) if group.why else [group])
-            for group in _blocks(robot, _with_balls(robot))]
+            for group in _groups(robot, _with_balls(robot))]
 
 
 def _parts(robot: Robot, group: Group) -> List[Group]:
@@ -55,21 +55,21 @@ def _parts(robot: Robot, group: Group) -> List[Group]:
     left = group.joints
     for joint in sorted(group.joints, key=lambda joint: joint.name not in robot.driven):
         if joint.kind == HINGE and joint in left:
-            parts += [part for part in _blocks(robot, [
+            parts += [part for part in _groups(robot, [
                 other for other in left if other.kind in FLAT and lean(other, joint.axis) < ASKEW
                 ]) if not part.why]
             left = [other for other in left if not any(other in part.joints for part in parts)]
     return parts
 
 
-def _blocks(robot: Robot, joints: List[Joint]) -> List[Group]:
+def _groups(robot: Robot, joints: List[Joint]) -> List[Group]:
     """Return the loops of some joints, those that share bars together."""
     tree, cuts = replace(robot, joints=joints).spanning_tree()
     groups = []
-    for block, closing in blocks(tree, cuts):
-        edges = {tree[body][1] for body in block} | {*closing}
+    for bodies, closing in loops_of(tree, cuts):
+        edges = {tree[body][1] for body in bodies} | {*closing}
         # The parent of the first body is nearest to the root.
-        ground = next(base for body, (base, _) in tree.items() if body in block)
+        ground = next(base for body, (base, _) in tree.items() if body in bodies)
         group = Group(ground, [joint for joint in joints if joint in edges], '', [])
         try:
             check_planar(ground, group.joints)
@@ -81,9 +81,8 @@ def _blocks(robot: Robot, joints: List[Joint]) -> List[Group]:
 
 def _with_balls(robot: Robot) -> List[Joint]:
     """Return the joints with a ball in place of two or three hinges that cross in a point."""
-    joints, bodies = robot.joints, [*robot.frames]
-    while bodies:
-        body = bodies.pop()
+    joints = robot.joints
+    for body in reversed(robot.frames):
         held = [joint for joint in joints if body in joint.bodies]
         if body == robot.root or len(held) != 2 or any(
                 joint.name in robot.driven or joint.kind not in (HINGE, BALL) for joint in held):
@@ -91,13 +90,12 @@ def _with_balls(robot: Robot) -> List[Joint]:
         first, second = held
         ends = first.other(body), second.other(body)
         places = first.place(ends[0]), second.place(ends[1])
-        if ends[0] != ends[1] and np.linalg.norm(places[0] - places[1]) < TOGETHER \
+        if ends[0] != ends[1] and np.linalg.norm(places[0] - places[1]) < CROSSING \
                 and (BALL in (first.kind, second.kind)
                      or np.linalg.norm(np.cross(first.axis, second.axis)) > ASKEW):
             ball = Joint(f'{first.name}+{second.name}', BALL, ends, places, first.axes,
                          parts=(first, second))
             joints = [*(joint for joint in joints if joint not in held), ball]
-            bodies += ends
     return joints
 
 

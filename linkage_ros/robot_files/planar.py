@@ -19,7 +19,7 @@ from typing import Any, Dict, Iterator, List, Optional, Sequence, Set, Tuple
 import numpy as np
 
 from . import check, loops
-from .spatial import EXACT, TOGETHER
+from .spatial import CROSSING, EXACT
 from .. import mechanisms, scene
 from ..linkage import (
     bar_name,
@@ -81,7 +81,7 @@ class Drawing(Dyads):
         self.driven = [joint for joint in self.joints if joint.name in drives]
         places = [place for joint in self.joints for place in joint.places]
         size = max(abs(place - other) for place in places for other in places)
-        if size < TOGETHER:
+        if size < CROSSING:
             raise ValueError('all its joints are at one place')
         if self.gap > OPEN * size:
             raise ValueError(f'its loops cannot be closed: they stay open by {self.gap:.3g} m, '

@@ -26,7 +26,7 @@ MAX_STEP = 0.5
 LAST_STEP = 1e-8
 MAX_BODIES = 150
 # Hinges nearer to each other [m] cross in a point.
-TOGETHER = 1e-6
+CROSSING = 1e-6
 # Loops open by less, of their size, are closed.
 CLOSED = 1e-10
 # Loops open by more, of their size, are so in the file or by a mistake, not by rounding.
@@ -46,7 +46,7 @@ class Screw(NamedTuple):
     body: str
 
 
-def blocks(tree: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
+def loops_of(tree: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
            ) -> List[Tuple[Set[str], List[Joint]]]:
     """Return bodies and cuts of the loops of a tree; loops that share joints are together."""
     groups: List[Tuple[Set[str], List[Joint]]] = []
@@ -66,7 +66,7 @@ def blocks(tree: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
 def components(robot: Robot) -> Iterator['Component']:
     """Yield the loops of a robot; those that share joints are one component."""
     tree, cuts = robot.spanning_tree()
-    for bodies, joints in blocks(tree, cuts):
+    for bodies, joints in loops_of(tree, cuts):
         if len(bodies) > MAX_BODIES:
             raise RequestError(f'{len(bodies)} bodies are in loops that share joints: no more '
                                f'than {MAX_BODIES} are closed at once')
@@ -116,7 +116,7 @@ class Component:
         self._starts = np.array([screw.joint.start for screw in self._screws])
         self._slides = np.array([screw.kind == SLIDE for screw in self._screws], bool)
         self._in_balls = np.array([any(
-            np.linalg.norm(screw.place - other.place) < TOGETHER
+            np.linalg.norm(screw.place - other.place) < CROSSING
             and np.linalg.norm(np.cross(screw.axis, other.axis)) > 0.1
             for other in self._screws if HINGE == screw.kind == other.kind)
             for screw in self._screws], bool)

@@ -43,7 +43,7 @@ COLOURS = {name: (*palette.rgb(code), 1.0) for name, code in (
     ('joint', palette.JOINT))}
 # Of each kind of piece: shape, radius (of a box its thickness) as a fraction of the longest bar,
 # and colour; none: that of the link that moves it.
-LOOKS = {'bar': (CYLINDER, 1 / 80, ''), shapes.ROD: (CYLINDER, 1 / 80, 'bar'),
+STYLES = {'bar': (CYLINDER, 1 / 80, ''), shapes.ROD: (CYLINDER, 1 / 80, 'bar'),
          shapes.BARREL: (CYLINDER, 1 / 32, ''), shapes.GUIDE: (BOX, 1 / 80, 'slot'),
          shapes.BLOCK: (BOX, 1 / 20, ''), 'joint': (BALL, 1 / 40, 'joint')}
 # Thickness of bars as a fraction of the longest.
@@ -117,10 +117,10 @@ def robot(machines: Iterable[SceneMechanism], frame_id: str,
         base = machine.frame_id or frame_id
         part = Part(_Tree(machine, width).robot, base, machine.pose, machine)
         models.append(Model(machine.name, base, [part]))
-    return together(models)
+    return merged(models)
 
 
-def together(models: Sequence[Model]) -> Model:
+def merged(models: Sequence[Model]) -> Model:
     """
     Return robot models as one; raise SceneError if they do not form a tree.
 
@@ -133,10 +133,10 @@ def together(models: Sequence[Model]) -> Model:
     for line in lines.values():
         while len(line) <= len(lines) and line[-1] in below:
             line.append(below[line[-1]])
-    root, *more = tops = dict.fromkeys(line[-1] for line in lines.values())
+    root, *more = bases = dict.fromkeys(line[-1] for line in lines.values())
     if more or root in below:
         raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
-                         f'link of another one of them, not {listed(tops, 120)}')
+                         f'link of another one of them, not {listed(bases, 120)}')
     roots = [part.robot.root for part in parts]
     joints = [joint for part in parts for joint in part.robot.joints]
     for tag, names in (('link', [root, *roots, *(joint.bodies[1] for joint in joints)]),
@@ -246,7 +246,7 @@ class _Tree:
                 yield self._piece(kind, start, end, mover in self._machine.inputs)
 
     def _piece(self, kind: str, start: Place, end: Place, is_driven: bool = False) -> Piece:
-        form, thickness, colour = LOOKS[kind]
+        form, thickness, colour = STYLES[kind]
         return Piece(form, colour or ('driven' if is_driven else 'bar'), thickness * self._length,
                      start, end)
 

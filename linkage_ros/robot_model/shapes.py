@@ -108,12 +108,8 @@ def drawn(machine: SceneMechanism, names: Collection[str]) -> List[Shape]:
 def cranks(linkage: Mechanism, parent: Optional[str] = None) -> List[Tuple[str, str]]:
     """Return the bars that inputs turn, from centre to pin; all, or those with one parent."""
     names = [input_.name for input_ in linkage.inputs if input_.turns]
-    links = [link for link in linkage.links
-             if link.name in names and parent in (None, link.parent)]
-    # A link in space has no tip: its bars begin at its joint.
-    return [bar for link in links for bar in (
-        [(link.joint, link.tip)] if link.tip != link.joint else
-        [bar for bar in linkage.bars if bar[0] == link.joint])]
+    return [(link.joint, link.tip) for link in linkage.links
+            if link.name in names and parent in (None, link.parent)]
 
 
 def plates(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, str, str]]:

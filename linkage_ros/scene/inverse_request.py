@@ -19,7 +19,7 @@ from ..words import listed
 LEVER = 'lever'
 
 
-class Command(NamedTuple):
+class ActuatorCommand(NamedTuple):
     """
     A command to the actuators, one number for each input.
 
@@ -143,7 +143,7 @@ class InverseRequest:
                 [*map(operator.mul, rates, self._rate_units)])
 
     def command(self, values: Sequence[float], speeds: Optional[Sequence[float]],
-                seed: Sequence[float], jumps: bool = False) -> Command:
+                seed: Sequence[float], jumps: bool = False) -> ActuatorCommand:
         """
         Return the command for values of the outputs and their speeds.
 
@@ -160,8 +160,8 @@ class InverseRequest:
         """
         inputs, rates = self._mechanism.follow(
             self.outputs, values, seed, jumps or len(seed) == 1)
-        return Command(inputs, self.positions_of(inputs),
-                       self._speeds(speeds, rates) if speeds else ())
+        return ActuatorCommand(
+            inputs, self.positions_of(inputs), self._speeds(speeds, rates) if speeds else ())
 
     def _speeds(self, speeds: Sequence[float], rates: Sequence[float]) -> list[float]:
         """Return the actuators' speeds for speeds of the outputs, at rates by the inputs."""

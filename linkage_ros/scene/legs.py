@@ -15,7 +15,7 @@ from typing import Any, List, Optional, Sequence, Union
 
 import numpy as np
 
-from ..formula.program import Batch, Pose
+from ..formula.program import Batch, CompiledFunction
 from ..linkage import Leg, LinkPoint, Mechanism, sampled
 
 # Even samples of a locus: no corner is seen, unless bars fold flat but for some 1e-5 of them.
@@ -38,7 +38,7 @@ class Solution:
 
     """
 
-    def __init__(self, legs: Sequence[Leg], function: Pose, inputs: int,
+    def __init__(self, legs: Sequence[Leg], function: CompiledFunction, inputs: int,
                  sizes: Sequence[int], speeds: int, efforts: int):
         parts = [(part, float, (size,)) for part, size in zip(
             ('coordinates', 'angles', 'rates'), sizes)]
@@ -51,11 +51,10 @@ class Solution:
         self._function, self._has_speeds = function.at, speeds > 0
         self._at_rest = inputs * (0.0,)
         # Packing is faster than assignment to an array.
-        row: Any = Struct(f'{self.rows.shape[1]}d')
         driven: Any = Struct(f'{inputs + speeds}d')
-        self._pack_row, self._pack_driven = row.pack_into, driven.pack_into
-        # Each leg, with the place of its row [bytes].
-        self._legs = [(i * row.size, leg) for i, leg in enumerate(legs)]
+        solved: Any = Struct(f'{self.rows.size + inputs + speeds}d')
+        self._pack_driven, self._pack_solved = driven.pack_into, solved.pack_into
+        self._legs = legs
         self._batch: Optional[Batch] = None
         if len(legs) > 1:
             with suppress(ImportError):
@@ -70,16 +69,16 @@ class Solution:
         """
         driven = (*inputs, *speeds) if self._has_speeds else (*inputs,)
         arguments = driven if self._has_speeds else (*inputs, *self._at_rest)
-        total = sum(driven)
-        self._pack_driven(self.values, self.rows.nbytes, *driven)
         if self._batch and self._batch.solve(arguments):
+            self._pack_driven(self.values, self.rows.nbytes, *driven)
             # `vdot` overflows without the warning of `dot`.
-            return math.isfinite(total) and math.isfinite(np.vdot(self.rows, self.rows))
-        for place, leg in self._legs:
-            row = self._function(*arguments, *leg)
-            self._pack_row(self.values, place, *row)
-            total += sum(row)
-        return math.isfinite(total)
+            return math.isfinite(sum(driven)) and math.isfinite(np.vdot(self.rows, self.rows))
+        numbers: List[float] = []
+        for leg in self._legs:
+            numbers += self._function(*arguments, *leg)
+        numbers += driven
+        self._pack_solved(self.values, 0, *numbers)
+        return math.isfinite(sum(numbers))
 
 
 class Assembly:

@@ -37,8 +37,11 @@ def ends(mechanism: SceneMechanism, parameter: Parameter) -> Optional[Arc]:
         return None
     _, what, key = [*parameter.name.split('.'), ''][:3]
     if what == 'dimensions':
-        return _dimension_ends(
-            mechanism.linkage, key, field.positive, _required_range(mechanism))
+        # A crank that turns fully has to do so still.
+        first, *others = mechanism.inputs.values()
+        turns = not others and first.input.is_whole(first.reach)
+        return _dimension_ends(mechanism.linkage, key, field.positive,
+                               first.sweep or first.reach[0] if turns else None)
     if key == 'start':
         tried = [value, *(end for arc in mechanism.inputs[what].reach for end in arc)]
     elif key == 'offset':
@@ -47,14 +50,6 @@ def ends(mechanism: SceneMechanism, parameter: Parameter) -> Optional[Arc]:
     else:
         tried = [0.1 * value, 10.1 * value]
     return max(min(tried), -MAX_END), min(max(tried), MAX_END)
-
-
-def _required_range(mechanism: SceneMechanism) -> Optional[Arc]:
-    """Return the angles [rad] that a fully rotatable crank passes; None for other inputs."""
-    first, *others = mechanism.inputs.values()
-    if others or not first.input.is_whole(first.reach):
-        return None
-    return first.sweep or first.reach[0]
 
 
 @cached(16)
@@ -75,7 +70,7 @@ def _are_assembled(linkage: Mechanism, key: str, values: np.ndarray,
     """
     Return for each value of a dimension whether the linkage can be assembled, (values,).
 
-    It must be at all inputs tried in the range `required`, or at one input if that is None.
+    It must be at all angles tried in the range `required` [rad], or at one input if that is None.
     """
     try:
         tried = linkage.with_dimensions(**{key: values[:, None]})

@@ -6,11 +6,14 @@
 from __future__ import annotations
 
 import re
-from typing import Any, Mapping, Optional
+from typing import Any, Mapping
 
 from . import Scene
 from .parameter_file import is_text
 from ..optional import needs
+
+# Parameters that define a scene, which a file always has.
+_DEFINES = re.compile(r'mechanisms|[^.]+\.(type|scale|dimensions\..+)')
 
 
 def in_yaml(values: Mapping[str, Any]) -> str:
@@ -31,12 +34,7 @@ def in_yaml(values: Mapping[str, Any]) -> str:
     return dump({'/**': {'ros__parameters': lists}}, Dumper=Dumper, width=1000, sort_keys=False)
 
 
-def without_defaults(scene: Scene, always: Optional[re.Pattern] = None) -> dict[str, Any]:
-    """
-    Return the mechanisms and the values that differ from their defaults, by full parameter name.
-
-    A value whose whole name matches `always` is included even if it is the default.
-    """
+def without_defaults(scene: Scene) -> dict[str, Any]:
+    """Return what defines the mechanisms and what differs from defaults, by full name."""
     return {parameter.name: parameter.value for parameter in scene.parameters
-              if parameter.value != parameter.default or parameter.name == 'mechanisms'
-              or always and always.fullmatch(parameter.name)}
+            if parameter.value != parameter.default or _DEFINES.fullmatch(parameter.name)}

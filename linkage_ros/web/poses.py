@@ -18,7 +18,6 @@ from ..words import listed, quoted
 
 ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
 _, ACCELERATION, FORCE = ARROWS
-SIGNS = '+1', '−1'
 # Kinds of parameters with a control.
 CONTROLLED = 'double', 'integer', 'bool'
 # Change of a dimension that detects dependent bars, as a fraction of the longest bar.
@@ -64,7 +63,7 @@ def drawn(mechanism: SceneMechanism, speeds: Mapping[str, float]) -> dict[str, A
     return {
         'space': mechanism.in_space, 'points': mechanism.points, 'pairs': mechanism.leg_pairs,
         'legs': mechanism.leg_pairs * (1 + mechanism.mirrored),
-        'sides': {name: mechanism.linkage.line_of(name).sides or SIGNS
+        'sides': {name: mechanism.linkage.line_of(name).sides or ('+1', '−1')
                   for name in mechanism.linkage.branches},
         'inputs': {name: {
             'unit': settings.input.unit, 'speed': speeds[name],
@@ -173,20 +172,18 @@ def reached(mechanism: SceneMechanism, present: Sequence[float],
 
 def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
               value: float) -> Reached:
-    settings, ends = mechanism.inputs[name], mechanism.inputs[name].arcs
-    input_ = settings.input
-    middles = ((low + high) / 2.0 for low, high in ends)
-    near = min((min(max(float(input_.nearest_equivalent(value, middle)), low), high)
-                for middle, (low, high) in zip(middles, ends)),
-               key=lambda end: input_.apart(end, value))
-    whole = input_.is_whole(ends)
-    new = float(input_.wrapped(value)) if whole else near
+    arcs, input_ = mechanism.inputs[name].arcs, mechanism.inputs[name].input
+    is_whole = input_.is_whole(arcs)
+    nearest = [float(input_.wrapped(value))] if is_whole else [
+        min(max(input_.nearest_equivalent(value, 0.5 * (low + high)), low), high)
+        for low, high in arcs]
+    new = min(nearest, key=lambda end: input_.apart(end, value))
     inputs = [new if key == name else old for key, old in zip(mechanism.inputs, present)]
     places = mechanism.linkage.solve(linkage_inputs(mechanism, inputs))
     if not all(math.isfinite(part) for place in places.values() for part in place):
         raise SceneError(f'{mechanism.name} cannot be assembled there')
-    missed = not whole and settings.input.apart(near, value) > CLOSE * settings.input.size
-    return inputs, {'name': name, 'arcs': ends, 'unit': settings.input.unit} if missed else None
+    is_missed = not is_whole and input_.apart(new, value) > CLOSE * input_.size
+    return inputs, {'name': name, 'arcs': arcs, 'unit': input_.unit} if is_missed else None
 
 
 def _output_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
@@ -226,12 +223,12 @@ def tunable(mechanism: SceneMechanism) -> dict[str, Any]:
     Return the `travel` of a mechanism's parameters, and `bars` that follow its dimensions.
 
     By parameter, these are the ends of its slider, or None, and pairs of joints. `fixed` are the
-    joints that do not move. This is slow.
+    joints that cannot be dragged. This is slow.
     """
     linkage = mechanism.linkage
     return {'travel': {parameter.name.partition('.')[2]: slider.ends(mechanism, parameter)
                        for parameter in mechanism.parameters},
-            'fixed': list(linkage.grounded),
+            'fixed': mechanism.points if mechanism.in_space else linkage.grounded,
             'bars': {f'dimensions.{key}': _bars(linkage, key) for key in linkage.dimensions}}
 
 

@@ -11,7 +11,6 @@ from contextlib import suppress
 from functools import partial
 from itertools import starmap
 import math
-import re
 from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence
 
 from rcl_interfaces.msg import ParameterEvent
@@ -41,8 +40,9 @@ SETTER = 'set_parameters_atomically'
 POLL_S, LINGER_S = 1.0, 1.0
 # For the first announcement of a node, and a response; between two looks for one of these.
 MAX_ANNOUNCE_S, MAX_ANSWER_S, RETRY_S = 1.0, 3.0, 0.005
-# Parameters that define a scene, which a saved file always has.
-DEFINES = re.compile(r'mechanisms|[^.]+\.(type|scale|dimensions\..+)')
+
+# Downloads, the last two of linkages in a plane only; the page itself draws 'png'.
+FORMS = 'yaml', 'png', 'h', 'csv', 'urdf'
 
 Answer = dict[str, Any]
 
@@ -52,20 +52,16 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 class ShownMechanism(NamedTuple):
     """
-    A mechanism on the page: prefix of its topics, node, and topics of its inputs.
+    A mechanism on the page: prefix of its topics, name, node, and topics of its inputs.
 
     `nodes` has the node that announces a parameter, by full name.
     """
 
     key: str
+    name: str
     owner: str
     sources: Sequence[str]
     nodes: Mapping[str, str]
-
-    @property
-    def name(self) -> str:
-        """Its name in its scene."""
-        return self.key.rsplit('/', 1)[1]
 
 
 class SceneView:
@@ -104,7 +100,6 @@ class SceneView:
         self._speeds: dict[str, dict[str, float]] = defaultdict(dict)
         self._news = asyncio.Event()
         self._watching: Optional[asyncio.Task[None]] = None
-        self._stopping: Optional[asyncio.TimerHandle] = None
         # Subscriptions and clients of services by name, feeds of markers by topic.
         self._entities: dict[str, Any] = {}
         self._feeds: dict[str, Feed] = {}
@@ -114,27 +109,15 @@ class SceneView:
     def add(self, client: Any) -> None:
         """Add a client; the first one starts the observation of the graph."""
         self.clients.append(client)
-        if self._stopping:
-            self._stopping.cancel()
-        if self._watching is None:
+        if self._watching:
+            self._show(client)
+        else:
             self._watching = asyncio.create_task(self._watch())
-            return
-        self._show(client)
 
     def remove(self, client: Any) -> None:
         """Remove a client; after the last one the observation ends, unless it was a reload."""
         self.clients.remove(client)
-        if not self.clients:
-            # Requests in progress would wait for a client that has left.
-            self._stopping = self.loop.call_later(LINGER_S, self._stop)
-
-    def _stop(self) -> None:
-        if self._watching:
-            self._watching.cancel()
-        self._watching = self._stopping = None
-        self._graph, self._mechanisms, self._announced, self._scenes = {}, {}, {}, {}
-        self._is_stale = True
-        self._keep({})
+        self._news.set()
 
     async def set(self, key: str, values: Mapping[str, Any]) -> Answer:
         """
@@ -218,7 +201,7 @@ class SceneView:
         names = {parameter.name for parameter in whole.parameters}
         # An input that was stopped is saved with the speed that it had.
         speeds = {name: speed for name, speed in self._speeds[owner].items() if name in names}
-        return writing.in_yaml(writing.without_defaults(scene.changed(whole, speeds), DEFINES))
+        return writing.in_yaml(writing.without_defaults(scene.changed(whole, speeds)))
 
     async def read(self, text: str) -> Answer:
         """Return the result of `poses.number`."""
@@ -285,8 +268,8 @@ class SceneView:
     def _described(self, shown: ShownMechanism) -> Answer:
         """Describe what the page needs of a mechanism beside its markers."""
         mechanism = self._mechanism(shown)
-        return {'key': shown.key, 'name': shown.name,
-                'curves': {} if mechanism.in_space else curves.KINDS,
+        forms, kinds = (FORMS[:3], {}) if mechanism.in_space else (FORMS, curves.KINDS)
+        return {'key': shown.key, 'name': shown.name, 'forms': forms, 'curves': kinds,
                 'settings': list(starmap(poses.setting, self._settings(shown).items())),
                 **poses.drawn(mechanism, self._playing(shown))}
 
@@ -297,7 +280,8 @@ class SceneView:
             for name, settings in self._mechanism(shown).inputs.items()}
 
     async def _watch(self) -> None:
-        while True:
+        """Observe the graph until the last page is closed."""
+        while self.clients or await self._until(lambda: bool(self.clients), LINGER_S):
             try:
                 graph = self._find_announcers()
                 if graph != self._graph or self._is_stale:
@@ -309,6 +293,9 @@ class SceneView:
             with suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(self._news.wait(), POLL_S)
             self._news.clear()
+        self._graph, self._mechanisms, self._announced, self._scenes = {}, {}, {}, {}
+        self._is_stale, self._watching = True, None
+        self._keep({})
 
     def _find_announcers(self) -> dict[str, tuple[str, list[str]]]:
         """Return, by node that announces parameters, that topic and the topics of its inputs."""
@@ -336,7 +323,8 @@ class SceneView:
         self._graph, self._is_stale = graph, False
         wanted: dict[str, Callable[[str], Any]] = {
             **dict.fromkeys((topic for topic, _ in graph.values()), self._listen),
-            **dict.fromkeys((f'{node}/{SETTER}' for node in graph), self._setter)}
+            **dict.fromkeys((f'{node}/{SETTER}' for node in graph),
+                            partial(self._node.create_client, SetParametersAtomically))}
         present = dict.fromkeys(self._entities, self._listen)
         self._keep({**present, **wanted})
         await self._until(lambda: self._announced.keys() >= graph.keys(), MAX_ANNOUNCE_S)
@@ -347,7 +335,7 @@ class SceneView:
                 nodes = self._read(owner)
                 for name in self._scenes[owner].machines:
                     key = f'{_space(owner)}/{name}'
-                    self._mechanisms[key] = ShownMechanism(key, owner, sources, nodes)
+                    self._mechanisms[key] = ShownMechanism(key, name, owner, sources, nodes)
                     wanted.update(dict.fromkeys(sources, self._follow))
                     wanted[f'{key}/markers'] = partial(self._draw, key, MarkerArray, NEWEST)
                     wanted[f'{key}/locus'] = partial(self._draw, key, Marker, LATCHED)
@@ -386,9 +374,6 @@ class SceneView:
                 self._node.destroy_subscription(entity)
         for name in wanted.keys() - self._entities.keys():
             self._entities[name] = wanted[name](name)
-
-    def _setter(self, service: str) -> Any:
-        return self._node.create_client(SetParametersAtomically, service)
 
     def _listen(self, topic: str) -> Any:
         return self._node.create_subscription(

@@ -5,8 +5,6 @@
 What the library is held to, worked out without it: for the tests and for the benchmark.
 
 =====================  ============================================================================
-exact_poses            the catalogue, each mechanism placed in 80 digits
-accuracy_rule          how far an answer of the catalogue may be from that, and its measure
 drawing                any linkage, drawn from its joint lines in 96 digits or for many angles
 drawing_accuracy       how far an answer of any linkage may be from its drawing
 hard_cases             angles and dimensions that are hard on the catalogue

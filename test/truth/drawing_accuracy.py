@@ -20,8 +20,12 @@ stands on can be assembled and NaN wherever it cannot; within `GRAZE` sensitivit
 a cylinder's within `LOOSER` times as much, either will do. What hangs on an arm that is no longer
 than what the rule lets its ends be off has no direction that could be right. Angles are compared
 modulo a turn, so that their ulp is that of pi.
+
+By the `strict` rule, that of the catalogue, joints on the way are not rounded, and rates are held
+to the rule of poses, or to `SPEED_RULE` x 2^-53 of their top speed over a turn if that is more.
 """
 
+from functools import cached_property
 import math
 from typing import NamedTuple
 
@@ -33,6 +37,7 @@ from .drawing import DIGITS, draw, half_ulp, Linkage, precisely, SLIDING
 
 # By how often an output is differentiated.
 RULES = 4.0, 8.0, 8.0
+SPEED_RULE = 60.0
 GRAZE = 32.0
 # The limits of a cylinder are as exact as its longest length.
 LOOSER = 8
@@ -186,14 +191,37 @@ class Measure:
     """The truth of a linkage, one way past its change points, and what rounding does to it."""
 
     @precisely
-    def __init__(self, linkage: Linkage, poses, way=None):
-        self.linkage, self.poses, self._way = linkage, poses, way or {}
+    def __init__(self, linkage: Linkage, poses, way=None, strict=False):
+        self.linkage, self.poses, self._way, self.strict = linkage, poses, way or {}, strict
         self._nominal = self._given(linkage.numbers)
         self._moved = {}
         self._pinned = linkage.fixed | set(linkage.cranks)
         self._lines = {name: line for line in linkage.lines for name in line.names}
         # An angle is about as large as one; lengths are as large as the longest of them.
         self._units = [1 if line.turns else linkage.longest for line in linkage.inputs]
+
+    @cached_property
+    @precisely
+    def _top_speeds(self):
+        """Return each output's largest speed over a turn; at least a crank's of its own kind."""
+        ways, longest = self._ways(True, None), max(
+            number[0] for line, number in zip(self.linkage.lines, self.linkage.numbers)
+            if line.word == 'crank')
+        found = [mpfr(1) if out.what == 'angle' else longest for out in self.poses]
+        for theta in np.arange(24) * (math.tau / 24) + 0.1:
+            given = [mpfr(float(theta))]
+            now = self._drawn(self._nominal, given)
+            if all(gap > 0 for gap in now.gaps.values()):
+                speeds = self._values(now, _Move(self._nominal, given, ways))[len(self.poses):]
+                found = [max(top, abs(speed)) for top, speed in zip(found, speeds)]
+        return {out: float(top) for out, top in zip(self.poses, found)}
+
+    def rule(self, out):
+        """Return an output's rule, the ulps beside it, and the error that is allowed at all."""
+        if self.strict:
+            return RULES[0], 1.0, out.order and SPEED_RULE * 2.0 ** -53 * self._top_speeds[
+                out._replace(by=None)]
+        return RULES[out.order], RULES[out.order] if out.order else 1.0, 0.0
 
     def _given(self, numbers):
         return _Moved(self.linkage.prepared(numbers), self.linkage.turns(numbers, self._way))
@@ -240,7 +268,8 @@ class Measure:
                     one_slack[name] += abs(drawn.gaps[name] - gap)
                 for name, arm in arms.items():
                     bent[name] += abs(drawn.arms[name] - arm)
-            for moved in self._displaced(now.points, self.linkage.fixed, side):
+            for moved in self._displaced(now.points, () if self.strict else self.linkage.fixed,
+                                         side):
                 drawn = self._drawn(self._nominal, given, moved)
                 for name, gap in closures.items():
                     one_slack[name] += abs(drawn.gaps[name] - gap)
@@ -295,7 +324,8 @@ class Measure:
         for i, slack in self.linkage.geared(rows, given):
             moved = [*rows[:i], (*rows[i][:-1], rows[i][-1] + side * slack), *rows[i + 1:]]
             yield still._replace(numbers=self._nominal._replace(rows=moved))
-        hung = [name for name in self.linkage.placed if self._lines[name].word != 'ground']
+        hung = [name for name in self.linkage.placed
+                if self._lines[name].word != 'ground' and not self.strict]
         for moved in self._displaced(now.points, hung, side):
             yield still._replace(joints=moved)
         for i, (way, motion) in enumerate(zip(ways, speeds)):
@@ -422,20 +452,21 @@ def _change(before, now, after, order):
 
 @precisely
 def judge(measure, given, found, rates=False, exact=None, motion=None):
-    """Return the `Row` of each output at values of the inputs, shape (n, inputs)."""
+    """Return the `Row` of each output that is found, at inputs of the shape (n, inputs)."""
     rows = []
     for index, row in enumerate(given):
         truth = exact[index] if exact else measure.at(row, rates, motion)
         outs = differentiated(measure.poses, len(row), rates, motion)
         for i, out in enumerate(outs):
-            rows.append(_row(out, row, found[out][index], truth.values[i],
-                             truth.sensitivity[i], measure.due(out, truth.states)))
+            if out in found:
+                rows.append(_row(out, row, found[out][index], truth.values[i],
+                                 truth.sensitivity[i], measure.due(out, truth.states),
+                                 *measure.rule(out)))
     return rows
 
 
-def _row(out, given, result, value, spread, due):
+def _row(out, given, result, value, spread, due, rule, ulps, allowed):
     error, ratio, problem, rate = math.nan, 0.0, '', out.order > 0
-    rule = RULES[out.order]
     if np.all(np.isnan(result)) or (rate and due != 'number' and not np.all(np.isfinite(result))):
         problem = 'NaN' if due == 'number' else ''
     elif due == 'nan' or due == 'number' and np.any(np.isnan(result)):
@@ -443,10 +474,12 @@ def _row(out, given, result, value, spread, due):
     elif due in ('number', 'maybe') or due == 'either' and not rate:
         error = float(_error(out, result, value))
         ulp = np.spacing(math.pi if out.what == 'angle' and not rate else np.max(np.abs(result)))
-        excess = max(0.0, error - float(ulp) * (rule if rate else 1.0))
+        excess = max(0.0, error - float(ulp) * ulps)
         # What the differencing leaves of a rate of zero is no error.
         still = rate and not spread and not np.any(result)
         ratio = 0.0 if not excess or still else excess / spread if spread else math.inf
+        if 0.0 < error <= allowed:
+            ratio = min(ratio, rule * error / allowed)
         problem = 'rule' if not ratio <= rule else ''
     return Row(out, tuple(map(float, given)), problem, math.inf if 'NaN' in problem else ratio,
                error, spread, result, value)
@@ -463,3 +496,22 @@ def _error(out, result, value):
 def broken(rows):
     """Return the rows that break the rule, worst first."""
     return sorted((row for row in rows if row.problem), key=lambda row: -row.ratio)
+
+
+def strict(mechanism):
+    """Return the measure of a mechanism by the strict rule."""
+    linkage = Linkage(mechanism.design.joints, mechanism.dimensions, mechanism.branches)
+    return Measure(linkage, outputs(linkage, mechanism.links), linkage.passings()[0], strict=True)
+
+
+def measured(mechanism, thetas, rates=False):
+    """Measure all that a mechanism answers at crank angles [rad], by the strict rule."""
+    measure, given = strict(mechanism), np.asarray(thetas, float)[:, None]
+    return judge(measure, given, answers(mechanism, given, measure.poses, rates), rates)
+
+
+def summary(mechanism, rows, count=5):
+    """Return the worst failures as text that reproduces them."""
+    return '\n'.join([f'{mechanism.type} {mechanism.dimensions} {mechanism.branches}', *(
+        f'{row.problem} {row.output} at {row.values}: ratio {row.ratio:.3g}, error {row.error:.3g}'
+        f', sensitivity {row.sensitivity:.3g}' for row in broken(rows)[:count])])

@@ -116,6 +116,15 @@ _DIMENSIONS = {'water_drop': _water_drop, 'jansen': _jansen, 'peaucellier': _pea
                'slotted_lever': _slotted_lever}
 
 
+def lever_gap(lengths, lever, half):
+    """Return the smallest gap at lever angles [rad]: the slot cuts the circle on its own half."""
+    a, b, e = (lengths[name] for name in 'abe')
+    offset = e + b * np.sin(lever)
+    height = np.sqrt(np.maximum(a * a - offset * offset, 0.0))
+    ahead = half * b * np.cos(lever) + height
+    return np.minimum(a - np.abs(offset), ahead) / (a + b + abs(e))
+
+
 def angles(rng, count, limits=(), turns=1e9):
     """
     Return crank angles: half of them anywhere, half close to 0, pi or the given limits [rad].

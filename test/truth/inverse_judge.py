@@ -26,6 +26,9 @@ MOST, ALLOWED = 64.0, 1e-9
 # Samples of the range of an input, and steps of a bisection.
 SAMPLES, STEPS = 721, 60
 KINDS = 'ordinary', 'next to ends', 'ends', 'extremes', 'dead points'
+# The rule says nothing where the next floats change the output by more than this, and of several
+# inputs nothing where the margin is less.
+SINGULAR = 1e-6
 
 
 class Output:
@@ -33,7 +36,7 @@ class Output:
 
     def __init__(self, linkage, name, others=()):
         self.linkage, self.name, self.others = linkage, name, others
-        self.first = linkage.inputs[0]
+        self.first, self._pose = linkage.inputs[0], linkage.checked((name,))
         self.size = 1.0 if linkage.is_angle(name) else linkage.longest
         own = name == self.first.name
         self.period = math.inf if not linkage.is_angle(name) else (
@@ -49,17 +52,18 @@ class Output:
     def at(self, theta):
         """Return the output at inputs, NaN where any joint cannot be assembled."""
         theta = np.asarray(theta, float)
-        inputs = [theta, *(np.full_like(theta, other) for other in self.others)]
-        value = self.linkage.joint_angles(inputs if self.others else theta, (self.name,))[
-            self.name]
-        margins = self.linkage.margins(*(each.ravel() for each in inputs))
-        return np.where((margins >= 0.0).all(axis=0).reshape(theta.shape), value, np.nan)
+        return self._pose.over(theta, *self.others)[0]
 
     def away(self, value, other):
         """Return the distance of two values, without whole turns."""
         gap = np.asarray(value) - other
         return np.abs(gap if math.isinf(self.period) else gap - self.period * np.round(
             gap / self.period))
+
+    def ulp_changes(self, at):
+        """Return by how much four ulps of an input change the output."""
+        beside = self.at(at + 4.0 * np.spacing(abs(at)) * np.array([-1.0, 1.0]))
+        return np.nanmax([0.0, *self.away(beside, self.at(at))])
 
     def ends(self):
         """Return the last inputs at which there is a pose, with the direction inside."""
@@ -139,6 +143,10 @@ def judge(linkage, name, rng, count=6, others=()):
         if value != value:
             continue
         answers = [answer.inputs[0] for answer in inverse.all([value, *others], [at, *others])]
+        if others and Solution((at, *others), inverse).margin < SINGULAR:
+            kind = 'singular'
+        elif output.ulp_changes(at) > SINGULAR * output.size:
+            kind = 'no direction'
         found[kind, 'questions'] += 1
         expected = [at] if kind != 'ordinary' else [at, *output.roots(value)]
         close = (AT if kind == 'ordinary' else NEXT) * first.size
@@ -161,6 +169,7 @@ def judge(linkage, name, rng, count=6, others=()):
                 worst = max(worst, error)
             if any(first.apart(x, y) <= 1e-9 * first.size for y in answers[:k]):
                 found[kind, 'duplicates'] += 1
+                found[kind, 'duplicates at', linkage, name, at, others] += 1
     return found, worst
 
 
@@ -186,7 +195,7 @@ def judge_several(linkage, names, rng, count=6):
     for _ in range(count):
         pose = [float(rng.uniform(input_.low, input_.high)) for input_ in linkage.inputs]
         row = np.array(linkage.checked(names).at(*pose)[:len(names)])
-        if not np.isfinite(row).all() or not Solution(pose, inverse).margin > 1e-6:
+        if not np.isfinite(row).all() or not Solution(pose, inverse).margin > SINGULAR:
             continue
         answers = inverse.all(row.tolist())
         found['ordinary', 'questions'] += 1

@@ -38,14 +38,10 @@ using Passive = void(const double * q, double * position, double (*rate)[LKR_MAX
 class HeldLog
 {
 public:
-  HeldLog() = default;
-  HeldLog(const HeldLog &) = delete;
-  HeldLog & operator=(const HeldLog &) = delete;
-
   ~HeldLog()
   {
+    over_.set_value();
     if (thread_.joinable()) {
-      over_.set_value();
       thread_.join();
     }
   }
@@ -53,8 +49,7 @@ public:
   void start(const std::string & name)
   {
     if (!thread_.joinable()) {
-      name_ = name;
-      thread_ = std::thread([this] { run(); });
+      thread_ = std::thread(&HeldLog::run, this, name);
     }
   }
 
@@ -62,14 +57,11 @@ public:
   void note(int status, bool is_command)
   {
     // A value that is not commanded is not held.
-    const int bits = is_command ? status & ~linkage_ros::LinkageTransmission::NOT_KNOWN : status << 3;
-    if (bits) {
-      seen_.fetch_or(bits, std::memory_order_relaxed);
-    }
+    seen_ |= is_command ? status & ~linkage_ros::LinkageTransmission::NOT_KNOWN : status << 3;
   }
 
 private:
-  void run()
+  void run(const std::string & name)
   {
     static const std::array<const char *, 6> reasons{
       "a command is out of reach or out of the sweep: the actuators hold their positions",
@@ -81,18 +73,17 @@ private:
     bool is_over = false;
     for (int before = 0; !is_over;) {
       is_over = over.wait_for(std::chrono::seconds(1)) == std::future_status::ready;
-      const int now = seen_.exchange(0, std::memory_order_relaxed);
+      const int now = seen_.exchange(0);
       for (std::size_t i = 0; i < reasons.size(); ++i) {
         // A reason that goes on is logged once.
         if (now & ~before & 1 << i) {
-          RCUTILS_LOG_WARN_NAMED("linkage_transmission", "%s: %s", name_.c_str(), reasons[i]);
+          RCUTILS_LOG_WARN_NAMED("linkage_transmission", "%s: %s", name.c_str(), reasons[i]);
         }
       }
       before = now;
     }
   }
 
-  std::string name_;
   std::atomic<int> seen_{0};
   std::promise<void> over_;
   std::thread thread_;

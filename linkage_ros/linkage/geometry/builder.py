@@ -78,8 +78,8 @@ class Point:
     """A joint: its place, the link that it belongs to, and the size of its coordinates [m]."""
 
     place: Any
-    home: str
-    span: Real
+    link: str
+    magnitude: Real
     crank: Optional[planar.Crank] = None
 
 
@@ -130,7 +130,7 @@ class Builder:
     @property
     def grounded(self) -> Tuple[str, ...]:
         """Return the joints on the ground."""
-        return tuple(name for name, point in self.points.items() if point.home == GROUND)
+        return tuple(name for name, point in self.points.items() if point.link == GROUND)
 
     def ground(self, name: str, x: Number, y: Number) -> None:
         """Fix a joint to the ground at (x, y) [m]."""
@@ -154,8 +154,9 @@ class Builder:
             parent, along, start = self._direction(centre, zero)
         crank = planar.Crank(self.points[centre].place, length, along, turning,
                              backwards=len(self.mirrors) % 2 == 1)
-        bar = crank.bar() if parent == GROUND else planar.turned(along, turning, length)
-        self._hang(centre, name, bar, length, link, parent, start)
+        bar = crank.bar() if parent == GROUND else along * Complex(
+            cosine(turning), sine(turning)) * length
+        self._add_link(centre, name, bar, length, link, parent, start)
         self.joint_values[link] = turning
         self._place(name, centre, bar, link, length)
         if parent == GROUND:
@@ -169,10 +170,10 @@ class Builder:
         length = self.drive(Input(word, LENGTH, shortest, longest), geared)
         found = planar.extended(self._plain_arm(base, pivot), length, bar, side, longest)
         self.limits += found.limits
-        link = self._hang(pivot, name, found.second, bar)
+        link = self._add_link(pivot, name, found.second, bar)
         self._place(name, pivot, found.second, link, bar)
         self.transmissions[name] = planar.transmission(found)
-        barrel = self._hang(base, name, found.first, None, self._numbered('barrel'))
+        barrel = self._add_link(base, name, found.first, None, self._numbered('barrel'))
         self._axes[barrel] = _Vector(found.first, real(1.0), barrel)
         self._slide(word, barrel, base, name, length, found.first)
         self.cylinders.append((base, name))
@@ -189,7 +190,7 @@ class Builder:
             self.limits.append(limit)
             self.ways.append(limit)
             place = gated(place, limit.margin, limit.tolerance)
-        self._ride(word, name, origin, towards, place, abs(low) + abs(high))
+        self._add_block(word, name, origin, towards, place, abs(low) + abs(high))
 
     def yoke(self, name: str, pin: str, origin: str, towards: str) -> None:
         """Slide a block along a line between two joints; a pin runs in a slot across it."""
@@ -197,17 +198,17 @@ class Builder:
         start, end = self.points[origin], self.points[pin]
         block = self._numbered('block')
         self.yokes[block] = pin
-        self._ride(block, name, origin, towards,
-                   dot(along, end.place - start.place), end.span + start.span)
+        self._add_block(block, name, origin, towards,
+                   dot(along, end.place - start.place), end.magnitude + start.magnitude)
 
-    def _ride(self, link: str, name: str, origin: str, towards: str, place: Real, way: Real
+    def _add_block(self, link: str, name: str, origin: str, towards: str, place: Real, way: Real
               ) -> None:
         """Place a joint on the line of two others, as the block that slides there."""
         parent, along, direction = self._direction(origin, towards)
         self._slide(link, parent, origin, name, place, along, direction)
         start = self.points[origin]
         self.points[name] = Point(
-            start.place + planar.on_line(along, place), link, start.span + way)
+            start.place + planar.on_line(along, place), link, start.magnitude + way)
 
     def block(self, name: str, joint: str, along: Real, across: Real) -> None:
         """Add a joint to the block that slides with a joint: along its line, and to its left."""
@@ -256,7 +257,7 @@ class Builder:
         """Return the shortest and longest cylinder that a bar to a pivot allows."""
         if side := self._constant(base, pivot):
             return abs(side.length - bar), side.length + bar
-        return real(0.0), self.points[base].span + self.points[pivot].span + bar
+        return real(0.0), self.points[base].magnitude + self.points[pivot].magnitude + bar
 
     def image(self, name: str, point: str, first: str, second: str) -> None:
         """Fix a joint to the ground at the mirror image of another in the line of two others."""
@@ -264,7 +265,8 @@ class Builder:
             self._on_ground(joint)
         self.mirrors, origin = ((first, second),), self.points[first]
         place = origin.place + self._mirrored(self.points[point].place - origin.place)
-        self.points[name] = Point(place, GROUND, self.points[point].span + 2.0 * origin.span)
+        self.points[name] = Point(
+            place, GROUND, self.points[point].magnitude + 2.0 * origin.magnitude)
 
     def _mirrored(self, vector: Complex) -> Complex:
         """Return a vector's image in the mirror lines."""
@@ -281,7 +283,7 @@ class Builder:
         self.limits += found.limits
         start, pivot = self.points[first], self.points[second]
         place = start.place + found.first
-        if start.home != GROUND == pivot.home:
+        if start.link != GROUND == pivot.link:
             # About a joint of the ground it can only turn.
             place = planar.with_velocity(place, pivot.place, found.second)
         self._pair(name, first, second, found, to_first, to_second, place)
@@ -310,7 +312,8 @@ class Builder:
         vector, _, link = self._side(first, second)
         if link == GROUND:
             start = self.points[first]
-            self.points[name] = Point(start.place + vector * corner, GROUND, start.span + length)
+            self.points[name] = Point(
+                start.place + vector * corner, GROUND, start.magnitude + length)
             return
         self._place(name, first, vector * corner, link, length, place)
         frame = self.frames[link]
@@ -370,11 +373,11 @@ class Builder:
         found = planar.inversor(self.arm(pole, pin), long, short)
         self.limits += found.right.limits
         self._pair(right, pole, pin, found.right, long, short)
-        link = self._hang(right, corner, found.left.second, short)
+        link = self._add_link(right, corner, found.left.second, short)
         self._place(corner, right, found.left.second, link, short,
                     self.points[pole].place + found.inverse)
         self._pair(left, pole, pin, found.left, long, short)
-        link = self._hang(left, corner, found.right.second, short)
+        link = self._add_link(left, corner, found.right.second, short)
         self._bar(left, corner, found.right.second, short, link)
 
     def slot(self, tip: str, pivot: str, pin: str, offset: Real, half: float,
@@ -382,8 +385,9 @@ class Builder:
         """Turn a lever of this length [m] about a joint by a pin in its slot."""
         found = planar.slot(self.arm(pivot, pin), offset, half)
         self.limits.append(found.limit)
-        start = real(pi / 2) if self.points[pivot].home == GROUND else real(0.0)
-        lever = self._hang(pivot, tip, found.along, length, self._numbered('lever'), start=start)
+        start = real(pi / 2) if self.points[pivot].link == GROUND else real(0.0)
+        lever = self._add_link(
+            pivot, tip, found.along, length, self._numbered('lever'), start=start)
         self._place(tip, pivot, found.along * length, lever, length)
         self._axes[lever] = self._vectors[pivot, tip]
         self.transmissions[tip] = arctangent(abs(found.slide), offset)
@@ -407,17 +411,17 @@ class Builder:
                 angle = arctangent(along.y, along.x)
         start, end = self.points[origin], self.points[pin]
         rail = planar.CrankRail(end.crank, start.place, along) \
-            if end.crank and not along.x.varies and start.home == GROUND \
-            else planar.Rail(end.place, start.place, along, start.span + end.span)
+            if end.crank and not along.x.varies and start.link == GROUND \
+            else planar.Rail(end.place, start.place, along, start.magnitude + end.magnitude)
         found = planar.slider(rail, rod, side)
         self.limits += found.limits
-        link = self._hang(pin, name, found.rod, rod)
+        link = self._add_link(pin, name, found.rod, rod)
         self._place(name, pin, found.rod, link, rod)
         self.transmissions[name] = arctangent(abs(found.reach), rail.height)
         self._slide(self._numbered('block'), parent, origin, name, found.place, along, angle)
 
     def _on_ground(self, name: str, otherwise: str = '') -> None:
-        if self.points[name].home != GROUND:
+        if self.points[name].link != GROUND:
             raise ConstructionError(f'joint {name} must be on the ground{otherwise}')
 
     def _side(self, first: str, second: str) -> _Vector:
@@ -429,7 +433,7 @@ class Builder:
     def _constant(self, first: str, second: str) -> Optional[_Vector]:
         """Return the vector between two joints; None if they are of two links."""
         ends = self.points[first], self.points[second]
-        if ends[0].home == ends[1].home == GROUND:
+        if ends[0].link == ends[1].link == GROUND:
             vector = ends[1].place - ends[0].place
             if vector.length().value == 0.0:
                 raise ConstructionError(f'{first} and {second} are at the same place')
@@ -473,7 +477,7 @@ class Builder:
         """Return the arm from one joint to another; see `planar.CrankArm` for `smooth`."""
         ends = self.points[first], self.points[second]
         for (foot, pin), reverse in ((ends, False), (ends[::-1], True)):
-            if pin.crank and foot.home == GROUND and foot.place is not pin.crank.centre:
+            if pin.crank and foot.link == GROUND and foot.place is not pin.crank.centre:
                 return planar.CrankArm(foot.place, pin.crank, reverse, smooth)
         return self._plain_arm(first, second)
 
@@ -483,7 +487,7 @@ class Builder:
         if side := self._constant(first, second):
             return planar.Arm(ends[0].place, side.vector, side.length, side.length)
         return planar.Arm(ends[0].place, self._between(first, second),
-                          ends[0].span + ends[1].span)
+                          ends[0].magnitude + ends[1].magnitude)
 
     def _between(self, first: str, second: str) -> Complex:
         """Return the vector between two joints; bars from a common joint are more accurate."""
@@ -498,13 +502,13 @@ class Builder:
     def _pair(self, name: str, first: str, second: str, found: planar.Dyad, to_first: Real,
               to_second: Real, place: Optional[Complex] = None) -> None:
         """Join the two bars of a dyad: the joint belongs to the first, the second is cut there."""
-        link = self._hang(first, name, found.first, to_first)
+        link = self._add_link(first, name, found.first, to_first)
         self._place(name, first, found.first, link, to_first, place)
-        link = self._hang(second, name, found.second, to_second)
+        link = self._add_link(second, name, found.second, to_second)
         self._bar(second, name, found.second, to_second, link)
         self.transmissions[name] = planar.transmission(found)
 
-    def _hang(self, joint: str, tip: str, bar: Complex, length: Optional[Real],
+    def _add_link(self, joint: str, tip: str, bar: Complex, length: Optional[Real],
               name: Optional[str] = None, parent: Optional[str] = None,
               start: Optional[Real] = None) -> str:
         """
@@ -515,7 +519,7 @@ class Builder:
         """
         name = name or ('' if len(joint + tip) == 2 else '_').join((joint, tip))
         self._check_new(name)
-        parent, start = parent or self.points[joint].home, start or real(0.0)
+        parent, start = parent or self.points[joint].link, start or real(0.0)
         zero = Complex(0.0, 1.0) if start.value else Complex(1.0, 0.0)
         relative = bar * self.directions.get(parent, zero).conjugate()
         self.links.append(Link(name, parent, joint, 'revolute', start, tip))
@@ -531,7 +535,7 @@ class Builder:
                place: Optional[Complex] = None) -> None:
         """Place a joint at the end of a bar from another, or where it is known to be."""
         origin = self.points[start]
-        self.points[name] = Point(place or origin.place + vector, link, origin.span + length)
+        self.points[name] = Point(place or origin.place + vector, link, origin.magnitude + length)
         self._bar(start, name, vector, length, link)
 
     def _bar(self, first: str, second: str, vector: Complex, length: Number,

@@ -91,13 +91,6 @@ def unit(vector: Complex) -> Complex:
     return with_spin(along, spin(vector)) if along.x.varies else along
 
 
-def turned(along: Complex, theta: Real, length: Real) -> Complex:
-    """Return a bar of a length [m], turned from a direction by an angle [rad]."""
-    turning = spin(along)
-    return with_spin(along * Complex(cosine(theta), sine(theta)) * length, Rate(
-        (theta, *turning.of), lambda rate, *rates: rate + turning.formula(*rates)))
-
-
 def on_line(along: Complex, place: Real) -> Complex:
     """Return the vector of a length along a direction; both parts are NaN where the length is."""
     # Generated code omits products with zero, which would carry the NaN.
@@ -137,13 +130,14 @@ class Arm:
     length: Optional[Real] = None
     _is_smooth = False
 
-    def __init__(self, foot: Complex, vector: Complex, span: Real, length: Optional[Real] = None):
+    def __init__(self, foot: Complex, vector: Complex, magnitude: Real,
+                 length: Optional[Real] = None):
         self.foot = foot
         self.vector = vector
         # A constant would have a value even where the points cannot be assembled.
         self.square = vector.squared() if length is None else gated(
             square(length), abs(vector.x), real(0.0))
-        self._span, self.length = span, length
+        self._magnitude, self.length = magnitude, length
 
     @property
     def divisor(self) -> Real:
@@ -190,7 +184,7 @@ class Arm:
         # At the limit the length is the radius: an error of a length changes the square by the
         # radius times that error. A tolerance is constant: size bounds a radius that varies.
         bound = (self.length or size) if radius.varies else abs(radius)
-        return Limit(margin, TOLERANCE * bound * (size + self._span))
+        return Limit(margin, TOLERANCE * bound * (size + self._magnitude))
 
 
 class CrankArm(Arm):
@@ -524,15 +518,15 @@ def slot(arm: Arm, offset: Real, half: float) -> Slot:
 class Rail:
     """A pin relative to the line that a block slides on: its foot along it, its height above."""
 
-    def __init__(self, pin: Complex, origin: Complex, along: Complex, span: Real):
+    def __init__(self, pin: Complex, origin: Complex, along: Complex, magnitude: Real):
         self.along = along
         self.height, self.foot = cross(along, pin - origin), dot(along, pin - origin)
-        self._span = span
+        self._magnitude = magnitude
 
     def limits(self, rod: Real) -> Tuple[Limit, ...]:
         """Return the margins whose product is rod^2 - height^2."""
         margin = (rod - self.height) * (rod + self.height)
-        return (Limit(margin, TOLERANCE * rod * (rod + self._span)),)
+        return (Limit(margin, TOLERANCE * rod * (rod + self._magnitude)),)
 
 
 class CrankRail(Rail):
@@ -546,8 +540,8 @@ class CrankRail(Rail):
 
     def __init__(self, crank: Crank, origin: Complex, along: Complex):
         # Only the crank's distance from the line matters, not its place on the ground.
-        span = (crank.centre - origin).length() + crank.length
-        super().__init__(crank.centre + crank.bar(), origin, along, span)
+        magnitude = (crank.centre - origin).length() + crank.length
+        super().__init__(crank.centre + crank.bar(), origin, along, magnitude)
         self._crank = crank
         self._centre = cross(along, crank.centre - origin)
         self._turn = (crank.zero * along.conjugate()).turned()
@@ -566,7 +560,7 @@ class CrankRail(Rail):
     def _limit(self, rod: Real, start: Real, end: Real, gap: Real, half: Real,
                sign: Real) -> Limit:
         margin = gap + 2.0 * self._crank.length * square(half)
-        tolerance = TOLERANCE * (rod + self._span)
+        tolerance = TOLERANCE * (rod + self._magnitude)
         grown = square_root(2.0 * self._crank.length) * sign
         smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
         return Limit(margin, tolerance, smooth, CrankEnds(

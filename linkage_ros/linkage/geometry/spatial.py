@@ -194,13 +194,13 @@ def rated_turn(y: Real, x: Real, cos: Real, sin: Real, rate: Rate) -> Turn:
 
 
 def rod_on_hinge(hinge: Hinge, pivot: Pivot, end: Vector, length: Real, side: Real,
-                 span: Real) -> Tuple[Turn, Limit, Limit, Real]:
+                 magnitude: Real) -> Tuple[Turn, Limit, Limit, Real]:
     """
     Return the turn of a hinge with which a rod fits, its limits, and the transmission angle [rad].
 
     The rod's pivot is in the coordinates of the hinge's parent, its end in those of the child at
     angle zero. Seen from the axis, the end is to the left of the pivot if the side is 1, to the
-    right if it is -1. The span is the size of all coordinates [m], for the tolerance.
+    right if it is -1. The magnitude is the size of all coordinates [m], for the tolerance.
     """
     across = hinge.axis.cross(end.minus(hinge.origin))
     # Rounding tilts this vector against the axis if the end is next to the axis: once more.
@@ -211,7 +211,7 @@ def rod_on_hinge(hinge: Hinge, pivot: Pivot, end: Vector, length: Real, side: Re
     d = pivot.along(hinge.axis, end)
     w = square_root(square(p) + square(q))
     room = (length - d) * (length + d)
-    tolerance = TOLERANCE * span * span
+    tolerance = TOLERANCE * magnitude * magnitude
     near, far = (Limit(margin, tolerance) for margin in (
         room - square(w - rho), square(w + rho) - room))
     r1, r2 = near.root(), far.root()
@@ -233,11 +233,11 @@ def rod_on_hinge(hinge: Hinge, pivot: Pivot, end: Vector, length: Real, side: Re
 
 
 def rod_on_slide(axis: Vector, pivot: Vector, end: Vector, length: Real, side: Real,
-                 span: Real) -> Tuple[Real, Limit]:
+                 magnitude: Real) -> Tuple[Real, Limit]:
     """Slide along an axis, a unit vector, so that a rod fits; see `rod_on_hinge`."""
     foot = pivot.minus(end)
     ahead, off = foot.dot(axis), axis.cross(foot).length()
-    limit = Limit((length - off) * (length + off), TOLERANCE * span * span)
+    limit = Limit((length - off) * (length + off), TOLERANCE * magnitude * magnitude)
     reach = limit.root()
 
     def rate(dx: Real, dy: Real, dz: Real, dlength: Real) -> Real:
@@ -260,13 +260,13 @@ class Rod(NamedTuple):
     length: Real
     side: Real
 
-    def drawn(self, first: Turn, second: Turn, span: Real) -> Limit:
+    def drawn(self, first: Turn, second: Turn, magnitude: Real) -> Limit:
         """Return the limit of its crank, which is on its side of a dead point."""
         place = self.end.at(second.cosine, second.sine).turned(first.cosine, first.sine)
         turn = self.pivot.turn or Turn(real(0.0), real(1.0), real(0.0))
         ahead = self.pivot.path.ahead(turn.cosine, turn.sine)
         return Limit(self.side * (self.pivot.path.centre.minus(place)).dot(ahead),
-                     TOLERANCE * span * span)
+                     TOLERANCE * magnitude * magnitude)
 
 
 class Frame(NamedTuple):
@@ -303,10 +303,10 @@ class Row(NamedTuple):
 
 
 # Cosine and sine of both angles.
-Pose = Tuple[Scalar, Scalar, Scalar, Scalar]
+HingeAngles = Tuple[Scalar, Scalar, Scalar, Scalar]
 
 
-def row(pivot: Vector, end: Circle, pose: Pose) -> Row:
+def row(pivot: Vector, end: Circle, pose: HingeAngles) -> Row:
     """Return the row of a rod between a pivot and its end, which both angles turn."""
     c1, s1, c2, s2 = pose
     place, ahead = end.at(c2, s2).turned(c1, s1), end.ahead(c2, s2).turned(c1, s1)
@@ -320,7 +320,7 @@ def gap(rod: Vector, length: Scalar) -> Scalar:
 
 
 def newton_step(rods: Sequence[Tuple[Vector, Circle, Scalar]],
-                pose: Pose) -> Tuple[Pose, Scalar]:
+                pose: HingeAngles) -> Tuple[HingeAngles, Scalar]:
     """Return the pose after a Newton step towards the fit of two rods, and the step [rad]."""
     rows = [row(pivot, end, pose) for pivot, end, _ in rods]
     d1, d2 = _solution(rows, [-gap(each.rod, rod[2]) for each, rod in zip(rows, rods)])
@@ -335,7 +335,7 @@ def two_rods(rods: Sequence[Rod], home: Sequence[Real]) -> Tuple[Turn, Turn, Lim
     on a circle. The limit is below zero where no pose is found.
     """
     bars = [(rod.pivot.place, rod.end, rod.length) for rod in rods]
-    pose: Pose = cosine(home[0]), sine(home[0]), cosine(home[1]), sine(home[1])
+    pose: HingeAngles = cosine(home[0]), sine(home[0]), cosine(home[1]), sine(home[1])
     for _ in range(STEPS - 1):
         pose, _step = newton_step(bars, pose)
     # The steps before have changed the length of both unit vectors by rounding.

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .spatial import Circle, EDGE, LAST_STEP, newton_step, Pose, row, STEPS, Vector
+from .spatial import Circle, EDGE, HingeAngles, LAST_STEP, newton_step, row, STEPS, Vector
 from ..tolerances import ROUNDING, SINGULAR
 
 # The most pairs of boxes that a proof examines, and each trial in a search for a rectangle.
@@ -298,7 +298,7 @@ def _flat(path: Circle) -> float:
     return math.hypot(*path.centre[:2]) + _norm(path.u)
 
 
-def _pose(poses: np.ndarray) -> Pose:
+def _pose(poses: np.ndarray) -> HingeAngles:
     """Return the cosine and sine of the first and of the second angle."""
     first, second = poses
     return np.cos(first), np.sin(first), np.cos(second), np.sin(second)

@@ -4,9 +4,13 @@
 """
 The solution that is continuous from given inputs.
 
-The outputs go straight from their present values to others. Of one input, the solution is on the
-segment of the present input, or on one that continues it. Of several, Newton's method follows the
-motion in steps, which get shorter where it fails.
+The outputs go straight from their present values to others, and a step of this motion has one
+candidate. Only the length of a step differs. Of one input, segments know all special inputs
+beforehand: the motion is one step, along the segments. Of several inputs, nothing is known
+beforehand: the candidate is the present inputs, and a step is halved if Newton's method does not
+end nearby, on the same side of all folds. With one input this would lose motions that begin at a
+special input, where there is no rate: 103 of 272 in the catalogue and 40 random linkages, of which
+segments lose 6 (measured at commit aebd2314).
 
 Source: Gosselin and Angeles, "Singularity analysis of closed-loop kinematic chains", IEEE Trans.
 Robotics and Automation 6 (1990).
@@ -24,8 +28,8 @@ from .refine import refine
 from .segments import Segments
 from ..motion.curves import HALVINGS
 
-# The longest step of an input [rad, sizes].
-LONGEST = 0.7
+# The longest step of an input [rad, sizes]: a fold and its other side are farther apart, mostly.
+MAX_STEP = 0.7
 
 
 def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
@@ -34,31 +38,28 @@ def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[floa
     start = problem.newton.at(*seed, *values)
     if not start[0] < math.inf:
         return None
-    gaps = [gap * scale for gap, scale in zip(start[2:], problem.scales)]
+    residuals = [residual * scale for residual, scale in zip(start[2:], problem.scales)]
     if not isinstance(source, Segments):
         side = _side(start[-problem.n ** 2:])
-        return _followed(problem, values, gaps, seed, side, HALVINGS) if side else None
-    way = source.follow(values[0], gaps[0], seed[0])
-    if not way:
-        return None
-    bracket, turns = way
-    found = refine(problem, values, bracket)
-    return found and (*problem.nearest_equivalent(found, (turns + bracket.seed,)), found[1])
+        return _followed(problem, values, residuals, seed, side, HALVINGS) if side else None
+    bracket, estimate = source.follow(values[0], residuals[0], seed[0]) or (None, ())
+    solution = bracket and refine(problem, values, bracket)
+    return solution and (*problem.nearest_equivalent(solution, estimate), solution[1])
 
 
-def _followed(problem: InverseProblem, values: Sequence[float], gaps: Sequence[float],
+def _followed(problem: InverseProblem, values: Sequence[float], residuals: Sequence[float],
               seed: Sequence[float], side: float, halvings: int) -> Optional[Row]:
-    """Return the end of a motion of the outputs from `gaps` above values; None if none."""
-    if found := refine(problem, values, tuple(seed)):
-        inputs, rates = problem.nearest_equivalent(found, seed), found[problem.n:]
+    """Return the end of a motion of the outputs from `residuals` above values; None if none."""
+    if solution := refine(problem, values, tuple(seed)):
+        inputs, rates = problem.nearest_equivalent(solution, seed), solution[problem.n:]
         # A fold is not passed, nor is the motion left for another one.
-        if _side(rates) == side and all(abs(x - y) <= LONGEST * size for x, y, size in zip(
+        if _side(rates) == side and all(abs(x - y) <= MAX_STEP * size for x, y, size in zip(
                 inputs, seed, problem.sizes)):
             return *inputs, *rates
     if not halvings:
         return None
-    halves = [0.5 * gap for gap in gaps]
-    middle = _followed(problem, [x + gap for x, gap in zip(values, halves)], halves, seed, side,
+    halves = [0.5 * residual for residual in residuals]
+    middle = _followed(problem, [x + half for x, half in zip(values, halves)], halves, seed, side,
                        halvings - 1)
     return middle and _followed(problem, values, halves, middle[:problem.n], side, halvings - 1)
 

@@ -18,7 +18,7 @@ from typing import Iterator, List, Sequence, Union
 
 import numpy as np
 
-from .follow import LONGEST
+from .follow import MAX_STEP
 from .problem import ACCEPTED, InverseProblem, Row
 from .segments import Bracket, segments_of
 from ..formulas import Names
@@ -75,7 +75,9 @@ class Grid:
                                        others).candidates(values[place:place + 1]):
                 yield bracket._replace(place=place, others=others)
         else:
-            yield from self._descended(self._starts(held, values), values)
+            solutions = self._descended(self._starts(held, values), values)
+            yield from solutions
+            yield from self._descended(self._across_folds(solutions, values), values)
 
     def _solved(self, q: np.ndarray, values: Sequence[float]) -> np.ndarray:
         """Return what a step of Newton's method returns, for rows of inputs."""
@@ -93,6 +95,21 @@ class Grid:
             if len(starts) >= ASSEMBLED:
                 break
         return starts
+
+    def _across_folds(self, solutions: List[Row], values: Sequence[float]) -> np.ndarray:
+        """
+        Return starts on both sides of solutions, in the direction that changes outputs least.
+
+        Beyond a fold, few of the starts all over the inputs may lead to the other solution.
+        """
+        n, q = self._problem.n, np.reshape(solutions, (-1, self._problem.n))
+        rates = self._solved(q, values)[-n * n:].T.reshape(-1, n, n).swapaxes(1, 2)
+        known = np.isfinite(rates).all(axis=(1, 2))
+        *_, directions = np.linalg.svd(self._problem.scaled(rates[known]))
+        steps = MAX_STEP * 0.5 ** np.arange(HALVINGS) * self._steps[:, None]
+        return np.concatenate([q[known] + side * step * directions[:, -1]
+                               for step in steps.T for side in (1.0, -1.0)]).clip(
+                                   self._low, self._high)
 
     def _check_independent(self) -> None:
         """Raise ValueError if the outputs do not determine the inputs in nearly all poses."""
@@ -119,7 +136,7 @@ class Grid:
             q, solved, parts = q[going], solved[:, going], parts[going]
             step = solved[2 + n:2 + 2 * n].T - q
             longest = np.abs(step / self._steps).max(axis=1)
-            step *= (parts * LONGEST / np.maximum(longest, LONGEST))[:, None]
+            step *= (parts * MAX_STEP / np.maximum(longest, MAX_STEP))[:, None]
             trial = (q + step).clip(self._low, self._high)
             new = self._solved(trial, values)
             better = new[0] < solved[0]

@@ -24,7 +24,7 @@ from .choice import Choice
 from .expressions import chosen_of, modes_of, SINGLE
 from .follow import follow
 from .grid import check_dependence, Grid
-from .linkage import InverseLinkage, taken_apart
+from .linkage import decompose, InverseLinkage
 from .modes import Modes
 from .problem import InverseProblem, Row
 from .refine import distinct, distinct_arrays, refine, refine_arrays
@@ -150,7 +150,7 @@ class Inverse:
     def closed(self) -> Optional[InverseLinkage]:
         """Joint lines and assembly modes of the inverse linkage; None if there is none."""
         # An inverse linkage has each input in one period, or else in one turn.
-        make = taken_apart if self.linkage.axes == 'xy' else rods.taken_apart
+        make = decompose if self.linkage.axes == 'xy' else rods.decompose
         return None if self._is_part else make(self.linkage, self.outputs)
 
     @property

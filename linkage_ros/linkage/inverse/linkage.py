@@ -140,7 +140,7 @@ class _Read(NamedTuple):
     turns: Tuple[float, ...]
 
 
-def taken_apart(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
+def decompose(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
     """Return the inverse linkage for outputs, None where no closed form is known."""
     # Lengths in joint lines are in metres.
     if len(set(outputs)) < len(outputs):

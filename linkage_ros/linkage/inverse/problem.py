@@ -24,7 +24,7 @@ from ..motion.curves import LEAST
 from ..tolerances import SINGULAR
 from ...cache import cached
 from ...formula.expression import argument, dimension, greater, nearest_integer, Real, real, where
-from ...formula.program import Pose, Program
+from ...formula.program import CompiledFunction, Program
 
 # Errors of a solution, relative to rounding of outputs, and of inputs times rates: one rounding,
 # which no step betters, and the largest that is accepted.
@@ -92,7 +92,7 @@ class InverseProblem:
                                for row, angular, scale in rows])
 
     @cached_property
-    def newton(self) -> Pose:
+    def newton(self) -> CompiledFunction:
         """Return the code for a step of Newton's method; see `newton`."""
         program = newton(self.linkage.structure, self.outputs, tuple(self.periods),
                          tuple(self.turns))
@@ -102,7 +102,7 @@ class InverseProblem:
 
     def reduced(self, values: Row) -> Row:
         """Return values with large angles reduced to one period, exactly."""
-        if all([abs(x) <= turn for x, turn in zip(values, self.periods)]):
+        if all(abs(x) <= turn for x, turn in zip(values, self.periods)):
             return values
         return tuple(self.reduced_arrays(np.array(values)).tolist())
 

@@ -24,6 +24,8 @@ from ..tolerances import ONE, SINGULAR
 
 # A larger error [sizes], or a longer step [rad, sizes], leads to another solution.
 FAR = 0.1
+# Steps of arrays: from samples of a segment, three reach rounding nearly everywhere.
+ARRAY_STEPS = 3
 
 
 def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Bracket, Row]
@@ -41,16 +43,12 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
         best = at(*inputs, *values)
     for _ in range(HALVINGS):
         following = best[2 + n:2 + 2 * n]
-        if best[1] <= ROUNDED or not (best[0] <= FAR and sum([abs(x - y) / size for x, y, size in zip(
-                following, inputs, problem.sizes)]) <= FAR):
+        if best[1] <= ROUNDED or not best[0] <= FAR:
+            break
+        if not sum([abs(x - y) / size for x, y, size in zip(
+                following, inputs, problem.sizes)]) <= FAR:
             break
         trial = at(*following, *values)
-        for _ in range(HALVINGS):
-            if trial[0] < math.inf:
-                break
-            # A step that leads out of the reach is halved.
-            following = [0.5 * (x + y) for x, y in zip(following, inputs)]
-            trial = at(*following, *values)
         if not trial[0] < best[0]:
             break
         best, inputs = trial, following
@@ -66,14 +64,13 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Br
     best, best_x = (math.inf, math.inf), x
     for _ in range(HALVINGS):
         trial = at(x, *others, *values)
-        gap, following = trial[2 + place], trial[2 + n]
-        if trial[0] < best[0]:
+        better = trial[0] < best[0]
+        if better:
             best, best_x = trial, x
-        elif best[1] <= ACCEPTED:
+        if best[1] <= (ROUNDED if better else ACCEPTED):
             break
-        if best[1] <= ROUNDED:
-            break
-        low, high = (x, high) if gap * sign < 0.0 else (low, x)
+        error, following = trial[2 + place], trial[2 + n]
+        low, high = (x, high) if error * sign < 0.0 else (low, x)
         x = following if low < following < high else 0.5 * (low + high)
         if x in (low, high):
             break
@@ -103,21 +100,13 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
         low, high, inputs, far = *candidates[:2], candidates[2:3], math.inf
     best = over(*inputs.clip(low, high), *values)
     left = ~np.isfinite(best).all(axis=0)
-    again = np.flatnonzero((best[1] > ROUNDED) & (best[0] <= far))
-    for _ in range(HALVINGS):
-        if not len(again):
-            break
-        x = best[2 + n:2 + 2 * n].clip(low, high)
-        trial = over(*x[:, again], *values[:, again])
-        # Steps out of the reach are shortened one by one.
-        left[again[np.isnan(trial[0])]] = True
-        better = trial[0] < best[0, again]
-        again = again[better]
-        best[:, again] = trial[:, better]
-        again = again[best[1, again] > ROUNDED]
-    solutions = best[2 + 2 * n:]
+    for _ in range(ARRAY_STEPS):
+        trial = over(*best[2 + n:2 + 2 * n].clip(low, high), *values)
+        better = (best[1] > ROUNDED) & (best[0] <= far) & (trial[0] < best[0])
+        best[:, better] = trial[:, better]
+    # What is left is refined one by one.
     left = (left | ~(best[1] <= ACCEPTED)) & ~(best[0] > far)
-    solutions[:, ~(best[1] <= ACCEPTED)] = math.nan
+    solutions = np.where(best[1] <= ACCEPTED, best[2 + 2 * n:], math.nan)
     for k in np.flatnonzero(left).tolist():
         candidate = candidates[:, k].tolist()
         row = refine(problem, values[:, k].tolist(),
@@ -126,7 +115,7 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
     return solutions
 
 
-def _same(problem: InverseProblem, one: Row, other: Row) -> bool:
+def _are_one(problem: InverseProblem, solution: Row, other: Row) -> bool:
     """
     Return whether two solutions are one.
 
@@ -134,23 +123,23 @@ def _same(problem: InverseProblem, one: Row, other: Row) -> bool:
     the rates say that the outputs differ by no more than ONE.
     """
     n, steps = problem.n, []
-    for x, y, turn, size in zip(one, other, problem.turns, problem.sizes):
+    for x, y, turn, size in zip(solution, other, problem.turns, problem.sizes):
         steps.append(math.remainder(x - y, turn))
         if not abs(steps[-1]) <= SINGULAR * size:
             return False
     return all(abs(step) <= ONE * size for step, size in zip(steps, problem.sizes)) or any(
         all(abs(sum(rate * step for rate, step in zip(row[n + i::n], steps))) <= ONE * scale
-            for i, scale in enumerate(problem.scales)) for row in (one, other))
+            for i, scale in enumerate(problem.scales)) for row in (solution, other))
 
 
 def distinct(problem: InverseProblem, solutions: Sequence[Row]) -> List[Row]:
     """Return solutions in order, one of those that are one."""
     distinct: List[Row] = []
-    for row in sorted(solutions):
+    for solution in sorted(solutions):
         # Of one input only neighbours can be one, a turn apart too.
         others = distinct if problem.n > 1 else {*distinct[-1:], *distinct[:1]}
-        if not any(_same(problem, row, other) for other in others):
-            distinct.append(row)
+        if not any(_are_one(problem, solution, other) for other in others):
+            distinct.append(solution)
     return distinct
 
 
@@ -160,9 +149,9 @@ def distinct_arrays(problem: InverseProblem, solutions: np.ndarray) -> np.ndarra
     order = np.lexsort(solutions[:, :n].swapaxes(0, 1)[::-1], axis=0)
     solutions = np.take_along_axis(solutions, order[:, None], 0)
     pairs = np.triu_indices(len(solutions), 1)
-    apart = np.max([input_.apart(*(solutions[k, by] for k in pairs)) / size for by, (
+    distances = np.max([input_.apart(*(solutions[k, by] for k in pairs)) / size for by, (
         input_, size) in enumerate(zip(problem.inputs, problem.sizes))], axis=0)
-    for k in np.flatnonzero((apart <= SINGULAR).any(axis=0)).tolist():
+    for k in np.flatnonzero((distances <= SINGULAR).any(axis=0)).tolist():
         rows = distinct(problem, [row for row in map(tuple, solutions[:, :, k].tolist())
                                   if row[0] == row[0]])
         solutions[:, :, k] = math.nan

@@ -21,7 +21,7 @@ from ..text.rod_lines import turning_rods
 from ...formula.expression import argument, real, substituted
 
 
-def taken_apart(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
+def decompose(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
     """Return the inverse of rods for outputs, None where no closed form is known."""
     try:
         design, n = linkage.driven_by(*outputs).design, len(outputs)

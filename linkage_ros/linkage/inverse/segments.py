@@ -139,7 +139,7 @@ class Segments:
         # Values so near to an end of the segment are the end's.
         near = np.minimum(slack, ONE * self._size)
         # At an end of the reach there is a pose also when a period is added.
-        start, end = (x + side * 2.0 * math.ulp(max(abs(x), self._counted.high)) * (
+        start, end = (x + side * 4.0 * math.ulp(max(abs(x), self._counted.high)) * (
             x in self._ends) for x, side in zip(theta[[0, -1]].tolist(), (1.0, -1.0)))
         theta = np.array([start, *theta.clip(start, end), end]) * self._unit
         value = np.pad(value.clip(value[0] + near[0], value[-1] - near[1]), 1, 'edge')
@@ -180,26 +180,29 @@ class Segments:
         numbers, places, brackets = zip((none, none, np.empty((4, 0))), *found)
         return np.concatenate(numbers), np.concatenate(places), np.hstack(brackets)
 
-    def follow(self, value: float, gap: float, seed: float) -> Optional[Tuple[Bracket, float]]:
+    def follow(self, value: float, residual: float, seed: float
+               ) -> Optional[Tuple[Bracket, Tuple[float]]]:
         """
         Return the bracket of a value on the segment of a seed or those that continue it.
 
-        The output goes straight there, from `gap` above it; also returned are the whole turns of
-        the input there.
+        The output goes straight there, from `residual` above it; also returned is the input that
+        is estimated there, with its whole turns.
         """
         turns = self._input.turns_of(seed)
-        near = (seed - turns) / self._unit
+        place = (seed - turns) / self._unit
         number = next((i for i, segment in enumerate(self.all)
-                       if segment.theta[0] <= near <= segment.theta[-1]), None)
+                       if segment.theta[0] <= place <= segment.theta[-1]), None)
         if number is None:
             return None
         theta, values, sign = self.all[number]
-        target = float(np.interp(near, theta, values))
-        target += math.remainder(sign * (value + gap) - target, self._period) - sign * gap
+        target = float(np.interp(place, theta, values))
+        target += math.remainder(sign * (value + residual) - target, self._period)
+        target -= sign * residual
         for _ in range(2 * len(self.all)):
             table = self._tables[number]
             if table.low <= target <= table.high:
-                return table.bracket(target), turns
+                bracket = table.bracket(target)
+                return bracket, (turns + bracket.seed,)
             end, side = (-1, 1) if target > table.high else (0, -1)
             if not self._goes_on[number if end else number - 1]:
                 break
@@ -381,7 +384,7 @@ def extremes_of(linkage: Kinematics, output: str, arcs: Optional[Sequence[Arc]],
 
 
 def _cut(arcs: Sequence[Arc], marks: Any) -> Iterator[Arc]:
-    """Yield arcs, cut at marks."""
+    """Yield arcs, cut at marks; a mark next to an end is that end."""
     for start, end in arcs:
-        inside = sorted(mark for mark in marks if start < mark < end)
+        inside = sorted(mark for mark in marks if start + ROUNDING < mark < end - ROUNDING)
         yield from zip([start, *inside], [*inside, end])

@@ -59,7 +59,7 @@ import numpy as np
 from .arithmetic import ARITHMETIC_WORDS, Formula, IN_RANGE, in_range
 from ..geometry.builder import Builder, ConstructionError, Gear
 from ...cache import cached
-from ...formula.expression import dimension, Real
+from ...formula.expression import Real
 from ...words import elided, listed, meant, quoted
 
 _WORDS = {'left': 1.0, 'right': -1.0, 'out': 1.0, 'in': -1.0}
@@ -399,8 +399,3 @@ def _value(line: Line, arg: Argument, symbols: Mapping[str, Real],
     if '|' in arg.kind:
         return signs.get(line.names[0], _WORDS[arg.text])
     return True if arg.kind == arg.text else arg.text
-
-
-def symbols_of(dimensions: Iterable[str], signed: Iterable[str]) -> dict:
-    """Return the leaves of expressions for named dimensions."""
-    return {name: dimension(name, positive=name not in signed) for name in dimensions}

@@ -296,7 +296,7 @@ class _Drawing:
         self._joints = {name: _Joint(self._assembly.lines[name], self._numbers[name])
                         for name in self._assembly.parents}
         self._lengths: Dict[str, Real] = {}
-        self._span = sum((part for numbers in self._numbers.values() for part in map(
+        self._magnitude = sum((part for numbers in self._numbers.values() for part in map(
             abs, numbers[:3])), real(0.0))
 
     def draw(self) -> None:
@@ -343,7 +343,7 @@ class _Drawing:
             joint.turn = Turn.by(gated_by(joint.turn.angle, limits))
             return
         value = self._builder.drive(Input(name, LENGTH, *(
-            ends or (real(0.0) if joint is None else -self._span, self._span))), None)
+            ends or (real(0.0) if joint is None else -self._magnitude, self._magnitude))), None)
         if joint:
             joint.shift = value
         else:
@@ -394,13 +394,14 @@ class _Drawing:
         end, pivot = self._beyond(line, link)
         length, hinge = self._lengths[name], joint.hinge
         base, point = self._pivot(pivot, joint.parent), self._on_link(end, link)
-        span = self._span + (length if not length.varies else real(0.0))
+        magnitude = self._magnitude + (length if not length.varies else real(0.0))
         side = self._side(line, joint, pivot, end)
         if joint.line.word == 'slide':
-            joint.shift, *limits = rod_on_slide(hinge.axis, base.place, point, length, side, span)
+            joint.shift, *limits = rod_on_slide(
+                hinge.axis, base.place, point, length, side, magnitude)
         else:
             joint.turn, *limits, self._builder.transmissions[name] = rod_on_hinge(
-                hinge, base, point, length, side, span)
+                hinge, base, point, length, side, magnitude)
         self._builder.limits += limits
         joint.gate(self._add_limits(joint, joint.turn.angle if joint.turn else joint.shift))
 
@@ -417,7 +418,7 @@ class _Drawing:
         """Add the limits of a joint to the linkage, and return them."""
         if not joint.limits:
             return []
-        slack = TOLERANCE * self._span if joint.line.word == 'slide' else real(EDGE)
+        slack = TOLERANCE * self._magnitude if joint.line.word == 'slide' else real(EDGE)
         found = [Limit(value - joint.limits[0], slack), Limit(joint.limits[1] - value, slack)]
         self._builder.limits += found
         return found
@@ -453,7 +454,8 @@ class _Drawing:
                 for rod in rods)))
         first.turn, second.turn, limit = two_rods(rods, [
             0.5 * (each[0] + each[1]) if each else real(0.0) for each in limits])
-        drawn = [rod.drawn(first.turn, second.turn, self._span) for rod in rods if rod.pivot.turn]
+        drawn = [rod.drawn(first.turn, second.turn, self._magnitude)
+                 for rod in rods if rod.pivot.turn]
         self._builder.limits += [limit, *drawn]
         edges = [limit, *drawn, *self._add_limits(first, first.turn.angle),
                  *self._add_limits(second, second.turn.angle)]
@@ -492,4 +494,4 @@ class _Drawing:
     def _point(self, name: str, end: _End) -> None:
         if name in self._builder.points:
             raise self._assembly.lines[end.link].error(f'the name {name} is used by another point')
-        self._builder.points[name] = Point(self._on_link(end, GROUND), end.link, self._span)
+        self._builder.points[name] = Point(self._on_link(end, GROUND), end.link, self._magnitude)

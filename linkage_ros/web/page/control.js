@@ -22,14 +22,17 @@ export const units = {
 };
 
 /** A number of at most so many figures that has room in a field. */
-export function figures(value, most) {
-  for (let digits = most; digits > 1; digits--) {
+export function figures(value, maxDigits) {
+  for (let digits = maxDigits; digits > 1; digits--) {
     const number = Number(value.toPrecision(digits));
     const short = [String(number), number.toExponential().replace('+', '')].find(text => text.length <= ROOM);
     if (short) return short;
   }
   return value.toExponential(0).replace('+', '');
 }
+
+/** A value in its displayed unit, or a dash for none. */
+export const shown = (value, unit, digits) => value === null || value === undefined ? '—' : figures(value * units.of(unit).factor, digits);
 
 /** The value [rad or m] of a text in a displayed unit, `factor` times smaller; or the reason why it has none. */
 export async function read(text, unit, factor) {
@@ -155,7 +158,7 @@ export class Slider {
   settle(requested, { value = requested, reason, inputs }) {
     const refused = reason && !inputs;
     if (!refused) this.accepted = value;
-    const [wanted, low, high] = [requested, this.low, this.high].map(each => this.shortened(each));
+    const [wanted, low, high] = [requested, this.low, this.high].map(number => this.shortened(number));
     const unit = this.unitShown.textContent;
     this.explain(refused ? `Refused: ${wanted} ${unit}; the slider goes from ${low} to ${high} ${unit}. ${this.translated(reason)}` : reason, refused);
     if (!this.gesture && !this.requests.waiting) this.render();
@@ -219,12 +222,12 @@ export class Slider {
 export class Choice {
   constructor({ label, title, value }, words, request) {
     this.reason = new Reason();
-    this.buttons = words.map(([one, word]) => [one, button(word, async () => {
-      const { reason } = await request(one, {});
+    this.buttons = words.map(([choice, word]) => [choice, button(word, async () => {
+      const { reason } = await request(choice, {});
       this.reason.say(refusal(reason));
-      if (!reason) this.update(one);
+      if (!reason) this.update(choice);
     })]);
-    this.group = element('span', { className: 'choice', role: 'group', ariaLabel: label }, ...this.buttons.map(([, each]) => each));
+    this.group = element('span', { className: 'choice', role: 'group', ariaLabel: label }, ...this.buttons.map(([, node]) => node));
     this.row = element('div', { className: 'row', title }, element('span', { textContent: label }), this.group, this.reason.line);
     this.update(value);
   }
@@ -232,10 +235,6 @@ export class Choice {
   update(value) {
     if (value !== this.value) this.reason.say();
     this.value = value;
-    for (const [one, each] of this.buttons) put(each, { ariaPressed: String(one === value) });
+    for (const [choice, node] of this.buttons) put(node, { ariaPressed: String(choice === value) });
   }
-
-  render() {}
-
-  bound() {}
 }

@@ -66,7 +66,7 @@ connect({
   scene({ mechanisms: descriptions }) {
     const known = new Map(mechanisms);
     mechanisms.clear();
-    for (const description of descriptions.sort((one, other) => one.key.localeCompare(other.key, 'en', { numeric: true }))) {
+    for (const description of descriptions.sort((a, b) => a.key.localeCompare(b.key, 'en', { numeric: true }))) {
       const { key, name } = description;
       const mechanism = known.get(key) ?? new Mechanism();
       mechanism.describe(description);
@@ -129,7 +129,7 @@ function show(key) {
   if (key !== shown) picture.view.reset();
   shown = key;
   const several = mechanisms.size > 1;
-  const labels = several ? [['', 'all'], ...[...mechanisms.values()].map(one => [one.key, one.title])] : [];
+  const labels = several ? [['', 'all'], ...[...mechanisms.values()].map(({ key: value, title }) => [value, title])] : [];
   views.replaceChildren(...labels.map(([value, title]) => button(title, () => {
     store({ shown: value });
     show(value);

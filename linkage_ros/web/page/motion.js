@@ -4,18 +4,16 @@
 // The motion of a mechanism: a slider for each input, play and step, and its present outputs.
 
 import { isOpen } from './connection.js';
-import { button, element, figures, Newest, put, read, Reason, refusal, Slider, units } from './control.js';
+import { button, element, Newest, put, read, Reason, refusal, shown, Slider, units } from './control.js';
 
 const STEP = Math.PI / 180;
 const STEPS_A_STROKE = 100;
 const FIGURES = 5;
 const FIGURES_OF_MANY = 3;
 
-const shown = (value, unit, digits = FIGURES) => value === null ? '—' : figures(value * units.of(unit).factor, digits);
-
 /** What is reached, in the units that are shown. */
 function inWords({ name, arcs, unit }) {
-  const ends = arcs.map(([low, high]) => `[${shown(low, unit)}, ${shown(high, unit)}]`);
+  const ends = arcs.map(([low, high]) => `[${shown(low, unit, FIGURES)}, ${shown(high, unit, FIGURES)}]`);
   return `${name} reaches ${ends.join(' or ')} ${units.of(unit).name}`;
 }
 
@@ -84,7 +82,7 @@ class OutputRow {
   render() {
     if (!this.output) return;
     const { value, unit, rates } = this.output;
-    if (document.activeElement !== this.value) put(this.value, { [this.editable ? 'value' : 'textContent']: shown(value, unit) });
+    if (document.activeElement !== this.value) put(this.value, { [this.editable ? 'value' : 'textContent']: shown(value, unit, FIGURES) });
     put(this.unit, { textContent: units.of(unit).name });
     this.inputs.forEach((input, i) => {
       const ratio = `${unit}/${input.unit}`;

@@ -37,7 +37,7 @@ class Section {
       about, this.still, this.motion.element, ...this.tuning.speeds, this.tuning.element, this.tuning.files());
     this.element.dataset.key = key;
     // Foldings that are open in the section that this one replaces are open here.
-    const openTitles = [...old?.element.querySelectorAll('details[open] > summary') ?? []].map(one => one.textContent);
+    const openTitles = [...old?.element.querySelectorAll('details[open] > summary') ?? []].map(summary => summary.textContent);
     for (const summary of this.element.querySelectorAll('summary')) summary.parentElement.open ||= openTitles.includes(summary.textContent);
   }
 
@@ -104,7 +104,7 @@ export class Panel {
   }
 
   lit(key, name) {
-    for (const [own, { tuning }] of this.sections) tuning.lit(own === key ? name : '');
+    for (const [sectionKey, { tuning }] of this.sections) tuning.lit(sectionKey === key ? name : '');
   }
 
   render() {

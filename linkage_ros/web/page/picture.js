@@ -40,7 +40,7 @@ function axes([, , , x, y, z, w]) {
 /** A number of 1, 2 or 5 times a power of ten that is not below this one. */
 function round(value) {
   const power = 10 ** Math.floor(Math.log10(value));
-  return [1, 2, 5, 10].find(one => one * power >= value * 0.999) * power;
+  return [1, 2, 5, 10].find(digit => digit * power >= value * 0.999) * power;
 }
 
 /** The multiples of a step between two ends; few even where adding a step is lost to rounding. */
@@ -51,7 +51,7 @@ export function multiples(step, low, high) {
 }
 
 /** Whether a text or a box is clear of others; `half` and `high` are half of its width and height. */
-const isClear = (one, others) => others.every(other => Math.abs(other.x - one.x) >= other.half + one.half || Math.abs(other.y - one.y) >= other.high + one.high);
+const isClear = ({ x, y, half, high }, others) => others.every(other => Math.abs(other.x - x) >= other.half + half || Math.abs(other.y - y) >= other.high + high);
 
 /** How far a text is from a place. */
 const apart = ({ x, y, half, high }, [left, top]) => Math.hypot(
@@ -62,7 +62,7 @@ const dark = matchMedia('(prefers-color-scheme: dark)');
 /** A colour mixed with that of the paper, or of the ink. */
 function mixed([r, g, b, a], part, towards) {
   const other = dark.matches === (towards === 'ink') ? 0.92 : 0.1;
-  return `rgba(${[r, g, b].map(one => Math.round(255 * (one + (other - one) * part))).join(',')},${a})`;
+  return `rgba(${[r, g, b].map(share => Math.round(255 * (share + (other - share) * part))).join(',')},${a})`;
 }
 
 /** A colour, stronger for the legs in front; all are visible against the paper. */
@@ -143,15 +143,15 @@ export class Picture {
     const shapes = this.shapes();
     if (!shapes.length) return;
     // The picture is not refitted while a joint is dragged.
-    if (!this.scale || !this.view.line) this.fit(shapes, width, height);
+    if (!this.scale || !this.view.dragLine) this.fit(shapes, width, height);
     if (!this.view.turned && !this.mechanisms[0].space) this.grid(width, height, shapes[0].map);
     // Slots are drawn first, so that they do not hide bars.
-    const rank = ({ kind }) => kind === 'slots' ? 0 : kind === 'joints' ? 2 : 1;
-    shapes.sort((a, b) => rank(a) - rank(b) || a.depth - b.depth);
+    const isSlot = ({ kind }) => kind === 'slots';
+    shapes.sort((a, b) => isSlot(b) - isSlot(a) || a.depth - b.depth);
     const legs = this.legsSeen(shapes);
-    for (const shape of shapes.filter(one => rank(one) < 2)) this[shape.kind](shape);
+    for (const shape of shapes) if (shape.kind !== 'joints') this[shape.kind](shape);
     this.light(legs);
-    for (const shape of shapes.filter(one => rank(one) === 2)) this.joints(shape);
+    for (const shape of shapes) if (shape.kind === 'joints') this.joints(shape);
     this.arrows(legs);
     this.dragLine();
     if (this.named && legs.length === 1) this.names(legs[0]);
@@ -459,13 +459,13 @@ export class Picture {
     for (const { mechanism: { arrows }, leg, map, seen } of legs) {
       if (!this.kind || leg) continue;
       const at = Object.entries(arrows.at).filter(([joint, [x]]) => x !== null && seen.has(joint));
-      const most = Math.max(0, ...at.map(([, way]) => Math.hypot(...way)));
-      const [longest] = at.find(([, way]) => Math.hypot(...way) === most) ?? [];
-      for (const [joint, [x, y]] of most ? at : []) {
-        const [right, up] = map.map(([a, b]) => (a * x + b * y) * length / most);
+      const max = Math.max(0, ...at.map(([, way]) => Math.hypot(...way)));
+      const [longest] = at.find(([, way]) => Math.hypot(...way) === max) ?? [];
+      for (const [joint, [x, y]] of max ? at : []) {
+        const [right, up] = map.map(([a, b]) => (a * x + b * y) * length / max);
         this.arrow(seen.get(joint), [right, -up]);
       }
-      if (this.mechanisms.length === 1 && arrows.unit) legend = this.explained(arrows, longest, most);
+      if (this.mechanisms.length === 1 && arrows.unit) legend = this.explained(arrows, longest, max);
     }
     put(this.legend, { textContent: legend });
   }
@@ -484,22 +484,22 @@ export class Picture {
   }
 
   /** The value of the longest arrow, and the efforts that balance the loads, in words. */
-  explained({ unit, efforts = {} }, joint, most) {
+  explained({ unit, efforts = {} }, joint, max) {
     const { name, factor } = units.of(unit);
     const figure = value => value === null ? 'without bound' : figures(value, 3);
     const holds = Object.entries(efforts).map(([input, [value, of]]) => `, the ${input} holds ${figure(value)} ${of}`);
-    return joint ? `longest ${this.kind}: ${figure(most * factor)} ${name} at ${joint}${holds.join('')}`
+    return joint ? `longest ${this.kind}: ${figure(max * factor)} ${name} at ${joint}${holds.join('')}`
       : this.kind === 'force' ? `no loads on its joints${holds.join('')}` : `no ${this.kind}`;
   }
 
   /** Draw a line from the dragged joint to the pointer. */
   dragLine() {
-    const { line } = this.view;
-    if (!line) return;
+    const ends = this.view.dragLine;
+    if (!ends) return;
     const { context } = this;
     context.setLineDash([6, 6]);
     Object.assign(context, { lineWidth: 2, strokeStyle: paint('--faint') });
-    this.line(...line.flat());
+    this.line(...ends.flat());
     context.setLineDash([]);
   }
 }

@@ -3,7 +3,7 @@
 
 // A plot of an output over a turn or a stroke of the first input; the other inputs are fixed.
 
-import { button, element, figures, Newest, put, Reason, units } from './control.js';
+import { button, element, figures, Newest, put, Reason, shown, units } from './control.js';
 import { isTuned } from './mechanism.js';
 import { beside } from './motion.js';
 import { multiples, paint } from './picture.js';
@@ -17,9 +17,9 @@ const MAX_BEYOND = 8;
 /** The least range of what is drawn, as a part of its values. */
 const MIN_RANGE = 1e-9;
 
-const options = names => names.map(textContent => element('option', { textContent }));
+const figure = value => shown(value, '', FIGURES);
 
-const shown = value => value === null || value === undefined ? '—' : figures(value, FIGURES);
+const options = names => names.map(textContent => element('option', { textContent }));
 
 /** The range of the drawn values: all, except those that grow without bound. */
 function bounds(values) {
@@ -110,7 +110,7 @@ export class Plot {
     const { kind, input, output, units: [across, up], power, x, y, ends, dead } = this.curve;
     const [{ name: acrossName, factor: wide }, { name: upName, factor: high }] = this.units = [across, up].map(unit => units.of(unit));
     const { speed } = this.mechanism.inputs[input];
-    const title = `${kind} of ${output}${power ? ` with the ${input} at ${shown(speed * wide)} ${acrossName}/s` : ''}`;
+    const title = `${kind} of ${output}${power ? ` with the ${input} at ${figure(speed * wide)} ${acrossName}/s` : ''}`;
     this.data = [x.map(value => value * wide), y.map(value => value === null ? null : value * high * speed ** power)];
     this.bounds = bounds(this.data[1]);
     [this.dead, this.ends] = [dead, ends].map(values => values.map(value => value * wide));
@@ -131,13 +131,13 @@ export class Plot {
   /** Describe the plot in words. */
   describe(title, unit, across) {
     const known = this.data[1].filter(value => value !== null);
-    const [from, to] = [this.data[0][0], this.data[0].at(-1)].map(shown);
+    const [from, to] = [this.data[0][0], this.data[0].at(-1)].map(figure);
     const ends = [Math.min(...known), Math.max(...known)];
     const isCut = this.bounds[0] > ends[0] || this.bounds[1] < ends[1];
     const [low, high] = isCut ? this.bounds : ends;
-    const range = known.length ? `from ${shown(low)} to ${shown(high)}${unit && ` ${unit}`}${isCut ? ' and beyond' : ''}` : 'no value anywhere';
+    const range = known.length ? `from ${figure(low)} to ${figure(high)}${unit && ` ${unit}`}${isCut ? ' and beyond' : ''}` : 'no value anywhere';
     const places = [['Dead points', this.dead], ['Ends of the reach', this.ends]].filter(([, { length }]) => length)
-      .map(([what, values]) => ` ${what} at ${values.map(shown).join(', ')} ${this.units[0].name}.`);
+      .map(([what, values]) => ` ${what} at ${values.map(figure).join(', ')} ${this.units[0].name}.`);
     this.marks.textContent = `${title[0].toUpperCase()}${title.slice(1)}: ${range}.${places.join('') || ' No dead points.'}`;
     this.place.ariaLabel = `${this.marks.textContent} Over the ${across} from ${from} to ${to}.`;
   }
@@ -216,7 +216,7 @@ export class Plot {
     const { kind, input, output, units: [, unit] } = this.curve;
     // An angle is drawn without jumps, but printed within half a turn.
     const value = kind === 'position' && unit === 'rad' && y ? beside(y, 0, 2 * Math.PI * this.units[1].factor) : y;
-    put(this.read, { textContent: `${input} ${shown(x)} ${this.units[0].name}: ${output} ${shown(value)} ${this.units[1].name}` });
+    put(this.read, { textContent: `${input} ${figure(x)} ${this.units[0].name}: ${output} ${figure(value)} ${this.units[1].name}` });
   }
 
   render() {

@@ -76,7 +76,7 @@ export class View {
 
   /** Return axes, turned: to the right, up, and out of the picture. */
   axes({ right, up, out }) {
-    const mix = (a, part, b, other) => a.map((one, i) => part * one + other * b[i]);
+    const mix = (a, part, b, other) => a.map((end, i) => part * end + other * b[i]);
     const [c, s, e, f] = [Math.cos(this.yaw), Math.sin(this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
     const towards = mix(out, c, right, s);
     return { right: mix(right, c, out, -s), up: mix(up, e, towards, -f), out: mix(towards, e, up, f) };
@@ -105,7 +105,7 @@ export class View {
 
   /** The joint that is nearest to a pointer, of those that can be moved. */
   joint([x, y], reach) {
-    return closest(this.picture.legsSeen().filter(({ mechanism }) => !mechanism.space).flatMap(
+    return closest(this.picture.legsSeen().flatMap(
       leg => [...leg.seen].filter(([joint]) => !leg.mechanism.tunable.fixed.includes(joint)).map(
         ([joint, at]) => ({ ...leg, joint, away: Math.hypot(at[0] - x, at[1] - y) }))), reach);
   }
@@ -131,13 +131,13 @@ export class View {
 
   move(event) {
     const pointer = [event.offsetX, event.offsetY];
-    if (event.pointerId === this.grabbed?.pointerId) this.pull(pointer);
-    else if (this.pointers.has(event.pointerId)) this.shove(event, pointer);
+    if (event.pointerId === this.grabbed?.pointerId) this.dragTo(pointer);
+    else if (this.pointers.has(event.pointerId)) this.moveView(event, pointer);
     else if (!this.grabbed) this.hover(pointer);
   }
 
   /** Drag the joint to a pointer. */
-  pull(pointer) {
+  dragTo(pointer) {
     this.grabbed.pointer = pointer;
     const { dragged, grabbed: { joint, leg } } = this;
     const place = dragged && this.picture.inPlane(dragged.map, ...this.picture.from(...pointer));
@@ -145,12 +145,12 @@ export class View {
   }
 
   /** Shift the view with a pointer, turn it, or zoom with two. */
-  shove({ pointerId, shiftKey, buttons }, pointer) {
+  moveView({ pointerId, shiftKey, buttons }, pointer) {
     const before = [...this.pointers.values()];
     this.pointers.set(pointerId, pointer);
     const now = [...this.pointers.values()];
     const [from, to] = [middle(before), middle(now)];
-    const way = to.map((one, i) => one - from[i]);
+    const way = to.map((end, i) => end - from[i]);
     if (shiftKey || buttons & 2) {
       this.turn(...way);
       return;
@@ -185,13 +185,13 @@ export class View {
   }
 
   /** The ends of the line from the dragged joint to the pointer. */
-  get line() {
+  get dragLine() {
     const from = this.dragged?.seen.get(this.grabbed.joint);
     return from ? [from, this.grabbed.pointer] : null;
   }
 
   key(event) {
-    const way = KEYS[event.key]?.map(one => one * STEP);
+    const way = KEYS[event.key]?.map(sign => sign * STEP);
     const zoom = { '+': ZOOM, '=': ZOOM, '-': 1 / ZOOM }[event.key];
     if (way && event.shiftKey) this.turn(...way);
     else if (way) this.pan(...way);

@@ -14,8 +14,6 @@ const FORMS = {
   URDF: ['urdf', 'The robot model'],
   C: ['h', 'A C99 header for a microcontroller'],
 };
-/** What there is not of a linkage in space. */
-const PLANAR = ['csv', 'urdf'];
 
 const picture = () => new Promise(done => { document.getElementById('picture').toBlob(done); });
 
@@ -108,7 +106,7 @@ export class Tuning {
 
   /** The buttons that download. */
   files() {
-    const forms = Object.entries(FORMS).filter(([, [form]]) => !this.mechanism.space || !PLANAR.includes(form));
+    const forms = Object.entries(FORMS).filter(([, [form]]) => this.mechanism.forms.includes(form));
     return element('div', { className: 'tools' }, element('span', { className: 'about', textContent: 'Download' }),
       ...forms.map(([name, [form, title]]) => button(name, () => this.download(form), { title })));
   }
@@ -132,7 +130,7 @@ export class Tuning {
       if (tunable.reason) return;
       this.mechanism.tunable = tunable;
       for (const [name, ends] of Object.entries(tunable.travel)) {
-        if (ends) this.controls.get(name)?.bound(...ends);
+        if (ends) this.controls.get(name)?.bound?.(...ends);
       }
     }, RESTED);
   }
@@ -152,7 +150,7 @@ export class Tuning {
 
   /** Light up the slider of a dimension. */
   lit(name) {
-    for (const [own, { row }] of this.controls) row.classList.toggle('lit', own === name);
+    for (const [key, { row }] of this.controls) row.classList.toggle('lit', key === name);
   }
 
   /** Go to the slider of a dimension. */
@@ -165,6 +163,6 @@ export class Tuning {
   }
 
   render() {
-    for (const control of this.controls.values()) control.render();
+    for (const control of this.controls.values()) control.render?.();
   }
 }
