@@ -204,7 +204,7 @@ def test_a_growing_trace_is_what_the_tracer_went_through_until_now():
 def test_a_fading_trace_ends_at_the_tracer_and_begins_where_it_was_three_tenths_of_a_turn_ago():
     drop = machine('water_drop')
     picture = picture_of(drop, trace='fading')
-    for turns in (0.0, 0.1, 0.80007, 1.3):
+    for turns in (0.0, 0.1, 0.80125, 1.3):
         picture.show(turns)
         pieces = segments_of(picture)
         first, last = drop.linkage.solve(math.tau * np.array([turns - 0.3, turns]), ('P',))['P']
