@@ -140,8 +140,9 @@ def test_a_reader_that_has_gone_ends_a_command_quietly_and_a_full_disk_with_a_se
     with open(writer, 'wb') as gone, open('/dev/full', 'wb') as full:
         for output, code, text in (
                 (gone, 0, ''), (full, 1, 'draw: [Errno 28] No space left on device\n')):
-            ended = subprocess.run([sys.executable, '-c', command], stdout=output,
-                                   stderr=subprocess.PIPE, text=True)
+            ended = subprocess.run(
+                [sys.executable, '-c', command], stdout=output, stderr=subprocess.PIPE, text=True,
+                env={**os.environ, 'PYTHONUNBUFFERED': ''})
             assert (ended.returncode, ended.stderr) == (code, text)
 
 
