@@ -101,11 +101,11 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
     best = over(*inputs.clip(low, high), *values)
     left = ~np.isfinite(best).all(axis=0)
     for _ in range(ARRAY_STEPS):
-        trial = over(*best[2 + n:2 + 2 * n].clip(low, high), *values)
-        better = (best[1] > ROUNDED) & (best[0] <= far) & (trial[0] < best[0])
-        if not better.any():
-            break
-        best[:, better] = trial[:, better]
+        again = np.flatnonzero((best[1] > ROUNDED) & (best[0] <= far))
+        x = best[2 + n:2 + 2 * n].clip(low, high)
+        trial = over(*x[:, again], *values[:, again])
+        better = trial[0] < best[0, again]
+        best[:, again[better]] = trial[:, better]
     # What is left is refined one by one.
     left = (left | ~(best[1] <= ACCEPTED)) & ~(best[0] > far)
     solutions = np.where(best[1] <= ACCEPTED, best[2 + 2 * n:], math.nan)
