@@ -63,17 +63,22 @@ def run(name: str, work: Callable, args: Optional[Sequence[str]]) -> int:
         sys.stdout.flush()
         return 0
     except BrokenPipeError:
-        # The reader has closed the pipe: Python discards the rest of the output at its end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        # The reader has all that it wants.
+        why: object = ''
     except (RequestError, SceneError, ImportError) as error:
-        why: object = error
+        why = error
     except OSError as error:
         why = f'{error.filename}: {error.strerror}{_beside(error)}' if error.filename else error
     except KeyboardInterrupt:
         why = 'interrupted'
-    print(f'{name}: {sentence(why)}', file=sys.stderr)
-    return 1
+    try:
+        sys.stdout.flush()
+    except OSError:
+        # Python would try to write the rest at its end, and say that it cannot.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if why:
+        print(f'{name}: {sentence(why)}', file=sys.stderr)
+    return 1 if why else 0
 
 
 def _beside(error: OSError) -> str:

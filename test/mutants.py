@@ -212,7 +212,7 @@ def run(copy, *arguments, seconds=None, **environment):
         process = subprocess.Popen(
             [*limits, sys.executable, '-m', 'pytest', '-m', 'not nightly', *arguments], cwd=copy,
             stdout=output, stderr=output, start_new_session=True,
-            env={**os.environ, 'PYTHONDONTWRITEBYTECODE': '1', **environment,
+            env={**os.environ, **environment,
                  'PYTHONPATH': os.pathsep.join([str(copy), os.environ.get('PYTHONPATH', '')])})
         try:
             status = process.wait(BUSY * seconds if seconds else None)
@@ -313,8 +313,9 @@ def tested(copy, job):
     lines[mutant['line'] - 1:mutant['line'] - 1 + len(mutant['before'])] = mutant['after']
     path.write_text('\n'.join(lines) + '\n')
     try:
+        # What is compiled now is of no use later.
         status, output = run(copy, *files, *'-x -q -p no:cacheprovider -p no:cov --tb=no'.split(),
-                             seconds=START + SLOWER * seconds)
+                             seconds=START + SLOWER * seconds, PYTHONDONTWRITEBYTECODE='1')
     finally:
         path.write_text(source)
     state = 'hung or crashed' if status < 0 else 'killed' if status else 'survived'

@@ -79,6 +79,7 @@ def broken(tmp_path, monkeypatch):
             del sys.modules[name]
 
 
+@pytest.mark.nightly(all_but=18)
 @pytest.mark.parametrize('way', WAYS)
 @pytest.mark.parametrize('package, command', [
     (package, command) for command, (packages, *_) in COMMANDS.items() for package in packages])
@@ -175,7 +176,7 @@ def test_a_node_moves_without_machine_code_and_says_why_once(harness, tmp_path, 
     assert len(said) == 1 and f'[{level}]' in said[0] and optional.INSTALL['llvmlite'] in said[0]
 
 
-@pytest.mark.nightly(all_but=2)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('way', ['missing', 'OSError', 'empty'])
 @pytest.mark.parametrize('package, name', [
     ('aiohttp', 'viewer'), ('linkage_interfaces', 'servo_inverse'),

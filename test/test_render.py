@@ -204,7 +204,7 @@ def test_a_growing_trace_is_what_the_tracer_went_through_until_now():
 def test_a_fading_trace_ends_at_the_tracer_and_begins_where_it_was_three_tenths_of_a_turn_ago():
     drop = machine('water_drop')
     picture = picture_of(drop, trace='fading')
-    for turns in (0.0, 0.1, 0.8, 1.3):
+    for turns in (0.0, 0.1, 0.80125, 1.3):
         picture.show(turns)
         pieces = segments_of(picture)
         first, last = drop.linkage.solve(math.tau * np.array([turns - 0.3, turns]), ('P',))['P']
@@ -407,6 +407,14 @@ def test_options_have_these_defaults_and_limits(tmp_path):
         assert parsed(['a', '--out', str(still), '--angle', text]).angle == pytest.approx(60.0)
     # As 0.1.0 has it.
     assert parsed(['a', '--out', str(still), '--mechanisms', 'b,c']).mechanism == ['b', 'c']
+
+
+def test_the_help_has_examples_that_can_be_run(capsys):
+    from linkage_ros.render.command import main, parsed
+    with pytest.raises(SystemExit):
+        main(['--help'])
+    examples = re.findall(r'^  render (config/.*)', capsys.readouterr().out, re.M)
+    assert len(examples) == 4 and all(parsed(example.split()) for example in examples)
 
 
 def shapes_of(file):

@@ -4,7 +4,10 @@
 """Messages are one short line, and suggest what was meant or what to install."""
 
 import enum
+import os
 import string
+import subprocess
+import sys
 
 from hypothesis import given, settings, strategies as st
 from linkage_ros import palette, scene
@@ -127,6 +130,20 @@ def test_a_command_that_works_ends_with_0_and_a_mistake_is_not_hidden(capsys):
     assert capsys.readouterr() == ("['done']\n", '')
     with pytest.raises(ValueError):
         run('draw', a_command(ValueError()), ['a', 'b'])
+
+
+def test_a_reader_that_has_gone_ends_a_command_quietly_and_a_full_disk_with_a_sentence():
+    command = ('import sys; from linkage_ros.command import run; '
+               'sys.exit(run("draw", print, ["much"]))')
+    reader, writer = os.pipe()
+    os.close(reader)
+    with open(writer, 'wb') as gone, open('/dev/full', 'wb') as full:
+        for output, code, text in (
+                (gone, 0, ''), (full, 1, 'draw: [Errno 28] No space left on device\n')):
+            ended = subprocess.run(
+                [sys.executable, '-c', command], stdout=output, stderr=subprocess.PIPE, text=True,
+                env={**os.environ, 'PYTHONUNBUFFERED': ''})
+            assert (ended.returncode, ended.stderr) == (code, text)
 
 
 def test_a_file_that_is_not_there_is_suggested_by_its_name(capsys, tmp_path, monkeypatch):
