@@ -426,7 +426,7 @@ def test_passive_joints_have_states_where_there_are_handles(plugins, name, renam
     component.write(poses(machine, *INPUTS[name][0])[1], 1.0)
     assert np.array_equal(component.extra, before)
     component.read(actuator, speeds / ratios)
-    status, _ = component.read(NAN)
+    status, _ = component.read(NAN, NAN)
     assert status & NOT_KNOWN and np.array_equal(component.extra[0], before[0])
     assert not component.extra[1].any()
 
