@@ -143,10 +143,10 @@ class Browser:
         self._do('Page.navigate', url=url)
         until(lambda: self.value('document.readyState === "complete"'), url)
 
-    def resize(self, width: int, height: int, scheme: str):
-        """Look as a screen of this size [pixels] does that prefers light or dark."""
+    def resize(self, width: int = 0, height: int = 0, scheme: str = 'light'):
+        """Look as a screen of this size [pixels] does that prefers light or dark; 0: the own."""
         self._do('Emulation.setDeviceMetricsOverride', width=width, height=height,
-                       deviceScaleFactor=1, mobile=width < 600)
+                 deviceScaleFactor=1, mobile=0 < width < 600)
         self._do('Emulation.setEmulatedMedia', features=[
             {'name': 'prefers-color-scheme', 'value': scheme}])
 

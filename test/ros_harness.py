@@ -212,6 +212,14 @@ def _stamp(message):
     return header.stamp.sec
 
 
+def hastened(node, seconds):
+    """Return the timer of a node with a period [s], which now is a hundredth of a second."""
+    timer, = (timer for timer in node.timers if timer.timer_period_ns == 1e9 * seconds)
+    timer.timer_period_ns = 10 ** 7
+    timer.reset()
+    return timer
+
+
 def module(name):
     """Return the module of an executable."""
     rooms = {'render': 'render', 'urdf': 'nodes.urdf_command', 'viewer': 'web.viewer',

@@ -93,7 +93,7 @@ def drawn(seeds):
                 case = read(name, design.joints, names[i] if i < len(names) else (), **given)
                 yield case
                 if not i:
-                    linkage = case.machine.linkage
+                    linkage = case.mechanism.linkage
                     others = [*linkage.joints, *(f'{point}.{axis}' for point in linkage.points
                                                  for axis in 'xy')]
                     names += [[f'm{seed}_{k}_{output}' for output in rng.choice(
@@ -104,20 +104,20 @@ def questions(folder, cases, number):
     """Return how many questions were put to each case, and raise if there were misses."""
     folder.mkdir(parents=True, exist_ok=True)
     library = loaded(folder, header.printed(cases, number == 'float') + SAMPLE + ''.join(
-        QUESTIONS.format(name=case.machine.name, number=number, n=len(case.machine.inputs),
+        QUESTIONS.format(name=case.mechanism.name, number=number, n=len(case.mechanism.inputs),
                          slack='1e-2f' if number == 'float' else '1e-6',
-                         ranges=ranges(case.machine)) for case in cases), '-O1')
+                         ranges=ranges(case.mechanism)) for case in cases), '-O1')
     counts = {}
     for case in cases:
-        counts[case.machine.name] = (ctypes.c_long * 3)()
-        library[f'{case.machine.name}_counts'](ctypes.c_long(300), counts[case.machine.name])
+        counts[case.mechanism.name] = (ctypes.c_long * 3)()
+        library[f'{case.mechanism.name}_counts'](ctypes.c_long(300), counts[case.mechanism.name])
     assert {name: each[:] for name, each in counts.items() if any(each[1:])} == {}
     return [each[0] for each in counts.values()]
 
 
 @pytest.mark.parametrize('output, joint_lines', FAULTS)
 def test_a_closed_form_knows_every_assembly_mode(tmp_path, output, joint_lines):
-    machine = read('fault', joint_lines).machine
+    machine = read('fault', joint_lines).mechanism
     linkage, invert = machine.linkage, inverter(tmp_path, machine, output)
     (low, high), = linkage.reach()
     for given in np.linspace(low, high, 41)[1:-1]:

@@ -60,7 +60,7 @@ def test_a_signal_ends_a_node_quietly(harness, name, stop):
 
 
 def test_a_program_that_a_node_ran_in_gets_its_signals_back(harness):
-    from linkage_ros.nodes.shutdown import ShutdownHandler
+    from linkage_ros.nodes.shutdown import ShutdownHandler, TIMEOUT_S
 
     def handlers():
         return [signal.getsignal(stop) for stop in (signal.SIGINT, signal.SIGTERM)]
@@ -70,6 +70,8 @@ def test_a_program_that_a_node_ran_in_gets_its_signals_back(harness):
         assert not set(handlers()) & set(before) and not shutdown.is_over
         signal.raise_signal(signal.SIGTERM)
         assert shutdown.is_over
+        # What would end the process, were it busy.
+        assert 0.0 < signal.getitimer(signal.ITIMER_REAL)[0] <= TIMEOUT_S
     assert handlers() == before and signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 
 

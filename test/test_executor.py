@@ -112,7 +112,6 @@ def test_where_there_is_no_such_executor_the_plain_one_is_used_and_ends_as_quiet
     assert [line for line in done.stderr.splitlines() if ': ready: ' not in line] == ['turned']
 
 
-@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('stop', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('plain', [False, True])
 def test_a_signal_amid_a_callback_ends_a_node_quietly(stop, plain):

@@ -24,7 +24,7 @@ from rcl_interfaces.msg import (  # noqa: E402
 )
 from rclpy.impl.rcutils_logger import RcutilsLogger  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
-from ros_harness import Graph, Process  # noqa: E402
+from ros_harness import Graph, hastened, Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 
 SOON = 2.0
@@ -291,15 +291,8 @@ def test_what_a_follower_refused_is_followed_with_the_value_that_it_waits_for(gr
 
 
 def test_a_second_node_of_the_same_name_is_noticed_once(graph, warned):
-    def look_often(**kwargs):
-        node = graph.start(CrankDriver, LEVER, **kwargs)
-        timer, = (timer for timer in node.timers
-                  if timer.timer_period_ns == 1e9 * scene_node.NAMESAKE_CHECK_PERIOD_S)
-        timer.timer_period_ns = 10 ** 7
-        timer.reset()
-        return timer
-
-    timers = [look_often(**kwargs) for kwargs in ({}, {'namespace': 'other'}, {})]
+    timers = [hastened(graph.start(CrankDriver, LEVER, namespace=namespace),
+                       scene_node.NAMESAKE_CHECK_PERIOD_S) for namespace in ('', 'other', '')]
     graph.until(lambda: len(warned) == 2)
     assert all('there is another node /crank_driver' in text for text in warned)
     assert [timer.is_canceled() for timer in timers] == [True, False, True]

@@ -98,8 +98,10 @@ def test_a_slider_sets_the_node_that_owns_the_parameter_and_others_changes_are_s
     page.setting('/leg', 'crank.speed', -2.5)
     assert (running.value('leg.leg_pairs'), running.value('leg.crank.speed')) == (3, -2.5)
     assert page.set('/leg', crank__speed=0.0) == ''
-    # It plays as fast as before.
+    # It plays as fast as before, from a file too.
     assert running.page().mechanisms('/leg')['/leg']['inputs']['crank']['speed'] == -2.5
+    saved = page.ask('export', key='/leg', form='yaml')['text']
+    assert 'leg.crank.speed: -2.5\n' in saved and 'leg.leg_pairs: 3\n' in saved
     running.set('leg.mirrored', True)
     both = page.setting('/leg', 'mirrored', True)
     assert [(told['legs'], told['pairs']) for told in (first, more, both)] == [
@@ -193,33 +195,6 @@ def test_an_input_goes_again_to_where_it_started_though_that_is_a_middle_or_an_e
 def test_what_cannot_be_brought_about_says_why(lever, page, key, want, reason):
     assert re.search(reason, page.pose(key, **want)['reason'])
     assert lever.value('lever.crank.speed') == 1.0
-
-
-@pytest.mark.nightly
-def test_what_is_saved_starts_the_tuned_scene_again(show, tmp_path):
-    running = show({**LEVER, 'drop.pose': [0.0, 0.0, 0.5, 1.5, 0.0, 0.0]})
-    page = running.page()
-    assert page.set('/lever', **{'dimensions.a': 81.25, 'scale': 0.01}) == ''
-    page.setting('/lever', 'scale', 0.01)
-    assert page.set('/lever', crank__speed=2.0) == ''
-    page.setting('/lever', 'crank.speed', 2.0)
-    page.pose('/lever', output='crank', value=0.75)
-    stopped = page.setting('/lever', 'crank.speed', 0.0)
-    assert stopped['inputs']['crank']['speed'] == 2.0
-    page.setting('/lever', 'crank.start', 0.75)
-    # Whoever opens the page again finds it stopped, and what it had before.
-    again = running.page()
-    lever = again.mechanisms('/lever', '/drop')['/lever']
-    assert lever['inputs']['crank']['speed'] == 2.0
-    file = tmp_path / 'tuned.yaml'
-    file.write_text(again.ask('export', key='/lever', form='yaml')['text'])
-    lever, drop = scene.load(str(file)).machines.values()
-    assert (lever.linkage.dimensions['a'], lever.scale) == (81.25, 0.01)
-    assert (lever.first.start, lever.first.speed) == (0.75, 2.0)
-    assert drop.pose == (0.0, 0.0, 0.5, 1.5, 0.0, 0.0)
-    assert scene.load(str(file)).rate == RATE['rate']
-    # What defines a mechanism is there, what is as usual besides is not.
-    assert 'lever.dimensions.b: 150.0' in file.read_text() and 'leg_pairs' not in file.read_text()
 
 
 def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(page):

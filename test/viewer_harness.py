@@ -234,7 +234,7 @@ class Seen(browser.Browser):
         self.complaints.clear()
         self.requests.clear()
         self._url = url
-        self.resize(1200, 900, 'light')
+        self.resize()
         self.open(url)
         self.becomes('!!document.querySelector("section")')
 

@@ -67,7 +67,6 @@ typedef double lkr_real;
 #define LKR_FAR ((lkr_real)1e30)
 /* A solution that misses by more than this belongs to another assembly [rad, sizes]. */
 #define LKR_OTHER ((lkr_real)0.01)
-#define LKR_HALF ((lkr_real)0.5)
 
 /* Formulas are inlined wherever a pose is needed, so that only what is used there is computed. */
 #ifdef __GNUC__
@@ -107,7 +106,7 @@ LKR_FORMULA lkr_real lkr_turns(lkr_real x, lkr_real turn)
     if (!(turn > 0) || LKR_MATH(fabs)(x) <= turn / 2) {
         return 0;
     }
-    return turn * LKR_MATH(floor)(x * (1 / turn) + LKR_HALF);
+    return turn * LKR_MATH(floor)(x * (1 / turn) + (lkr_real)0.5);
 }
 
 /* A limit that is missed by rounding counts as reached. */
@@ -526,10 +525,8 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
         && lkr_bring(model, side, m->q, m->q, q) == 0;
     p = m->point;
     memcpy(q, m->q, sizeof q);
-    if (!is_there && !lkr_inverse(model, side, position, q, &p)) {
-        return LKR_OUT_OF_REACH;
-    }
-    if (!lkr_are_finite(n, p.position[1 - side])) {
+    if ((!is_there && !lkr_inverse(model, side, position, q, &p))
+        || !lkr_are_finite(n, p.position[1 - side])) {
         return LKR_OUT_OF_REACH;
     }
     m->newest = side;

@@ -39,30 +39,30 @@ class Axis(NamedTuple):
     wraps: bool
 
 
-def axis(machine: SceneMechanism, output: str, name: str = '', factor: float = 1.0,
+def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float = 1.0,
          offset: float = 0.0, wraps: bool = False) -> Axis:
     """Return the axis of an output, with a factor and an offset from its value in the scene."""
-    linkage = machine.linkage
-    factor *= machine.scale_of(output)
-    counts_turns = output in (*machine.inputs, *linkage.geared) and not wraps
+    linkage = mechanism.linkage
+    factor *= mechanism.scale_of(output)
+    counts_turns = output in (*mechanism.inputs, *linkage.geared) and not wraps
     angular = linkage.is_angle(output)
     return Axis(name, output, factor, offset, abs(factor) * (1.0 if angular else linkage.longest),
                 math.tau * abs(factor) if angular and not counts_turns else 0.0, wraps)
 
 
-def actuators(machine: SceneMechanism) -> List[Axis]:
+def actuators(mechanism: SceneMechanism) -> List[Axis]:
     """Return the axes of the sources of a mechanism's inputs."""
-    return [axis(machine, drive.measures or name, drive.source, 1.0 / drive.ratio,
-                 -drive.offset / drive.ratio) for name, drive in machine.inputs.items()]
+    return [axis(mechanism, settings.measures or name, settings.source, 1.0 / settings.ratio,
+                 -settings.offset / settings.ratio) for name, settings in mechanism.inputs.items()]
 
 
-def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
+def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
     """
     Return the joints that a controller commands, as many as there are inputs.
 
     Parameters
     ----------
-    machine : SceneMechanism
+    mechanism : SceneMechanism
         Its first leg is used.
     names : sequence of str
         Joints by their names in the scene, or outputs after the mechanism's name: 'leg_P.x'.
@@ -74,39 +74,39 @@ def joints(machine: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
         If one does not exist, they do not determine all inputs, or there is no inverse.
 
     """
-    outputs = [output for name in names if (output := output_of(machine, name))
-               ] if names else _chain(machine)
-    if len({*outputs}) != len(machine.inputs):
-        raise ValueError(f'{machine.name} has {len(machine.inputs)} inputs: as many of its joints '
-                         f'are needed, not {listed(names)}')
-    if names and not _tell(machine, outputs):
-        raise ValueError(f'{listed(names)} of {machine.name} moves with none of the inputs, or '
+    outputs = [output for name in names if (output := output_of(mechanism, name))
+               ] if names else _chain(mechanism)
+    if len({*outputs}) != len(mechanism.inputs):
+        raise ValueError(f'{mechanism.name} has {len(mechanism.inputs)} inputs: as many of its '
+                         f'joints are needed, not {listed(names)}')
+    if names and not _tell(mechanism, outputs):
+        raise ValueError(f'{listed(names)} of {mechanism.name} moves with none of the inputs, or '
                          'only together with another joint')
-    check_inverse(machine, [axis(machine, output) for output in outputs])
-    return [_joint(machine, output) for output in outputs]
+    check_inverse(mechanism, [axis(mechanism, output) for output in outputs])
+    return [_joint(mechanism, output) for output in outputs]
 
 
-def passive(machine: SceneMechanism, commanded: Sequence[Axis]) -> List[Axis]:
+def passive(mechanism: SceneMechanism, commanded: Sequence[Axis]) -> List[Axis]:
     """Return the joints of the first leg's links that are not commanded."""
     outputs = [each.output for each in commanded]
-    return [_joint(machine, link.name) for link in machine.linkage.links
-            if link.name not in outputs and _key(machine, link.name) in machine.joints]
+    return [_joint(mechanism, link.name) for link in mechanism.linkage.links
+            if link.name not in outputs and _key(mechanism, link.name) in mechanism.joints]
 
 
-def _joint(machine: SceneMechanism, output: str) -> Axis:
+def _joint(mechanism: SceneMechanism, output: str) -> Axis:
     """Return the axis of an output, with the name, sign and offset of its joint."""
-    joint = machine.joints.get(_key(machine, output), JointName(f'{machine.name}_{output}'))
-    return axis(machine, output, joint.name, joint.sign, joint.offset, joint.wraps)
+    joint = mechanism.joints.get(_key(mechanism, output), JointName(f'{mechanism.name}_{output}'))
+    return axis(mechanism, output, joint.name, joint.sign, joint.offset, joint.wraps)
 
 
-def output_of(machine: SceneMechanism, name: str) -> Optional[str]:
+def output_of(mechanism: SceneMechanism, name: str) -> Optional[str]:
     """Return the output with a name in the scene, or None."""
-    for link in machine.linkage.joints:
-        joint = machine.joints.get(_key(machine, link))
+    for link in mechanism.linkage.joints:
+        joint = mechanism.joints.get(_key(mechanism, link))
         if joint and joint.name == name:
             return link
-    output = name.removeprefix(f'{machine.name}_')
-    return output if output != name and machine.linkage.has_output(output) else None
+    output = name.removeprefix(f'{mechanism.name}_')
+    return output if output != name and mechanism.linkage.has_output(output) else None
 
 
 def gears(linkage: Mechanism, axes: Sequence[Axis]) -> Dict[int, Tuple[int, float, float]]:
@@ -117,19 +117,20 @@ def gears(linkage: Mechanism, axes: Sequence[Axis]) -> Dict[int, Tuple[int, floa
             or each.output in linkage.geared_to(i) and not each.wraps}
 
 
-def check_inverse(machine: SceneMechanism, axes: Sequence[Axis]) -> None:
+def check_inverse(mechanism: SceneMechanism, axes: Sequence[Axis]) -> None:
     """Raise ValueError if positions of axes give the inputs neither in closed form nor safely."""
-    linkage, names = machine.linkage, [each.output for each in axes]
+    linkage, names = mechanism.linkage, [each.output for each in axes]
     if len(gears(linkage, axes)) == len(axes) or linkage.inverse(tuple(names)).closed:
         return
     if len(axes) > 1:
-        raise ValueError(f'{listed(names)} of {machine.name} have no inverse in closed form, and '
-                         'a search of several inputs may miss; choose other joints, or the inputs')
+        raise ValueError(f'{listed(names)} of {mechanism.name} have no inverse in closed form, '
+                         'and a search of several inputs may miss; choose other joints, or the '
+                         'inputs')
     if linkage.inputs[0].is_part:
-        raise ValueError(f'{names[0]} of {machine.name} has no inverse in closed form, and '
+        raise ValueError(f'{names[0]} of {mechanism.name} has no inverse in closed form, and '
                          'repeats after too many turns for a search')
     if not pieces(linkage, names[0]):
-        raise ValueError(f'{names[0]} of {machine.name} moves nowhere')
+        raise ValueError(f'{names[0]} of {mechanism.name} moves nowhere')
 
 
 def pieces(linkage: Mechanism, output: str) -> List[Tuple[float, ...]]:
@@ -139,58 +140,58 @@ def pieces(linkage: Mechanism, output: str) -> List[Tuple[float, ...]]:
     return [part for part in parts if part[2] != part[3]]
 
 
-def loads(machine: SceneMechanism) -> Iterator[Tuple[str, float]]:
+def loads(mechanism: SceneMechanism) -> Iterator[Tuple[str, float]]:
     """Yield outputs on which the scene's loads work, with their factors."""
-    for name, load in machine.loads.items():
+    for name, load in mechanism.loads.items():
         if isinstance(load, float):
-            yield from ((link, load) for link in loaded_links(machine.linkage, name))
+            yield from ((link, load) for link in loaded_links(mechanism.linkage, name))
         else:
-            yield from ((f'{name}.{direction}', machine.scale * part)
-                        for direction, part in zip(machine.linkage.axes, load))
+            yield from ((f'{name}.{direction}', mechanism.scale * part)
+                        for direction, part in zip(mechanism.linkage.axes, load))
 
 
-def start(machine: SceneMechanism) -> List[float]:
+def start(mechanism: SceneMechanism) -> List[float]:
     """Return the starts of the inputs, in the linkage's own units; elsewhere if it has no pose."""
-    linkage = machine.linkage
-    first = [Motion.of(drive).at(0)[0] / machine.scale_of(name)
-             for name, drive in machine.inputs.items()]
+    linkage = mechanism.linkage
+    first = [Motion.of(settings).at(0)[0] / mechanism.scale_of(name)
+             for name, settings in mechanism.inputs.items()]
     samples = np.vstack([first, np.transpose(spread(linkage.inputs, SAMPLES))])
     values = linkage.posed(linkage.points, ()).over(*samples.T)
     return samples[np.isfinite(values).all(axis=0).argmax()].tolist()
 
 
-def _key(machine: SceneMechanism, link: str) -> str:
+def _key(mechanism: SceneMechanism, link: str) -> str:
     """Return the key of a link of the first leg among the joints' names."""
-    return link if link in machine.inputs else next(iter(machine.assembly().legs)) + link
+    return link if link in mechanism.inputs else next(iter(mechanism.assembly().legs)) + link
 
 
-def _chain(machine: SceneMechanism) -> List[str]:
+def _chain(mechanism: SceneMechanism) -> List[str]:
     """Return a chain of links that determines the inputs."""
-    links = machine.linkage.links
-    barrels = {link.parent for link in links if link.name in machine.inputs}
+    links = mechanism.linkage.links
+    barrels = {link.parent for link in links if link.name in mechanism.inputs}
     chosen: List[str] = []
 
     def rank(link: Link) -> tuple:
-        key = _key(machine, link.name)
-        joint = machine.joints.get(key, JointName(link.name))
+        key = _key(mechanism, link.name)
+        joint = mechanism.joints.get(key, JointName(link.name))
         return (not joint.published, link.parent != (chosen[-1] if chosen else GROUND),
-                link.name in barrels, link.name in machine.inputs,
-                joint.name == f'{machine.name}_{key}')
+                link.name in barrels, link.name in mechanism.inputs,
+                joint.name == f'{mechanism.name}_{key}')
 
     try:
-        for _ in machine.inputs:
+        for _ in mechanism.inputs:
             chosen.append(min((link for link in links if link.name not in chosen
-                               and _tell(machine, [*chosen, link.name])), key=rank).name)
-        check_inverse(machine, [axis(machine, output) for output in chosen])
+                               and _tell(mechanism, [*chosen, link.name])), key=rank).name)
+        check_inverse(mechanism, [axis(mechanism, output) for output in chosen])
         return chosen
     except ValueError:
         # There is none, or it has no inverse.
-        return list(machine.inputs)
+        return list(mechanism.inputs)
 
 
-def _tell(machine: SceneMechanism, outputs: Sequence[str]) -> bool:
+def _tell(mechanism: SceneMechanism, outputs: Sequence[str]) -> bool:
     """Return whether outputs determine the inputs in any of many poses."""
-    linkage = machine.linkage
+    linkage = mechanism.linkage
     rates = np.reshape(linkage.posed((), (), tuple(outputs)).over(*spread(
         linkage.inputs, SPREAD)), (len(linkage.inputs), len(outputs), -1))
     if not np.isfinite(rates).all(axis=(0, 1)).any():

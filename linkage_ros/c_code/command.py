@@ -22,21 +22,21 @@ def main(args: Optional[List[str]] = None) -> int:
 
 def show(args: Optional[List[str]]) -> None:
     """Print the headers that a command line requests."""
-    asked = arguments().parse_args(args)
-    machines = command.chosen(scene.load(asked.scene).machines, asked.mechanism)
+    options = arguments().parse_args(args)
+    mechanisms = command.chosen(scene.load(options.scene).machines, options.mechanism)
     try:
-        print(header.printed([header.Request(machine, asked.output, own) for machine, own
-                              in with_joints(machines, asked.joints)], asked.float))
+        print(header.printed([header.Request(mechanism, options.output, own) for mechanism, own
+                              in with_joints(mechanisms, options.joints)], options.float))
     except ValueError as error:
         raise command.RequestError(str(error)) from None
 
 
-def with_joints(machines: Sequence[SceneMechanism], names: Sequence[str]
+def with_joints(mechanisms: Sequence[SceneMechanism], names: Sequence[str]
                 ) -> List[Tuple[SceneMechanism, List[str]]]:
-    """Return each machine with its joints among those named."""
-    chosen = [(machine, [name for name in names if output_of(machine, name)])
-              for machine in machines]
-    known = [joint.name for machine in machines for joint in machine.joints.values()]
+    """Return each mechanism with its joints among those named."""
+    chosen = [(mechanism, [name for name in names if output_of(mechanism, name)])
+              for mechanism in mechanisms]
+    known = [joint.name for mechanism in mechanisms for joint in mechanism.joints.values()]
     for name in sorted({*names}.difference(*(joints for _, joints in chosen))):
         raise command.RequestError(f'no mechanism has a joint {name!r}; allowed: '
                                    f'{listed(known, 200)}{meant(name, known)}')

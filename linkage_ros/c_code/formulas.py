@@ -19,7 +19,7 @@ class Formulas:
 
     Parameters
     ----------
-    machine : SceneMechanism
+    mechanism : SceneMechanism
         Its first leg is written.
     code : Code
         Writes its C.
@@ -35,15 +35,15 @@ class Formulas:
 
     """
 
-    def __init__(self, machine: SceneMechanism, code: Code, outputs: Sequence[str]):
-        self._machine, self._code = machine, code
-        self._linkage = linkage = machine.linkage
+    def __init__(self, mechanism: SceneMechanism, code: Code, outputs: Sequence[str]):
+        self._mechanism, self._code = mechanism, code
+        self._linkage = linkage = mechanism.linkage
         self.inputs = [input_.name for input_ in linkage.inputs]
         # No word of C and no macro ends so.
         self.parameters = [f'{name}_' for name in self.inputs]
         self.by = [f'by_{name}' for name in self.inputs]
         # Points in space are of no use on a board.
-        self._points = () if machine.in_space else linkage.points
+        self._points = () if mechanism.in_space else linkage.points
         named = dict.fromkeys((
             *(f'{point}.{axis}' for point in self._points for axis in 'xy'), *linkage.joints,
             *outputs))
@@ -77,19 +77,19 @@ class Formulas:
             lambda codes: ['return ' + (' && '.join(
                 f'{margin} >= -{tolerance}' for margin, tolerance in zip(codes[::2], codes[1::2]))
                 or '1') + ';']))
-        name, number = self._machine.name, self._code.number
+        name, number = self._mechanism.name, self._code.number
         poses = ', '.join(f'{name}_pose *{each}' for each in ['p', *self.by])
         return self._code.function(
             f'/* The pose, and its rates by {" and by ".join(self.inputs)}. Returns 0 if a limit '
             f'is exceeded. */\nLKR_FORMULA int {name}_formulas('
             f'{", ".join(f"{number} {each}" for each in self.parameters)}, {poses})',
-            [self._code.times(each, 1.0 / self._machine.scale_of(name))
+            [self._code.times(each, 1.0 / self._mechanism.scale_of(name))
              for each, name in zip(self.parameters, self.inputs)], blocks)
 
     def _groups(self) -> Iterator[Tuple[str, List[str]]]:
         """Yield the joint lines, with the outputs that each adds."""
         lines = [line.text for line in self._linkage.design.lines]
-        if self._machine.in_space:
+        if self._mechanism.in_space:
             # The joints follow from all rods together.
             yield '; '.join(lines), [*self.fields]
             return
@@ -106,7 +106,7 @@ class Formulas:
 
     def _assigned(self, outputs: Sequence[str], codes: Sequence[str]) -> List[str]:
         """Return the assignments of outputs and of their rates by each input."""
-        scale_of, n = self._machine.scale_of, len(outputs)
+        scale_of, n = self._mechanism.scale_of, len(outputs)
         units = [1.0, *map(scale_of, self.inputs)]
         return [f'{pose}->{self.fields[output]} = '
                 f'{self._code.times(codes[k * n + i], scale_of(output) / unit)};'
@@ -115,7 +115,7 @@ class Formulas:
 
     def call(self) -> str:
         """Return a call of the function for inputs q in their sizes, to s and the rates."""
-        values = [self._code.times(f'q[{i}]', input_.size * self._machine.scale_of(input_.name))
+        values = [self._code.times(f'q[{i}]', input_.size * self._mechanism.scale_of(input_.name))
                   for i, input_ in enumerate(self._linkage.inputs)]
         results = ['&s', *(f'&{by}' for by in self.by)]
-        return f'{self._machine.name}_formulas({", ".join(values + results)})'
+        return f'{self._mechanism.name}_formulas({", ".join(values + results)})'

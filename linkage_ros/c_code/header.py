@@ -33,7 +33,7 @@ class Request(NamedTuple):
 
     Attributes
     ----------
-    machine : SceneMechanism
+    mechanism : SceneMechanism
         Mechanism of a scene; lengths include its scale, and only its first leg is written.
     outputs : sequence of str
         Outputs, as for `input_for`, with an inverse each.
@@ -44,13 +44,13 @@ class Request(NamedTuple):
 
     """
 
-    machine: SceneMechanism
+    mechanism: SceneMechanism
     outputs: Sequence[str] = ()
     joints: Sequence[str] = ()
     passive: Sequence[Axis] = ()
 
 
-def written(machine: SceneMechanism, outputs: Sequence[str] = (), single: bool = False,
+def written(mechanism: SceneMechanism, outputs: Sequence[str] = (), single: bool = False,
             joints: Sequence[str] = ()) -> str:
     """
     Return the header of a mechanism, see `Request`; `single`: with float instead of double.
@@ -61,7 +61,7 @@ def written(machine: SceneMechanism, outputs: Sequence[str] = (), single: bool =
         If an output or a joint does not exist, there are too few of them, or without an inverse.
 
     """
-    return printed([Request(machine, outputs, joints)], single)
+    return printed([Request(mechanism, outputs, joints)], single)
 
 
 def printed(requests: Sequence[Request], single: bool = False) -> str:
@@ -80,18 +80,18 @@ def headers(requests: Sequence[Request], single: bool, common: Iterable[str]) ->
 
 def _values(request: Request, single: bool) -> Dict[str, Any]:
     """Return the values of the template of a header."""
-    machine, linkage = request.machine, request.machine.linkage
-    name, n, code = machine.name, len(linkage.inputs), Code(linkage, single)
-    sides = actuators(machine), joints(machine, request.joints)
-    inverses = _inverses(machine, request.outputs)
-    formulas = Formulas(machine, code, [
+    mechanism, linkage = request.mechanism, request.mechanism.linkage
+    name, n, code = mechanism.name, len(linkage.inputs), Code(linkage, single)
+    sides = actuators(mechanism), joints(mechanism, request.joints)
+    inverses = _inverses(mechanism, request.outputs)
+    formulas = Formulas(mechanism, code, [
         *(each.output for axes in (*sides, *inverses.values()) for each in axes),
-        *(output for output, _ in loads(machine))])
-    tables = Tables(machine, code, formulas)
+        *(output for output, _ in loads(mechanism))])
+    tables = Tables(mechanism, code, formulas)
     parts = [tables.text(sides), tables.passive(request.passive) if request.passive else '']
     for tag, axes in inverses.items():
-        parts += [tables.text(([], axes), tag), _inverse(machine, axes, tag, code.number)]
-    about = [*_about(machine), f'A call takes at most {POSES * (tables.solutions + 1)} poses.']
+        parts += [tables.text(([], axes), tag), _inverse(mechanism, axes, tag, code.number)]
+    about = [*_about(mechanism), f'A call takes at most {POSES * (tables.solutions + 1)} poses.']
     whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
     return {
         'about': '\n'.join(f' * {line}' for line in about),
@@ -111,44 +111,44 @@ def _values(request: Request, single: bool) -> Dict[str, Any]:
         'model': '\n'.join(filter(None, parts))}
 
 
-def _inverses(machine: SceneMechanism, texts: Sequence[str]) -> Dict[str, List[Axis]]:
+def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> Dict[str, List[Axis]]:
     """Return the axes of each inverse, by the end of its names."""
-    outputs, n = [*map(plain_text, texts)], len(machine.inputs)
+    outputs, n = [*map(plain_text, texts)], len(mechanism.inputs)
     for output in outputs:
-        machine.linkage.check_output(output)
+        mechanism.linkage.check_output(output)
     if outputs and n > 1 and len(outputs) != n:
-        raise ValueError(f'{machine.name} has {n} inputs: as many outputs are needed, '
+        raise ValueError(f'{mechanism.name} has {n} inputs: as many outputs are needed, '
                          f'got {listed(outputs)}')
-    groups = [[axis(machine, output, output) for output in outputs[i:i + n]]
+    groups = [[axis(mechanism, output, output) for output in outputs[i:i + n]]
               for i in range(0, len(outputs), n)]
     for axes in groups:
-        check_inverse(machine, axes)
-    return dict(zip(distinct('_'.join(['', *(field(machine.linkage, each.output)
+        check_inverse(mechanism, axes)
+    return dict(zip(distinct('_'.join(['', *(field(mechanism.linkage, each.output)
                                              for each in axes)]) for axes in groups), groups))
 
 
-def _inverse(machine: SceneMechanism, axes: Sequence[Axis], tag: str, number: str) -> str:
+def _inverse(mechanism: SceneMechanism, axes: Sequence[Axis], tag: str, number: str) -> str:
     """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
-    n, (first, *_) = len(axes), machine.inputs
+    n, (first, *_) = len(axes), mechanism.inputs
     place = f'{first}_' if n == 1 else 'inputs'
     return filled(template('inverse.h.in'), {
-        'what': first if n == 1 else place, 'name': machine.name, 'tag': tag,
-        'outputs': _with_units(machine.linkage, axes),
+        'what': first if n == 1 else place, 'name': mechanism.name, 'tag': tag,
+        'outputs': _with_units(mechanism.linkage, axes),
         'parameters': f'{number} value, {number} near, {number} *{place}' if n == 1 else
         f'const {number} value[{n}], const {number} near[{n}], {number} inputs[{n}]',
         'arguments': f'&value, &near, {place}' if n == 1 else 'value, near, inputs'})
 
 
-def _about(machine: SceneMechanism) -> Iterator[str]:
-    linkage = machine.linkage
+def _about(mechanism: SceneMechanism) -> Iterator[str]:
+    linkage = mechanism.linkage
     lengths = ', '.join(f'{name} = {length:.9g}' for name, length in linkage.dimensions.items())
     inputs = ', '.join(f'{input_.name} [{input_.unit}]' for input_ in linkage.inputs)
-    scale = f', times {machine.scale:.9g}' if machine.scale != 1.0 else ''
-    yield f'{machine.name}: {linkage.type}, written by linkage_ros.'
+    scale = f', times {mechanism.scale:.9g}' if mechanism.scale != 1.0 else ''
+    yield f'{mechanism.name}: {linkage.type}, written by linkage_ros.'
     yield f'Lengths [m]{scale}: {lengths or "those of the joint lines"}.'
     yield f'Input: {inputs}. Angles [rad] count counterclockwise.'
     if len(linkage.inputs) == 1 and not linkage.inputs[0].is_part:
-        arcs = ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in machine.first.reach)
+        arcs = ' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in mechanism.first.reach)
         yield f'It can be assembled in {arcs} {linkage.inputs[0].unit}.'
 
 

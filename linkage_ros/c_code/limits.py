@@ -16,28 +16,28 @@ from ..scene import SceneMechanism
 SAMPLES = 200_000
 
 
-def text(machine: SceneMechanism, names: Sequence[str] = ()) -> str:
+def text(mechanism: SceneMechanism, names: Sequence[str] = ()) -> str:
     """Return the limits of the commanded joints as elements of a URDF; see `axes.joints`."""
     lines = []
-    for name, low, high in joint_limits(machine, names):
+    for name, low, high in joint_limits(mechanism, names):
         limit = f'<limit lower="{low:.9g}" upper="{high:.9g}"/>' if math.isfinite(
             high - low) else '<!-- it turns without an end: continuous -->'
         lines.append(f'<joint name={quoteattr(name)}>{limit}</joint>')
     return '\n'.join(lines)
 
 
-def joint_limits(machine: SceneMechanism, names: Sequence[str] = ()
+def joint_limits(mechanism: SceneMechanism, names: Sequence[str] = ()
                  ) -> Iterator[Tuple[str, float, float]]:
     """Yield the name of each commanded joint, and its limits [rad or m]; infinite: it turns."""
-    linkage = machine.linkage
+    linkage = mechanism.linkage
     # The arcs of each input, in the linkage's own units.
-    arcs = [np.divide(drive.arcs, machine.scale_of(name))
-            for name, drive in machine.inputs.items()]
-    for axis in joints(machine, names):
+    arcs = [np.divide(settings.arcs, mechanism.scale_of(name))
+            for name, settings in mechanism.inputs.items()]
+    for axis in joints(mechanism, names):
         if len(arcs) > 1:
-            values = _values(machine, axis, arcs)
+            values = _values(mechanism, axis, arcs)
         elif axis.output == linkage.inputs[0].name:
-            is_whole = not machine.first.ends and linkage.inputs[0].is_whole(arcs[0].tolist())
+            is_whole = not mechanism.first.ends and linkage.inputs[0].is_whole(arcs[0].tolist())
             values = np.array([-math.inf, math.inf]) if is_whole else arcs[0]
         else:
             values = np.array(linkage.extremes(axis.output, arcs[0].tolist()))[..., 0]
@@ -47,12 +47,12 @@ def joint_limits(machine: SceneMechanism, names: Sequence[str] = ()
         yield (axis.name, -math.inf, math.inf) if is_turning else (axis.name, low, high)
 
 
-def _values(machine: SceneMechanism, axis: Axis, arcs: Sequence[np.ndarray]) -> np.ndarray:
+def _values(mechanism: SceneMechanism, axis: Axis, arcs: Sequence[np.ndarray]) -> np.ndarray:
     """Return an output at many poses, the corners of the sweeps among them."""
-    linkage, rng = machine.linkage, np.random.default_rng(1)
+    linkage, rng = mechanism.linkage, np.random.default_rng(1)
     parts = rng.uniform(-0.1, 1.1, (len(arcs), SAMPLES)).clip(0.0, 1.0)
     inputs = [own.min() + part * np.ptp(own) for part, own in zip(parts, arcs)]
     values = linkage.joint_angles(inputs, [axis.output])[axis.output]
-    first = float(linkage.joint_angles(start(machine), [axis.output])[axis.output])
+    first = float(linkage.joint_angles(start(mechanism), [axis.output])[axis.output])
     return first + np.remainder(values - first + math.pi, math.tau) - math.pi if axis.turn \
         else values

@@ -20,7 +20,7 @@ from ..scene import SceneMechanism
 PACKAGE = re.compile(r'(?=.{2,64}$)[a-z](_?[a-z0-9])*', re.ASCII)
 
 
-def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequence[str]]]
+def package(name: str, scene: str, mechanisms: Sequence[Tuple[SceneMechanism, Sequence[str]]]
             ) -> Dict[Path, str]:
     """
     Return the files of a package, by their path in it.
@@ -31,7 +31,7 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
         The package's name.
     scene : str
         The name of the scene's file.
-    machines : sequence of (SceneMechanism, sequence of str)
+    mechanisms : sequence of (SceneMechanism, sequence of str)
         The mechanisms, each with its commanded joints; see `axes.joints`.
 
     Raises
@@ -41,14 +41,14 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
 
     """
     classes = distinct(
-        re.sub(r'(?<=[a-z])(?=[A-Z])', '_', machine.name).title().replace('_', '')
-        for machine, _ in machines)
+        re.sub(r'(?<=[a-z])(?=[A-Z])', '_', mechanism.name).title().replace('_', '')
+        for mechanism, _ in mechanisms)
     parts, requests = [], []
-    for class_, (machine, chosen) in zip(classes, machines):
-        commanded = joints(machine, chosen)
-        others = passive(machine, commanded)
-        requests.append(header.Request(machine, (), chosen, others))
-        parts.append(_values(name, class_, machine, commanded, others))
+    for class_, (mechanism, chosen) in zip(classes, mechanisms):
+        commanded = joints(mechanism, chosen)
+        others = passive(mechanism, commanded)
+        requests.append(header.Request(mechanism, (), chosen, others))
+        parts.append(_values(name, class_, mechanism, commanded, others))
     common = {
         'package': name, 'namespace': f'{name}_plugins', 'scene': escape(comment(scene)),
         'mechanisms': ' '.join(part['name'] for part in parts),
@@ -69,39 +69,39 @@ def package(name: str, scene: str, machines: Sequence[Tuple[SceneMechanism, Sequ
         'src/linkage.h': template('linkage.h')}
     texts = header.headers(requests, False, repeat('#include "linkage.h"'))
     for part, text in zip(parts, texts):
-        mechanism = part['name']
-        files[f'src/{mechanism}_linkage.h'] = text
-        files[f'src/{mechanism}.hpp'] = filled(template('mechanism.hpp'), part)
-        files[f'test/test_{mechanism}.cpp'] = filled(template('test.cpp'), part)
+        own = part['name']
+        files[f'src/{own}_linkage.h'] = text
+        files[f'src/{own}.hpp'] = filled(template('mechanism.hpp'), part)
+        files[f'test/test_{own}.cpp'] = filled(template('test.cpp'), part)
     return {Path(path): text for path, text in files.items()}
 
 
-def ranges(machine: SceneMechanism) -> str:
+def ranges(mechanism: SceneMechanism) -> str:
     """Return the sweeps or reaches of the inputs, in rad or in sizes, as an initializer of C++."""
-    arcs = [np.divide(max(drive.arcs, key=np.ptp),
-                      input_.size * machine.scale_of(input_.name))
-            for input_, drive in zip(machine.linkage.inputs, machine.inputs.values())]
+    arcs = [np.divide(max(settings.arcs, key=np.ptp),
+                      input_.size * mechanism.scale_of(input_.name))
+            for input_, settings in zip(mechanism.linkage.inputs, mechanism.inputs.values())]
     return '{%s}' % ', '.join('{%r, %r}' % (*arc.tolist(),) for arc in arcs)
 
 
-def _values(package_name: str, class_: str, machine: SceneMechanism, commanded: Sequence[Axis],
+def _values(package_name: str, class_: str, mechanism: SceneMechanism, commanded: Sequence[Axis],
             others: Sequence[Axis]) -> Mapping[str, str]:
     """Return the values of a mechanism's templates."""
     def rows(roles: Mapping[str, Axis]) -> str:
         return ', '.join(f'{{{literal(axis.name)}, {literal(role)}}}'
                          for role, axis in roles.items())
 
-    driven = dict(zip(machine.inputs, actuators(machine)))
+    driven = dict(zip(mechanism.inputs, actuators(mechanism)))
     by_output = {axis.output: axis for axis in commanded}
     named = [escape(comment(', '.join(axis.name for axis in axes.values())))
              for axes in (driven, by_output)]
     return {
         'package': package_name, 'namespace': f'{package_name}_plugins', 'class': class_,
-        'name': machine.name, 'n': str(len(driven)), 'ranges': ranges(machine),
+        'name': mechanism.name, 'n': str(len(driven)), 'ranges': ranges(mechanism),
         'actuators': rows(driven),
         'joints': rows({**by_output, **{axis.output: axis for axis in others}}),
         'joint_count': str(len(commanded) + len(others)),
-        'passive_function': f'{machine.name}_passive' if others else 'nullptr',
+        'passive_function': f'{mechanism.name}_passive' if others else 'nullptr',
         'axes': ' and '.join(named),
         'lines': '\n'.join(f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(role)}/>'
                            for kind, axes in (('actuator', driven), ('joint', by_output))

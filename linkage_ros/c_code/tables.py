@@ -38,7 +38,7 @@ class Tables:
 
     Parameters
     ----------
-    machine : SceneMechanism
+    mechanism : SceneMechanism
         Its first leg is used.
     code, formulas
         Write its C.
@@ -50,13 +50,13 @@ class Tables:
 
     """
 
-    def __init__(self, machine: SceneMechanism, code: Code, formulas: Formulas):
-        self.machine, self.linkage, self._code, self._formulas = (
-            machine, machine.linkage, code, formulas)
-        self._sizes = [input_.size for input_ in machine.linkage.inputs]
+    def __init__(self, mechanism: SceneMechanism, code: Code, formulas: Formulas):
+        self.mechanism, self.linkage, self._code, self._formulas = (
+            mechanism, mechanism.linkage, code, formulas)
+        self._sizes = [input_.size for input_ in mechanism.linkage.inputs]
         # The sizes of the inputs in the scene's units.
-        self._units = [size * machine.scale_of(name)
-                       for name, size in zip(machine.inputs, self._sizes)]
+        self._units = [size * mechanism.scale_of(name)
+                       for name, size in zip(mechanism.inputs, self._sizes)]
         self._written: Set[str] = set()
         self.solutions = 1
 
@@ -68,11 +68,11 @@ class Tables:
         at the end of its names.
         """
         names, functions = zip(*map(self._solutions, sides))
-        row, inputs = self._code.row, [*zip(self.machine.inputs.values(), self._units)]
-        sweeps = ['{ -LKR_FAR, LKR_FAR }' if tag or not drive.ends else
-                  row(np.divide(drive.ends, unit)) for drive, unit in inputs]
+        row, inputs = self._code.row, [*zip(self.mechanism.inputs.values(), self._units)]
+        sweeps = ['{ -LKR_FAR, LKR_FAR }' if tag or not settings.ends else
+                  row(np.divide(settings.ends, unit)) for settings, unit in inputs]
         return filled(template('model.h.in'), {
-            'name': self.machine.name, 'tag': tag, 'number': self._code.number,
+            'name': self.mechanism.name, 'tag': tag, 'number': self._code.number,
             'about': 'the inverse' if tag else 'the actuators and joints',
             'n': len(self._sizes), 'is_rated': int(not tag), 'names': ', '.join(names),
             'solutions': '\n'.join(filter(None, functions)),
@@ -80,17 +80,17 @@ class Tables:
             'actuators': self._rows(sides[0]), 'joints': self._rows(sides[1]),
             'turns': ', '.join(row(self._turns(axes)) for axes in sides),
             'units': row(self._units), 'start': row(np.divide(
-                start(self.machine), self._sizes)),
+                start(self.mechanism), self._sizes)),
             'sweeps': ', '.join(sweeps)})
 
     def passive(self, axes: Sequence[Axis]) -> str:
         """Return the function for joints that are not commanded."""
-        lines = [f'{self.machine.name}_pose s, {", ".join(self._formulas.by)};',
+        lines = [f'{self.mechanism.name}_pose s, {", ".join(self._formulas.by)};',
                  f'(void){self._formulas.call()};']
         for i, each in enumerate(axes):
             lines += self._position(f'position[{i}]', each) + self._rates(f'rate[{i}]', each)
         return filled(template('passive.h.in'), {
-            'name': self.machine.name, 'number': self._code.number,
+            'name': self.mechanism.name, 'number': self._code.number,
             'body': '\n'.join(indented(lines))})
 
     # --- a pose ---
@@ -100,7 +100,7 @@ class Tables:
         code, formulas = self._code, self._formulas
         places = {f'[{side}][{i}]': each for side, axes in enumerate(sides)
                   for i, each in enumerate(axes)}
-        yield f'{self.machine.name}_pose s, {", ".join(formulas.by)};'
+        yield f'{self.mechanism.name}_pose s, {", ".join(formulas.by)};'
         yield from (f'if (!{formulas.call()}) {{', '    return 0;', '}')
         for place, each in places.items():
             yield from self._position(f'p->position{place}', each)
@@ -108,10 +108,10 @@ class Tables:
         for place, each in places.items():
             yield from (f'    {line}' for line in self._rates(f'p->rate{place}', each))
         # An inverse alone needs no efforts.
-        powers = [*loads(self.machine)] if sides[0] else []
+        powers = [*loads(self.mechanism)] if sides[0] else []
         for j, (by, unit) in enumerate(zip(formulas.by, self._units)):
             terms = [code.times(f'{by}.{formulas.fields[output]}',
-                                -load * unit / self.machine.scale_of(output))
+                                -load * unit / self.mechanism.scale_of(output))
                      for output, load in powers]
             yield f'    p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
         yield '}'
@@ -119,7 +119,7 @@ class Tables:
 
     def _position(self, place: str, axis: Axis) -> List[str]:
         """Return the statements for the position of an axis."""
-        factor = axis.factor / self.machine.scale_of(axis.output)
+        factor = axis.factor / self.mechanism.scale_of(axis.output)
         value = self._code.times(f's.{self._formulas.fields[axis.output]}', factor)
         offset = f' + {self._code.literal(axis.offset)}' if axis.offset else ''
         return [f'{place} = {value}{offset};'] + [
@@ -127,7 +127,7 @@ class Tables:
 
     def _rates(self, place: str, axis: Axis) -> List[str]:
         """Return the statements for the rates of an axis by each input."""
-        factor = axis.factor / self.machine.scale_of(axis.output)
+        factor = axis.factor / self.mechanism.scale_of(axis.output)
         field = self._formulas.fields[axis.output]
         return [f'{place}[{j}] = {self._code.times(f"{by}.{field}", factor * unit)};'
                 for j, (by, unit) in enumerate(zip(self._formulas.by, self._units))]
@@ -163,7 +163,7 @@ class Tables:
         outputs = tuple(each.output for each in axes)
         if len(gears(self.linkage, axes)) == len(axes):
             return '0', ''
-        name = '_'.join([f'{self.machine.name}_solutions', *(
+        name = '_'.join([f'{self.mechanism.name}_solutions', *(
             self._formulas.fields[output] for output in outputs)])
         if name in self._written:
             return name, ''

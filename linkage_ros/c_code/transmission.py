@@ -23,20 +23,20 @@ def main(args: Optional[List[str]] = None) -> int:
 
 def write(args: Optional[List[str]]) -> None:
     """Write the package or print the limits that a command line requests."""
-    asked = arguments().parse_args(args)
-    chosen = command.chosen(scene.load(asked.scene).machines, asked.mechanism)
+    options = arguments().parse_args(args)
+    chosen = command.chosen(scene.load(options.scene).machines, options.mechanism)
     try:
-        machines = with_joints(chosen, asked.joints)
-        if asked.limits:
-            print('\n'.join(limits.text(*each) for each in machines))
+        mechanisms = with_joints(chosen, options.joints)
+        if options.limits:
+            print('\n'.join(limits.text(*each) for each in mechanisms))
         else:
-            write_package(asked.out, Path(asked.scene).name, machines)
+            write_package(options.out, Path(options.scene).name, mechanisms)
     except ValueError as error:
         raise command.RequestError(str(error)) from None
 
 
 def write_package(folder: str, scene_file: str,
-                  machines: Sequence[Tuple[SceneMechanism, Sequence[str]]]) -> None:
+                  mechanisms: Sequence[Tuple[SceneMechanism, Sequence[str]]]) -> None:
     """Write the package of mechanisms with their commanded joints."""
     out = Path(folder).absolute()
     if not PACKAGE.fullmatch(out.name):
@@ -46,10 +46,10 @@ def write_package(folder: str, scene_file: str,
     if out.exists() and any(out.iterdir()) and not is_ours(out):
         raise command.RequestError('--out must be a new folder, or one written by this command, '
                                    f'but {out} has other files')
-    for path, text in package(out.name, scene_file, machines).items():
+    for path, text in package(out.name, scene_file, mechanisms).items():
         (out / path).parent.mkdir(parents=True, exist_ok=True)
         (out / path).write_text(text, encoding='utf-8')
-    print(f'{out}: {", ".join(machine.name for machine, _ in machines)}; see README.md')
+    print(f'{out}: {", ".join(mechanism.name for mechanism, _ in mechanisms)}; see README.md')
 
 
 def is_ours(folder: Path) -> bool:

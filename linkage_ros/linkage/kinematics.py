@@ -113,6 +113,10 @@ class Kinematics:
             return expressions
         return getattr(expressions, '_make', tuple)(map(self.constants, expressions))
 
+    def windows(self) -> list:
+        """Return the links on two hinges in a row with two rods, and their limits."""
+        return [self.constants(window) for window in self.structure.built.windows]
+
     def value(self, length: Real) -> Any:
         """Return the value of an expression of dimensions alone."""
         if length not in self._evaluated:
@@ -135,8 +139,8 @@ class Kinematics:
                 np.isnan(size) & (not self.design.is_written))
             if not allowed.all():
                 raise line.error(problem)
-        for window in self.structure.built.windows:
-            self.constants(window).check()
+        for window in self.windows():
+            window.check()
         for by, input_ in enumerate(self.inputs):
             for name in self.geared if input_.speed > FASTEST else ():
                 if abs(ratio := self.gear(name, by)[0]) > FASTEST:

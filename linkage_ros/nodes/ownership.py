@@ -42,11 +42,11 @@ class Announcer:
                   for parameter in (self._node.scene.parameters if is_full else changed)
                   if parameter.name in self._node.fields]
         if values:
-            self._count += 1
             self._publisher.publish(ParameterEvent(
                 stamp=self._node.get_clock().now().to_msg(),
                 node=self._node.get_fully_qualified_name(),
                 **{'new_parameters' if is_full else 'changed_parameters': values}))
+            self._count += 1
 
 
 class Follower:

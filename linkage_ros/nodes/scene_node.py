@@ -194,10 +194,10 @@ class SceneNode(Node):
 
     def _adopt(self, new: scenes.Scene, prepared: Any) -> None:
         """Adopt a prepared scene, then announce what has changed."""
-        old, self._adopted = self._adopted, new
         self.adopt(prepared)
         if self._announcer:
-            self._announcer.announce(new.changed_from(old))
+            self._announcer.announce(new.changed_from(self._adopted))
+        self._adopted = new
 
     def _start(self) -> None:
         """Do what would delay the start."""

@@ -24,8 +24,10 @@ STARTS, SCREWS = 96, 1400
 # Two poses are equally near if their distances differ by less than this factor and this [rad];
 # they are different if a joint differs by this [rad].
 ALIKE, ALIKE_LENGTH, DISTINCT = 1.2, 1e-3, 1e-3
-# Part of the distances that also counts hinges of balls.
+# How much hinges of balls count in the distance of two poses, to choose one of a ball's positions.
 NEARLY = 1e-6
+# A pose is the nearest around it if the next step to the file's is smaller [rad, or of the size].
+RESTING = 1e-6
 # A step of motors away from a dead point [rad, or of the size].
 ASIDE = 0.1
 # How far inside its limits a joint starts, as a part of its range.
@@ -242,7 +244,6 @@ def nearest(component: Component, motors: List[str], followers: List[str], seed:
         determined = which & ~is_free(component.free_ways(some[0], fixed | ~which)) \
             if still else which
         distances = np.linalg.norm(component.away(some) * determined, axis=1)
-        # A ball of three hinges has two positions in each of its poses.
         first, *more = np.argsort(distances + NEARLY * np.linalg.norm(some, axis=1))
         pose[which] = some[first, which]
         for i in more:
@@ -256,12 +257,15 @@ def nearest(component: Component, motors: List[str], followers: List[str], seed:
 
 
 def _searched(component: Component, fixed: np.ndarray, seed: int) -> np.ndarray:
-    """Return poses of random starts, the first that of the file, closed as far as they can be."""
+    """
+    Return poses of random starts, closed as far as they can be.
+
+    Where motors move there are nearer poses beside most of these; they do not count.
+    """
     count = min(STARTS, SCREWS // max(len(fixed), 1))
     spread = np.linspace(0.0, math.pi, count)[:, None] * ~fixed * component.unit
     poses = spread * np.random.default_rng(seed).uniform(-1.0, 1.0, (count, len(fixed)))
     poses = component.closed(component.closed(poses, fixed, 40, 1e-2), fixed, 12)
-    # Where motors move, there is always a nearer pose beside some others.
-    steps = component.away(component.closed(poses, fixed, 1, 1e-9) - poses)
-    at_rest = np.max(np.abs(steps), axis=1) < DISTINCT
+    steps = component.away(component.closed(poses, fixed, 1, 1e-12) - poses)
+    at_rest = np.max(np.abs(steps), axis=1) < RESTING
     return poses[at_rest] if at_rest.any() else poses

@@ -264,7 +264,8 @@ class Component:
     def texts(self, pose: np.ndarray, which: Any) -> Dict[str, str]:
         """Return the positions of some screws with names in a pose."""
         positions = self.read(pose[None])
-        return {name: f'{positions[name][0]:.5g}' for name, i in self.named.items() if which[i]}
+        return {name: f'{round(float(positions[name][0]), 6) + 0.0:.5g}'
+                for name, i in self.named.items() if which[i]}
 
     def moves(self, pose: np.ndarray) -> Dict[str, np.ndarray]:
         """Return the displacement of each body on its parent in a pose."""

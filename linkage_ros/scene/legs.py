@@ -109,11 +109,6 @@ class Assembly:
         self.is_limited = len(inputs) == 1 and not linkage.inputs[0].is_whole(self.reach)
         self._scale = scale
 
-    @property
-    def all_joints(self) -> List[str]:
-        """Return the joints of all legs, with their legs' prefixes."""
-        return [prefix + joint for prefix in self.legs for joint in self.joints]
-
     def solution(self, points: Sequence[Union[str, LinkPoint]] = (), joints: Sequence[str] = (),
                  rates: Optional[Sequence[str]] = None, efforts: int = 0) -> Solution:
         """

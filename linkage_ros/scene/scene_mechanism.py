@@ -31,6 +31,11 @@ def is_distinct(names: Sequence[str]) -> bool:
     return 0 < len(names) == len(set(names))
 
 
+def is_pose(numbers: Sequence[float]) -> bool:
+    """Return whether there are the six numbers of a pose."""
+    return len(numbers) == 6
+
+
 TYPE = Field('string', 'Type of the mechanism.', read_only=True, choices=TYPES,
              rule=f'one of {", ".join(TYPES)}')
 JOINTS = Field('string_array', 'The linkage, one line per joint.', default=(), read_only=True)
@@ -49,7 +54,7 @@ POINTS = Field('string_array', 'Joints that markers display.', readers=(KINEMATI
                holds=is_distinct, rule='each once')
 POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
              'x, y, z [m], roll, pitch, yaw [rad].', default=(0.0,) * 6, readers=(KINEMATICS,),
-             rule='six of them', holds=lambda numbers: len(numbers) == 6)
+             rule='six of them', holds=is_pose)
 # Names of frames are as free as those of links in URDF; tf2 forbids a leading slash.
 FRAME = Field(
     'string', "Frame that its pose is in; empty: the scene's.", default='', readers=(KINEMATICS,),
@@ -221,8 +226,11 @@ def read_mechanism(name: str, entries: Mapping[str, Any], old: Optional[SceneMec
     inputs = {input_.name: read_settings(name, linkage, input_, reach, scale, values)
               for input_ in linkage.inputs}
     frame_id, only_named = take('frame_id', FRAME), take('only_named', ONLY_NAMED)
-    joints = _joint_names(name, linkage, reach, leg_pairs, mirrored,
-                          take('joint_names', JOINT_NAMES), only_named)
+    assembly = Assembly(linkage, leg_pairs, mirrored, scale, reach)
+    joints = _joint_names(
+        name, (*inputs,), (*assembly.legs,),
+        tuple((joint, linkage.is_angle(joint)) for joint in assembly.joints),
+        take('joint_names', JOINT_NAMES), only_named)
     loads = read_loads(name, linkage, take('loads', LOADS))
     if loads and (leg_pairs > 1 or mirrored):
         raise SceneError(f'{name}.loads must be empty for more than one leg')
@@ -265,15 +273,13 @@ def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
 
 
 @cached(16)
-def _joint_names(name: str, linkage: Mechanism, reach: tuple[Arc, ...], leg_pairs: int,
-                 mirrored: bool, lines: tuple[str, ...], only_named: bool
+def _joint_names(name: str, inputs: tuple[str, ...], legs: tuple[str, ...],
+                 joints: tuple[tuple[str, bool], ...], lines: tuple[str, ...], only_named: bool
                  ) -> Mapping[str, JointName]:
     """Read the names of all joints; most changes of a mechanism leave them as they are."""
-    assembly = Assembly(linkage, leg_pairs, mirrored, reach=reach)
-    angles = [linkage.is_angle(joint) for joint in assembly.joints]
-    return read_joint_names(
-        name, {**{input_.name: False for input_ in linkage.inputs},
-               **dict(zip(assembly.all_joints, len(assembly.legs) * angles))},
+    return read_joint_names(name, {
+        **dict.fromkeys(inputs, False),
+        **{leg + joint: is_angle for leg in legs for joint, is_angle in joints}},
         lines, only_named)
 
 

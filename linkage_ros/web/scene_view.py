@@ -188,10 +188,10 @@ class SceneView:
     async def export(self, key: str, form: str) -> Answer:
         """Return a file's text: 'yaml', the scene; 'csv', all outputs; 'urdf'; or 'h', of C."""
         shown = self._find(key)
-        mechanism, frame_id = self._mechanism(shown), self._scenes[shown.owner].frame_id
+        mechanism = self._mechanism(shown)
         write = {'yaml': lambda: self._saved(shown.owner),
                  'csv': lambda: curves.table(*self._state(shown)),
-                 'urdf': lambda: urdf.describe([mechanism], mechanism.frame_id or frame_id),
+                 'urdf': lambda: urdf.describe([mechanism], self._scenes[shown.owner].frame_id),
                  'h': lambda: header.written(mechanism)}[form]
         return {'text': await asyncio.to_thread(write)}
 

@@ -123,9 +123,9 @@ class Output:
         special += [('dead points', at, side) for at in self.linkage.dead_points(*self.others)
                     for side in (1.0, -1.0)]
         for kind, at, side in special:
-            yield kind, at
+            yield kind, float(at)
             for away in AWAY:
-                yield 'next to ends', at + side * away * self.first.size
+                yield 'next to ends', float(at + side * away * self.first.size)
 
 
 def judge(linkage, name, rng, count=6, others=()):

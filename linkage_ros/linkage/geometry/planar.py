@@ -150,10 +150,6 @@ class Arm:
         """Return a square that is not tiny where the arm has a direction."""
         return self.square
 
-    def offset(self, point: Complex, relative: Complex) -> Real:
-        """Return the cross product of the arm and a point relative to its foot."""
-        return cross(self.vector, relative)
-
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
         return self._limit(radius, size, square(radius) - self.square)
@@ -176,7 +172,7 @@ class Arm:
         return (self._limit(first + second, size, longer),
                 self._limit(first - second, size, shorter))
 
-    def across(self, point: Complex, offset: Real) -> Complex:
+    def across(self, offset: Real) -> Complex:
         """Return the vector from a point of this offset to its mirror image in the arm's line."""
         return self.vector.turned() * (-2.0 * offset / self.divisor)
 
@@ -209,7 +205,6 @@ class CrankArm(Arm):
         self.square = square(g - m) + 4.0 * g * m * square(h)
         self._crank, self._along, self._turn = crank, -along if reverse else along, turn
         self._line = along
-        self._area = 2.0 * g * m * s * h * (1.0 if reverse else -1.0)
         self._g, self._m, self._s, self._h, self._is_smooth = g, m, s, h, smooth
         # The arm between two equal lengths bisects them, also where it has no length itself.
         turning = where(self._is_isosceles, 0.5,
@@ -224,10 +219,6 @@ class CrankArm(Arm):
     @property
     def _is_isosceles(self) -> Real:
         return abs(self._g - self._m) <= 0.0
-
-    def offset(self, point: Complex, relative: Complex) -> Real:
-        """Return the cross product of the arm and a point relative to its foot."""
-        return self._area if point is self._crank.centre else super().offset(point, relative)
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
@@ -422,7 +413,7 @@ def mirror(arm: Arm, point: Complex, offset: Real, ends: Sequence[Complex],
     foot and from its end. `image` is a more accurate form of the image, if there is one. The spin
     of a bar's image is twice the arm's minus the bar's own.
     """
-    across, turning, bars = arm.across(point, offset), spin(arm.vector), []
+    across, turning, bars = arm.across(offset), spin(arm.vector), []
     image = image or point + across
     for bar in ends:
         own = spin(bar)

@@ -144,4 +144,5 @@ class Grid:
             q = np.where(better[:, None], trial, q)
             solved = np.where(better, new, solved)
         # Most of those that reach one solution differ by rounding.
-        return [*map(tuple, CLOSE * np.unique(np.round(np.concatenate(reached) / CLOSE), axis=0))]
+        places = CLOSE * np.unique(np.round(np.concatenate(reached) / CLOSE), axis=0)
+        return [*map(tuple, places.tolist())]

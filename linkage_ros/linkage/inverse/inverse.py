@@ -296,9 +296,10 @@ class Inverse:
     def _numbers(self, values: Any, name: str = 'values', finite: bool = False) -> Row:
         """Return one number for each output; raise ValueError if there are not as many."""
         parts = self._each(values, name)
-        if any(type(x) is not float and x.size != 1 for x in parts):
-            raise self._miscounted(values, name)
-        row = tuple([x if type(x) is float else x.item() for x in parts])
+        try:
+            row = tuple([x if type(x) is float else x.item() for x in parts])
+        except ValueError:
+            raise self._miscounted(values, name) from None
         if finite and not all(map(math.isfinite, row)):
             raise ValueError(f'{name} must be finite, got {quoted([*row])}')
         return row
@@ -309,8 +310,8 @@ class Inverse:
             values = np.atleast_1d(numbers(name, values))
         if len(values) != self._n:
             raise self._miscounted(values, name)
-        parts = [x if type(x) is float else numbers(name, x) for x in values]
-        return tuple([x if type(x) is float or np.ndim(x) else float(x) for x in parts])
+        parts: List[Any] = [x if type(x) is float else numbers(name, x) for x in values]
+        return tuple([x if type(x) is float or x.ndim else x.item() for x in parts])
 
     def _miscounted(self, values: Any, name: str) -> ValueError:
         return ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '

@@ -103,6 +103,8 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
     for _ in range(ARRAY_STEPS):
         trial = over(*best[2 + n:2 + 2 * n].clip(low, high), *values)
         better = (best[1] > ROUNDED) & (best[0] <= far) & (trial[0] < best[0])
+        if not better.any():
+            break
         best[:, better] = trial[:, better]
     # What is left is refined one by one.
     left = (left | ~(best[1] <= ACCEPTED)) & ~(best[0] > far)
@@ -137,7 +139,7 @@ def distinct(problem: InverseProblem, solutions: Sequence[Row]) -> List[Row]:
     distinct: List[Row] = []
     for solution in sorted(solutions):
         # Of one input only neighbours can be one, a turn apart too.
-        others = distinct if problem.n > 1 else {*distinct[-1:], *distinct[:1]}
+        others = distinct if problem.n > 1 else distinct[-1:] + distinct[:-1][:1]
         if not any(_are_one(problem, solution, other) for other in others):
             distinct.append(solution)
     return distinct

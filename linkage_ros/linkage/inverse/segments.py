@@ -138,8 +138,9 @@ class Segments:
         least, greatest = float(value[0] - slack[0]), float(value[-1] + slack[1])
         # Values so near to an end of the segment are the end's.
         near = np.minimum(slack, ONE * self._size)
-        # At an end of the reach there is a pose also when a period is added.
-        start, end = (x + side * 4.0 * math.ulp(max(abs(x), self._counted.high)) * (
+        # At an end of the reach there is a pose also when a period is added, and behind gears.
+        ulps = 2.0 if self._input.period == 1 else 4.0
+        start, end = (x + side * ulps * math.ulp(max(abs(x), self._counted.high)) * (
             x in self._ends) for x, side in zip(theta[[0, -1]].tolist(), (1.0, -1.0)))
         theta = np.array([start, *theta.clip(start, end), end]) * self._unit
         value = np.pad(value.clip(value[0] + near[0], value[-1] - near[1]), 1, 'edge')
