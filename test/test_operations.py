@@ -190,6 +190,11 @@ def test_infinity_zeros_and_nan_are_the_same_to_all(name, c_library):
         assert np.array_equal(np.signbit(found)[zero], np.signbit(expected)[zero])
 
 
+def test_a_constant_is_known_to_be_positive_if_it_is():
+    for value in (*SPECIAL, -0.5, -5e-324):
+        assert bool(expression.real(value).positive) == (value > 0.0)
+
+
 @pytest.mark.parametrize('name', NAMES)
 def test_constants_come_to_what_floats_do(name):
     values = numbers(name)

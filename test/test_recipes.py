@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 PAGE = ROOT / 'docs' / 'design' / 'architecture.md'
 TITLES = ['A mechanism', 'A construction']
 # What is made, or belongs to no release.
-MADE = re.compile(r'\..*|__pycache__|(build|install|log)(-.*)?|out|_build')
+MADE = re.compile(r'\.(?!ci$|github$).*|__pycache__|(build|install|log)(-.*)?|out|_build')
 
 
 def steps(title):
