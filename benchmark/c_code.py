@@ -197,10 +197,10 @@ def prepared(name, outputs, number, use):
     if name == 'five_bar':
         given |= {f'{name}.{input_}.sweep': ends for input_, ends in (
             ('crank', [1.5, 1.9]), ('crank2', [1.24, 1.6]))}
-    machine = scene.read(given).machines[name]
-    n, linkage = len(machine.inputs), machine.linkage
+    mechanism = scene.read(given).mechanisms[name]
+    n, linkage = len(mechanism.inputs), mechanism.linkage
     rows = np.stack([np.linspace(*(drive.ends or drive.reach[0]), POSES + 2)[1:-1]
-                     for drive in machine.inputs.values()])
+                     for drive in mechanism.inputs.values()])
     rows[1:] = np.roll(rows[1:], POSES // 3, axis=1)
     values = linkage.joint_angles(rows if n > 1 else rows[0], outputs)
     found = np.stack([values[output] for output in outputs])
@@ -221,7 +221,7 @@ def prepared(name, outputs, number, use):
         named[f'{key}_rows'] = ', '.join('{ %s }' % ', '.join(
             f'{value:.7g}f' if number == 'float' else repr(float(value)) for value in row)
             for row in each.T)
-    return header.written(machine, outputs, number == 'float', joints), named
+    return header.written(mechanism, outputs, number == 'float', joints), named
 
 
 def times(target, text, values):

@@ -35,7 +35,7 @@ def tasks():
     ankle = Path(__file__).parents[1] / 'examples' / 'ankle.yaml'
     return [
         Task("Jansen's leg, all points", mechanisms.create('jansen'), (None, (), ()), 3.1),
-        Task('ankle, pitch, roll and rates', scene.load(ankle).machines['ankle'].linkage,
+        Task('ankle, pitch, roll and rates', scene.load(ankle).mechanisms['ankle'].linkage,
              ((), ('pitch', 'roll'), ('pitch', 'roll')), 0.2)]
 
 
@@ -103,7 +103,7 @@ def main():
          *(method.title for method in METHODS), 'on a GPU'],
         [[task.title, size, *measured(task, size), 'not measured']
          for task in tasks() for size in SIZES])
-    text += '\n\n' + document.machine('llvmlite', 'torch', 'jax')
+    text += '\n\n' + document.mechanism('llvmlite', 'torch', 'jax')
     document.show(options, 'design/performance.md', text, 'measured: namespaces')
 
 

@@ -157,9 +157,10 @@ def mujoco(_, count):
     import mujoco as mj
 
     for kind in mechanisms.TYPES:
-        machine = scene.read({'mechanisms': ['m'], 'm.type': kind}).machines['m']
-        linkage, size = machine.linkage, bodies.size(machine)
-        model = mj.MjModel.from_xml_string(mjcf.write(assembled(bodies.robot([machine], 'world'))))
+        mechanism = scene.read({'mechanisms': ['m'], 'm.type': kind}).mechanisms['m']
+        linkage, size = mechanism.linkage, bodies.size(mechanism)
+        robot = assembled(bodies.robot([mechanism], 'world'))
+        model = mj.MjModel.from_xml_string(mjcf.write(robot))
         data, names = mj.MjData(model), [model.joint(i).name for i in range(model.njnt)]
         outputs = [name.removeprefix('m_') for name in names]
         if not set(outputs) <= set(linkage.joints):
@@ -198,7 +199,7 @@ def main():
         is_far |= bool(far) or not len(found)
         rows.append([name, len(found), f'{np.nanmax(found, initial=0.0):.1e}', far])
     text = document.table(['source', 'numbers', 'largest difference', f'above {FAR:.0e}'], rows)
-    text += '\n\n' + document.machine('pylinkage', 'mujoco')
+    text += '\n\n' + document.mechanism('pylinkage', 'mujoco')
     document.show(options, 'design/accuracy.md', text, 'measured: foreign')
     return int(is_far)
 

@@ -105,7 +105,7 @@ def seconds(message):
 
 def demo():
     """Observe the nodes, report and draw; raise DemoError if something is wrong."""
-    mechanisms = scene.load(SCENE).machines
+    mechanisms = scene.load(SCENE).mechanisms
     try:
         motions, answer = observe(mechanisms.values())
     except (AssertionError, RuntimeError) as error:

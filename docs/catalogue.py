@@ -48,7 +48,7 @@ USES = {
     'slotted_lever': ('A lever moved by a pin: steering, flaps, grippers on a hobby servo; '
                       'shaping machines.', 'No inventor is known.'),
     'chebyshev_lambda': ('Legs, and a nearly straight line over half a turn.',
-                         'Pafnuty Chebyshev, whose walking machine was shown in Paris in 1878.'),
+                         'Pafnuty Chebyshev, whose walking mechanism was shown in Paris in 1878.'),
     'five_bar': ('Pick and place, drawing, legs: light arms, since both motors stand still.',
                  'No inventor is known; as a robot it is called a double SCARA.'),
     'four_bar': ('Wipers, doors, suspensions, grippers: most loops of most machines.',
@@ -65,7 +65,7 @@ USES = {
     'watt': ('Guiding a rod nearly straight; today rear axles of cars.',
              'James Watt, 1784, for the piston rod of his steam engine.'),
     'whitworth': ('Shaping and slotting machines: slow while it cuts, quick on the way back.',
-                  'Joseph Whitworth, in the 19th century, for his machine tools.'),
+                  'Joseph Whitworth, in the 19th century, for his mechanism tools.'),
 }
 
 # What is written in letters in a docstring.
@@ -299,16 +299,16 @@ def links(linkage):
         yield f'`{link.name}`', link.kind, link.parent, link.joint, link.tip, zero
 
 
-def machine(type_, **lengths):
+def mechanism(type_, **lengths):
     """Return a mechanism of a scene, its cranks as slow as the pictures need."""
     given = {f'{type_}.dimensions.{name}': value for name, value in lengths.items()}
     given.update({f'{type_}.{name}': value for name, value in MOTIONS.get(type_, {}).items()})
-    return scene.read({'mechanisms': [type_], **given}).machines[type_]
+    return scene.read({'mechanisms': [type_], **given}).mechanisms[type_]
 
 
 def draw(type_, folder):
     """Write the figures of a mechanism: named joints, in motion, and changed dimensions."""
-    one = machine(type_)
+    one = mechanism(type_)
     still = Picture([one], SIZE)
     still.arrange([SHOWN_AT])
     files.still(still, SHOWN_AT, folder / f'{type_}.svg')
@@ -367,7 +367,7 @@ def change(linkage) -> float:
 def traced(type_, changed):
     """Return the tracer's curve [m], or a lever's angle over the crank's [rad]; empty if none."""
     try:
-        one = machine(type_, **changed)
+        one = mechanism(type_, **changed)
     except scene.SceneError:
         return np.empty((0, 2))
     if hasattr(one.linkage, 'reduction'):

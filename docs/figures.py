@@ -20,7 +20,7 @@ COLOURS = palette.BAR, palette.DRIVEN, palette.GREEN
 
 def bucket(folder):
     """Draw an excavator whose bucket goes along a straight line, and what its cylinders do."""
-    linkage = scene.load(str(ROOT / 'config' / 'excavator.yaml')).machines['excavator'].linkage
+    linkage = scene.load(str(ROOT / 'config' / 'excavator.yaml')).mechanisms['excavator'].linkage
     outputs = ['T.x', 'T.y', 'angle(H,T)']
     inputs = np.array([1.0, 1.15, 1.05])
     start = np.array([float(linkage.joint_angles(inputs, [name])[name]) for name in outputs])

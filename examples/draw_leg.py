@@ -22,17 +22,17 @@ HERE = Path(__file__).parent
 PARTS = 0.1, 0.35, 0.65, 0.95
 
 
-def joints(machines, part):
+def joints(mechanisms, part):
     """Return the positions of all joints, by name, at a part of each sweep."""
     found = {}
-    for machine in machines:
-        drive = machine.first
+    for mechanism in mechanisms:
+        drive = mechanism.first
         low, high = drive.sweep
         value = low + part * (high - low)
-        angles = machine.linkage.joint_angles(value)
+        angles = mechanism.linkage.joint_angles(value)
         found.update((called.name, called.of(angles[link]))
-                     for link, called in machine.joints.items())
-        found[drive.source], _ = machine.to_source(drive, value, 0.0)
+                     for link, called in mechanism.joints.items())
+        found[drive.source], _ = mechanism.to_source(drive, value, 0.0)
     return found
 
 
@@ -94,12 +94,12 @@ def faces(robot, positions):
 def main(out):
     """Draw four poses."""
     robot = ElementTree.parse(HERE / 'leg.urdf').getroot()
-    machines = scene.load(HERE / 'leg.yaml').machines.values()
+    mechanisms = scene.load(HERE / 'leg.yaml').mechanisms.values()
     figure, row = pyplot.subplots(
         1, len(PARTS), figsize=(8.0, 2.5), dpi=100, subplot_kw={'projection': '3d'})
     figure.subplots_adjust(-0.02, -0.1, 1.02, 1.0, wspace=-0.1)
     for axes, part in zip(row, PARTS):
-        polygons, shades = zip(*faces(robot, joints(machines, part)))
+        polygons, shades = zip(*faces(robot, joints(mechanisms, part)))
         axes.add_collection3d(Poly3DCollection(
             polygons, facecolors=shades, shade=True, lightsource=LightSource(20.0, 30.0)))
         axes.set(xlim=(-0.28, 0.2), ylim=(-0.18, 0.3), zlim=(-0.42, 0.16), proj_type='ortho')

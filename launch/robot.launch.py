@@ -50,7 +50,7 @@ def _started(context):
     robot = readers.read(chosen['robot'], chosen['loops'] or None)
     held = command.positions(shlex.split(chosen['hold']))
     files = [chosen['scene']]
-    rest, lost = command.others(robot, shown.machines, held)
+    rest, lost = command.others(robot, shown.mechanisms, held)
     if rest:
         # The last file says which mechanisms there are.
         file = Path(tempfile.mkdtemp()) / 'others.yaml'

@@ -69,11 +69,11 @@ def _started(context):
     common = {'namespace': text['namespace'], 'output': 'screen'}
     time = {'use_sim_time': has['use_sim_time']}
     # First the packages that may not be installed: then nothing is left running.
-    nodes = [_robot(machine, shown.frame_id, text['namespace'], prefix, time)
-             for machine in shown.machines.values() if has['robot_model']]
+    nodes = [_robot(mechanism, shown.frame_id, text['namespace'], prefix, time)
+             for mechanism in shown.mechanisms.values() if has['robot_model']]
     if has['rviz']:
         config = rviz.adapted(
-            yaml.safe_load((share / 'config' / RVIZ_CONFIG).read_text()), shown.machines,
+            yaml.safe_load((share / 'config' / RVIZ_CONFIG).read_text()), shown.mechanisms,
             shown.frame_id, text['namespace'], has['robot_model'], prefix)
         # Among the logs of this launch, so that nothing is left behind elsewhere.
         adapted = Path(launch_config.log_dir, RVIZ_CONFIG)
@@ -105,12 +105,12 @@ def _scene_path(share, name):
     return path
 
 
-def _robot(machine, frame_id, namespace, prefix, time):
+def _robot(mechanism, frame_id, namespace, prefix, time):
     """Return what moves the model of a mechanism by its joint states."""
-    text = ParameterValue(urdf.describe([machine], frame_id), value_type=str)
+    text = ParameterValue(urdf.describe([mechanism], frame_id), value_type=str)
     return Node(
         package='robot_state_publisher', executable='robot_state_publisher',
-        namespace=f'{namespace}/{machine.name}', output='screen',
+        namespace=f'{namespace}/{mechanism.name}', output='screen',
         parameters=[{'robot_description': text, 'publish_frequency': 100.0,
                      'frame_prefix': prefix}, time],
         # The model itself is offered by kinematics, which keeps it up to date.

@@ -89,13 +89,13 @@ def _beside(error: OSError) -> str:
     return meant(name, os.listdir(folder or '.'))
 
 
-def chosen(machines: Mapping[str, SceneMechanism], names: Sequence[str]) -> List[SceneMechanism]:
-    """Return the named machines, or all; raise RequestError for an unknown name."""
+def chosen(mechanisms: Mapping[str, SceneMechanism], names: Sequence[str]) -> List[SceneMechanism]:
+    """Return the named mechanisms, or all; raise RequestError for an unknown name."""
     for name in names:
-        if name not in machines:
-            raise RequestError(f'there is no mechanism {name!r}; allowed: {", ".join(machines)}'
-                               f'{meant(name, machines)}')
-    return [machines[name] for name in names or machines]
+        if name not in mechanisms:
+            raise RequestError(f'there is no mechanism {name!r}; allowed: {", ".join(mechanisms)}'
+                               f'{meant(name, mechanisms)}')
+    return [mechanisms[name] for name in names or mechanisms]
 
 
 def within(kind: Callable[[str], Any], low: float, high: float) -> Callable[[str], Any]:

@@ -52,9 +52,9 @@ def loaded(folder, code, *flags):
     return ctypes.CDLL(str(library))
 
 
-def inverter(folder, machine, output, single=False):
+def inverter(folder, mechanism, output, single=False):
     """Return the inverse of a mechanism's only input in C: value, near -> input, None: refused."""
-    number, text = 'float' if single else 'double', header.written(machine, [output], single)
+    number, text = 'float' if single else 'double', header.written(mechanism, [output], single)
     name, = re.findall(r'int (\w+_for_\w+)', text)
     call = loaded(folder, f"""{text}
 int inverted(double value, double near, double *input)

@@ -47,20 +47,20 @@ def pytest_collection_finish():
 
 
 @pytest.fixture(scope='module')
-def machines(request):
+def mechanisms(request):
     """Return the mechanisms of the module's SCENE."""
     from linkage_ros import scene
 
-    return scene.read(request.module.SCENE).machines
+    return scene.read(request.module.SCENE).mechanisms
 
 
 @pytest.fixture(scope='module')
-def library(request, machines, tmp_path_factory):
+def library(request, mechanisms, tmp_path_factory):
     """Return the C library of all of them."""
     from c_libraries import shared
 
     with shared(tmp_path_factory, request.module.__name__) as folder:
-        return request.module.compiled(folder, [*machines.values()])
+        return request.module.compiled(folder, [*mechanisms.values()])
 
 
 @pytest.fixture

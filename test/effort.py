@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What something costs, counted: the same on any machine, however busy it is."""
+"""What something costs, counted: the same on any mechanism, however busy it is."""
 
 from contextlib import contextmanager
 import cProfile

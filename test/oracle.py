@@ -103,16 +103,16 @@ class Pose(NamedTuple):
 class Solver:
     """A mechanism of a scene, solved by the library's public functions."""
 
-    def __init__(self, machine):
-        self.machine, self.assembly = machine, machine.assembly()
-        linkage, self._joints = machine.linkage, self.assembly.joints
+    def __init__(self, mechanism):
+        self.mechanism, self.assembly = mechanism, mechanism.assembly()
+        linkage, self._joints = mechanism.linkage, self.assembly.joints
         # At an end of the reach rates divide by zero, and then all that comes with them is worked
         # out by arrays, whose last digits differ.
         self._places, self._angles, self._rates = (linkage.function(*wanted) for wanted in (
             (linkage.points,), ((), self._joints), ((), (), self._joints)))
         slides = {link.name for link in linkage.links if link.kind == 'prismatic'}
-        self._sizes = [machine.scale if name in slides else 1.0 for name in self._joints]
-        self.shown = _shown(machine)
+        self._sizes = [mechanism.scale if name in slides else 1.0 for name in self._joints]
+        self.shown = _shown(mechanism)
         spots = [spot for pieces in self.shown.values() for piece in pieces for spot in piece
                  if isinstance(spot, LinkPoint)]
         self._spots = tuple(dict.fromkeys(spots))
@@ -132,7 +132,7 @@ class Solver:
         return Pose(legs, moving) if legs else None
 
     def _leg(self, leg, values, speeds):
-        inputs = self.machine.linkage.inputs
+        inputs = self.mechanism.linkage.inputs
         own = [leg.start + leg.side * (value - leg.lag) if input_.turns else value / leg.size
                for value, input_ in zip(values, inputs)]
         xy = self._places(*own)
@@ -156,13 +156,13 @@ class Solver:
             legs = _on_each_side(pose.legs) if id_ == GROUND else pose.legs
             found[id_] = [
                 spots[leg.number][point] if isinstance(point, LinkPoint)
-                else leg.places[self.machine.linkage.points.index(point)]
+                else leg.places[self.mechanism.linkage.points.index(point)]
                 for leg in legs for piece in pieces for point in piece]
         return found
 
     def _placed(self, values):
         """Return where the spots are, by leg; no other public function places them."""
-        place, at_rest = self.machine.linkage.legs(self._spots, (), ()), [0.0] * len(values)
+        place, at_rest = self.mechanism.linkage.legs(self._spots, (), ()), [0.0] * len(values)
         rows = [place.at(*values, *at_rest, *leg) for leg in self.assembly.legs.values()]
         return [dict(zip(self._spots, zip(row[::2], row[1::2]))) for row in rows]
 
@@ -172,16 +172,16 @@ def _on_each_side(legs):
     return list({leg.prefix[:1]: leg for leg in reversed(legs)}.values())
 
 
-def _shown(machine):
+def _shown(mechanism):
     """Return what each marker shows, by its id: joints, ends of lines or corners."""
-    linkage, wanted = machine.linkage, machine.points
+    linkage, wanted = mechanism.linkage, mechanism.points
     cranks, plates = shapes.cranks(linkage), shapes.plates(linkage, wanted)
     edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}
     bars = [bar for bar in linkage.bars if bar not in cranks and frozenset(bar) not in edges]
     pieces = {0: [*bars, *linkage.cylinders], 1: [(name,) for name in wanted], 3: [], 4: [],
               5: cranks, 6: [], 7: plates, 8: shapes.marks(linkage, wanted)}
-    for shape in shapes.drawn(machine, wanted):
-        id_ = 3 if shape.kind == shapes.GUIDE else 6 if shape.slide.name in machine.inputs else 4
+    for shape in shapes.drawn(mechanism, wanted):
+        id_ = 3 if shape.kind == shapes.GUIDE else 6 if shape.slide.name in mechanism.inputs else 4
         pieces[id_].append((shape.start, shape.end))
     drawn = {id_: [piece for piece in several if all(
         isinstance(point, LinkPoint) or point in wanted for point in piece)]
@@ -208,15 +208,17 @@ class Model:
         self._take(scene.read(parameters))
         # A default is that of the start.
         self._given = {parameter.name: parameter.value for parameter in self.scene.parameters}
-        self.states = {name: State([None] * len(machine.inputs), [None] * len(machine.inputs))
-                       for name, machine in self.scene.machines.items()}
+        self.states = {name: State([None] * len(mechanism.inputs), [None] * len(mechanism.inputs))
+                       for name, mechanism in self.scene.mechanisms.items()}
 
     def _take(self, new):
-        frames = {name: machine.frame_id or new.frame_id for name, machine in new.machines.items()}
-        robots = {name: bodies.robot([machine], frames[name])
-                  for name, machine in new.machines.items()}
+        frames = {name: mechanism.frame_id or new.frame_id
+                  for name, mechanism in new.mechanisms.items()}
+        robots = {name: bodies.robot([mechanism], frames[name])
+                  for name, mechanism in new.mechanisms.items()}
         self.descriptions = {name: urdf.write(robot) for name, robot in robots.items()}
-        own = [robots[name] for name, machine in new.machines.items() if not machine.only_named]
+        own = [robots[name] for name, mechanism in new.mechanisms.items()
+               if not mechanism.only_named]
         try:
             whole = urdf.write(bodies.merged(own)) if own else ''
         except scene.SceneError:
@@ -224,9 +226,9 @@ class Model:
         # What is latched stays where a change leaves no robot of one root.
         self.description = whole or getattr(self, 'description', '')
         self.scene, self.frames = new, {name: new.frame_prefix + f for name, f in frames.items()}
-        self.solvers = {name: Solver(machine) for name, machine in new.machines.items()}
-        for name in new.machines:
-            bodies.size(new.machines[name])
+        self.solvers = {name: Solver(mechanism) for name, mechanism in new.mechanisms.items()}
+        for name in new.mechanisms:
+            bodies.size(new.mechanisms[name])
 
     def said(self, message, now):
         """Take over joint states that came at a time (low, high) [ns]; return what they move."""
@@ -235,11 +237,11 @@ class Model:
         stamp = message.header.stamp
         at = (stamp.sec * 10 ** 9 + stamp.nanosec,) * 2 if stamp.sec or stamp.nanosec else now
         moved = []
-        for name, machine in self.scene.machines.items():
-            for i, drive in enumerate(machine.inputs.values()):
+        for name, mechanism in self.scene.mechanisms.items():
+            for i, drive in enumerate(mechanism.inputs.values()):
                 if drive.source in where:
                     place = where[drive.source]
-                    self._source(self.states[name], machine, i, drive, message.position[place],
+                    self._source(self.states[name], mechanism, i, drive, message.position[place],
                                  message.velocity[place] if known else None)
                     moved.append(name)
         for name in moved:
@@ -248,8 +250,8 @@ class Model:
             self.stamp = at
         return set(moved)
 
-    def _source(self, state, machine, i, drive, position, speed):
-        value, speed = machine.from_source(drive, position, speed, state.near)
+    def _source(self, state, mechanism, i, drive, position, speed):
+        value, speed = mechanism.from_source(drive, position, speed, state.near)
         state.values[i], state.speeds[i] = value, speed
         if math.isfinite(value):
             state.near = value
@@ -274,8 +276,8 @@ class Model:
                     if signature != before[name]}
 
     def _signatures(self):
-        return {name: ([(p.name, p.value) for p in machine.parameters], self.frames[name])
-                for name, machine in self.scene.machines.items()}
+        return {name: ([(p.name, p.value) for p in mechanism.parameters], self.frames[name])
+                for name, mechanism in self.scene.mechanisms.items()}
 
     def _pose(self, name):
         state = self.states[name]
@@ -291,7 +293,7 @@ class Model:
 
     def all_joints(self, sources=()):
         """Return the joint states of the scene, without what sources say on the same topic."""
-        poses = {name: pose for name in self.scene.machines if (pose := self._pose(name))}
+        poses = {name: pose for name in self.scene.mechanisms if (pose := self._pose(name))}
         return self._joint_states(self.stamp, poses, sources)
 
     def _joint_states(self, stamp, poses, sources=()):
@@ -301,20 +303,20 @@ class Model:
             return None
         names, positions, velocities, efforts = map(list, zip(*rows))
         moving = all(pose.moving for pose in poses.values())
-        loaded = any(self.scene.machines[name].loads for name in poses) and all(
+        loaded = any(self.scene.mechanisms[name].loads for name in poses) and all(
             effort is None or math.isfinite(effort)
             for name, pose in poses.items() for effort in self._efforts(name))
         return Joints(stamp, names, positions, velocities if moving else [],
                       efforts if loaded else [])
 
     def _efforts(self, name):
-        machine, state = self.scene.machines[name], self.states[name]
-        return machine.efforts(state.values) if machine.loads else [0.0] * len(state.values)
+        mechanism, state = self.scene.mechanisms[name], self.states[name]
+        return mechanism.efforts(state.values) if mechanism.loads else [0.0] * len(state.values)
 
     def _rows(self, name, pose):
         """Yield name, position, velocity and effort of each joint that is published."""
-        machine, state = self.scene.machines[name], self.states[name]
-        n, names = len(machine.inputs), list(machine.joints)
+        mechanism, state = self.scene.mechanisms[name], self.states[name]
+        n, names = len(mechanism.inputs), list(mechanism.joints)
         each = [*zip(names[:n], state.values, state.speeds, self._efforts(name))]
         per_leg = len(self.solvers[name].assembly.joints)
         for leg in pose.legs:
@@ -322,7 +324,7 @@ class Model:
             each += zip(names[first:first + per_leg], leg.angles, leg.rates or [0.0] * per_leg,
                         [0.0] * per_leg)
         for joint, position, velocity, effort in each:
-            called = machine.joints[joint]
+            called = mechanism.joints[joint]
             if called.published:
                 yield (called.name, float(called.of(position)), called.sign * (velocity or 0.0),
                        called.sign * effort)
@@ -334,9 +336,9 @@ class Model:
 
     def locus(self, name):
         """Return the points of a mechanism's curve; with its mirror image, the ends of lines."""
-        machine = self.scene.machines[name]
-        curve = machine.assembly().locus(machine.tracer).tolist()
-        if machine.mirrored:
+        mechanism = self.scene.mechanisms[name]
+        curve = mechanism.assembly().locus(mechanism.tracer).tolist()
+        if mechanism.mirrored:
             lines = [end for line in zip(curve, curve[1:]) for end in line]
             curve = [*lines, *([-x, y] for x, y in lines)]
         return curve if len(curve) > 1 else []
@@ -401,7 +403,7 @@ class Bench:
         self.listeners = {}
         self._latched = {topic: self._subscribe(topic, kind, LATCHED) for topic, kind in [
             ('robot_description', String), *((f'{name}/{topic}', kind)
-                                             for name in self.model.scene.machines
+                                             for name in self.model.scene.mechanisms
                                              for topic, kind in [('locus', Marker),
                                                                  ('robot_description', String)])]}
         self._said = dict.fromkeys(self._latched)
@@ -613,24 +615,24 @@ class Bench:
                 own, other = ({*zip(*[iter(points)] * 3)} for points in (own, other))
             if own != other:
                 raise Mismatch(f'{topic}: marker {id_}: {differences([own], [other])}')
-        machine = self.model.scene.machines[topic.partition('/')[0]]
+        mechanism = self.model.scene.mechanisms[topic.partition('/')[0]]
         for marker in markers:
-            self._same_look(topic, marker, machine)
+            self._same_look(topic, marker, mechanism)
             self._same_stamp(topic, marker.header.stamp, content.stamp)
 
-    def _same_look(self, topic, marker, machine):
-        frame = self.model.frames[machine.name]
+    def _same_look(self, topic, marker, mechanism):
+        frame = self.model.frames[mechanism.name]
         if (marker.type, marker.header.frame_id) != (KINDS[marker.id], frame):
             raise Mismatch(f'{topic}: marker {marker.id} is a {marker.type} in '
                            f'{marker.header.frame_id!r} instead of {frame!r}')
         if any(p.z for p in marker.points):
             raise Mismatch(f'{topic}: marker {marker.id} leaves its plane')
-        x, y, z, roll, pitch, yaw = machine.pose
+        x, y, z, roll, pitch, yaw = mechanism.pose
         turned = rotation(roll, pitch, yaw)
         q = marker.pose.orientation
         if not np.abs(turned - matrix(q.x, q.y, q.z, q.w)).max() < 1e-12:
             raise Mismatch(f'{topic}: marker {marker.id} is turned')
-        at, step = marker.pose.position, bodies.size(machine) / 250.0
+        at, step = marker.pose.position, bodies.size(mechanism) / 250.0
         heights = [(x, y, z) + step * layer * turned[:, 2] for layer in LAYERS]
         near = 1e-9 * (step + max(map(abs, (x, y, z))))
         if np.abs(np.array(heights) - (at.x, at.y, at.z)).max(axis=1).min() > near:
@@ -657,7 +659,7 @@ class Bench:
         curve = self.model.locus(name)
         if message is None or message.action == Marker.DELETE:
             return not curve
-        mirrored = self.model.scene.machines[name].mirrored
+        mirrored = self.model.scene.mechanisms[name].mirrored
         return ([[p.x, p.y] for p in message.points] == curve
                 and message.type == (Marker.LINE_LIST if mirrored else Marker.LINE_STRIP)
                 and message.header.frame_id == self.model.frames[name])
@@ -714,9 +716,9 @@ class Generator:
 
     def __init__(self, parameters, random):
         self._random, self._scene = random, scene.read(parameters)
-        self._drives = [(machine, drive) for machine in self._scene.machines.values()
-                        for drive in machine.inputs.values()]
-        self.topics = ['joint_states', *(f'{name}/{kind}' for name in self._scene.machines
+        self._drives = [(mechanism, drive) for mechanism in self._scene.mechanisms.values()
+                        for drive in mechanism.inputs.values()]
+        self.topics = ['joint_states', *(f'{name}/{kind}' for name in self._scene.mechanisms
                                          for kind in ('joint_states', 'markers'))]
         self._settable = [p for p in self._scene.parameters
                           if scene.KINEMATICS in p.field.readers]
@@ -767,7 +769,7 @@ class Generator:
         if kind == 0:
             return self._drives
         if kind == 1:
-            name = self._pick(list(self._scene.machines))
+            name = self._pick(list(self._scene.mechanisms))
             return [(m, d) for m, d in self._drives if m.name == name]
         if kind == 2:
             return [self._pick(self._drives)]
@@ -776,7 +778,7 @@ class Generator:
 
     def _message(self, drives, moving):
         names = list(dict.fromkeys(drive.source for _, drive in drives))
-        by_name = {drive.source: (machine, drive) for machine, drive in drives}
+        by_name = {drive.source: (mechanism, drive) for mechanism, drive in drives}
         positions = [self._position(*by_name[name]) for name in names]
         velocities = [self._speed() for _ in names] if moving else []
         if self._random.random() < 0.05:
@@ -800,12 +802,12 @@ class Generator:
             return float(self._pick([*SPECIAL, 1e308]))
         return float(self._random.normal())
 
-    def _position(self, machine, drive):
+    def _position(self, mechanism, drive):
         if self._random.random() < 0.05:
             return float(self._pick(SPECIAL))
         value = self._input(drive)
         if drive.measures:
-            value = float(machine.to_source(drive, value, 0.0)[0])
+            value = float(mechanism.to_source(drive, value, 0.0)[0])
             return value if math.isfinite(value) else float(self._random.normal())
         return (value - drive.offset) / drive.ratio
 
@@ -856,16 +858,16 @@ class Generator:
     def _change(self):
         parameter = self._pick(self._settable)
         name, value, kind = parameter.name, parameter.value, parameter.field.kind
-        machine = self._scene.machines.get(name.partition('.')[0])
+        mechanism = self._scene.mechanisms.get(name.partition('.')[0])
         what = name.rpartition('.')[2]
         if self._random.random() < 0.15:
             return name, self._pick([-1.0, 'nonsense', 1e308, 77, ['Zed=1'], [1.0], True, 0])
         if self._random.random() < 0.1:
             return name, list(value) if isinstance(value, tuple) else value
         if what in ('points', 'joint_names', 'loads'):
-            return name, self._lines(what, machine)
+            return name, self._lines(what, mechanism)
         if what == 'sweep':
-            low, high = sorted(map(float, self._random.uniform(*machine.first.reach[0], 2)))
+            low, high = sorted(map(float, self._random.uniform(*mechanism.first.reach[0], 2)))
             return name, self._pick([[], [low, high]])
         if what == 'pose':
             return name, self._random.normal(size=6).tolist()
@@ -881,16 +883,16 @@ class Generator:
             return name, float(value * self._random.uniform(0.8, 1.25))
         return name, value
 
-    def _lines(self, what, machine):
-        linkage = machine.linkage
+    def _lines(self, what, mechanism):
+        linkage = mechanism.linkage
         if what == 'points':
             chosen = [name for name in linkage.points if self._random.random() < 0.6]
             self._random.shuffle(chosen)
             return chosen or list(linkage.points)
         if what == 'joint_names':
             sign, offset = self._pick(['', '-']), self._pick(['', '+0.35', '-7.5'])
-            return [f'{joint}={sign}{machine.name}_my_{joint}{offset}' for joint in machine.joints
-                    if self._random.random() < 0.4]
+            return [f'{joint}={sign}{mechanism.name}_my_{joint}{offset}'
+                    for joint in mechanism.joints if self._random.random() < 0.4]
         return [*(f'{name}={self._random.normal():.4f} -9.81' for name in linkage.points
                   if self._random.random() < 0.3),
                 *(f'{name}=2.5' for name in linkage.joints if self._random.random() < 0.1)]

@@ -52,49 +52,50 @@ void {name}_over(long count, const {number} *given, {number} *out)
 """
 
 
-def fields(machine):
+def fields(mechanism):
     """Return the outputs that are the fields of a mechanism's pose in C."""
-    linkage = machine.linkage
+    linkage = mechanism.linkage
     return list(dict.fromkeys([*(f'{joint}.{axis}' for joint in linkage.points for axis in 'xy'),
-                               *linkage.joints, *OUTPUTS.get(machine.name, ())]))
+                               *linkage.joints, *OUTPUTS.get(mechanism.name, ())]))
 
 
-def compiled(folder, machines, single=False):
+def compiled(folder, mechanisms, single=False):
     """Return a library with a loop over each mechanism."""
     text, number = [], 'float' if single else 'double'
-    for machine in machines:
-        n = len(machine.inputs)
+    for mechanism in mechanisms:
+        n = len(mechanism.inputs)
         given = ', '.join(f'given[i * {n} + {k}]' for k in range(n))
-        text.append(header.written(machine, OUTPUTS.get(machine.name, ()), single))
+        text.append(header.written(mechanism, OUTPUTS.get(mechanism.name, ()), single))
         text.append(CALLER.format(
-            name=machine.name, number=number, given=given, size=len(fields(machine)) * (n + 1) + 1,
+            name=mechanism.name, number=number, given=given,
+            size=len(fields(mechanism)) * (n + 1) + 1,
             places=', '.join(f'p + {k + 1}' for k in range(n))))
     return loaded(folder, '\n'.join(text))
 
 
-def solved(library, machine, inputs, kind=np.float64):
+def solved(library, mechanism, inputs, kind=np.float64):
     """Return what C makes of inputs, shape (poses, n): pose, rates by each, and whether it is."""
-    size = len(fields(machine)) * (inputs.shape[1] + 1) + 1
+    size = len(fields(mechanism)) * (inputs.shape[1] + 1) + 1
     given, out = np.ascontiguousarray(inputs, kind), np.zeros((len(inputs), size), kind)
-    library[f'{machine.name}_over'](ctypes.c_long(len(inputs)), ctypes.c_void_p(
+    library[f'{mechanism.name}_over'](ctypes.c_long(len(inputs)), ctypes.c_void_p(
         given.ctypes.data), ctypes.c_void_p(out.ctypes.data))
     return out
 
 
-def expected(machine, inputs):
+def expected(mechanism, inputs):
     """Return the same from Python, one pose after the other."""
-    linkage, names = machine.linkage, fields(machine)
+    linkage, names = mechanism.linkage, fields(mechanism)
     solve = linkage.function(linkage.points, names[2 * len(linkage.points):], names)
-    units = [machine.scale_of(input_.name) for input_ in linkage.inputs]
-    sizes = np.array([machine.scale_of(name) for name in names])
+    units = [mechanism.scale_of(input_.name) for input_ in linkage.inputs]
+    sizes = np.array([mechanism.scale_of(name) for name in names])
     rows = np.array([solve(*(np.array(row) / units).tolist()) for row in inputs])
     return rows * np.concatenate([sizes, *(sizes / unit for unit in units)])
 
 
-def values(machine, count):
+def values(mechanism, count):
     """Return inputs all over and beyond the reach, dead points included."""
     rng, rows = np.random.default_rng(1), []
-    for drive in machine.inputs.values():
+    for drive in mechanism.inputs.values():
         low, high = (-9.0, 9.0) if drive.input.turns else (
             drive.input.low - 0.1, min(drive.input.high, 4.0) + 0.1)
         own = rng.uniform(low, high, count)
@@ -105,41 +106,41 @@ def values(machine, count):
 
 
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
-def test_poses_and_rates_are_those_of_python(library, machines, name, count=50):
-    machine = machines[name]
-    inputs = values(machine, count)
-    *found, whole = solved(library, machine, inputs).T
-    poses = expected(machine, inputs).T
+def test_poses_and_rates_are_those_of_python(library, mechanisms, name, count=50):
+    mechanism = mechanisms[name]
+    inputs = values(mechanism, count)
+    *found, whole = solved(library, mechanism, inputs).T
+    poses = expected(mechanism, inputs).T
     assert np.array_equal(whole.astype(bool),
-                          np.isfinite(poses[:len(fields(machine))]).all(axis=0))
+                          np.isfinite(poses[:len(fields(mechanism))]).all(axis=0))
     np.testing.assert_allclose(np.array(found), poses, rtol=1e-15, atol=0.0)
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize('name', ['jansen', 'slotted_lever'])
-def test_so_they_are_at_a_hundred_thousand_poses(library, machines, name):
-    test_poses_and_rates_are_those_of_python(library, machines, name, 100_000)
+def test_so_they_are_at_a_hundred_thousand_poses(library, mechanisms, name):
+    test_poses_and_rates_are_those_of_python(library, mechanisms, name, 100_000)
 
 
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
-def test_the_reach_is_that_of_python(library, machines, name):
-    machine = machines[name]
-    said = re.search('It can be assembled in (.*).\n', header.written(machine))
+def test_the_reach_is_that_of_python(library, mechanisms, name):
+    mechanism = mechanisms[name]
+    said = re.search('It can be assembled in (.*).\n', header.written(mechanism))
     # Of two inputs, and of a part of a period, there is none.
     assert bool(said) == (name not in ('five_bar', 'bent'))
     if said:
-        arcs, drive = machine.first.reach, machine.first
+        arcs, drive = mechanism.first.reach, mechanism.first
         assert said[1] == f'{" or ".join("[%.6g, %.6g]" % arc for arc in arcs)} {drive.input.unit}'
-        unit = machine.scale_of(drive.input.name)
+        unit = mechanism.scale_of(drive.input.name)
         inside = [low + part * (high - low) for low, high in arcs for part in (
             0.0, 1e-9, 0.3, 0.7, 1.0 - 1e-9, 1.0)]
         beyond = [end for low, high in arcs for end in (low - 1e-6, high + 1e-6)]
         turns = (0, 3, -1) if drive.input.turns else (0,)
         given = np.array([[value + turn * drive.input.turn] for value in (
-            *inside, *beyond, *values(machine, 20)[:, 0], math.nan, math.inf) for turn in turns])
+            *inside, *beyond, *values(mechanism, 20)[:, 0], math.nan, math.inf) for turn in turns])
         with np.errstate(invalid='ignore'):
-            places = np.array([*machine.linkage.solve(given[:, 0] / unit).values()])
-        np.testing.assert_array_equal(solved(library, machine, given)[:, -1].astype(bool),
+            places = np.array([*mechanism.linkage.solve(given[:, 0] / unit).values()])
+        np.testing.assert_array_equal(solved(library, mechanism, given)[:, -1].astype(bool),
                                       np.isfinite(places).all(axis=(0, 2)))
 
 
@@ -148,21 +149,21 @@ def test_the_reach_is_that_of_python(library, machines, name):
     *(('five_bar', single, '', 'crank [rad], crank2 [rad]',
        'five_bar_crank [rad], five_bar_AP [rad]') for single in (False, True)),
     ('slotted_lever', False, ', times 0.001', 'crank [rad]', 'slotted_lever_lever [rad]')])
-def test_a_header_says_what_it_has(machines, name, single, times, inputs, joints):
-    machine = machines[name]
-    text = header.written(machine, OUTPUTS.get(name, ())[:1], single)
+def test_a_header_says_what_it_has(mechanisms, name, single, times, inputs, joints):
+    mechanism = mechanisms[name]
+    text = header.written(mechanism, OUTPUTS.get(name, ())[:1], single)
     head, code = text.split('*/')[0], re.sub(
         r'/\*[^@]*?\*/|".*"', '', text[text.index('struct {', text.index('#endif /* LINKAGE')):])
     lengths = re.search(r'Lengths \[m\](.*?): (.*)\.\n', head)
-    assert f'{name}: {machine.linkage.type}, written' in head and lengths[1] == times
+    assert f'{name}: {mechanism.linkage.type}, written' in head and lengths[1] == times
     assert {key: float(value) for key, value in (
         each.split(' = ') for each in lengths[2].split(', ') if '=' in each)} == pytest.approx(
-            dict(machine.linkage.dimensions), rel=1e-8)
+            dict(mechanism.linkage.dimensions), rel=1e-8)
     # What is computed of lengths has their names.
     named = re.findall(r'const \w+ length_(\w+) = ([^f;]*)', code)
-    assert bool(named) == bool(machine.linkage.dimensions)
+    assert bool(named) == bool(mechanism.linkage.dimensions)
     assert [float(value) for _, value in named] == pytest.approx(
-        [machine.linkage.dimensions[key] for key, _ in named], rel=1e-7)
+        [mechanism.linkage.dimensions[key] for key, _ in named], rel=1e-7)
     actuators = ', '.join(f'{name}_{each}' for each in inputs.split(', '))
     assert f'/* Actuators: {actuators}; joints: {joints}. */' in text
     assert f' * Input: {inputs}. Angles' in head and f'#ifndef {name.upper()}_LINKAGE_H\n' in text
@@ -177,11 +178,11 @@ def test_a_header_says_what_it_has(machines, name, single, times, inputs, joints
 
 @pytest.mark.parametrize('name, output', [
     (name, output) for name, outputs in OUTPUTS.items() for output in outputs])
-def test_the_inverse_finds_the_nearest_input(machines, tmp_path, name, output):
-    machine, rng = machines[name], np.random.default_rng(2)
-    linkage, drive = machine.linkage, machine.first
-    unit, size = machine.scale_of(drive.input.name), machine.scale_of(output)
-    invert = inverter(tmp_path, machine, output)
+def test_the_inverse_finds_the_nearest_input(mechanisms, tmp_path, name, output):
+    mechanism, rng = mechanisms[name], np.random.default_rng(2)
+    linkage, drive = mechanism.linkage, mechanism.first
+    unit, size = mechanism.scale_of(drive.input.name), mechanism.scale_of(output)
+    invert = inverter(tmp_path, mechanism, output)
     low, high = drive.ends or drive.reach[0]
     for theta in rng.uniform(low, high, 12):
         value = float(linkage.joint_angles(theta / unit, [output])[output]) * size
@@ -202,9 +203,9 @@ def test_the_inverse_finds_the_nearest_input(machines, tmp_path, name, output):
 @pytest.mark.parametrize('name, output', [
     ('four_bar', 'QB'), ('slotted_lever', 'lever'), ('jansen', 'BC'), ('whitworth', 'lever'),
     ('peaucellier', 'BC'), ('klann', 'CF')])
-def test_an_inverse_takes_no_more_poses_than_its_header_says(machines, tmp_path, name, output):
-    machine, rng = machines[name], np.random.default_rng(6)
-    text = header.written(machine, (output,))
+def test_an_inverse_takes_no_more_poses_than_its_header_says(mechanisms, tmp_path, name, output):
+    mechanism, rng = mechanisms[name], np.random.default_rng(6)
+    text = header.written(mechanism, (output,))
     said = re.search(r'call takes at most (\d+) poses', text)[1]
     counted = re.sub(rf'(int {name}_at\w*\([^;]*?\)\n{{\n)', r'\1    taken++;\n', text)
     assert counted.count('taken++') and 'where there is none. */' in text
@@ -219,9 +220,9 @@ int poses(double value, double near)
     return taken;
 }}
 """)
-    (low, high), = machine.first.reach
+    (low, high), = mechanism.first.reach
     edge = 0.01 * (high - low)
-    values = machine.linkage.joint_angles(np.concatenate([
+    values = mechanism.linkage.joint_angles(np.concatenate([
         rng.uniform(low + edge, high - edge, 200), [low, high]]), [output])[output]
     taken = [library.poses(*map(ctypes.c_double, (value, near))) for value, near in zip(
         [*values, *rng.uniform(-7.0, 7.0, 200)], rng.uniform(-9.0, 9.0, 402))]
@@ -232,12 +233,12 @@ int poses(double value, double near)
 
 @pytest.mark.nightly
 @pytest.mark.parametrize('name, output', [('klann', 'CF'), ('jansen', 'G.x')])
-def test_a_search_misses_none_of_ten_thousand(machines, tmp_path, name, output):
-    machine, rng = machines[name], np.random.default_rng(7)
-    linkage, scale = machine.linkage, machine.scale_of(output)
+def test_a_search_misses_none_of_ten_thousand(mechanisms, tmp_path, name, output):
+    mechanism, rng = mechanisms[name], np.random.default_rng(7)
+    linkage, scale = mechanism.linkage, mechanism.scale_of(output)
     assert linkage.inverse(output).closed is None
-    invert = inverter(tmp_path, machine, output)
-    (low, high), = machine.first.reach
+    invert = inverter(tmp_path, mechanism, output)
+    (low, high), = mechanism.first.reach
     inputs, nears = rng.uniform(low, high, 10_000), rng.uniform(-9.0, 9.0, 10_000)
     values = linkage.joint_angles(inputs, [output])[output]
     cranks = np.array([*map(invert, values * scale, nears)])
@@ -250,9 +251,9 @@ def test_a_search_misses_none_of_ten_thousand(machines, tmp_path, name, output):
             + 1e-6).all()
 
 
-def test_several_inputs_are_found_for_as_many_outputs(machines, tmp_path):
-    machine, rng = machines['five_bar'], np.random.default_rng(5)
-    closed = header.written(machine, ('P.x', 'P.y'))
+def test_several_inputs_are_found_for_as_many_outputs(mechanisms, tmp_path):
+    mechanism, rng = mechanisms['five_bar'], np.random.default_rng(5)
+    closed = header.written(mechanism, ('P.x', 'P.y'))
     library = loaded(tmp_path, closed + """
 int found(const double *value, const double *near, double *inputs)
 {
@@ -264,7 +265,7 @@ int found(const double *value, const double *near, double *inputs)
         made = (ctypes.c_double * 2)(7.0, 7.0)
         return function((ctypes.c_double * 2)(*value), (ctypes.c_double * 2)(*near), made), [*made]
 
-    inverse = machine.linkage.inverse(['P.x', 'P.y'])
+    inverse = mechanism.linkage.inverse(['P.x', 'P.y'])
     for _ in range(100):
         near, place = rng.uniform(-2.0, 2.0, 2), rng.uniform(-0.1, 0.2, 2)
         answers, (ended, made) = inverse.all(place, near), inputs(library.found, place, near)
@@ -274,40 +275,40 @@ int found(const double *value, const double *near, double *inputs)
             continue
         away = [np.abs(np.array(answer.inputs) - near).sum() for answer in answers]
         assert np.abs(np.array(made) - near).sum() == pytest.approx(min(away), abs=1e-8)
-        reached = machine.linkage.solve(made, ['P'])['P']
+        reached = mechanism.linkage.solve(made, ['P'])['P']
         np.testing.assert_allclose(reached, place, atol=1e-14)
     assert 'leaves inputs alone, where there is none. */' in closed
     # Without a closed form a search may miss.
     with pytest.raises(ValueError, match='bent have no inverse in closed form'):
-        header.written(machines['bent'], ('C.x', 'angle(O,C)'))
+        header.written(mechanisms['bent'], ('C.x', 'angle(O,C)'))
 
 
 @pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('name', ['slotted_lever', 'boom', *(
     name for name in mechanisms.TYPES if name not in ('slotted_lever', 'five_bar'))])
-def test_single_precision_is_as_good_as_the_page_says(machines, tmp_path, name):
-    machine = machines[name]
-    library = compiled(tmp_path, [machine], single=True)
-    (low, high), = machine.first.reach
+def test_single_precision_is_as_good_as_the_page_says(mechanisms, tmp_path, name):
+    mechanism = mechanisms[name]
+    library = compiled(tmp_path, [mechanism], single=True)
+    (low, high), = mechanism.first.reach
     edge = 0.01 * (high - low)
     inputs = np.random.default_rng(3).uniform(low + edge, high - edge, (300, 1)).astype(np.float32)
-    points = 2 * len(machine.linkage.points)
-    found = solved(library, machine, inputs, np.float32)
-    exact = expected(machine, inputs.astype(float))
-    size = machine.scale * machine.linkage.longest
+    points = 2 * len(mechanism.linkage.points)
+    found = solved(library, mechanism, inputs, np.float32)
+    exact = expected(mechanism, inputs.astype(float))
+    size = mechanism.scale * mechanism.linkage.longest
     assert np.abs(found[:, :points] - exact[:, :points]).max() < 1e-6 * size
     # So are angles and rates.
     np.testing.assert_allclose(found[:, points:-1], exact[:, points:], rtol=1e-3, atol=1e-3 * max(
         1.0, size))
 
 
-def test_an_inverse_is_found_after_any_number_of_turns(machines, tmp_path):
-    machine = machines['slotted_lever']
-    invert = inverter(tmp_path, machine, 'lever')
+def test_an_inverse_is_found_after_any_number_of_turns(mechanisms, tmp_path):
+    mechanism = mechanisms['slotted_lever']
+    invert = inverter(tmp_path, mechanism, 'lever')
     for whole in (math.tau * 100, math.tau * 10_000):
         for value in np.linspace(-0.4, 0.4, 50):
             assert invert(value, whole) - whole == pytest.approx(
-                machine.linkage.input_for('lever', value, 0.0), abs=1e-15 * whole)
+                mechanism.linkage.input_for('lever', value, 0.0), abs=1e-15 * whole)
 
 
 GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
@@ -327,9 +328,9 @@ STEEP = ['O ground 0 0', 'Q ground 0.5 0.25', 'A crank O 0.8',
     # An angle that turns by more than half a turn from one extreme to the other.
     (STEEP, 'angle(A,B)', [6.151306541], [6.52, 6.2, 6.15, 5.0])])
 def test_the_input_of_an_output_is_found_from_anywhere(tmp_path, joints, output, inputs, nears):
-    machine, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': joints}
-                          ).machines.values()
-    invert, angles = inverter(tmp_path, machine, output), machine.linkage.joint_angles
+    mechanism, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': joints}
+                            ).mechanisms.values()
+    invert, angles = inverter(tmp_path, mechanism, output), mechanism.linkage.joint_angles
     for value in inputs:
         wanted = float(angles(value, [output])[output])
         for answer in (invert(wanted, near) for near in nears):
@@ -343,9 +344,9 @@ def test_the_input_of_an_output_is_found_from_anywhere(tmp_path, joints, output,
     ('jansen', 'k', 0.8, 'G.x'), ('jansen', 'e', 1.25, 'G.y'), ('klann', 'i', 0.8, 'CF')])
 def test_a_search_finds_inputs_up_to_the_ends_of_the_reach(tmp_path, kind, key, factor, output):
     length = factor * mechanisms.create(kind).dimensions[key]
-    machine, = scene.read({'mechanisms': ['m'], 'm.type': kind, f'm.dimensions.{key}': length}
-                          ).machines.values()
-    linkage, invert = machine.linkage, inverter(tmp_path, machine, output)
+    mechanism, = scene.read({'mechanisms': ['m'], 'm.type': kind, f'm.dimensions.{key}': length}
+                            ).mechanisms.values()
+    linkage, invert = mechanism.linkage, inverter(tmp_path, mechanism, output)
     parts = np.array([0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1])
     for low, high in linkage.reach():
         for crank in low + (high - low) * np.concatenate([parts, 1.0 - parts]):
@@ -360,8 +361,8 @@ def test_a_search_finds_inputs_up_to_the_ends_of_the_reach(tmp_path, kind, key, 
 
 @pytest.mark.nightly
 def test_an_ankle_in_single_precision_is_that_of_python(tmp_path):
-    machine, = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).machines.values()
-    library = loaded(tmp_path, header.written(machine, single=True) + """
+    mechanism, = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).mechanisms.values()
+    library = loaded(tmp_path, header.written(mechanism, single=True) + """
 int pose(float right, float left, float *angle)
 {
     ankle_pose p;
@@ -378,7 +379,7 @@ int pose(float right, float left, float *angle)
     inputs = np.random.default_rng(4).uniform(-0.2, 0.2, (300, 2)).astype(np.float32)
     for given in inputs:
         found = (ctypes.c_float * 2)()
-        angles = machine.linkage.joint_angles([*map(float, given)])
+        angles = mechanism.linkage.joint_angles([*map(float, given)])
         assert library.pose(*map(ctypes.c_float, given), found)
         assert list(found) == pytest.approx([angles['pitch'], angles['roll']], abs=1e-5)
 
@@ -388,15 +389,15 @@ def test_the_sketch_has_the_header_of_its_scene():
     text = (sketch / 'lever.h').read_text()
     called = set(re.findall(r'\blever_\w+(?=\()', (sketch / 'hobby_servo.ino').read_text()))
     assert called and called <= set(re.findall(r'\blever_\w+', text))
-    machine, = scene.load(str(sketch / 'lever.yaml')).machines.values()
-    assert text == header.written(machine, ['lever'], single=True) + '\n'
+    mechanism, = scene.load(str(sketch / 'lever.yaml')).mechanisms.values()
+    assert text == header.written(mechanism, ['lever'], single=True) + '\n'
 
 
 @pytest.mark.parametrize('number, step, beyond', [('double', 1e-12, 1e-11),
                                                   ('float', 2e-5, 5e-5)])
-def test_small_steps_up_to_an_extreme_are_not_lost(machines, tmp_path, number, step, beyond):
-    machine = machines['slotted_lever']
-    library = loaded(tmp_path, header.written(machine, (), number == 'float') + f"""
+def test_small_steps_up_to_an_extreme_are_not_lost(mechanisms, tmp_path, number, step, beyond):
+    mechanism = mechanisms['slotted_lever']
+    library = loaded(tmp_path, header.written(mechanism, (), number == 'float') + f"""
 static slotted_lever_memory m;
 int begun(void) {{ return slotted_lever_begin(&m); }}
 int commanded(double value, double *crank)
@@ -425,7 +426,7 @@ double lever(double crank)
         assert command(library.lever(ctypes.c_double(crank))) == 0
         assert abs(answer.value - crank) <= step
     # What is hardly beyond is out of reach, there, too, where it is at the extreme already.
-    angles = machine.linkage.joint_angles(np.linspace(-math.pi, math.pi, 100_001), ['lever'])
+    angles = mechanism.linkage.joint_angles(np.linspace(-math.pi, math.pi, 100_001), ['lever'])
     for extreme, out in ((angles['lever'].min(), -beyond), (angles['lever'].max(), beyond)):
         for before in (0.5 * extreme, extreme - 0.1 * out):
             parts = -10.0, 1000.0, 10.0, 1.0
@@ -436,18 +437,19 @@ double lever(double crank)
 
 def test_a_scene_file_is_printed_as_c(capsys, monkeypatch):
     path = ROOT / 'config' / 'all.yaml'
-    machines, both = scene.load(path).machines, ['--mechanism', 'peaucellier', 'slotted_lever']
+    mechanisms, both = scene.load(path).mechanisms, ['--mechanism', 'peaucellier', 'slotted_lever']
     assert command.main([str(path), *both, '--output', 'crank', '--float', '--joints',
                          'peaucellier_PB', 'slotted_lever_lever']) == 0
     printed = capsys.readouterr().out
-    assert printed == header.printed([header.Request(machines[name], ['crank'], [joint])
+    assert printed == header.printed([header.Request(mechanisms[name], ['crank'], [joint])
                                       for name, joint in (
         ('peaucellier', 'peaucellier_PB'), ('slotted_lever', 'slotted_lever_lever'))], True) + '\n'
     assert printed.count('\n#define LINKAGE_ROS_LINKAGE_H\n') == 1
     monkeypatch.setattr('sys.argv', ['', str(path), *both[:2], '--output', 'PB', 'BC'])
     with pytest.raises(SystemExit, match='0'):
         runpy.run_module('linkage_ros.c_code', run_name='__main__')
-    assert capsys.readouterr().out == header.written(machines['peaucellier'], ['PB', 'BC']) + '\n'
+    printed = header.written(mechanisms['peaucellier'], ['PB', 'BC'])
+    assert capsys.readouterr().out == printed + '\n'
 
 
 def test_any_names_of_a_scene_are_names_in_c(tmp_path):
@@ -466,8 +468,8 @@ def test_any_names_of_a_scene_are_names_in_c(tmp_path):
             'O ground 0 0', 'Q ground 1 0', f'A crank O 0.3 called {name}']})
     outputs = {'Arm': ['Arm_Tip', 'angle(Arm,Tip)', 'Arm_Tip'], 'm0': ['q'], 'm1': ['A.x']}
     file = tmp_path / 'code.c'
-    file.write_text(''.join(header.written(machine, outputs.get(name, ()))
-                            for name, machine in scene.read(given).machines.items()))
+    file.write_text(''.join(header.written(mechanism, outputs.get(name, ()))
+                            for name, mechanism in scene.read(given).mechanisms.items()))
     text = file.read_text()
     assert 'Arm_crank_for_angle_Arm_Tip_2(' in text and 'slide_x_2;' in text
     for language in ('c', 'c++'):
@@ -483,19 +485,19 @@ LOADED = [['B=0 -9.81'], ['B=3 0', 'A=0 1', 'QB=0'], ['C=1 2', 'AB=-0.0', 'B=0 0
 @pytest.fixture(scope='module')
 def with_loads(tmp_path_factory):
     """Return a folder of C files of linkages with LOADED: double.c and float.c."""
-    machines = [*scene.read({
+    mechanisms = [*scene.read({
         'mechanisms': [f'm{i}' for i in range(len(LOADED))],
         **{f'm{i}.{key}': value for i, loads in enumerate(LOADED) for key, value in {
             'type': 'custom', 'loads': loads, 'crank.sweep': [-1.0, 1.0], 'joints': [
                 'O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left',
-                'C rigid A B 0.6 0.6 left']}.items()}}).machines.values()]
+                'C rigid A B 0.6 0.6 left']}.items()}}).mechanisms.values()]
     # A compiler does not warn of what a header that is included does not use.
     folder = tmp_path_factory.mktemp('loads')
     for single in (False, True):
         kind = 'float' if single else 'double'
         (folder / f'{kind}.h').write_text(header.printed([
-            header.Request(machine, [output]) for machine, output in zip(
-                machines, ['QB', 'B.y', 'C.x'])], single))
+            header.Request(mechanism, [output]) for mechanism, output in zip(
+                mechanisms, ['QB', 'B.y', 'C.x'])], single))
         (folder / f'{kind}.c').write_text(
             f'#include "{kind}.h"\nint main(void) {{ return 0; }}\n')
     return folder

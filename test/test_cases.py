@@ -149,7 +149,7 @@ def test_the_closed_four_bar_of_gazebo_stays_a_parallelogram():
 
 
 def test_a_scissor_lift_follows_from_the_cylinder_between_its_arms():
-    lift = scene.load('config/scissor_lift.yaml').machines['lift'].linkage
+    lift = scene.load('config/scissor_lift.yaml').mechanisms['lift'].linkage
     foot = np.linspace(0.6, 1.7, 31)
     height, length = (lift.joint_angles(foot, (name,))[name] for name in
                       ('P.y', 'distance(C,D)'))
@@ -172,7 +172,7 @@ def test_a_clamp_is_locked_where_handle_and_rod_are_in_line():
 
 
 def test_a_rack_steers_both_wheels_alike_and_the_inner_one_more():
-    steering = scene.load('config/rack_steering.yaml').machines['steering'].linkage
+    steering = scene.load('config/rack_steering.yaml').mechanisms['steering'].linkage
     right, left = (np.degrees(turned(steering, np.linspace(0.28, 0.42, 29), *ends))
                    for ends in ('ME', 'NF'))
     right, left = right - right[14], left - left[14]
@@ -249,8 +249,9 @@ def test_a_carriage_alone_is_a_linkage_and_has_a_picture(tmp_path):
     linkage = mechanisms.create('custom', joints=rail)
     assert linkage.reach() == [(-0.2, 0.7)] and linkage.input_for('R.x', 0.3) == [0.3]
     assert linkage.extremes('R.x') == [((-0.2, -0.2), (0.7, 0.7))]
-    machine = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': rail}).machines['m']
-    assert Pinocchio(urdf.describe([machine], 'world')).joints == ['m_carriage']
+    mechanism = scene.read({
+        'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': rail}).mechanisms['m']
+    assert Pinocchio(urdf.describe([mechanism], 'world')).joints == ['m_carriage']
     path = tmp_path / 'rail.yaml'
     path.write_text(
         f'/**: {{ros__parameters: {{mechanisms: [m], m.type: custom, m.joints: {rail}}}}}')

@@ -210,8 +210,8 @@ def test_commands_move_the_picture(stream, graph):
     ('four_bar', 'QB', 1.0), ('jansen', 'G.x', 1.0), ('slider_crank', 'block', 1.0),
     ('watt', 'P.y', 1.0), ('whitworth', 'lever', 3.0)])
 def test_a_turning_crank_is_found_again_without_a_jump(type_, output, part):
-    machine = scene.read({'mechanisms': ['one'], 'one.type': type_}).machines['one']
-    linkage, wanted = machine.linkage, InverseRequest(machine, [output])
+    mechanism = scene.read({'mechanisms': ['one'], 'one.type': type_}).mechanisms['one']
+    linkage, wanted = mechanism.linkage, InverseRequest(mechanism, [output])
     (_, start), (_, end) = linkage.extremes(output)[0]
     near = start + 0.02 * part * (end - start)
     for k in range(2, 98):
@@ -287,7 +287,7 @@ def test_without_a_closed_form_a_first_command_does_not_jump_and_no_message_wait
         graph, capfd, monkeypatch):
     monkeypatch.setattr(InverseRequest, 'reason', None)
     stream = Stream(graph, SEVERAL)
-    linkage = stream.node.scene.machines['digger'].linkage
+    linkage = stream.node.scene.mechanisms['digger'].linkage
     outputs = linkage.function((), tuple(name.split('_')[1] for name in SEARCHED))
     near, far = [108.1, 132.1, 119.1], [56.8, 137.9, 133.8]
     for inputs, moved in ((far, {}), (near, {'digger_cylinder': near[0] - 80.0})):

@@ -73,11 +73,11 @@ void {name}_counts(long poses, long *counts)
 
 def read(name, joint_lines, names=(), **given):
     """Return a mechanism of joint lines, with the names of its commanded joints."""
-    machine, = scene.read({
+    mechanism, = scene.read({
         'mechanisms': [name], f'{name}.type': 'custom', f'{name}.joints': list(joint_lines),
-        **{f'{name}.{key}': value for key, value in given.items()}}).machines.values()
-    joints(machine, names)
-    return header.Request(machine, (), tuple(names))
+        **{f'{name}.{key}': value for key, value in given.items()}}).mechanisms.values()
+    joints(mechanism, names)
+    return header.Request(mechanism, (), tuple(names))
 
 
 def drawn(seeds):
@@ -117,8 +117,8 @@ def questions(folder, cases, number):
 
 @pytest.mark.parametrize('output, joint_lines', FAULTS)
 def test_a_closed_form_knows_every_assembly_mode(tmp_path, output, joint_lines):
-    machine = read('fault', joint_lines).mechanism
-    linkage, invert = machine.linkage, inverter(tmp_path, machine, output)
+    mechanism = read('fault', joint_lines).mechanism
+    linkage, invert = mechanism.linkage, inverter(tmp_path, mechanism, output)
     (low, high), = linkage.reach()
     for given in np.linspace(low, high, 41)[1:-1]:
         value = float(linkage.joint_angles(given, [output])[output])
@@ -132,11 +132,11 @@ def test_a_closed_form_knows_every_assembly_mode(tmp_path, output, joint_lines):
 @pytest.mark.nightly
 @NUMBERS
 def test_the_catalogue_and_what_was_refused(tmp_path, number):
-    machines = scene.read({'mechanisms': [*mechanisms.TYPES], **{
-        f'{name}.type': name for name in mechanisms.TYPES}}).machines.values()
+    catalogue = scene.read({'mechanisms': [*mechanisms.TYPES], **{
+        f'{name}.type': name for name in mechanisms.TYPES}}).mechanisms.values()
     faults = [read(f'fault{i}', joint_lines, [f'fault{i}_{output}'])
               for i, (output, joint_lines) in enumerate(FAULTS)]
-    assert min(questions(tmp_path, [*map(header.Request, machines), *faults], number)) > 200
+    assert min(questions(tmp_path, [*map(header.Request, catalogue), *faults], number)) > 200
 
 
 @pytest.mark.nightly

@@ -141,7 +141,7 @@ def test_a_new_dimension_keeps_the_crank_in_its_new_reach(graph):
     driver = Driver(graph, {**CELL, 'cell.crank.speed': 0.0, 'cell.crank.start': 1.1})
     assert driver.at(SECOND) == (1.1, 0.0)
     graph.change(driver.node, CELL, cell__dimensions__r=2.6)
-    (_, end), = driver.node.scene.machines['cell'].first.reach
+    (_, end), = driver.node.scene.mechanisms['cell'].first.reach
     assert 0.0 < driver.at(2 * SECOND)[0] < end < 1.0
     assert driver.set(cell__crank__start=0.25).successful
     assert driver.at(3 * SECOND) == (0.25, 0.0)

@@ -116,25 +116,25 @@ def test_what_hangs_on_a_cylinder_limits_its_stroke():
 
 
 def test_several_cylinders_are_several_inputs():
-    machine = scene.load('config/excavator.yaml').machines['excavator']
-    assert list(machine.inputs) == ['boom', 'arm', 'bucket']
+    mechanism = scene.load('config/excavator.yaml').mechanisms['excavator']
+    assert list(mechanism.inputs) == ['boom', 'arm', 'bucket']
     lengths = [0.9, 1.3, 1.1]
-    place = {name: complex(*at) for name, at in machine.linkage.solve(lengths).items()}
+    place = {name: complex(*at) for name, at in mechanism.linkage.solve(lengths).items()}
     for (base, rod), length in zip(('PB', 'CD', 'FG'), lengths):
         assert abs(place[base] - place[rod]) == pytest.approx(length, rel=1e-14)
-    for (first, second), length in machine.linkage.bar_lengths.items():
+    for (first, second), length in mechanism.linkage.bar_lengths.items():
         assert abs(place[first] - place[second]) == pytest.approx(length, rel=1e-13)
-    bucket = machine.linkage.velocity(lengths, by=2)
+    bucket = mechanism.linkage.velocity(lengths, by=2)
     assert not bucket['A'].any() and bucket['T'].any()
 
 
 def test_a_scene_counts_lengths_in_metres_scaled():
-    machine = scene.read({**SCENE, 'boom.scale': 10.0, 'boom.cylinder.speed': 0.5,
-                          'boom.cylinder.start': 9.0}).machines['boom']
-    drive = machine.first
+    mechanism = scene.read({**SCENE, 'boom.scale': 10.0, 'boom.cylinder.speed': 0.5,
+                            'boom.cylinder.start': 9.0}).mechanisms['boom']
+    drive = mechanism.first
     assert drive.reach[0] == pytest.approx(np.multiply(10.0, boom().reach()[0]))
     assert drive.start == 9.0 and drive.sweep[0] > drive.reach[0][0]
-    solution = machine.assembly().solution(('B', 'P'), ('OB',), ('OB',))
+    solution = mechanism.assembly().solution(('B', 'P'), ('OB',), ('OB',))
     solution.solve([9.0], [0.5])
     *places, angle, speed = solution.rows[0]
     assert math.dist(places[:2], places[2:]) == pytest.approx(9.0)
@@ -156,17 +156,17 @@ def test_its_parameters_say_metres_and_have_sliders():
     read = scene.read(SCENE)
     about = {parameter.name: parameter for parameter in read.parameters}
     assert about['boom.cylinder.speed'].field.meaning == 'Speed of the cylinder [m/s].'
-    boom = read.machines['boom']
+    boom = read.mechanisms['boom']
     low, high = slider.ends(boom, about['boom.cylinder.start'])
     (least, greatest), = boom.first.reach
     assert low <= least and high == pytest.approx(greatest, abs=0.03)
 
 
 def test_a_picture_follows_the_stroke_there_and_back():
-    machine = scene.read({**SCENE, 'boom.cylinder.start': 0.9}).machines['boom']
-    cycle = Cycle(machine)
+    mechanism = scene.read({**SCENE, 'boom.cylinder.start': 0.9}).mechanisms['boom']
+    cycle = Cycle(mechanism)
     assert cycle.pose(0.0).inputs == (0.9,)
-    low, high = machine.first.sweep
+    low, high = mechanism.first.sweep
     lengths = [cycle.pose(turns).inputs[0] for turns in np.linspace(0.0, 1.0, 101)]
     assert low <= min(lengths) < low + 0.03 and high - 0.03 < max(lengths) <= high
     assert np.isfinite(cycle.course).all()

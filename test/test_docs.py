@@ -109,13 +109,13 @@ def test_the_pictures_that_are_kept_are_small():
 
 def test_every_word_has_its_drawing_with_the_very_lines_that_it_shows():
     pytest.importorskip('yaml')
-    machines = scene.load(ROOT / 'pictures' / 'words.yaml').machines
+    mechanisms = scene.load(ROOT / 'pictures' / 'words.yaml').mechanisms
     text = (ROOT / 'docs' / 'which-word.md').read_text()
     rows = re.findall(r'\(images/words/(\w+)\.png\)\n\n```text\n(.*?)\n```', text, re.DOTALL)
     shown = {name: lines.splitlines() for name, lines in rows}
-    assert len(rows) == len(shown) and set(shown) == set(machines)
+    assert len(rows) == len(shown) and set(shown) == set(mechanisms)
     for name, lines in shown.items():
-        written = machines[name].values[f'{name}.joints']
+        written = mechanisms[name].values[f'{name}.joints']
         assert lines == [line for line in written if line in lines]
         assert lines[-1] == written[-1]
     drawn = {part for lines in shown.values() for part in lines[-1].split()}
@@ -162,7 +162,7 @@ def test_the_example_of_a_scene_file_is_a_scene(page):
     yaml = pytest.importorskip('yaml')
     text, = blocks(ROOT / 'docs' / f'{page}.md', 'yaml')
     given = yaml.safe_load(text)['/**']['ros__parameters']
-    assert list(scene.read(given).machines) == given['mechanisms']
+    assert list(scene.read(given).mechanisms) == given['mechanisms']
 
 
 @pytest.mark.parametrize('type_', list(mechanisms.TYPES))

@@ -183,19 +183,20 @@ def test_machine_code_has_the_limits_too(word):
 
 
 def folded_scene():
-    """Return the machine of a scene with the folded dyad."""
+    """Return the mechanism of a scene with the folded dyad."""
     return scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
         'O ground 0 0', 'Q ground 0.25 0', 'A crank O 0.25',
-        'C dyad A Q 0.25 0.25 left']}).machines['m']
+        'C dyad A Q 0.25 0.25 left']}).mechanisms['m']
 
 
 @pytest.mark.parametrize('single', [False, True])
 def test_generated_c_has_the_limits_too(tmp_path, single):
-    machine = folded_scene()
+    mechanism = folded_scene()
     kind = np.float32 if single else np.float64
     theta = np.array([0.0, 1e-30, -1e-30, 1e-12, 1e-3])
-    *found, whole = solved(compiled(tmp_path, [machine], single), machine, theta[:, None], kind).T
-    at = 2 * machine.linkage.points.index('C')
+    *found, whole = solved(
+        compiled(tmp_path, [mechanism], single), mechanism, theta[:, None], kind).T
+    at = 2 * mechanism.linkage.points.index('C')
     assert whole.all()
     close = 1e-7 if single else 1e-16
     np.testing.assert_allclose(found[at], 0.25 * (1.0 + np.cos(theta)), atol=close)

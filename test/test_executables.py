@@ -228,8 +228,8 @@ def test_the_library_works_where_there_is_no_ros():
         sys.modules['rclpy'] = None
         from linkage_ros import scene
         from linkage_ros.scene import motion
-        machine = scene.read({}).machines['jansen']
-        assert machine.assembly().solution(('G',)).rows.shape == (1, 2)
+        mechanism = scene.read({}).mechanisms['jansen']
+        assert mechanism.assembly().solution(('G',)).rows.shape == (1, 2)
         assert motion.Motion(1.0).at(10 ** 9) == (1.0, 1.0)
         try:
             import linkage_ros.nodes.kinematics

@@ -287,7 +287,7 @@ def test_joints_that_no_mechanism_publishes_are_one_of_cranks(tmp_path):
                     ('source', source), ('ratio', ratio), ('offset', offset), ('start', start),
                     ('speed', 0.0))}}
     assert command.others(readers.read(str(ROBOTS / 'four_bar.sdf')), scene.read(command.described(
-        readers.read(str(ROBOTS / 'four_bar.sdf')))[0]).machines, {}) == ({}, [])
+        readers.read(str(ROBOTS / 'four_bar.sdf')))[0]).mechanisms, {}) == ({}, [])
 
 
 LEG = """<link name="coupler{0}"/><link name="rocker{0}"/>
@@ -608,15 +608,16 @@ def test_a_cylinder_in_space_turns_a_foot(tmp_path, capsys, ends, within):
     out, err = capsys.readouterr()
     assert 'in 240 poses of the robot, ram from ' in err and 'Left out' not in err
     file.with_suffix('.yaml').write_text(out)
-    (name, machine), = scene.load(str(file.with_suffix('.yaml'))).machines.items()
-    drive, = machine.inputs.values()
-    assert (name, drive.source, machine.frame_id) == ('ram_rods', 'ram', 'shin')
+    (name, mechanism), = scene.load(str(file.with_suffix('.yaml'))).mechanisms.items()
+    drive, = mechanism.inputs.values()
+    assert (name, drive.source, mechanism.frame_id) == ('ram_rods', 'ram', 'shin')
     assert drive.start == pytest.approx(np.linalg.norm(way))
     assert f'- pitch hinge ground at 0 0 0.1 axis 0 1 0{within} - ram' in ' '.join(out.split())
     for angle in np.linspace(-0.39, 0.49, 9):
         length = np.linalg.norm(pivot + rotation((0.0, angle, 0.0)) @ eye - base)
         ram = 0.3 + length - np.linalg.norm(way)
-        assert published(machine, ram=ram) == pytest.approx({'pitch': angle, 'ram': ram}, abs=1e-9)
+        assert published(mechanism, ram=ram) == pytest.approx(
+            {'pitch': angle, 'ram': ram}, abs=1e-9)
 
 
 @pytest.mark.parametrize('old, new, why', [

@@ -145,32 +145,32 @@ def test_a_gear_that_is_too_fast_is_refused_with_what_is_allowed(ratio):
 
 @pytest.mark.parametrize('ratio', ['1/80', '0.12345', 'sqrt(2)', '22/7'])
 def test_a_driver_goes_on_without_a_jump_until_all_comes_round(ratio):
-    machine = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
-        'O ground 0 0', 'M crank O 0.01', f'A crank O 1 geared crank {ratio} 0']}).machines['m']
-    motion, gear = Motion.of(machine.first), Fraction(machine.linkage.gear('crank2')[0])
+    mechanism = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
+        'O ground 0 0', 'M crank O 0.01', f'A crank O 1 geared crank {ratio} 0']}).mechanisms['m']
+    motion, gear = Motion.of(mechanism.first), Fraction(mechanism.linkage.gear('crank2')[0])
     for seconds in (1, 10 ** 4, 10 ** 7):
         angle, _ = motion.at(seconds * 10 ** 9)
         turned = float(gear * seconds % Fraction(math.tau))
         # 2 pi is rounded, once a turn.
-        assert machine.linkage.solve(angle)['A'] == pytest.approx(
+        assert mechanism.linkage.solve(angle)['A'] == pytest.approx(
             [math.cos(turned), math.sin(turned)], abs=1e-14 * seconds + 1e-9)
 
 
 def test_c_goes_on_in_the_turn_of_near(tmp_path):
     for name, ratio in (('slow', '1/80'), ('fast', '180')):
-        machine = scene.read({'mechanisms': [name], f'{name}.type': 'custom', f'{name}.joints': [
+        mechanism = scene.read({'mechanisms': [name], f'{name}.type': 'custom', f'{name}.joints': [
             'O ground 0 0', 'M crank O 0.01', f'A crank O 1 geared crank {ratio} 0']}
-        ).machines[name]
+        ).mechanisms[name]
         (tmp_path / name).mkdir()
-        invert = inverter(tmp_path / name, machine, 'A.x')
+        invert = inverter(tmp_path / name, mechanism, 'A.x')
         for near in (0.4, 83.0, 83.0 + 320.0 * math.pi):
-            value = machine.linkage.solve(near)['A'][0]
+            value = mechanism.linkage.solve(near)['A'][0]
             assert invert(value, near + 1e-3) == pytest.approx(near, abs=1e-9)
 
 
 def test_what_cannot_be_searched_in_c_is_refused():
-    machine = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
+    mechanism = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
         'O ground 0 0', 'M crank O 0.01', 'A crank O 1 geared crank sqrt(2) 0'],
-        'm.crank.sweep': [-1.0, 1.0]}).machines['m']
+        'm.crank.sweep': [-1.0, 1.0]}).mechanisms['m']
     with pytest.raises(ValueError, match='A.x of m .* repeats after too many turns'):
-        header.written(machine, ['A.x'])
+        header.written(mechanism, ['A.x'])

@@ -22,7 +22,8 @@ def linkages(a):
     """Return the linkages of jansens with a dimension, of three sizes."""
     given = {f'{name}.{key}': value for i, name in enumerate('xyz') for key, value in (
         ('type', 'jansen'), ('scale', 1.0 + i), ('dimensions.a', a))}
-    return [one.linkage for one in scene.read({'mechanisms': [*'xyz'], **given}).machines.values()]
+    shown = scene.read({'mechanisms': [*'xyz'], **given})
+    return [mechanism.linkage for mechanism in shown.mechanisms.values()]
 
 
 def test_equal_linkages_are_one_and_their_travels_are_found_once():

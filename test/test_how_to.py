@@ -237,7 +237,7 @@ def test_two_robots_of_one_kind(graph, reader):
 def test_robots_of_each_format(reader):
     pytest.importorskip('mujoco')
     reader.follow('robot-files')
-    lid = scene.load('lid.yaml').machines['motor']
+    lid = scene.load('lid.yaml').mechanisms['motor']
     # The lid is closed in the pose of its file, in which all joints are at zero.
     angles = lid.linkage.joint_angles(lid.first.offset)
     names = {called.name: called.of(angles[link]) for link, called in lid.joints.items()
@@ -249,14 +249,14 @@ def test_robots_of_each_format(reader):
 def test_the_scene_of_a_whole_robot(reader):
     reader.follow('how-to/whole-robot')
     shown = scene.load('robot.yaml')
-    assert len(shown.machines) == 2
+    assert len(shown.mechanisms) == 2
     line = Path('robot.yaml').read_text().splitlines()[1]
     assert line.startswith('# ros2 launch linkage_ros robot.launch.py robot:=examples/leg.urdf')
 
 
 def test_coordinates_of_a_drawing(reader):
     robot = LIBRARIES[0](reader.follow('how-to/cad-export'))
-    lid = scene.load('export.yaml').machines['lid']
+    lid = scene.load('export.yaml').mechanisms['lid']
     angles = lid.linkage.joint_angles(lid.first.start)
     places = robot.places({f'lid_{name}': angle for name, angle in angles.items()},
                           ['lid_A', 'lid_B'])
@@ -265,12 +265,12 @@ def test_coordinates_of_a_drawing(reader):
 
 
 def test_ros2_control_moves_the_motors_of_the_scene(graph, reader):
-    machines = reader.follow('how-to/ros2-control').scene.machines
-    sources = {name: [machine.first.source] for name, machine in machines.items()}
+    mechanisms = reader.follow('how-to/ros2-control').scene.mechanisms
+    sources = {name: [mechanism.first.source] for name, mechanism in mechanisms.items()}
     motors = [motor for listed in sources.values() for motor in listed]
     controllers = yaml.safe_load(Path('controllers.yaml').read_text())
     control, robot = map(ElementTree.parse, ('control.urdf', 'examples/leg.urdf'))
-    assert {name: controllers[name]['ros__parameters']['joints'] for name in machines} == sources
+    assert {name: controllers[name]['ros__parameters']['joints'] for name in mechanisms} == sources
     assert [joint.get('name') for joint in control.iter('joint')] == motors
     assert {*motors} < {joint.get('name') for joint in robot.iter('joint')}
 

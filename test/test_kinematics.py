@@ -45,7 +45,7 @@ class Bench:
 
     def legs_at(self, theta):
         """Return the joints' places at a crank angle, of each leg by name."""
-        points = self.node.scene.machines[self._name].points
+        points = self.node.scene.mechanisms[self._name].points
         rows = places(self.markers_at(theta)[1]).reshape(-1, len(points), 2)
         return [dict(zip(points, row)) for row in rows]
 
@@ -128,10 +128,10 @@ def test_what_cannot_be_assembled_is_said_with_the_reason(graph, parameters, pos
     node = graph.start(Kinematics, {'mechanisms': ['m'], **{
         f'm.{key}': value for key, value in parameters.items()}} if parameters else {
             one.name: one.value for one in ANKLE.parameters if one.value != ()})
-    machine, = node.scene.machines.values()
-    graph.listen(JointState, f'{machine.name}/joint_states')
+    mechanism, = node.scene.mechanisms.values()
+    graph.listen(JointState, f'{mechanism.name}/joint_states')
     graph.until(lambda: node.count_subscribers('/rosout'))
-    push = graph.crank([settings.source for settings in machine.inputs.values()])
+    push = graph.crank([settings.source for settings in mechanism.inputs.values()])
     graph.until(lambda: push.send(positions) and [
         m for m in heard if 'cannot be assembled' in m.msg])
     text, = {m.msg for m in heard if 'cannot be assembled' in m.msg}
@@ -157,8 +157,8 @@ def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, g
         **given, f'{name}.pose': pose, f'{name}.frame_id': 'floor', 'frame_prefix': 'robot/'})
     drawn, locus = graph.listen(MarkerArray, f'{name}/markers'), graph.listen(
         Marker, f'{name}/locus', LATCHED)
-    machine, = node.scene.machines.values()
-    push = graph.crank([drive.source for drive in machine.inputs.values()])
+    mechanism, = node.scene.mechanisms.values()
+    push = graph.crank([drive.source for drive in mechanism.inputs.values()])
     markers = push([0.3] if len(ids) > 5 else [2.0, 1.1], drawn).markers
     (cr, cp, cy), (sr, sp, sy) = np.cos(pose[3:]), np.sin(pose[3:])
     # The third column of the rotation about x, then y, then z.
@@ -286,7 +286,7 @@ def test_the_driver_tells_what_the_motor_would(graph, told):
                     for topic in ('bars/joint_states', 'crank_states'))
     graph.until(lambda: len(states) > 5 and len(sent) > 5)
     assert set(sent[-1].name) == {told.get('bars.crank.source', 'bars_QB')}
-    crank = driver.scene.machines['bars'].first
+    crank = driver.scene.mechanisms['bars'].first
     low, high = crank.sweep or (-math.inf, math.inf)
     assert all(low <= state.position[0] <= high for state in states)
     assert all(abs(state.velocity[0]) == pytest.approx(1.0) for state in states)

@@ -68,7 +68,7 @@ def test_rviz_and_foxglove_show_what_the_nodes_of_the_scene_publish(graph, shown
             if type_ in types and name != '/robot_description':
                 info, = node.get_publishers_info_by_topic(name)
                 published.add((name, class_, DURABLE[info.qos_profile.durability.name]))
-    assert len(published) == 3 * len(given.machines)
+    assert len(published) == 3 * len(given.mechanisms)
     assert topics(shown) == published
     layout = json.loads((CONFIG / 'linkage.foxglove.json').read_text())
     panels, room = layout['configById'], layout['layout']
@@ -79,7 +79,7 @@ def test_rviz_and_foxglove_show_what_the_nodes_of_the_scene_publish(graph, shown
     for path in panels['Plot!joints']['paths']:
         found = re.fullmatch(r'/(\w+)/joint_states\.position\[(\d)\]', path['value'])
         name, place = found.groups()
-        called = [joint.name for joint in given.machines[name].joints.values()]
+        called = [joint.name for joint in given.mechanisms[name].joints.values()]
         assert path['label'] == called[int(place)]
 
 
@@ -88,35 +88,36 @@ def test_rviz_looks_from_where_the_linkages_are_seen(shown):
     manager = shown['Visualization Manager']
     assert manager['Global Options']['Fixed Frame'] == given.frame_id
     groups = [d['Name'] for d in manager['Displays'] if d['Class'] == rviz.GROUP]
-    assert groups == list(given.machines)
+    assert groups == list(given.mechanisms)
     enabled = {d['Class'] for d in displays(shown) if d['Enabled']}
     assert enabled == {'rviz_default_plugins/Grid', 'rviz_default_plugins/MarkerArray',
                        'rviz_default_plugins/Marker'}
     # Along +y, on the plane x-z that they stand in.
     assert manager['Views']['Current']['Yaw'] == pytest.approx(4.712389)
-    assert all(machine.pose[3:] == pytest.approx((1.5707963, 0.0, 0.0))
-               for machine in given.machines.values())
+    assert all(mechanism.pose[3:] == pytest.approx((1.5707963, 0.0, 0.0))
+               for mechanism in given.mechanisms.values())
 
 
 def test_rviz_shows_any_other_scene_too(shown):
     given = scene.load(str(CONFIG / 'all.yaml'))
-    assert rviz.adapted(shown, given.machines, given.frame_id) == shown
-    machines = scene.read({'mechanisms': ['walker', 'jansen'], 'walker.type': 'klann'}).machines
-    other = rviz.adapted(shown, machines, 'earth', 'left/side', True, 'left/')
+    assert rviz.adapted(shown, given.mechanisms, given.frame_id) == shown
+    mechanisms = scene.read(
+        {'mechanisms': ['walker', 'jansen'], 'walker.type': 'klann'}).mechanisms
+    other = rviz.adapted(shown, mechanisms, 'earth', 'left/side', True, 'left/')
     assert {name for name, *_ in topics(other)} == {
         f'/left/side/{name}/{topic}' for name in ('walker', 'jansen')
         for topic in ('markers', 'locus', 'robot_description')}
     assert other['Visualization Manager']['Global Options']['Fixed Frame'] == 'earth'
     assert all(d['Enabled'] and d['Value'] for d in displays(other))
     assert [d['TF Prefix'] for d in displays(other) if 'TF Prefix' in d] == ['left', 'left']
-    assert rviz.adapted(other, given.machines, given.frame_id)['Panels'] == shown['Panels']
+    assert rviz.adapted(other, given.mechanisms, given.frame_id)['Panels'] == shown['Panels']
 
 
 def test_rviz_opens_on_all_of_a_linkage_in_space(shown):
-    machines = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).machines
-    view = rviz.adapted(shown, machines, 'world')['Visualization Manager']['Views']['Current']
+    mechanisms = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).mechanisms
+    view = rviz.adapted(shown, mechanisms, 'world')['Visualization Manager']['Views']['Current']
     focus = [view['Focal Point'][axis] for axis in 'XYZ']
-    linkage = machines['ankle'].linkage
+    linkage = mechanisms['ankle'].linkage
     places = np.array(list(linkage.solve([0.0, 0.0]).values()))
     off = np.linalg.norm(places - focus, axis=1)
     assert 0.3 < off.max() / view['Distance'] / math.sin(math.radians(22.5)) < 1.0

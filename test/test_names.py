@@ -85,8 +85,8 @@ def test_dimensions_and_types_have_such_names_too(made):
 @of_any_class
 def test_a_header_is_the_same_for_outputs_of_any_class(made):
     given = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
-    machine = scene.read(given).machines['lever']
-    assert header.written(machine, [made('lever')]) == header.written(machine, ['lever'])
+    mechanism = scene.read(given).mechanisms['lever']
+    assert header.written(mechanism, [made('lever')]) == header.written(mechanism, ['lever'])
 
 
 @of_any_class

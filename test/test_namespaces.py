@@ -33,7 +33,7 @@ def linkage(kind):
             'O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'C crank Q 0.5 geared crank -2 0.3',
             'B dyad A C 2 2 left'))
     if kind in files:
-        return scene.load(files[kind]).machines[kind].linkage
+        return scene.load(files[kind]).mechanisms[kind].linkage
     return mechanisms.create(kind)
 
 

@@ -148,8 +148,8 @@ def test_after_a_slip_the_owner_is_followed_and_nothing_is_lost(
         announce(mechanisms=['lever'], lever__type='slotted_lever', lever__dimensions__a=81.0)
         graph.until(lambda: errors(log))
     announce(lever__scale=2.0)
-    lever = graph.until(lambda: node.scene.machines['lever'].scale == 2.0
-                        and node.scene.machines['lever'])
+    lever = graph.until(lambda: node.scene.mechanisms['lever'].scale == 2.0
+                        and node.scene.mechanisms['lever'])
     assert lever.linkage.dimensions['a'] == 81.0
     logged_once(graph, node, log)
 

@@ -108,7 +108,8 @@ def by_lanes(name, values):
 def c_library(tmp_path_factory):
     """Return a function that does an operation in C, for double or float."""
     libraries = {}
-    lever = scene.read({'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}).machines['lever']
+    lever = scene.read(
+        {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}).mechanisms['lever']
     for kind, f in (('double', ''), ('float', 'f')):
         text = [header.written(lever, (), bool(f))]
         for name, row in OPERATIONS.items():

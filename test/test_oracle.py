@@ -133,8 +133,8 @@ def test_the_reach_is_the_same_in_any_turn(graph, turn):
                                   'more legs than are solved one by one'])
 def test_numbers_are_the_same_at_the_ends_of_the_reach_and_in_many_legs(graph, name):
     bench = Bench(graph, SCENES[name])
-    drives = [drive for machine in bench.model.scene.machines.values()
-              for drive in machine.inputs.values()]
+    drives = [drive for mechanism in bench.model.scene.mechanisms.values()
+              for drive in mechanism.inputs.values()]
     middle = {drive.source: 0.5 * sum(drive.reach[0]) for drive in drives}
     speeds = [1.0] * len(drives)
     bench.run([*everything(SCENES[name]), message(middle, speeds), ('compiled',), *(

@@ -111,25 +111,25 @@ def test_whole_turns_of_a_wanted_angle_cost_no_digits(value):
 
 
 def test_a_scene_measures_lengths_scaled_and_beyond_a_branch_the_nearest_answer():
-    machine = scene.read({**LIFT, 'lift.cylinder.measures': 'OB'}).machines['lift']
+    mechanism = scene.read({**LIFT, 'lift.cylinder.measures': 'OB'}).mechanisms['lift']
     for length in (1.3, 2.0, 3.1):
-        angle = machine.linkage.joint_angles(length / 2.0)['OB']
-        (found,), (rate,) = machine.follow(['OB'], [float(angle)], [2.0])
+        angle = mechanism.linkage.joint_angles(length / 2.0)['OB']
+        (found,), (rate,) = mechanism.follow(['OB'], [float(angle)], [2.0])
         assert found == pytest.approx(length)
-        assert rate == pytest.approx(0.5 * machine.linkage.joint_rates(length / 2.0)['OB'])
-    drawn = machine.linkage.solve(1.0)['C']
-    assert machine.follow(['C.x'], [2.0 * drawn[0]], [2.0])[0][0] == pytest.approx(2.0)
-    crank = scene.read({**ROCKER, 'bars.crank.measures': 'QB'}).machines['bars']
+        assert rate == pytest.approx(0.5 * mechanism.linkage.joint_rates(length / 2.0)['OB'])
+    drawn = mechanism.linkage.solve(1.0)['C']
+    assert mechanism.follow(['C.x'], [2.0 * drawn[0]], [2.0])[0][0] == pytest.approx(2.0)
+    crank = scene.read({**ROCKER, 'bars.crank.measures': 'QB'}).mechanisms['bars']
     across = float(crank.linkage.joint_angles(math.pi - 0.01)['QB'])
     assert crank.follow(['QB'], [across], [math.pi + 0.01])[0][0] == pytest.approx(math.pi - 0.01)
 
 
 def test_a_measured_value_stays_inside_the_sweep_that_is_set():
     swept = scene.read({**ROCKER, 'bars.crank.measures': 'QB', 'bars.crank.sweep': [0.5, 1.0]})
-    machine = swept.machines['bars']
-    inside, outside = (float(machine.linkage.joint_angles(theta)['QB']) for theta in (0.8, 1.6))
-    assert machine.follow(['QB'], [inside], [0.6])[0][0] == pytest.approx(0.8)
-    assert math.isnan(machine.follow(['QB'], [outside], [0.6])[0][0])
+    mechanism = swept.mechanisms['bars']
+    inside, outside = (float(mechanism.linkage.joint_angles(theta)['QB']) for theta in (0.8, 1.6))
+    assert mechanism.follow(['QB'], [inside], [0.6])[0][0] == pytest.approx(0.8)
+    assert math.isnan(mechanism.follow(['QB'], [outside], [0.6])[0][0])
 
 
 @pytest.mark.parametrize('name, source, text', [

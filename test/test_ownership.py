@@ -229,7 +229,7 @@ def test_a_cylinder_is_moved_over_its_scaled_stroke_whoever_sets_the_scale(graph
     assert not graph.set(driver, boom__cylinder__speed=-1e3).successful
     graph.until(lambda: graph.set(owner, boom__scale=5.0).successful
                 and of(driver, 'boom.scale') == 5.0)
-    assert driver.scene.machines['boom'].inputs == owner.scene.machines['boom'].inputs
+    assert driver.scene.mechanisms['boom'].inputs == owner.scene.mechanisms['boom'].inputs
     heard = graph.listen(JointState, 'crank_states')
     # Beyond the stroke without the scale.
     graph.until(lambda: heard and heard[-1].position[0] > 2.6)

@@ -140,8 +140,8 @@ def test_a_linkage_in_space_is_drawn_whole_and_says_what_the_page_does_not(start
     seen.downloads(tmp_path)
     seen.value(f'{seen.button("C")}.click()')
     until((tmp_path / 'ankle.h').exists)
-    machine = scene.read(example('ankle')).machines['ankle']
-    assert (tmp_path / 'ankle.h').read_text() == header.written(machine)
+    mechanism = scene.read(example('ankle')).mechanisms['ankle']
+    assert (tmp_path / 'ankle.h').read_text() == header.written(mechanism)
 
 
 # --- tuning ---
@@ -250,7 +250,7 @@ def test_changes_are_saved_undone_and_reset(start, tmp_path):
     seen.click(seen.button('scene file'))
     saved = tmp_path / 'leg.yaml'
     until(saved.exists)
-    dimensions = scene.load(str(saved)).machines['leg'].linkage.dimensions
+    dimensions = scene.load(str(saved)).mechanisms['leg'].linkage.dimensions
     assert (dimensions['g'], dimensions['h'], dimensions['i']) == (37.25, 60.5, 49.0)
     seen.click(seen.button('Undo'))
     becomes(g=36.7, h=60.5)
@@ -435,12 +435,12 @@ def test_a_plot_follows_what_is_tuned_and_all_can_be_downloaded(start, tmp_path)
     files = [tmp_path / f'leg.{ending}' for ending in ('csv', 'png', 'urdf', 'h')]
     until(lambda: all(file.exists() for file in files))
     assert list(Image.open(files[1]).size) == seen.value('[picture.width, picture.height]')
-    machine = scene.read({**given, 'leg.dimensions.m': 16.0, 'leg.crank.start':
-                          running.value('leg.crank.start')}).machines['leg']
+    mechanism = scene.read({**given, 'leg.dimensions.m': 16.0, 'leg.crank.start':
+                            running.value('leg.crank.start')}).mechanisms['leg']
     assert (tmp_path / 'leg.csv').read_text() == curves.table(
-        machine, [machine.first.start])
-    assert (tmp_path / 'leg.urdf').read_text() == urdf.describe([machine], 'world')
-    assert (tmp_path / 'leg.h').read_text() == header.written(machine)
+        mechanism, [mechanism.first.start])
+    assert (tmp_path / 'leg.urdf').read_text() == urdf.describe([mechanism], 'world')
+    assert (tmp_path / 'leg.h').read_text() == header.written(mechanism)
 
 
 @pytest.mark.nightly

@@ -193,5 +193,5 @@ kinematics:
   ros__parameters: {jansen.scale: 3.0}
 """)
     found = scene.load(str(path))
-    assert (found.rate, found.machines['jansen'].first.speed) == (100.0, 2.5)
-    assert found.machines['jansen'].scale == 2.0
+    assert (found.rate, found.mechanisms['jansen'].first.speed) == (100.0, 2.5)
+    assert found.mechanisms['jansen'].scale == 2.0

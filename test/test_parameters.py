@@ -229,7 +229,7 @@ def test_the_parameters_of_another_scene_can_be_loaded_in_one_request(graph):
     assert not alone.successful
     results = Client(graph, node).set(*values, ('leg.crank.speed', 1.0), ('leg.scale', 0.01))
     assert [r.successful for r in results] == [True] * 13 + [False, True]
-    assert node.scene.machines['leg'].linkage.dimensions['m'] == 1500.0
+    assert node.scene.mechanisms['leg'].linkage.dimensions['m'] == 1500.0
 
 
 class Slow(nodes.SceneNode):
@@ -244,19 +244,19 @@ class Slow(nodes.SceneNode):
 
     def check(self, new):
         """Refuse a scale of 1300."""
-        if new.machines['leg'].scale == 1300.0:
+        if new.mechanisms['leg'].scale == 1300.0:
             raise scene.SceneError('leg.scale must not be 1300')
 
     def prepare(self, new):
         """Wait until it may go on."""
         self.begun.append(new)
         self.free.wait(60.0)
-        self.prepared.append((threading.current_thread(), new.machines['leg'].scale))
+        self.prepared.append((threading.current_thread(), new.mechanisms['leg'].scale))
         return new
 
     def adopt(self, new):
         """Note what is adopted."""
-        self.adopted.append((threading.current_thread(), new.machines['leg'].scale))
+        self.adopted.append((threading.current_thread(), new.mechanisms['leg'].scale))
 
 
 def settled(graph, node):
@@ -324,7 +324,7 @@ def test_a_changed_scene_is_prepared_before_what_else_is_queued(graph):
     assert client.set(('leg.scale', 2.0))[0].successful
     node.free.set()
     graph.until(lambda: begun)
-    assert begun == [len(node.begun)] and node.begun[-1].machines['leg'].scale == 2.0
+    assert begun == [len(node.begun)] and node.begun[-1].mechanisms['leg'].scale == 2.0
 
 
 def test_a_set_among_a_thousand_mechanisms_costs_what_it_changes():
@@ -348,7 +348,7 @@ def test_each_of_many_sets_gets_its_own_answer(graph):
         assert result.successful or result.reason.startswith(f'{name} must')
     assert 'read-only parameter: leg.type' in results[-1].reason
     before = node.scene
-    assert (before.machines['leg'].scale, before.frame_id) == (2.0, 'map')
+    assert (before.mechanisms['leg'].scale, before.frame_id) == (2.0, 'map')
     for other in ('leg.loads', ['Z=1 2']), ('leg.scale', 1300.0):
         results = client.set(('frame_id', 'odom'), ('leg.scale', -1.0), other)
         assert [r.successful for r in results] == [False] * 3 and node.scene is before
@@ -442,7 +442,7 @@ def test_an_executor_that_awaits_no_service_answers_at_once(graph, monkeypatch):
     result = client.call(SetParametersAtomically, parameters=[
         _message('leg.scale', 3.0), _message('leg.frame_id', 'base')]).result
     assert result.successful
-    leg = client.node.scene.machines['leg']
+    leg = client.node.scene.mechanisms['leg']
     assert (leg.scale, leg.pose, leg.frame_id) == (3.0, (1.0,) * 6, 'base')
 
 
@@ -451,11 +451,11 @@ def test_a_set_within_the_process_is_at_once_and_is_kept(graph):
     held_up(graph, Client(graph, node))
     for name, value in (('leg.pose', [1.0] * 6), ('leg.scale', 3.0)):
         assert node.set_parameters([Parameter(name, value=value)])[0].successful
-    machine = node.scene.machines['leg']
-    assert (machine.scale, machine.pose) == (3.0, (1.0,) * 6)
+    mechanism = node.scene.mechanisms['leg']
+    assert (mechanism.scale, mechanism.pose) == (3.0, (1.0,) * 6)
     node.free.set()
     settled(graph, node)
-    assert node.adopted[-1][1] == 3.0 and node.scene.machines['leg'] is machine
+    assert node.adopted[-1][1] == 3.0 and node.scene.mechanisms['leg'] is mechanism
 
 
 def test_a_mistake_while_a_scene_is_prepared_leaves_the_one_before(graph, monkeypatch):
@@ -486,17 +486,17 @@ def test_what_was_refused_keeps_nothing_from_being_accepted(graph, refused):
         # A parameter that somebody declares later is none of the scene's business.
         node.declare_parameter(f'own{scale:g}', 1.0)
         assert client.set(('leg.scale', scale))[0].successful
-        assert node.scene.machines['leg'].scale == scale
+        assert node.scene.mechanisms['leg'].scale == scale
     # The same objects once more, though others were set meanwhile.
     both = [Parameter('use_sim_time', value=False), Parameter('leg.scale', value=5.0)]
     for scale in (5.0, 3.0):
         assert node.set_parameters_atomically(both).successful
-        assert node.scene.machines['leg'].scale == 5.0
+        assert node.scene.mechanisms['leg'].scale == 5.0
         assert client.set(('leg.scale', scale))[0].successful
     together = client.call(SetParametersAtomically, parameters=[
         _message('leg.scale', 4.0), _message(*refused)]).result
     node.declare_parameter('own', 1.0)
-    assert not together.successful and node.scene.machines['leg'].scale == 3.0
+    assert not together.successful and node.scene.mechanisms['leg'].scale == 3.0
 
 
 def test_what_others_have_to_say_about_a_parameter_counts(graph):
@@ -505,7 +505,7 @@ def test_what_others_have_to_say_about_a_parameter_counts(graph):
         successful=not any(p.name == 'leg.scale' for p in parameters), reason='not by me'))
     results = Client(graph, node).set(('leg.scale', 2.0), ('leg.points', ['G']))
     assert [(r.successful, r.reason) for r in results] == [(False, 'not by me')] * 2
-    assert node.scene.machines['leg'].scale == 1.0
+    assert node.scene.mechanisms['leg'].scale == 1.0
 
 
 def test_the_time_to_be_used_can_be_set_as_ever(graph):

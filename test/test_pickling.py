@@ -85,10 +85,10 @@ def test_scenes_and_what_is_in_them_can_be_sent(file):
     sent = scene.load(str(file))
     for way in WAYS.values():
         got = way(sent)
-        assert got.parameters == sent.parameters and list(got.machines) == list(sent.machines)
-        for machine, other in zip(sent.machines.values(), got.machines.values()):
-            assert answers(other.linkage) == answers(machine.linkage)
-            assert (other.inputs, other.joints) == (machine.inputs, machine.joints)
+        assert got.parameters == sent.parameters and list(got.mechanisms) == list(sent.mechanisms)
+        for mechanism, other in zip(sent.mechanisms.values(), got.mechanisms.values()):
+            assert answers(other.linkage) == answers(mechanism.linkage)
+            assert (other.inputs, other.joints) == (mechanism.inputs, mechanism.joints)
 
 
 @pytest.mark.nightly
@@ -101,6 +101,6 @@ def test_processes_that_share_nothing_answer_the_same():
             there = result.get(100.0)
             for name, places in linkage.solve(inputs(linkage)).items():
                 assert bits(there[name]) == bits(places)
-        machine = next(iter(scene.load(str(CONFIG / 'excavator.yaml')).machines.values()))
-        assert pool.apply(methodcaller('efforts', [1.0] * len(machine.inputs)), (
-            machine,)) == machine.efforts([1.0] * len(machine.inputs))
+        mechanism = next(iter(scene.load(str(CONFIG / 'excavator.yaml')).mechanisms.values()))
+        assert pool.apply(methodcaller('efforts', [1.0] * len(mechanism.inputs)), (
+            mechanism,)) == mechanism.efforts([1.0] * len(mechanism.inputs))

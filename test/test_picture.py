@@ -98,7 +98,7 @@ def test_whoever_comes_late_sees_the_newest_locus_and_model(graph):
         assert graph.set(node, cell__scale=scale).successful
     locus = graph.listen(Marker, 'cell/locus', LATCHED)
     model = graph.listen(String, 'cell/robot_description', LATCHED)
-    wanted = scene.read({**CELL, 'cell.scale': 4.0}).machines['cell']
+    wanted = scene.read({**CELL, 'cell.scale': 4.0}).mechanisms['cell']
     curve = wanted.assembly().locus(wanted.tracer)
     graph.until(lambda: model and model[-1].data == urdf.describe([wanted], 'world'))
     graph.until(lambda: locus and np.allclose(

@@ -38,13 +38,13 @@ TABLE = [line.split() for line in (ROOT / 'pictures' / 'pictures.txt').read_text
          if line and not line.startswith('#')]
 
 
-def machine(type_, **parameters):
+def mechanism(type_, **parameters):
     given = {f'{type_}.{name.replace("__", ".")}': value for name, value in parameters.items()}
-    return scene.read({'mechanisms': [type_], **given}).machines[type_]
+    return scene.read({'mechanisms': [type_], **given}).mechanisms[type_]
 
 
-def picture_of(*machines, times=(0.0,), **kwargs):
-    made = Picture(machines, **kwargs)
+def picture_of(*mechanisms, times=(0.0,), **kwargs):
+    made = Picture(mechanisms, **kwargs)
     made.arrange(list(times))
     return made
 
@@ -141,7 +141,7 @@ def test_a_turn_is_drawn_in_the_time_it_takes(tmp_path):
 @pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('type_', list(mechanisms.TYPES))
 def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
-    one = machine(type_)
+    one = mechanism(type_)
     picture = picture_of(one, size=(640, 400))
     axes = picture.figure.axes[0]
     (x0, y0), (x1, y1) = axes.transData.transform([(0.0, 0.0), (1.0, 1.0)])
@@ -177,7 +177,7 @@ def test_a_gif_keeps_the_colours_that_colour_blind_people_tell_apart(tmp_path):
 
 
 def test_the_pairs_of_a_walker_pale_from_the_first_to_the_last(tmp_path):
-    made = picture_of(machine('jansen', leg_pairs=3))
+    made = picture_of(mechanism('jansen', leg_pairs=3))
     legs = next(layer for layer in made.panels[0].moving if isinstance(layer, layers.Legs))
     brightness = {leg: np.mean(artists['bars'].get_colors()[0][:3]) for leg, artists in legs.legs}
     assert brightness[0] == brightness[1] < brightness[2] == brightness[3] < brightness[4]
@@ -189,7 +189,7 @@ def segments_of(picture):
 
 
 def test_a_growing_trace_is_what_the_tracer_went_through_until_now():
-    drop = machine('water_drop')
+    drop = mechanism('water_drop')
     picture = picture_of(drop, trace='growing')
     for turns in (0.1, 0.55, 1.0, 1.7):
         picture.show(turns)
@@ -202,7 +202,7 @@ def test_a_growing_trace_is_what_the_tracer_went_through_until_now():
 
 
 def test_a_fading_trace_ends_at_the_tracer_and_begins_where_it_was_three_tenths_of_a_turn_ago():
-    drop = machine('water_drop')
+    drop = mechanism('water_drop')
     picture = picture_of(drop, trace='fading')
     for turns in (0.0, 0.1, 0.80125, 1.3):
         picture.show(turns)
@@ -215,7 +215,7 @@ def test_a_fading_trace_ends_at_the_tracer_and_begins_where_it_was_three_tenths_
 
 
 def test_a_foot_stands_on_the_lowest_part_of_its_curve():
-    leg = machine('jansen')
+    leg = mechanism('jansen')
     curve = Cycle(leg).locus(leg)
     standing = layers.standing(curve)
     low, high = curve[:, 1].min(), curve[:, 1].max()
@@ -227,7 +227,7 @@ def test_a_foot_stands_on_the_lowest_part_of_its_curve():
 
 @pytest.mark.nightly
 def test_a_cylinder_is_drawn_from_base_to_rod_and_a_scribble_is_not():
-    arm = scene.load(CONFIG / 'excavator.yaml').machines['excavator']
+    arm = scene.load(CONFIG / 'excavator.yaml').mechanisms['excavator']
     picture = picture_of(arm)
     picture.show(0.3)
     legs = next(layer for layer in picture.panels[0].moving if isinstance(layer, layers.Legs))
@@ -240,14 +240,14 @@ def test_a_cylinder_is_drawn_from_base_to_rod_and_a_scribble_is_not():
         assert start == pytest.approx(base) and math.dist(start, end) < math.dist(base, rod)
         assert math.dist(start, end) + math.dist(end, rod) == pytest.approx(math.dist(base, rod))
     assert len(Cycle(arm).locus(arm)) > 1
-    five_bar = machine('five_bar', crank2__speed=math.pi)
+    five_bar = mechanism('five_bar', crank2__speed=math.pi)
     assert not len(Cycle(five_bar).locus(five_bar)) and picture_of(five_bar, trace='stance')
-    five_bar = machine('five_bar', crank2__speed=2.0)
+    five_bar = mechanism('five_bar', crank2__speed=2.0)
     assert len(Cycle(five_bar).locus(five_bar)) > 1
 
 
 def test_any_motion_is_drawn_in_place_of_the_solved_one():
-    leg, motion = machine('jansen'), Cycle(machine('jansen', dimensions__m=14.0))
+    leg, motion = mechanism('jansen'), Cycle(mechanism('jansen', dimensions__m=14.0))
     picture = picture_of(leg, motions=[motion])
     picture.show(0.3)
     values = picture.panels[0].values()[1:]
@@ -256,7 +256,7 @@ def test_any_motion_is_drawn_in_place_of_the_solved_one():
 
 
 def test_the_floor_moves_as_the_foot_that_stands_on_it():
-    walker = machine('jansen', leg_pairs=3)
+    walker = mechanism('jansen', leg_pairs=3)
     picture = picture_of(walker, parts=DEFAULT | {'floor'})
     floor = next(la for la in picture.panels[0].moving if isinstance(la, layers.Floor))
     foot = walker.linkage.points.index('G')
@@ -272,7 +272,7 @@ def test_the_floor_moves_as_the_foot_that_stands_on_it():
         return lowest, feet[lowest, 0], marks[3, 0]
 
     # Below a foot that hardly moves there are few marks, too.
-    cell = machine('peaucellier')
+    cell = mechanism('peaucellier')
     layer = layers.Floor(picture.figure.axes[0], cell, Cycle(cell), 1.0)
     assert layer.spacing > 0.009 * cell.linkage.longest
     moved = 0
@@ -286,14 +286,14 @@ def test_the_floor_moves_as_the_foot_that_stands_on_it():
 
 
 def test_a_line_is_drawn_where_the_curve_is_one():
-    curves = {t: Cycle(machine(t)).locus(machine(t)) for t in (
+    curves = {t: Cycle(mechanism(t)).locus(mechanism(t)) for t in (
         'peaucellier', 'slider_crank', 'whitworth', 'jansen', 'hoeken', 'watt', 'pantograph')}
     straight = [t for t, curve in curves.items() if layers.straight(curve) is not None]
     assert straight == ['peaucellier', 'slider_crank', 'whitworth']
 
 
 def test_the_angle_is_in_the_title():
-    picture = picture_of(machine('water_drop'))
+    picture = picture_of(mechanism('water_drop'))
     picture.show(0.125)
     assert texts_of(picture) == ['θ = 45.0°']
 
@@ -303,7 +303,7 @@ def texts_of(picture):
 
 
 def test_angles_and_ratio_of_a_slotted_lever_are_printed():
-    picture = picture_of(machine('slotted_lever'))
+    picture = picture_of(mechanism('slotted_lever'))
     picture.show(50.0 / 360.0)
     lever = math.degrees(math.atan2(80 * math.sin(math.radians(50)),
                                     80 * math.cos(math.radians(50)) + 150))
@@ -318,7 +318,7 @@ def test_angles_and_ratio_of_a_slotted_lever_are_printed():
 @pytest.mark.parametrize('trace', TRACES)
 @pytest.mark.parametrize('type_', ['jansen', 'five_bar'])
 def test_every_trace_and_part_can_be_drawn(type_, trace):
-    picture_of(machine(type_), trace=trace, parts=frozenset(PARTS)).at(0.4)
+    picture_of(mechanism(type_), trace=trace, parts=frozenset(PARTS)).at(0.4)
 
 
 @pytest.mark.parametrize('part', [
@@ -329,14 +329,14 @@ def test_a_part_is_seen_unless_it_is_hidden(part):
 
 @functools.lru_cache(None)
 def drawn_with(parts):
-    return picture_of(machine('jansen'), size=(320, 320), parts=parts).at(0.0)
+    return picture_of(mechanism('jansen'), size=(320, 320), parts=parts).at(0.0)
 
 
 @pytest.mark.parametrize('crank', [
     {'crank__speed': 2.0}, {'crank__speed': -3.0, 'crank__start': 1.0},
     {'crank__sweep': [-0.5, 1.0]}, {'crank__sweep': [-0.5, 1.0], 'crank__speed': -1.0}])
 def test_the_crank_is_where_it_was_asked_to_be(crank):
-    cycle = Cycle(machine('four_bar', **crank))
+    cycle = Cycle(mechanism('four_bar', **crank))
     for angle in np.linspace(-0.49, 0.99, 17):
         assert math.remainder(cycle.pose(cycle.turns_to(angle)).inputs[0] - angle,
                               math.tau) == pytest.approx(0.0, abs=1e-12)
@@ -351,8 +351,8 @@ def test_the_crank_is_where_it_was_asked_to_be(crank):
     ((1.0, -1.5), 2, (1.0, -1.5)), ((-2.0, 0.0), 1, (-1.0, 0.0)), ((0.0, 3.0), 1, (1.0, 1.0)),
     ((1.0, math.pi), 24, (1.0, math.pi))])
 def test_several_cranks_turn_as_fast_as_they_were_told_to(speeds, count, ratios):
-    five_bar = machine('five_bar', crank__speed=speeds[0], crank2__speed=speeds[1],
-                       crank2__start=2.0)
+    five_bar = mechanism('five_bar', crank__speed=speeds[0], crank2__speed=speeds[1],
+                         crank2__start=2.0)
     cycle = Cycle(five_bar)
     assert cycle.turns == count and cycle.course.shape[:2] == (720 * count + 1, 1)
     for turns in (0.0, 0.3, 1.9):
@@ -362,15 +362,16 @@ def test_several_cranks_turn_as_fast_as_they_were_told_to(speeds, count, ratios)
             [0.0, 0.0], abs=1e-12)
 
 
-def test_machines_side_by_side_have_one_time():
-    machines = [machine('four_bar', crank__speed=2.0), machine('slider_crank', crank__speed=-3.0),
-                machine('water_drop', crank__sweep=[-0.5, 1.0])]
-    picture = Picture(machines, (600, 400))
+def test_mechanisms_side_by_side_have_one_time():
+    mechanisms = [mechanism('four_bar', crank__speed=2.0),
+                  mechanism('slider_crank', crank__speed=-3.0),
+                  mechanism('water_drop', crank__sweep=[-0.5, 1.0])]
+    picture = Picture(mechanisms, (600, 400))
     assert [one.get_subplotspec().get_geometry() for one in picture.figure.axes] == [
         (2, 2, k, k) for k in range(3)]
     assert picture.seconds(0.4) == pytest.approx(0.4 * math.pi)
     # Beside one that stands still, the others do.
-    still = Picture([machine('four_bar', crank__speed=0.0), machines[1]])
+    still = Picture([mechanism('four_bar', crank__speed=0.0), mechanisms[1]])
     still.show(0.25)
     assert still.seconds(0.25) == still.panels[1].values()[0] == 0.0
     picture.show(0.4)
@@ -380,7 +381,7 @@ def test_machines_side_by_side_have_one_time():
     seconds, speed = 0.4 * math.pi, third.mechanism.first.speed
     place = (0.5 + seconds * speed) % 3.0
     assert third.values()[0] == pytest.approx(-0.5 + min(place, 3.0 - place))
-    for panel, one in zip(picture.panels, machines):
+    for panel, one in zip(picture.panels, mechanisms):
         names = [f'{joint}_{axis}' for joint in one.points for axis in 'xy']
         assert panel.moving[-1].text.get_fontsize() == 11.5
         assert panel.columns() == [f'{one.name}_{name}' for name in ('crank', *names)]
@@ -530,19 +531,19 @@ def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
 
 @pytest.mark.nightly
 def test_the_readings_of_one_picture_are_not_written_over_those_of_another():
-    machines = [*scene.load(str(CONFIG / 'excavator.yaml')).machines.values(),
-                *scene.load(str(CONFIG / 'scissor_lift.yaml')).machines.values(),
-                machine('five_bar')]
-    picture = picture_of(*machines, size=(900, 400))
+    mechanisms = [*scene.load(str(CONFIG / 'excavator.yaml')).mechanisms.values(),
+                  *scene.load(str(CONFIG / 'scissor_lift.yaml')).mechanisms.values(),
+                  mechanism('five_bar')]
+    picture = picture_of(*mechanisms, size=(900, 400))
     picture.at(0.0)
     boxes = [panel.moving[-1].text.get_window_extent() for panel in picture.panels]
     assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
 
 
 @pytest.mark.nightly(all_but=7)
-@pytest.mark.parametrize('name', scene.load(str(ROOT / 'pictures' / 'words.yaml')).machines)
+@pytest.mark.parametrize('name', scene.load(str(ROOT / 'pictures' / 'words.yaml')).mechanisms)
 def test_no_name_is_on_a_joint_or_on_another(name):
-    shown = scene.load(str(ROOT / 'pictures' / 'words.yaml')).machines[name]
+    shown = scene.load(str(ROOT / 'pictures' / 'words.yaml')).mechanisms[name]
     picture = picture_of(shown, size=(360, 270), trace='none', parts=DEFAULT - {'axes', 'title'})
     picture.show(0.0)
     names = picture.panels[0].moving[-1].artists
@@ -555,7 +556,7 @@ def test_no_name_is_on_a_joint_or_on_another(name):
 def test_names_are_around_their_joints_however_long():
     shown, = scene.read({'mechanisms': ['own'], 'own.type': 'custom', 'own.joints': [
         'O ground 0 0', 'Motor ground 3 0', 'Pin crank O 1', 'Elbow_joint dyad Pin Motor 3 2 left',
-        ]}).machines.values()
+        ]}).mechanisms.values()
     picture = picture_of(shown, size=(720, 720), parts=frozenset({'labels'}))
     picture.show(0.0)
     for text in picture.panels[0].moving[-1].artists:
@@ -566,8 +567,8 @@ def test_names_are_around_their_joints_however_long():
 
 
 def test_a_larger_picture_has_wider_lines_and_all_have_equal_margins():
-    machine, = scene.read({'mechanisms': ['jansen']}).machines.values()
-    small, large = (Picture([machine], (size, size), 'whole', frozenset(PARTS)).figure
+    mechanism, = scene.read({'mechanisms': ['jansen']}).mechanisms.values()
+    small, large = (Picture([mechanism], (size, size), 'whole', frozenset(PARTS)).figure
                     for size in (720, 1440))
     widths = [[float(line.get_linewidth()[0]) for line in figure.findobj(LineCollection)]
               for figure in (small, large)]
@@ -577,7 +578,7 @@ def test_a_larger_picture_has_wider_lines_and_all_have_equal_margins():
 
 
 def test_the_grid_has_its_colour_of_the_palette():
-    axes, = picture_of(machine('four_bar'), parts=frozenset({'axes'})).figure.axes
+    axes, = picture_of(mechanism('four_bar'), parts=frozenset({'axes'})).figure.axes
     assert {line.get_color() for line in axes.get_xgridlines()} == {palette.GRID}
 
 

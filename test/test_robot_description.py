@@ -47,21 +47,21 @@ def given(name):
     *((name, Pinocchio) for name in SCENES), ('slotted_lever', Yourdfpy),
     *(pytest.param(name, Yourdfpy, marks=pytest.mark.nightly) for name in SCENES)])
 def test_joint_states_put_the_robot_where_the_markers_are(graph, name, library):
-    machine = graph.start(Kinematics, given(name)).scene.machines['m']
+    mechanism = graph.start(Kinematics, given(name)).scene.mechanisms['m']
     descriptions = graph.listen(String, 'm/robot_description', LATCHED)
     joints = graph.listen(JointState, 'm/joint_states')
     markers = graph.listen(MarkerArray, 'm/markers')
     turn = graph.crank(['m_crank'])
     robot = library(graph.until(lambda: descriptions)[0].data)
-    frames = [f'm_{prefix}{point}' for prefix in machine.assembly().legs
-              for point in machine.points]
+    frames = [f'm_{prefix}{point}' for prefix in mechanism.assembly().legs
+              for point in mechanism.points]
     for theta in (-1.0, 0.0, 0.3, 1.1):
         state = turn([theta], joints)
         _, spheres, *_ = turn([theta], markers).markers
         found = robot.places(dict(zip(state.name, state.position)), frames)
         for frame, point in zip(frames, spheres.points):
             wanted = in_frame(spheres.pose, point)
-            assert np.abs(found[frame] - wanted).max() < 1e-12 * 0.01 * machine.linkage.longest
+            assert np.abs(found[frame] - wanted).max() < 1e-12 * 0.01 * mechanism.linkage.longest
     assert spheres.header.frame_id == 'world'
 
 
@@ -78,7 +78,7 @@ def test_one_robot_state_publisher_sees_all_loops_of_the_scene_closed(graph):
     drawn = graph.listen(MarkerArray, 'hand/markers')
     text = graph.until(lambda: descriptions)[0].data
     robot = Pinocchio(text)
-    points = [f'hand_{point}' for point in node.scene.machines['hand'].points]
+    points = [f'hand_{point}' for point in node.scene.mechanisms['hand'].points]
     ends = [link.get('name') for link in ElementTree.fromstring(text).iter('link')]
     cuts = [end for end in ends if end.endswith('_cut')]
     assert {cut[:4] for cut in cuts} == {'arm_', 'hand'} and 'foot' not in text
@@ -139,7 +139,7 @@ def test_a_new_dimension_makes_a_new_description(graph):
 
 def test_the_command_prints_those_that_are_named(capsys):
     assert main(['--mechanism', 'jansen', '--ros-args', '--params-file', str(CATALOGUE)]) == 0
-    jansen = scene.load(str(CATALOGUE)).machines['jansen']
+    jansen = scene.load(str(CATALOGUE)).mechanisms['jansen']
     assert capsys.readouterr().out == urdf.describe([jansen], 'world') + '\n'
 
 
@@ -159,8 +159,8 @@ def files(tmp_path, monkeypatch):
 def test_the_scene_may_be_an_argument(capsys):
     assert main([str(CATALOGUE), '--mechanism', 'jansen', 'water_drop']) == 0
     found = scene.load(str(CATALOGUE))
-    machines = [found.machines[name] for name in ('jansen', 'water_drop')]
-    assert capsys.readouterr().out == urdf.describe(machines, found.frame_id) + '\n'
+    mechanisms = [found.mechanisms[name] for name in ('jansen', 'water_drop')]
+    assert capsys.readouterr().out == urdf.describe(mechanisms, found.frame_id) + '\n'
 
 
 def test_arguments_may_follow_those_for_ros(capsys):

@@ -51,18 +51,18 @@ def imported(tmp_path):
             pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
         file = tmp_path / 'scene.yaml'
         file.write_text(printed(name, *more))
-        return scene.load(str(file)).machines
+        return scene.load(str(file)).mechanisms
     return load
 
 
-def published(machine, **motors):
+def published(mechanism, **motors):
     """Return the positions of a robot's joints where its motors are, motors included."""
     values = [drive.ratio * motors[drive.source] + drive.offset
-              for drive in machine.inputs.values()]
-    angles = machine.linkage.joint_angles(values if len(values) > 1 else values[0])
-    assert machine.only_named
+              for drive in mechanism.inputs.values()]
+    angles = mechanism.linkage.joint_angles(values if len(values) > 1 else values[0])
+    assert mechanism.only_named
     return {**motors, **{called.name: float(called.of(angles[link]))
-                         for link, called in machine.joints.items() if called.published}}
+                         for link, called in mechanism.joints.items() if called.published}}
 
 
 def error(file, positions):
@@ -82,22 +82,22 @@ MODELS = {'four_bar.xml': np.linspace(-3.0, 3.0, 40), 'whitworth.xml': np.linspa
 
 @pytest.mark.parametrize('file', MODELS)
 def test_mujoco_sees_the_loops_of_a_model_closed(imported, file):
-    machines = imported(file).values()
+    mechanisms = imported(file).values()
     for position in MODELS[file]:
         joints = {}
-        for machine in machines:
-            joints.update(published(machine, **{machine.first.source: position}))
+        for mechanism in mechanisms:
+            joints.update(published(mechanism, **{mechanism.first.source: position}))
         assert error(file, joints) < 1e-14
 
 
 def test_a_rod_with_ball_ends_on_a_moving_tarsus_keeps_its_length(imported):
     mujoco = pytest.importorskip('mujoco')
-    machine, = imported('toe_rod.xml').values()
-    assert machine.frame_id == 'tarsus'
+    mechanism, = imported('toe_rod.xml').values()
+    assert mechanism.frame_id == 'tarsus'
     model = mujoco.MjModel.from_xml_path(str(ROBOTS / 'toe_rod.xml'))
     data, eye = mujoco.MjData(model), model.eq_data[0]
     for position in np.linspace(-1.75, -0.1, 20):
-        for name, value in published(machine, foot_crank_joint=position).items():
+        for name, value in published(mechanism, foot_crank_joint=position).items():
             data.qpos[model.joint(name).qposadr] = value
         mujoco.mj_kinematics(model, data)
         foot = model.body('foot').id
@@ -128,10 +128,10 @@ URDF = {
 def test_the_joints_of_a_urdf_close_its_loops(imported, file, library):
     more, motors, loops = URDF[file]
     robot = library((ROBOTS / file).read_text())
-    machine, = imported(file, *more).values()
+    mechanism, = imported(file, *more).values()
     for part in np.linspace(0.0, 1.0, 15):
-        joints = published(machine, **{motor: low + part * (high - low)
-                                       for motor, (low, high) in motors.items()})
+        joints = published(mechanism, **{motor: low + part * (high - low)
+                                         for motor, (low, high) in motors.items()})
         assert set(robot.joints) - joints.keys() <= {'swing'}
         places = robot.places(joints, [name for pair in loops for name in pair])
         for first, second in loops:
@@ -171,8 +171,8 @@ def test_limits_of_a_motor_become_a_sweep_or_a_sentence(
         imported, tmp_path, file, old, new, ends, why):
     path = tmp_path / file
     path.write_text((ROBOTS / file).read_text().replace(old, new, 1))
-    machine, = imported(path).values()
-    drive = machine.first
+    mechanism, = imported(path).values()
+    drive = mechanism.first
     assert (f'# Left out: the limits of {drive.source}, {why}.\n' in printed(path)) == bool(why)
     assert (drive.ends and [(end - drive.offset) / drive.ratio for end in drive.ends]) == (
         ends and pytest.approx(ends, abs=1e-5))
@@ -208,8 +208,8 @@ SERVO = '<transmission name="t"><joint name="servo"/></transmission>'
 def test_limits_of_a_joint_are_those_of_all_that_it_follows(
         imported, tmp_path, servos, ends, more):
     file = mimicking(tmp_path, *servos, more=more)
-    machine, = imported(file).values()
-    drive = machine.first
+    mechanism, = imported(file).values()
+    drive = mechanism.first
     assert drive.source == 'servo'
     assert ('the limits of servo, from 5 to 2.6: its loops do not reach them' in printed(
         file)) == (ends is None)
@@ -223,8 +223,8 @@ def test_limits_of_a_passive_joint_bound_what_follows_it(imported, tmp_path):
     axis = '<axis xyz="0 -1 0"/>'
     file = written(tmp_path, 'four_bar.urdf', (
         axis, f'<mimic joint="motor" multiplier="-1"/>{axis}'))
-    machine, = imported(file).values()
-    drive = machine.first
+    mechanism, = imported(file).values()
+    drive = mechanism.first
     assert drive.source == 'motor' and drive.ratio == -1.0
     assert drive.ends == pytest.approx([drive.offset - 1.2, drive.offset + 1.2])
 
@@ -236,15 +236,15 @@ def test_limits_of_all_joints_that_follow_a_motor_bound_it(imported, tmp_path):
         axis, f'{axis}{ends}<mimic joint="mot_front" multiplier="0.5"/>'), (
         '"mot_back" type="continuous"', '"mot_back" type="revolute"'))
     loops.write_text('{closed_loop: [[front_foot, back_foot]], type: [3d], name_mot: [mot_front]}')
-    machine, = imported(file, '--loops', loops).values()
-    drive = machine.first
+    mechanism, = imported(file, '--loops', loops).values()
+    drive = mechanism.first
     assert (np.array(drive.ends) - drive.offset) / drive.ratio == pytest.approx([-0.2, 0.3])
 
 
 def test_a_check_begins_at_a_pose_outside_the_limits(imported, tmp_path):
     file = written(tmp_path, 'four_bar.urdf', (LIMIT, 'lower="0.2" upper="1.2"'))
-    machine, = imported(file).values()
-    assert machine.first.start == pytest.approx(machine.first.ends[0])
+    mechanism, = imported(file).values()
+    assert mechanism.first.start == pytest.approx(mechanism.first.ends[0])
     assert 'in 240 poses of the robot' in printed(file)
     assert 'motor from 0 to 1.2,' in printed(file)
 
@@ -257,16 +257,16 @@ def test_what_follows_a_joint_that_is_held_is_held(capsys, tmp_path):
 
 def compared(robot, given, **ends):
     """Return the report on a scene's mechanism, or how it differs from its robot."""
-    machines = scene.read(given).machines
-    reports, wrong = check.compared(robot, machines, [
-        check.Imported(*machines, {}, [], [*ends], ends)])
+    mechanisms = scene.read(given).mechanisms
+    reports, wrong = check.compared(robot, mechanisms, [
+        check.Imported(*mechanisms, {}, [], [*ends], ends)])
     return ' '.join([*reports, *wrong.values()])
 
 
 def test_a_source_of_several_mechanisms_is_checked_where_all_of_them_move():
     robot = closing.closed(readers.read(str(ROBOTS / 'four_bar.urdf'))).robot
-    machines = scene.read(command.described(robot)[0]).machines
-    (report,), wrong = check.compared(robot, machines, [
+    mechanisms = scene.read(command.described(robot)[0]).mechanisms
+    (report,), wrong = check.compared(robot, mechanisms, [
         check.Imported('motor', {}, [], ['motor'], {'motor': ends})
         for ends in ((-1.0, 0.5), (-0.5, 1.0))])
     assert not wrong and 'motor from -0.5 to 0.5, ' in report
@@ -331,10 +331,10 @@ ROD = [(PIN_OF_ROD, BALL), ('name="wrist" type="revolute"', 'name="wrist" type="
 def test_hinges_that_cross_at_the_end_of_a_rod_are_a_ball(imported, capsys, tmp_path):
     file = written(tmp_path, 'four_bar.urdf', *ROD)
     assert "hold:='elbow_x=0 elbow=0'" in printed(file) and 'Not published' not in printed(file)
-    machine, = imported(file).values()
+    mechanism, = imported(file).values()
     # About the normal of the plane first, so that the rod's other hinges stay.
     for angle in (-1.1, 0.4, 1.2):
-        assert published(machine, motor=angle) == pytest.approx(
+        assert published(mechanism, motor=angle) == pytest.approx(
             {'motor': angle, 'shoulder': -angle, 'elbow_y': -angle}, abs=1e-14)
     loose = written(tmp_path, 'four_bar.urdf', *ROD, (
         'name="shoulder" type="continuous"', 'name="shoulder" type="spherical"'))
@@ -351,8 +351,8 @@ def test_hinges_of_a_rod_that_its_other_end_needs_do_not_stay(imported, tmp_path
         '"wrist" type="spherical"', '"wrist" type="revolute"'), (
         '<link2 link="rocker" xyz="0 0 0.2"/>', '<link2 link="cross" xyz="0 0 0"/>'), (
         '<axis xyz="0 1 0"/>\n  </loop_joint>', '<axis xyz="0 1 -1"/>\n  </loop_joint>'))
-    machine, = imported(file).values()
-    assert published(machine, motor=0.4) == pytest.approx({'motor': 0.4, 'shoulder': -0.4})
+    mechanism, = imported(file).values()
+    assert published(mechanism, motor=0.4) == pytest.approx({'motor': 0.4, 'shoulder': -0.4})
     assert 'Not published: elbow_y, elbow_x, elbow, wrist_1: passive joints' in printed(file)
 
 
@@ -371,15 +371,15 @@ def test_a_five_bar_is_closed_by_what_moves_it(imported, tmp_path, more, mimic, 
     axis, loops = '<axis xyz="0 -1 0"/>', tmp_path / 'loops.yaml'
     file = written(tmp_path, 'five_bar.urdf', (axis, axis + mimic))
     loops.write_text(f'{{closed_loop: [[front_foot, back_foot]], type: [3d], {more}}}')
-    machine, = imported(file, '--loops', loops).values()
-    assert {drive.source for drive in machine.inputs.values()} == {
+    mechanism, = imported(file, '--loops', loops).values()
+    assert {drive.source for drive in mechanism.inputs.values()} == {
         *re.search(r'name_mot: \[(.*)\]', more)[1].split(', ')}
     robot = LIBRARIES[1]((ROBOTS / 'five_bar.urdf').read_text())
     for angle in np.linspace(-0.3, 0.3, 7):
-        joints = published(machine, **motors(angle))
+        joints = published(mechanism, **motors(angle))
         places = robot.places(joints, ['front_foot', 'back_foot'])
         assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
-    rest, lost = command.others(readers.read(str(file), str(loops)), {'m': machine}, {})
+    rest, lost = command.others(readers.read(str(file), str(loops)), {'m': mechanism}, {})
     assert not lost and [value for key, value in rest.items() if key.endswith('.source')] == [
         'front_knee'] * ('FIXED' in more) + ['mot_front'] * bool(mimic)
 
@@ -393,9 +393,9 @@ def test_a_ring_that_spins_on_a_pin_is_no_dead_point(imported, tmp_path):
         f'<link name="{ring}"/><joint name="{ring}_pin" type="continuous"><parent link="{foot}"/>'
         f'<child link="{ring}"/><axis xyz="0 1 0"/></joint>'
         for ring, foot in (('ring_a', 'front_foot'), ('ring_b', 'back_foot'))) + '</robot>'))
-    machine, = imported(file, '--loops', loops).values()
+    mechanism, = imported(file, '--loops', loops).values()
     assert 'Not published: ring_a_pin, ring_b_pin: ' in printed(file, '--loops', loops)
-    joints = published(machine, mot_front=0.3, mot_back=0.1)
+    joints = published(mechanism, mot_front=0.3, mot_back=0.1)
     places = LIBRARIES[1]((ROBOTS / 'five_bar.urdf').read_text()).places(
         joints, ['front_foot', 'back_foot'])
     assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
@@ -405,8 +405,8 @@ def test_pins_that_are_apart_by_rounding_are_one(imported, tmp_path):
     plain, = imported('wheel_leg.urdf').values()
     file = written(tmp_path, 'wheel_leg.urdf', (
         '<child link="bell"/><axis', '<child link="bell"/><origin xyz="1e-13 0 0"/><axis'))
-    machine, = imported(file).values()
-    assert machine.linkage.points == plain.linkage.points
+    mechanism, = imported(file).values()
+    assert mechanism.linkage.points == plain.linkage.points
 
 
 def test_angles_that_are_rounded_in_the_file_are_in_one_plane(imported, tmp_path):
@@ -415,18 +415,19 @@ def test_angles_that_are_rounded_in_the_file_are_in_one_plane(imported, tmp_path
         'xyz="0.3 0 0" rpy="1.5708 0 0"/><axis xyz="0 0 1"/>'), (
         '<link2 link="rocker" xyz="0 0 0.2"/>',
         '<link2 link="rocker" xyz="0 0.2 0" rpy="-1.5708 0 0"/>'))
-    machine, = imported(rounded).values()
-    assert machine.linkage.solve(machine.first.offset)['D'] == pytest.approx([0.3, -0.2], abs=1e-5)
+    mechanism, = imported(rounded).values()
+    assert mechanism.linkage.solve(mechanism.first.offset)['D'] == pytest.approx(
+        [0.3, -0.2], abs=1e-5)
 
 
 def test_a_jaw_slides_as_its_crank_and_rod_say(imported):
-    machine, = imported('slider_crank.sdf').values()
+    mechanism, = imported('slider_crank.sdf').values()
     start = 0.0175 * complex(math.cos(0.4), math.sin(0.4))
     rod = abs(complex(0.0548, 0.013) - start)
     for angle in np.linspace(-2.0, 2.0, 25):
         pin = 0.0175 * complex(math.cos(0.4 + angle), math.sin(0.4 + angle))
         slide = pin.real + math.sqrt(rod ** 2 - (0.013 - pin.imag) ** 2) - 0.0548
-        assert published(machine, servo=angle)['finger_slide'] == pytest.approx(slide, abs=1e-16)
+        assert published(mechanism, servo=angle)['finger_slide'] == pytest.approx(slide, abs=1e-16)
 
 
 def written(tmp_path, file, *changes):
@@ -453,9 +454,9 @@ def test_a_change_point_that_is_no_parallelogram_is_passed(imported, tmp_path):
         '<pose>0.3 0 0 0 0 0</pose>', '<pose>0.5 0 0 0 0 0</pose>'), (
         '      <pose>0 0 -0.2 0 0 0</pose>',
         f'      <pose relative_to="__model__">{pin(-1)}</pose>'))
-    machine, = imported(bars).values()
+    mechanism, = imported(bars).values()
     for angle in np.linspace(-3.0, 3.0, 61):
-        place = machine.linkage.solve(machine.first.offset + angle)['D']
+        place = mechanism.linkage.solve(mechanism.first.offset + angle)['D']
         assert not np.isnan(place).any()
 
 
@@ -661,12 +662,12 @@ def test_bars_in_line_move_on_as_they_are_told(imported, capsys, tmp_path, side)
     motor, joint, *ends = re.search(
         r'bars lie in line where the file has them, and it moves on with (.*) (.*)=(.*) as '
         r'with \2=(.*): choose by --pose', line).groups()
-    machine, = imported(file, '--driven', 'motor', '--pose', *FLAT, motor,
-                        f'{joint}={ends[side]}').values()
+    mechanism, = imported(file, '--driven', 'motor', '--pose', *FLAT, motor,
+                          f'{joint}={ends[side]}').values()
     robot = LIBRARIES[1](file.read_text())
     elbows = set()
     for angle in np.linspace(0.3, 1.2, 10):
-        joints = published(machine, motor=angle)
+        joints = published(mechanism, motor=angle)
         places = robot.places(joints, ['wrist_a', 'wrist_b'])
         assert places['wrist_a'] == pytest.approx(places['wrist_b'], abs=2e-15)
         elbows.add(abs(math.remainder(joints['elbow'] + angle, math.tau)) < 1e-12)
@@ -699,8 +700,8 @@ def test_names_of_a_file_stay_names(imported, tmp_path):
     file = written(tmp_path, 'four_bar.urdf', ('"shoulder"', f'"{text}"'), (
         '"elbow"', '"finger-1"'), ('"wrist"', '"&#x2028;evil: 1&#x85;"'))
     evil = file.rename(tmp_path / 'robot\nevil: 2\n#.urdf')
-    machine, = imported(evil).values()
-    assert published(machine, motor=0.4).keys() == {name, 'finger-1', 'motor'}
+    mechanism, = imported(evil).values()
+    assert published(mechanism, motor=0.4).keys() == {name, 'finger-1', 'motor'}
     assert yaml.safe_load(printed(evil)).keys() == {'/**'}
 
 
@@ -763,8 +764,8 @@ def test_world_of_drake_is_no_second_root(imported, tmp_path):
     plain, = imported('four_bar.urdf').values()
     file = written(tmp_path, 'four_bar.urdf', ('<link name="base_link"/>',
                                                '<link name="world"/><link name="base_link"/>'))
-    machine, = imported(file).values()
-    assert machine.values == plain.values and machine.frame_id == 'base_link'
+    mechanism, = imported(file).values()
+    assert mechanism.values == plain.values and mechanism.frame_id == 'base_link'
     more = written(tmp_path, 'four_bar.urdf', ('<link name="base_link"/>',
                                                '<link name="earth"/><link name="base_link"/>'))
     with pytest.raises(readers.RequestError, match='a URDF has one root link, not 2'):
@@ -822,9 +823,9 @@ def test_joints_of_the_tree_are_what_a_file_of_loops_makes_them(imported, capsys
     file.write_text(CUT.sub('<transmission name="t"><joint name="shoulder"/></transmission>',
                             (ROBOTS / 'four_bar.urdf').read_text()))
     loops.write_text(text)
-    machine, = imported(file, '--loops', loops).values()
+    mechanism, = imported(file, '--loops', loops).values()
     for angle in (-1.1, 0.0, 0.7):
-        assert published(machine, motor=angle) == pytest.approx(
+        assert published(mechanism, motor=angle) == pytest.approx(
             {'motor': angle, 'shoulder': -angle}, abs=1e-14)
     loops.write_text(text.replace('elbow', 'elbwo'))
     said = refused(capsys, file, '--loops', loops)
@@ -849,10 +850,10 @@ def test_a_universal_joint_of_an_sdf_is_a_pin(imported, tmp_path, joints):
     assert text.count('universal') == len(joints)
     file = tmp_path / 'four_bar.sdf'
     file.write_text(text)
-    machine, = imported(file).values()
+    mechanism, = imported(file).values()
     # A parallelogram stays one.
     for angle in (-2.0, 0.4, 3.0):
-        found = published(machine, joint_A=angle)
+        found = published(mechanism, joint_A=angle)
         assert found.keys() == {f'joint_{name}' for name in 'ABCD'}
         for name, value in {'joint_B': -angle, 'joint_C': angle, 'joint_D': angle}.items():
             assert math.remainder(found[name] - value, math.tau) == pytest.approx(0.0, abs=1e-14)
@@ -878,19 +879,19 @@ def test_limits_of_a_motor_between_two_moving_links_are_its_sweep(imported, tmp_
     file = written(tmp_path, 'four_bar.urdf', (
         '"elbow" type="continuous">', f'"elbow" type="revolute"><limit lower="{low}" upper="0.8"/>'
     ))
-    machine, = imported(file, '--driven', 'elbow').values()
-    assert machine.first.ends == pytest.approx((low, 0.8)) and machine.first.start == start
+    mechanism, = imported(file, '--driven', 'elbow').values()
+    assert mechanism.first.ends == pytest.approx((low, 0.8)) and mechanism.first.start == start
 
 
 def test_a_passive_joint_of_a_loop_is_no_input(imported, tmp_path):
     # A spring beside the motor's loop leaves a second one undetermined.
     spring = sprung(tmp_path)
-    machines, robot = imported(spring), readers.read(str(spring))
-    rest, lost = command.others(robot, machines, {})
+    mechanisms, robot = imported(spring), readers.read(str(spring))
+    rest, lost = command.others(robot, mechanisms, {})
     loop = {'spring', 'right_spring_link_joint', 'right_follower_joint'}
     assert {*lost} == loop and not loop & {*map(str, rest.values())}
     assert f'Not published: {", ".join(lost)}: passive joints of loops' in printed(spring)
-    rest, lost = command.others(robot, machines, {'spring': 0.0})
+    rest, lost = command.others(robot, mechanisms, {'spring': 0.0})
     assert {*lost} == loop - {'spring'} and 'spring' in {*map(str, rest.values())}
 
 
@@ -900,15 +901,15 @@ def test_a_joint_of_the_whole_robot_that_opens_a_loop_is_named(monkeypatch, caps
     robot = closing.closed(readers.read(str(file))).robot
     given, _, _ = command.described(robot)
     names = [line for line in given['hip.joint_names'] if 'bell' not in line]
-    machines = scene.read({**given, 'hip.joint_names': names}).machines
-    rest, lost = command.others(robot, machines, {})
+    mechanisms = scene.read({**given, 'hip.joint_names': names}).mechanisms
+    rest, lost = command.others(robot, mechanisms, {})
     assert lost == ['bell_joint'] and not rest
-    still, _ = command.others(robot, machines, {'bell_joint': 0.0})
+    still, _ = command.others(robot, mechanisms, {'bell_joint': 0.0})
     wrong = scene.read({**given, **still, 'hip.joint_names': names,
-                        'mechanisms': ['hip', 'others']}).machines
+                        'mechanisms': ['hip', 'others']}).mechanisms
     ends = {'hip': (-0.2, 0.3), 'crank_motor': (-0.3, 0.3)}
     made = [check.Imported('hip', {}, [], [*ends], ends)]
-    assert not check.compared(robot, machines, made)[1]
+    assert not check.compared(robot, mechanisms, made)[1]
     found = check.compared(robot, wrong, made)
     assert not found[0] and re.match('with hip at .*, crank_motor at .* its loops stand open by ',
                                      found[1]['hip'])
@@ -919,16 +920,17 @@ def test_a_joint_of_the_whole_robot_that_opens_a_loop_is_named(monkeypatch, caps
 @pytest.mark.parametrize('file', ['boom.urdf', 'gripper.xml', 'rack.sdf', 'palletiser.urdf'])
 def test_all_joints_of_a_whole_robot_are_published(imported, file):
     more = ['--loops', ROBOTS / 'palletiser_loops.yaml'] * ('pallet' in file)
-    machines, robot = imported(file, *more), readers.read(str(ROBOTS / file), *map(str, more[1:]))
-    rest, lost = command.others(robot, machines, {})
+    mechanisms = imported(file, *more)
+    robot = readers.read(str(ROBOTS / file), *map(str, more[1:]))
+    rest, lost = command.others(robot, mechanisms, {})
     assert not lost
     names = ['others'] * bool(rest)
     if names:
-        machines = {**machines, **scene.read({**rest, 'mechanisms': names}).machines}
-    published = {drive.source for machine in machines.values()
-                 for drive in machine.inputs.values()}
-    published |= {called.name for machine in machines.values()
-                  for called in machine.joints.values() if called.published}
+        mechanisms = {**mechanisms, **scene.read({**rest, 'mechanisms': names}).mechanisms}
+    published = {drive.source for mechanism in mechanisms.values()
+                 for drive in mechanism.inputs.values()}
+    published |= {called.name for mechanism in mechanisms.values()
+                  for called in mechanism.joints.values() if called.published}
     text = readers.description(str(ROBOTS / file), robot)
     assert {*LIBRARIES[1](text).joints} <= published
 
@@ -940,10 +942,10 @@ def test_a_comment_of_another_format_makes_no_urdf(tmp_path):
 
 def test_a_motor_between_two_moving_links_drives_in_the_frame_of_one(imported):
     # As in a parallelogram: the elbow turns back as far as the shoulder turns.
-    machine, = imported('four_bar.urdf', '--driven', 'elbow').values()
-    assert (machine.first.source, machine.frame_id) == ('elbow', 'crank')
+    mechanism, = imported('four_bar.urdf', '--driven', 'elbow').values()
+    assert (mechanism.first.source, mechanism.frame_id) == ('elbow', 'crank')
     for angle in (-0.8, 0.3, 1.1):
-        assert published(machine, elbow=angle) == pytest.approx(
+        assert published(mechanism, elbow=angle) == pytest.approx(
             {'elbow': angle, 'motor': -angle, 'shoulder': angle}, abs=1e-9)
 
 
@@ -1083,16 +1085,16 @@ def check_comes_back(linkage, values, robot, steps, zeros=None):
     given, said, _ = command.described(robot)
     for count, worst in checked('\n'.join(said)):
         assert count >= 200 and worst < 1e-6
-    machines = scene.read(given).machines.values()
+    mechanisms = scene.read(given).mechanisms.values()
     was, moved = linkage.joint_angles(values), 0
     for step in steps:
         now = linkage.joint_angles(np.add(values, step))
         motors = {each.name: zeros[each.name] + change
                   for each, change in zip(linkage.inputs, np.ravel(step))}
         found = {}
-        for machine in machines:
-            found.update(published(machine, **{drive.source: motors[drive.source]
-                                               for drive in machine.inputs.values()}))
+        for mechanism in mechanisms:
+            found.update(published(mechanism, **{drive.source: motors[drive.source]
+                                                 for drive in mechanism.inputs.values()}))
         for link in linkage.links:
             apart = found.get(link.name, math.nan) - zeros[link.name] - (
                 now[link.name] - was[link.name])

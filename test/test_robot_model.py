@@ -287,24 +287,24 @@ LONG = 'm.scale and m.dimensions must make the longest bar from 1e-30 to 1e+30 m
 def test_what_makes_no_model_is_refused(given, complaint):
     found = scene.read({'mechanisms': ['m'], 'm.type': 'four_bar', **given})
     try:
-        urdf.describe(found.machines.values(), found.frame_id)
+        urdf.describe(found.mechanisms.values(), found.frame_id)
         assert not complaint
     except scene.SceneError as error:
         assert str(error) == complaint
 
 
 def test_a_linkage_in_space_makes_no_model():
-    machines = scene.load('examples/ankle.yaml').machines
+    mechanisms = scene.load('examples/ankle.yaml').mechanisms
     with pytest.raises(scene.SceneError, match='^ankle is a linkage in space: pictures and robot '
                        'models are of linkages in a plane$'):
-        model(machines.values())
+        model(mechanisms.values())
 
 
 def test_what_has_no_length_is_not_drawn():
     # At its shortest the cylinder has no length, and so has its barrel.
     lines = ['P ground 0 0', 'O ground 1 0', 'B cylinder P O 1 right']
     one = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.cylinder.start': 1.0,
-                      'm.joints': lines}).machines['m']
+                      'm.joints': lines}).mechanisms['m']
     pieces = [piece for pieces in model([one]).parts[0].robot.pieces.values() for piece in pieces]
     assert {(piece.shape, piece.length > 0.0) for piece in pieces} == {
         ('sphere', False), ('cylinder', True)}
@@ -327,7 +327,7 @@ def test_names_with_signs_of_xml_come_back(tmp_path):
     found = scene.read({'mechanisms': ['m'], 'm.type': 'four_bar', 'm.frame_id': frame,
                         'm.joint_names': [f'AB="{joint}"']})
     file = tmp_path / 'robot.urdf'
-    file.write_text(urdf.describe(found.machines.values(), 'world'), encoding='utf-8')
+    file.write_text(urdf.describe(found.mechanisms.values(), 'world'), encoding='utf-8')
     read = readers.read(str(file))
     assert read.root == frame
     assert read.tree_joints[joint].bodies == ('m_crank_link', 'm_AB_link')
@@ -337,15 +337,15 @@ def test_the_command_prints_what_its_options_ask_for(tmp_path, capsys):
     file = tmp_path / 'scene.yaml'
     file.write_text('/**:\n  ros__parameters:\n    mechanisms: [a, b]\n    a.type: four_bar\n'
                     '    b.type: jansen\n    frame_id: base\n')
-    several, lever = scene.load(str(file)).machines, scene.load('config/slotted_lever.yaml')
-    for options, machines, frame, width, density in (
-            ([], scene.read({}).machines.values(), 'world', None, []),
-            (['config/slotted_lever.yaml', '--width', '0.5'], lever.machines.values(),
+    several, lever = scene.load(str(file)).mechanisms, scene.load('config/slotted_lever.yaml')
+    for options, mechanisms, frame, width, density in (
+            ([], scene.read({}).mechanisms.values(), 'world', None, []),
+            (['config/slotted_lever.yaml', '--width', '0.5'], lever.mechanisms.values(),
              lever.frame_id, 0.5, ['--density', '7.8e3']),
             ([str(file), '--mechanism', 'b'], [several['b']], 'base', None, []),
             ([str(file), '--mechanism', 'b', 'a'], [several['b'], several['a']], 'base', None,
              [])):
-        robot = bodies.robot(machines, frame, width)
+        robot = bodies.robot(mechanisms, frame, width)
         built = assembled(robot, 7800.0 if density else 2700.0)
         for more, text in (([], urdf.write(robot)), (['--format', 'urdf'], urdf.write(robot)),
                            (['--format', 'sdf', *density], sdf.write(built)),
@@ -390,19 +390,19 @@ RVIZ = {'Visualization Manager': {
     ((math.pi / 2, 0.0, 2.0), 0.15, 2.0 - math.pi / 2), ((math.pi, 0.0, 0.0), 0.15, -math.pi / 2),
     ((0.05, 0.0, 1.0), math.pi / 2 - 0.05, -math.pi / 2)])
 def test_rviz_s_camera_sees_all_of_a_scene_square_to_the_first_plane(angles, pitch, yaw):
-    machines = scene.read({
+    mechanisms = scene.read({
         'mechanisms': ['m', 'n'], 'm.type': 'jansen', 'm.pose': [1.0, 2.0, 3.0, *angles],
         'n.type': 'slider_crank', 'm.scale': 0.01, 'm.leg_pairs': 2, 'n.scale': 0.01,
-        'n.pose': [-1.0, 0.5, 0.0, 0.3, 0.2, 0.1], 'n.crank.sweep': [0.5, 2.0]}).machines
+        'n.pose': [-1.0, 0.5, 0.0, 0.3, 0.2, 0.1], 'n.crank.sweep': [0.5, 2.0]}).mechanisms
     before = copy.deepcopy(RVIZ)
-    manager = rviz.adapted(RVIZ, machines, 'base')['Visualization Manager']
+    manager = rviz.adapted(RVIZ, mechanisms, 'base')['Visualization Manager']
     assert RVIZ == before
     assert manager['Displays'] == [{'Class': 'Grid'}, *(
         {'Class': 'rviz_common/Group', 'Name': name, 'Displays': [
             {'Class': 'rviz_default_plugins/MarkerArray', 'Topic': {'Value': f'/{name}/markers'}}]}
-        for name in machines), {'Class': 'Axes'}]
+        for name in mechanisms), {'Class': 'Axes'}]
     view, places = manager['Views']['Current'], []
-    for one in machines.values():
+    for one in mechanisms.values():
         ends = one.first.ends or (0.0, math.tau)
         solution = one.assembly().solution(one.linkage.points)
         for theta in np.linspace(*ends, 51):
@@ -423,7 +423,8 @@ def test_rviz_s_camera_sees_all_of_a_scene_square_to_the_first_plane(angles, pit
 
 @pytest.mark.parametrize('scale, distance', [(1e-6, 1.0), (0.01, ANY)])
 def test_rviz_s_camera_sees_what_some_inputs_cannot_reach_and_what_is_tiny(scale, distance):
-    machines = scene.read({'mechanisms': ['m'], 'm.type': 'five_bar', 'm.scale': scale}).machines
-    view = rviz.adapted(RVIZ, machines, 'base')['Visualization Manager']['Views']['Current']
+    mechanisms = scene.read(
+        {'mechanisms': ['m'], 'm.type': 'five_bar', 'm.scale': scale}).mechanisms
+    view = rviz.adapted(RVIZ, mechanisms, 'base')['Visualization Manager']['Views']['Current']
     assert view['Distance'] == distance
     assert all(map(math.isfinite, (view['Distance'], *view['Focal Point'].values())))

@@ -488,9 +488,9 @@ def test_a_linkage_a_million_times_the_size_has_the_same_angles(g1):
 def compiled(tmp_path_factory):
     """Return the ankle as C, with its inverse."""
     folder = tmp_path_factory.mktemp('c')
-    machine = scene.read({'mechanisms': ['ankle'], 'ankle.type': 'rods',
-                          'ankle.joints': list(G1)}).machines['ankle']
-    text = header.written(machine)
+    mechanism = scene.read({'mechanisms': ['ankle'], 'ankle.type': 'rods',
+                            'ankle.joints': list(G1)}).mechanisms['ankle']
+    text = header.written(mechanism)
     calls = """
 int pose_(double x, double y, ankle_pose *p)
 {

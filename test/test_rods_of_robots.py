@@ -63,8 +63,8 @@ def imported(folder, ankle, limits, capsys):
     assert from_robot([str(folder / 'robot.xml')]) == 0
     said = capsys.readouterr()
     (folder / 'robot.yaml').write_text(said.out)
-    (machine,) = scene.load(folder / 'robot.yaml').machines.values()
-    return machine, said.err
+    (mechanism,) = scene.load(folder / 'robot.yaml').mechanisms.values()
+    return mechanism, said.err
 
 
 def turning(seed):
@@ -79,12 +79,12 @@ def turning(seed):
 @pytest.mark.parametrize('seed', [1, 2])
 def test_an_ankle_is_imported_with_the_limits_of_its_file(tmp_path, capsys, seed):
     ankle, half = turning(seed), np.array([0.15, 0.12])
-    machine, said = imported(tmp_path, ankle, (-half, half), capsys)
+    mechanism, said = imported(tmp_path, ankle, (-half, half), capsys)
     assert 'in 240 poses of the robot' in said
     assert 'Limits' not in said
-    names = {called.name for called in machine.joints.values() if called.published}
-    assert names == {'pitch', 'roll'} and machine.frame_id == 'shin'
-    assert {drive.source for drive in machine.inputs.values()} == {'l', 'r'}
+    names = {called.name for called in mechanism.joints.values() if called.published}
+    assert names == {'pitch', 'roll'} and mechanism.frame_id == 'shin'
+    assert {drive.source for drive in mechanism.inputs.values()} == {'l', 'r'}
     axes = [axis / np.linalg.norm(axis) for axis in (
         ankle.first_axis, ankle.second_axis, *ankle.motor_axes)]
     lines = [f'pitch hinge ground at {text(ankle.first)} axis {text(axes[0])} within -0.15 0.15',
@@ -97,7 +97,7 @@ def test_an_ankle_is_imported_with_the_limits_of_its_file(tmp_path, capsys, seed
     for word, there in zip(' - '.join(lines).split(), given.split()):
         assert there == word or float(there) == pytest.approx(float(word), abs=1e-12)
     motors = np.random.default_rng(3).uniform(-0.1, 0.1, (2, 40))
-    found = np.stack(list(machine.linkage.joint_angles(motors, ['pitch', 'roll']).values()))
+    found = np.stack(list(mechanism.linkage.joint_angles(motors, ['pitch', 'roll']).values()))
     there = np.isfinite(found[0])
     assert there.sum() > 10
     gaps = rods.gaps(ankle, motors, *found)
@@ -134,11 +134,11 @@ def test_an_ankle_on_a_cross_is_imported(tmp_path, capsys, seed):
     # As most are: both hinges of the foot cross in a point, and are no ball all the same.
     ankle = turning(seed)
     ankle = ankle._replace(second=ankle.first)
-    machine, _ = imported(tmp_path, ankle, ([-0.15, -0.12], [0.15, 0.12]), capsys)
-    assert {called.name for called in machine.joints.values() if called.published} == {
+    mechanism, _ = imported(tmp_path, ankle, ([-0.15, -0.12], [0.15, 0.12]), capsys)
+    assert {called.name for called in mechanism.joints.values() if called.published} == {
         'pitch', 'roll'}
     motors = np.random.default_rng(4).uniform(-0.1, 0.1, (2, 40))
-    found = np.stack(list(machine.linkage.joint_angles(motors, ['pitch', 'roll']).values()))
+    found = np.stack(list(mechanism.linkage.joint_angles(motors, ['pitch', 'roll']).values()))
     there = np.isfinite(found[0])
     assert there.sum() > 10
     assert np.abs(np.array(rods.gaps(ankle, motors, *found))[:, there]).max() < 1e-15
@@ -161,18 +161,18 @@ def test_hinges_of_rods_are_published(tmp_path, capsys, seed, count):
     out, said = capsys.readouterr()
     assert 'Not published' not in said and ('pin 1 2=0' in out) == (count == 3)
     (tmp_path / 'robot.yaml').write_text(out)
-    (machine,) = scene.load(tmp_path / 'robot.yaml').machines.values()
-    names = {link: called for link, called in machine.joints.items() if called.published}
+    (mechanism,) = scene.load(tmp_path / 'robot.yaml').mechanisms.values()
+    names = {link: called for link, called in mechanism.joints.items() if called.published}
     assert {called.name for called in names.values()} == {
         'pitch', 'roll', *(f'pin {i} {k}' for i in (0, 1) for k in (0, 1))}
     model = mujoco.MjModel.from_xml_path(str(file))
     data, closed = mujoco.MjData(model), 0
     for values in np.random.default_rng(3).uniform(-0.1, 0.1, (30, 2)):
-        angles = machine.linkage.joint_angles(values)
+        angles = mechanism.linkage.joint_angles(values)
         found = {called.name: float(called.of(angles[link])) for link, called in names.items()}
         if np.isnan([*found.values()]).any():
             continue
-        for (drive, value) in zip(machine.inputs.values(), values):
+        for (drive, value) in zip(mechanism.inputs.values(), values):
             data.joint(drive.source).qpos = value
         for name, value in found.items():
             data.joint(name).qpos = value
@@ -219,8 +219,8 @@ def test_limits_of_its_motors_are_sweeps(tmp_path, capsys, left, right, sweep):
     file.write_text(written)
     assert from_robot([str(file)]) == 0
     file.with_suffix('.yaml').write_text(capsys.readouterr().out)
-    (machine,) = scene.load(file.with_suffix('.yaml')).machines.values()
-    drives = {drive.source: drive for drive in machine.inputs.values()}
+    (mechanism,) = scene.load(file.with_suffix('.yaml')).mechanisms.values()
+    drives = {drive.source: drive for drive in mechanism.inputs.values()}
     if sweep:
         assert drives['l'].ends == pytest.approx((-0.1, 0.08))
         assert drives['r'].ends == pytest.approx(sweep) and drives['r'].start == sweep[0]
@@ -236,10 +236,10 @@ def test_the_sweeps_of_an_ankle_s_motors_are_in_its_window(tmp_path, capsys, see
         '<joint name="l" ', f'<joint name="l" {turn} '))
     assert from_robot([str(file)]) == 0
     file.with_suffix('.yaml').write_text(capsys.readouterr().out)
-    (machine,) = scene.load(file.with_suffix('.yaml')).machines.values()
-    values = np.meshgrid(*(np.linspace(*drive.ends, 50) for drive in machine.inputs.values()))
-    assert min(drive.ends[1] - drive.ends[0] for drive in machine.inputs.values()) > 0.1
-    assert np.isfinite(list(machine.linkage.joint_angles(values).values())).all()
+    (mechanism,) = scene.load(file.with_suffix('.yaml')).mechanisms.values()
+    values = np.meshgrid(*(np.linspace(*drive.ends, 50) for drive in mechanism.inputs.values()))
+    assert min(drive.ends[1] - drive.ends[0] for drive in mechanism.inputs.values()) > 0.1
+    assert np.isfinite(list(mechanism.linkage.joint_angles(values).values())).all()
 
 
 def test_a_foot_without_one_end_is_said_to_have_none(tmp_path, capsys):
@@ -249,7 +249,7 @@ def test_a_foot_without_one_end_is_said_to_have_none(tmp_path, capsys):
 
 @pytest.mark.nightly
 def test_without_limits_the_largest_are_taken_and_said(tmp_path, capsys):
-    machine, said = imported(tmp_path, turning(4), None, capsys)
+    mechanism, said = imported(tmp_path, turning(4), None, capsys)
     assert 'these are the largest proved to have one pose at most: pitch from -' in said
-    assert all(math.isfinite(end) for held in machine.linkage.windows()
+    assert all(math.isfinite(end) for held in mechanism.linkage.windows()
                for ends in held.limits for end in ends)

@@ -98,8 +98,8 @@ def check_loops(robot, form, joints, frames, size):
             assert place == pytest.approx(frames[name][:3, 3], abs=1e-9 * size)
 
 
-def prepared(machines, form, frame_id='world'):
-    robot = bodies.robot(machines, frame_id)
+def prepared(mechanisms, form, frame_id='world'):
+    robot = bodies.robot(mechanisms, frame_id)
     return robot if form == 'urdf' else assembled(robot)
 
 
@@ -110,9 +110,9 @@ def test_robots_of_the_shipped_scenes_come_back(tmp_path, config, form):
     if form == 'mjcf':
         pytest.importorskip('mujoco')
     given = scene.load(str(config))
-    for machine in given.machines.values():
-        if not machine.in_space:
-            check_read(prepared([machine], form, given.frame_id), form, tmp_path)
+    for mechanism in given.mechanisms.values():
+        if not mechanism.in_space:
+            check_read(prepared([mechanism], form, given.frame_id), form, tmp_path)
 
 
 @pytest.mark.parametrize('form', FORMATS)
@@ -120,11 +120,11 @@ def test_robots_of_the_shipped_scenes_come_back(tmp_path, config, form):
 def test_a_hand_on_an_arm_comes_back(tmp_path, link, form):
     if form == 'mjcf':
         pytest.importorskip('mujoco')
-    machines = scene.read({**ARM, 'hand.frame_id': f'arm_{link}'}).machines.values()
-    check_read(prepared(machines, form), form, tmp_path)
+    mechanisms = scene.read({**ARM, 'hand.frame_id': f'arm_{link}'}).mechanisms.values()
+    check_read(prepared(mechanisms, form), form, tmp_path)
 
 
-def random_machine(seed):
+def random_mechanism(seed):
     """Return a random linkage as a mechanism in a random pose, at a start where it has a pose."""
     rng = np.random.default_rng(seed)
     design = random_linkages.design(rng)
@@ -148,8 +148,8 @@ def random_machine(seed):
                 # Not all of it need be in the reach.
                 return scene.read({**given, **{
                     f'm.{each.name}.sweep': [value - 0.01 * each.size, value + 0.01 * each.size]
-                    for each, value in zip(linkage.inputs, values)}}).machines['m']
-            return scene.read(given).machines['m']
+                    for each, value in zip(linkage.inputs, values)}}).mechanisms['m']
+            return scene.read(given).mechanisms['m']
     return None
 
 
@@ -159,10 +159,10 @@ def random_machine(seed):
 def test_random_robots_come_back(tmp_path, seeds, form):
     if form == 'mjcf':
         pytest.importorskip('mujoco')
-    machines = [*filter(None, map(random_machine, seeds))]
-    assert len(machines) > len(seeds) // 2
-    for machine in machines:
-        check_read(prepared([machine], form), form, tmp_path)
+    mechanisms = [*filter(None, map(random_mechanism, seeds))]
+    assert len(mechanisms) > len(seeds) // 2
+    for mechanism in mechanisms:
+        check_read(prepared([mechanism], form), form, tmp_path)
 
 
 @pytest.mark.parametrize('form', FORMATS)

@@ -40,18 +40,18 @@ def places(assembly, theta, points):
     return solved(assembly, theta, points).reshape(len(assembly.legs), -1, 2)
 
 
-def whole_motion(machine):
+def whole_motion(mechanism):
     """Return all joints all along the motion, shape (..., 2), moved by the pose."""
-    return Cycle(machine).course + machine.pose[0:3:2]
+    return Cycle(mechanism).course + mechanism.pose[0:3:2]
 
 
 def test_without_parameters_the_scene_is_the_catalogue():
-    machines = scene.read({}).machines
-    assert list(machines) == ['water_drop', 'jansen', 'peaucellier', 'slotted_lever']
-    for name, machine in machines.items():
-        assert machine.linkage.type == name
-        assert machine.linkage.dimensions == mechanisms.defaults(name)
-        assert machine.first.speed == 1.0 and machine.first.start == 0.0
+    shown = scene.read({}).mechanisms
+    assert list(shown) == ['water_drop', 'jansen', 'peaucellier', 'slotted_lever']
+    for name, mechanism in shown.items():
+        assert mechanism.linkage.type == name
+        assert mechanism.linkage.dimensions == mechanisms.defaults(name)
+        assert mechanism.first.speed == 1.0 and mechanism.first.start == 0.0
     assert scene.read({}).rate == 50.0
 
 
@@ -88,8 +88,8 @@ def test_a_frame_is_called_as_links_of_robots_are(tmp_path, name):
     again = tmp_path / 'again.yaml'
     again.write_text(writing.in_yaml(writing.without_defaults(before)))
     found = scene.load(str(again))
-    assert (found.frame_id, found.machines['jansen'].frame_id) == (name, name)
-    root = ElementTree.fromstring(urdf.describe(found.machines.values(), name))
+    assert (found.frame_id, found.mechanisms['jansen'].frame_id) == (name, name)
+    root = ElementTree.fromstring(urdf.describe(found.mechanisms.values(), name))
     assert root.find('joint/parent').get('link') == root.find('link').get('name') == name
 
 
@@ -105,27 +105,27 @@ def test_scale_multiplies_every_length():
 
 
 def test_a_linkage_of_ones_own_is_written_joint_by_joint():
-    machine = scene.read({
+    mechanism = scene.read({
         'mechanisms': ['rocker'], 'rocker.type': 'custom', 'rocker.tracer': 'P',
         'rocker.joints': ['O ground 0 0', 'Q ground g 0', 'A crank O 0.3',
                           'B dyad A Q 0.7 0.6 left', 'P line A B h', 'R line A B 0.1'],
         'rocker.dimensions.g': 0.8, 'rocker.dimensions.h': -0.2,
-        'rocker.branches.B': -1}).machines['rocker']
-    places = machine.linkage.solve(0.3)
-    assert machine.linkage.tracer == 'P'
+        'rocker.branches.B': -1}).mechanisms['rocker']
+    places = mechanism.linkage.solve(0.3)
+    assert mechanism.linkage.tracer == 'P'
     assert np.linalg.norm(places['B'] - places['A']) == pytest.approx(0.7)
     assert places['B'][1] < places['A'][1]
 
 
 def test_a_branch_is_an_assembly_sign_and_0_the_usual_one():
     given = {'mechanisms': ['jansen'], 'jansen.branches.E': 0, 'jansen.branches.F': -1}
-    assert scene.read(given).machines['jansen'].linkage.branches == {'C': 1, 'E': -1, 'F': -1}
+    assert scene.read(given).mechanisms['jansen'].linkage.branches == {'C': 1, 'E': -1, 'F': -1}
 
 
 def test_only_more_than_one_pair_is_mirrored_by_default():
     def mirrored(**given):
         given = {f'jansen.{key}': value for key, value in given.items()}
-        return scene.read({'mechanisms': ['jansen'], **given}).machines['jansen'].mirrored
+        return scene.read({'mechanisms': ['jansen'], **given}).mechanisms['jansen'].mirrored
 
     assert not mirrored() and mirrored(leg_pairs=2)
     assert mirrored(mirrored=True) and not mirrored(leg_pairs=3, mirrored=False)
@@ -219,7 +219,7 @@ def test_a_wrong_parameter_is_named_with_what_is_allowed(given, named):
 def test_joints_bear_a_robots_own_names_signs_and_zeros():
     lines = ['crank=hip', 'left0_BC=-left-knee', 'right1_EF=-ankle.2-1.5e-1']
     joints = scene.read({'jansen.leg_pairs': 2, 'jansen.only_named': True,
-                         'jansen.joint_names': lines}).machines['jansen'].joints
+                         'jansen.joint_names': lines}).mechanisms['jansen'].joints
     named = {joint: called for joint, called in joints.items() if called.published}
     assert named == {'crank': ('hip', 1.0, 0.0, True, False),
                      'left0_BC': ('left-knee', -1.0, 0.0, True, False),
@@ -232,37 +232,38 @@ def test_joints_bear_a_robots_own_names_signs_and_zeros():
     ' ', '\u2028', 'a=b', '#'])
 def test_any_name_of_a_joint_can_be_quoted(name):
     line = f'BC=-{quoted_name(name)}+1'
-    joints = scene.read({'jansen.joint_names': [line]}).machines['jansen'].joints
+    joints = scene.read({'jansen.joint_names': [line]}).mechanisms['jansen'].joints
     assert joints['BC'] == (name, -1.0, 1.0, True, True)
 
 
 def test_a_whole_number_is_taken_for_the_number_that_it_is():
-    machine = scene.read({'jansen.dimensions.m': 15, 'jansen.pose': [1, 0, 0, 0, 0, 0],
-                          'jansen.crank.speed': 2}).machines['jansen']
-    for value in (machine.linkage.dimensions['m'], machine.pose[0], machine.first.speed):
+    mechanism = scene.read({'jansen.dimensions.m': 15, 'jansen.pose': [1, 0, 0, 0, 0, 0],
+                            'jansen.crank.speed': 2}).mechanisms['jansen']
+    for value in (mechanism.linkage.dimensions['m'], mechanism.pose[0], mechanism.first.speed):
         assert type(value) is float
 
 
 def test_only_mechanisms_that_are_given_something_else_are_read_again():
     given = {'jansen.dimensions.m': 15.0, 'peaucellier.scale': 0.1}
     before = scene.read(given)
-    after = scene.changed(before, {'jansen.dimensions.m': 14.9, 'peaucellier.scale': 0.1}).machines
-    assert {name for name in after if after[name] is not before.machines[name]} == {'jansen'}
+    after = scene.changed(
+        before, {'jansen.dimensions.m': 14.9, 'peaucellier.scale': 0.1}).mechanisms
+    assert {name for name in after if after[name] is not before.mechanisms[name]} == {'jansen'}
     assert [p.name for p in scene.changed(before, {'rate': 9.0}).changed_from(before)] == [
         'rate']
 
 
 def test_what_is_not_changed_stays_though_its_default_depends_on_it():
     before = scene.read({'jansen.leg_pairs': 1})
-    assert not scene.changed(before, {'jansen.leg_pairs': 3}).machines['jansen'].mirrored
+    assert not scene.changed(before, {'jansen.leg_pairs': 3}).mechanisms['jansen'].mirrored
 
 
 @pytest.mark.parametrize('given, start', [
     ({'mechanisms': ['jansen'], 'jansen.crank.sweep': [2.0, 3.0], 'jansen.crank.start': 0.5}, 2.0),
     ({**CELL, 'cell.crank.start': 1.5}, 0.98 * 1.171371)])
 def test_a_start_outside_the_sweep_or_the_reach_is_the_nearer_end(given, start):
-    machine, = scene.read(given).machines.values()
-    assert Motion.of(machine.first).at(0)[0] == pytest.approx(start, rel=1e-6)
+    mechanism, = scene.read(given).mechanisms.values()
+    assert Motion.of(mechanism.first).at(0)[0] == pytest.approx(start, rel=1e-6)
 
 
 def test_parameters_of_the_client_library_are_none_of_the_scenes_business():
@@ -275,17 +276,17 @@ def test_overrides_of_quality_of_service_would_not_act_and_are_refused():
 
 
 def test_a_crank_that_cannot_turn_swings_within_its_reach():
-    machine = scene.read(CELL).machines['cell']
-    (low, high), = machine.reach
-    assert machine.first.sweep == pytest.approx((0.98 * low, 0.98 * high))
+    mechanism = scene.read(CELL).mechanisms['cell']
+    (low, high), = mechanism.reach
+    assert mechanism.first.sweep == pytest.approx((0.98 * low, 0.98 * high))
 
 
 def test_a_crank_swings_in_the_arc_that_its_start_is_in():
     stiff = {**CELL, 'cell.dimensions.r': 10.0}
-    first, second = scene.read(stiff).machines['cell'].reach
+    first, second = scene.read(stiff).mechanisms['cell'].reach
     middle = 0.5 * (second[0] + second[1])
-    assert scene.read(stiff).machines['cell'].first.sweep[1] < first[1]
-    crank = scene.read({**stiff, 'cell.crank.start': middle - math.tau}).machines['cell'].first
+    assert scene.read(stiff).mechanisms['cell'].first.sweep[1] < first[1]
+    crank = scene.read({**stiff, 'cell.crank.start': middle - math.tau}).mechanisms['cell'].first
     assert second[0] < crank.sweep[0] < middle < crank.sweep[1] < second[1]
 
 
@@ -293,13 +294,14 @@ def test_a_crank_swings_in_the_arc_that_its_start_is_in():
 @pytest.mark.parametrize('path', sorted(glob(os.path.join(CONFIG, '*.yaml'))))
 def test_every_scene_in_config_stands_above_the_floor(path):
     pytest.importorskip('yaml')
-    for machine in scene.load(path).machines.values():
+    for mechanism in scene.load(path).mechanisms.values():
         file = os.path.basename(path)
         lies = file == 'rack_steering.yaml'
-        assert machine.pose[2] >= 0.0 and machine.pose[3:] == (0.0 if lies else math.pi / 2, 0, 0)
+        upright = 0.0 if lies else math.pi / 2
+        assert mechanism.pose[2] >= 0.0 and mechanism.pose[3:] == (upright, 0, 0)
         if file not in ('rack_steering.yaml', 'excavator.yaml', 'catalogue.yaml'):
             # Not those that are seen from above, dig, or hang on a wall.
-            assert 0.0 < whole_motion(machine)[..., 1].min() < 0.2
+            assert 0.0 < whole_motion(mechanism)[..., 1].min() < 0.2
 
 
 @pytest.mark.parametrize('text, reason', [
@@ -338,7 +340,7 @@ def lengths(given):
     """Return the scene, and name, value and slider of each length."""
     made = scene.read(given)
     return made, [(p.name, p.value, slider.ends(mechanism, p))
-                  for mechanism in made.machines.values() for p in mechanism.parameters
+                  for mechanism in made.mechanisms.values() for p in mechanism.parameters
                   if '.dimensions.' in p.name]
 
 
@@ -347,7 +349,7 @@ def lengths(given):
                                    {'jansen.scale': 1e308}],
                          ids=[*TYPES, 'small', 'signed', 'swept', 'least', 'most'])
 def test_every_slider_has_its_value_between_finite_ends(given):
-    numbers = [(mechanism, p) for mechanism in scene.read(given).machines.values()
+    numbers = [(mechanism, p) for mechanism in scene.read(given).mechanisms.values()
                for p in mechanism.parameters if p.field.kind == 'double']
     for mechanism, parameter in numbers:
         low, high = slider.ends(mechanism, parameter)
@@ -358,7 +360,7 @@ def test_every_slider_has_its_value_between_finite_ends(given):
 
 @pytest.mark.parametrize('ratio', [-2.0, 1.0])
 def test_the_sliders_of_ratio_and_offset_move_an_input(ratio):
-    own = scene.read({**SIGNED, 'own.crank.ratio': ratio}).machines['own']
+    own = scene.read({**SIGNED, 'own.crank.ratio': ratio}).mechanisms['own']
     found = {p.name: slider.ends(own, p) for p in own.parameters
              if p.name in ('own.crank.ratio', 'own.crank.offset')}
     assert found['own.crank.ratio'] == pytest.approx(sorted((0.1 * ratio, 10.1 * ratio)), abs=0.2)
@@ -381,8 +383,8 @@ def test_nearly_all_of_a_sliders_travel_keeps_a_crank_turning(given, stops):
             except scene.SceneError:
                 fits.append(False)
                 continue
-            machine, old = (next(iter(s.machines.values())) for s in (after, made))
-            turned, turns = (each.first.input.is_whole(each.reach) for each in (old, machine))
+            mechanism, old = (next(iter(s.mechanisms.values())) for s in (after, made))
+            turned, turns = (each.first.input.is_whole(each.reach) for each in (old, mechanism))
             fits.append(not turned or turns or 'own.crank.sweep' in given)
     assert sum(fits) >= 0.9 * len(fits)
 
@@ -441,10 +443,10 @@ def test_the_nodes_that_use_a_parameter_are_those_of_the_page():
 def test_scenes_of_the_same_values_are_equal_however_they_are_written():
     few, all_ = scene.read({}), scene.read({'frame_id': 'world', 'jansen.scale': 0.005,
                                             'jansen.leg_pairs': 1, 'jansen.dimensions.m': 15})
-    for name in few.machines:
-        one, other = few.machines[name], all_.machines[name]
+    for name in few.mechanisms:
+        one, other = few.mechanisms[name], all_.mechanisms[name]
         assert one == other and repr(one) == repr(other) and 'Parameter(' not in repr(one)
-    assert few.machines['jansen'] != scene.read({'jansen.scale': 0.1}).machines['jansen']
+    assert few.mechanisms['jansen'] != scene.read({'jansen.scale': 0.1}).mechanisms['jansen']
 
 
 @pytest.mark.parametrize('given, reason', [
@@ -479,7 +481,7 @@ def test_settings_of_inputs_and_loads_that_cannot_be_are_refused(given, reason):
 
 def test_a_stroke_takes_three_seconds_by_default_and_its_lengths_are_scaled():
     for scale, speed in ((1.0, 0.67), (0.25, 0.17), (1000.0, 100.0)):
-        made = scene.read({**ACTUATED, 'own.scale': scale}).machines['own'].inputs
+        made = scene.read({**ACTUATED, 'own.scale': scale}).mechanisms['own'].inputs
         stroke = made['cylinder']
         assert (stroke.speed, made['tilt'].speed) == (speed, 1.0)
         assert (stroke.input.low, stroke.input.high) == pytest.approx((0.5 * scale, 2.5 * scale))
@@ -488,23 +490,23 @@ def test_a_stroke_takes_three_seconds_by_default_and_its_lengths_are_scaled():
         assert made['tilt'].sweep is None and stroke.ends is None
         assert made['tilt'].source == 'own_tilt' and stroke.actuator == (1.0, 0.0)
     swept = scene.read({**ACTUATED, 'own.cylinder.sweep': [1, 2], 'own.cylinder.ratio': 2.0})
-    drive = swept.machines['own'].inputs['cylinder']
+    drive = swept.mechanisms['own'].inputs['cylinder']
     assert drive.sweep == drive.ends == (1.0, 2.0) and drive.actuator == (2.0, 0.0)
 
 
 def test_loads_are_forces_of_joints_and_moments_of_links():
     lines = ['C=-1.5e1 +.5', 'OB=-2', 'B=0  3']
-    assert scene.read({**ACTUATED, 'own.loads': lines}).machines['own'].loads == {
+    assert scene.read({**ACTUATED, 'own.loads': lines}).mechanisms['own'].loads == {
         'C': (-15.0, 0.5), 'OB': -2.0, 'B': (0.0, 3.0)}
 
 
 def test_a_load_of_a_linkage_in_space_has_three_components():
     given = {**OWN, 'own.type': 'rods', 'own.joints': G1}
-    own = scene.read({**given, 'own.loads': ['pitch=2']}).machines['own']
+    own = scene.read({**given, 'own.loads': ['pitch=2']}).mechanisms['own']
     assert own.in_space is True and own.loads == {'pitch': 2.0}
-    assert scene.read({}).machines['jansen'].in_space is False
+    assert scene.read({}).mechanisms['jansen'].in_space is False
     point = own.linkage.points[0]
-    loaded = scene.read({**given, 'own.loads': [f'{point}=1 -2 3']}).machines['own']
+    loaded = scene.read({**given, 'own.loads': [f'{point}=1 -2 3']}).mechanisms['own']
     assert loaded.loads == {point: (1.0, -2.0, 3.0)}
     with pytest.raises(scene.SceneError, match=(
             f'own.loads: the load of {point} must have the components x, y, z, not '
@@ -532,7 +534,7 @@ def test_a_motion_that_is_moved_in_time_goes_on_as_it_would_have(sweep, speed):
 def test_the_travel_of_a_published_joint_is_that_of_its_values(offset):
     for sign, ends in itertools.product((1, -1), ((-0.3, 0.2), (-2.0, 2.5), (7.0, 7.5))):
         joint = scene.read({'mechanisms': ['klann'], 'klann.joint_names': [
-            f'AD={"-" * (sign < 0)}a{offset}']}).machines['klann'].joints['AD']
+            f'AD={"-" * (sign < 0)}a{offset}']}).mechanisms['klann'].joints['AD']
         values = joint.of(np.linspace(*ends, 1001))
         plain = sign * np.linspace(*ends, 1001) + float(offset or 0.0)
         assert abs(np.exp(1j * values) - np.exp(1j * plain)).max() < 1e-12
@@ -562,15 +564,15 @@ def test_a_year_of_motion_loses_nothing():
 @pytest.mark.parametrize('ratio, period', [
     ('1.5', 2), ('-2', 1), ('1/3', 3), ('7/12', 12), ('0.999', 1000)])
 def test_a_crank_that_is_geared_by_a_fraction_turns_on_until_all_comes_round(ratio, period):
-    machine = scene.read({'mechanisms': ['gears'], 'gears.type': 'custom', 'gears.joints': [
+    mechanism = scene.read({'mechanisms': ['gears'], 'gears.type': 'custom', 'gears.joints': [
         'O ground 0 0', 'Q ground 3 0', 'A crank O 1',
-        f'B crank Q 1 geared crank {ratio} 0']}).machines['gears']
-    drive = machine.first
+        f'B crank Q 1 geared crank {ratio} 0']}).mechanisms['gears']
+    drive = mechanism.first
     motion, exact = Motion.of(drive), eval(ratio, {'sqrt': math.sqrt})
     for turns in (0.5, 1.5, period - 0.25, period + 0.25):
         angle, _ = motion.at(round(turns * math.tau * 1e9))
         assert 0.0 <= angle < period * math.tau
-        tip = machine.linkage.solve(angle)['B'] - (3.0, 0.0)
+        tip = mechanism.linkage.solve(angle)['B'] - (3.0, 0.0)
         wanted = exact * turns * math.tau
         assert tip == pytest.approx([math.cos(wanted), math.sin(wanted)], abs=1e-7)
 
@@ -662,8 +664,8 @@ def test_crank_driver_reads_whatever_its_motions_depend_on():
                 after = scene.read({**values, parameter.name: other})
             except scene.SceneError:
                 continue
-            if any(after.machines[name].inputs != machine.inputs
-                   for name, machine in before.machines.items()):
+            if any(after.mechanisms[name].inputs != mechanism.inputs
+                   for name, mechanism in before.mechanisms.items()):
                 found.add(parameter.name.rpartition('.')[2])
                 assert 'crank_driver' in parameter.field.readers, parameter.name
     assert found >= {'scale', 'a', 'speed', 'ratio', 'offset'}

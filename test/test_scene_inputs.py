@@ -57,16 +57,16 @@ class Case:
         type_, lengths, lines, given, self.outputs, self.inputs = CASES[name]
         self.given, self.scale = {**given, **more}, given['scale']
         own = {'joints': list(lines)} if lines else {}
-        self.machine = scene.read({'mechanisms': ['m'], **{
+        self.mechanism = scene.read({'mechanisms': ['m'], **{
             f'm.{key}': value for key, value in {
                 'type': type_, **own, **self.given,
                 **{f'dimensions.{key}': value for key, value in lengths.items()}}.items()
-        }}).machines['m']
+        }}).mechanisms['m']
         self.linkage = mechanisms.create(type_, **own, **{
             key: self.scale * value for key, value in lengths.items()})
-        self.drives = [*self.machine.inputs.values()]
-        self.ratios = [self.given.get(f'{key}.ratio', 1.0) for key in self.machine.inputs]
-        self.offsets = [self.given.get(f'{key}.offset', 0.0) for key in self.machine.inputs]
+        self.drives = [*self.mechanism.inputs.values()]
+        self.ratios = [self.given.get(f'{key}.ratio', 1.0) for key in self.mechanism.inputs]
+        self.offsets = [self.given.get(f'{key}.offset', 0.0) for key in self.mechanism.inputs]
 
     def at(self, inputs, outputs=()):
         """Return outputs at inputs at full size, each a number or an array."""
@@ -99,7 +99,7 @@ def posed(request):
     name, i = request.param
     case = Case(name)
     inputs = case.inputs[i]
-    return case, inputs, case.at(inputs), InverseRequest(case.machine, case.outputs)
+    return case, inputs, case.at(inputs), InverseRequest(case.mechanism, case.outputs)
 
 
 def near(found, expected):
@@ -169,7 +169,7 @@ def test_efforts_do_the_work_of_the_loads(posed):
         name, _, figures = load.partition('=')
         outputs = [f'{name}.x', f'{name}.y'] if ' ' in figures else [name]
         work += np.array([*map(float, figures.split())]) @ case.jacobian(inputs, outputs)
-    np.testing.assert_allclose(case.machine.efforts(inputs), -work, 1e-6, 1e-7)
+    np.testing.assert_allclose(case.mechanism.efforts(inputs), -work, 1e-6, 1e-7)
 
 
 @pytest.mark.parametrize('name, output', [
@@ -177,25 +177,25 @@ def test_efforts_do_the_work_of_the_loads(posed):
     ('angle', 'B.y')])
 def test_a_sensor_gives_the_input_and_an_input_the_sensor(name, output):
     case = Case(name)
-    key, = case.machine.inputs
+    key, = case.mechanism.inputs
     case = Case(name, **{f'{key}.measures': output, f'{key}.ratio': 2.0, f'{key}.offset': 0.125})
     drive, = case.drives
     assert drive.source == f'm_{output}' and drive.actuator == (1.0, 0.0)
     for (value,), speed in itertools.product(case.inputs, (0.0, -0.6)):
         (read,), (slope,) = case.at([value], [output]), case.jacobian([value], [output])[0]
-        position, rate = case.machine.to_source(drive, value, speed)
+        position, rate = case.mechanism.to_source(drive, value, speed)
         near([position], [(read - 0.125) / 2.0])
         assert rate == pytest.approx(slope * speed / 2.0, rel=1e-6, abs=1e-9)
-        near(case.machine.from_source(drive, position, rate, value + 1e-3), [value, speed])
-        assert case.machine.from_source(drive, position, None, value)[1] is None
+        near(case.mechanism.from_source(drive, position, rate, value + 1e-3), [value, speed])
+        assert case.mechanism.from_source(drive, position, None, value)[1] is None
         # Without the last input the start counts; another source is not known.
-        first, _ = case.machine.from_source(drive, position, None, None)
-        near(first, case.machine.from_source(drive, position, None, drive.start)[0])
-        assert present_inputs(case.machine, {drive.source: position, 'other': 9.0}) == [first]
-        assert present_inputs(case.machine, {}) == [math.inf]
-    if not case.machine.linkage.is_angle(output):
-        assert math.isnan(case.machine.from_source(drive, 1e6, 1.0, 0.0)[0])
-        assert present_inputs(case.machine, {drive.source: 1e6}) == [math.inf]
+        first, _ = case.mechanism.from_source(drive, position, None, None)
+        near(first, case.mechanism.from_source(drive, position, None, drive.start)[0])
+        assert present_inputs(case.mechanism, {drive.source: position, 'other': 9.0}) == [first]
+        assert present_inputs(case.mechanism, {}) == [math.inf]
+    if not case.mechanism.linkage.is_angle(output):
+        assert math.isnan(case.mechanism.from_source(drive, 1e6, 1.0, 0.0)[0])
+        assert present_inputs(case.mechanism, {drive.source: 1e6}) == [math.inf]
 
 
 def test_where_the_way_leads_out_of_the_sweep_one_input_jumps_into_it():
@@ -205,12 +205,12 @@ def test_where_the_way_leads_out_of_the_sweep_one_input_jumps_into_it():
             ([0.2, 1.5], -0.5, 0.9), ([-1.5, -0.2], 0.5, -0.9), ([-1.5, 1.5], -0.5, -0.9),
             ([-1.5, 0.9], 0.5, 0.9), ([0.9, 1.5], -0.5, 0.9), ([-0.8, 0.8], 0.5, math.nan),
             ([5.0, 6.0], 0.5, math.tau - 0.9)):
-        machine = scene.read({'mechanisms': ['m'], 'm.type': 'slider_crank', 'm.scale': 0.5,
-                              'm.dimensions.c': 0.0, 'm.crank.sweep': sweep}).machines['m']
+        mechanism = scene.read({'mechanisms': ['m'], 'm.type': 'slider_crank', 'm.scale': 0.5,
+                                'm.dimensions.c': 0.0, 'm.crank.sweep': sweep}).mechanisms['m']
         for jumps in (False, True):
-            near(InverseRequest(machine, ['block']).command(
+            near(InverseRequest(mechanism, ['block']).command(
                 [0.5 * block], None, [near_], jumps).inputs, [expected])
-        near(machine.follow(['block'], [0.5 * block], [near_])[0][0], expected)
+        near(mechanism.follow(['block'], [0.5 * block], [near_])[0][0], expected)
 
 
 @pytest.mark.parametrize('turn', [-1, 0])
@@ -218,14 +218,14 @@ def test_a_sensor_s_input_continues_where_another_answer_is_nearer(turn):
     """A slotted lever returns quickly: the slow answer is the farther one from its extreme."""
     extreme, pin = math.acos(-80.0 / 150.0), 2.0
     sweep = [turn * math.tau + end for end in (-1.9, 4.0)]
-    machine = scene.read({'mechanisms': ['m'], 'm.type': 'slotted_lever',
-                          'm.crank.sweep': sweep, 'm.crank.start': sweep[0]}).machines['m']
+    mechanism = scene.read({'mechanisms': ['m'], 'm.type': 'slotted_lever',
+                            'm.crank.sweep': sweep, 'm.crank.start': sweep[0]}).mechanisms['m']
     lever = math.atan2(80.0 * math.sin(pin - 0.7), 150.0 + 80.0 * math.cos(pin - 0.7))
     last = turn * math.tau + extreme - 0.02
-    fast = machine.linkage.input_for('lever', lever).max() + turn * math.tau
+    fast = mechanism.linkage.input_for('lever', lever).max() + turn * math.tau
     assert abs(fast - last) < last - (turn * math.tau + pin - 0.7)
-    near(machine.follow(['lever'], [lever], [last])[0][0], turn * math.tau + pin - 0.7)
-    near(InverseRequest(machine, ['lever']).command([lever], None, [last]).inputs,
+    near(mechanism.follow(['lever'], [lever], [last])[0][0], turn * math.tau + pin - 0.7)
+    near(InverseRequest(mechanism, ['lever']).command([lever], None, [last]).inputs,
          [turn * math.tau + pin - 0.7])
 
 
@@ -239,7 +239,7 @@ def test_several_inputs_jump_only_if_they_may(scale):
     swept = {**given, 'm.crank.sweep': ends, 'm.crank.start': ends[0]}
     values = [scale * foot.real, scale * foot.imag]
     for parameters in (given, swept):
-        request = InverseRequest(scene.read(parameters).machines['m'], ['P.x', 'P.y'])
+        request = InverseRequest(scene.read(parameters).mechanisms['m'], ['P.x', 'P.y'])
         inside = [mode for mode in modes if parameters is given or mode[0] < ends[1]]
         expected = sorted(inside, key=lambda mode: math.dist(mode, start))
         for jumps in (False, True):
@@ -253,11 +253,11 @@ def test_several_inputs_jump_only_if_they_may(scale):
 @pytest.mark.parametrize('part', [(0.3, 0.8), (0.1, 0.4), None])
 def test_a_value_out_of_reach_is_told_the_range_or_the_input_that_it_needs(name, part):
     case = Case(name)
-    (key, drive), = case.machine.inputs.items()
+    (key, drive), = case.mechanism.inputs.items()
     low, high = whole = drive.reach[0]
     ends = part and [low + each * (high - low) for each in part]
     case = Case(name, **{f'{key}.sweep': ends or [], f'{key}.start': ends[0] if ends else low})
-    request, output = InverseRequest(case.machine, case.outputs), case.outputs[0]
+    request, output = InverseRequest(case.mechanism, case.outputs), case.outputs[0]
     low, high = ends or whole
     inputs = np.linspace(low, high, 20001)
     values, everywhere = (case.at([each])[0] for each in (inputs, np.linspace(*whole, 20001)))
@@ -285,7 +285,7 @@ def test_a_value_out_of_reach_is_told_the_range_or_the_input_that_it_needs(name,
             what = 'the lever' if output == 'lever' else output
             least, most, rest = re.fullmatch(
                 rf'{what} reaches \[(\S+), (\S+)\] '
-                rf'{"rad" if case.machine.linkage.is_angle(output) else "m"}\b(.*)',
+                rf'{"rad" if case.mechanism.linkage.is_angle(output) else "m"}\b(.*)',
                 found).groups()
             np.testing.assert_allclose([float(least), float(most)],
                                        [values.min(), values.max()], 1e-5)
@@ -298,9 +298,9 @@ def test_a_value_out_of_reach_is_told_the_range_or_the_input_that_it_needs(name,
     ('slider_crank', ['block'], 0.001), ('slotted_lever', ['L.x'], 0.001),
     ('five_bar', ['P.x', 'P.y'], 1.0)])
 def test_a_value_far_beyond_the_reach_is_refused_at_once(kind, outputs, size, far):
-    machine = scene.read({'mechanisms': ['m'], 'm.type': kind, **{
+    mechanism = scene.read({'mechanisms': ['m'], 'm.type': kind, **{
         f'm.dimensions.{key}': size * value for key, value in mechanisms.defaults(kind).items()
-    }}).machines['m']
+    }}).mechanisms['m']
     start = [1.9, 1.24][:len(outputs)]
-    found = InverseRequest(machine, outputs).command([far] * len(outputs), None, start, True)
+    found = InverseRequest(mechanism, outputs).command([far] * len(outputs), None, start, True)
     assert np.isnan(found.inputs).all() and np.isnan(found.positions).all()

@@ -284,7 +284,7 @@ def random_scene(rng):
              **{f'm.dimensions.{name}': length * math.exp(rng.uniform(-0.1, 0.1))
                 for name, length in mechanisms.defaults(kind).items() if length}}
     try:
-        reach = scene.read(given).machines['m'].reach
+        reach = scene.read(given).mechanisms['m'].reach
     except scene.SceneError:
         return None
     if rng.random() < 0.7:
@@ -306,8 +306,8 @@ def check_random_scene(graph, rng):
     if given is None:
         return 0
     node = graph.start(ServoInverse, given)
-    machine = node.scene.machines['m']
-    linkage, sweep = machine.linkage, given.get('m.crank.sweep')
+    mechanism = node.scene.mechanisms['m']
+    linkage, sweep = mechanism.linkage, given.get('m.crank.sweep')
     output = str(rng.choice([*linkage.joints, *(f'{joint}.{axis}' for joint in linkage.points
                                                 for axis in 'xy')]))
     joint, _, axis = output.rpartition('.')
@@ -317,14 +317,14 @@ def check_random_scene(graph, rng):
     def value(theta):
         found = (linkage.solve(theta, (joint,))[joint][..., 'xy'.index(axis)] if joint
                  else linkage.joint_angles(theta, (output,))[output])
-        return found if turns else found * machine.scale
+        return found if turns else found * mechanism.scale
 
-    arcs = [sweep] if sweep else machine.reach
+    arcs = [sweep] if sweep else mechanism.reach
     theta = np.concatenate([[*np.linspace(*arc, 40001), math.nan] for arc in arcs])
     curve = value(theta)
-    if np.nanmax(curve) - np.nanmin(curve) <= 1e-12 * machine.scale * linkage.longest:
+    if np.nanmax(curve) - np.nanmin(curve) <= 1e-12 * mechanism.scale * linkage.longest:
         return 0  # it never moves, but for rounding
-    wanted = value(np.concatenate([rng.uniform(*arcs[0], 2), rng.uniform(*machine.reach[0], 2)]))
+    wanted = value(np.concatenate([rng.uniform(*arcs[0], 2), rng.uniform(*mechanism.reach[0], 2)]))
     near = rng.uniform(-12.0, 12.0, 4) if rng.random() < 0.7 else np.zeros(0)
     response = ask(node, wanted.tolist(), near.tolist(), output, 'm')
     assert all(response.reachable[:2]), (given, output, wanted, response)

@@ -25,18 +25,18 @@ RACK = ('O ground 0 0', 'H ground 1 0.5', 'S carriage O along H 0.1 0.9', 'A gro
         'B dyad S A 0.6 0.5 left', 'm mirrored O H')
 
 
-def machine(type_='custom', **given):
+def mechanism(type_='custom', **given):
     return scene.read({'mechanisms': ['m'], 'm.type': type_, **{
-        f'm.{name.replace("__", ".")}': value for name, value in given.items()}}).machines['m']
+        f'm.{name.replace("__", ".")}': value for name, value in given.items()}}).mechanisms['m']
 
 
 MACHINES = {
-    'excavator': lambda: scene.load('config/excavator.yaml').machines['excavator'],
-    'boxer engine': lambda: machine(joints=ENGINE, leg_pairs=2, scale=0.01),
-    'guide on a coupler': lambda: machine(joints=MOVING, crank__sweep=[0.8, 1.6], scale=3.0),
-    'rack and its image': lambda: machine(joints=RACK),
-    'slotted_lever': lambda: machine('slotted_lever', dimensions__e=20.0, scale=1e-3),
-    'slider_crank': lambda: machine('slider_crank'),
+    'excavator': lambda: scene.load('config/excavator.yaml').mechanisms['excavator'],
+    'boxer engine': lambda: mechanism(joints=ENGINE, leg_pairs=2, scale=0.01),
+    'guide on a coupler': lambda: mechanism(joints=MOVING, crank__sweep=[0.8, 1.6], scale=3.0),
+    'rack and its image': lambda: mechanism(joints=RACK),
+    'slotted_lever': lambda: mechanism('slotted_lever', dimensions__e=20.0, scale=1e-3),
+    'slider_crank': lambda: mechanism('slider_crank'),
 }
 
 
@@ -107,7 +107,7 @@ BOOM = 'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right'
 @pytest.mark.parametrize('sweep, barrel', [
     ([0.8, 0.9], 0.4), ([0.8, 1.4], 0.6), ([0.6, 1.4], 0.54), ([0.8, 1.2], 0.4)])
 def test_a_barrel_is_as_long_as_the_stroke_from_half_to_nine_tenths(sweep, barrel):
-    one = machine(joints=BOOM, scale=3.0, cylinder__sweep=[3.0 * end for end in sweep])
+    one = mechanism(joints=BOOM, scale=3.0, cylinder__sweep=[3.0 * end for end in sweep])
     outer, rod = shapes.shapes(one)
     assert (outer.start, outer.end.x, outer.end.y) == (
         LinkPoint('barrel', 0.0, 0.0), pytest.approx(barrel), 0.0)
@@ -121,7 +121,7 @@ def test_a_guide_is_longer_than_its_block_s_way_by_the_block(sweep):
     # The pin of the crank, along and across the guide.
     pin = (40.0 * np.exp(1j * np.linspace(*sweep, 100_000)) + 20.0j) / cmath.rect(1.0, 0.5)
     way = pin.real + np.sqrt(120.0 ** 2 - pin.imag ** 2)
-    one = machine(joints=ENGINE, **({'crank__sweep': sweep} if sweep[0] else {}))
+    one = mechanism(joints=ENGINE, **({'crank__sweep': sweep} if sweep[0] else {}))
     guide, block = shapes.shapes(one)
     half = one.linkage.longest / 20.0
     ends = [complex(end.x, end.y + 20.0) / cmath.rect(1.0, 0.5) for end in guide[2:]]
@@ -158,7 +158,7 @@ def test_cranks_are_bars_that_inputs_turn_and_marks_are_below_the_ground():
     assert shapes.cranks(toe) == [('O', 'F'), ('K', 'A')]
     assert shapes.cranks(toe, 'ground') == [('O', 'F')]
     assert shapes.cranks(MACHINES['rack and its image']().linkage) == []
-    engine = machine(joints=ENGINE).linkage
+    engine = mechanism(joints=ENGINE).linkage
     height = engine.longest / 15.0
     assert shapes.marks(engine, ['G', 'A']) == [(
         'G', *(LinkPoint('ground', pytest.approx(side * 0.6 * height),
@@ -174,9 +174,9 @@ def test_a_guide_stays_on_the_link_that_it_is_on():
 
 
 def test_what_nobody_wants_is_not_drawn():
-    one = machine(joints=MOVING, points=['O', 'A', 'B'], crank__sweep=[0.8, 1.6])
+    one = mechanism(joints=MOVING, points=['O', 'A', 'B'], crank__sweep=[0.8, 1.6])
     assert shapes.shapes(one) and not shapes.drawn(one, one.points)
-    assert not shapes.shapes(scene.read({'mechanisms': ['jansen']}).machines['jansen'])
+    assert not shapes.shapes(scene.read({'mechanisms': ['jansen']}).mechanisms['jansen'])
 
 
 def test_a_linkage_without_a_bar_is_as_large_as_its_stroke():

@@ -28,11 +28,11 @@ def simulated(name):
     """Return a mechanism of about a metre that starts in the middle of its reach."""
     one = {**MACHINES, **OWN}[name]()
     given = {**one.values, 'm.scale': one.scale / bodies.size(one)}
-    one = scene.read({'mechanisms': ['m'], **given}).machines['m']
+    one = scene.read({'mechanisms': ['m'], **given}).mechanisms['m']
     rows = drives(one)
     given.update((f'm.{key}.start', value) for key, value in zip(
         one.inputs, rows[len(rows) // 2].tolist()))
-    return scene.read({'mechanisms': ['m'], **given}).machines['m']
+    return scene.read({'mechanisms': ['m'], **given}).mechanisms['m']
 
 
 def some_quick(names, quick):
@@ -45,8 +45,8 @@ def some_scenes(*quick):
         () if path.stem in quick else pytest.mark.nightly)) for path in SCENES]
 
 
-def model(machines, frame_id='world', **given):
-    return assembled(bodies.robot(machines, frame_id), **given)
+def model(mechanisms, frame_id='world', **given):
+    return assembled(bodies.robot(mechanisms, frame_id), **given)
 
 
 class MuJoCo:
@@ -122,8 +122,8 @@ def test_mujoco_has_every_joint_where_it_is_and_every_loop_closed(name):
 @pytest.mark.parametrize('file', some_scenes('all', 'excavator', 'rack_steering'))
 def test_gravity_tears_no_scene(file):
     found = scene.load(str(file))
-    robot = MuJoCo(mjcf.write(model(found.machines.values(), found.frame_id)))
-    bar = min(map(bodies.size, found.machines.values()))
+    robot = MuJoCo(mjcf.write(model(found.mechanisms.values(), found.frame_id)))
+    bar = min(map(bodies.size, found.mechanisms.values()))
     assert max(robot.open() for _ in robot.run(1.0)) < 1e-5 * bar
 
 
@@ -150,7 +150,7 @@ def follow(one, robot, seconds):
 
 @pytest.mark.parametrize('file', some_scenes('excavator', 'jansen', 'rack_steering'))
 def test_servos_drive_the_linkage_through_the_poses_of_solve(file):
-    for one in scene.load(str(file)).machines.values():
+    for one in scene.load(str(file)).mechanisms.values():
         robot = MuJoCo(mjcf.write(model([one])))
         assert max(follow(one, robot, 2.0)) < 2e-3 * bodies.size(one)
 
@@ -173,7 +173,7 @@ def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
     joints = [joint for part in built.parts for joint in part.robot.joints]
     zeros = {joint.name: joint.start if form is sdf else 0.0 for joint in joints}
     turns = {joint.name: joint.kind == 'hinge' for joint in joints}
-    machines = scene.read(given).machines.values()
+    mechanisms = scene.read(given).mechanisms.values()
     # A file has 15 digits: exactly at an end of the reach its linkage may not be assembled.
     ends = np.ravel(one.first.reach) if len(one.inputs) == 1 else ()
     for thetas in drives(one, 9):
@@ -181,7 +181,7 @@ def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
             continue
         wanted = {name: value - zeros[name] for name, value in posed(one, thetas)[0].items()}
         found = {}
-        for each in machines:
+        for each in mechanisms:
             found.update(published(each, **{
                 drive.source: wanted[drive.source] for drive in each.inputs.values()}))
         for joint, value in found.items():

@@ -60,22 +60,22 @@ def with_length(given, rng):
 KINDS = with_sign, with_offset, with_side, with_length
 
 
-def is_found(robot, machine, values, made):
+def is_found(robot, mechanism, values, made):
     """Tell whether the check finds a fault; what changes no position is none."""
-    name, ends = machine.name, made.ends
+    name, ends = mechanism.name, made.ends
     try:
         wrong = scene.read({'mechanisms': [name], **{
-            f'{name}.{key}': value for key, value in values.items()}}).machines[name]
+            f'{name}.{key}': value for key, value in values.items()}}).mechanisms[name]
         if check.compared(robot, {name: wrong}, [made])[1]:
             return True
     except scene.SceneError:
         return True
     parts = [[drive.ratio * np.linspace(*ends[drive.source], 9) + drive.offset
-              for drive in machine.inputs.values()]] * 2
+              for drive in mechanism.inputs.values()]] * 2
     (one, other) = (each.linkage.joint_angles(part if len(part) > 1 else part[0])
-                    for each, part in zip((machine, wrong), parts))
-    off = [machine.joints[link].of(one[link]) - wrong.joints[link].of(other[link])
-           for link in machine.joints if machine.joints[link].published]
+                    for each, part in zip((mechanism, wrong), parts))
+    off = [mechanism.joints[link].of(one[link]) - wrong.joints[link].of(other[link])
+           for link in mechanism.joints if mechanism.joints[link].published]
     return np.nanmax(np.abs(off - math.tau * np.round(np.divide(off, math.tau)))) < 1e-9
 
 
@@ -98,14 +98,14 @@ def faults(robot, seed):
     rng, given = np.random.default_rng(seed), {}
     with patch.object(check, 'compared', wraps=check.compared) as spy, suppress(RequestError):
         given = described(robot)[0] if robot else {}
-    for robot, machines, made in ((*call.args[:2], made) for call in spy.call_args_list
-                                  for made in call.args[2] if made.name in given['mechanisms']):
-        machine = machines[made.name]
+    for robot, mechanisms, made in ((*call.args[:2], made) for call in spy.call_args_list
+                                    for made in call.args[2] if made.name in given['mechanisms']):
+        mechanism = mechanisms[made.name]
         made = made._replace(ends={
             name: (max(low, robot.positions[name] - 0.1), min(high, robot.positions[name] + 0.1))
             for name, (low, high) in made.ends.items()})
         own = {key.partition('.')[2]: value for key, value in given.items()
-               if key.startswith(f'{machine.name}.')}
+               if key.startswith(f'{mechanism.name}.')}
         for _ in range(FAULTS):
             values = {key: value[:] if isinstance(value, list) else value
                       for key, value in own.items()}
@@ -113,7 +113,7 @@ def faults(robot, seed):
             with suppress(IndexError):
                 kind(values, rng)
                 yield (seed, kind.__name__, values['joints'], values['joint_names']), is_found(
-                    robot, machine, values, made)
+                    robot, mechanism, values, made)
 
 
 @pytest.mark.parametrize('seeds', [

@@ -124,10 +124,10 @@ static long {name}_walked(long states)
 """
 
 
-def compiled(folder, machines, *names, flags=()):
+def compiled(folder, mechanisms, *names, flags=()):
     """Return a library with the actuators and joints of mechanisms."""
-    return loaded(folder, ''.join(header.written(machine, joints=names) + CALLER.format(
-        name=machine.name, n=len(machine.inputs)) for machine in machines), *flags)
+    return loaded(folder, ''.join(header.written(mechanism, joints=names) + CALLER.format(
+        name=mechanism.name, n=len(mechanism.inputs)) for mechanism in mechanisms), *flags)
 
 
 class Memory:
@@ -147,58 +147,58 @@ class Memory:
         return status, found.reshape(3, n)
 
 
-def states(machine, count, seed=1):
+def states(mechanism, count, seed=1):
     """Return values of all inputs in the scene's units that can be assembled, not at the ends."""
     rng, found = np.random.default_rng(seed), []
     while len(found) < count:
         own = []
-        for drive in machine.inputs.values():
+        for drive in mechanism.inputs.values():
             low, high = drive.ends or drive.reach[0]
             own.append(rng.uniform(low + 0.02 * (high - low), high - 0.02 * (high - low)))
-        values = outputs(machine, own, [each.output for each in joints(machine)])
+        values = outputs(mechanism, own, [each.output for each in joints(mechanism)])
         if np.isfinite(values).all():
             found.append(own)
     return found
 
 
-def outputs(machine, inputs, names, by=None):
+def outputs(mechanism, inputs, names, by=None):
     """Return outputs, or their rates by an input, in the scene's units, at such inputs."""
-    units = [machine.scale_of(name) for name in machine.inputs]
+    units = [mechanism.scale_of(name) for name in mechanism.inputs]
     own = [value / unit for value, unit in zip(inputs, units)]
-    ask = machine.linkage.joint_angles if by is None else machine.linkage.joint_rates
+    ask = mechanism.linkage.joint_angles if by is None else mechanism.linkage.joint_rates
     values = ask(own if len(own) > 1 else own[0], names, *([] if by is None else [by]))
-    return np.array([float(values[name]) * machine.scale_of(name) / (
+    return np.array([float(values[name]) * mechanism.scale_of(name) / (
         1.0 if by is None else units[by]) for name in names])
 
 
-def expected(machine, inputs):
+def expected(mechanism, inputs):
     """Return positions of actuators and joints at inputs, and their Jacobians, from the scene."""
-    n, drives = len(machine.inputs), list(machine.inputs.values())
-    told = [drive.measures or name for name, drive in machine.inputs.items()]
+    n, drives = len(mechanism.inputs), list(mechanism.inputs.values())
+    told = [drive.measures or name for name, drive in mechanism.inputs.items()]
     ratio, offset = (np.array([getattr(drive, key) for drive in drives])
                      for key in ('ratio', 'offset'))
-    position = (outputs(machine, inputs, told) - offset) / ratio
-    rates = np.array([outputs(machine, inputs, told, by) for by in range(n)]).T / ratio[:, None]
-    chosen = [each.output for each in joints(machine)]
-    prefix = next(iter(machine.assembly().legs))
-    called = [machine.joints[name if name in machine.inputs else prefix + name]
+    position = (outputs(mechanism, inputs, told) - offset) / ratio
+    rates = np.array([outputs(mechanism, inputs, told, by) for by in range(n)]).T / ratio[:, None]
+    chosen = [each.output for each in joints(mechanism)]
+    prefix = next(iter(mechanism.assembly().legs))
+    called = [mechanism.joints[name if name in mechanism.inputs else prefix + name]
               for name in chosen]
     joint = np.array([name.of(value) for name, value in zip(
-        called, outputs(machine, inputs, chosen))])
+        called, outputs(mechanism, inputs, chosen))])
     signs = np.array([name.sign for name in called])
-    turning = np.array([outputs(machine, inputs, chosen, by) for by in range(n)]).T
+    turning = np.array([outputs(mechanism, inputs, chosen, by) for by in range(n)]).T
     return position, rates, joint, signs[:, None] * turning
 
 
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
-def test_both_ways_are_those_of_the_scene(library, machines, name):
-    machine = machines[name]
-    n = len(machine.inputs)
+def test_both_ways_are_those_of_the_scene(library, mechanisms, name):
+    mechanism = mechanisms[name]
+    n = len(mechanism.inputs)
     memory = Memory(library, name, n)
-    for inputs in states(machine, 20):
-        actuator, by, joint, turning = expected(machine, inputs)
+    for inputs in states(mechanism, 20):
+        actuator, by, joint, turning = expected(mechanism, inputs)
         speeds, torques = np.arange(1.0, n + 1.0), np.arange(2.0, n + 2.0)
-        loads = np.array(machine.efforts(inputs)) if machine.loads else np.zeros(n)
+        loads = np.array(mechanism.efforts(inputs)) if mechanism.loads else np.zeros(n)
         if np.linalg.cond(by) > 1e3 or np.linalg.cond(turning) > 1e3:
             continue
         status, (position, velocity, effort) = memory.send(0, actuator, by @ speeds, torques)
@@ -215,54 +215,55 @@ def test_both_ways_are_those_of_the_scene(library, machines, name):
 
 
 @pytest.mark.parametrize('name', ['boom', 'rack'])
-def test_what_is_beyond_the_stroke_is_out_of_reach(library, machines, name):
-    machine, memory = machines[name], Memory(library, name, 1)
-    (low, high), = machine.first.reach
+def test_what_is_beyond_the_stroke_is_out_of_reach(library, mechanisms, name):
+    mechanism, memory = mechanisms[name], Memory(library, name, 1)
+    (low, high), = mechanism.first.reach
     for end, inwards in ((low, 1.0), (high, -1.0)):
-        inside, outside = ((end + way * inwards * 1e-6) / machine.first.ratio for way in (1, -1))
+        inside, outside = ((end + way * inwards * 1e-6) / mechanism.first.ratio for way in (1, -1))
         assert memory.send(0, [inside])[0] & 1 == 0 and memory.send(0, [outside])[0] & 1 == 1
 
 
 def test_what_is_not_assembled_is_out_of_reach_whatever_is_commanded(tmp_path):
-    machine, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
+    mechanism, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
         'O ground 0 0', 'A crank O 1', 'Q ground 2 0', 'B dyad A Q 1.1 1 left',
         'R ground 1 1.7', 'C dyad A R 1 1 left', 'S ground 1.9 0.3', 'D dyad A S 0.7 0.6 left']}
-        ).machines.values()
-    library = compiled(tmp_path, [machine], 'm_QB')
+        ).mechanisms.values()
+    library = compiled(tmp_path, [mechanism], 'm_QB')
     memory, angles = Memory(library, 'm', 1), np.linspace(-1.5, 2.5, 81)
-    assembled = [np.isfinite(list(machine.linkage.solve(angle).values())).all()
+    assembled = [np.isfinite(list(mechanism.linkage.solve(angle).values())).all()
                  for angle in angles]
     assert [memory.send(0, [angle])[0] & 1 == 0 for angle in angles] == assembled
     # The joint of the first bars is farther in reach, on both sides.
-    (low, high), = machine.first.reach
-    own = angles[np.isfinite(machine.linkage.joint_angles(angles, ['B.x'])['B.x'])]
+    (low, high), = mechanism.first.reach
+    own = angles[np.isfinite(mechanism.linkage.joint_angles(angles, ['B.x'])['B.x'])]
     assert own[0] < low - 0.1 and own[-1] > high + 0.1
 
 
 def test_a_first_pose_is_found_in_a_small_workspace(tmp_path):
-    machines = []
+    mechanisms = []
     for name, turned in zip('mnop', (0.5, 2.0, 3.5, 5.0)):
         # Two cranks that have to point at each other, within 0.3 rad: 0.7 % of all their poses.
-        machines += scene.read({'mechanisms': [name], f'{name}.type': 'custom', f'{name}.joints': [
+        mechanisms += scene.read({
+            'mechanisms': [name], f'{name}.type': 'custom', f'{name}.joints': [
             'O ground 0 0', f'Q ground {4.0 * math.cos(turned)} {4.0 * math.sin(turned)}',
-            'A crank O 1', 'C crank Q 1', 'P dyad A C 1.05 1.05 left']}).machines.values()
-    library = compiled(tmp_path, machines)
-    assert [library[f'{machine.name}_started']() for machine in machines] == [1] * 4
+            'A crank O 1', 'C crank Q 1', 'P dyad A C 1.05 1.05 left']}).mechanisms.values()
+    library = compiled(tmp_path, mechanisms)
+    assert [library[f'{mechanism.name}_started']() for mechanism in mechanisms] == [1] * 4
 
 
-def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, machines):
-    machine, memory = machines['lever'], Memory(library, 'lever', 1)
-    (inside, *_), (outside, *_) = (expected(machine, [angle])[2] for angle in (0.3, 0.45))
+def test_a_command_beyond_the_sweep_is_held_and_stands_still(library, mechanisms):
+    mechanism, memory = mechanisms['lever'], Memory(library, 'lever', 1)
+    (inside, *_), (outside, *_) = (expected(mechanism, [angle])[2] for angle in (0.3, 0.45))
     _, (good, *_) = memory.send(1, [inside], [1.0])
     status, (position, velocity, _) = memory.send(1, [outside], [1.0])
     assert status == 1 and position == good and velocity == 0.0
     # The ends are in it.
     for end in (-0.4, 0.4):
-        actuator, _, joint, _ = expected(machine, [end])
+        actuator, _, joint, _ = expected(mechanism, [end])
         status, (position, *_) = memory.send(1, joint, [1.0])
         assert status == 0 and position == pytest.approx(actuator, abs=1e-12)
     # What is measured there is what it is.
-    actuator, _, joint, _ = expected(machine, [0.45])
+    actuator, _, joint, _ = expected(mechanism, [0.45])
     status, (position, *_) = memory.send(0, actuator)
     assert status == 0 and position == pytest.approx(joint)
     # It cannot be commanded for all that.
@@ -296,9 +297,10 @@ def choosing(tmp_path_factory):
     """Return the library of CHOICES."""
     code = ''
     for i, (joints_, given, names, *_) in enumerate(CHOICES):
-        machine, = scene.read({'mechanisms': [f'm{i}'], **{f'm{i}.{key}': value for key, value in {
-            'type': 'custom', 'joints': joints_, **given}.items()}}).machines.values()
-        code += header.written(machine, joints=[
+        mechanism, = scene.read({'mechanisms': [f'm{i}'], **{
+            f'm{i}.{key}': value for key, value in {
+                'type': 'custom', 'joints': joints_, **given}.items()}}).mechanisms.values()
+        code += header.written(mechanism, joints=[
             each if each == 'wheel' else f'm{i}_{each}' for each in names])
         code += CALLER.format(name=f'm{i}', n=1)
     with shared(tmp_path_factory, 'choosing') as folder:
@@ -313,42 +315,42 @@ def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
         assert status == 0 and found[0] == pytest.approx(expected_, rel=1e-12)
 
 
-def test_a_new_position_takes_one_pose(machines, tmp_path):
+def test_a_new_position_takes_one_pose(mechanisms, tmp_path):
     """Actuators count inputs, and these joints have closed forms."""
-    chosen = [machines[name] for name in ('leg', 'boom', 'beast', 'rocker')]
+    chosen = [mechanisms[name] for name in ('leg', 'boom', 'beast', 'rocker')]
     text = re.sub(r'(int \w+_at\([^;]*?\)\n{\n)', r'\1    taken++;\n', header.printed(
-        [header.Request(machine) for machine in chosen]))
+        [header.Request(mechanism) for mechanism in chosen]))
     library = loaded(tmp_path, f'static int taken;\n{text}' + ''.join(
-        CALLER.format(name=machine.name, n=len(machine.inputs)) for machine in chosen) + (
+        CALLER.format(name=mechanism.name, n=len(mechanism.inputs)) for mechanism in chosen) + (
         'int poses(void) { int before = taken; taken = 0; return before; }\n'))
-    for machine in chosen:
-        memory = Memory(library, machine.name, len(machine.inputs))
-        first, second, *_ = states(machine, 4)
+    for mechanism in chosen:
+        memory = Memory(library, mechanism.name, len(mechanism.inputs))
+        first, second, *_ = states(mechanism, 4)
         for inputs in (first, second, first):
-            actuator, _, joint, _ = expected(machine, inputs)
+            actuator, _, joint, _ = expected(mechanism, inputs)
             library.poses()
             assert memory.send(0, actuator)[0] & 1 == 0 and library.poses() == 1
-            memory.send(0, expected(machine, second if inputs is first else first)[0])
+            memory.send(0, expected(mechanism, second if inputs is first else first)[0])
             library.poses()
             assert memory.send(1, joint)[0] & 1 == 0 and library.poses() == 1
 
 
 def test_a_sensor_repeats_after_a_turn_of_what_it_measures(tmp_path):
     ratios = {'2': -2.0, '4': 0.25}
-    machines = scene.read({'mechanisms': [f'{kind}{end}' for kind in ('lift', 'wheel')
-                                          for end in ratios], **{
+    mechanisms = scene.read({'mechanisms': [f'{kind}{end}' for kind in ('lift', 'wheel')
+                                            for end in ratios], **{
         f'{kind}{end}.{key}': value for end, ratio in ratios.items() for kind, given in (
             ('lift', {'joints': ['O ground 0 0', 'Q ground 1 0', 'A crank O 0.3',
                                  'B dyad A Q 1 0.6 left'], 'crank.measures': 'QB',
                       'crank.offset': 0.1, 'crank.start': 0.5}),
             ('wheel', {'joints': GEARED, 'crank.measures': 'crank2'}))
-        for key, value in {'type': 'custom', 'crank.ratio': ratio, **given}.items()}}).machines
+        for key, value in {'type': 'custom', 'crank.ratio': ratio, **given}.items()}}).mechanisms
     library = loaded(tmp_path, ''.join(
-        header.written(machine, joints=[f'{name}_crank']) + CALLER.format(name=name, n=1)
-        for name, machine in machines.items()))
+        header.written(mechanism, joints=[f'{name}_crank']) + CALLER.format(name=name, n=1)
+        for name, mechanism in mechanisms.items()))
     for end, ratio in ratios.items():
         memory = Memory(library, f'lift{end}', 1)
-        (reading, *_) = expected(machines[f'lift{end}'], [0.5])
+        (reading, *_) = expected(mechanisms[f'lift{end}'], [0.5])
         for turns in (0, 1, -1, 3, -100):
             status, (crank, *_) = memory.send(0, reading + turns * math.tau / abs(ratio))
             assert status == 0 and crank == pytest.approx(0.5, abs=1e-10)
@@ -368,18 +370,18 @@ def test_a_sensor_repeats_after_a_turn_of_what_it_measures(tmp_path):
 
 
 def test_joints_that_move_with_no_input_are_refused():
-    machine, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
+    mechanism, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
         'O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left',
         # Two bars to joints of one link: D does not move on it.
-        'C rigid A B 0.6 0.6 left', 'D dyad C B 0.5 0.4 left']}).machines.values()
-    assert [each.name for each in joints(machine, ['m_QB'])] == ['m_QB']
+        'C rigid A B 0.6 0.6 left', 'D dyad C B 0.5 0.4 left']}).mechanisms.values()
+    assert [each.name for each in joints(mechanism, ['m_QB'])] == ['m_QB']
     with pytest.raises(ValueError, match='m_CD of m moves with none'):
-        joints(machine, ['m_CD'])
+        joints(mechanism, ['m_CD'])
 
 
-def test_what_is_measured_is_held(library, machines):
+def test_what_is_measured_is_held(library, mechanisms):
     memory, nan = Memory(library, 'rocker', 1), math.nan
-    actuator, *_ = expected(machines['rocker'], [1.0])
+    actuator, *_ = expected(mechanisms['rocker'], [1.0])
     _, (position, _, effort) = memory.send(0, actuator, [1.0], [2.0])
     status, found = memory.send(0, [nan], [nan], [nan])
     assert status == 4 and list(found.ravel()) == [position, 0.0, effort]
@@ -389,28 +391,28 @@ def test_what_is_measured_is_held(library, machines):
     assert status == 4 and again == velocity != 0.0
 
 
-def test_a_singular_pose_is_said(library, machines):
-    machine, memory = machines['rocker'], Memory(library, 'rocker', 1)
-    dead = machine.linkage.extremes('QB')[0][0][1]
+def test_a_singular_pose_is_said(library, mechanisms):
+    mechanism, memory = mechanisms['rocker'], Memory(library, 'rocker', 1)
+    dead = mechanism.linkage.extremes('QB')[0][0][1]
     _, (_, _, held) = memory.send(0, [1.0], [1.0], [1.0])
     status, (_, velocity, effort) = memory.send(0, [dead], [1.0], [2.0])
     assert status == 2 and abs(velocity) < 1e-6 and effort == held
-    status, (position, velocity, _) = memory.send(1, expected(machine, [dead])[2], [1.0], [1.0])
+    status, (position, velocity, _) = memory.send(1, expected(mechanism, [dead])[2], [1.0], [1.0])
     assert status == 2 and velocity == 0.0 and np.isfinite(position)
     # So is a velocity that is more than a number can be.
     boom = Memory(library, 'boom', 1)
-    own = expected(machines['boom'], states(machines['boom'], 1)[0])[2]
+    own = expected(mechanisms['boom'], states(mechanisms['boom'], 1)[0])[2]
     assert boom.send(1, own, [1.0])[0] == 0
     status, (_, velocity, _) = boom.send(1, own, [1e308])
     assert status == 2 and velocity == 0.0
 
 
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
-def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
-    machine, rng = machines[name], np.random.default_rng(4)
-    n = len(machine.inputs)
+def test_nothing_that_comes_in_gets_out_as_no_number(library, mechanisms, name):
+    mechanism, rng = mechanisms[name], np.random.default_rng(4)
+    n = len(mechanism.inputs)
     memory = Memory(library, name, n)
-    assert memory.send(0, expected(machine, states(machine, 1)[0])[0])[0] == 0
+    assert memory.send(0, expected(mechanism, states(mechanism, 1)[0])[0])[0] == 0
     values = [math.nan, math.inf, -math.inf, 1e308, -1e300, 5e-324, 0.0, 1.0, 1e-3, 3.0]
     for _ in range(400):
         side, given = int(rng.integers(2)), rng.choice(values, (3, n))
@@ -441,21 +443,21 @@ def test_nothing_that_comes_in_gets_out_as_no_number(library, machines, name):
     ('klann', {'joint_names': ['EF=knee'], 'only_named': True}, ['knee']),
     ('klann', {'joint_names': ['crank=motor'], 'only_named': True}, ['motor'])])
 def test_joints_by_default(type_, given, chosen):
-    machine = scene.read({'mechanisms': ['m'], 'm.type': type_, **{
-        f'm.{key}': value for key, value in given.items()}}).machines['m']
-    assert [each.name for each in joints(machine)] == chosen
+    mechanism = scene.read({'mechanisms': ['m'], 'm.type': type_, **{
+        f'm.{key}': value for key, value in given.items()}}).mechanisms['m']
+    assert [each.name for each in joints(mechanism)] == chosen
 
 
 def test_joints_by_default_have_no_barrel():
-    machine = scene.load(ROOT / 'config' / 'excavator.yaml').machines['excavator']
-    assert [each.output for each in joints(machine)] == ['OB', 'AD', 'EG']
+    mechanism = scene.load(ROOT / 'config' / 'excavator.yaml').mechanisms['excavator']
+    assert [each.output for each in joints(mechanism)] == ['OB', 'AD', 'EG']
 
 
-def test_the_joints_are_chosen_by_their_names(machines):
-    leg = machines['leg']
+def test_the_joints_are_chosen_by_their_names(mechanisms):
+    leg = mechanisms['leg']
     assert [each.output for each in joints(leg, ['leg_P.x', 'leg_P.y'])] == ['P.x', 'P.y']
-    assert [each.name for each in joints(machines['boom'])] == ['boom_OB']
-    assert [each.name for each in actuators(machines['lever'])] == ['servo']
+    assert [each.name for each in joints(mechanisms['boom'])] == ['boom_OB']
+    assert [each.name for each in actuators(mechanisms['lever'])] == ['servo']
     for names in (['knee'], ['P.x', 'P.y'], ['leg_AP'], ['leg_AP', 'leg_AP']):
         with pytest.raises(ValueError, match='leg has 2 inputs: as many of its joints are needed'):
             joints(leg, names)
@@ -464,34 +466,35 @@ def test_the_joints_are_chosen_by_their_names(machines):
 @pytest.mark.nightly
 @pytest.mark.parametrize('seeds', [range(3), range(3, 12), range(12, 22)])
 def test_random_linkages_are_measured(tmp_path, seeds):
-    machines = []
+    mechanisms = []
     for seed in seeds:
         drawn, name = random_linkages.design(np.random.default_rng(seed)), f'm{seed}'
         given = {'mechanisms': [name], f'{name}.type': 'custom', f'{name}.joints': drawn.joints,
                  **{f'{name}.dimensions.{key}': float(value)
                     for key, value in drawn.dimensions.items()}}
         with suppress(scene.SceneError):  # of lengths that allow no pose
-            machines += scene.read(given).machines.values()
-    library, measured = compiled(tmp_path, machines, flags=['-O2']), 0
+            mechanisms += scene.read(given).mechanisms.values()
+    library, measured = compiled(tmp_path, mechanisms, flags=['-O2']), 0
     rng = np.random.default_rng(1)
-    for machine in machines:
-        if library[f'{machine.name}_started']() == 0:
+    for mechanism in mechanisms:
+        if library[f'{mechanism.name}_started']() == 0:
             continue
-        memory = Memory(library, machine.name, len(machine.inputs))
+        memory = Memory(library, mechanism.name, len(mechanism.inputs))
         for _ in range(40):
             inputs = [rng.uniform(*(drive.ends or drive.reach[0]))
-                      for drive in machine.inputs.values()]
-            actuator, _, joint, _ = expected(machine, inputs)
-            own = [value / machine.scale_of(name) for value, name in zip(inputs, machine.inputs)]
-            places = machine.linkage.solve(own if len(own) > 1 else own[0]).values()
+                      for drive in mechanism.inputs.values()]
+            actuator, _, joint, _ = expected(mechanism, inputs)
+            own = [value / mechanism.scale_of(name)
+                   for value, name in zip(inputs, mechanism.inputs)]
+            places = mechanism.linkage.solve(own if len(own) > 1 else own[0]).values()
             status, (position, *_) = memory.send(0, actuator)
             # All of it can be assembled, or it is said that it cannot.
-            assert (status & 1 == 0) == np.isfinite(list(places)).all(), (machine.name, inputs)
+            assert (status & 1 == 0) == np.isfinite(list(places)).all(), (mechanism.name, inputs)
             if status == 0:
                 gap = np.abs(position - joint)
                 assert np.minimum(gap, np.abs(gap - math.tau)).max() < 1e-11
                 measured += 1
-    assert measured > 20 * len(machines)
+    assert measured > 20 * len(mechanisms)
 
 
 def test_all_ground_links_of_the_catalogue_but_one_are_closed_forms():
@@ -502,20 +505,20 @@ def test_all_ground_links_of_the_catalogue_but_one_are_closed_forms():
     assert len(closed) == 16 and [key for key in closed if not closed[key]] == [('klann', 'CF')]
 
 
-def test_enumerators_are_words_of_c(machines):
-    text = header.written(machines['int'])
+def test_enumerators_are_words_of_c(mechanisms):
+    text = header.written(mechanisms['int'])
     assert 'enum { INT_JOINT_WHILE_1_X = 0 };' in text
     assert re.search(r'enum { INT_ACTUATOR_A_B_S = 0 };', text)
-    both = header.written(machines['leg'])
+    both = header.written(mechanisms['leg'])
     assert 'enum { LEG_ACTUATOR_LEG_CRANK = 0, LEG_ACTUATOR_LEG_CRANK2 = 1 };' in both
     assert 'enum { LEG_JOINT_LEG_CRANK = 0, LEG_JOINT_LEG_AP = 1 };' in both
 
 
 @pytest.mark.skipif(not shutil.which('avr-gcc'), reason='avr-gcc is not installed')
-def test_where_a_double_is_a_float_it_says_so(machines, tmp_path):
+def test_where_a_double_is_a_float_it_says_so(mechanisms, tmp_path):
     for single, said in ((False, 'print the header again with --float'), (True, '')):
         file = tmp_path / 'lever.c'
-        file.write_text(header.written(machines['lever'], (), single) + 'int main(void) { }\n')
+        file.write_text(header.written(mechanisms['lever'], (), single) + 'int main(void) { }\n')
         ended = subprocess.run(['avr-gcc', '-mmcu=atmega328p', '-std=c99', '-c', file, '-o',
                                 tmp_path / 'lever.o'], capture_output=True, text=True)
         assert (ended.returncode != 0) == bool(said) and said in ended.stderr
@@ -528,15 +531,15 @@ def written(folder, path, *arguments):
     return made
 
 
-def proved(package, machine, compiler, count, *flags):
+def proved(package, mechanism, compiler, count, *flags):
     """Compile the proof for a mechanism of a package and run it at so many states."""
-    name = machine.name
+    name = mechanism.name
     code = (package / 'src' / f'{name}.hpp').read_text()
     class_, space = re.search(r'struct (\w+)Code', code)[1], re.search(r'namespace (\w+)', code)[1]
     program = package / f'proof_{name}'
     subprocess.run([compiler, '-std=c++17', *STRICT, '-O2', *flags, f'-DNAME={name}',
                     f'-DCLASS={class_}', f'-DNAMESPACE={space}',
-                    f'-DRANGES={ranges(machine)}', '-isystem', STAND_IN / 'include',
+                    f'-DRANGES={ranges(mechanism)}', '-isystem', STAND_IN / 'include',
                     '-I', package / 'src', '-I', package / 'include', STAND_IN / 'proof.cpp',
                     '-o', program, *ROS], check=True)
     ended = subprocess.run([program, str(count)], capture_output=True, text=True)
@@ -546,7 +549,7 @@ def proved(package, machine, compiler, count, *flags):
 
 
 @pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
-def test_sanitizers_find_nothing(machines, tmp_path):
+def test_sanitizers_find_nothing(mechanisms, tmp_path):
     # A lever with sweep and loads, and a leg of two inputs; all scenes are nightly.
     def ran(name, text):
         (tmp_path / f'{name}.c').write_text(text)
@@ -561,8 +564,8 @@ def test_sanitizers_find_nothing(machines, tmp_path):
         pytest.skip('no program with sanitizers is linked or runs here')
     names = ['lever', 'leg']
     printed, error = ran('walk', '#include <stdio.h>\n' + header.printed(
-        [header.Request(machines[name]) for name in names]) + SAMPLE + ''.join(
-        WALK.replace('{name}', name).replace('{ranges}', ranges(machines[name]))
+        [header.Request(mechanisms[name]) for name in names]) + SAMPLE + ''.join(
+        WALK.replace('{name}', name).replace('{ranges}', ranges(mechanisms[name]))
         for name in names) + 'int main(void)\n{\n' + ''.join(
             f'    printf("%ld ", {name}_walked(2000));\n' for name in names) + '}\n')
     assert printed is not None, error
@@ -574,16 +577,17 @@ def test_sanitizers_find_nothing(machines, tmp_path):
 @pytest.mark.parametrize('path', SCENES, ids=lambda path: path.stem)
 def test_every_scene_is_proved_at_a_hundred_thousand_states(tmp_path, path, compiler):
     package = written(tmp_path, path)
-    for machine in scene.load(path).machines.values():
-        proved(package, machine, compiler, 100_000)
-        proved(package, machine, compiler, 5000, *SANITIZED)
+    for mechanism in scene.load(path).mechanisms.values():
+        proved(package, mechanism, compiler, 100_000)
+        proved(package, mechanism, compiler, 5000, *SANITIZED)
 
 
 def test_mechanisms_of_any_names_are_classes_of_their_own():
     names = ['linkage', 'a_b', 'aB', 'Arm', 'arm', 'arm2', 'class']
-    machines = scene.read({'mechanisms': names, **{f'{name}.type': 'four_bar' for name in names}}
-                          ).machines.values()
-    text = package('odd', 'odd.yaml', [(machine, []) for machine in machines])[Path('plugins.xml')]
+    mechanisms = scene.read({'mechanisms': names, **{f'{name}.type': 'four_bar' for name in names}}
+                            ).mechanisms.values()
+    text = package('odd', 'odd.yaml', [
+        (mechanism, []) for mechanism in mechanisms])[Path('plugins.xml')]
     assert re.findall(r'plugins::(\w+)Loader', text) == [
         'Linkage', 'AB', 'AB_2', 'Arm', 'Arm_2', 'Arm2', 'Class']
 
@@ -632,9 +636,9 @@ AXES = {'leg': ({'leg_crank': 'crank', 'leg_crank2': 'crank2'},
 
 
 @pytest.fixture(scope='module')
-def files(machines):
+def files(mechanisms):
     """Return the files of a package by their paths, as texts."""
-    made = package('robot_1', 'a<b>*/.yaml', [(machines[name], []) for name in AXES])
+    made = package('robot_1', 'a<b>*/.yaml', [(mechanisms[name], []) for name in AXES])
     return {str(path): text for path, text in made.items()}
 
 
@@ -658,7 +662,7 @@ def test_a_package_is_complete(files):
     assert '| `robot_1/Int` | a* / "b"/ ? ?/?%s ? | while/1:x |' in files['README.md']
 
 
-def test_a_package_names_what_the_scene_names(files, machines):
+def test_a_package_names_what_the_scene_names(files, mechanisms):
     plugins = ElementTree.fromstring(files['plugins.xml'])
     pasted = ElementTree.fromstring(f'<all>{files["urdf/transmissions.xml"]}</all>',
                                     ElementTree.XMLParser(target=ElementTree.TreeBuilder(
@@ -722,12 +726,12 @@ def limits_of(capsys, path, *arguments):
                                   'examples/ankle.yaml', 'config/slotted_lever.yaml'])
 def test_joint_limits_are_those_of_all_poses(capsys, path):
     limits, rng = limits_of(capsys, ROOT / path), np.random.default_rng(9)
-    for machine in scene.load(ROOT / path).machines.values():
+    for mechanism in scene.load(ROOT / path).mechanisms.values():
         # What the joints are at poses of the sweeps, by another way than that of the limits.
-        given = [rng.uniform(*(drive.ends or drive.reach[0]), 3000) / machine.scale_of(name)
-                 for name, drive in machine.inputs.items()]
-        for axis in joints(machine):
-            values = axis.factor * machine.linkage.joint_angles(
+        given = [rng.uniform(*(drive.ends or drive.reach[0]), 3000) / mechanism.scale_of(name)
+                 for name, drive in mechanism.inputs.items()]
+        for axis in joints(mechanism):
+            values = axis.factor * mechanism.linkage.joint_angles(
                 given if len(given) > 1 else given[0], [axis.output])[axis.output] + axis.offset
             low, high = limits[axis.name]
             slack = 0.05 * (high - low)
@@ -748,7 +752,7 @@ def test_a_package_is_written_again(tmp_path, capsys, monkeypatch):
     made = written(tmp_path, path, *named, '--joints', 'knee')
     assert capsys.readouterr().out == f'{made}: knee, hip; see README.md\n'
     before = {file: file.read_text() for file in made.rglob('*') if file.is_file()}
-    chosen = scene.load(path).machines
+    chosen = scene.load(path).mechanisms
     assert before == {made / file: text for file, text in package(
         'leg_transmissions', 'leg.yaml', [(chosen['knee'], ['knee']), (chosen['hip'], [])]
         ).items()}

@@ -67,22 +67,23 @@ class Plugins:
     """The compiled packages of both scenes, and the component that loads them."""
 
     def __init__(self, folder, compiler='g++', *flags):
-        self.machines, self.libraries = {}, {}
+        self.mechanisms, self.libraries = {}, {}
         compile_ = [compiler, '-std=c++17', *STRICT, '-O0', *flags, '-shared', '-fPIC', '-isystem',
                     STAND_IN / 'include', *ROS]
         for name, parameters in (('robot_transmissions', SCENE), ('other_transmissions', OTHER)):
-            machines = scene.read(parameters).machines
+            mechanisms = scene.read(parameters).mechanisms
             made = folder / name
             for path, text in package(name, 'robot.yaml', [
-                    (machine, [*JOINTS[each]]) for each, machine in machines.items()]).items():
+                    (mechanism, [*JOINTS[each]])
+                    for each, mechanism in mechanisms.items()]).items():
                 (made / path).parent.mkdir(parents=True, exist_ok=True)
                 (made / path).write_text(text, encoding='utf-8')
             library = folder / f'lib{name}.so'
             if not library.exists():
                 subprocess.run([*compile_, '-I', made / 'include', made / 'src' / 'plugins.cpp',
                                 '-o', library, *ROS], check=True)
-            self.machines.update(machines)
-            self.libraries.update(dict.fromkeys(machines, (library, f'{name}_plugins')))
+            self.mechanisms.update(mechanisms)
+            self.libraries.update(dict.fromkeys(mechanisms, (library, f'{name}_plugins')))
         host = folder / 'component.so'
         if not host.exists():
             subprocess.run([*compile_, '-I', made / 'include', STAND_IN / 'component.cpp', '-o',
@@ -155,16 +156,16 @@ def plugins(tmp_path_factory):
         return Plugins(folder)
 
 
-def poses(machine, *crank):
+def poses(mechanism, *crank):
     """Return the actuators' and the joints' positions at inputs, from Python."""
-    linkage, names = machine.linkage, [*JOINTS[machine.name].values()]
+    linkage, names = mechanism.linkage, [*JOINTS[mechanism.name].values()]
     angles = linkage.joint_angles(crank if len(crank) > 1 else crank[0])
-    keys = [name if name in machine.inputs else next(iter(machine.assembly().legs)) + name
+    keys = [name if name in mechanism.inputs else next(iter(mechanism.assembly().legs)) + name
             for name in names]
-    measured = [angles[drive.measures or name] for name, drive in machine.inputs.items()]
+    measured = [angles[drive.measures or name] for name, drive in mechanism.inputs.items()]
     return (np.array([(float(value) - drive.offset) / drive.ratio
-                      for value, drive in zip(measured, machine.inputs.values())]),
-            np.array([machine.joints[key].of(float(angles[name]))
+                      for value, drive in zip(measured, mechanism.inputs.values())]),
+            np.array([mechanism.joints[key].of(float(angles[name]))
                       for key, name in zip(keys, names)]))
 
 
@@ -178,8 +179,8 @@ UNREACHABLE = {'knee': 9.0, 'lever': 1.5, 'leg': [1.9, -0.2], 'lift': 0.5 + math
 @pytest.mark.parametrize('name', INPUTS)
 def test_what_is_not_commanded_is_not_written(plugins, name):
     component, (inputs, others) = plugins.component(name), INPUTS[name]
-    actuator, joint = poses(plugins.machines[name], *inputs)
-    further = poses(plugins.machines[name], *others)[0]
+    actuator, joint = poses(plugins.mechanisms[name], *inputs)
+    further = poses(plugins.mechanisms[name], *others)[0]
     # Before anything is known, after a measurement, a command, and another measurement.
     for before in (lambda: None, lambda: component.read(actuator),
                    lambda: component.write(joint, 1.0, 2.0), lambda: component.read(further)):
@@ -195,9 +196,9 @@ def test_what_is_not_commanded_is_not_written(plugins, name):
 
 
 def test_an_effort_is_not_held_over_a_pause(plugins):
-    machine, component = plugins.machines['lift'], plugins.component('lift')
-    (_, dead), *_ = machine.linkage.extremes('QB')[0]
-    good, singular = (poses(machine, crank)[0] for crank in (0.5, dead))
+    mechanism, component = plugins.mechanisms['lift'], plugins.component('lift')
+    (_, dead), *_ = mechanism.linkage.extremes('QB')[0]
+    good, singular = (poses(mechanism, crank)[0] for crank in (0.5, dead))
     component.read(good)
     _, (*_, held) = component.write(effort=5.0)
     component.read(singular)
@@ -210,16 +211,16 @@ def test_an_effort_is_not_held_over_a_pause(plugins):
 
 def test_the_nearest_input_is_that_to_the_newest_position(plugins):
     # The motor turns on by commands alone: none of them goes back by a turn.
-    machine, component = plugins.machines['drag'], plugins.component('drag')
+    mechanism, component = plugins.mechanisms['drag'], plugins.component('drag')
     component.read(0.0)
     for crank in np.arange(0.0, 20.0, 0.25):
-        assert component.write(poses(machine, crank)[1])[1][0] == pytest.approx(crank, abs=1e-9)
-    machine, component = plugins.machines['lever'], plugins.component('lever')
-    component.read(poses(machine, 0.2)[0])
+        assert component.write(poses(mechanism, crank)[1])[1][0] == pytest.approx(crank, abs=1e-9)
+    mechanism, component = plugins.mechanisms['lever'], plugins.component('lever')
+    component.read(poses(mechanism, 0.2)[0])
     # A velocity or an effort without a position is at the newest pose.
     for crank in (0.1, -0.2):
-        actuator, joint = poses(machine, crank)
-        rate = float(machine.linkage.joint_rates(crank, ['lever'])['lever'])
+        actuator, joint = poses(mechanism, crank)
+        rate = float(mechanism.linkage.joint_rates(crank, ['lever'])['lever'])
         component.write(joint)
         _, (_, velocity, effort) = component.write(NAN, 1.0, 3.0)
         assert velocity == pytest.approx(1.0 / -rate / -0.5, rel=1e-9)
@@ -227,9 +228,9 @@ def test_the_nearest_input_is_that_to_the_newest_position(plugins):
 
 
 def test_an_effort_is_that_at_the_measured_pose(plugins):
-    machine, component = plugins.machines['lever'], plugins.component('lever')
-    there, here = (poses(machine, crank) for crank in (-0.1, 0.3))
-    rate = float(machine.linkage.joint_rates(0.3, ['lever'])['lever'])
+    mechanism, component = plugins.mechanisms['lever'], plugins.component('lever')
+    there, here = (poses(mechanism, crank) for crank in (-0.1, 0.3))
+    rate = float(mechanism.linkage.joint_rates(0.3, ['lever'])['lever'])
     component.write(there[1])
     component.read(here[0])
     _, (position, _, effort) = component.write(there[1], effort=3.0)
@@ -237,8 +238,8 @@ def test_an_effort_is_that_at_the_measured_pose(plugins):
 
 
 def test_a_motor_in_one_memory_for_states_and_commands_stays(plugins):
-    machine, component = plugins.machines['leg'], plugins.component('leg', kinds=('position',))
-    actuator, _ = poses(machine, 1.9, 1.24)
+    mechanism, component = plugins.mechanisms['leg'], plugins.component('leg', kinds=('position',))
+    actuator, _ = poses(mechanism, 1.9, 1.24)
     component.actuator[0] = actuator
     for _ in range(100):
         component.transmit('read')
@@ -250,12 +251,12 @@ def test_a_motor_in_one_memory_for_states_and_commands_stays(plugins):
 def test_any_history_of_values_moves_a_motor_to_what_was_commanded(plugins, name):
     """Random calls, against a model: a motor gets nothing, a solution, or where it stays."""
     component, rng = plugins.component(name), np.random.default_rng(3)
-    machine, (low, high) = plugins.machines[name], np.array(INPUTS[name])
+    mechanism, (low, high) = plugins.mechanisms[name], np.array(INPUTS[name])
     # Where motors were last commanded or measured, and joints last measured.
     held, measured = np.full(len(low), NAN), np.full(len(low), UNWRITTEN)
     for _ in range(300):
         inputs = low + rng.uniform(0.0, 1.0, len(low)) * (high - low)
-        actuator, joint = poses(machine, *inputs)
+        actuator, joint = poses(mechanism, *inputs)
         is_missing = np.arange(len(low)) == rng.integers(len(low))
         kind = rng.integers(5)
         if kind == 0:
@@ -283,11 +284,11 @@ def test_any_history_of_values_moves_a_motor_to_what_was_commanded(plugins, name
 
 
 def test_a_singular_pose_of_positions_alone_is_not_told(plugins):
-    machine = plugins.machines['rocker']
-    dead = machine.linkage.extremes('QB')[0][0][1]
+    mechanism = plugins.mechanisms['rocker']
+    dead = mechanism.linkage.extremes('QB')[0][0][1]
     for kinds, expected in ((('position',), OK), (KINDS, SINGULAR)):
         component = plugins.component('rocker', kinds=kinds)
-        assert component.read(poses(machine, dead)[0])[0] == expected
+        assert component.read(poses(mechanism, dead)[0])[0] == expected
 
 
 @pytest.mark.parametrize('name, lines, actuators, joints, said', [
@@ -363,7 +364,7 @@ def test_a_robot_has_its_own_gears_and_encoder_zeros(plugins):
                                joints={'c': None, 'd': None})
     (reduction, offset), (joint_reduction, joint_offset) = (
         np.array([numbers[name] for name in names]).T for names in ('ab', 'cd'))
-    actuator, joint = poses(plugins.machines['leg'], *inputs)
+    actuator, joint = poses(plugins.mechanisms['leg'], *inputs)
     _, seen = plain.read(actuator, [0.3, -0.2], [2.0, 5.0])
     status, found = geared.read(actuator * reduction + offset, np.array([0.3, -0.2]) * reduction,
                                 np.array([2.0, 5.0]) / reduction)
@@ -390,11 +391,11 @@ def test_other_lengths_need_another_package(plugins, key):
 @pytest.mark.parametrize('name', ['knee', 'leg', 'lever'])
 @pytest.mark.parametrize('renamed', [False, True])
 def test_passive_joints_have_states_where_there_are_handles(plugins, name, renamed):
-    machine = plugins.machines[name]
-    linkage, inputs = machine.linkage, INPUTS[name][1]
-    prefix = next(iter(machine.assembly().legs))
-    passive = {link.name: machine.joints[link.name if link.name in machine.inputs else
-                                         prefix + link.name]
+    mechanism = plugins.mechanisms[name]
+    linkage, inputs = mechanism.linkage, INPUTS[name][1]
+    prefix = next(iter(mechanism.assembly().legs))
+    passive = {link.name: mechanism.joints[link.name if link.name in mechanism.inputs else
+                                           prefix + link.name]
                for link in linkage.links if link.name not in JOINTS[name].values()}
     values = np.full((2, len(passive)), UNWRITTEN)
     lines, called = [], [f'{name}_{i}' if renamed else joint.name
@@ -409,8 +410,8 @@ def test_passive_joints_have_states_where_there_are_handles(plugins, name, renam
                         for i, own in enumerate(called)
                         for row, kind in enumerate(('position', 'velocity'))),
         extra=values)
-    actuator, _ = poses(machine, *inputs)
-    ratios = np.array([drive.ratio for drive in machine.inputs.values()])
+    actuator, _ = poses(mechanism, *inputs)
+    ratios = np.array([drive.ratio for drive in mechanism.inputs.values()])
     speeds = np.arange(1.0, n + 1.0)
     status, _ = component.read(actuator, speeds / ratios, 0.0)
     assert status == OK
@@ -423,7 +424,7 @@ def test_passive_joints_have_states_where_there_are_handles(plugins, name, renam
             [joint.of(float(angles[link])) / factor + offset, speed / factor], abs=1e-9)
     # What cannot be measured is held, and stands still; a command is no state.
     before = component.extra.copy()
-    component.write(poses(machine, *INPUTS[name][0])[1], 1.0)
+    component.write(poses(mechanism, *INPUTS[name][0])[1], 1.0)
     assert np.array_equal(component.extra, before)
     component.read(actuator, speeds / ratios)
     status, _ = component.read(NAN, NAN)
@@ -432,7 +433,7 @@ def test_passive_joints_have_states_where_there_are_handles(plugins, name, renam
 
 
 def test_why_values_are_held_is_logged_once_per_reason(plugins, capfd):
-    actuator, joint = poses(plugins.machines['knee'], 0.3)
+    actuator, joint = poses(plugins.mechanisms['knee'], 0.3)
     # Neither what is not commanded nor what can be had is worth a word.
     for commands, measured, said in (
             ([9.0, NAN, joint], [], 'tested: a command is out of reach or out of the sweep'),
@@ -456,5 +457,5 @@ def test_a_status_is_reached_where_nothing_else_is_visible(tmp_path, compiler):
     plugins = Plugins(tmp_path, compiler, '-fvisibility=hidden')
     for name in ('knee', 'rocker'):
         component = plugins.component(name)
-        assert component.read(poses(plugins.machines[name], *INPUTS[name][0])[0])[0] == OK
+        assert component.read(poses(plugins.mechanisms[name], *INPUTS[name][0])[0])[0] == OK
         assert component.write(9.0)[0] & OUT_OF_REACH

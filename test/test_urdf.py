@@ -37,34 +37,34 @@ SWINGING_BLOCK = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'P slot A Q 0 o
                   'B slider A 3 Q along O out']
 
 
-def machine(type_, joints=None, **given):
+def mechanism(type_, joints=None, **given):
     """Return a mechanism `m` of a scene in a pose askew."""
     values = {'mechanisms': ['m'], 'm.type': type_, 'm.pose': POSE, 'm.scale': 0.01,
               **({'m.joints': joints} if joints else {}),
               **{f'm.{name.replace("__", ".")}': value for name, value in given.items()}}
-    return scene.read(values).machines['m']
+    return scene.read(values).mechanisms['m']
 
 
 MACHINES = {
-    **{name: lambda name=name: machine(name) for name in mechanisms.TYPES},
-    'slotted_lever with offset': lambda: machine('slotted_lever', dimensions__e=20.0),
-    'walker of 3 pairs': lambda: machine('jansen', leg_pairs=3),
-    'one-sided walker': lambda: machine('klann', leg_pairs=2, mirrored=False),
-    'gripper': lambda: machine('custom', GRIPPER, scale=1.0),
-    'engine': lambda: machine('custom', ENGINE),
-    'boxer engine': lambda: machine('custom', ENGINE, leg_pairs=2),
-    'five-bar with a block': lambda: machine('custom', FIVE_BAR, scale=1.0),
-    'engine with zeros elsewhere': lambda: machine('custom', ENGINE, leg_pairs=2, joint_names=[
+    **{name: lambda name=name: mechanism(name) for name in mechanisms.TYPES},
+    'slotted_lever with offset': lambda: mechanism('slotted_lever', dimensions__e=20.0),
+    'walker of 3 pairs': lambda: mechanism('jansen', leg_pairs=3),
+    'one-sided walker': lambda: mechanism('klann', leg_pairs=2, mirrored=False),
+    'gripper': lambda: mechanism('custom', GRIPPER, scale=1.0),
+    'engine': lambda: mechanism('custom', ENGINE),
+    'boxer engine': lambda: mechanism('custom', ENGINE, leg_pairs=2),
+    'five-bar with a block': lambda: mechanism('custom', FIVE_BAR, scale=1.0),
+    'engine with zeros elsewhere': lambda: mechanism('custom', ENGINE, leg_pairs=2, joint_names=[
         'crank=-m_crank+0.3', 'left0_block=-m_left0_block+0.7', 'right1_block=m_right1_block-2',
         'right0_AB=-m_right0_AB', 'left1_AB=m_left1_AB+2.5']),
-    'swinging block on the ground': lambda: machine('custom', SWINGING_BLOCK),
-    'boom': lambda: machine('custom', BOOM[:4], scale=2.0),
-    'boom and arm': lambda: machine('custom', BOOM, scale=2.0),
-    'five-bar with a gear': lambda: machine(
+    'swinging block on the ground': lambda: mechanism('custom', SWINGING_BLOCK),
+    'boom': lambda: mechanism('custom', BOOM[:4], scale=2.0),
+    'boom and arm': lambda: mechanism('custom', BOOM, scale=2.0),
+    'five-bar with a gear': lambda: mechanism(
         'custom', GEARED, scale=1.0, crank2__sweep=[-6.0, 1.0],
         joint_names=['crank2=-m_crank2+1.0', 'crank3=-m_crank3-0.4']),
 }
-OWN = {name: lambda case=case, pairs=2 if name == 'Cardan gears' else 1: machine(
+OWN = {name: lambda case=case, pairs=2 if name == 'Cardan gears' else 1: mechanism(
     'custom', case.joints, leg_pairs=pairs,
     **{f'dimensions__{key}': value for key, value in case.numbers.items()})
     for name, case in CASES.items()}
@@ -172,55 +172,55 @@ def spare(low, high, length=1.0):
 
 
 def test_limits_are_what_textbooks_give_and_a_millionth():
-    lever = limits(machine('slotted_lever'))
+    lever = limits(mechanism('slotted_lever'))
     swing = math.asin(80.0 / 150.0)
     assert lever['crank'] is None
     assert lever['lever'] == spare(-swing, swing) and lever['slide'] == spare(0.7, 2.3, 2.7)
-    engine = limits(machine('slider_crank'))
+    engine = limits(mechanism('slider_crank'))
     assert engine['AB'] is None
     assert engine['block'] == spare(*(
         0.01 * math.sqrt(end ** 2 - 20.0 ** 2) for end in (80.0, 160.0)), 1.2)
-    assert limits(machine('water_drop'))['CB'] == spare(math.pi / 6.0, math.pi * 5.0 / 6.0)
+    assert limits(mechanism('water_drop'))['CB'] == spare(math.pi / 6.0, math.pi * 5.0 / 6.0)
 
 
 def test_a_crank_that_cannot_turn_ends_with_its_reach():
     end = 2.0 * math.acos(5.0 / 6.0)
-    assert limits(machine('peaucellier'))['crank'] == pytest.approx((-end, end), abs=1e-15)
-    later = limits(machine('peaucellier', crank__sweep=[math.tau - 1.0, math.tau + 1.0]))
+    assert limits(mechanism('peaucellier'))['crank'] == pytest.approx((-end, end), abs=1e-15)
+    later = limits(mechanism('peaucellier', crank__sweep=[math.tau - 1.0, math.tau + 1.0]))
     assert later['crank'] == pytest.approx((math.tau - end, math.tau + end), abs=4e-15)
 
 
 def test_a_crank_of_several_legs_has_no_ends():
-    assert limits(machine('peaucellier', mirrored=True))['crank'] is None
+    assert limits(mechanism('peaucellier', mirrored=True))['crank'] is None
 
 
 @pytest.mark.parametrize('library', LIBRARIES)
 def test_several_mechanisms_make_one_robot(library):
-    machines = scene.read({'frame_id': 'base', 'jansen.leg_pairs': 2}).machines
-    text = urdf.describe(machines.values(), 'base')
+    mechanisms = scene.read({'frame_id': 'base', 'jansen.leg_pairs': 2}).mechanisms
+    text = urdf.describe(mechanisms.values(), 'base')
     assert ElementTree.fromstring(text).get('name') == 'linkages'
     assert links(text)[0] == 'base'
-    assert set(links(text)) == {link for one in machines.values()
+    assert set(links(text)) == {link for one in mechanisms.values()
                                 for link in links(urdf.describe([one], 'base'))}
-    assert len(library(text).joints) == sum(len(limits(one)) for one in machines.values())
+    assert len(library(text).joints) == sum(len(limits(one)) for one in mechanisms.values())
 
 
 def test_the_model_is_valid():
-    assert Yourdfpy(description(machine('jansen', leg_pairs=3))).robot.validate()
+    assert Yourdfpy(description(mechanism('jansen', leg_pairs=3))).robot.validate()
 
 
 def test_the_points_that_are_drawn_as_markers_make_no_difference():
-    assert description(machine('jansen', points=['G'])) == description(machine('jansen'))
+    assert description(mechanism('jansen', points=['G'])) == description(mechanism('jansen'))
 
 
 @pytest.mark.parametrize('given, named', [
     ({'leg.leg_pairs': 2, 'leg_left0.only_named': True}, 'leg.joints.* two links leg_left0_O$'),
     ({'leg.joint_names': ['BC=leg_O_fixed']}, 'leg.joints.* two joints leg_O_fixed$')])
 def test_names_that_meet_are_refused(given, named):
-    machines = scene.read({'mechanisms': ['leg', 'leg_left0'], 'leg.type': 'jansen',
-                           'leg_left0.type': 'jansen', **given}).machines
+    mechanisms = scene.read({'mechanisms': ['leg', 'leg_left0'], 'leg.type': 'jansen',
+                             'leg_left0.type': 'jansen', **given}).mechanisms
     with pytest.raises(scene.SceneError, match=named):
-        urdf.describe(machines.values(), 'world')
+        urdf.describe(mechanisms.values(), 'world')
 
 
 ARM = {'mechanisms': ['hand', 'arm'], 'arm.type': 'four_bar', 'hand.type': 'four_bar',
@@ -232,7 +232,7 @@ ARM = {'mechanisms': ['hand', 'arm'], 'arm.type': 'four_bar', 'hand.type': 'four
     (('arm_AB_link', 'hand_AB_link'), '.*_AB_link, .*_AB_link')])
 def test_what_makes_no_tree_is_refused(frames, tops):
     hand, arm = scene.read({**ARM, 'hand.frame_id': frames[0], 'arm.frame_id': frames[1]}
-                           ).machines.values()
+                           ).mechanisms.values()
     with pytest.raises(scene.SceneError, match=f'frame_id must be the same .* not {tops}$'):
         urdf.describe([hand, arm], 'world')
     assert links(urdf.describe([hand], 'world'))[0] == frames[0]

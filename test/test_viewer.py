@@ -172,7 +172,7 @@ def test_an_input_goes_again_to_where_it_started_though_that_is_a_middle_or_an_e
         graph, show, parameters):
     cranks = graph.listen(JointState, 'crank_states')
     name, page = parameters['mechanisms'][0], show(parameters).page()
-    arcs = scene.read(parameters).machines[name].first.arcs
+    arcs = scene.read(parameters).mechanisms[name].first.arcs
 
     def away(value):
         states = dict(zip(cranks[-1].name, cranks[-1].position)) if cranks else {}
@@ -203,7 +203,7 @@ def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(page):
             ('lever', 'OQ', {'a': ['OA'], 'b': ['OQ', 'QL'], 'e': []}),
             ('drop', 'OC', {'a': 'OC OA AB AP BP CB'.split()})):
         answer = page.ask('tune', key=f'/{name}')
-        mechanism = whole.machines[name]
+        mechanism = whole.mechanisms[name]
         ends = {parameter.name.partition('.')[2]: slider.ends(mechanism, parameter)
                 for parameter in mechanism.parameters}
         assert {**answer, 'id': 0} == {
@@ -219,11 +219,11 @@ def test_what_is_saved_or_exported_is_the_mechanism_as_it_is(page):
         if '.dimensions.' in parameter.name}}
     saved = yaml.safe_load(page.ask('export', key='/drop', form='yaml')['text'])
     assert saved == {'/**': {'ros__parameters': {**LEVER, **defined}}}
-    machine = scene.read(LEVER).machines['lever']
+    mechanism = scene.read(LEVER).mechanisms['lever']
     assert [page.ask('export', key='/lever', form=form)['text']
             for form in ('csv', 'urdf', 'h')] == [
-        curves.table(machine, [0.0]), urdf.describe([machine], 'world'),
-        header.written(machine)]
+        curves.table(mechanism, [0.0]), urdf.describe([mechanism], 'world'),
+        header.written(mechanism)]
 
 
 def test_the_page_is_sent_what_an_output_does_over_a_turn(page):
@@ -280,7 +280,7 @@ def test_where_an_input_is_that_nobody_has_named_is_not_guessed(graph, show):
 
 def test_what_a_sensor_cannot_be_at_is_nowhere_on_the_page(show):
     running = show({**example('scissor_lift'), 'rate': 0.0})
-    lift = scene.read(example('scissor_lift')).machines['lift']
+    lift = scene.read(example('scissor_lift')).mechanisms['lift']
     crank_states = running.graph.node.create_publisher(JointState, 'crank_states', 10)
     page = running.page()
 

@@ -19,30 +19,30 @@ pytest.importorskip('rclpy')
 from linkage_ros import mechanisms, scene  # noqa: E402
 from linkage_ros.web import curves, poses  # noqa: E402
 from linkage_ros.web.nearest_pose import nearest_inputs, theta_of  # noqa: E402
-from viewer_harness import DOUBLE, example, EXAMPLES, machine_of  # noqa: E402
+from viewer_harness import DOUBLE, example, EXAMPLES, mechanism_of  # noqa: E402
 
 
 @pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
 def test_the_page_is_told_what_it_draws_and_moves(path):
-    for machine in scene.load(str(path)).machines.values():
+    for mechanism in scene.load(str(path)).mechanisms.values():
         told = json.loads(json.dumps(poses.drawn(
-            machine, dict.fromkeys(machine.inputs, 2.5)), allow_nan=False))
-        legs = machine.assembly().legs
+            mechanism, dict.fromkeys(mechanism.inputs, 2.5)), allow_nan=False))
+        legs = mechanism.assembly().legs
         assert told['legs'] == len(legs) and told['pairs'] == sum(
             leg.side > 0 for leg in legs.values())
-        assert told['space'] == (machine.linkage.type == 'rods')
-        assert told['points'] == list(machine.points)
-        assert told['sides'].keys() == machine.linkage.branches.keys()
-        assert told['inputs'].keys() == machine.inputs.keys()
-        start = [drive.start for drive in machine.inputs.values()]
-        for i, (key, drive) in enumerate(machine.inputs.items()):
+        assert told['space'] == (mechanism.linkage.type == 'rods')
+        assert told['points'] == list(mechanism.points)
+        assert told['sides'].keys() == mechanism.linkage.branches.keys()
+        assert told['inputs'].keys() == mechanism.inputs.keys()
+        start = [drive.start for drive in mechanism.inputs.values()]
+        for i, (key, drive) in enumerate(mechanism.inputs.items()):
             about = told['inputs'][key]
             assert (about['speed'], about['unit']) == (2.5, drive.input.unit)
             assert about['ends'] == [drive.arcs[0][0], drive.arcs[-1][1]]
             assert (about['turn'] is not None) == drive.input.turns
             other = [value + (about['turn'] or 0.0) * (j == i) for j, value in enumerate(start)]
-            after = machine.linkage.solve(theta_of(other))
-            for joint, place in machine.linkage.solve(theta_of(start)).items():
+            after = mechanism.linkage.solve(theta_of(other))
+            for joint, place in mechanism.linkage.solve(theta_of(start)).items():
                 np.testing.assert_allclose(after[joint], place, atol=1e-9)
 
 
@@ -63,7 +63,7 @@ def test_what_is_no_arithmetic_is_refused(text, reason):
 
 
 def test_no_joint_of_a_linkage_in_space_is_dragged():
-    ankle, _ = machine_of('ankle')
+    ankle, _ = mechanism_of('ankle')
     assert poses.tunable(ankle)['fixed'] == ankle.points
 
 
@@ -72,21 +72,21 @@ def test_a_bar_follows_a_dimension_that_can_only_become_shorter():
     bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'custom', 'bar.dimensions.p': 4.0,
                       'bar.joints': ['O ground 0 0', 'Q ground 4 0', 'A crank O 1',
                                      'B dyad A Q 3 3 left', 'C rigid A B p 1 left']})
-    assert poses.tunable(bar.machines['bar'])['bars'] == {'dimensions.p': [('A', 'C')]}
+    assert poses.tunable(bar.mechanisms['bar'])['bars'] == {'dimensions.p': [('A', 'C')]}
 
 
 @pytest.mark.parametrize('name', ['excavator', 'jansen', 'peaucellier', 'scissor_lift'])
 def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
-    machine, present = machine_of(name, **{
+    mechanism, present = mechanism_of(name, **{
         'excavator': DOUBLE, 'scissor_lift': {'scale': 2.0, 'carriage.start': 2.4}}.get(name, {}))
     present = [1.02 * value for value in present]
-    heads, *rows = csv.reader(io.StringIO(curves.table(machine, present)))
+    heads, *rows = csv.reader(io.StringIO(curves.table(mechanism, present)))
     # Rounded, an end is outside the reach.
-    columns, linkage = dict(zip(heads, np.array(rows, float).T[:, 1:-1])), machine.linkage
+    columns, linkage = dict(zip(heads, np.array(rows, float).T[:, 1:-1])), mechanism.linkage
     unit_in = linkage.inputs[0].unit
     x = columns[f'{linkage.inputs[0].name} [{unit_in}]']
-    theta = theta_of([value / scale for value, scale in zip([x, *present[1:]], machine.scales)])
-    outputs = [*(joint for joint in linkage.joints if joint not in machine.inputs), *(
+    theta = theta_of([value / scale for value, scale in zip([x, *present[1:]], mechanism.scales)])
+    outputs = [*(joint for joint in linkage.joints if joint not in mechanism.inputs), *(
         f'{point}.{axis}' for point in linkage.points if point not in linkage.grounded
         for axis in 'xy')]
     angles = linkage.transmission_angles(theta)
@@ -96,7 +96,7 @@ def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
                                    rtol=1e-9, atol=1e-9)
     ratio = {'mm': '1', 'radrad': '1', 'radm': 'N·m/N', 'mrad': 'N/(N·m)'}
     for output, truth in linkage.joint_angles(theta, outputs).items():
-        unit, size = 'rad' if linkage.is_angle(output) else 'm', machine.scale_of(output)
+        unit, size = 'rad' if linkage.is_angle(output) else 'm', mechanism.scale_of(output)
         position, speed, change, force = (columns[f'{kind} {output} [{form}]'] for kind, form in (
             ('position', unit), ('velocity', f'{unit}/s'), ('acceleration', f'{unit}/s²'),
             ('force ratio', ratio[unit + unit_in])))
@@ -114,21 +114,21 @@ def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
 @pytest.mark.parametrize('kind', ['velocity', 'acceleration'])
 @pytest.mark.parametrize('name', ['excavator', 'jansen', 'scissor_lift'])
 def test_arrows_are_how_the_joints_move_in_the_picture(name, kind):
-    machine, = scene.read(example(name)).machines.values()
-    starts = [drive.start for drive in machine.inputs.values()]
-    speeds = {name: 0.1 * (2 + i) for i, name in enumerate(machine.inputs)}
+    mechanism, = scene.read(example(name)).mechanisms.values()
+    starts = [drive.start for drive in mechanism.inputs.values()]
+    speeds = {name: 0.1 * (2 + i) for i, name in enumerate(mechanism.inputs)}
 
     def places(time):
-        own = [(start + time * speed) / machine.scale_of(name)
+        own = [(start + time * speed) / mechanism.scale_of(name)
                for start, (name, speed) in zip(starts, speeds.items())]
-        solved = machine.linkage.solve(theta_of(own))
-        return {joint: machine.scale * place for joint, place in solved.items()}
+        solved = mechanism.linkage.solve(theta_of(own))
+        return {joint: mechanism.scale * place for joint, place in solved.items()}
 
-    found, h = poses.arrows(machine, starts, kind, speeds), 1e-4
+    found, h = poses.arrows(mechanism, starts, kind, speeds), 1e-4
     before, now, after = map(places, (-h, 0.0, h))
     assert found.keys() == {'unit', 'at'}
     assert found['unit'] == {'velocity': 'm/s', 'acceleration': 'm/s²'}[kind]
-    assert set(found['at']) == set(machine.linkage.points) - set(machine.linkage.grounded)
+    assert set(found['at']) == set(mechanism.linkage.points) - set(mechanism.linkage.grounded)
     for joint, arrow in found['at'].items():
         slope = ((after[joint] - before[joint]) / (2.0 * h) if kind == 'velocity' else
                  (after[joint] - 2.0 * now[joint] + before[joint]) / h ** 2)
@@ -145,13 +145,13 @@ def test_arrows_are_how_the_joints_move_in_the_picture(name, kind):
     ('scissor_lift', 'carriage', 0.1, 0.6, (0.6, 1.7))])
 def test_an_input_goes_where_it_is_wanted_or_as_near_as_it_gets(
         name, input_, value, expected, reach):
-    machine, present = (machine_of('excavator', **DOUBLE) if name == 'twice'
-                        else machine_of(name))
-    found, missed = poses.reached(machine, present, {'output': input_, 'value': value})
-    assert dict(zip(machine.inputs, found)) == pytest.approx(
-        {**dict(zip(machine.inputs, present)), input_: expected}, rel=1e-15)
+    mechanism, present = (mechanism_of('excavator', **DOUBLE) if name == 'twice'
+                          else mechanism_of(name))
+    found, missed = poses.reached(mechanism, present, {'output': input_, 'value': value})
+    assert dict(zip(mechanism.inputs, found)) == pytest.approx(
+        {**dict(zip(mechanism.inputs, present)), input_: expected}, rel=1e-15)
     assert missed == (reach and {'name': input_, 'arcs': (reach,),
-                                 'unit': machine.inputs[input_].input.unit})
+                                 'unit': mechanism.inputs[input_].input.unit})
 
 
 GEARED = {'mechanisms': ['gear'], 'gear.type': 'custom', 'gear.joints': [
@@ -160,11 +160,12 @@ GEARED = {'mechanisms': ['gear'], 'gear.type': 'custom', 'gear.joints': [
 
 @pytest.mark.parametrize('value', [4.0, -15.7, 12.6])
 def test_a_geared_input_goes_where_it_is_wanted_in_all_of_its_period(value):
-    gear = scene.read(GEARED).machines['gear']
+    gear = scene.read(GEARED).mechanisms['gear']
     inputs, missed = poses.reached(gear, [0.0], {'output': 'crank', 'value': value})
     assert (inputs, missed) == ([value], None)
     # It can be set to start there.
-    assert scene.read({**GEARED, 'gear.crank.start': value}).machines['gear'].first.start == value
+    started = scene.read({**GEARED, 'gear.crank.start': value}).mechanisms['gear']
+    assert started.first.start == value
     again, _ = poses.reached(gear, [0.0], {'output': 'crank', 'value': value + 10.0 * math.pi})
     assert again == pytest.approx([value], abs=1e-12)
 
@@ -172,14 +173,14 @@ def test_a_geared_input_goes_where_it_is_wanted_in_all_of_its_period(value):
 def test_an_input_goes_to_the_nearest_of_two_arcs_and_not_where_nothing_can_be_assembled():
     bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'four_bar', 'bar.crank.start': 1.0, **{
         f'bar.dimensions.{name}': length for name, length in zip('abcd', (3.0, 2.0, 2.5, 3.0))}})
-    bar = bar.machines['bar']
+    bar = bar.mechanisms['bar']
     (low, beside), (beyond, high) = bar.first.reach
     for value, expected in ((3.0, high), (-3.0, low), (3.5, low), (0.01, beyond), (-0.01, beside)):
         (found,), reach = poses.reached(bar, [1.0], {'output': 'crank', 'value': value})
         assert found == pytest.approx(expected, abs=1e-12) and reach['arcs'] == bar.first.reach
     inside = 0.5 * (beyond + high)
     assert poses.reached(bar, [1.0], {'output': 'crank', 'value': inside}) == ([inside], None)
-    five, = scene.read({'mechanisms': ['five_bar']}).machines.values()
+    five, = scene.read({'mechanisms': ['five_bar']}).mechanisms.values()
     with pytest.raises(scene.SceneError, match='^five_bar cannot be assembled there$'):
         poses.reached(five, [1.9, 1.24], {'output': 'crank2', 'value': -1.9})
 
@@ -189,24 +190,24 @@ def test_an_input_goes_to_the_nearest_of_two_arcs_and_not_where_nothing_can_be_a
     ('peaucellier', {'scale': 3.0}, 'C.y', 'm'), ('peaucellier', {}, 'PB', 'rad'),
     ('scissor_lift', {'scale': 2.0, 'carriage.start': 2.4}, 'P.y', 'm')])
 def test_an_output_goes_where_it_is_wanted_or_to_the_end_of_its_reach(name, changed, output, unit):
-    machine, present = machine_of(name, **changed)
-    own, size = machine.scale_of(machine.first.input.name), machine.scale_of(output)
+    mechanism, present = mechanism_of(name, **changed)
+    own, size = mechanism.scale_of(mechanism.first.input.name), mechanism.scale_of(output)
 
     def at(inputs):
-        return size * machine.linkage.joint_angles(np.divide(inputs, own), [output])[output]
+        return size * mechanism.linkage.joint_angles(np.divide(inputs, own), [output])[output]
 
-    (low, high), = machine.first.reach
+    (low, high), = mechanism.first.reach
     values = at(0.5 * (low + high - (high - low) * np.cos(np.linspace(0.0, math.pi, 20003)[1:-1])))
     values = np.unwrap(values) if unit == 'rad' else values
     ends = np.array([values.min(), values.max()])
     for part in (0.2, 0.5, 0.9):
         value = float(ends @ (1.0 - part, part))
-        found, reach = poses.reached(machine, present, {'output': output, 'value': value})
+        found, reach = poses.reached(mechanism, present, {'output': output, 'value': value})
         assert reach is None
         assert math.remainder(at(found)[0] - value, math.tau if unit == 'rad' else math.inf) == (
             pytest.approx(0.0, abs=1e-9))
     for end, beyond in zip(ends.tolist(), (np.ptp(ends) * np.array([-0.2, 0.2])).tolist()):
-        found, reach = poses.reached(machine, present, {'output': output, 'value': end + beyond})
+        found, reach = poses.reached(mechanism, present, {'output': output, 'value': end + beyond})
         assert (reach['name'], reach['unit']) == (output, unit)
         # Next to a dead point the last of the values is a little away from the end.
         np.testing.assert_allclose(np.ravel(reach['arcs']), ends, atol=3e-4 * np.ptp(ends))
@@ -217,7 +218,7 @@ def test_an_output_goes_where_it_is_wanted_or_to_the_end_of_its_reach(name, chan
 @pytest.mark.parametrize('leg', range(6))
 def test_a_joint_of_any_leg_goes_where_it_is_wanted_or_as_near_as_it_gets(leg):
     walker = scene.read({'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.leg_pairs': 3,
-                         'walker.scale': 0.01}).machines['walker']
+                         'walker.scale': 0.01}).mechanisms['walker']
 
     def foot(crank):
         # A pair is behind the one before, and its right leg is the mirror image.
@@ -234,7 +235,7 @@ def test_a_joint_of_any_leg_goes_where_it_is_wanted_or_as_near_as_it_gets(leg):
 
 
 def test_a_joint_moved_by_several_inputs_goes_where_it_is_wanted_within_their_ends():
-    digger, present = machine_of('excavator', **DOUBLE)
+    digger, present = mechanism_of('excavator', **DOUBLE)
     within = [drive.ends for drive in digger.inputs.values()]
 
     def tip(inputs):
@@ -291,7 +292,7 @@ def test_what_cannot_be_assembled_is_not_dragged():
 
 
 def test_a_pose_of_several_inputs_is_described_whole():
-    digger, present = machine_of('excavator', **DOUBLE)
+    digger, present = mechanism_of('excavator', **DOUBLE)
     found, linkage = poses.described(digger, present), digger.linkage
 
     def at(inputs):
@@ -316,21 +317,21 @@ def test_a_pose_of_several_inputs_is_described_whole():
 def test_an_output_is_what_it_is_however_small_and_rounding_is_zero(scale):
     lift = example('scissor_lift')
     del lift['lift.carriage.start']
-    machine = scene.read({**lift, 'lift.scale': scale}).machines['lift']
+    mechanism = scene.read({**lift, 'lift.scale': scale}).mechanisms['lift']
     at = 1.2
-    outputs = poses.described(machine, [at * scale])['outputs']
-    truth = machine.linkage.solve(at, ('P',))['P'] * scale
+    outputs = poses.described(mechanism, [at * scale])['outputs']
+    truth = mechanism.linkage.solve(at, ('P',))['P'] * scale
     assert [outputs[name]['value'] for name in ('P.x', 'P.y')] == pytest.approx(list(truth))
     assert outputs['P.x']['rates'] == [0.0] and abs(outputs['P.y']['rates'][0]) > 0.1
 
 
 def test_arrows_of_force_are_the_loads_and_what_holds_them():
-    machine = scene.read({'mechanisms': ['lever'], 'lever.type': 'slotted_lever',
-                          'lever.loads': ['L=3 -4', 'lever=2']}).machines['lever']
-    found = poses.arrows(machine, [0.5], 'force', {'crank': 1.0})
-    effort, = machine.efforts([0.5])
+    mechanism = scene.read({'mechanisms': ['lever'], 'lever.type': 'slotted_lever',
+                            'lever.loads': ['L=3 -4', 'lever=2']}).mechanisms['lever']
+    found = poses.arrows(mechanism, [0.5], 'force', {'crank': 1.0})
+    effort, = mechanism.efforts([0.5])
     assert found == {'unit': 'N', 'at': {'L': (3.0, -4.0)}, 'efforts': {'crank': [effort, 'N·m']}}
-    digger, = scene.read(example('excavator')).machines.values()
+    digger, = scene.read(example('excavator')).mechanisms.values()
     present = [drive.start for drive in digger.inputs.values()]
     assert poses.arrows(digger, present, 'force', {}) == {'unit': 'N', 'at': {}, 'efforts': {}}
     loaded = dataclasses.replace(digger, loads={'T': (0.0, -9.0)})
@@ -342,21 +343,21 @@ def test_arrows_of_force_are_the_loads_and_what_holds_them():
 @pytest.mark.parametrize('name, output', [
     ('excavator', 'T.y'), ('jansen', 'G.x'), ('peaucellier', 'PB'), ('peaucellier', 'C.y')])
 def test_a_position_is_drawn_as_it_bends_even_next_to_a_dead_point(name, output):
-    machine, = scene.read(example(name)).machines.values()
-    present = [drive.start for drive in machine.inputs.values()]
-    curve = curves.curve(machine, present, 'position', output)
+    mechanism, = scene.read(example(name)).mechanisms.values()
+    present = [drive.start for drive in mechanism.inputs.values()]
+    curve = curves.curve(mechanism, present, 'position', output)
     x, y = np.array(curve['x']), np.array(curve['y'], float)
     middle = 0.5 * (x[:-1] + x[1:])
-    sizes = [machine.scale_of(key) for key in machine.inputs]
+    sizes = [mechanism.scale_of(key) for key in mechanism.inputs]
     inputs = [middle / sizes[0], *(value / size for value, size in zip(present[1:], sizes[1:]))]
-    truth = machine.scale_of(output) * machine.linkage.joint_angles(
+    truth = mechanism.scale_of(output) * mechanism.linkage.joint_angles(
         inputs if len(inputs) > 1 else inputs[0], [output])[output]
     assert abs(truth - 0.5 * (y[:-1] + y[1:])).max() < np.ptp(y) / 500.0
 
 
 def test_no_line_goes_through_a_pole():
-    machine = scene.read({'mechanisms': ['slotted_lever']}).machines['slotted_lever']
-    curve = curves.curve(machine, [0.3], 'force ratio', 'lever')
+    mechanism = scene.read({'mechanisms': ['slotted_lever']}).mechanisms['slotted_lever']
+    curve = curves.curve(mechanism, [0.3], 'force ratio', 'lever')
     x, y = np.array(curve['x']), np.array(curve['y'], float)
     turns = math.pi - math.acos(80.0 / 150.0)
     gaps = x[np.isnan(y)].reshape(2, 2)

@@ -351,7 +351,7 @@ def test_where_a_port_is_taken_another_is_used_or_the_viewer_says_how(graph):
 
 @pytest.mark.parametrize('host, shown, numbers', [
     ('0.0.0.0', '127.0.0.1', True), ('', '127.0.0.1', True), ('localhost', 'localhost', False)])
-def test_a_viewer_answers_by_the_names_and_numbers_of_its_machine(graph, host, shown, numbers):
+def test_a_viewer_answers_by_the_names_and_numbers_of_its_mechanism(graph, host, shown, numbers):
     viewer = graph.start(Viewer, {'port': 0, 'host': host})
     url = re.fullmatch(rf'http://{shown}:\d+/', viewer.url)[0]
     assert [status(url, Host=name) == 200 for name in (

@@ -172,13 +172,13 @@ def test_a_parser_names_the_option_that_was_meant():
         assert str(refused.value) == text
 
 
-def test_machines_are_chosen_by_their_names_in_order():
-    machines = scene.read({'mechanisms': ['klann', 'watt']}).machines
-    assert [each.name for each in chosen(machines, [])] == ['klann', 'watt']
-    assert [each.name for each in chosen(machines, ['watt', 'klann'])] == ['watt', 'klann']
+def test_mechanisms_are_chosen_by_their_names_in_order():
+    mechanisms = scene.read({'mechanisms': ['klann', 'watt']}).mechanisms
+    assert [each.name for each in chosen(mechanisms, [])] == ['klann', 'watt']
+    assert [each.name for each in chosen(mechanisms, ['watt', 'klann'])] == ['watt', 'klann']
     with pytest.raises(RequestError, match=r"^there is no mechanism 'wat'; allowed: klann, watt; "
                        r'did you mean watt\?$'):
-        chosen(machines, ['klann', 'wat'])
+        chosen(mechanisms, ['klann', 'wat'])
 
 
 def test_a_package_that_another_one_needs_is_the_one_at_fault():

@@ -53,13 +53,13 @@ def example(name):
         path for path in EXAMPLES if path.stem == name))))
 
 
-def machine_of(name, **changed):
+def mechanism_of(name, **changed):
     """Return the mechanism of an example with some values changed, and its inputs at the start."""
     values = example(name)
     key, = values['mechanisms']
-    machine, = scene.read({**values, **{
-        f'{key}.{name}': value for name, value in changed.items()}}).machines.values()
-    return machine, [drive.start for drive in machine.inputs.values()]
+    mechanism, = scene.read({**values, **{
+        f'{key}.{name}': value for name, value in changed.items()}}).mechanisms.values()
+    return mechanism, [drive.start for drive in mechanism.inputs.values()]
 
 
 def lever_of(servo, a=80.0, b=150.0):
@@ -73,7 +73,7 @@ class Show(contextlib.ExitStack):
     def __init__(self, graph, parameters, kinds=NODES, **kwargs):
         super().__init__()
         self.graph = graph
-        self.names = scene.read(parameters).machines if parameters else ()
+        self.names = scene.read(parameters).mechanisms if parameters else ()
         self.viewer = graph.start(Viewer, {'port': 0})
         self.nodes = [graph.start(kind, parameters, **kwargs) for kind in kinds]
         self._over = threading.Event()

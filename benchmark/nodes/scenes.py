@@ -61,9 +61,9 @@ class Cranks:
     """One crank message after the other."""
 
     def __init__(self, name: str):
-        machines = scene.read(given(name)).machines
-        self._motions = [Motion.of(machine.first) for machine in machines.values()]
-        self._message = JointState(name=[f'{machine}_crank' for machine in machines])
+        mechanisms = scene.read(given(name)).mechanisms
+        self._motions = [Motion.of(mechanism.first) for mechanism in mechanisms.values()]
+        self._message = JointState(name=[f'{mechanism}_crank' for mechanism in mechanisms])
         self._count = 0
 
     def __next__(self) -> JointState:

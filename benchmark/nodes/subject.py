@@ -73,9 +73,9 @@ class Relay(Node):
 
     def __init__(self, **kwargs):
         super().__init__('relay', **kwargs)
-        machine = scene.read({'mechanisms': ['leg'], 'leg.type': 'jansen'}).machines['leg']
-        self._loops = Loops(machine.linkage)
-        self._names = [f'leg_{link.name}' for link in machine.linkage.links]
+        mechanism = scene.read({'mechanisms': ['leg'], 'leg.type': 'jansen'}).mechanisms['leg']
+        self._loops = Loops(mechanism.linkage)
+        self._names = [f'leg_{link.name}' for link in mechanism.linkage.links]
         self._publisher = self.create_publisher(JointState, 'leg/joint_states', 10)
         self.create_subscription(JointState, 'crank_states', self._turn, ANY)
 

@@ -23,7 +23,7 @@ def main(args: Optional[List[str]] = None) -> int:
 def show(args: Optional[List[str]]) -> None:
     """Print the headers that a command line requests."""
     options = arguments().parse_args(args)
-    mechanisms = command.chosen(scene.load(options.scene).machines, options.mechanism)
+    mechanisms = command.chosen(scene.load(options.scene).mechanisms, options.mechanism)
     try:
         print(header.printed([header.Request(mechanism, options.output, own) for mechanism, own
                               in with_joints(mechanisms, options.joints)], options.float))

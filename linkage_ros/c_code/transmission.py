@@ -24,7 +24,7 @@ def main(args: Optional[List[str]] = None) -> int:
 def write(args: Optional[List[str]]) -> None:
     """Write the package or print the limits that a command line requests."""
     options = arguments().parse_args(args)
-    chosen = command.chosen(scene.load(options.scene).machines, options.mechanism)
+    chosen = command.chosen(scene.load(options.scene).mechanisms, options.mechanism)
     try:
         mechanisms = with_joints(chosen, options.joints)
         if options.limits:

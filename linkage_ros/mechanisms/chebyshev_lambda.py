@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Chebyshev's lambda: the four-bar of his walking machine.
+Chebyshev's lambda: the four-bar of his walking mechanism.
 
 Built like Hoeken's linkage, with ground OQ = a (4 + sqrt 7)/3 and AB = QB = BP = a (3 + sqrt 7)/2.
 These make the straight part of P's curve as straight as it can be over half a turn of the crank:

@@ -41,7 +41,7 @@ class CrankDriver(scene_node.SceneNode):
         self._steady = 0
         self._publisher = TrackedPublisher(self, JointState, 'crank_states', 10)
         sources = list(dict.fromkeys(
-            settings.source for mechanism in self.scene.machines.values()
+            settings.source for mechanism in self.scene.mechanisms.values()
             for settings in mechanism.inputs.values()))
         n = len(sources)
         self._message = PatchedMessages(
@@ -57,7 +57,7 @@ class CrankDriver(scene_node.SceneNode):
     def adopt(self, new: scene.Scene) -> None:
         """Adopt a scene; an input continues from its value, or from its start if that is new."""
         now = 0 if self._now is None else self._follow_clock()
-        all_settings = {(name, input_): settings for name, mechanism in new.machines.items()
+        all_settings = {(name, input_): settings for name, mechanism in new.mechanisms.items()
                         for input_, settings in mechanism.inputs.items()}
         for key, settings in all_settings.items():
             old = self._settings.get(key)
@@ -106,7 +106,7 @@ class CrankDriver(scene_node.SceneNode):
     def _position(self, key: Tuple[str, str], settings: scene.InputSettings,
                   now: int) -> Tuple[float, float]:
         """Return position [rad or m] and speed [rad/s or m/s] of an input's source joint."""
-        return self.scene.machines[key[0]].to_source(settings, *self._motions[key].at(now))
+        return self.scene.mechanisms[key[0]].to_source(settings, *self._motions[key].at(now))
 
 
 def main(args: Any = None) -> int:

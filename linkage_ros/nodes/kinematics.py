@@ -53,12 +53,12 @@ class Kinematics(scene_node.SceneNode):
         super().__init__(scene.KINEMATICS, **kwargs)
         # Mechanism and index of the inputs, by their source joint.
         self._inputs: Dict[str, List[Tuple[str, int]]] = {}
-        for name, mechanism in self.scene.machines.items():
+        for name, mechanism in self.scene.mechanisms.items():
             for i, settings in enumerate(mechanism.inputs.values()):
                 self._inputs.setdefault(settings.source, []).append((name, i))
         self._scene_joint_states = SceneJointStates(self, self._inputs)
         self._mechanisms.update((name, MechanismTopics(self, mechanism))
-                                for name, mechanism in self.scene.machines.items())
+                                for name, mechanism in self.scene.mechanisms.items())
         # That of the last message that set an input.
         self._stamp = NEVER
         self._joint_names: frozenset = frozenset()
@@ -84,8 +84,8 @@ class Kinematics(scene_node.SceneNode):
 
     def check(self, new: scene.Scene) -> None:
         """Raise SceneError if no robot model can be made of a planar mechanism."""
-        for name, mechanism in new.machines.items():
-            before, frame_id = self.scene.machines[name], mechanism.frame_id or new.frame_id
+        for name, mechanism in new.mechanisms.items():
+            before, frame_id = self.scene.mechanisms[name], mechanism.frame_id or new.frame_id
             if mechanism.in_space:
                 continue
             if mechanism is not before:
@@ -99,7 +99,7 @@ class Kinematics(scene_node.SceneNode):
         in_scene = self._scene_joint_states.joint_states.has_subscribers
         return {name: self._mechanisms[name].prepared(
             mechanism, mechanism.frame_id or new.frame_id, new.frame_prefix, in_scene)
-            for name, mechanism in new.machines.items()}
+            for name, mechanism in new.mechanisms.items()}
 
     def adopt(self, models: Dict[str, MechanismModel]) -> None:
         """Replace the models of the mechanisms, and publish those that have changed."""

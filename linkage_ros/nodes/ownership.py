@@ -86,7 +86,7 @@ class Follower:
     def _compare(self, event: ParameterEvent, mechanisms: Iterable[str],
                  there: Mapping[str, Any]) -> None:
         """Compare a full announcement with this node's mechanisms: equal ones are followed."""
-        fields, present = self._parameters.followed, self._parameters.scene.machines
+        fields, present = self._parameters.followed, self._parameters.scene.mechanisms
         here = {parameter.name: parameter.value
                 for name in {name.partition('.')[0] for name in there} & present.keys()
                 for parameter in present[name].parameters}

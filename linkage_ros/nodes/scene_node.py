@@ -261,7 +261,7 @@ def run(node_classes: Iterable[Callable[[], Node]], name: str, args: Any = None,
                 nodes.append(node)
                 if isinstance(node, SceneNode):
                     node.get_logger().info('ready: ' + node.task.format(
-                        mechanisms=listed(node.scene.machines, 200), rate=node.scene.rate))
+                        mechanisms=listed(node.scene.mechanisms, 200), rate=node.scene.rate))
             # All objects so far are permanent; collections need not visit them.
             gc.freeze()
             gc.enable()

@@ -45,20 +45,20 @@ class ServoInverse(scene_node.SceneNode):
         joint_state_reader.subscribe(self, 'crank_states', self._interpret, self._receive)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
         self.create_service(InputsFor, 'inputs_for', self.answer_inputs_for)
-        self._stream = CommandStream(self, self.scene.machines, lambda mechanism: present_inputs(
+        self._stream = CommandStream(self, self.scene.mechanisms, lambda mechanism: present_inputs(
             mechanism, self._positions))
         self.begin()
 
     def check(self, new: scene.Scene) -> None:
         """Raise SceneError for a length that `kinematics` could not publish."""
-        for mechanism in new.machines.values():
+        for mechanism in new.mechanisms.values():
             bodies.size(mechanism)
 
     def adopt(self, new: scene.Scene) -> None:
         """Replace the scene for which requests are answered."""
         self._requests.clear()
-        self._stream.adopt(new.machines)
-        self._sources = frozenset(settings.source for mechanism in new.machines.values()
+        self._stream.adopt(new.mechanisms)
+        self._sources = frozenset(settings.source for mechanism in new.mechanisms.values()
                                   for settings in mechanism.inputs.values())
 
     def answer(self, request: Any, response: Any) -> Any:
@@ -72,7 +72,7 @@ class ServoInverse(scene_node.SceneNode):
             self._with_several_inputs(request.mechanism), request, response), response)
 
     def _request(self, key: Tuple[str, str]) -> InverseRequest:
-        (name, output), mechanisms = key, self.scene.machines
+        (name, output), mechanisms = key, self.scene.mechanisms
         levers = {} if output not in ('', LEVER) else {
             name: mechanism for name, mechanism in mechanisms.items()
             if mechanism.linkage.type == 'slotted_lever'}
@@ -84,7 +84,7 @@ class ServoInverse(scene_node.SceneNode):
         return InverseRequest(mechanism, [output])
 
     def _with_several_inputs(self, name: str) -> scene.SceneMechanism:
-        mechanisms = self.scene.machines
+        mechanisms = self.scene.mechanisms
         return _chosen(mechanisms, name, {
             name: mechanism for name, mechanism in mechanisms.items()
             if len(mechanism.inputs) > 1}, 'mechanism with several inputs')

@@ -64,7 +64,7 @@ def parsed(args):
 def draw(args):
     """Write the files that a command line requests."""
     arguments = parsed(args)
-    mechanisms = chosen(scene.load(arguments.scene).machines, arguments.mechanism)
+    mechanisms = chosen(scene.load(arguments.scene).mechanisms, arguments.mechanism)
     with needs('matplotlib'):
         from matplotlib import style
 

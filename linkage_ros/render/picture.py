@@ -29,7 +29,7 @@ class PictureError(SceneError):
 
 class Picture:
     """
-    Machines side by side, each on axes of its own.
+    Mechanisms side by side, each on axes of its own.
 
     Parameters
     ----------

@@ -104,7 +104,7 @@ class Walk(NamedTuple):
     good: np.ndarray
 
 
-def compared(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
+def compared(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
              imported: Sequence[Imported]) -> Tuple[List[str], Dict[str, str]]:
     """
     Put what a scene publishes into the loops of its robot, which is in a closed pose.
@@ -118,16 +118,17 @@ def compared(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
         parts = [made for made in imported if {*made.driven} & component.positions.keys()]
         if parts:
             try:
-                reports.append(_Loops(robot, component, machines, parts).report())
+                reports.append(_Loops(robot, component, mechanisms, parts).report())
             except Difference as error:
                 wrong.update((made.name, str(error)) for made in parts)
     return reports, wrong
 
 
-def published(machines: Mapping[str, scene.SceneMechanism]) -> Set[str]:
+def published(mechanisms: Mapping[str, scene.SceneMechanism]) -> Set[str]:
     """Return the joints that a scene publishes or reads."""
-    return {drive.source for machine in machines.values() for drive in machine.inputs.values()} | {
-        called.name for machine in machines.values() for called in machine.joints.values()
+    every = mechanisms.values()
+    return {drive.source for mechanism in every for drive in mechanism.inputs.values()} | {
+        called.name for mechanism in every for called in mechanism.joints.values()
         if called.published}
 
 
@@ -135,15 +136,15 @@ class _Loops:
     """Loops that share joints, and what mechanisms publish of them."""
 
     def __init__(self, robot: Robot, component: Component,
-                 machines: Mapping[str, scene.SceneMechanism], parts: Sequence[Imported]):
+                 mechanisms: Mapping[str, scene.SceneMechanism], parts: Sequence[Imported]):
         self._component, self._parts = component, parts
-        self._machines = [machine for name, machine in machines.items()
-                          if published({name: machine}) & component.positions.keys()]
+        self._mechanisms = [mechanism for name, mechanism in mechanisms.items()
+                            if published({name: mechanism}) & component.positions.keys()]
         self._motors = {name: robot.source(name) for made in parts for name in made.driven}
         # Where each source starts, and between which positions it moves.
         self._start = {drive.source: robot.positions.get(
             drive.source, (drive.start - drive.offset) / drive.ratio)
-            for machine in self._machines for drive in machine.inputs.values()}
+            for mechanism in self._mechanisms for drive in mechanism.inputs.values()}
         self._ends: Ranges = {}
         for source, ends in (item for made in parts for item in made.ends.items()):
             low, high = self._ends.get(source, ends)
@@ -241,12 +242,12 @@ class _Loops:
         """Return positions of the loops' joints along paths."""
         positions = {**sources, **{name: ratio * sources[source] + offset
                                    for name, (source, ratio, offset) in self._motors.items()}}
-        for machine in self._machines:
+        for mechanism in self._mechanisms:
             values = [drive.ratio * positions[drive.source] + drive.offset
-                      for drive in machine.inputs.values()]
-            angles = machine.linkage.joint_angles(theta_of(values))
+                      for drive in mechanism.inputs.values()]
+            angles = mechanism.linkage.joint_angles(theta_of(values))
             positions.update((called.name, called.of(angles[link]))
-                             for link, called in machine.joints.items() if called.published)
+                             for link, called in mechanism.joints.items() if called.published)
         return {name: values for name, values in positions.items()
                 if name in self._component.named.keys() | self._component.cut_names}
 

@@ -118,14 +118,14 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
     parameters: Dict[str, Any] = {'mechanisms': [made.name for made in imported]}
     for made in imported:
         parameters.update(made.parameters)
-    machines = scene.read(parameters).machines
+    mechanisms = scene.read(parameters).mechanisms
     tree = robot.tree_joints
     stay = {name for made in imported for name in made.still}
     still = {name: value for name, value in robot.positions.items()
-             if name in tree.keys() & stay - check.published(machines)}
-    rest, lost = others(robot, machines, still)
-    machines = scene.read({**parameters, **rest}).machines
-    checks, wrong = check.compared(robot, machines, imported)
+             if name in tree.keys() & stay - check.published(mechanisms)}
+    rest, lost = others(robot, mechanisms, still)
+    mechanisms = scene.read({**parameters, **rest}).mechanisms
+    checks, wrong = check.compared(robot, mechanisms, imported)
     if wrong:
         return _checked(robot, [made for made in imported if made.name not in wrong], [
             *reports, *(f'Left out: {name}: {WRONG}: {why}.' for name, why in wrong.items())])
@@ -139,7 +139,7 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
     return parameters, reports, still
 
 
-def others(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
+def others(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
            held: Mapping[str, float]) -> Tuple[Dict[str, Any], List[str]]:
     """
     Return the parameters that add a mechanism of all joints that a scene does not publish.
@@ -149,7 +149,7 @@ def others(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
     """
     held = {name: value for name, value in {**robot.held, **held}.items()
             if name in robot.positions}
-    known = check.published(machines)
+    known = check.published(mechanisms)
     passive = {joint.name for component in components(closing.held(robot, held))
                for joint in component.joints}.difference(known, held, robot.driven)
     cranks: Dict[str, check.Source] = {}
@@ -165,7 +165,7 @@ def others(robot: Robot, machines: Mapping[str, scene.SceneMechanism],
     if not cranks:
         return {}, lost
     lines = ['A ground 0 0', *(f'B{i} crank A 1' for i in range(1, len(cranks) + 1))]
-    return {'mechanisms': [*machines, OTHERS], **check.parameters(
+    return {'mechanisms': [*mechanisms, OTHERS], **check.parameters(
         OTHERS, 'custom', lines, [*cranks.values()],
         [(crank.name, 1.0, name, 0.0) for name, crank in cranks.items() if crank.source != name],
         **{f'{crank.name}.speed': 0.0 for crank in cranks.values()})}, lost

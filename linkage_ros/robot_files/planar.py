@@ -265,8 +265,8 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
     drawing = _drawn(robot, group)
     name = check.name_beside(others, plain(drawing.driven[0].name, 60))
     parameters = _parameters(drawing, name)
-    machine = scene.read({'mechanisms': [name], **parameters}).machines[name]
-    if not any(called.published for called in machine.joints.values()):
+    mechanism = scene.read({'mechanisms': [name], **parameters}).mechanisms[name]
+    if not any(called.published for called in mechanism.joints.values()):
         raise NotDriven(_why(drawing))
     limits, reports = robot.limits(drawing.driven)
     if drawing.left:
@@ -277,7 +277,8 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
         low, high = drive.value - around, drive.value + around
         if drive.source in limits:
             try:
-                low, high = sweep = _sweep(drive, limits[drive.source], machine.inputs[drive.name])
+                low, high = sweep = _sweep(
+                    drive, limits[drive.source], mechanism.inputs[drive.name])
                 parameters[f'{name}.{drive.name}.sweep'] = [*sweep]
                 parameters[f'{name}.{drive.name}.start'] = min(max(drive.value, low), high)
             except ValueError as error:
@@ -288,7 +289,7 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
         low, high = sorted((end - drive.offset) / drive.ratio for end in (
             max(low, start - 2.0 * around), min(high, start + 2.0 * around)))
         ends[drive.source] = low, high
-    if drawing.apart(machine.linkage) > drawing.allowed:
+    if drawing.apart(mechanism.linkage) > drawing.allowed:
         raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
     slack = drawing.lean + drawing.gap / drawing.size
     if slack > EXACT:

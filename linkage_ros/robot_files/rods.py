@@ -214,9 +214,9 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
     parameters = check.parameters(name, 'rods', lines, made.drives, [
         (link, 1.0, joint.name, joint.start) for link, joint in made.links.items()
         if joint.name not in sources and joint.position is not None], frame_id=group.ground)
-    machine = scene.read({'mechanisms': [name], **parameters}).machines[name]
+    mechanism = scene.read({'mechanisms': [name], **parameters}).mechanisms[name]
     ends = {}
-    for drive, (low, high) in zip(machine.inputs.values(), _sweeps(machine, limits)):
+    for drive, (low, high) in zip(mechanism.inputs.values(), _sweeps(mechanism, limits)):
         ends[drive.source] = low - drive.offset, high - drive.offset
         key = f'{name}.{drive.input.name}'
         parameters[f'{key}.sweep'] = [float(short(low)), float(short(high))]
@@ -224,10 +224,10 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
     return check.Imported(name, parameters, reports, [*ends], ends, still=made.still)
 
 
-def _sweeps(machine: scene.SceneMechanism, limits: Mapping[str, Tuple[float, float]]
+def _sweeps(mechanism: scene.SceneMechanism, limits: Mapping[str, Tuple[float, float]]
             ) -> List[List[float]]:
     """Return the ends of the inputs: limits, made smaller until every pose in them exists."""
-    drives = machine.inputs.values()
+    drives = mechanism.inputs.values()
     low, high = np.array([np.add(limits.get(drive.source, (-math.inf, math.inf)), drive.offset)
                           for drive in drives]).T
     start = np.clip([drive.start for drive in drives], low, high)
@@ -235,7 +235,7 @@ def _sweeps(machine: scene.SceneMechanism, limits: Mapping[str, Tuple[float, flo
     for share in _SMALLER ** np.arange(_TRIES):
         ends = np.clip([start - share * size, start + share * size], low, high)
         values = np.meshgrid(*np.linspace(ends[0], ends[1], _SIDE).T)
-        angles = machine.linkage.joint_angles(theta_of(values))
+        angles = mechanism.linkage.joint_angles(theta_of(values))
         if np.isfinite(list(angles.values())).all():
             break
     return ends.T.tolist()

@@ -63,7 +63,7 @@ class Part:
     robot: Robot
     base: str = ''
     pose: Sequence[float] = ()
-    machine: Any = None
+    mechanism: Any = None
 
     def bodies(self) -> Iterator[Body]:
         """Yield its bodies, parents first, with the root if it stands on a link."""
@@ -92,14 +92,14 @@ class Model:
     density: float = 0.0
 
 
-def robot(machines: Iterable[SceneMechanism], frame_id: str,
+def robot(mechanisms: Iterable[SceneMechanism], frame_id: str,
           width: Optional[float] = None) -> Model:
     """
     Return mechanisms as one robot model.
 
     Parameters
     ----------
-    machines : iterable of SceneMechanism
+    mechanisms : iterable of SceneMechanism
         Mechanisms of the model; a model of one mechanism has its name.
     frame_id : str
         The root link: the frame of the poses of mechanisms without their own frame.
@@ -113,10 +113,10 @@ def robot(machines: Iterable[SceneMechanism], frame_id: str,
 
     """
     models = []
-    for machine in machines:
-        base = machine.frame_id or frame_id
-        part = Part(_Tree(machine, width).robot, base, machine.pose, machine)
-        models.append(Model(machine.name, base, [part]))
+    for mechanism in mechanisms:
+        base = mechanism.frame_id or frame_id
+        part = Part(_Tree(mechanism, width).robot, base, mechanism.pose, mechanism)
+        models.append(Model(mechanism.name, base, [part]))
     return merged(models)
 
 
@@ -150,38 +150,38 @@ def merged(models: Sequence[Model]) -> Model:
                  sorted(parts, key=lambda part: len(lines[part.base])))
 
 
-def size(machine: SceneMechanism) -> float:
+def size(mechanism: SceneMechanism) -> float:
     """Return the length of the longest bar [m]; raise SceneError if it or a place is too far."""
-    name, length = machine.name, machine.scale * float(machine.linkage.longest)
+    name, length = mechanism.name, mechanism.scale * float(mechanism.linkage.longest)
     if not SMALLEST <= length <= LARGEST:
         raise SceneError(f'{name}.scale and {name}.dimensions must make the longest bar from '
                          f'{SMALLEST:g} to {LARGEST:g} m long, not {length:g}')
-    if max(map(abs, machine.pose)) > LARGEST:
-        raise SceneError(f'{name}.pose must be within {LARGEST:g} m, not {machine.pose}')
+    if max(map(abs, mechanism.pose)) > LARGEST:
+        raise SceneError(f'{name}.pose must be within {LARGEST:g} m, not {mechanism.pose}')
     return length
 
 
 class _Tree:
     """The bodies of a mechanism: ground, the root, crank and legs, in `robot`."""
 
-    def __init__(self, machine: SceneMechanism, width: Optional[float]):
-        if machine.in_space:
-            raise SceneError(f'{machine.name} is {IN_SPACE}')
-        length = size(machine)
+    def __init__(self, mechanism: SceneMechanism, width: Optional[float]):
+        if mechanism.in_space:
+            raise SceneError(f'{mechanism.name} is {IN_SPACE}')
+        length = size(mechanism)
         self._length = length if width is None else width / WIDTH
         self._ball = self._piece('joint', (0.0, 0.0), (0.0, 0.0))
-        self._machine, legs = machine, machine.assembly().legs
-        self._shapes = shapes.shapes(machine)
-        self._frames = {GROUND: shapes.ground_frame(machine.linkage), **machine.linkage.frames}
+        self._mechanism, legs = mechanism, mechanism.assembly().legs
+        self._shapes = shapes.shapes(mechanism)
+        self._frames = {GROUND: shapes.ground_frame(mechanism.linkage), **mechanism.linkage.frames}
         self._travels = {
-            name: (machine.scale_of(name) * low, machine.scale_of(name) * high)
-            for name, (low, high) in travels(machine.linkage, machine.reach).items()}
+            name: (mechanism.scale_of(name) * low, mechanism.scale_of(name) * high)
+            for name, (low, high) in travels(mechanism.linkage, mechanism.reach).items()}
         # The crank of several legs is limited by all of them.
         if len(legs) == 1:
-            self._travels.update(_input_travels(machine))
+            self._travels.update(_input_travels(mechanism))
         ground = self._body('', GROUND)
         self.robot = Robot(ground, {ground: np.eye(4)}, pieces={ground: []})
-        self._shared = machine.linkage.links[0] if len(legs) > 1 else None
+        self._shared = mechanism.linkage.links[0] if len(legs) > 1 else None
         if self._shared:
             self._hang('', 1.0, self._shared)
             self.robot.pieces[self._body('', self._shared.name)] = [self._ball]
@@ -190,7 +190,7 @@ class _Tree:
 
     def _add_leg(self, prefix: str, leg: Leg) -> None:
         robot, ends = self.robot, Counter[str]()
-        links = {link.name: link for link in self._machine.linkage.links}
+        links = {link.name: link for link in self._mechanism.linkage.links}
         for name, frame in self._frames.items():
             body, link = self._body(prefix, name), links.get(name)
             if link and link is self._shared:
@@ -205,7 +205,7 @@ class _Tree:
             for point, place in frame.items():
                 if not link or point != link.joint:
                     ends[point] += 1
-                    met = f'{self._machine.name}_{prefix}{point}'
+                    met = f'{self._mechanism.name}_{prefix}{point}'
                     cut = f'_cut{ends[point] - 1 if ends[point] > 2 else ""}' * (ends[point] > 1)
                     place = *self._place(leg.side, name, place), 0.0, 0.0, 0.0, 0.0
                     robot.hang(met + cut, body, place)
@@ -219,7 +219,7 @@ class _Tree:
         if side < 0.0 and link.parent == GROUND:
             zero += math.pi
         x, y = self._place(side, link.parent, self._frames[link.parent][link.joint])
-        called = self._machine.joints[prefix + link.name]
+        called = self._mechanism.joints[prefix + link.name]
         # The link's position at a published value of zero.
         back = -called.sign * called.offset
         if slides:
@@ -235,7 +235,7 @@ class _Tree:
 
     def _pieces(self, side: float, name: str) -> Iterator[Piece]:
         """Yield the bars of a link, and the guides, blocks, barrels and rods on it."""
-        frame, bars = self._frames[name], self._machine.linkage.bars if name != GROUND else ()
+        frame, bars = self._frames[name], self._mechanism.linkage.bars if name != GROUND else ()
         drawn = [('bar', name, frame[start], frame[end]) for start, end in bars
                  if start in frame and end in frame]
         drawn += [(shape.kind, shape.slide.name, shape.start[1:], shape.end[1:])
@@ -243,7 +243,7 @@ class _Tree:
         for kind, mover, *ends in drawn:
             start, end = (self._place(side, name, place) for place in ends)
             if start != end:
-                yield self._piece(kind, start, end, mover in self._machine.inputs)
+                yield self._piece(kind, start, end, mover in self._mechanism.inputs)
 
     def _piece(self, kind: str, start: Place, end: Place, is_driven: bool = False) -> Piece:
         form, thickness, colour = STYLES[kind]
@@ -251,18 +251,18 @@ class _Tree:
                      start, end)
 
     def _body(self, prefix: str, name: str) -> str:
-        return f'{self._machine.name}_{"" if name == GROUND else prefix}{name}_link'
+        return f'{self._mechanism.name}_{"" if name == GROUND else prefix}{name}_link'
 
     def _place(self, side: float, name: str, place: Sequence[float]) -> Place:
         """Return a place on a link [m]; a mirrored ground is so in y, a link in its bar."""
-        x, y = (self._machine.scale * value for value in place)
+        x, y = (self._mechanism.scale * value for value in place)
         return (side * x, y) if name == GROUND else (x, side * y)
 
 
-def _input_travels(machine: SceneMechanism) -> Dict[str, Arc]:
+def _input_travels(mechanism: SceneMechanism) -> Dict[str, Arc]:
     """Return the outermost ends of each input's reach that is no full rotation."""
     ends: Dict[str, Arc] = {}
-    for name, settings in machine.inputs.items():
+    for name, settings in mechanism.inputs.items():
         arcs, sweep = settings.reach, settings.sweep
         if not settings.input.is_whole(arcs):
             low, high = min(low for low, _ in arcs), max(high for _, high in arcs)
@@ -320,8 +320,8 @@ def assembled(model: Model, density: float = DENSITY) -> Model:
 
 def _started(part: Part, density: float) -> Robot:
     """Return the robot of a mechanism at the start of its inputs, with motors and gears."""
-    machine, joints = part.machine, part.machine.joints
-    assembly, linkage, inputs = machine.assembly(), machine.linkage, machine.inputs
+    mechanism, joints = part.mechanism, part.mechanism.joints
+    assembly, linkage, inputs = mechanism.assembly(), mechanism.linkage, mechanism.inputs
     values = {name: Motion.of(settings).at(0)[0] for name, settings in inputs.items()}
     starts, rates = [*values.values()], defaultdict[str, Dict[str, float]](dict)
     solution = assembly.solution((), assembly.joints, linkage.geared)
@@ -332,23 +332,23 @@ def _started(part: Part, density: float) -> Robot:
             for name, rate in zip(linkage.geared, row[len(assembly.joints):]):
                 rates[prefix + name][driving] = rate
     if not np.isfinite([*values.values()]).all():
-        keys = ' and '.join(f'{machine.name}.{name}.start' for name in inputs)
-        raise SceneError(f'{keys} must be where {machine.name} can be assembled, not at '
+        keys = ' and '.join(f'{mechanism.name}.{name}.start' for name in inputs)
+        raise SceneError(f'{keys} must be where {mechanism.name} can be assembled, not at '
                          f'{", ".join(f"{start:g}" for start in starts)}')
     positions = {joints[name].name: joints[name].of(value) for name, value in values.items()}
     robot = replace(part.robot, pieces={**part.robot.pieces}, meets={**part.robot.meets},
                     driven=[], servos={}, follows={})
     robot = posed(robot, {name: positions[name] for name in robot.positions})
-    _add_slots(machine, robot)
+    _add_slots(mechanism, robot)
     still = {robot.root, *(joint.bodies[1] for joint in robot.joints
                            if joint.kind == FIXED and joint.bodies[0] == robot.root)}
     mass = sum(weight(pieces, density)[0] for body, pieces in robot.pieces.items()
                if pieces and body not in still)
     tips = {link.name: link.tip for link in linkage.links}
     for name in inputs:
-        joint, arm = joints[name], machine.scale * math.hypot(*linkage.frames[name][tips[name]])
+        joint, arm = joints[name], mechanism.scale * math.hypot(*linkage.frames[name][tips[name]])
         robot.driven.append(joint.name)
-        robot.servos[joint.name] = mass, arm or size(machine)
+        robot.servos[joint.name] = mass, arm or size(mechanism)
     sweeps = {joints[name].name: tuple(sorted(map(joints[name].of, settings.sweep)))
               for name, settings in inputs.items() if settings.sweep}
     robot.joints = [replace(joint, limits=sweeps.get(joint.name)) for joint in robot.joints]
@@ -361,11 +361,11 @@ def _started(part: Part, density: float) -> Robot:
     return robot
 
 
-def _add_slots(machine: SceneMechanism, robot: Robot) -> None:
+def _add_slots(mechanism: SceneMechanism, robot: Robot) -> None:
     """Add the bodies in slots of yokes, which have no joint in the tree."""
-    for prefix in machine.assembly().legs:
-        for link, pin in machine.linkage.yokes.items():
-            name, point = (f'{machine.name}_{prefix}{end}' for end in (link, pin))
+    for prefix in mechanism.assembly().legs:
+        for link, pin in mechanism.linkage.yokes.items():
+            name, point = (f'{mechanism.name}_{prefix}{end}' for end in (link, pin))
             slot, end = f'{name}_slot_link', f'{name}_pin'
             x, y, *_ = np.linalg.solve(robot.frames[f'{name}_link'], robot.frames[point])[:, 3]
             robot.hang(slot, f'{name}_link', (x, y, 0.0, 0.0, 0.0, 0.5 * math.pi),

@@ -25,7 +25,7 @@ def show(args: Optional[Sequence[str]], given_scene: Optional[scene.Scene] = Non
     shown = given_scene or (scene.load(options.scene) if options.scene else scene.read({}))
     if options.format == 'urdf' and options.density:
         raise command.RequestError('--density is for sdf and mjcf only: the URDF has no masses')
-    model = bodies.robot(command.chosen(shown.machines, options.mechanism), shown.frame_id,
+    model = bodies.robot(command.chosen(shown.mechanisms, options.mechanism), shown.frame_id,
                          options.width)
     if options.format != 'urdf':
         model = assembled(model, options.density or DENSITY)

@@ -24,7 +24,7 @@ MIN_PITCH, MAX_PITCH = 0.15, 1.56
 OBLIQUE = np.array([0.576, -0.768, 0.28])
 
 
-def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
+def adapted(config: dict, mechanisms: Mapping[str, SceneMechanism], frame_id: str,
             namespace: str = '', robot_model: bool = False, frame_prefix: str = '') -> dict:
     """
     Return a configuration that shows mechanisms, and whose camera sees them all.
@@ -39,12 +39,12 @@ def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
     places = [i for i, display in enumerate(displays) if display['Class'] == GROUP]
     text, topics = json.dumps(displays[places[0]]), f'/{namespace.strip("/")}/'.replace('//', '/')
     groups = [json.loads(text.replace(f'"/{displays[places[0]]["Name"]}/', f'"{topics}{name}/'))
-              for name in machines]
-    for name, group in zip(machines, groups):
+              for name in mechanisms]
+    for name, group in zip(mechanisms, groups):
         group['Name'] = name
     displays[places[0]:places[-1] + 1] = groups
     manager['Global Options']['Fixed Frame'] = frame_id
-    manager['Views']['Current'].update(_camera(machines.values()))
+    manager['Views']['Current'].update(_camera(mechanisms.values()))
     for display in displays + [display for group in groups for display in group['Displays']]:
         if display['Class'] in NEEDS_TRANSFORMS:
             display['Enabled'] = display['Value'] = robot_model
@@ -53,9 +53,9 @@ def adapted(config: dict, machines: Mapping[str, SceneMechanism], frame_id: str,
     return made
 
 
-def _camera(machines: Iterable[SceneMechanism]) -> dict[str, Any]:
+def _camera(mechanisms: Iterable[SceneMechanism]) -> dict[str, Any]:
     """Return a camera that sees all places of the joints, square to the first one's plane."""
-    clouds, normals = zip(*map(_seen, machines))
+    clouds, normals = zip(*map(_seen, mechanisms))
     places, normal = np.concatenate(clouds), normals[0]
     low, high = places.min(axis=0), places.max(axis=0)
     pitch = np.clip(math.asin(np.clip(normal[2], -1.0, 1.0)), MIN_PITCH, MAX_PITCH)
@@ -67,14 +67,14 @@ def _camera(machines: Iterable[SceneMechanism]) -> dict[str, Any]:
             'Pitch': round(float(pitch), 6), 'Yaw': round(yaw % math.tau, 6)}
 
 
-def _seen(machine: SceneMechanism) -> tuple[np.ndarray, np.ndarray]:
+def _seen(mechanism: SceneMechanism) -> tuple[np.ndarray, np.ndarray]:
     """Return points that a mechanism's joints come to [m], (n, 3), and the way to the camera."""
-    places = machine.scale * np.concatenate([
-        place.reshape(-1, place.shape[-1]) for place in machine.linkage.solve(
-            input_values(machine), machine.points).values()])
+    places = mechanism.scale * np.concatenate([
+        place.reshape(-1, place.shape[-1]) for place in mechanism.linkage.solve(
+            input_values(mechanism), mechanism.points).values()])
     places = places[np.isfinite(places).all(axis=1)]
-    if machine.mirrored:
+    if mechanism.mirrored:
         places = np.concatenate([places, places * (-1.0, 1.0)])
-    frame = pose(*machine.pose)
-    normal = OBLIQUE if machine.in_space else frame[:3, 2]
+    frame = pose(*mechanism.pose)
+    normal = OBLIQUE if mechanism.in_space else frame[:3, 2]
     return places @ frame[:3, :places.shape[1]].T + frame[:3, 3], normal

@@ -58,14 +58,14 @@ def ground_frame(linkage: Mechanism) -> Dict[str, Tuple[float, ...]]:
             [0.0] * len(linkage.inputs), linkage.grounded).items()})
 
 
-def shapes(machine: SceneMechanism) -> List[Shape]:
+def shapes(mechanism: SceneMechanism) -> List[Shape]:
     """Return the sliding parts, guides first; parts that no pose was found for are omitted."""
-    linkage = machine.linkage
+    linkage = mechanism.linkage
     slides = [link for link in linkage.links if link.kind == 'prismatic']
     if not slides:
         return []
     frames = {GROUND: ground_frame(linkage), **linkage.frames}
-    lengths = linkage.joint_angles(input_values(machine), [link.name for link in slides])
+    lengths = linkage.joint_angles(input_values(mechanism), [link.name for link in slides])
     guides, others = [], []
     for link in slides:
         values = lengths[link.name][np.isfinite(lengths[link.name])]
@@ -91,17 +91,17 @@ def _shape(kind: str, slide: Link, link: str, *ends: complex) -> Shape:
     return Shape(kind, slide, *(LinkPoint(link, end.real, end.imag) for end in ends))
 
 
-def input_values(machine: SceneMechanism) -> Any:
+def input_values(mechanism: SceneMechanism) -> Any:
     """Return values of the inputs through their ends or parts of their reach, before scale."""
-    count = max(round(SAMPLES ** (1.0 / len(machine.inputs))), 2)
+    count = max(round(SAMPLES ** (1.0 / len(mechanism.inputs))), 2)
     values = [np.concatenate([np.linspace(*arc, count) for arc in settings.arcs])
-              / machine.scale_of(name) for name, settings in machine.inputs.items()]
+              / mechanism.scale_of(name) for name, settings in mechanism.inputs.items()]
     return theta_of(np.meshgrid(*values))
 
 
-def drawn(machine: SceneMechanism, names: Collection[str]) -> List[Shape]:
+def drawn(mechanism: SceneMechanism, names: Collection[str]) -> List[Shape]:
     """Return the shapes to draw between these joints; rods are drawn as bars."""
-    return [shape for shape in shapes(machine)
+    return [shape for shape in shapes(mechanism)
             if shape.kind != ROD and {shape.slide.joint, shape.slide.tip} <= set(names)]
 
 

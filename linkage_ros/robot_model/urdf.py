@@ -26,9 +26,9 @@ from ..scene import SceneMechanism
 FAR = 1e3
 
 
-def describe(machines: Iterable[SceneMechanism], frame_id: str) -> str:
+def describe(mechanisms: Iterable[SceneMechanism], frame_id: str) -> str:
     """Return mechanisms as one URDF; see `bodies.robot`."""
-    return write(bodies.robot(machines, frame_id))
+    return write(bodies.robot(mechanisms, frame_id))
 
 
 def write(model: Model) -> str:

@@ -49,7 +49,7 @@ GENERAL = {
 class Scene:
     """Mechanisms by name, their common frame, and the rate of the crank messages [Hz]."""
 
-    machines: Mapping[str, SceneMechanism]
+    mechanisms: Mapping[str, SceneMechanism]
     frame_id: str
     frame_prefix: str
     rate: float
@@ -59,14 +59,15 @@ class Scene:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters, the general ones first."""
-        return (*self.general, *(parameter for mechanism in self.machines.values()
+        return (*self.general, *(parameter for mechanism in self.mechanisms.values()
                                  for parameter in mechanism.parameters))
 
     def changed_from(self, old: 'Scene') -> list[Parameter]:
         """Return the parameters whose values differ from an older scene of the same mechanisms."""
         parts = [(self.general, old.general), *(
-            (mechanism.parameters, old.machines[name].parameters)
-            for name, mechanism in self.machines.items() if mechanism is not old.machines[name])]
+            (mechanism.parameters, before.parameters)
+            for mechanism, before in zip(self.mechanisms.values(), old.mechanisms.values())
+            if mechanism is not before)]
         before = {parameter.name: parameter.value for _, part in parts for parameter in part}
         return [parameter for part, _ in parts for parameter in part
                 if parameter.value != before.get(parameter.name)]
@@ -109,28 +110,28 @@ def changed(before: Scene, values: Mapping[str, Any]) -> Scene:
     reused. Raises SceneError as `read` does.
     """
     parts = {'': _values(before.general),
-             **{name: mechanism.values for name, mechanism in before.machines.items()}}
+             **{name: mechanism.values for name, mechanism in before.mechanisms.items()}}
     for name, part in _by_mechanism(values).items():
-        mechanism = before.machines.get(name)
+        mechanism = before.mechanisms.get(name)
         present = _values(mechanism.parameters) if mechanism else parts.get(name, {})
         if not part.items() <= present.items():
             parts[name] = {**present, **part}
-    return _read(parts, before.machines)
+    return _read(parts, before.mechanisms)
 
 
 def _read(parts: Mapping[str, Mapping[str, Any]], known: Mapping[str, SceneMechanism]) -> Scene:
     values = Values(parts.get('', {}))
     names, frame_id, frame_prefix, rate = (
         values.take(name, field) for name, field in GENERAL.items())
-    machines = {name: read_mechanism(name, parts.get(name, {}), known.get(name))
-                for name in names}
-    joints = {name: mechanism.joints for name, mechanism in machines.items()}
+    mechanisms = {name: read_mechanism(name, parts.get(name, {}), known.get(name))
+                  for name in names}
+    joints = {name: mechanism.joints for name, mechanism in mechanisms.items()}
     if joints != {name: mechanism.joints for name, mechanism in known.items()}:
         check_distinct(joints)
     allowed = [*GENERAL, *(f'{name}.*' for name in names)]
     for rest in (values, *(Values(parts[name]) for name in parts if name not in ('', *names))):
         rest.refuse_unknown(allowed)
-    return Scene(machines, frame_id, frame_prefix, rate, tuple(values.parameters))
+    return Scene(mechanisms, frame_id, frame_prefix, rate, tuple(values.parameters))
 
 
 def _values(parameters: Iterable[Parameter]) -> dict[str, Any]:

@@ -246,7 +246,7 @@ class SceneView:
                 present_inputs(mechanism, positions), mechanism.inputs.values())]
 
     def _mechanism(self, shown: ShownMechanism) -> SceneMechanism:
-        return self._scenes[shown.owner].machines[shown.name]
+        return self._scenes[shown.owner].mechanisms[shown.name]
 
     def _find(self, key: str) -> ShownMechanism:
         if key not in self._mechanisms:
@@ -333,7 +333,7 @@ class SceneView:
             # What a node announces may be no scene.
             with suppress(SceneError):
                 nodes = self._read(owner)
-                for name in self._scenes[owner].machines:
+                for name in self._scenes[owner].mechanisms:
                     key = f'{_space(owner)}/{name}'
                     self._mechanisms[key] = ShownMechanism(key, name, owner, sources, nodes)
                     wanted.update(dict.fromkeys(sources, self._follow))
@@ -416,8 +416,8 @@ class SceneView:
             with suppress(SceneError):
                 self._read(owner)
             for shown in self._mechanisms.values():
-                if shown.owner == owner and (self._scenes[owner].machines[shown.name]
-                                             is not whole.machines[shown.name]):
+                if shown.owner == owner and (self._scenes[owner].mechanisms[shown.name]
+                                             is not whole.mechanisms[shown.name]):
                     for client in self.clients:
                         client.tell(shown.key, {'op': 'mechanism', **self._described(shown)})
 
