@@ -13,11 +13,11 @@ from setuptools import setup
 package_name = 'linkage_ros'
 interfaces = Path(__file__).resolve().with_name('linkage_interfaces')
 commands = {
-    'c_code': 'c_code.command:main', 'crank_driver': 'executables:crank_driver',
-    'from_robot': 'robot_files.command:main', 'kinematics': 'executables:kinematics',
+    'c_code': 'c_code.cli:main', 'crank_driver': 'executables:crank_driver',
+    'from_robot': 'robot_files.cli:main', 'kinematics': 'executables:kinematics',
     'render': 'render:main', 'scene': 'executables:scene',
     'servo_inverse': 'executables:servo_inverse', 'transmission': 'c_code.transmission:main',
-    'urdf': 'nodes.urdf_command:main', 'viewer': 'executables:viewer'}
+    'urdf': 'nodes.urdf_cli:main', 'viewer': 'executables:viewer'}
 # colcon and bloom put commands where `ros2 run` looks for them; pip would put them on everybody's
 # PATH, where names like `render` have no business.
 for_ros = sys.argv[1:2] != ['--help'] and {'install', 'develop'} & set(sys.argv)

@@ -18,7 +18,7 @@ import time
 
 try:
     from domains import Domain
-    from linkage_ros import command, scene
+    from linkage_ros import cli, scene
 except ImportError as error:
     sys.exit(f'view: {error}; `make view` installs and builds what is needed')
 
@@ -27,7 +27,7 @@ SECONDS_TO_END = 10.0
 PORT = 8020
 
 
-class DemoError(command.RequestError):
+class DemoError(cli.RequestError):
     """What is missing or went wrong, in one sentence."""
 
 
@@ -91,7 +91,7 @@ def run(name, work) -> int:
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
         # The terminal is closed. With nohup it may be.
         signal.signal(signal.SIGHUP, signal.default_int_handler)
-    return command.run(name, lambda _: work(), None)
+    return cli.run(name, lambda _: work(), None)
 
 
 if __name__ == '__main__':

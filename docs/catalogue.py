@@ -18,7 +18,7 @@ from linkage_ros import mechanisms, palette, scene
 from linkage_ros.linkage import joint_lines
 from linkage_ros.linkage.geometry import planar
 from linkage_ros.render import files
-from linkage_ros.render.command import parser
+from linkage_ros.render.cli import parser
 from linkage_ros.render.cycle import Cycle
 from linkage_ros.render.parts import DEFAULT
 from linkage_ros.render.picture import Picture

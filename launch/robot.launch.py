@@ -18,7 +18,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from linkage_ros import scene
-from linkage_ros.robot_files import command, readers
+from linkage_ros.robot_files import cli, readers
 from linkage_ros.scene.writing import in_yaml
 
 SWITCH = ['true', 'false', 'True', 'False']
@@ -48,16 +48,16 @@ def _started(context):
     chosen = {name: LaunchConfiguration(name).perform(context) for name, *_ in ARGUMENTS}
     shown = scene.load(chosen['scene'])
     robot = readers.read(chosen['robot'], chosen['loops'] or None)
-    held = command.positions(shlex.split(chosen['hold']))
+    held = cli.positions(shlex.split(chosen['hold']))
     files = [chosen['scene']]
-    rest, lost = command.others(robot, shown.mechanisms, held)
+    rest, lost = cli.others(robot, shown.mechanisms, held)
     if rest:
         # The last file says which mechanisms there are.
         file = Path(tempfile.mkdtemp()) / 'others.yaml'
         file.write_text(in_yaml(rest))
         files.append(str(file))
     text = ParameterValue(readers.description(chosen['robot'], robot), value_type=str)
-    reports = [LogInfo(msg=f'robot.launch.py: {command.not_published(lost)}')] * bool(lost)
+    reports = [LogInfo(msg=f'robot.launch.py: {cli.not_published(lost)}')] * bool(lost)
     is_simulated = IfCondition(LaunchConfiguration('simulated')).evaluate(context)
     nodes = ('kinematics', 'crank_driver') if is_simulated else ('kinematics',)
     return [*reports,

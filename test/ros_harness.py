@@ -222,7 +222,7 @@ def hastened(node, seconds):
 
 def module(name):
     """Return the module of an executable."""
-    rooms = {'render': 'render', 'urdf': 'nodes.urdf_command', 'viewer': 'web.viewer',
+    rooms = {'render': 'render', 'urdf': 'nodes.urdf_cli', 'viewer': 'web.viewer',
              'scene': 'nodes.scene_process'}
     return f'linkage_ros.{rooms.get(name, f"nodes.{name}")}'
 

@@ -13,7 +13,7 @@ import subprocess
 
 from c_libraries import COMPILER, inverter, loaded
 from linkage_ros import mechanisms, scene
-from linkage_ros.c_code import command, header
+from linkage_ros.c_code import cli, header
 import numpy as np
 import pytest
 
@@ -438,8 +438,8 @@ double lever(double crank)
 def test_a_scene_file_is_printed_as_c(capsys, monkeypatch):
     path = ROOT / 'config' / 'all.yaml'
     mechanisms, both = scene.load(path).mechanisms, ['--mechanism', 'peaucellier', 'slotted_lever']
-    assert command.main([str(path), *both, '--output', 'crank', '--float', '--joints',
-                         'peaucellier_PB', 'slotted_lever_lever']) == 0
+    assert cli.main([str(path), *both, '--output', 'crank', '--float', '--joints',
+                     'peaucellier_PB', 'slotted_lever_lever']) == 0
     printed = capsys.readouterr().out
     assert printed == header.printed([header.Request(mechanisms[name], ['crank'], [joint])
                                       for name, joint in (
@@ -536,6 +536,6 @@ def test_linters_find_nothing():
     ([], 'the following arguments are required: SCENE')])
 def test_what_cannot_be_is_one_sentence(capsys, arguments, said):
     scenes = [str(ROOT / 'config' / f'{arguments[0]}.yaml')] if arguments else []
-    assert command.main(scenes + arguments[1:]) == 1
+    assert cli.main(scenes + arguments[1:]) == 1
     printed = capsys.readouterr().err
     assert printed.startswith('c_code: ') and printed.count('\n') == 1 and said in printed

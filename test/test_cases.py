@@ -6,7 +6,7 @@
 import math
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.render.command import main
+from linkage_ros.render.cli import main
 from linkage_ros.robot_model import urdf
 from mpmath import mp, mpc, mpf
 import numpy as np

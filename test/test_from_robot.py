@@ -11,9 +11,9 @@ import re
 import shlex
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.command import RequestError
-from linkage_ros.robot_files import closing, command, readers
-from linkage_ros.robot_model.command import main as robot_model
+from linkage_ros.cli import RequestError
+from linkage_ros.robot_files import cli, closing, readers
+from linkage_ros.robot_model.cli import main as robot_model
 from linkage_ros.robot_model.robot import posed
 import numpy as np
 import pytest
@@ -180,7 +180,7 @@ def test_all_that_is_printed_of_a_robot(capsys, file):
     if file.endswith('xml'):
         pytest.importorskip('mujoco')
     args, more, text = SCENES[file]
-    assert command.main([str(ROBOTS / file), *args]) == 0
+    assert cli.main([str(ROBOTS / file), *args]) == 0
     out, err = (re.sub(r'-?\d+\.\d+', lambda found: repr(round(float(found[0]), 7) + 0.0),
                        re.sub(r'\b\de-1\d m', '0 m', each)) for each in capsys.readouterr())
     assert out == (
@@ -193,7 +193,7 @@ def test_all_that_is_printed_of_a_robot(capsys, file):
 
 def test_a_motor_that_had_to_move_is_named(capsys):
     # The cylinder is longer than its pins can be apart.
-    assert command.main([str(ROBOTS / 'boom.urdf'), '--pose', 'boom_cylinder=5']) == 0
+    assert cli.main([str(ROBOTS / 'boom.urdf'), '--pose', 'boom_cylinder=5']) == 0
     assert capsys.readouterr().err.startswith(
         'from_robot: boom_cylinder moved: their loops cannot be closed where the file has them.\n'
         'from_robot: Checked: boom_cylinder: in 240 poses of the robot, boom_cylinder from -0.3')
@@ -201,8 +201,8 @@ def test_a_motor_that_had_to_move_is_named(capsys):
 
 def test_a_motor_never_closes_a_loop_of_the_tree(capsys):
     # Of hinges the last closes it, as joint_D does where it does not drive.
-    assert command.main([str(ROBOTS / 'four_bar.sdf'), '--driven', 'joint_D', '--pose',
-                         'joint_D=0.1']) == 0
+    assert cli.main([str(ROBOTS / 'four_bar.sdf'), '--driven', 'joint_D', '--pose',
+                     'joint_D=0.1']) == 0
     assert 'Checked: joint_D: in 240 poses' in capsys.readouterr().err
 
 
@@ -211,7 +211,7 @@ def test_a_motor_never_closes_a_loop_of_the_tree(capsys):
 def test_bars_that_mirror_others_have_a_word_of_their_own(word, base):
     linkage = mechanisms.create('custom', joints=[
         'A ground 0 0', f'B ground {base}', 'C crank A 0.2', f'D {word} A C B'])
-    given, reports, still = command.described(robot_of(linkage, 0.7))
+    given, reports, still = cli.described(robot_of(linkage, 0.7))
     ground, _, crank, line = given['crank.joints']
     assert (ground, crank, line) == ('A ground 0 0', 'C crank A 0.2', f'D {word} A C B')
     assert [line[:9] for line in reports] == ['Checked: '] and not still
@@ -275,7 +275,7 @@ def test_joints_that_no_mechanism_publishes_are_one_of_cranks(tmp_path):
         ABC + '<link name="d"/>', '', hinge('k 2', 'b', 'c', (
             '<mimic joint="j" multiplier="-0.5" offset="0.1"/>')) + hinge('l', 'c', 'd')))
     robot = readers.read(str(file))
-    given, lost = command.others(robot, {}, {'l': 0.25, 'nobody': 1.0})
+    given, lost = cli.others(robot, {}, {'l': 0.25, 'nobody': 1.0})
     assert not lost and given == {
         'mechanisms': ['others'], 'others.type': 'custom', 'others.only_named': True,
         'others.joints': [
@@ -286,7 +286,7 @@ def test_joints_that_no_mechanism_publishes_are_one_of_cranks(tmp_path):
                 ('crank3', 'l', 1.0, 0.0, 0.25)) for key, value in (
                     ('source', source), ('ratio', ratio), ('offset', offset), ('start', start),
                     ('speed', 0.0))}}
-    assert command.others(readers.read(str(ROBOTS / 'four_bar.sdf')), scene.read(command.described(
+    assert cli.others(readers.read(str(ROBOTS / 'four_bar.sdf')), scene.read(cli.described(
         readers.read(str(ROBOTS / 'four_bar.sdf')))[0]).mechanisms, {}) == ({}, [])
 
 
@@ -324,7 +324,7 @@ def test_all_legs_that_are_undecided_are_asked_in_one_run(capsys, tmp_path, coun
     assert line.count(' as with ') == count and len(sides) == 2
     found = []
     for side in sides:
-        assert command.main([str(file), *side]) == 0
+        assert cli.main([str(file), *side]) == 0
         out, err = capsys.readouterr()
         assert 'loops stand open by' in err and 'Left out' not in err
         found.append(out)
@@ -336,7 +336,7 @@ def test_of_two_poses_the_one_inside_the_limits_is_no_question(capsys, tmp_path,
     # The file's pose is inside of the first, and outside of the second.
     file = tmp_path / 'legs.urdf'
     file.write_text(legs(2, f'<limit lower="{low}" upper="3"/>'))
-    assert command.main([str(file)]) == 0
+    assert cli.main([str(file)]) == 0
     assert '--pose' not in capsys.readouterr().err
 
 
@@ -355,7 +355,7 @@ def test_a_fold_is_left_by_a_line_that_is_printed(capsys, tmp_path):
     file.write_text(FOLDED.format('continuous'))
     sides, found = choices(refused(capsys, file)), set()
     for side in sides:
-        assert command.main([str(file), *side]) == 0
+        assert cli.main([str(file), *side]) == 0
         found |= {*re.findall('parallelogram|dyad', capsys.readouterr().out)}
     assert len(sides) == 2 and 'parallelogram' in found
 
@@ -371,7 +371,7 @@ def test_a_pose_next_to_a_fold_is_one(capsys, tmp_path):
     for side in sides:
         motor, = (float(value.partition('=')[2]) for value in side if value.startswith('motor='))
         assert -0.1 < motor < 0.7
-        assert command.main([str(file), *side]) == 0
+        assert cli.main([str(file), *side]) == 0
         assert 'Left out' not in capsys.readouterr().err
 
 
@@ -454,7 +454,7 @@ def test_a_fold_outside_the_limits_starts_inside_them(capsys, tmp_path):
     file = tmp_path / 'folded.urdf'
     file.write_text(FOLDED.format('revolute').replace(
         '</joint>', '<limit lower="0.5" upper="2"/></joint>', 1))
-    assert command.main([str(file)]) == 0
+    assert cli.main([str(file)]) == 0
     assert 'Started inside the limits of the file: motor at 0.6' in capsys.readouterr().err
 
 
@@ -466,7 +466,7 @@ def test_what_is_not_driven_is_imported_with_the_line_that_is_printed(capsys, tm
     line = refused(capsys, file, '--loops', loops)
     assert 'not driven: 1 of ' in line
     for more in choices(line):
-        assert command.main([str(file), '--loops', str(loops), *more]) == 0
+        assert cli.main([str(file), '--loops', str(loops), *more]) == 0
         assert 'Checked: mot_front' in capsys.readouterr().err
     assert len(choices(line)) == 2
 
@@ -476,9 +476,9 @@ def answer(robot, *lines):
     more = {'--driven': robot.driven, '--pose': [], '--hold': []}
     for option, *values in lines:
         more[option] = values if option == '--driven' else more[option] + values
-    robot = posed(replace(robot, driven=more['--driven']), command.positions(more['--pose']))
+    robot = posed(replace(robot, driven=more['--driven']), cli.positions(more['--pose']))
     try:
-        return '', *command.described(closing.held(robot, command.positions(more['--hold'])))[1]
+        return '', *cli.described(closing.held(robot, cli.positions(more['--hold'])))[1]
     except RequestError as error:
         return str(error),
 
@@ -520,7 +520,7 @@ def test_two_hinges_that_cross_between_two_bodies_hold_them(capsys, tmp_path):
 
 def test_what_has_no_one_position_is_named(capsys):
     pytest.importorskip('mujoco')
-    assert command.main([str(ROBOTS / 'toe_rod.xml')]) == 0
+    assert cli.main([str(ROBOTS / 'toe_rod.xml')]) == 0
     assert re.search('Not published: .*: a ball or a free joint has no one position',
                      capsys.readouterr().err)
 
@@ -528,7 +528,7 @@ def test_what_has_no_one_position_is_named(capsys):
 def refusals():
     """Return the texts of all errors and reasons for which a loop is left out."""
     for name in ('closing', 'planar', 'loops', 'rods', 'check'):
-        tree = ast.parse(Path(command.__file__).with_name(f'{name}.py').read_text())
+        tree = ast.parse(Path(cli.__file__).with_name(f'{name}.py').read_text())
         for node in ast.walk(tree):
             is_reason = isinstance(node, ast.FunctionDef) and node.name in (
                 '_why',)
@@ -574,13 +574,13 @@ def test_the_twelve_legs_of_a_strandbeest_come_back_from_its_sdf(tmp_path, capsy
     config, file = ROBOTS.parents[1] / 'config' / 'strandbeest.yaml', tmp_path / 'legs.sdf'
     assert robot_model(['--format', 'sdf', str(config)]) == 0
     file.write_text(capsys.readouterr().out)
-    assert command.main([str(file)]) == 0
+    assert cli.main([str(file)]) == 0
     assert 'Checked: strandbeest_crank: in 240 poses' in capsys.readouterr().err
 
 
 def test_a_mechanism_that_cannot_move_is_not_checked():
     robot = closing.closed(readers.read(str(ROBOTS / 'four_bar.urdf'))).robot
-    assert compared(robot, command.described(robot)[0], motor=(0.0, 0.0)) == (
+    assert compared(robot, cli.described(robot)[0], motor=(0.0, 0.0)) == (
         'it could not be checked in more than 0 poses')
 
 
@@ -604,7 +604,7 @@ def test_a_cylinder_in_space_turns_a_foot(tmp_path, capsys, ends, within):
     file.write_text(CYLINDER.format(
         ends=ends, base=words(base), eye=words(eye), way=words(way),
         mass='<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'))
-    assert command.main([str(file)]) == 0
+    assert cli.main([str(file)]) == 0
     out, err = capsys.readouterr()
     assert 'in 240 poses of the robot, ram from ' in err and 'Left out' not in err
     file.with_suffix('.yaml').write_text(out)

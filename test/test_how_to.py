@@ -23,14 +23,14 @@ pytest.importorskip('linkage_interfaces')
 yaml = pytest.importorskip('yaml')
 
 from linkage_ros import mechanisms, scene  # noqa: E402
-from linkage_ros.c_code.command import main as c_code  # noqa: E402
+from linkage_ros.c_code.cli import main as c_code  # noqa: E402
 from linkage_ros.c_code.transmission import main as transmission  # noqa: E402
 from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
 from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from linkage_ros.render.command import main as render  # noqa: E402
-from linkage_ros.robot_files.command import main as from_robot  # noqa: E402
-from linkage_ros.robot_model.command import main as urdf  # noqa: E402
+from linkage_ros.render.cli import main as render  # noqa: E402
+from linkage_ros.robot_files.cli import main as from_robot  # noqa: E402
+from linkage_ros.robot_model.cli import main as urdf  # noqa: E402
 from robots import LIBRARIES  # noqa: E402
 from ros_harness import Process  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402

@@ -240,10 +240,10 @@ COUPLER = '<body name="right_coupler" pos="0 0.0315 -0.0041">'
 
 def robot_launched(tmp_path, monkeypatch, file, capsys, *more, **arguments):
     """Return what robot.launch.py starts of a robot, with the scene that from_robot prints."""
-    from linkage_ros.robot_files import command
+    from linkage_ros.robot_files import cli
 
     monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
-    assert command.main([str(file), *more]) == 0
+    assert cli.main([str(file), *more]) == 0
     made = tmp_path / 'scene.yaml'
     made.write_text(capsys.readouterr().out)
     return made, started(ROBOT, robot=str(file), scene=str(made), **arguments)

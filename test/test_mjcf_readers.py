@@ -13,7 +13,8 @@ import math
 import re
 from xml.sax.saxutils import quoteattr
 
-from linkage_ros.robot_files import command, readers
+from linkage_ros.cli import RequestError
+from linkage_ros.robot_files import readers
 import numpy as np
 import pytest
 from test_robot_files import check_comes_back, random_robot, words
@@ -187,7 +188,7 @@ def check_is_read(folder, seeds):
             moved += check_comes_back(
                 linkage, values, readers.read(str(file)), steps if len(steps[0]) > 1
                 else steps.ravel(), writer.zeros)[1] > 0
-        except command.command.RequestError as error:
+        except RequestError as error:
             assert re.search('closes a loop|not of dyads|it cannot move', str(error)), seed
     assert moved > 0.9 * len(robots)
 

@@ -85,7 +85,7 @@ def broken(tmp_path, monkeypatch):
     (package, command) for command, (packages, *_) in COMMANDS.items() for package in packages])
 def test_a_command_says_in_one_sentence_what_to_install(broken, capsys, package, command, way):
     room, args = COMMANDS[command][1:]
-    main = import_module(f'linkage_ros.{room}.command').main
+    main = import_module(f'linkage_ros.{room}.cli').main
     broken(package, way)
     assert main([*args]) == 1
     printed, error = capsys.readouterr()

@@ -391,7 +391,7 @@ def test_mechanisms_side_by_side_have_one_time():
 
 
 def test_options_have_these_defaults_and_limits(tmp_path):
-    from linkage_ros.render.command import parsed
+    from linkage_ros.render.cli import parsed
     given = {'scene': 'a', 'data': None, 'mechanism': [], 'trace': 'whole', 'show': frozenset(),
              'hide': frozenset(), 'size': (720, 720), 'angle': None, 'turns': None, 'fps': None,
              'frames': None, 'loop': None, 'colours': None}
@@ -411,7 +411,7 @@ def test_options_have_these_defaults_and_limits(tmp_path):
 
 
 def test_the_help_has_examples_that_can_be_run(capsys):
-    from linkage_ros.render.command import main, parsed
+    from linkage_ros.render.cli import main, parsed
     with pytest.raises(SystemExit):
         main(['--help'])
     examples = re.findall(r'^  render (config/.*)', capsys.readouterr().out, re.M)

@@ -17,7 +17,7 @@ pytest.importorskip('rclpy')
 
 from linkage_ros import scene  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.urdf_command import main  # noqa: E402
+from linkage_ros.nodes.urdf_cli import main  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from robots import in_frame, Pinocchio, Yourdfpy  # noqa: E402
@@ -197,7 +197,7 @@ def test_what_is_not_understood_is_refused_in_one_line(capsys, arguments, compla
 @pytest.mark.nightly
 def test_a_scene_is_described_without_ros():
     code = ('import sys; sys.modules["rclpy"] = None; '
-            'from linkage_ros.robot_model.command import main; sys.exit(main(sys.argv[1:]))')
+            'from linkage_ros.robot_model.cli import main; sys.exit(main(sys.argv[1:]))')
     for arguments, ended in (([str(CATALOGUE)], 0), (['--ros-args'], 1)):
         process = subprocess.run([sys.executable, '-c', code, *arguments], capture_output=True,
                                  text=True, timeout=60, cwd=Path(__file__).parents[1])

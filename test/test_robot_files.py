@@ -18,7 +18,8 @@ from xml.etree import ElementTree
 
 from hypothesis import example, given, settings, strategies as st
 from linkage_ros import mechanisms, scene
-from linkage_ros.robot_files import check, closing, command, readers
+from linkage_ros.cli import RequestError
+from linkage_ros.robot_files import check, cli, closing, readers
 from linkage_ros.robot_model.robot import posed
 from linkage_ros.robot_model.urdf import write
 import numpy as np
@@ -37,7 +38,7 @@ def printed(name, *more):
 @lru_cache(None)
 def _printed(name, _, *more):
     with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()):
-        assert command.main([str(ROBOTS / name), *map(str, more)]) == 0
+        assert cli.main([str(ROBOTS / name), *map(str, more)]) == 0
     return out.getvalue()
 
 
@@ -265,7 +266,7 @@ def compared(robot, given, **ends):
 
 def test_a_source_of_several_mechanisms_is_checked_where_all_of_them_move():
     robot = closing.closed(readers.read(str(ROBOTS / 'four_bar.urdf'))).robot
-    mechanisms = scene.read(command.described(robot)[0]).mechanisms
+    mechanisms = scene.read(cli.described(robot)[0]).mechanisms
     (report,), wrong = check.compared(robot, mechanisms, [
         check.Imported('motor', {}, [], ['motor'], {'motor': ends})
         for ends in ((-1.0, 0.5), (-0.5, 1.0))])
@@ -309,7 +310,7 @@ def test_a_range_is_checked_up_to_where_loops_end(tmp_path):
     ('=elbow-1.57079632', '=elbow-1.57079633', 'its loops stand open by 3e-09 m$')])
 def test_a_mechanism_that_differs_from_its_robot_is_refused(old, new, why):
     robot = closing.closed(readers.read(str(ROBOTS / 'four_bar.urdf'))).robot
-    given, *_ = command.described(robot)
+    given, *_ = cli.described(robot)
     assert compared(robot, given, motor=(-1.2, 1.2)).startswith('Checked: motor: in 240 poses')
     key = 'motor.joint_names' if '=' in old else 'motor.joints'
     changed = [line.replace(old, new) for line in given[key]]
@@ -379,7 +380,7 @@ def test_a_five_bar_is_closed_by_what_moves_it(imported, tmp_path, more, mimic, 
         joints = published(mechanism, **motors(angle))
         places = robot.places(joints, ['front_foot', 'back_foot'])
         assert places['front_foot'] == pytest.approx(places['back_foot'], abs=2e-15)
-    rest, lost = command.others(readers.read(str(file), str(loops)), {'m': mechanism}, {})
+    rest, lost = cli.others(readers.read(str(file), str(loops)), {'m': mechanism}, {})
     assert not lost and [value for key, value in rest.items() if key.endswith('.source')] == [
         'front_knee'] * ('FIXED' in more) + ['mot_front'] * bool(mimic)
 
@@ -443,7 +444,7 @@ def written(tmp_path, file, *changes):
 
 def refused(capsys, *args):
     """Return the sentence that refuses a file."""
-    assert command.main([str(arg) for arg in args]) == 1
+    assert cli.main([str(arg) for arg in args]) == 1
     out, err = capsys.readouterr()
     assert not out and err.count('\n') == 1 and 'Traceback' not in err
     return err
@@ -546,7 +547,7 @@ def test_whatever_is_in_a_file_it_is_read_or_refused_in_one_sentence(
     for _ in range(count):
         file = tmp_path / f'robot.{ending}'
         file.write_text(changed(rng.choice(texts), rng), encoding='utf-8')
-        code = command.main([str(file)])
+        code = cli.main([str(file)])
         out, err = capsys.readouterr()
         assert code == 0 or not out and err.count('\n') == 1, file.read_text()
 
@@ -582,8 +583,8 @@ def test_a_name_of_the_file_is_never_more_than_text_in_the_terminal(more, times)
                     part.set(key, called[part.get(key)])
         with suppress(UnicodeEncodeError):
             ElementTree.ElementTree(root).write(file, 'utf-8')
-        command.main([str(file), '--driven', 'nobody'])
-        command.main([str(file)])
+        cli.main([str(file), '--driven', 'nobody'])
+        cli.main([str(file)])
     for line in err.getvalue().splitlines():
         assert line.isprintable() and len(line) < 5000
         assert max(map(len, line.split()), default=0) <= 300
@@ -638,7 +639,7 @@ def sprung(tmp_path):
 
 @pytest.mark.nightly
 def test_a_finger_with_a_spring_is_not_driven(capsys, tmp_path):
-    assert command.main([str(sprung(tmp_path))]) == 0
+    assert cli.main([str(sprung(tmp_path))]) == 0
     assert re.search('Left out: .*right_coupler, right_spring_link, right_follower: not driven: '
                      '1 of right_spring_link_joint, .* must be moved, named by --driven, or held, '
                      'named by --hold', capsys.readouterr().err)
@@ -689,7 +690,7 @@ def test_a_pose_at_the_end_of_its_loops_is_left_on_the_other_side(capsys, tmp_pa
     assert 'bars lie in line where the file has them, and it moves on with motor=0.1 ' in line
     # What is printed leads on: the loops do not let the motor inside its limits.
     for more in re.findall('--pose ([^,]*)(?:, or by|.\n)', line):
-        assert command.main([str(file), '--driven', 'motor', '--pose', *more.split()]) == 0
+        assert cli.main([str(file), '--driven', 'motor', '--pose', *more.split()]) == 0
         assert 'motor, from -2 to -1: its loops do not reach them' in capsys.readouterr().err
 
 
@@ -866,7 +867,7 @@ def test_a_universal_joint_of_an_sdf_is_a_pin(imported, tmp_path, joints):
 def test_a_misfit_is_printed_and_imported_if_it_is_small(capsys, tmp_path, lean, why):
     pytest.importorskip('mujoco')
     file = written(tmp_path, 'four_bar.xml', ('axis="0 -1 0"', f'axis="{lean} -1 0"'))
-    code = command.main([str(file)])
+    code = cli.main([str(file)])
     out, err = capsys.readouterr()
     assert code == (lean > 1e-3) and why in err and bool(why) == ('rad, and' in err or code > 0)
     # Where the file has it, by as much as the axis leans.
@@ -887,11 +888,11 @@ def test_a_passive_joint_of_a_loop_is_no_input(imported, tmp_path):
     # A spring beside the motor's loop leaves a second one undetermined.
     spring = sprung(tmp_path)
     mechanisms, robot = imported(spring), readers.read(str(spring))
-    rest, lost = command.others(robot, mechanisms, {})
+    rest, lost = cli.others(robot, mechanisms, {})
     loop = {'spring', 'right_spring_link_joint', 'right_follower_joint'}
     assert {*lost} == loop and not loop & {*map(str, rest.values())}
     assert f'Not published: {", ".join(lost)}: passive joints of loops' in printed(spring)
-    rest, lost = command.others(robot, mechanisms, {'spring': 0.0})
+    rest, lost = cli.others(robot, mechanisms, {'spring': 0.0})
     assert {*lost} == loop - {'spring'} and 'spring' in {*map(str, rest.values())}
 
 
@@ -899,12 +900,12 @@ def test_a_joint_of_the_whole_robot_that_opens_a_loop_is_named(monkeypatch, caps
     # As if a passive joint were an input.
     file = ROBOTS / 'wheel_leg.urdf'
     robot = closing.closed(readers.read(str(file))).robot
-    given, _, _ = command.described(robot)
+    given, _, _ = cli.described(robot)
     names = [line for line in given['hip.joint_names'] if 'bell' not in line]
     mechanisms = scene.read({**given, 'hip.joint_names': names}).mechanisms
-    rest, lost = command.others(robot, mechanisms, {})
+    rest, lost = cli.others(robot, mechanisms, {})
     assert lost == ['bell_joint'] and not rest
-    still, _ = command.others(robot, mechanisms, {'bell_joint': 0.0})
+    still, _ = cli.others(robot, mechanisms, {'bell_joint': 0.0})
     wrong = scene.read({**given, **still, 'hip.joint_names': names,
                         'mechanisms': ['hip', 'others']}).mechanisms
     ends = {'hip': (-0.2, 0.3), 'crank_motor': (-0.3, 0.3)}
@@ -922,7 +923,7 @@ def test_all_joints_of_a_whole_robot_are_published(imported, file):
     more = ['--loops', ROBOTS / 'palletiser_loops.yaml'] * ('pallet' in file)
     mechanisms = imported(file, *more)
     robot = readers.read(str(ROBOTS / file), *map(str, more[1:]))
-    rest, lost = command.others(robot, mechanisms, {})
+    rest, lost = cli.others(robot, mechanisms, {})
     assert not lost
     names = ['others'] * bool(rest)
     if names:
@@ -1082,7 +1083,7 @@ def check_comes_back(linkage, values, robot, steps, zeros=None):
     `zeros` are positions of the robot's joints before a step, if they are not 0.
     """
     zeros = Counter(zeros or {})
-    given, said, _ = command.described(robot)
+    given, said, _ = cli.described(robot)
     for count, worst in checked('\n'.join(said)):
         assert count >= 200 and worst < 1e-6
     mechanisms = scene.read(given).mechanisms.values()
@@ -1138,7 +1139,7 @@ def check_random_robots(seeds):
         try:
             moved += check_comes_back(linkage, values, robot, steps if len(steps[0]) > 1
                                       else steps.ravel())[1] > 0
-        except command.command.RequestError as error:
+        except RequestError as error:
             assert re.search('closes a loop|not of dyads|it cannot move', str(error))
     assert moved > len(seeds) // 2
 

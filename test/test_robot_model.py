@@ -9,11 +9,11 @@ from unittest.mock import ANY
 from xml.etree import ElementTree
 
 from hypothesis import given, settings, strategies as st
-from linkage_ros import command, scene
+from linkage_ros import cli, scene
 from linkage_ros.robot_files import readers
 from linkage_ros.robot_model import bodies, mjcf, robot, rviz, sdf, urdf
 from linkage_ros.robot_model.bodies import assembled
-from linkage_ros.robot_model.command import main, show
+from linkage_ros.robot_model.cli import main, show
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, ground_frame, GUIDE, ROD, shapes
 import numpy as np
 import pytest
@@ -371,7 +371,7 @@ def test_the_command_says_what_is_wrong(capsys, arguments, complaint):
 
 
 def test_the_command_has_one_scene():
-    with pytest.raises(command.RequestError, match='^give the scene either as SCENE or with '
+    with pytest.raises(cli.RequestError, match='^give the scene either as SCENE or with '
                        '--ros-args, not both$'):
         show(['config/jansen.yaml'], scene.read({}))
 

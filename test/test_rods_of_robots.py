@@ -7,8 +7,8 @@ import math
 import re
 
 from linkage_ros import scene
-from linkage_ros.robot_files import closing, command, readers
-from linkage_ros.robot_files.command import main as from_robot
+from linkage_ros.robot_files import cli, closing, readers
+from linkage_ros.robot_files.cli import main as from_robot
 import numpy as np
 import pytest
 from test_robot_files import compared
@@ -110,7 +110,7 @@ def ankle_of_a_robot(tmp_path_factory):
     file = tmp_path_factory.mktemp('ankle') / 'robot.xml'
     file.write_text(mjcf(turning(1), ([-0.15, -0.12], [0.15, 0.12])))
     robot = closing.closed(readers.read(str(file))).robot
-    return robot, command.described(robot)[0]
+    return robot, cli.described(robot)[0]
 
 
 @pytest.mark.parametrize('old, new, why', [

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / 'linkage_ros'
 # From the ground up: a module imports from its own room and from those below.
 ROOMS = ('words', 'optional', 'palette', 'cache', 'formula', 'linkage', 'mechanisms', 'scene',
-         'command', 'c_code', 'robot_model', 'robot_files', 'render', 'nodes', 'web',
+         'cli', 'c_code', 'robot_model', 'robot_files', 'render', 'nodes', 'web',
          'executables')
 # The floors of the core, in the same order.
 FLOORS = ('tolerances', 'inputs', 'geometry', 'text', 'formulas', 'kinematics', 'statics',

@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from linkage_ros import scene
-from linkage_ros.robot_files import command as from_robot, readers
+from linkage_ros.robot_files import cli as from_robot, readers
 from linkage_ros.robot_model import bodies, mjcf, sdf
 from linkage_ros.robot_model.bodies import assembled
 import numpy as np

@@ -9,9 +9,9 @@ import re
 from unittest.mock import patch
 
 from linkage_ros import scene
-from linkage_ros.command import RequestError
+from linkage_ros.cli import RequestError
 from linkage_ros.robot_files import check, readers
-from linkage_ros.robot_files.command import described
+from linkage_ros.robot_files.cli import described
 import numpy as np
 import pytest
 from test_robot_files import random_robot

@@ -11,7 +11,7 @@ import sys
 
 from hypothesis import given, settings, strategies as st
 from linkage_ros import palette, scene
-from linkage_ros.command import chosen, Parser, RequestError, run
+from linkage_ros.cli import chosen, Parser, RequestError, run
 from linkage_ros.optional import needs
 from linkage_ros.words import elided, listed, meant, plain_text, quoted, sentence
 import numpy as np
@@ -133,7 +133,7 @@ def test_a_command_that_works_ends_with_0_and_a_mistake_is_not_hidden(capsys):
 
 
 def test_a_reader_that_has_gone_ends_a_command_quietly_and_a_full_disk_with_a_sentence():
-    command = ('import sys; from linkage_ros.command import run; '
+    command = ('import sys; from linkage_ros.cli import run; '
                'sys.exit(run("draw", print, ["much"]))')
     reader, writer = os.pipe()
     os.close(reader)

@@ -8,9 +8,9 @@ import sys
 from typing import List, Optional, Sequence, Tuple
 
 from . import limits
-from .command import parser, with_joints
+from .cli import parser, with_joints
 from .package import PACKAGE, package
-from .. import command, scene
+from .. import cli, scene
 from ..scene import SceneMechanism
 
 NAME = 'transmission'
@@ -18,13 +18,13 @@ NAME = 'transmission'
 
 def main(args: Optional[List[str]] = None) -> int:
     """Write the package; return the exit code."""
-    return command.run(NAME, write, args)
+    return cli.run(NAME, write, args)
 
 
 def write(args: Optional[List[str]]) -> None:
     """Write the package or print the limits that a command line requests."""
     options = arguments().parse_args(args)
-    chosen = command.chosen(scene.load(options.scene).mechanisms, options.mechanism)
+    chosen = cli.chosen(scene.load(options.scene).mechanisms, options.mechanism)
     try:
         mechanisms = with_joints(chosen, options.joints)
         if options.limits:
@@ -32,7 +32,7 @@ def write(args: Optional[List[str]]) -> None:
         else:
             write_package(options.out, Path(options.scene).name, mechanisms)
     except ValueError as error:
-        raise command.RequestError(str(error)) from None
+        raise cli.RequestError(str(error)) from None
 
 
 def write_package(folder: str, scene_file: str,
@@ -40,12 +40,12 @@ def write_package(folder: str, scene_file: str,
     """Write the package of mechanisms with their commanded joints."""
     out = Path(folder).absolute()
     if not PACKAGE.fullmatch(out.name):
-        raise command.RequestError(
+        raise cli.RequestError(
             "--out must end in the package's name: 2 to 64 lower-case letters, digits and single "
             f'underscores, a letter first, not {out.name!r}')
     if out.exists() and any(out.iterdir()) and not is_ours(out):
-        raise command.RequestError('--out must be a new folder, or one written by this command, '
-                                   f'but {out} has other files')
+        raise cli.RequestError('--out must be a new folder, or one written by this command, '
+                               f'but {out} has other files')
     for path, text in package(out.name, scene_file, mechanisms).items():
         (out / path).parent.mkdir(parents=True, exist_ok=True)
         (out / path).write_text(text, encoding='utf-8')
@@ -58,7 +58,7 @@ def is_ours(folder: Path) -> bool:
     return xml.is_file() and 'written by linkage_ros' in xml.read_text(errors='replace')
 
 
-def arguments() -> command.Parser:
+def arguments() -> cli.Parser:
     """Return the parser of the command line."""
     made = parser(NAME, 'Write the mechanisms of a scene as a ROS 2 package of transmissions for '
                         'ros2_control.')

@@ -7,6 +7,6 @@ Pictures of scenes: PNG, SVG, GIF and MP4, with Matplotlib and without ROS.
     python -m linkage_ros.render config/jansen.yaml --out leg.gif
 """
 
-from .command import main
+from .cli import main
 
 __all__ = ['main']

@@ -5,6 +5,6 @@
 
 import sys
 
-from .command import main
+from .cli import main
 
 sys.exit(main())

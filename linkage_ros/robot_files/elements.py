@@ -11,7 +11,7 @@ from xml.parsers import expat
 
 import numpy as np
 
-from ..command import RequestError
+from ..cli import RequestError
 from ..robot_model.robot import FIXED, MAX_NUMBER, pose, Robot
 
 Element = ElementTree.Element

@@ -13,7 +13,7 @@ from mujoco import MjSpec
 import numpy as np
 
 from .elements import turned_by
-from ..command import RequestError
+from ..cli import RequestError
 from ..robot_model.robot import at, BALL, FIXED, Robot
 
 # What MuJoCo says of a file, and the sentence for it.

@@ -13,7 +13,7 @@ from typing import Any, Iterator, Mapping, Optional
 
 from . import sdf, urdf
 from .elements import parse
-from ..command import RequestError
+from ..cli import RequestError
 from ..optional import needs
 from ..robot_model import bodies
 from ..robot_model.robot import posed, Robot

@@ -12,7 +12,7 @@ from typing import Dict, Iterator, Optional, Tuple
 import numpy as np
 
 from .elements import attribute, Element, numbers, once, text, turned_by, weld
-from ..command import RequestError
+from ..cli import RequestError
 from ..robot_model.robot import at, pose, Robot
 
 

@@ -17,7 +17,7 @@ from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Sequence, Set
 
 import numpy as np
 
-from ..command import RequestError
+from ..cli import RequestError
 from ..robot_model.robot import BALL, exponentials, FIXED, FREE, HINGE, Joint, Robot, screws, SLIDE
 
 # The largest step of an iteration [rad, or of the size].

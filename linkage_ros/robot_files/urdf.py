@@ -19,7 +19,7 @@ from typing import Any, Mapping, Sequence
 import numpy as np
 
 from .elements import attribute, Element, numbers, once, origin, text, weld
-from ..command import RequestError
+from ..cli import RequestError
 from ..robot_model.robot import at, BALL, FIXED, HINGE, pose, Robot, UNIVERSAL
 from ..words import listed, meant, quoted
 

@@ -17,7 +17,7 @@ from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Optional, Seque
 import numpy as np
 
 from .shapes import Piece
-from ..command import RequestError
+from ..cli import RequestError
 from ..words import listed, meant
 
 HINGE, SLIDE, BALL, FIXED, UNIVERSAL, FREE = (

@@ -8,7 +8,7 @@ from typing import List, Optional, Sequence, Tuple
 
 from . import header
 from .axes import output_of
-from .. import command, scene
+from .. import cli, scene
 from ..scene import SceneMechanism
 from ..words import listed, meant
 
@@ -17,18 +17,18 @@ NAME = 'c_code'
 
 def main(args: Optional[List[str]] = None) -> int:
     """Print C99; return the exit code."""
-    return command.run(NAME, show, args)
+    return cli.run(NAME, show, args)
 
 
 def show(args: Optional[List[str]]) -> None:
     """Print the headers that a command line requests."""
     options = arguments().parse_args(args)
-    mechanisms = command.chosen(scene.load(options.scene).mechanisms, options.mechanism)
+    mechanisms = cli.chosen(scene.load(options.scene).mechanisms, options.mechanism)
     try:
         print(header.printed([header.Request(mechanism, options.output, own) for mechanism, own
                               in with_joints(mechanisms, options.joints)], options.float))
     except ValueError as error:
-        raise command.RequestError(str(error)) from None
+        raise cli.RequestError(str(error)) from None
 
 
 def with_joints(mechanisms: Sequence[SceneMechanism], names: Sequence[str]
@@ -38,21 +38,21 @@ def with_joints(mechanisms: Sequence[SceneMechanism], names: Sequence[str]
               for mechanism in mechanisms]
     known = [joint.name for mechanism in mechanisms for joint in mechanism.joints.values()]
     for name in sorted({*names}.difference(*(joints for _, joints in chosen))):
-        raise command.RequestError(f'no mechanism has a joint {name!r}; allowed: '
-                                   f'{listed(known, 200)}{meant(name, known)}')
+        raise cli.RequestError(f'no mechanism has a joint {name!r}; allowed: '
+                               f'{listed(known, 200)}{meant(name, known)}')
     return chosen
 
 
-def parser(name: str, description: str) -> command.Parser:
+def parser(name: str, description: str) -> cli.Parser:
     """Return the parser of a command on the mechanisms of a scene."""
-    made = command.Parser(name, description=description)
-    command.add_scene(made, help="the scene's parameter file")
+    made = cli.Parser(name, description=description)
+    cli.add_scene(made, help="the scene's parameter file")
     made.add_argument('--joints', nargs='+', default=[], metavar='JOINT',
                       help='what a controller commands, by its name in the scene')
     return made
 
 
-def arguments() -> command.Parser:
+def arguments() -> cli.Parser:
     """Return the parser of the command line."""
     made = parser(NAME, 'Print the mechanisms of a scene as C99 headers, one after another, '
                         'without heap and with no dependency except math.h.')

@@ -12,13 +12,13 @@ import rclpy
 from rclpy.utilities import remove_ros_args
 
 from . import scene_node
-from .. import command, scene
-from ..robot_model.command import NAME, show
+from .. import cli, scene
+from ..robot_model.cli import NAME, show
 
 
 def main(args: Optional[List[str]] = None) -> int:
     """Print the URDF of a scene; return the exit code. `args` are by default sys.argv[1:]."""
-    return command.run(NAME, _show, sys.argv[1:] if args is None else args)
+    return cli.run(NAME, _show, sys.argv[1:] if args is None else args)
 
 
 def _show(args: List[str]) -> None:
@@ -28,7 +28,7 @@ def _show(args: List[str]) -> None:
     try:
         show(remove_ros_args([NAME, *args])[1:], _scene(args))
     except RuntimeError as error:
-        raise command.RequestError(f'the arguments for ROS are wrong: {error}') from None
+        raise cli.RequestError(f'the arguments for ROS are wrong: {error}') from None
 
 
 def _scene(args: List[str]) -> scene.Scene:
@@ -40,8 +40,8 @@ def _scene(args: List[str]) -> scene.Scene:
     finally:
         rclpy.try_shutdown()
     if '--params-file' in args and not node.is_given:
-        raise command.RequestError("the parameter file must have '/**:' and below it "
-                                   "'ros__parameters:' with a scene")
+        raise cli.RequestError("the parameter file must have '/**:' and below it "
+                               "'ros__parameters:' with a scene")
     return node.scene
 
 

@@ -7,40 +7,40 @@ from typing import Optional, Sequence
 
 from . import bodies, mjcf, sdf, urdf
 from .bodies import assembled, DENSITY
-from .. import command, scene
+from .. import cli, scene
 
 NAME = 'urdf'
 
 
 def main(args: Optional[Sequence[str]] = None) -> int:
     """Print a robot model; return the exit code."""
-    return command.run(NAME, show, args)
+    return cli.run(NAME, show, args)
 
 
 def show(args: Optional[Sequence[str]], given_scene: Optional[scene.Scene] = None) -> None:
     """Print the model that a command line requests, of its scene or of the one from ROS."""
     options = parser().parse_args(args)
     if given_scene and options.scene:
-        raise command.RequestError('give the scene either as SCENE or with --ros-args, not both')
+        raise cli.RequestError('give the scene either as SCENE or with --ros-args, not both')
     shown = given_scene or (scene.load(options.scene) if options.scene else scene.read({}))
     if options.format == 'urdf' and options.density:
-        raise command.RequestError('--density is for sdf and mjcf only: the URDF has no masses')
-    model = bodies.robot(command.chosen(shown.mechanisms, options.mechanism), shown.frame_id,
+        raise cli.RequestError('--density is for sdf and mjcf only: the URDF has no masses')
+    model = bodies.robot(cli.chosen(shown.mechanisms, options.mechanism), shown.frame_id,
                          options.width)
     if options.format != 'urdf':
         model = assembled(model, options.density or DENSITY)
     print({'urdf': urdf, 'sdf': sdf, 'mjcf': mjcf}[options.format].write(model))
 
 
-def parser() -> command.Parser:
+def parser() -> cli.Parser:
     """Return the parser of the command line."""
-    made = command.Parser(
+    made = cli.Parser(
         NAME, description='Print the robot model of a scene.',
         epilog='`ros2 run linkage_ros urdf` also accepts the scene as a node does: '
                '--ros-args --params-file SCENE')
-    positive = command.within(float, bodies.SMALLEST, bodies.LARGEST)
-    command.add_scene(made, nargs='?', help="the scene's parameter file (default: the "
-                                            "catalogue's linkages)")
+    positive = cli.within(float, bodies.SMALLEST, bodies.LARGEST)
+    cli.add_scene(made, nargs='?', help="the scene's parameter file (default: the "
+                                        "catalogue's linkages)")
     made.add_argument('--format', choices=('urdf', 'sdf', 'mjcf'), default='urdf',
                       help='a tree for robot_state_publisher, or closed loops for Gazebo or '
                            'MuJoCo (default: urdf)')

@@ -14,7 +14,7 @@ import numpy as np
 
 from . import check, closing, loops, planar, readers, rods
 from .spatial import components
-from .. import command, scene
+from .. import cli, scene
 from ..linkage import short
 from ..robot_model.robot import FIXED, HINGE, MAX_NUMBER, NotDriven, posed, Robot, SLIDE
 from ..scene.writing import in_yaml
@@ -29,13 +29,13 @@ READING = 'joint_names: QB=-knee+0.6 is to be read as knee = 0.6 - angle of QB.'
 
 def main(args: Optional[List[str]] = None) -> int:
     """Print a scene file; return the exit code."""
-    return command.run(NAME, show, args)
+    return cli.run(NAME, show, args)
 
 
 def show(args: Optional[List[str]]) -> None:
     """Print what a command line asks for."""
-    parser = command.Parser(NAME, description='Print the scene of the planar closed loops in a '
-                            'robot: MJCF, SDF or URDF.')
+    parser = cli.Parser(NAME, description='Print the scene of the planar closed loops in a '
+                        'robot: MJCF, SDF or URDF.')
     parser.add_argument('file', metavar='FILE', help='the robot')
     parser.add_argument('--loops', metavar='FILE', help='YAML with the loop joints of a URDF')
     parser.add_argument('--driven', metavar='JOINT', nargs='+', help='joints that motors move '
@@ -60,8 +60,8 @@ def show(args: Optional[List[str]]) -> None:
     print(*(f'# {line}' for line in head + lines), in_yaml(parameters), sep='\n', end='')
     print(*(f'{NAME}: {line}' for line in lines), sep='\n', file=sys.stderr)
     if wrong := [line for line in reports if WRONG in line]:
-        raise command.RequestError(f'{len(wrong)} mechanisms are left out, as they differ from '
-                                   'the robot or could not be compared with it')
+        raise cli.RequestError(f'{len(wrong)} mechanisms are left out, as they differ from '
+                               'the robot or could not be compared with it')
 
 
 def _launch(parsed: Any, still: Mapping[str, float]) -> str:
@@ -114,7 +114,7 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
              ) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
     """Return what is described, without mechanisms that differ from the robot."""
     if not imported:
-        raise command.RequestError(' '.join(reports) or 'no joint of this robot closes a loop')
+        raise cli.RequestError(' '.join(reports) or 'no joint of this robot closes a loop')
     parameters: Dict[str, Any] = {'mechanisms': [made.name for made in imported]}
     for made in imported:
         parameters.update(made.parameters)
@@ -187,5 +187,5 @@ def positions(texts: Sequence[str]) -> Dict[str, float]:
         except ValueError:
             values[name] = math.nan
         if not name or not abs(values[name]) < MAX_NUMBER:
-            raise command.RequestError(f'{text!r} must be JOINT=VALUE, its value in rad or m')
+            raise cli.RequestError(f'{text!r} must be JOINT=VALUE, its value in rad or m')
     return values

@@ -11,7 +11,7 @@ import shutil
 
 from . import parts
 from .. import scene
-from ..command import add_scene, chosen, Parser, RequestError, run, within
+from ..cli import add_scene, chosen, Parser, RequestError, run, within
 from ..linkage import Formula
 from ..optional import needs
 from ..scene.scene_mechanism import IN_SPACE
