@@ -119,7 +119,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         text = document.table(('page', 'call', '[us]', 'below it', '[us]', 'more [us]'), rows())
-    text += '\n\n' + document.mechanism()
+    text += '\n\n' + document.machine()
     document.show(options, 'design/performance.md', text, 'measured: calls')
 
 

@@ -38,7 +38,7 @@ def table(head, rows):
     return '\n'.join('| ' + ' | '.join(map(str, line)) + ' |' for line in lines)
 
 
-def mechanism(*packages):
+def machine(*packages):
     """Return the date, the processor, the versions and the commit, as a sentence."""
     numbers = ', '.join(f'{name} {_version(name)}' for name in ('numpy', *packages))
     return (f'{datetime.now(timezone.utc):%Y-%m-%d}, {_processor()}; Python '
@@ -82,7 +82,7 @@ def _processor():
                 line.partition(':') for line in lines)}
         return f'{fields["model name"]}, family {fields["cpu family"]} model {fields["model"]}'
     except (OSError, KeyError):
-        return platform.processor() or platform.mechanism()
+        return platform.processor() or platform.machine()
 
 
 def _version(package):

@@ -87,7 +87,7 @@ def main():
     text += (f'\n\n{used} linkages. The largest error of a solution at an ordinary value is '
              f"{worst:.2g} in units of the rule: half an ulp of the output's size, and half an "
              'ulp of the input times the rate.')
-    text += '\n\n' + document.mechanism()
+    text += '\n\n' + document.machine()
     document.show(options, 'design/accuracy.md', text, 'measured: inverse')
 
 

@@ -103,7 +103,7 @@ def main():
          *(method.title for method in METHODS), 'on a GPU'],
         [[task.title, size, *measured(task, size), 'not measured']
          for task in tasks() for size in SIZES])
-    text += '\n\n' + document.mechanism('llvmlite', 'torch', 'jax')
+    text += '\n\n' + document.machine('llvmlite', 'torch', 'jax')
     document.show(options, 'design/performance.md', text, 'measured: namespaces')
 
 

@@ -105,7 +105,7 @@ def compiled_c(kind):
         return one, many
 
     yield Method('C', *built())
-    if platform.mechanism() == 'x86_64':
+    if platform.machine() == 'x86_64':
         yield Method('C, vector sine', None, built('-DVECTOR_SINE')[1])
 
 

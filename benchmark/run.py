@@ -121,7 +121,7 @@ def main():
     rows = [row for kind in peers.POINTS for row in compared(kind, options.budget)]
     text = document.table(['CPU time per pose [us]', *BATCHES, 'median error [uL]', 'worst [uL]',
                            'wrong'], rows)
-    text += '\n\n' + document.mechanism('llvmlite', *peers.PEERS)
+    text += '\n\n' + document.machine('llvmlite', *peers.PEERS)
     document.show(options, 'design/accuracy.md', text, 'measured: comparison')
 
 

@@ -131,7 +131,7 @@ def main():
              for (kind, title), found in sorted(ratios.items())]
     text = document.table(['error / sensitivity', 'results', 'largest', '99.9 % are below',
                            'beyond the rule'], lines)
-    text += '\n\n' + document.mechanism('gmpy2')
+    text += '\n\n' + document.machine('gmpy2')
     document.show(options, 'design/accuracy.md', text, 'measured: stability')
     return int(any(number for (_, title), number in problems.items()
                    if title != 'original formulas'))

@@ -199,7 +199,7 @@ def main():
         is_far |= bool(far) or not len(found)
         rows.append([name, len(found), f'{np.nanmax(found, initial=0.0):.1e}', far])
     text = document.table(['source', 'numbers', 'largest difference', f'above {FAR:.0e}'], rows)
-    text += '\n\n' + document.mechanism('pylinkage', 'mujoco')
+    text += '\n\n' + document.machine('pylinkage', 'mujoco')
     document.show(options, 'design/accuracy.md', text, 'measured: foreign')
     return int(is_far)
 

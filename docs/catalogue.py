@@ -48,7 +48,7 @@ USES = {
     'slotted_lever': ('A lever moved by a pin: steering, flaps, grippers on a hobby servo; '
                       'shaping machines.', 'No inventor is known.'),
     'chebyshev_lambda': ('Legs, and a nearly straight line over half a turn.',
-                         'Pafnuty Chebyshev, whose walking mechanism was shown in Paris in 1878.'),
+                         'Pafnuty Chebyshev, whose walking machine was shown in Paris in 1878.'),
     'five_bar': ('Pick and place, drawing, legs: light arms, since both motors stand still.',
                  'No inventor is known; as a robot it is called a double SCARA.'),
     'four_bar': ('Wipers, doors, suspensions, grippers: most loops of most machines.',
@@ -65,7 +65,7 @@ USES = {
     'watt': ('Guiding a rod nearly straight; today rear axles of cars.',
              'James Watt, 1784, for the piston rod of his steam engine.'),
     'whitworth': ('Shaping and slotting machines: slow while it cuts, quick on the way back.',
-                  'Joseph Whitworth, in the 19th century, for his mechanism tools.'),
+                  'Joseph Whitworth, in the 19th century, for his machine tools.'),
 }
 
 # What is written in letters in a docstring.

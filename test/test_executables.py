@@ -30,8 +30,8 @@ def harness():
 
 
 @pytest.mark.parametrize('module, file', [
-    ('c_code.cli', 'SCENE'), ('c_code.transmission', 'SCENE'), ('render.command', 'SCENE'),
-    ('robot_files.cli', 'FILE'), ('robot_model.command', '[SCENE]')])
+    ('c_code.cli', 'SCENE'), ('c_code.transmission', 'SCENE'), ('render.cli', 'SCENE'),
+    ('robot_files.cli', 'FILE'), ('robot_model.cli', '[SCENE]')])
 def test_the_help_of_a_command_names_its_file_and_explains_each_of_its_options(
         capsys, module, file):
     with pytest.raises(SystemExit):

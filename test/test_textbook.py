@@ -5,7 +5,7 @@
 Textbook examples come out to the digits that are printed.
 
 Norton: R. L. Norton, "Design of Machinery" (examples of ch. 4, answers to the tables of problems
-P4-1 to P4-3, table 3-1). Khurmi and Gupta: "Theory of Mechanisms", ch. 5. Mabie and Reinholtz:
+P4-1 to P4-3, table 3-1). Khurmi and Gupta: "Theory of Machines", ch. 5. Mabie and Reinholtz:
 "Mechanisms and Dynamics of Machinery", the table of Geneva wheels.
 """
 

@@ -6,7 +6,7 @@ How long poses are held up by changes of parameters, at 500 Hz and 12 legs.
 
 `kinematics` runs as a process; a thread publishes crank messages at equal times, the time between
 one joint state and the next is taken as it arrives here. What no change at all brings is printed
-beside: the mechanism's own part. The CPU time of the executor for a change is taken without crank
+beside: the machine's own part. The CPU time of the executor for a change is taken without crank
 messages. At 200 Hz it is counted how many messages 100 requests at once cost, and by how much they
 delay one.
 """

@@ -182,7 +182,7 @@ class Line:
         start = time.perf_counter()
         while len(sent) < count:
             now = time.perf_counter()
-            # A driver that the mechanism kept waiting does not send in a heap what it missed.
+            # A driver that the machine kept waiting does not send in a heap what it missed.
             start = max(start, now - len(sent) / rate - LATE)
             left = start + len(sent) / rate - now
             if left > 0.0:

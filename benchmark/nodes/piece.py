@@ -35,4 +35,4 @@ if __name__ == '__main__':
     name, path, rounds, *quick = sys.argv[1:]
     Path(path).write_text(json.dumps({
         'found': measured(name, int(rounds), bool(quick)), 'load': os.getloadavg()[2],
-        'mechanism': document.mechanism('ros-rclpy', 'ros-rmw-fastrtps-cpp')}))
+        'machine': document.machine('ros-rclpy', 'ros-rmw-fastrtps-cpp')}))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tables of the results, {piece: what it found, on which mechanism}."""
+"""Tables of the results, {piece: what it found, on which machine}."""
 
 import statistics
 
@@ -36,10 +36,10 @@ def document(result):
         parts += ['### Changes of parameters', change(changes)]
     where = {}
     for name, piece in result.items():
-        where.setdefault(piece['mechanism'], {})[name] = piece['load']
+        where.setdefault(piece['machine'], {})[name] = piece['load']
     return '\n\n'.join([*parts, *(
-        f'{", ".join(loads)}: {mechanism} Load {min(loads.values()):.1f} to '
-        f'{max(loads.values()):.1f}.' for mechanism, loads in where.items())])
+        f'{", ".join(loads)}: {machine} Load {min(loads.values()):.1f} to '
+        f'{max(loads.values()):.1f}.' for machine, loads in where.items())])
 
 
 def ratio(values, others):

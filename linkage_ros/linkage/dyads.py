@@ -9,7 +9,7 @@ One joint line places two bodies that share a joint and are each joined to a pla
 word. The bodies that stay unplaced are an Assur group of class III or higher, or depend on one.
 
 Source: Assur's groups as in Norton, "Design of Machinery", sec. 2.13, and Galletti, "A note on
-modular approaches to planar linkage kinematic analysis", Mechanism and Mechanism Theory 21 (1986).
+modular approaches to planar linkage kinematic analysis", Mechanism and Machine Theory 21 (1986).
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ while it turns beta, with cos(beta/2) = b/a. With b > a it is the crank and slot
 shaper, with the same ratio for sin(beta/2 - pi/2) = a/b.
 
 Source: Norton, "Design of Machinery", sec. 3.7; the defaults a, b from an exercise in Khurmi and
-Gupta, "Theory of Mechanisms", ch. 5.
+Gupta, "Theory of Machines", ch. 5.
 """
 
 from ..linkage import Design
