@@ -314,7 +314,7 @@ class Kinematics:
         bar); for a slider between its rod and the normal of its line; for a slot between its
         line and the normal of the radius from pivot to pin. Sources: Norton, "Design of
         Machinery", sec. 3.3; Balli and Chand, "Transmission angle in mechanisms", Mechanism and
-        Mechanism Theory 37 (2002).
+        Machine Theory 37 (2002).
         """
         return self._scalars('transmissions', theta, joints)
 
