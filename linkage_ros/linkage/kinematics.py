@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from .formulas import LinkPoint, Points, structure_of
 from .geometry.spatial import IN_SINGLE
-from .inputs import FASTEST, Input, is_periodic, MAX_COUNTED, MOST_TURNS, spread
+from .inputs import FASTEST, Input, is_periodic, MAX_PERIOD, MOST_TURNS, spread
 from .text import joint_lines
 from .text.arguments import checked_dimensions, numbers
 from .text.design import Design
@@ -66,7 +66,7 @@ class Kinematics:
         self._evaluated: dict = {}
         evaluate_in_order(self.structure.constants, self.dimensions, self._evaluated)
         self._poses, self.cache = Cache(), Cache()
-        self.inputs = tuple(map(self._counted_input, range(len(built.inputs)), built.inputs))
+        self.inputs = tuple(map(self._with_limits, range(len(built.inputs)), built.inputs))
         own = {input_.name for input_ in self.inputs}
         self.geared = tuple(name for name in built.driven if name not in own)
         self.links = tuple(link._replace(zero=np.asarray(self.value(link.zero)).tolist())
@@ -241,13 +241,13 @@ class Kinematics:
         inputs[by] = values
         return self.bound('points', self.points).searched(*inputs)
 
-    def _counted_input(self, by: int, input_: Input) -> Input:
+    def _with_limits(self, by: int, input_: Input) -> Input:
         """Return an input with the limits [rad or m] of all poses."""
         if not input_.turns:
             return self._with_stroke(input_)
         ratios = self._ratios(by)
         input_ = input_._replace(speed=max(1.0, *map(abs, ratios)))
-        most = input_.step * MAX_COUNTED ** (1.0 / len(self.structure.built.inputs))
+        most = input_.step * MAX_PERIOD ** (1.0 / len(self.structure.built.inputs))
         period = self._period(by, ratios, most)
         turns = period if period <= max(most, 1.0) else max(2.0, 2.0 * round(0.5 * most))
         return input_._replace(low=-math.pi * turns, high=math.pi * turns, period=period)

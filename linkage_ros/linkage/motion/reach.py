@@ -47,7 +47,7 @@ def _reach(linkage: Kinematics, others: Tuple[float, ...]) -> List[Arc]:
     margins = over_first(linkage, 'margins', (), others)
     limits, step = linkage.structure.built.limits, linkage.inputs[0].step
     # From here on the input is in units of its step.
-    input_ = linkage.inputs[0].counted()
+    input_ = linkage.inputs[0].normalized()
 
     def assembled(theta: Any) -> Any:
         return _failing(margins, theta) == len(limits)
