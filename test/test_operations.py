@@ -255,6 +255,13 @@ def test_a_sum_keeps_every_digit_however_much_cancels():
             assert found == math.fsum(terms)
 
 
+def test_a_sum_of_two_terms_costs_one_operation_and_zeros_cost_none():
+    a, b = map(expression.dimension, 'ab')
+    for terms in ((a, b), (a, 0.0, b)):
+        listed = program.in_order([expression.exact_sum(*terms)])
+        assert [x.op for x in listed if x.operands] == ['add']
+
+
 def test_all_back_ends_read_all_operands():
     for row in OPERATIONS.values():
         operands = [f'operand {i}' for i in range(arity(row.name))]
