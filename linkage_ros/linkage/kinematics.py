@@ -239,7 +239,7 @@ class Kinematics:
         """Return the coordinates of all joints over one input; the others are spread."""
         inputs = spread([self._with_stroke(x) for x in self.structure.built.inputs], len(values))
         inputs[by] = values
-        return self.bound('points', self.points).searched(*inputs)
+        return self.compiled('points', self.points).searched(*inputs)
 
     def _with_limits(self, by: int, input_: Input) -> Input:
         """Return an input with the limits [rad or m] of all poses."""
@@ -343,7 +343,7 @@ class Kinematics:
     def posed(self, points: Names = None, joints: Sequence[str] = (),
               rates: Sequence[str] = ()) -> CompiledFunction:
         """Return the code behind `function`."""
-        return self.bound('parts', self._requested(points, joints, rates))
+        return self.compiled('parts', self._requested(points, joints, rates))
 
     def _requested(self, *names: Any) -> Tuple[Tuple[str, ...], ...]:
         """Return names of points, joints and rates."""
@@ -424,13 +424,9 @@ class Kinematics:
         # A copy, since what a program needs beside the constants goes with the program.
         return program.bind(self.dimensions, dict(self._evaluated), self.is_accelerated)
 
-    def bound(self, kind: str, names: Any, *by: int) -> CompiledFunction:
+    def compiled(self, kind: str, names: Any, *by: int) -> CompiledFunction:
         """Return the code for quantities of one kind; see `Structure.program`."""
         return self.bind(self.structure.program(kind, names, *by))
-
-    def checked(self, outputs: Tuple[str, ...]) -> CompiledFunction:
-        """Return the code for outputs and their rates, NaN unless all joints are assembled."""
-        return self.bound('checked', outputs)
 
     def _vectors(self, kind: str, theta: Inputs, points: Any, *by: int) -> dict:
         names, pose = self._ready(kind, points, *by)
@@ -467,7 +463,7 @@ class Kinematics:
         """Return the requested names and the function that computes them."""
         def make() -> Tuple[Tuple[str, ...], CompiledFunction]:
             names = self._names(kind, requested)
-            return names, self.bound(kind, names, *by)
+            return names, self.compiled(kind, names, *by)
 
         requested = _hashable(requested)
         return self._poses.get_or_make((kind, requested, *by), make)

@@ -87,7 +87,8 @@ class InverseProblem:
         inputs = spread(self.linkage.inputs, len(values))
         inputs[by] = values
         # A value repeats only where the linkage can be assembled again.
-        rows = zip(self.linkage.checked(self.outputs).over(*inputs), self.angular, self.scales)
+        pose = self.linkage.compiled('checked', self.outputs)
+        rows = zip(pose.over(*inputs), self.angular, self.scales)
         return np.concatenate([[np.cos(row), np.sin(row)] if angular else [row / scale]
                                for row, angular, scale in rows])
 

@@ -374,7 +374,7 @@ def extremes_of(linkage: Kinematics, output: str, arcs: Optional[Sequence[Arc]],
                 others: Sequence[float]) -> list:
     """Implement `Mechanism.extremes`."""
     linkage.check_output(output)
-    pose, angular = linkage.bound('output', output), np.array([linkage.is_angle(output)])
+    pose, angular = linkage.compiled('output', output), np.array([linkage.is_angle(output)])
     size = linkage.inputs[0].step
     parts = reach_of(linkage, tuple(others)) if arcs is None else arcs
     if arcs is None and (segments := segments_of(linkage, output, others)).jumps:

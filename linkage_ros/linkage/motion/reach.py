@@ -36,7 +36,7 @@ def reach_of(linkage: Kinematics, others: Tuple[float, ...] = ()) -> List[Arc]:
 
 def over_first(linkage: Kinematics, kind: str, names: Any, others: Tuple[float, ...]) -> Callable:
     """Return the function from values of the first input (n,), in its step, to numbers."""
-    pose, step = linkage.bound(kind, names), linkage.inputs[0].step
+    pose, step = linkage.compiled(kind, names), linkage.inputs[0].step
     if pose.shape:
         raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
                          'not for arrays')
