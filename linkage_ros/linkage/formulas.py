@@ -139,7 +139,7 @@ class Structure:
         if (arm := self._arm(name)) is None:
             joint, _, axis = name.rpartition('.')
             return self._points((joint,))[self.built.axes.index(axis)]
-        if self.turns(name):
+        if self.is_angle(name):
             return arctangent(arm.vector.y, arm.vector.x)
         return square_root(arm.square)
 
@@ -222,7 +222,7 @@ class Structure:
 
         def rate(name: str) -> Real:
             # In space a joint turns about its own axis: there is no direction in a plane.
-            if not self.turns(name) or name in self.built.driven or self.built.axes != 'xy':
+            if not self.is_angle(name) or name in self.built.driven or self.built.axes != 'xy':
                 return d(self.output(name))
             if arm := self._arm(name):
                 return turning(arm.vector)
@@ -263,7 +263,7 @@ class Structure:
         return output in self.built.joint_values or bool(ends) and len(set(ends)) == len(
             ends) and set(ends) <= self.built.points.keys()
 
-    def turns(self, output: str) -> bool:
+    def is_angle(self, output: str) -> bool:
         """Return whether an output is an angle, not a length."""
         if output in self.built.joint_values:
             return not self._slides(output)

@@ -382,7 +382,7 @@ class Kinematics:
     def is_angle(self, output: str) -> bool:
         """Return whether an output is an angle [rad], not a length [m]."""
         self.check_there(output)
-        return self.structure.turns(output)
+        return self.structure.is_angle(output)
 
     def moves(self, output: str, by: int = 0) -> bool:
         """Return whether an output depends on one of the inputs."""

@@ -147,7 +147,8 @@ def newton(structure: Structure, outputs: Tuple[str, ...], periods: Sequence[flo
     n, inputs = len(outputs), [argument(by) for by in range(len(outputs))]
     # Of one input, candidates are inside the reach.
     rows = structure.checked(outputs) if n > 1 else structure.parts(((), outputs, outputs))
-    scales = [real(1.0) if structure.turns(name) else dimension(LONGEST_BAR) for name in outputs]
+    scales = [real(1.0) if structure.is_angle(name) else dimension(LONGEST_BAR)
+              for name in outputs]
     sizes = [real(1.0) if input_.turns else dimension(f'[{input_.name}]')
              for input_ in structure.built.inputs]
     gaps = [nearest(row - argument(n + by), real(0.0), turn) / scale

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..inputs import Arc, Input
 from ..kinematics import Kinematics
-from ..motion.curves import ascending, CUTS, extremes, LEAST, refined, sampled, turns
+from ..motion.curves import ascending, CUTS, extremes, LEAST, refined, sampled, turning_points
 from ..motion.reach import MAX_ENDS, reach_of
 from ..motion.singularities import Analysis, distinct, NEAR, NearZero
 from ..tolerances import CLOSE, ONE, ROUNDING, SINGULAR, TOLERANCE
@@ -315,7 +315,7 @@ class Segments:
                   noise: np.ndarray) -> Iterator[Segment]:
         """Yield the segments of a run, cut at its extremes."""
         with np.errstate(invalid='ignore'):
-            places = turns(value, rate, 4.0 * (noise + self._rounding))
+            places = turning_points(value, rate, 4.0 * (noise + self._rounding))
             rising = rate[places] >= 0.0
             at, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
                 x.shape) == rising[:, None], theta[places], theta[places + 1])
