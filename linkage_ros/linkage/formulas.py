@@ -66,7 +66,7 @@ class LinkPoint(NamedTuple):
 Points = Tuple[Union[str, LinkPoint], ...]
 
 
-class Structure:
+class LinkageFormulas:
     """Formulas of a design with its branches, which all its mechanisms share."""
 
     def __init__(self, design: Design, branches: Mapping[str, Any]):
@@ -291,6 +291,6 @@ def _vanishes(rate: Real) -> bool:
 
 
 @cached(32, shared=True)
-def structure_of(design: Design, branches: Tuple[Tuple[str, int], ...]) -> Structure:
+def formulas_of(design: Design, branches: Tuple[Tuple[str, int], ...]) -> LinkageFormulas:
     """Return the cached structure of a design with its branches."""
-    return Structure(design, dict(branches))
+    return LinkageFormulas(design, dict(branches))

@@ -15,7 +15,7 @@ from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple, Type
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .formulas import LinkPoint, Points, structure_of
+from .formulas import formulas_of, LinkPoint, Points
 from .geometry.spatial import IN_SINGLE
 from .inputs import FASTEST, Input, is_periodic, MAX_PERIOD, MOST_TURNS, spread
 from .text import joint_lines
@@ -57,7 +57,7 @@ class Kinematics:
         self.dimensions, self.branches = dict(dimensions), dict(branches)
         self.is_accelerated = accelerate
         # Equal linkages share it, including unpickled ones.
-        self.structure = structure_of(design, tuple(self.branches.items()))
+        self.structure = formulas_of(design, tuple(self.branches.items()))
         built = self.structure.built
         self.points, self.joints = tuple(built.points), tuple(built.joint_values)
         self.grounded, self.axes = built.grounded, built.axes
@@ -425,7 +425,7 @@ class Kinematics:
         return program.bind(self.dimensions, dict(self._evaluated), self.is_accelerated)
 
     def compiled(self, kind: str, names: Any, *by: int) -> CompiledFunction:
-        """Return the code for quantities of one kind; see `Structure.program`."""
+        """Return the code for quantities of one kind; see `LinkageFormulas.program`."""
         return self.bind(self.structure.program(kind, names, *by))
 
     def _vectors(self, kind: str, theta: Inputs, points: Any, *by: int) -> dict:

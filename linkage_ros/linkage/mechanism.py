@@ -59,7 +59,7 @@ class Mechanism(Kinematics):
         Joint of the locus.
     is_accelerated : bool
         Whether compiled code solves arrays.
-    structure : Structure
+    structure : LinkageFormulas
         Formulas, for any dimensions.
     cache : Cache
         Cached results: reach, inverses, travels.

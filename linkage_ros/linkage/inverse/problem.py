@@ -17,7 +17,7 @@ from typing import Dict, Sequence, Tuple
 
 import numpy as np
 
-from ..formulas import Structure
+from ..formulas import LinkageFormulas
 from ..inputs import Input, is_periodic, spread
 from ..kinematics import Kinematics
 from ..motion.curves import LEAST
@@ -135,7 +135,7 @@ def nearest(x: Real, seed: Real, turn: float) -> Real:
 
 
 @cached(64, shared=True)
-def newton(structure: Structure, outputs: Tuple[str, ...], periods: Sequence[float],
+def newton(structure: LinkageFormulas, outputs: Tuple[str, ...], periods: Sequence[float],
            turns: Sequence[float]) -> Program:
     """
     Return the code for a step of Newton's method, from the inputs and values of the outputs.
