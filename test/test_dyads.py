@@ -17,22 +17,35 @@ class Driven(Dyads):
         return '', ''
 
 
-def slotted(axis, bodies):
+PIN = 0.3 + 0.4j
+CRANK = Hinge(('ground', 'crank'), (0.0j, 0.0j), 1.0, 0.0)
+
+
+def slot(axis, bodies):
     """Return a lever on a pivot, and a block on it that a crank carries, in the pose drawn."""
-    pivot, pin = 2.0 + 0.0j, 0.3 + 0.4j
-    on_line = pin + 0.2
-    dyads = Driven(
-        'ground', ['ground', 'crank', 'lever', 'block'],
-        [{'crank': pin, 'block': pin}, {'ground': pivot, 'lever': pivot}],
-        [Slide(bodies, (on_line, on_line), (axis, axis))],
-        [Hinge(('ground', 'crank'), (0.0j, 0.0j), 1.0, 0.0)], size=1.0, near=1e-9)
-    dyads.take_apart()
-    return dyads
+    pivot, on_line = 2.0 + 0.0j, PIN + 0.2
+    return Driven('ground', ['ground', 'crank', 'lever', 'block'],
+                  [{'crank': PIN, 'block': PIN}, {'ground': pivot, 'lever': pivot}],
+                  [Slide(bodies, (on_line, on_line), (axis, axis))], [CRANK], 1.0, 1e-9)
 
 
+def yoke(axis, bodies):
+    """Return a block on the ground, with a slot across it in which a crank's pin slides."""
+    on_slot = PIN + 0.2
+    return Driven('ground', ['ground', 'crank', 'lever', 'block'],
+                  [{'ground': 1.0 + 0.0j}, {'crank': PIN, 'block': PIN}],
+                  [Slide(('ground', 'lever'), (0.0j, 0.0j), (axis, axis)),
+                   Slide(bodies, (on_slot, on_slot), (1.0j, 1.0j))],
+                  [CRANK], 1.0, 1e-9)
+
+
+@pytest.mark.parametrize('drawn', [slot, yoke])
 @pytest.mark.parametrize('bodies', [('lever', 'block'), ('block', 'lever')])
-def test_a_slot_is_the_same_in_whichever_direction_its_slide_is_given(bodies):
-    forward, backward = slotted(1.0 + 0.0j, bodies), slotted(-1.0 + 0.0j, bodies)
+def test_a_slide_is_the_same_in_whichever_direction_it_is_given(drawn, bodies):
+    forward, backward = drawn(1.0 + 0.0j, bodies), drawn(-1.0 + 0.0j, bodies)
+    for dyads in (forward, backward):
+        dyads.take_apart()
+        assert not dyads.left
     assert forward.lines == backward.lines and forward.parts == backward.parts
     linkage = mechanisms.create('custom', joints=forward.lines)
     for places in forward.on.values():
