@@ -154,7 +154,7 @@ def degrees(text):
     except (ValueError, KeyError):
         raise argparse.ArgumentTypeError(f'must be a finite angle, such as 30, pi/6 or 30deg, '
                                          f'not {text}') from None
-    return math.degrees(value) if {'pi', 'deg'} & formula.words.keys() else value
+    return math.degrees(value) if formula.is_angle else value
 
 
 def words(text):

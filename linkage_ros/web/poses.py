@@ -136,7 +136,7 @@ def number(text: str) -> dict[str, Any]:
     formula = Formula(text if '(' in text else text.replace(',', '.'))
     if formula.names:
         raise SceneError(f'{quoted(text)} is not a number: {listed(formula.names)} is unknown')
-    return {'value': float(formula.value({})), 'turns': bool({'pi', 'deg'} & formula.words.keys())}
+    return {'value': float(formula.value({})), 'turns': formula.is_angle}
 
 
 def reached(mechanism: SceneMechanism, present: Sequence[float],
