@@ -14,7 +14,6 @@ from .. import scene
 from ..cli import add_scene, chosen, Parser, RequestError, run, within
 from ..linkage import Formula
 from ..optional import needs
-from ..scene.scene_mechanism import IN_SPACE
 from ..words import meant
 
 IMAGES, VIDEOS = ('.png', '.svg'), ('.gif', '.mp4')
@@ -73,8 +72,7 @@ def draw(args):
         from . import files
 
     for mechanism in mechanisms:
-        if mechanism.in_space:
-            raise RequestError(f'{mechanism.name} is {IN_SPACE}')
+        mechanism.check_planar()
     default = parts.DEFAULT_IN_MOTION if arguments.moving else parts.DEFAULT
     out, fps = arguments.out, arguments.fps or FPS
     with style.context('default', after_reset=True):

@@ -22,7 +22,6 @@ from ..cache import cached
 from ..linkage import Arc, Design, Mechanism, theta_of
 from ..words import listed
 
-IN_SPACE = 'a linkage in space: pictures and robot models are of linkages in a plane'
 TYPES = (*mechanisms.TYPES, *mechanisms.WRITTEN)
 
 
@@ -104,6 +103,12 @@ class SceneMechanism:
     def in_space(self) -> bool:
         """Whether the linkage is spatial; only planar ones have pictures and robot models."""
         return len(self.linkage.axes) > 2
+
+    def check_planar(self) -> None:
+        """Raise SceneError for a linkage in space."""
+        if self.in_space:
+            raise SceneError(f'{self.name} is a linkage in space: pictures and robot models are '
+                             'of linkages in a plane')
 
     @property
     def first(self) -> InputSettings:
