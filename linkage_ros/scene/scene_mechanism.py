@@ -124,6 +124,10 @@ class SceneMechanism:
         """Return the factor of each input from the linkage to the scene."""
         return [self.scale_of(name) for name in self.inputs]
 
+    def theta(self, values: Sequence[float]) -> Any:
+        """Return inputs [rad or m], or their speeds, as an argument of the unscaled linkage."""
+        return theta_of(divided(values, self.scales))
+
     def follow(self, outputs: Sequence[str], values: Sequence[float], seed: Sequence[float],
                jumps: bool = True) -> tuple[list[float], list[float]]:
         """
@@ -193,11 +197,10 @@ class SceneMechanism:
 
     def efforts(self, values: Sequence[float]) -> tuple[float, ...]:
         """Return the inputs' efforts [N m or N] that balance the loads at inputs `values`."""
-        inputs = divided(values, self.scales)
         # The scale lengthens the lever arms of forces; moments do not depend on it.
         loads = {name: load if isinstance(load, float) else tuple(
             self.scale * part for part in load) for name, load in self.loads.items()}
-        efforts = self.linkage.effort(theta_of(inputs), loads)
+        efforts = self.linkage.effort(self.theta(values), loads)
         return tuple(divided(efforts.tolist(), self.scales))
 
     def assembly(self) -> Assembly:
