@@ -148,7 +148,8 @@ def period(linkage: Mechanism, outputs: Sequence[str]) -> float:
     input_, = linkage.inputs
     if not input_.wraps:
         return math.inf
-    inputs = np.concatenate([np.linspace(*arc, SPREAD)[1:-1] for arc in linkage.reach()])
+    inputs = np.concatenate([
+        np.linspace(low, high, SPREAD)[1:-1] for low, high in linkage.reach()])
     pose = linkage.posed((), tuple(outputs))
 
     def places(shift: float) -> np.ndarray:

@@ -187,7 +187,7 @@ class Tables:
         self._written.add(name)
         closed = self.linkage.inverse(outputs).closed
         count, function = self._closed(name, closed, outputs) if closed else (
-            self._series(name, *outputs, turn))
+            self._series(name, outputs[0], turn))
         self.solutions = max(self.solutions, count)
         return name, function
 
