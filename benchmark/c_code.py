@@ -117,7 +117,7 @@ static int done(void) {{ return 0; }}
 HERE = """
 #include <stdio.h>
 #include <time.h>
-#define TRIES 2000
+#define TRIES 100000
 static void begin(void) {{ }}
 static unsigned long now(void) {{ struct timespec t; clock_gettime(CLOCK_MONOTONIC, &t);
     return 1000000000ul * (unsigned long)t.tv_sec + (unsigned long)t.tv_nsec; }}
