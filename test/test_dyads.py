@@ -39,9 +39,17 @@ def yoke(axis, bodies):
                   [CRANK], 1.0, 1e-9)
 
 
-@pytest.mark.parametrize('drawn', [slot, yoke])
+def carriage(axis, bodies):
+    """Return a block that a motor moves along the ground."""
+    ends = tuple('ground' if body == 'lever' else body for body in bodies)
+    return Driven('ground', ['ground', 'block'], [{'ground': 1.0 + 0.0j}, {'block': 0.25 + 0.0j}],
+                  [], [Slide(ends, (0.0j, 0.0j), (axis, axis))], 1.0, 1e-9)
+
+
+@pytest.mark.parametrize('drawn, value', [
+    (slot, math.atan2(0.4, 0.3)), (yoke, math.atan2(0.4, 0.3)), (carriage, 0.0)])
 @pytest.mark.parametrize('bodies', [('lever', 'block'), ('block', 'lever')])
-def test_a_slide_is_the_same_in_whichever_direction_it_is_given(drawn, bodies):
+def test_a_slide_is_the_same_in_whichever_direction_it_is_given(drawn, value, bodies):
     forward, backward = drawn(1.0 + 0.0j, bodies), drawn(-1.0 + 0.0j, bodies)
     for dyads in (forward, backward):
         dyads.take_apart()
@@ -50,5 +58,5 @@ def test_a_slide_is_the_same_in_whichever_direction_it_is_given(drawn, bodies):
     linkage = mechanisms.create('custom', joints=forward.lines)
     for places in forward.on.values():
         for name, place in places.items():
-            x, y = linkage.solve(math.atan2(0.4, 0.3), (name,))[name]
+            x, y = linkage.solve(value, (name,))[name]
             assert complex(x, y) == pytest.approx(place, abs=1e-14)
