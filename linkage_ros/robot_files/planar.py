@@ -188,8 +188,8 @@ class Drawing(Dyads):
             way = (self.on[block][part.joint] - part.start) / part.along
             return part.link, sign, way.real
         pin = self.joint_at(child, joint.places[1]) or ''
-        base, body = (parent, child) if self.home[pin] == parent else (child, parent)
-        if self.home[pin] != base:
+        base, body = (parent, child) if self.placed_on[pin] == parent else (child, parent)
+        if self.placed_on[pin] != base:
             return self._between(pin, parent, child, joint)
         link, hangs, along, slide, _ = self.parts[body]
         if not link or hangs != pin or slide:
@@ -212,7 +212,7 @@ class Drawing(Dyads):
         # A bar parallel to the one body that hangs on the other.
         tip, end = self.other(body, pin)
         aside = next((name for name in self.on[base]
-                      if self.home[name] == base and name not in self._tips), '') \
+                      if self.placed_on[name] == base and name not in self._tips), '') \
             or self._triangle(base, pin)
         along = end - self.on[body][pin]
         name = self.name(self.on[base][aside] + along, body, f'parallelogram {pin} {aside} {tip}')
