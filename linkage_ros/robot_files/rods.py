@@ -188,7 +188,7 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
     """Return a mechanism; raise ValueError for loops that rods cannot be."""
     made = Rods(robot, group)
     if not made.drives:
-        raise NotDriven('not driven: its motors must be named by --driven')
+        raise NotDriven('not driven: --driven must name its motors')
     sources = [drive.source for drive in made.drives]
     limits, reports = robot.limits(joint for joint in robot.joints if joint.name in sources)
     lines = made.lines()
