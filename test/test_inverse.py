@@ -12,8 +12,6 @@ import pytest
 from truth.drawing import DIGITS, precisely
 from truth.drawing_accuracy import strict
 
-pytestmark = pytest.mark.nightly
-
 KINDS = list(mechanisms.TYPES)
 # The angle of a second crank [rad].
 HELD = 1.25
@@ -63,6 +61,7 @@ def difference(linkage, output, one, other):
     return gap - 2 * math.pi * np.round(gap / (2 * math.pi)) if turned(linkage, output) else gap
 
 
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('kind', [kind for kind in KINDS
                                   if len(mechanisms.create(kind).inputs) == 1])
 @pytest.mark.parametrize('values', [2, 40], ids=['floats', 'arrays'])
@@ -94,6 +93,7 @@ def _miss(measure, theta, output, value):
     return abs(float(error)), truth.sensitivity[i] + 0.5 * np.spacing(abs(value))
 
 
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('kind', KINDS)
 def test_answers_ascend_in_one_turn_and_give_the_value_back(kind):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(3)
@@ -209,6 +209,7 @@ def test_a_slot_through_the_pivot_always_passes_on_the_whole_force():
     assert offset.transmission_angles(1.0)['L'] == pytest.approx(math.atan2(slide, 30.0))
 
 
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('kind', KINDS)
 def test_every_joint_that_closes_a_loop_has_a_transmission_angle_between_its_bars(kind):
     linkage = mechanisms.create(kind)

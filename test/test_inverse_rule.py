@@ -180,3 +180,15 @@ def test_the_jacobian_has_a_row_for_each_output():
     slopes = [np.subtract(*(arm.solve(np.add(pose, side * step * e))['P'] for side in (1, -1)))
               / (2.0 * step) for e in np.eye(2)]
     np.testing.assert_allclose(answer.jacobian, np.transpose(slopes), rtol=1e-6)
+
+
+def test_next_to_an_extreme_a_pose_is_found_with_another_input_held_too():
+    linkage = mechanisms.create('custom', joints=[
+        'A ground 0 0', 'E ground 0 1.3553388288843333', 'F crank A 0.7488443055072416',
+        'G dyad E F 0.8982826140105455 1.5047771372371597 right',
+        'H crank F 1.6646414933875167 zero A called drive', 'M line G E -0.8779779844163468'])
+    # The extreme is 1e-9 rad away, and the closed form leads there.
+    at, held = 1.5708057357023772, 0.25
+    value = linkage.solve((at, held))['M'][0]
+    solutions = linkage.inverse(('M.x', 'drive')).all((value, held))
+    assert min((abs(each.inputs[0] - at) for each in solutions), default=1.0) < 1e-10

@@ -26,10 +26,8 @@ from ...cache import cached
 from ...formula.expression import argument, dimension, greater, nearest_integer, Real, real, where
 from ...formula.program import CompiledFunction, Program
 
-# Errors of a solution, relative to rounding of outputs, and of inputs times rates: one rounding,
-# which no step betters, and the largest that is accepted.
-ROUNDED = 2.0 ** -53
-ACCEPTED = 64.0 * ROUNDED
+# The largest error of a solution, relative to rounding of outputs, and of inputs times rates.
+ACCEPTED = 64.0 * 2.0 ** -53
 
 # The dimension of this name is the unit of lengths [m]; those of inputs' names are their units.
 LONGEST_BAR = '[longest bar]'

@@ -5,9 +5,10 @@
 From candidates to solutions: Newton's method on the forward formula, and one judgement.
 
 A candidate is a solution if the outputs there have their values up to rounding: that of the
-outputs, and that of the inputs times their rates. `refine` works on floats, `refine_arrays` does
-the same on arrays, both with one code of a step. Where a bracket is known, Newton's method stays
-inside it.
+outputs, and that of the inputs times their rates. Steps end where one no longer improves: what
+rounding explains may still be many last digits of a small value. `refine` works on floats,
+`refine_arrays` does the same on arrays, both with one code of a step. Where a bracket is known,
+Newton's method stays inside it.
 """
 
 from __future__ import annotations
@@ -17,15 +18,13 @@ from typing import List, Optional, Sequence, Union
 
 import numpy as np
 
-from .problem import ACCEPTED, InverseProblem, ROUNDED, Row
+from .problem import ACCEPTED, InverseProblem, Row
 from .segments import Bracket
 from ..motion.curves import HALVINGS
 from ..tolerances import ONE, SINGULAR
 
 # A larger error [sizes], or a longer step [rad, sizes], leads to another solution.
 FAR = 0.1
-# Steps of arrays: from samples of a segment, three reach rounding nearly everywhere.
-ARRAY_STEPS = 3
 
 
 def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Bracket, Row]
@@ -41,17 +40,20 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
                   for ulps in (2.0, -2.0, 16.0, -16.0) for by in range(n))
         inputs = next((x for x in around if at(*x, *values)[0] < math.inf), inputs)
         best = at(*inputs, *values)
+    following = best[2 + n:2 + 2 * n]
     for _ in range(HALVINGS):
-        following = best[2 + n:2 + 2 * n]
-        if best[1] <= ROUNDED or not best[0] <= FAR:
-            break
-        if not sum([abs(x - y) / size for x, y, size in zip(
-                following, inputs, problem.sizes)]) <= FAR:
+        if following == inputs or not (best[0] <= FAR and sum([
+                abs(x - y) / size for x, y, size in zip(
+                    following, inputs, problem.sizes)]) <= FAR):
             break
         trial = at(*following, *values)
-        if not trial[0] < best[0]:
+        if trial[0] < best[0]:
+            best, inputs, following = trial, following, trial[2 + n:2 + 2 * n]
+        elif best[1] <= ACCEPTED:
             break
-        best, inputs = trial, following
+        else:
+            # Next to an extreme a whole step leads too far.
+            following = tuple([0.5 * (x + y) for x, y in zip(following, inputs)])
     return best[2 + 2 * n:] if best[1] <= ACCEPTED else None
 
 
@@ -64,12 +66,13 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Br
     best, best_x = (math.inf, math.inf), x
     for _ in range(HALVINGS):
         trial = at(x, *others, *values)
-        better = trial[0] < best[0]
-        if better:
+        if trial[0] < best[0]:
             best, best_x = trial, x
-        if best[1] <= (ROUNDED if better else ACCEPTED):
+        elif best[1] <= ACCEPTED:
             break
         error, following = trial[2 + place], trial[2 + n]
+        if following == x:
+            break
         low, high = (x, high) if error * sign < 0.0 else (low, x)
         x = following if low < following < high else 0.5 * (low + high)
         if x in (low, high):
@@ -100,12 +103,15 @@ def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.nd
         low, high, inputs, far = *candidates[:2], candidates[2:3], math.inf
     best = over(*inputs.clip(low, high), *values)
     left = ~np.isfinite(best).all(axis=0)
-    for _ in range(ARRAY_STEPS):
-        again = np.flatnonzero((best[1] > ROUNDED) & (best[0] <= far))
-        x = best[2 + n:2 + 2 * n].clip(low, high)
-        trial = over(*x[:, again], *values[:, again])
+    again = np.flatnonzero((best[0] > 0.0) & (best[0] <= far))
+    for _ in range(HALVINGS):
+        if not len(again):
+            break
+        x = best[2 + n:2 + 2 * n].clip(low, high)[:, again]
+        trial = over(*x, *values[:, again])
         better = trial[0] < best[0, again]
-        best[:, again[better]] = trial[:, better]
+        again = again[better]
+        best[:, again] = trial[:, better]
     # What is left is refined one by one.
     left = (left | ~(best[1] <= ACCEPTED)) & ~(best[0] > far)
     solutions = np.where(best[1] <= ACCEPTED, best[2 + 2 * n:], math.nan)
