@@ -14,6 +14,8 @@ from domains import Domain
 from hypothesis import settings
 import pytest
 
+# Until all tests are collected there is no garbage worth a search.
+gc.disable()
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 # A failure prints how to repeat it; a run depends on no earlier one.
@@ -44,6 +46,7 @@ def pytest_collection_finish():
     gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
+    gc.enable()
 
 
 @pytest.fixture(scope='module')
