@@ -13,7 +13,7 @@ from __future__ import annotations
 from functools import partial
 from itertools import product
 import math
-from typing import Iterator, List, Sequence, Set, Tuple
+from typing import Iterator, List, Optional, Sequence, Set, Tuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from .formulas import Formulas
 from .names import comment, filled, template
 from .series import series
 from ..formula.program import Program
-from ..linkage import InverseLinkage, Mode
+from ..linkage import Inverse, InverseLinkage, Mode
 from ..scene import SceneMechanism
 
 # Samples of each part of the reach, for the assembly modes that are there.
@@ -150,7 +150,8 @@ class Tables:
 
     def _turn(self, sides: Tuple[Sequence[Axis], Sequence[Axis]]) -> float:
         """Return after how much of the only input all that a pose has is the same, or infinity."""
-        if not any(map(self._is_searched, sides)):
+        inverses = [*filter(None, map(self._inverse, sides))]
+        if all(inverse.closed for inverse in inverses):
             return math.inf
         return period(self.linkage, [
             *(output for output, _ in loads(self.mechanism) if sides[0]),
@@ -159,34 +160,34 @@ class Tables:
 
     def _turns(self, axes: Sequence[Axis], turn: float) -> List[float]:
         """Return after how much of each input the positions of axes are the same, or 0."""
-        counted = {i for i, _, _ in gears(self.linkage, axes).values()}
-        if self._is_searched(axes):
+        inverse = self._inverse(axes)
+        if inverse and not inverse.closed:
             return [turn if turn < math.inf else 0.0]
+        counted = {i for i, _, _ in gears(self.linkage, axes).values()}
         # Outputs may repeat earlier than the linkage.
-        inputs = self.linkage.inverse(tuple(each.output for each in axes)).inputs if (
-            len(counted) < len(axes)) else self.linkage.inputs
+        inputs = inverse.inputs if inverse else self.linkage.inputs
         return [input_.turn if input_.wraps and i not in counted else 0.0
                 for i, input_ in enumerate(inputs)]
 
     # --- inverses ---
 
-    def _is_searched(self, axes: Sequence[Axis]) -> bool:
-        """Return whether positions of axes give the inputs in no closed form."""
-        return len(gears(self.linkage, axes)) < len(axes) and not self.linkage.inverse(
-            tuple(each.output for each in axes)).closed
+    def _inverse(self, axes: Sequence[Axis]) -> Optional[Inverse]:
+        """Return the inverse of axes, or None if each counts an input."""
+        if len(gears(self.linkage, axes)) == len(axes):
+            return None
+        return self.linkage.inverse(tuple(each.output for each in axes))
 
     def _solutions(self, axes: Sequence[Axis], turn: float) -> Tuple[str, str]:
         """Return the name of the function for all inputs of outputs, and it, if it is new."""
-        outputs = tuple(each.output for each in axes)
-        if len(gears(self.linkage, axes)) == len(axes):
+        inverse, outputs = self._inverse(axes), tuple(each.output for each in axes)
+        if not inverse:
             return '0', ''
         name = '_'.join([f'{self.mechanism.name}_solutions', *(
             self._formulas.fields[output] for output in outputs)])
         if name in self._written:
             return name, ''
         self._written.add(name)
-        closed = self.linkage.inverse(outputs).closed
-        count, function = self._closed(name, closed, outputs) if closed else (
+        count, function = self._closed(name, inverse.closed, outputs) if inverse.closed else (
             self._series(name, outputs[0], turn))
         self.solutions = max(self.solutions, count)
         return name, function
