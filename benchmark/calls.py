@@ -64,7 +64,7 @@ def below(call, known):
     if method in KINDS:
         kind, all_names = KINDS[method]
         names = [*given[1:], *named.values(), all_names(linkage)][0]
-        pose, inputs = linkage.bound(kind, tuple(names)), linkage.each_input(given[0])
+        pose, inputs = linkage.compiled(kind, tuple(names)), linkage.each_input(given[0])
         if not any(map(np.ndim, inputs)) and not pose.shape:
             return 'code of a pose', partial(pose.at, *map(float, inputs))
         return 'code of an array', partial(pose.over, *inputs)

@@ -57,19 +57,13 @@ def measure(count, minutes):
         if time.monotonic() - start > 60.0 * minutes:
             break
         used += 1
-        asked = judged(linkage, rng)
-        while time.monotonic() - start < 60.0 * minutes:
-            try:
-                kind, (found, error) = next(asked)
-            except StopIteration:
-                break
-            except ValueError as refused:
-                assert 'do not determine' in str(refused) or 'does not move' in str(refused)
-                break
-            worst = max(worst, error)
-            for key, number in found.items():
-                if len(key) == 2:
-                    total[(kind, *key)] += number
+        try:
+            for kind, (found, error) in judged(linkage, rng):
+                worst = max(worst, error)
+                total.update({(kind, *key): number for key, number in found.items()
+                              if len(key) == 2})
+        except ValueError as refused:
+            assert 'do not determine' in str(refused) or 'does not move' in str(refused)
     return total, worst, used
 
 

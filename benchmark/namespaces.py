@@ -8,23 +8,21 @@ Arrays of poses by torch and JAX, beside numpy and machine code, on one core.
     python -m benchmark.namespaces               prints the table, within two minutes
     python -m benchmark.namespaces --document    writes it to docs/design/performance.md, too
 
-Besides what the library needs, it takes torch, JAX and llvmlite. Times are CPU times, medians of
-calls in turn; those of a first call, which compiles, are not in it.
+Besides what the library needs, it takes torch, JAX and llvmlite. Times are CPU times, the least
+of several calls; those of a first call, which compiles, are not in it.
 """
 
 from collections import namedtuple
 import os
 from pathlib import Path
-import time
 
 from linkage_ros import mechanisms, scene
 import numpy as np
 
 from . import document
+from .calls import times
 
 SIZES = 1_000, 100_000, 1_000_000
-# How long each method runs [s], and how many calls at most.
-SLICE, CALLS = 0.5, 50
 Task = namedtuple('Task', 'title linkage requested ends')
 # How many poses a method has memory for: torch keeps every operation for its gradients.
 Method = namedtuple('Method', 'title package make most', defaults=[max(SIZES)])
@@ -79,19 +77,8 @@ def measured(task, size):
     """Return the CPU time of each method [ns per pose] as text."""
     rng = np.random.default_rng(1)
     given = [rng.uniform(-task.ends, task.ends, size) for _ in task.linkage.inputs]
-    return [f'{1e9 / size * timed(method.make(task, given)):.0f}' if size <= method.most else '-'
-            for method in METHODS]
-
-
-def timed(call):
-    """Return the median CPU time of a call [s]."""
-    call()
-    found, end = [], time.process_time() + SLICE
-    while len(found) < 3 or time.process_time() < end and len(found) < CALLS:
-        start = time.process_time()
-        call()
-        found.append(time.process_time() - start)
-    return np.median(found)
+    return [f'{1e3 / size * times([method.make(task, given)])[0]:.0f}'
+            if size <= method.most else '-' for method in METHODS]
 
 
 def main():

@@ -212,7 +212,7 @@ TWO_TURNS = custom('O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'D crank Q 1 g
         (mechanisms.create('jansen'), 'G.x', near + turns * math.tau, far + turns * math.tau)
         for near, far in ((3.1, 3.2), (3.2, 3.1)) for turns in (0, 2, -3))])
 def test_an_input_is_followed_in_its_turn_and_past_its_end(linkage, output, near, far):
-    value, _ = linkage.checked((output,)).at(far)
+    value, _ = linkage.compiled('checked', (output,)).at(far)
     assert linkage.follow(output, value, near)[0] == pytest.approx(far, abs=1e-12)
 
 

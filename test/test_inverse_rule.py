@@ -62,7 +62,7 @@ def test_special_linkages_have_each_pose_and_no_other(special):
         mechanisms.create('custom', joints=lines, **numbers)
     first, = linkage.inputs
     for output in outputs:
-        pose, size = linkage.checked((output,)), (
+        pose, size = linkage.compiled('checked', (output,)), (
             1.0 if linkage.is_angle(output) else linkage.longest)
         values, rates = pose.over(inputs)
         # An output that stands still tells no input.
@@ -143,7 +143,7 @@ def test_the_end_of_a_long_period_has_a_pose_a_period_away_too(ratio):
     linkage = mechanisms.create('custom', joints=[
         'O ground 0 0', 'Q ground 4 0', 'A crank O 1', f'D crank Q 2 geared crank {ratio} 0',
         'B dyad A D 2.2 2 left'])
-    pose, (first,) = linkage.checked(('B.x',)), linkage.inputs
+    pose, (first,) = linkage.compiled('checked', ('B.x',)), linkage.inputs
     for end in (end for arc in linkage.reach() for end in arc):
         for answer in linkage.input_for('B.x', pose.at(end)[0]).tolist():
             assert all(math.isfinite(pose.at(answer + turn)[0]) for turn in (

@@ -158,7 +158,8 @@ def test_what_cannot_be_is_refused_in_a_sentence(strict):
 def questions(kind, count):
     """Return values of the outputs and inputs beside those that they are from."""
     given, outputs = inputs(kind, count), INVERSES[kind]
-    rng, values = np.random.default_rng(1), linkage(kind).checked(outputs).searched(*given)
+    rng = np.random.default_rng(1)
+    values = linkage(kind).compiled('checked', outputs).searched(*given)
     near = [x + 0.2 * each.size * rng.uniform(-1.0, 1.0, count)
             for x, each in zip(given, linkage(kind).inputs)]
     return list(values[:len(outputs)]), near

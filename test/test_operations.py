@@ -29,7 +29,7 @@ TRUTH = {
     'less': lambda x, y: gmpy2.mpfr(x < y), 'less_equal': lambda x, y: gmpy2.mpfr(x <= y),
     'where': lambda c, x, y: x if c < 0 else y,
     'root': lambda x, t: gmpy2.sqrt(x) if x > 0 else gmpy2.mpfr(0) if x >= -abs(t) else NAN,
-    'gated': lambda x, margin, t: x if margin >= -abs(t) else NAN,
+    'valid_where': lambda x, margin, t: x if margin >= -abs(t) else NAN,
 }
 # Ulps: of the C library, of numpy over arrays, of `elementary`; all else is rounded correctly.
 ELEMENTARY = {'sin': (1.0, 4.0, 1.0), 'cos': (1.0, 4.0, 1.0), 'atan2': (1.0, 4.0, 2.0)}
@@ -46,7 +46,7 @@ def applied(name, operands):
     """Return an operation on operands as a number; what it asks of them is seen to."""
     if name == 'where':
         operands = [operands[0] < 0.0, *operands[1:]]
-    elif name in ('root', 'gated'):
+    elif name in ('root', 'valid_where'):
         operands = [*operands[:-1], abs(operands[-1])]
     done = expression.operation(name, *operands)
     return expression.where(done, 1.0, 0.0) if name.startswith('less') else done
@@ -116,7 +116,7 @@ def c_library(tmp_path_factory):
             operands = [f'x[{i}][n]' for i in range(arity(name))]
             if name == 'where':
                 operands[0] = f'({operands[0]} < 0)'
-            elif name in ('root', 'gated'):
+            elif name in ('root', 'valid_where'):
                 operands[-1] = f'fabs{f}({operands[-1]})'
             code = row.c.replace('{f}', f).replace('{name}', 'lkr').format(*operands)
             text.append(f'void do_{name}(long size, const {kind} **x, {kind} *out) '
@@ -213,7 +213,7 @@ def test_the_derivative_is_what_differences_tend_to(name):
     count, h = arity(name), gmpy2.mpfr(2) ** -80
     arguments = [expression.argument(i) for i in range(count)]
     rates = dict(enumerate(rng.uniform(-2.0, 2.0, count).tolist()))
-    if name in ('root', 'gated'):  # a tolerance is a constant
+    if name in ('root', 'valid_where'):  # a tolerance is a constant
         rates[count - 1] = 0.0
     made = expression.derivative(applied(name, arguments), rates, {})
     if name in WITHOUT_RATE:
@@ -253,6 +253,13 @@ def test_a_sum_keeps_every_digit_however_much_cancels():
             terms[-1] = -math.fsum(terms[:-1]) * (1.0 + rng.integers(-2, 3) * 2.0 ** -52)
             found = program.evaluate(node, dict(zip(names, terms.tolist())), {})
             assert found == math.fsum(terms)
+
+
+def test_a_sum_of_two_terms_costs_one_operation_and_zeros_cost_none():
+    a, b = map(expression.dimension, 'ab')
+    for terms in ((a, b), (a, 0.0, b)):
+        listed = program.in_order([expression.exact_sum(*terms)])
+        assert [x.op for x in listed if x.operands] == ['add']
 
 
 def test_all_back_ends_read_all_operands():

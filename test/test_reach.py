@@ -136,3 +136,13 @@ def test_the_lever_returns_quickly_by_the_textbook_ratio():
     stroke = math.asin(80 / 150)
     expected = (math.pi + 2 * stroke) / (math.pi - 2 * stroke)
     assert forth / (2 * math.pi - forth) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize('ground, crank, line', [
+    (0.3, 0.2, 'B dyad A Q 0.2 0.7 left'), (0.2, 0.7, 'B dyad A Q 0.3 0.2 left'),
+    (0.6, 0.4, 'B dyad A Q 0.1 0.1 left'), (0.4, 0.2, 'B slot Q A 0.6 out 0.1')])
+def test_a_linkage_that_fits_in_one_pose_alone_has_no_reach(ground, crank, line):
+    # In floats the lengths differ by rounding from those that just fit, to either side.
+    single = mechanisms.create('custom', joints=(
+        'O ground 0 0', f'Q ground {ground} 0', f'A crank O {crank}', line))
+    assert single.reach() == []

@@ -183,6 +183,16 @@ def test_the_pairs_of_a_walker_pale_from_the_first_to_the_last(tmp_path):
     assert brightness[0] == brightness[1] < brightness[2] == brightness[3] < brightness[4]
 
 
+def test_a_crank_on_a_moving_link_draws_no_circle():
+    toe = mechanism('custom', joints=(
+        'O ground 0 0', 'F crank O 0.4', 'K rigid O F 0.07 0.35 right', 'A crank K 0.05 zero F',
+        'B dyad A F 0.35 0.06 right'))
+    made = picture_of(toe, trace='none')
+    circle, = (line.get_xydata() @ (1, 1j) for line in made.figure.axes[0].lines
+               if line.get_linestyle() == '--')
+    assert np.abs(circle) == pytest.approx(0.4, abs=1e-12)
+
+
 def segments_of(picture):
     trace = next(layer for layer in picture.panels[0].moving if isinstance(layer, layers.Trace))
     return [np.asarray(path.vertices) for path in trace.lines.get_paths()]

@@ -156,7 +156,6 @@ def test_plates_are_triangles_of_bars_that_are_not_flat(name):
 def test_cranks_are_bars_that_inputs_turn_and_marks_are_below_the_ground():
     toe = mechanisms.create('custom', joints=CASSIE)
     assert shapes.cranks(toe) == [('O', 'F'), ('K', 'A')]
-    assert shapes.cranks(toe, 'ground') == [('O', 'F')]
     assert shapes.cranks(MACHINES['rack and its image']().linkage) == []
     engine = mechanism(joints=ENGINE).linkage
     height = engine.longest / 15.0

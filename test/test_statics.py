@@ -104,6 +104,7 @@ def test_what_is_not_loaded_needs_no_effort_even_at_a_dead_point():
     assert not np.isfinite(stretched.effort(0.0, {'AB': 1.0}))
     assert stretched.effort(0.0, {'B': (0.0, 0.0), 'AB': 0.0, 'A': (0.0, 4.0)}) == -4.0
     assert stretched.effort(0.0, {}) == 0.0
+    assert np.array_equal(stretched.effort(np.zeros((2, 3)), {}), np.zeros((2, 3, 1)))
 
 
 def test_the_effort_of_an_output_asks_for_one_input_and_an_output_that_moves():
@@ -115,10 +116,20 @@ def test_the_effort_of_an_output_asks_for_one_input_and_an_output_that_moves():
             mechanisms.create('four_bar').output_effort(output, 0.4, 1.0)
 
 
+class Loud(str):
+    """A text that prints in its own way, as a member of an enum does."""
+
+    def __str__(self):
+        return f'Loud.{super().__str__()}'
+
+
 def test_the_names_of_loads_are_texts_of_any_class():
     bars = mechanisms.create('four_bar')
-    assert bars.effort(0.4, {np.str_('B'): (0.0, 1.0), np.str_('QB'): 2.0}) == bars.effort(
-        0.4, {'B': (0.0, 1.0), 'QB': 2.0})
+    for text in (np.str_, Loud):
+        assert bars.effort(0.4, {text('B'): (0.0, 1.0), text('QB'): 2.0}) == bars.effort(
+            0.4, {'B': (0.0, 1.0), 'QB': 2.0})
+    with pytest.raises(ValueError, match='the load on the joint B must be a force'):
+        bars.effort(0.4, {Loud('B'): 3.0})
 
 
 @pytest.mark.parametrize('output', ['QB', 'P.x', 'B.y', 'distance(O,B)', 'angle(O,B)'])

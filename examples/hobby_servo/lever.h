@@ -118,7 +118,7 @@ static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
     return x >= -tolerance ? 0 : LKR_NAN;
 }
 
-static inline lkr_real lkr_gated(lkr_real x, lkr_real margin, lkr_real tolerance)
+static inline lkr_real lkr_valid_where(lkr_real x, lkr_real margin, lkr_real tolerance)
 {
     return margin >= -tolerance ? x : LKR_NAN;
 }
@@ -679,14 +679,14 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     p->angle_crank = x0;
     by_crank->A_x = -v18;
     by_crank->A_y = v13;
-    by_crank->angle_crank = lkr_gated(1.0f, fabsf(x0), 0.0f);
+    by_crank->angle_crank = lkr_valid_where(1.0f, fabsf(x0), 0.0f);
     /* L slot Q A e out max(1.8*b,a+b) */
     const float v31 = v9 * v9;
     const float v32 = k30 * v31;
     const float v33 = k27 + v32;
-    const float v40 = lkr_gated(v33, (v31 + k36) - 7.888609e-31f, 0.0f);
-    const float v41 = lkr_gated(-((k22 * v7) * v9), v40, 0.0f);
-    const float v45 = lkr_gated(k26 + (k22 * v31), v40, 0.0f);
+    const float v40 = lkr_valid_where(v33, (v31 + k36) - 7.888609e-31f, 0.0f);
+    const float v41 = lkr_valid_where(-((k22 * v7) * v9), v40, 0.0f);
+    const float v45 = lkr_valid_where(k26 + (k22 * v31), v40, 0.0f);
     const float v48 = sqrtf((v41 * v41) + (v45 * v45));
     const float v49 = v41 / v48;
     const float v56 = v45 / v48;

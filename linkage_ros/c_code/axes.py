@@ -17,6 +17,8 @@ from ..words import listed
 # Relative size of a Jacobian below which outputs do not determine the inputs, and the poses in
 # which it is looked at.
 DEPENDENT, SPREAD = 1e-9, 200
+# Part of a turn that is rounding.
+ALIKE = 1e-12
 # States that are tried for a first pose.
 SAMPLES = 4096
 
@@ -133,11 +135,34 @@ def check_inverse(mechanism: SceneMechanism, axes: Sequence[Axis]) -> None:
         raise ValueError(f'{names[0]} of {mechanism.name} moves nowhere')
 
 
-def pieces(linkage: Mechanism, output: str) -> List[Tuple[float, ...]]:
-    """Return parts of the reach in which an axis only rises or falls: inputs, and outputs."""
+def pieces(linkage: Mechanism, output: str, turn: float = math.inf) -> List[Tuple[float, ...]]:
+    """Return parts of a turn in which an output only rises or falls: inputs, and outputs."""
     # In a piece an angle changes by half a turn at most, so that its gaps are known.
     parts, _ = linkage.monotone(output, math.pi if linkage.is_angle(output) else math.inf)
-    return [part for part in parts if part[2] != part[3]]
+    end = linkage.inputs[0].low + turn * (1.0 - ALIKE)
+    return [part for part in parts if part[2] != part[3] and part[0] < end]
+
+
+def period(linkage: Mechanism, outputs: Sequence[str]) -> float:
+    """Return after how much of the only input outputs repeat, or infinity."""
+    input_, = linkage.inputs
+    if not input_.wraps:
+        return math.inf
+    inputs = np.concatenate([
+        np.linspace(low, high, SPREAD)[1:-1] for low, high in linkage.reach()])
+    pose = linkage.posed((), tuple(outputs))
+
+    def places(shift: float) -> np.ndarray:
+        """Return the outputs later, in sizes, and angles as directions."""
+        return np.concatenate([
+            [np.cos(row), np.sin(row)] if linkage.is_angle(output) else [row / linkage.longest]
+            for output, row in zip(outputs, pose.over(inputs + shift))])
+
+    now = places(0.0)
+    # Gears make them repeat earlier than the linkage.
+    return next((turn for turn in (
+        input_.turn / count for count in range(round(input_.speed * input_.period), 1, -1))
+        if (np.abs(places(turn) - now) <= DEPENDENT).all()), input_.turn)
 
 
 def loads(mechanism: SceneMechanism) -> Iterator[Tuple[str, float]]:

@@ -32,7 +32,9 @@ def series(linkage: Mechanism, output: str, part: Sequence[float], single: bool
     unit = linkage.inputs[0].size
     low, high, first, last = np.divide(part, [unit, unit, 1.0, 1.0])
     pose, is_angle = linkage.posed((), (output,)), linkage.is_angle(output)
-    size, terms, close = 1.0 if is_angle else linkage.longest, TERMS[single], CLOSE[single]
+    size, terms = 1.0 if is_angle else linkage.longest, TERMS[single]
+    # A fast link's angle has the rounding of the input, times its speed.
+    close = max(CLOSE[single], linkage.inputs[0].speed * CLOSE[False])
     nodes = chebyshev.chebpts1(terms)
     # Ever denser towards both ends.
     checked = np.tanh(np.linspace(-18.0, 18.0, 129))

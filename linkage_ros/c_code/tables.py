@@ -17,7 +17,7 @@ from typing import Iterator, List, Sequence, Set, Tuple
 
 import numpy as np
 
-from .axes import Axis, gears, loads, pieces, start
+from .axes import Axis, gears, loads, period, pieces, start
 from .code import Block, Code, indented
 from .formulas import Formulas
 from .names import comment, filled, template
@@ -67,7 +67,8 @@ class Tables:
         `sides` are the actuators and the joints; an inverse alone has no actuators, and a `tag`
         at the end of its names.
         """
-        names, functions = zip(*map(self._solutions, sides))
+        turn = self._turn(sides)
+        names, functions = zip(*(self._solutions(axes, turn) for axes in sides))
         row, inputs = self._code.row, [*zip(self.mechanism.inputs.values(), self._units)]
         sweeps = ['{ -LKR_FAR, LKR_FAR }' if tag or not settings.ends else
                   row(np.divide(settings.ends, unit)) for settings, unit in inputs]
@@ -78,7 +79,7 @@ class Tables:
             'solutions': '\n'.join(filter(None, functions)),
             'at': '\n'.join(indented(self._at(sides))),
             'actuators': self._rows(sides[0]), 'joints': self._rows(sides[1]),
-            'turns': ', '.join(row(self._turns(axes)) for axes in sides),
+            'turns': ', '.join(row(self._turns(axes, turn)) for axes in sides),
             'units': row(self._units), 'start': row(np.divide(
                 start(self.mechanism), self._sizes)),
             'sweeps': ', '.join(sweeps)})
@@ -147,9 +148,20 @@ class Tables:
             rows.append(f'{{ {scale}, {turn}, {i}, {", ".join(line)} }}')
         return ', '.join(rows) or '{ 0, 0, -1, 0, 0 }'
 
-    def _turns(self, axes: Sequence[Axis]) -> List[float]:
+    def _turn(self, sides: Tuple[Sequence[Axis], Sequence[Axis]]) -> float:
+        """Return after how much of the only input all that a pose has is the same, or infinity."""
+        if not any(map(self._is_searched, sides)):
+            return math.inf
+        return period(self.linkage, [
+            *(output for output, _ in loads(self.mechanism) if sides[0]),
+            *(each.output for axes in sides for k, each in enumerate(axes)
+              if k not in gears(self.linkage, axes))])
+
+    def _turns(self, axes: Sequence[Axis], turn: float) -> List[float]:
         """Return after how much of each input the positions of axes are the same, or 0."""
         counted = {i for i, _, _ in gears(self.linkage, axes).values()}
+        if self._is_searched(axes):
+            return [turn if turn < math.inf else 0.0]
         # Outputs may repeat earlier than the linkage.
         inputs = self.linkage.inverse(tuple(each.output for each in axes)).inputs if (
             len(counted) < len(axes)) else self.linkage.inputs
@@ -158,7 +170,12 @@ class Tables:
 
     # --- inverses ---
 
-    def _solutions(self, axes: Sequence[Axis]) -> Tuple[str, str]:
+    def _is_searched(self, axes: Sequence[Axis]) -> bool:
+        """Return whether positions of axes give the inputs in no closed form."""
+        return len(gears(self.linkage, axes)) < len(axes) and not self.linkage.inverse(
+            tuple(each.output for each in axes)).closed
+
+    def _solutions(self, axes: Sequence[Axis], turn: float) -> Tuple[str, str]:
         """Return the name of the function for all inputs of outputs, and it, if it is new."""
         outputs = tuple(each.output for each in axes)
         if len(gears(self.linkage, axes)) == len(axes):
@@ -170,13 +187,13 @@ class Tables:
         self._written.add(name)
         closed = self.linkage.inverse(outputs).closed
         count, function = self._closed(name, closed, outputs) if closed else (
-            self._series(name, *outputs))
+            self._series(name, outputs[0], turn))
         self.solutions = max(self.solutions, count)
         return name, function
 
-    def _series(self, name: str, output: str) -> Tuple[int, str]:
+    def _series(self, name: str, output: str, turn: float) -> Tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""
-        code, monotone = self._code, pieces(self.linkage, output)
+        code, monotone = self._code, pieces(self.linkage, output, turn)
         rows = [f'    {{ {", ".join(map(code.literal, numbers))}, '
                 f'{code.row(np.round(terms, 17))} }},' for part in monotone
                 for numbers, terms in series(self.linkage, output, part, code.single)]

@@ -203,9 +203,9 @@ def root(x: Real, tolerance: Real) -> Real:
     return operation('root', x, real(tolerance))
 
 
-def gated(x: Real, margin: Real, tolerance: Number) -> Real:
+def valid_where(x: Real, margin: Real, tolerance: Number) -> Real:
     """Return x where the margin is not below zero by more than the tolerance, else NaN."""
-    return operation('gated', x, margin, real(tolerance))
+    return operation('valid_where', x, margin, real(tolerance))
 
 
 def arctangent(y: Real, x: Real) -> Real:

@@ -93,7 +93,7 @@ class Finite:
         needs = reduce(or_, [conditions for _, conditions in operands], 0)
         if x.op == 'argument':
             return _finite(x), self._bit(abs(x) < math.inf)
-        if x.op in ('root', 'gated'):
+        if x.op in ('root', 'valid_where'):
             *_, margin, tolerance = values
             value, reached = _root(margin) if x.op == 'root' else values[0], -tolerance <= margin
             return (value, needs | self._bit(reached)) if reached.varies else (

@@ -57,7 +57,7 @@ def _root(x: Any, tolerance: Any) -> Any:
     return np.where((x > 0.0) | (x >= -tolerance), np.sqrt(np.maximum(x, 0.0)) + 0.0, np.nan)
 
 
-def _gated(x: Any, margin: Any, tolerance: Any) -> Any:
+def _valid_where(x: Any, margin: Any, tolerance: Any) -> Any:
     return np.where(margin >= -tolerance, x, np.nan)
 
 
@@ -74,11 +74,11 @@ def _sum_error_in_llvm(b: Any, x: Any, y: Any) -> Any:
 
 
 def _root_in_llvm(b: Any, x: Any, tolerance: Any) -> Any:
-    reached = _gated_in_llvm(b, x.type(0.0), x, tolerance)
+    reached = _valid_where_in_llvm(b, x.type(0.0), x, tolerance)
     return b.select(b.fcmp_ordered('>', x, x.type(0.0)), b.call_by_name('llvm.sqrt', x), reached)
 
 
-def _gated_in_llvm(b: Any, x: Any, margin: Any, tolerance: Any) -> Any:
+def _valid_where_in_llvm(b: Any, x: Any, margin: Any, tolerance: Any) -> Any:
     return b.select(b.fcmp_ordered('>=', margin, b.fneg(tolerance)), x, x.type(math.nan))
 
 
@@ -145,8 +145,9 @@ OPERATIONS = {row.name: row for row in (
     Operation('root', '(sqrt({0}) if {0} > 0.0 else 0.0 if {0} >= -{1} else nan)', _root,
               _root_in_llvm, '{name}_root({}, {})', lambda do, n, dx, _: dx / (2.0 * n)),
     # A value where a margin is at least -tolerance, else NaN.
-    Operation('gated', '({0} if {1} >= -{2} else nan)', _gated, _gated_in_llvm,
-              '{name}_gated({}, {}, {})', lambda do, n, dx, *_: do('gated', dx, *n.args[1:])),
+    Operation('valid_where', '({0} if {1} >= -{2} else nan)', _valid_where, _valid_where_in_llvm,
+              '{name}_valid_where({}, {}, {})',
+              lambda do, n, dx, *_: do('valid_where', dx, *n.args[1:])),
 )}
 # Piecewise constant operations.
 WITHOUT_RATE = frozenset(row.name for row in OPERATIONS.values() if row.rate is None)

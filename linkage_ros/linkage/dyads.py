@@ -133,7 +133,7 @@ class Dyads:
         self.parts: Dict[str, Part] = {}
         self.ground, self.size, self.near, self.farthest = ground, size, near, size
         # The body with which each joint was placed: other bodies turn relative to it.
-        self.home: Dict[str, str] = {}
+        self.placed_on: Dict[str, str] = {}
         self.pins, self.slides, self.motors = list(pins), list(slides), list(motors)
 
     def take_apart(self) -> None:
@@ -209,7 +209,7 @@ class Dyads:
     def name(self, place: complex, body: str, line: str) -> str:
         """Add the line that places a joint, and return the joint's name."""
         name = self.new_name(place, body)
-        self.home[name] = body
+        self.placed_on[name] = body
         self.on[body][name] = place
         for pin in self.pins:
             if body in pin and abs(pin[body] - place) < self.near:

@@ -15,7 +15,7 @@ import re
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
 
 from .geometry.builder import Builder
-from .geometry.planar import Arm, gated_by, Limit
+from .geometry.planar import Arm, Limit, valid_within
 from .geometry.spatial import Vector
 from .text.design import Design
 from ..cache import Cache, cached
@@ -25,13 +25,13 @@ from ..formula.expression import (
     Complex,
     derivative,
     dimension,
-    gated,
     Number,
     Real,
     real,
     spin,
     square_root,
     unknown,
+    valid_where,
 )
 from ..formula.program import in_order, Program
 
@@ -66,7 +66,7 @@ class LinkPoint(NamedTuple):
 Points = Tuple[Union[str, LinkPoint], ...]
 
 
-class Structure:
+class LinkageFormulas:
     """Formulas of a design with its branches, which all its mechanisms share."""
 
     def __init__(self, design: Design, branches: Mapping[str, Any]):
@@ -121,13 +121,13 @@ class Structure:
 
     def _velocities(self, names: Names, by: int = 0) -> List[Real]:
         known: Dict[Real, Real] = {}
-        return [self._gated_rate(derivative(part, {by: 1.0}, known), part)
+        return [self._rate_where_valid(derivative(part, {by: 1.0}, known), part)
                 for part in self._points(names)]
 
-    def _gated_rate(self, rate: Real, value: Real) -> Real:
+    def _rate_where_valid(self, rate: Real, value: Real) -> Real:
         """Return a rate by one input, NaN where the value is NaN because of other inputs."""
         alone = len(self.built.inputs) == 1 and rate.value is None
-        return rate if alone or not value.varies else gated(rate, abs(value), real(0.0))
+        return rate if alone or not value.varies else valid_where(rate, abs(value), real(0.0))
 
     def _angles(self, names: Names) -> List[Real]:
         return [self.output(name) for name in names]
@@ -139,7 +139,7 @@ class Structure:
         if (arm := self._arm(name)) is None:
             joint, _, axis = name.rpartition('.')
             return self._points((joint,))[self.built.axes.index(axis)]
-        if self.turns(name):
+        if self.is_angle(name):
             return arctangent(arm.vector.y, arm.vector.x)
         return square_root(arm.square)
 
@@ -157,7 +157,7 @@ class Structure:
     def checked(self, names: Names) -> List[Real]:
         """Return outputs and their rates by each input, NaN unless all joints are assembled."""
         limits = [limit for limit in self.built.limits if limit.margin.varies]
-        return [*(gated_by(value, limits) for value in self._angles(names)),
+        return [*(valid_within(value, limits) for value in self._angles(names)),
                 *self.parts(((), (), names))]
 
     def _legs(self, points: Points, joints: Names, moving: Names) -> Program:
@@ -186,7 +186,7 @@ class Structure:
 
     def _rates(self, names: Names, by: int = 0) -> List[Real]:
         known = self._derivatives.setdefault(by, {})
-        return [self._gated_rate(rate, self.output(name))
+        return [self._rate_where_valid(rate, self.output(name))
                 for name, rate in zip(names, self._turning(names, {by: 1.0}, known))]
 
     def _point_accelerations(self, names: Names) -> List[Real]:
@@ -222,7 +222,7 @@ class Structure:
 
         def rate(name: str) -> Real:
             # In space a joint turns about its own axis: there is no direction in a plane.
-            if not self.turns(name) or name in self.built.driven or self.built.axes != 'xy':
+            if not self.is_angle(name) or name in self.built.driven or self.built.axes != 'xy':
                 return d(self.output(name))
             if arm := self._arm(name):
                 return turning(arm.vector)
@@ -263,7 +263,7 @@ class Structure:
         return output in self.built.joint_values or bool(ends) and len(set(ends)) == len(
             ends) and set(ends) <= self.built.points.keys()
 
-    def turns(self, output: str) -> bool:
+    def is_angle(self, output: str) -> bool:
         """Return whether an output is an angle, not a length."""
         if output in self.built.joint_values:
             return not self._slides(output)
@@ -286,11 +286,11 @@ def _vanishes(rate: Real) -> bool:
         elif x.op == 'where':
             zero[x] = parts[1] and parts[2]
         else:
-            zero[x] = x.value == 0.0 or x.op in ('gated', 'negative', 'divide') and parts[0]
+            zero[x] = x.value == 0.0 or x.op in ('valid_where', 'negative', 'divide') and parts[0]
     return zero[rate]
 
 
 @cached(32, shared=True)
-def structure_of(design: Design, branches: Tuple[Tuple[str, int], ...]) -> Structure:
+def formulas_of(design: Design, branches: Tuple[Tuple[str, int], ...]) -> LinkageFormulas:
     """Return the cached structure of a design with its branches."""
-    return Structure(design, dict(branches))
+    return LinkageFormulas(design, dict(branches))

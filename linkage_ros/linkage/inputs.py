@@ -22,7 +22,7 @@ ANGLE, LENGTH = 'angle', 'length'
 
 # The longest period that is computed as a whole, and the part of a longer one [turns; fewer where
 # a geared link is fast]. Of several inputs it is the product, which is the cost.
-MAX_COUNTED = 100
+MAX_PERIOD = 100
 # Greatest denominator of a gear ratio with a period, and greatest ratio.
 MOST_TURNS, FASTEST = 10 ** 6, 1000
 # Poses that are compared with those a period later.
@@ -95,7 +95,7 @@ class Input(NamedTuple):
         """Return a unit, a power of two [rad or m], in which all of it moves a turn at most."""
         return self.size if self.kind == LENGTH else 2.0 ** min(0, 3 - math.frexp(self.speed)[1])
 
-    def counted(self) -> Input:
+    def normalized(self) -> Input:
         """Return the same input in units of its step."""
         step = self.step
         return self._replace(low=self.low / step, high=self.high / step,

@@ -15,9 +15,9 @@ from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple, Type
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .formulas import LinkPoint, Points, structure_of
+from .formulas import formulas_of, LinkPoint, Points
 from .geometry.spatial import IN_SINGLE
-from .inputs import FASTEST, Input, is_periodic, MAX_COUNTED, MOST_TURNS, spread
+from .inputs import FASTEST, Input, is_periodic, MAX_PERIOD, MOST_TURNS, spread
 from .text import joint_lines
 from .text.arguments import checked_dimensions, numbers
 from .text.design import Design
@@ -57,7 +57,7 @@ class Kinematics:
         self.dimensions, self.branches = dict(dimensions), dict(branches)
         self.is_accelerated = accelerate
         # Equal linkages share it, including unpickled ones.
-        self.structure = structure_of(design, tuple(self.branches.items()))
+        self.structure = formulas_of(design, tuple(self.branches.items()))
         built = self.structure.built
         self.points, self.joints = tuple(built.points), tuple(built.joint_values)
         self.grounded, self.axes = built.grounded, built.axes
@@ -66,7 +66,7 @@ class Kinematics:
         self._evaluated: dict = {}
         evaluate_in_order(self.structure.constants, self.dimensions, self._evaluated)
         self._poses, self.cache = Cache(), Cache()
-        self.inputs = tuple(map(self._counted_input, range(len(built.inputs)), built.inputs))
+        self.inputs = tuple(map(self._with_limits, range(len(built.inputs)), built.inputs))
         own = {input_.name for input_ in self.inputs}
         self.geared = tuple(name for name in built.driven if name not in own)
         self.links = tuple(link._replace(zero=np.asarray(self.value(link.zero)).tolist())
@@ -239,15 +239,15 @@ class Kinematics:
         """Return the coordinates of all joints over one input; the others are spread."""
         inputs = spread([self._with_stroke(x) for x in self.structure.built.inputs], len(values))
         inputs[by] = values
-        return self.bound('points', self.points).searched(*inputs)
+        return self.compiled('points', self.points).searched(*inputs)
 
-    def _counted_input(self, by: int, input_: Input) -> Input:
+    def _with_limits(self, by: int, input_: Input) -> Input:
         """Return an input with the limits [rad or m] of all poses."""
         if not input_.turns:
             return self._with_stroke(input_)
         ratios = self._ratios(by)
         input_ = input_._replace(speed=max(1.0, *map(abs, ratios)))
-        most = input_.step * MAX_COUNTED ** (1.0 / len(self.structure.built.inputs))
+        most = input_.step * MAX_PERIOD ** (1.0 / len(self.structure.built.inputs))
         period = self._period(by, ratios, most)
         turns = period if period <= max(most, 1.0) else max(2.0, 2.0 * round(0.5 * most))
         return input_._replace(low=-math.pi * turns, high=math.pi * turns, period=period)
@@ -343,7 +343,7 @@ class Kinematics:
     def posed(self, points: Names = None, joints: Sequence[str] = (),
               rates: Sequence[str] = ()) -> CompiledFunction:
         """Return the code behind `function`."""
-        return self.bound('parts', self._requested(points, joints, rates))
+        return self.compiled('parts', self._requested(points, joints, rates))
 
     def _requested(self, *names: Any) -> Tuple[Tuple[str, ...], ...]:
         """Return names of points, joints and rates."""
@@ -382,7 +382,7 @@ class Kinematics:
     def is_angle(self, output: str) -> bool:
         """Return whether an output is an angle [rad], not a length [m]."""
         self.check_there(output)
-        return self.structure.turns(output)
+        return self.structure.is_angle(output)
 
     def moves(self, output: str, by: int = 0) -> bool:
         """Return whether an output depends on one of the inputs."""
@@ -424,13 +424,9 @@ class Kinematics:
         # A copy, since what a program needs beside the constants goes with the program.
         return program.bind(self.dimensions, dict(self._evaluated), self.is_accelerated)
 
-    def bound(self, kind: str, names: Any, *by: int) -> CompiledFunction:
-        """Return the code for quantities of one kind; see `Structure.program`."""
+    def compiled(self, kind: str, names: Any, *by: int) -> CompiledFunction:
+        """Return the code for quantities of one kind; see `LinkageFormulas.program`."""
         return self.bind(self.structure.program(kind, names, *by))
-
-    def checked(self, outputs: Tuple[str, ...]) -> CompiledFunction:
-        """Return the code for outputs and their rates, NaN unless all joints are assembled."""
-        return self.bound('checked', outputs)
 
     def _vectors(self, kind: str, theta: Inputs, points: Any, *by: int) -> dict:
         names, pose = self._ready(kind, points, *by)
@@ -467,7 +463,7 @@ class Kinematics:
         """Return the requested names and the function that computes them."""
         def make() -> Tuple[Tuple[str, ...], CompiledFunction]:
             names = self._names(kind, requested)
-            return names, self.bound(kind, names, *by)
+            return names, self.compiled(kind, names, *by)
 
         requested = _hashable(requested)
         return self._poses.get_or_make((kind, requested, *by), make)

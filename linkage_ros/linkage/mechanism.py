@@ -59,7 +59,7 @@ class Mechanism(Kinematics):
         Joint of the locus.
     is_accelerated : bool
         Whether compiled code solves arrays.
-    structure : Structure
+    structure : LinkageFormulas
         Formulas, for any dimensions.
     cache : Cache
         Cached results: reach, inverses, travels.
@@ -212,5 +212,5 @@ class Mechanism(Kinematics):
         size = self.inputs[0].step
         self.check_output(output)
         return [(low * size, high * size, *values) for low, high, *values
-                in segments_of(self, output, self._fixed(others)).pieces(most)], self.bound(
+                in segments_of(self, output, self._fixed(others)).pieces(most)], self.compiled(
                     'output', output)

@@ -14,7 +14,6 @@ from .. import scene
 from ..cli import add_scene, chosen, Parser, RequestError, run, within
 from ..linkage import Formula
 from ..optional import needs
-from ..scene.scene_mechanism import IN_SPACE
 from ..words import meant
 
 IMAGES, VIDEOS = ('.png', '.svg'), ('.gif', '.mp4')
@@ -73,8 +72,7 @@ def draw(args):
         from . import files
 
     for mechanism in mechanisms:
-        if mechanism.in_space:
-            raise RequestError(f'{mechanism.name} is {IN_SPACE}')
+        mechanism.check_planar()
     default = parts.DEFAULT_IN_MOTION if arguments.moving else parts.DEFAULT
     out, fps = arguments.out, arguments.fps or FPS
     with style.context('default', after_reset=True):
@@ -154,7 +152,7 @@ def degrees(text):
     except (ValueError, KeyError):
         raise argparse.ArgumentTypeError(f'must be a finite angle, such as 30, pi/6 or 30deg, '
                                          f'not {text}') from None
-    return math.degrees(value) if {'pi', 'deg'} & formula.words.keys() else value
+    return math.degrees(value) if formula.is_angle else value
 
 
 def words(text):

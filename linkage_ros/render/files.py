@@ -21,7 +21,7 @@ GIF_TICKS = 100  # the unit of time in a GIF is a hundredth of a second
 # Fonts as outlines, and names from a fixed salt: an SVG that is the same everywhere.
 SVG = {'svg.hashsalt': 'linkage_ros', 'svg.fonttype': 'path'}
 
-# Options of ffmpeg for files without time, place and mechanism.
+# Options of ffmpeg for files without time, place and machine.
 REPRODUCIBLE = ('-threads', '1', '-fflags', '+bitexact', '-flags:v', '+bitexact',
                 '-map_metadata', '-1')
 

@@ -95,7 +95,8 @@ def guides(axes, mechanism, cycle, unit):
     first_leg = cycle.course[:, 0]
     dashed = {'color': GREY, 'lw': 1.6 * unit, 'ls': (0, (6, 4)), 'zorder': 1}
     around = np.exp(1j * np.linspace(0.0, math.tau, 361))
-    for bar in shapes.cranks(linkage, 'ground'):
+    # A crank on a moving link draws no circle.
+    for bar in [bar for bar in shapes.cranks(linkage) if bar[0] in linkage.grounded]:
         centre, pin = first_leg[0, indices(linkage, bar)]
         circle = centre @ (1, 1j) + around * math.dist(centre, pin)
         axes.plot(circle.real, circle.imag, **dashed)

@@ -17,7 +17,7 @@ from typing import Any, Dict, List, Mapping, NamedTuple, Sequence, Set, Tuple
 
 import numpy as np
 
-from .spatial import Component, components, EXACT
+from .spatial import Component, components, EXACT, wrapped
 from .. import scene
 from ..linkage import short, theta_of
 from ..robot_model.robot import Robot, SLIDE
@@ -230,9 +230,8 @@ class _Loops:
             gaps[:, k] = np.max(np.abs(component.errors(pose)[0] - self._misfit), axis=1)
             read = component.read(pose)
             for name in here.keys() & component.cut_names:
-                off = here[name] - read[name]
-                gaps[:, k] = np.maximum(gaps[:, k], component.size * np.abs(
-                    off - math.tau * np.round(off / math.tau)))
+                off = component.size * np.abs(wrapped(here[name] - read[name]))
+                gaps[:, k] = np.maximum(gaps[:, k], off)
             poses.append(pose)
         gaps[isnan] = math.nan
         return Walk({**sources, **joints}, gaps, poses,

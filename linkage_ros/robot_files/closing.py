@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 import shlex
-from typing import Dict, List, Mapping, NamedTuple, Sequence, Tuple
+from typing import Dict, Iterable, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -111,10 +111,14 @@ def _closed(robot: Robot, seed: int) -> Closed:
     return made._replace(robot=displaced(robot, moves, positions))
 
 
-def option(word: str, values: Mapping[str, str]) -> str:
+def option(word: str, values: Iterable[str]) -> str:
     """Return an option of a command line, to be pasted."""
-    return f'--{word} ' + ' '.join(shlex.quote(f'{name}={value}')
-                                   for name, value in values.items())
+    return f'--{word} {shlex.join(values)}'
+
+
+def added(*options: str) -> str:
+    """Return what to do with options of which one leads on; a word follows each, and no stop."""
+    return f'add {" or ".join(options)} to the command'
 
 
 def _check_driven(component: Component, pose: np.ndarray, motors: List[str], followers: List[str]
@@ -130,7 +134,7 @@ def _check_driven(component: Component, pose: np.ndarray, motors: List[str], fol
     if count < len(motors):
         raise NotDriven(
             f'{listed(motors)} drive it, and hold each other, as {count} of them tell where all '
-            f'is: name these by --driven, as in --driven {shlex.join(chosen)}')
+            f'is: {added(option("driven", chosen))}')
     loose, motions = component.loose(pose, motors + followers)
     if not loose:
         return
@@ -141,17 +145,19 @@ def _check_driven(component: Component, pose: np.ndarray, motors: List[str], fol
     at = component.texts(pose, component.is_of(more))
     raise NotDriven(
         f'not driven: {len(more)} of {listed(loose)} must be moved, named by --driven, or held, '
-        f'named by --hold, as in --driven {shlex.join([*motors, *more])} or '
-        + option('hold', {name: at[name] for name in more})
+        'named by --hold: '
+        + added(option('driven', [*motors, *more]),
+                option('hold', (f'{name}={at[name]}' for name in more)))
         + f'; the limits of {listed(stiff)} leave no range' * bool(stiff))
 
 
 def _choice(questions: Sequence[Question], why: str) -> ValueError:
     """Return the error of all that has to be chosen, with what to type."""
     texts, *sides = zip(*questions)
-    return ValueError(f'{why} {", and ".join(texts)}: choose by ' + ', or by '.join(option(
-        'pose', {name: value for side in choices for name, value in side.items()})
-        for choices in sides))
+    poses = [{name: value for side in choices for name, value in side.items()}
+             for choices in sides]
+    return ValueError(f'{why} {", and ".join(texts)}: ' + added(*(
+        option('pose', (f'{name}={value}' for name, value in pose.items())) for pose in poses)))
 
 
 def _question(component: Component, poses: np.ndarray, which: np.ndarray,

@@ -188,8 +188,8 @@ class Drawing(Dyads):
             way = (self.on[block][part.joint] - part.start) / part.along
             return part.link, sign, way.real
         pin = self.joint_at(child, joint.places[1]) or ''
-        base, body = (parent, child) if self.home[pin] == parent else (child, parent)
-        if self.home[pin] != base:
+        base, body = (parent, child) if self.placed_on[pin] == parent else (child, parent)
+        if self.placed_on[pin] != base:
             return self._between(pin, parent, child, joint)
         link, hangs, along, slide, _ = self.parts[body]
         if not link or hangs != pin or slide:
@@ -212,7 +212,7 @@ class Drawing(Dyads):
         # A bar parallel to the one body that hangs on the other.
         tip, end = self.other(body, pin)
         aside = next((name for name in self.on[base]
-                      if self.home[name] == base and name not in self._tips), '') \
+                      if self.placed_on[name] == base and name not in self._tips), '') \
             or self._triangle(base, pin)
         along = end - self.on[body][pin]
         name = self.name(self.on[base][aside] + along, body, f'parallelogram {pin} {aside} {tip}')
@@ -353,11 +353,20 @@ def _why(drawing: Drawing) -> str:
                and {*joint.bodies} <= {*drawing.left}]
     if between and freedom <= 0:
         return f'not of dyads, as {", ".join(between)} drives between two of them'
+    if all(_is_ring(drawing, body, holders) for body in drawing.left):
+        return 'idle, as it only turns about a pin of other bodies'
     if freedom < 0:
         return 'held more than once by ' + ', '.join(
             joint.name for joint in holders if joint.position is not None)
     return (f'not of dyads: {", ".join(drawing.left)} hold each other, as on a platform on three '
             'bars (an Assur group of class III or higher)')
+
+
+def _is_ring(drawing: Drawing, body: str, holders: Sequence[Joint]) -> bool:
+    """Return whether the joints of a body are hinges at one place, about which it turns."""
+    places = [joint.place(body) for joint in holders if body in joint.bodies]
+    return all(joint.kind == HINGE for joint in holders) and max(
+        abs(place - places[0]) for place in places) < drawing.near
 
 
 def _parameters(drawing: Drawing, name: str) -> Dict[str, Any]:

@@ -280,8 +280,7 @@ class Component:
 
         Hinges that cross in a point, as a ball does, do not count: a rod's pose in a file is any.
         """
-        turned = poses - math.tau * np.round(poses / math.tau)
-        return np.where(self._slides, poses / self.size, turned) * ~self._in_balls
+        return np.where(self._slides, poses / self.size, wrapped(poses)) * ~self._in_balls
 
     def free_ways(self, pose: np.ndarray, fixed: np.ndarray, least: float = DEAD_POINT
                   ) -> np.ndarray:
@@ -315,8 +314,7 @@ class Component:
 
     def read(self, poses: np.ndarray) -> Dict[str, np.ndarray]:
         """Return the positions of named joints [rad or m], within half a turn of the file's."""
-        turns = math.tau * np.round(poses / math.tau)
-        positions = self._starts + poses - np.where(self._slides, 0.0, turns)
+        positions = self._starts + np.where(self._slides, poses, wrapped(poses))
         by_name = {name: positions[:, i] for name, i in self.named.items()}
         frames = self._frames(poses)
         for cut, (first, second) in zip(self._cuts, self._cut_ends):
@@ -327,6 +325,11 @@ class Component:
                 by_name[cut.name] = cut.start + np.arctan2(
                     np.cross(across, ahead) @ cut.axis, ahead @ across)
         return by_name
+
+
+def wrapped(angles: np.ndarray) -> np.ndarray:
+    """Return angles within half a turn of zero."""
+    return angles - math.tau * np.round(angles / math.tau)
 
 
 def is_free(motions: np.ndarray) -> np.ndarray:

@@ -34,7 +34,6 @@ from .. import palette
 from ..linkage import Arc, extremes, GROUND, Leg, Link, Mechanism
 from ..scene import SceneError, SceneMechanism
 from ..scene.motion import Motion
-from ..scene.scene_mechanism import IN_SPACE
 from ..words import listed
 
 # The colours of the markers, red, green, blue and opacity: bars, driven bodies, guides, joints.
@@ -165,8 +164,7 @@ class _Tree:
     """The bodies of a mechanism: ground, the root, crank and legs, in `robot`."""
 
     def __init__(self, mechanism: SceneMechanism, width: Optional[float]):
-        if mechanism.in_space:
-            raise SceneError(f'{mechanism.name} is {IN_SPACE}')
+        mechanism.check_planar()
         length = size(mechanism)
         self._length = length if width is None else width / WIDTH
         self._ball = self._piece('joint', (0.0, 0.0), (0.0, 0.0))

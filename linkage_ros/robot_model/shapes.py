@@ -13,7 +13,7 @@ from __future__ import annotations
 import cmath
 from itertools import combinations
 import math
-from typing import Any, Collection, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Collection, Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -105,11 +105,10 @@ def drawn(mechanism: SceneMechanism, names: Collection[str]) -> List[Shape]:
             if shape.kind != ROD and {shape.slide.joint, shape.slide.tip} <= set(names)]
 
 
-def cranks(linkage: Mechanism, parent: Optional[str] = None) -> List[Tuple[str, str]]:
-    """Return the bars that inputs turn, from centre to pin; all, or those with one parent."""
+def cranks(linkage: Mechanism) -> List[Tuple[str, str]]:
+    """Return the bars that inputs turn, from centre to pin."""
     names = [input_.name for input_ in linkage.inputs if input_.turns]
-    return [(link.joint, link.tip) for link in linkage.links
-            if link.name in names and parent in (None, link.parent)]
+    return [(link.joint, link.tip) for link in linkage.links if link.name in names]
 
 
 def plates(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, str, str]]:

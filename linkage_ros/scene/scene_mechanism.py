@@ -22,7 +22,6 @@ from ..cache import cached
 from ..linkage import Arc, Design, Mechanism, theta_of
 from ..words import listed
 
-IN_SPACE = 'a linkage in space: pictures and robot models are of linkages in a plane'
 TYPES = (*mechanisms.TYPES, *mechanisms.WRITTEN)
 
 
@@ -105,6 +104,12 @@ class SceneMechanism:
         """Whether the linkage is spatial; only planar ones have pictures and robot models."""
         return len(self.linkage.axes) > 2
 
+    def check_planar(self) -> None:
+        """Raise SceneError for a linkage in space."""
+        if self.in_space:
+            raise SceneError(f'{self.name} is a linkage in space: pictures and robot models are '
+                             'of linkages in a plane')
+
     @property
     def first(self) -> InputSettings:
         """Return the settings of the first input; most linkages have only one."""
@@ -118,6 +123,10 @@ class SceneMechanism:
     def scales(self) -> list[float]:
         """Return the factor of each input from the linkage to the scene."""
         return [self.scale_of(name) for name in self.inputs]
+
+    def theta(self, values: Sequence[float]) -> Any:
+        """Return inputs [rad or m], or their speeds, as an argument of the unscaled linkage."""
+        return theta_of(divided(values, self.scales))
 
     def follow(self, outputs: Sequence[str], values: Sequence[float], seed: Sequence[float],
                jumps: bool = True) -> tuple[list[float], list[float]]:
@@ -188,11 +197,10 @@ class SceneMechanism:
 
     def efforts(self, values: Sequence[float]) -> tuple[float, ...]:
         """Return the inputs' efforts [N m or N] that balance the loads at inputs `values`."""
-        inputs = divided(values, self.scales)
         # The scale lengthens the lever arms of forces; moments do not depend on it.
         loads = {name: load if isinstance(load, float) else tuple(
             self.scale * part for part in load) for name, load in self.loads.items()}
-        efforts = self.linkage.effort(theta_of(inputs), loads)
+        efforts = self.linkage.effort(self.theta(values), loads)
         return tuple(divided(efforts.tolist(), self.scales))
 
     def assembly(self) -> Assembly:

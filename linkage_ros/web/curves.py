@@ -8,7 +8,7 @@ from typing import Any, Optional, Sequence
 
 import numpy as np
 
-from .poses import linkage_inputs, shown
+from .poses import shown
 from ..linkage import ascending, sampled, theta_of
 from ..scene import SceneError, SceneMechanism
 
@@ -37,7 +37,7 @@ class Sweep:
                  dense_ends: bool = False) -> None:
         self._mechanism, self.linkage = mechanism, mechanism.linkage
         self.input, self._size = mechanism.first.input, mechanism.scales[0]
-        _, *others = np.atleast_1d(linkage_inputs(mechanism, present))
+        _, *others = np.atleast_1d(mechanism.theta(present))
         reach, dead = self.linkage.reach(*others), self.linkage.dead_points(*others)
         if not reach:
             raise SceneError(f'{mechanism.name} cannot be assembled where its other inputs are')

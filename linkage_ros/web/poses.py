@@ -13,7 +13,6 @@ from .nearest_pose import nearest_inputs
 from ..linkage import Formula, Mechanism, theta_of
 from ..robot_model.shapes import ground_frame
 from ..scene import Parameter, SceneError, SceneMechanism, slider
-from ..scene.scene_mechanism import divided
 from ..words import listed, quoted
 
 ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
@@ -81,7 +80,7 @@ def described(mechanism: SceneMechanism, present: Sequence[float]) -> dict[str, 
     """
     linkage, tracer = mechanism.linkage, mechanism.tracer
     names = [*mechanism.assembly().joints, f'{tracer}.x', f'{tracer}.y']
-    theta = linkage_inputs(mechanism, present)
+    theta = mechanism.theta(present)
     values = linkage.joint_angles(theta, names)
     rates = {input_: linkage.joint_rates(theta, names, i)
              for i, input_ in enumerate(mechanism.inputs)}
@@ -117,8 +116,8 @@ def arrows(mechanism: SceneMechanism, present: Sequence[float], kind: str,
             name: load for name, load in mechanism.loads.items() if not isinstance(load, float)},
             'efforts': {name: [shown(effort), 'N·m' if settings.input.turns else 'N']
                         for (name, settings), effort in zip(mechanism.inputs.items(), efforts)}}
-    linkage, theta = mechanism.linkage, linkage_inputs(mechanism, present)
-    rates = linkage_inputs(mechanism, [speeds[name] for name in mechanism.inputs])
+    linkage, theta = mechanism.linkage, mechanism.theta(present)
+    rates = mechanism.theta([speeds[name] for name in mechanism.inputs])
     if kind == ACCELERATION:
         vectors = linkage.acceleration(theta, rates, theta_of([0.0] * len(speeds)))
     else:
@@ -136,7 +135,7 @@ def number(text: str) -> dict[str, Any]:
     formula = Formula(text if '(' in text else text.replace(',', '.'))
     if formula.names:
         raise SceneError(f'{quoted(text)} is not a number: {listed(formula.names)} is unknown')
-    return {'value': float(formula.value({})), 'turns': bool({'pi', 'deg'} & formula.words.keys())}
+    return {'value': float(formula.value({})), 'turns': formula.is_angle}
 
 
 def reached(mechanism: SceneMechanism, present: Sequence[float],
@@ -179,7 +178,7 @@ def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
         for low, high in arcs]
     new = min(nearest, key=lambda end: input_.apart(end, value))
     inputs = [new if key == name else old for key, old in zip(mechanism.inputs, present)]
-    places = mechanism.linkage.solve(linkage_inputs(mechanism, inputs))
+    places = mechanism.linkage.solve(mechanism.theta(inputs))
     if not all(math.isfinite(part) for place in places.values() for part in place):
         raise SceneError(f'{mechanism.name} cannot be assembled there')
     is_missed = not is_whole and input_.apart(new, value) > CLOSE * input_.size
@@ -211,11 +210,6 @@ def _joint_at(mechanism: SceneMechanism, present: Sequence[float], joint: str, p
         [[sorted(start + side * (end / size - lag) for end in arc) for arc in settings.arcs]
          for settings, size in zip(mechanism.inputs.values(), sizes)])
     return [float(lag + side * (value - start)) * size for value, size in zip(inputs, sizes)]
-
-
-def linkage_inputs(mechanism: SceneMechanism, values: Sequence[float]) -> Any:
-    """Return inputs [rad or m], or their speeds, as an argument of the unscaled linkage."""
-    return theta_of(divided(values, mechanism.scales))
 
 
 def tunable(mechanism: SceneMechanism) -> dict[str, Any]:

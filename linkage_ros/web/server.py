@@ -141,7 +141,7 @@ class Server:
             address = ipaddress.ip_address(name)
         except ValueError:
             return False
-        # A numeric address cannot be directed to another mechanism.
+        # A numeric address cannot be directed to another machine.
         return address.is_loopback or self._host in ('0.0.0.0', '::')
 
     async def _connect(self, request: web.Request) -> Any:

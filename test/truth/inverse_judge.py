@@ -36,7 +36,7 @@ class Output:
 
     def __init__(self, linkage, name, others=()):
         self.linkage, self.name, self.others = linkage, name, others
-        self.first, self._pose = linkage.inputs[0], linkage.checked((name,))
+        self.first, self._pose = linkage.inputs[0], linkage.compiled('checked', (name,))
         self.size = 1.0 if linkage.is_angle(name) else linkage.longest
         own = name == self.first.name
         self.period = math.inf if not linkage.is_angle(name) else (
@@ -194,7 +194,7 @@ def judge_several(linkage, names, rng, count=6):
     scales = [1.0 if linkage.is_angle(name) else linkage.longest for name in names]
     for _ in range(count):
         pose = [float(rng.uniform(input_.low, input_.high)) for input_ in linkage.inputs]
-        row = np.array(linkage.checked(names).at(*pose)[:len(names)])
+        row = np.array(linkage.compiled('checked', names).at(*pose)[:len(names)])
         if not np.isfinite(row).all() or not Solution(pose, inverse).margin > SINGULAR:
             continue
         answers = inverse.all(row.tolist())
@@ -206,7 +206,7 @@ def judge_several(linkage, names, rng, count=6):
             found['ordinary', 'lost'] += 1
             found['ordinary', 'lost at', linkage, names, tuple(pose), ()] += 1
         for answer in answers:
-            there = np.array(linkage.checked(names).at(*answer.inputs)[:len(names)])
+            there = np.array(linkage.compiled('checked', names).at(*answer.inputs)[:len(names)])
             if _differ(linkage, names, there - row, scales):
                 found['ordinary', 'invented'] += 1
                 found['ordinary', 'invented at', linkage, names, tuple(pose), ()] += 1

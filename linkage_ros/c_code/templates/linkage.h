@@ -99,7 +99,7 @@ static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
     return x >= -tolerance ? 0 : LKR_NAN;
 }
 
-static inline lkr_real lkr_gated(lkr_real x, lkr_real margin, lkr_real tolerance)
+static inline lkr_real lkr_valid_where(lkr_real x, lkr_real margin, lkr_real tolerance)
 {
     return margin >= -tolerance ? x : LKR_NAN;
 }

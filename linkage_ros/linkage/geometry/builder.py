@@ -25,12 +25,12 @@ from ...formula.expression import (
     cosine,
     cross,
     dot,
-    gated,
     nearest_integer,
     Number,
     Real,
     real,
     sine,
+    valid_where,
 )
 
 GROUND = 'ground'
@@ -189,7 +189,7 @@ class Builder:
             limit = planar.Limit(margin, TOLERANCE * way)
             self.limits.append(limit)
             self.ways.append(limit)
-            place = gated(place, limit.margin, limit.tolerance)
+            place = valid_where(place, limit.margin, limit.tolerance)
         self._add_block(word, name, origin, towards, place, abs(low) + abs(high))
 
     def yoke(self, name: str, pin: str, origin: str, towards: str) -> None:

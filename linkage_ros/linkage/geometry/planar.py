@@ -33,7 +33,6 @@ from ...formula.expression import (
     cross,
     dot,
     exact_sum,
-    gated,
     Rate,
     Real,
     real,
@@ -43,6 +42,7 @@ from ...formula.expression import (
     square,
     square_root,
     sum_and_error,
+    valid_where,
     where,
     with_rate,
     with_spin,
@@ -94,7 +94,7 @@ def unit(vector: Complex) -> Complex:
 def on_line(along: Complex, place: Real) -> Complex:
     """Return the vector of a length along a direction; both parts are NaN where the length is."""
     # Generated code omits products with zero, which would carry the NaN.
-    return Complex(*(gated(part * place, abs(place), real(0.0)) if part.value == 0.0
+    return Complex(*(valid_where(part * place, abs(place), real(0.0)) if part.value == 0.0
                      else part * place for part in (along.x, along.y)))
 
 
@@ -116,10 +116,10 @@ class Limit(NamedTuple):
         return root(self.margin, self.tolerance)
 
 
-def gated_by(value: Real, limits: Iterable[Limit]) -> Real:
+def valid_within(value: Real, limits: Iterable[Limit]) -> Real:
     """Return a value inside limits, NaN elsewhere."""
     for limit in limits:
-        value = gated(value, limit.margin, limit.tolerance)
+        value = valid_where(value, limit.margin, limit.tolerance)
     return value
 
 
@@ -135,14 +135,14 @@ class Arm:
         self.foot = foot
         self.vector = vector
         # A constant would have a value even where the points cannot be assembled.
-        self.square = vector.squared() if length is None else gated(
+        self.square = vector.squared() if length is None else valid_where(
             square(length), abs(vector.x), real(0.0))
         self._magnitude, self.length = magnitude, length
 
     @property
     def divisor(self) -> Real:
         """Its square, NaN where it has no direction."""
-        return self.square if self.length or self._is_smooth else gated(
+        return self.square if self.length or self._is_smooth else valid_where(
             self.square, self._clear - LEAST_SQUARE, real(0.0))
 
     @property
@@ -168,7 +168,7 @@ class Arm:
             sum_and_error(second, length)
         margins = (((first + near) + near_error) * (first + far),
                    ((far - first) + far_error) * ((first - near) - near_error))
-        longer, shorter = (gated(margin, self.square, real(0.0)) for margin in margins)
+        longer, shorter = (valid_where(margin, self.square, real(0.0)) for margin in margins)
         return (self._limit(first + second, size, longer),
                 self._limit(first - second, size, shorter))
 
@@ -241,7 +241,7 @@ class CrankArm(Arm):
         The bars first and second [m] go from that corner to the arm's end and to its foot. Vector
         and arm are the parallel sides of a trapezoid; their product is |first^2 - second^2|.
         """
-        power = gated((first - second) * (first + second), self.square, real(0.0))
+        power = valid_where((first - second) * (first + second), self.square, real(0.0))
         return self.vector * (power / self.divisor)
 
     def _half_angle_limit(self, radius: Real, size: Real, sign: float, start: Real,
@@ -386,7 +386,7 @@ def _nan_with(other: Real, vector: Complex, part: Real) -> Real:
     """Return one part of a factor of a vector, NaN where the other is, as their product is."""
     # Generated code omits products with zero, which would carry the NaN.
     axial = 0.0 in (vector.x.value, vector.y.value)
-    return gated(part, abs(other), real(0.0)) if axial else part
+    return valid_where(part, abs(other), real(0.0)) if axial else part
 
 
 def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
@@ -418,7 +418,7 @@ def mirror(arm: Arm, point: Complex, offset: Real, ends: Sequence[Complex],
     for bar in ends:
         own = spin(bar)
         bars.append(with_spin(bar + across, Rate(
-            (*turning.of, *own.of), lambda *rates, own=own: gated(
+            (*turning.of, *own.of), lambda *rates, own=own: valid_where(
                 2.0 * turning.formula(*rates[:len(turning.of)])
                 - own.formula(*rates[len(turning.of):]), abs(image.x + image.y), real(0.0)))))
     return with_velocity(image, arm.foot, bars[0]), *bars
@@ -427,7 +427,7 @@ def mirror(arm: Arm, point: Complex, offset: Real, ends: Sequence[Complex],
 def parallel(bar: Complex, place: Complex) -> Complex:
     """Return a bar equal to another one, NaN where the place of its end is NaN."""
     def with_place(part: Real) -> Real:
-        return gated(part, abs(place.x), real(0.0))
+        return valid_where(part, abs(place.x), real(0.0))
 
     turning = spin(bar)
     same = Complex(with_place(bar.x), with_place(bar.y))
@@ -478,7 +478,7 @@ def inversor(arm: Arm, long: Real, short: Real) -> Inversor:
     straight = arm.inverse_of_isosceles() if isinstance(arm, CrankArm) else None
     inverse = (arm.vector * (power / arm.divisor) if straight is None else straight * power)
     return Inversor(right, left, Complex(*(
-        gated_by(part, right.limits) for part in (inverse.x, inverse.y))))
+        valid_within(part, right.limits) for part in (inverse.x, inverse.y))))
 
 
 class Slot(NamedTuple):
@@ -498,8 +498,8 @@ def slot(arm: Arm, offset: Real, half: float) -> Slot:
     limit = arm.beyond(offset, abs(offset))
     slide = limit.root() * half
     central, aside = abs(offset) <= 0.0, arm.vector * Complex(slide, -offset)
-    along = Complex(*(gated(where(central, way * half, part), arm.divisor, real(0.0)) for way, part
-                      in ((arm.vector.x, aside.x), (arm.vector.y, aside.y))))
+    along = Complex(*(valid_where(where(central, way * half, part), arm.divisor, real(0.0))
+                      for way, part in ((arm.vector.x, aside.x), (arm.vector.y, aside.y))))
     turning = spin(arm.vector)
     return Slot(with_spin(along.direction(), Rate(
         (slide, *turning.of), lambda rate, *rates: turning.formula(*rates) + where(

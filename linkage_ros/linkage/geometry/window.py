@@ -71,7 +71,7 @@ class WindowRod(NamedTuple):
     side: Any
 
     @property
-    def turns(self) -> bool:
+    def is_on_crank(self) -> bool:
         """Whether a motor turns its pivot."""
         return self.length is not None and any(self.pivot.u)
 
@@ -79,7 +79,7 @@ class WindowRod(NamedTuple):
         """Return the motor's value for poses (2, n); NaN where the rod does not reach."""
         centre, u, v = self.pivot
         off = _place(self.end, poses).minus(centre)
-        if not self.turns:
+        if not self.is_on_crank:
             return np.sqrt(off.dot(off)) if self.length is None else np.zeros(poses.shape[1])
         x, y = off.dot(u), off.dot(v)
         along = 0.5 * (u.dot(u) + off.dot(off) - self.length ** 2)
@@ -87,7 +87,7 @@ class WindowRod(NamedTuple):
 
     def bar(self, motors: np.ndarray) -> Tuple[Vector, Circle, Any]:
         """Return the place of the pivot, the path of the end and the length at motor values."""
-        if self.turns:
+        if self.is_on_crank:
             return self.pivot.at(np.cos(motors), np.sin(motors)), self.end, self.length
         return self.pivot.centre, self.end, motors if self.length is None else self.length
 
@@ -108,7 +108,7 @@ class WindowRod(NamedTuple):
         slack = moved(off) + 0.5 * (
             level * flat * hp * hp + 2.0 * level * radius * hp * hr
             + (_norm(centre) + _norm(k)) * radius * hr * hr) + ROUNDING * size * size
-        if not self.turns:
+        if not self.is_on_crank:
             if self.length is None:
                 low, high = (np.sqrt(np.maximum(2.0 * (square + way * slack), 0.0))
                              for way in (-1.0, 1.0))
@@ -136,13 +136,13 @@ class WindowRod(NamedTuple):
     def shared(self, one: Boxes, other: Boxes) -> Boxes:
         """Return the motor's values that ranges share with others, or more; NaN for none."""
         start = other.middle
-        if self.turns:
+        if self.is_on_crank:
             start = start - math.tau * np.round((start - one.middle) / math.tau)
         low = np.maximum(one.middle - one.half, start - other.half)
         high = np.minimum(one.middle + one.half, start + other.half)
         half = np.where(low <= high, 0.5 * (high - low), np.nan)
         # Large ranges of angles may meet at both of their ends.
-        wide = self.turns & (one.half + other.half > math.pi - SINGULAR)
+        wide = self.is_on_crank & (one.half + other.half > math.pi - SINGULAR)
         smaller = np.where(one.half <= other.half, one.middle, start)
         return Boxes(np.where(wide, smaller, 0.5 * (low + high)),
                      np.where(wide, np.minimum(one.half, other.half), half))
@@ -152,7 +152,7 @@ class WindowRod(NamedTuple):
         pose = _pose(poses.middle)
         pivot, _, _ = self.bar(motors.middle)
         moved, turn = (self.pivot.ahead(np.cos(motors.middle), np.sin(motors.middle)),
-                       motors.half) if self.turns else (Vector(0.0, 0.0, 0.0), 0.0)
+                       motors.half) if self.is_on_crank else (Vector(0.0, 0.0, 0.0), 0.0)
         rod, by_p, by_r = row(pivot, self.end, pose)
         centre, end, ahead = (each.turned(*pose[:2]) for each in (
             self.end.centre, self.end.at(*pose[2:]), self.end.ahead(*pose[2:])))
@@ -257,7 +257,7 @@ class Window:
                                  2 * STEPS)
             again = [rod.motors(found) for rod in self.rods]
             good = (found > self.low[:, None]) & (found < self.high[:, None])
-            good &= [abs(np.exp(1j * one) - np.exp(1j * two)) < CONVERGED if rod.turns
+            good &= [abs(np.exp(1j * one) - np.exp(1j * two)) < CONVERGED if rod.is_on_crank
                      else abs(one - two) < CONVERGED * two
                      for rod, one, two in zip(self.rods, again, motors)]
         apart = np.abs(found - start).max(axis=0) * good.all(axis=0)

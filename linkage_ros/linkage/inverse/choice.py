@@ -19,7 +19,15 @@ import numpy as np
 from .problem import InverseProblem, nearest
 from ..tolerances import CLOSE, SINGULAR, TOLERANCE
 from ...cache import Cache
-from ...formula.expression import argument, gated, nearest_integer, Real, real, square_root, where
+from ...formula.expression import (
+    argument,
+    nearest_integer,
+    Real,
+    real,
+    square_root,
+    valid_where,
+    where,
+)
 from ...formula.program import Program
 
 Reals = Sequence[Real]
@@ -75,7 +83,7 @@ def _inside(problem: InverseProblem, by: int, place: Real, rates: Reals, ends: R
         place = place + turn * (up if first else where(
             place < low, up, where(high < place, down, 0.0)))
     inner = where(place < lower, lower, where(upper < place, upper, place))
-    return gated(gated(inner, place - low, 0.0), high - place, 0.0)
+    return valid_where(valid_where(inner, place - low, 0.0), high - place, 0.0)
 
 
 def _ceiling(x: Real) -> Real:

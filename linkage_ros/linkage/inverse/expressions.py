@@ -19,7 +19,7 @@ from .linkage import InverseLinkage
 from .problem import InverseProblem, nearest
 from ..geometry.spatial import IN_SINGLE
 from ..tolerances import CLOSE
-from ...formula.expression import argument, gated, Real, real, substituted
+from ...formula.expression import argument, Real, real, substituted, valid_where
 from ...words import listed
 
 # A mode whose outputs are off by more than this [sizes] is no solution.
@@ -45,7 +45,7 @@ def modes_of(problem: InverseProblem, closed: Optional[InverseLinkage]
         results = substituted(forward, dict(enumerate(inputs)))
         for by, (turn, scale) in enumerate(zip(problem.periods, problem.scales)):
             room = OFF * scale - abs(nearest(results[by] - argument(by), real(0.0), turn))
-            inputs = [gated(x, room, 0.0) for x in inputs]
+            inputs = [valid_where(x, room, 0.0) for x in inputs]
         modes.append(([nearest(x, real(0.0), turn) for x, turn in zip(inputs, problem.turns)],
                       results[problem.n:]))
     return modes

@@ -21,7 +21,7 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple
 import numpy as np
 
 from ..dyads import Dyads, Hinge, Motor, Slide
-from ..formulas import Names, PAIR, Structure
+from ..formulas import LinkageFormulas, Names, PAIR
 from ..geometry.builder import GROUND, Link
 from ..inputs import Input, spread
 from ..kinematics import Kinematics
@@ -49,7 +49,7 @@ class Mode(NamedTuple):
 
     Attributes
     ----------
-    linkage : Structure
+    linkage : LinkageFormulas
         Its joints, as expressions of its own inputs.
     inputs : tuple of Real
         The values [rad or m] of the original linkage's inputs in this mode. An input that is also
@@ -57,7 +57,7 @@ class Mode(NamedTuple):
 
     """
 
-    linkage: Structure
+    linkage: LinkageFormulas
     inputs: Tuple[Real, ...]
 
 
@@ -116,7 +116,7 @@ def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
     if 2 ** len(branches) * math.prod(map(len, turns)) > MAX_MODES:
         raise ValueError(f'more than {MAX_MODES} assembly modes')
     design = Design('inverse', {}, tuple(line.text for line in lines), lines[-1].names[0])
-    linkages = [Structure(design, dict(zip(branches, signs)))
+    linkages = [LinkageFormulas(design, dict(zip(branches, signs)))
                 for signs in product((1, -1), repeat=len(branches))]
     modes = tuple(Mode(linkage, tuple(read.value(linkage.built) for read in sketch.reads))
                   for linkage in linkages)

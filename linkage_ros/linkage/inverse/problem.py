@@ -17,7 +17,7 @@ from typing import Dict, Sequence, Tuple
 
 import numpy as np
 
-from ..formulas import Structure
+from ..formulas import LinkageFormulas
 from ..inputs import Input, is_periodic, spread
 from ..kinematics import Kinematics
 from ..motion.curves import LEAST
@@ -87,7 +87,8 @@ class InverseProblem:
         inputs = spread(self.linkage.inputs, len(values))
         inputs[by] = values
         # A value repeats only where the linkage can be assembled again.
-        rows = zip(self.linkage.checked(self.outputs).over(*inputs), self.angular, self.scales)
+        pose = self.linkage.compiled('checked', self.outputs)
+        rows = zip(pose.over(*inputs), self.angular, self.scales)
         return np.concatenate([[np.cos(row), np.sin(row)] if angular else [row / scale]
                                for row, angular, scale in rows])
 
@@ -134,7 +135,7 @@ def nearest(x: Real, seed: Real, turn: float) -> Real:
 
 
 @cached(64, shared=True)
-def newton(structure: Structure, outputs: Tuple[str, ...], periods: Sequence[float],
+def newton(structure: LinkageFormulas, outputs: Tuple[str, ...], periods: Sequence[float],
            turns: Sequence[float]) -> Program:
     """
     Return the code for a step of Newton's method, from the inputs and values of the outputs.
@@ -146,7 +147,8 @@ def newton(structure: Structure, outputs: Tuple[str, ...], periods: Sequence[flo
     n, inputs = len(outputs), [argument(by) for by in range(len(outputs))]
     # Of one input, candidates are inside the reach.
     rows = structure.checked(outputs) if n > 1 else structure.parts(((), outputs, outputs))
-    scales = [real(1.0) if structure.turns(name) else dimension(LONGEST_BAR) for name in outputs]
+    scales = [real(1.0) if structure.is_angle(name) else dimension(LONGEST_BAR)
+              for name in outputs]
     sizes = [real(1.0) if input_.turns else dimension(f'[{input_.name}]')
              for input_ in structure.built.inputs]
     gaps = [nearest(row - argument(n + by), real(0.0), turn) / scale

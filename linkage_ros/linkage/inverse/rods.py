@@ -15,7 +15,7 @@ from itertools import product
 from typing import Optional
 
 from .linkage import InverseLinkage, MAX_MODES, Mode
-from ..formulas import Names, Structure
+from ..formulas import LinkageFormulas, Names
 from ..kinematics import Kinematics
 from ..text.rod_lines import turning_rods
 from ...formula.expression import argument, real, substituted
@@ -30,7 +30,7 @@ def decompose(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
             return None
         # Solved once for all modes: the sides are arguments here, and constants in each mode.
         leaves = {rod: argument(n + i) for i, rod in enumerate(rods)}
-        structure = Structure(design, {**linkage.branches, **leaves})
+        structure = LinkageFormulas(design, {**linkage.branches, **leaves})
         values = [structure.output(input_.name) for input_ in linkage.inputs]
         modes = tuple(Mode(structure, tuple(substituted(
             values, dict(zip(leaves.values(), map(real, sides))))))

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..inputs import Arc, Input
 from ..kinematics import Kinematics
-from ..motion.curves import ascending, CUTS, extremes, LEAST, refined, sampled, turns
+from ..motion.curves import ascending, CUTS, extremes, LEAST, refined, sampled, turning_points
 from ..motion.reach import MAX_ENDS, reach_of
 from ..motion.singularities import Analysis, distinct, NEAR, NearZero
 from ..tolerances import CLOSE, ONE, ROUNDING, SINGULAR, TOLERANCE
@@ -114,13 +114,13 @@ class Segments:
         self._curve, self._period, self._size = curve, period, size
         self._input, self._unit = input_, input_.step
         self._rounding = TOLERANCE * size
-        self._counted = counted = input_.counted()
+        self._normalized = normalized = input_.normalized()
         special = distinct((near.value for near in near_zeros if near.gap <= near.rounding),
-                           counted)
+                           normalized)
         marks = distinct((near.value for near in near_zeros if near.gap <= NEAR * near.size),
-                         counted)
+                         normalized)
         self.jumps: List[float] = []
-        self._ends = {end for arc in arcs for end in arc if not counted.is_cut(end)}
+        self._ends = {end for arc in arcs for end in arc if not normalized.is_cut(end)}
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
         if not 0 < len(runs) <= MAX_ENDS * max(1.0, sum(hi - lo for lo, hi in arcs) / math.tau) \
                 or not self._moves(runs):
@@ -140,7 +140,7 @@ class Segments:
         near = np.minimum(slack, ONE * self._size)
         # At an end of the reach there is a pose also when a period is added, and behind gears.
         ulps = 2.0 if self._input.period == 1 else 4.0
-        start, end = (x + side * ulps * math.ulp(max(abs(x), self._counted.high)) * (
+        start, end = (x + side * ulps * math.ulp(max(abs(x), self._normalized.high)) * (
             x in self._ends) for x, side in zip(theta[[0, -1]].tolist(), (1.0, -1.0)))
         theta = np.array([start, *theta.clip(start, end), end]) * self._unit
         value = np.pad(value.clip(value[0] + near[0], value[-1] - near[1]), 1, 'edge')
@@ -315,7 +315,7 @@ class Segments:
                   noise: np.ndarray) -> Iterator[Segment]:
         """Yield the segments of a run, cut at its extremes."""
         with np.errstate(invalid='ignore'):
-            places = turns(value, rate, 4.0 * (noise + self._rounding))
+            places = turning_points(value, rate, 4.0 * (noise + self._rounding))
             rising = rate[places] >= 0.0
             at, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
                 x.shape) == rising[:, None], theta[places], theta[places + 1])
@@ -374,7 +374,7 @@ def extremes_of(linkage: Kinematics, output: str, arcs: Optional[Sequence[Arc]],
                 others: Sequence[float]) -> list:
     """Implement `Mechanism.extremes`."""
     linkage.check_output(output)
-    pose, angular = linkage.bound('output', output), np.array([linkage.is_angle(output)])
+    pose, angular = linkage.compiled('output', output), np.array([linkage.is_angle(output)])
     size = linkage.inputs[0].step
     parts = reach_of(linkage, tuple(others)) if arcs is None else arcs
     if arcs is None and (segments := segments_of(linkage, output, others)).jumps:

@@ -86,7 +86,7 @@ def near_misses(values: np.ndarray) -> np.ndarray:
                 & (sign * inner <= 2.0 * bent))
 
 
-def turns(values: np.ndarray, rates: np.ndarray, least: np.ndarray) -> np.ndarray:
+def turning_points(values: np.ndarray, rates: np.ndarray, least: np.ndarray) -> np.ndarray:
     """
     Return the samples after which a curve has an extreme.
 

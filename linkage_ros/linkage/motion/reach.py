@@ -36,7 +36,7 @@ def reach_of(linkage: Kinematics, others: Tuple[float, ...] = ()) -> List[Arc]:
 
 def over_first(linkage: Kinematics, kind: str, names: Any, others: Tuple[float, ...]) -> Callable:
     """Return the function from values of the first input (n,), in its step, to numbers."""
-    pose, step = linkage.bound(kind, names), linkage.inputs[0].step
+    pose, step = linkage.compiled(kind, names), linkage.inputs[0].step
     if pose.shape:
         raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
                          'not for arrays')
@@ -47,7 +47,7 @@ def _reach(linkage: Kinematics, others: Tuple[float, ...]) -> List[Arc]:
     margins = over_first(linkage, 'margins', (), others)
     limits, step = linkage.structure.built.limits, linkage.inputs[0].step
     # From here on the input is in units of its step.
-    input_ = linkage.inputs[0].counted()
+    input_ = linkage.inputs[0].normalized()
 
     def assembled(theta: Any) -> Any:
         return _failing(margins, theta) == len(limits)

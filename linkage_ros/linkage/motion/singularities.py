@@ -85,7 +85,7 @@ class Analysis:
 
     def dead_points(self) -> List[float]:
         """Return the values of the input at which a dyad stretches or folds."""
-        first = self._first.counted()
+        first = self._first.normalized()
         # Where a reach may only be cut off, a dead point is found as a touch.
         ends = [end for arc in self.reach() for end in arc if not first.is_cut(end)]
         touched = [near.value for near in self.near_zeros()
@@ -95,7 +95,7 @@ class Analysis:
 
     def reach(self) -> List[Arc]:
         """Return the reach in arcs, none of them on both sides of an end of a turn."""
-        size, first = self._first.step, self._first.counted()
+        size, first = self._first.step, self._first.normalized()
         arcs = [(lo / size, hi / size) for lo, hi in reach_of(self._linkage, self._others)]
         if self._first.turn < self._linkage.inputs[0].turn:
             arcs = [(max(lo, first.low), min(hi, first.high)) for lo, hi in arcs
@@ -140,7 +140,7 @@ class Analysis:
                 ignored[row].tolist()) if not flat)
 
         for end in (0, -1):
-            if self._first.counted().is_cut(theta[end]):
+            if self._first.normalized().is_cut(theta[end]):
                 yield from near(np.arange(len(folds)), np.full(len(folds), theta[end]),
                                 np.abs(values[:, end]))
         # A sample may be the zero itself, with a rate of either sign.

@@ -72,6 +72,11 @@ class Formula:
                 f'{quoted(text)} is not a number, dimension or arithmetic on them; '
                 'allowed: + - * / ( ) max(a,b) sqrt(a) pi 30deg') from None
 
+    @property
+    def is_angle(self) -> bool:
+        """Whether it has deg or pi, and so is an angle [rad]."""
+        return not {'deg', 'pi'}.isdisjoint(self.words)
+
     def expression(self, symbols: Mapping[str, Real]) -> Real:
         """Return it as an expression of dimensions."""
         return self._computed(lambda leaf: symbols[leaf] if leaf in symbols else real(leaf),

@@ -328,8 +328,7 @@ def _check_number(line: Line, kind: str, number: Formula, dimensions: Mapping) -
         raise line.error(f'{quoted(number.text)} must be {IN_RANGE}')
     if kind == 'LENGTH' and not np.all(value > 0.0):
         raise line.error(f'a bar must be longer than zero, got {elided(number.text)}')
-    if kind == 'ANGLE' and np.any(np.abs(value) > _TURN) \
-            and not {'deg', 'pi'} & number.words.keys():
+    if kind == 'ANGLE' and np.any(np.abs(value) > _TURN) and not number.is_angle:
         plain = number.text.lstrip('-').replace('.', '').isdigit()
         degrees = f'{number.text}deg' if plain else f'({number.text})deg'
         raise line.error(f'an angle is in rad, and {elided(number.text)} is more than a turn; '

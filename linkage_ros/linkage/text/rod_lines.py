@@ -44,7 +44,7 @@ import numpy as np
 
 from .joint_lines import check_order, formula, Line, parsed
 from ..geometry.builder import Bar, Builder, GROUND, Link, Point
-from ..geometry.planar import gated_by, Limit
+from ..geometry.planar import Limit, valid_within
 from ..geometry.spatial import (
     Circle,
     drawn_ahead,
@@ -274,9 +274,9 @@ class _Joint:
     def gate(self, limits: Iterable[Limit]) -> None:
         """Make its value NaN beyond limits."""
         if self.turn:
-            self.turn = Turn(*(gated_by(x, limits) for x in self.turn))
+            self.turn = Turn(*(valid_within(x, limits) for x in self.turn))
         elif self.shift is not None:
-            self.shift = gated_by(self.shift, limits)
+            self.shift = valid_within(self.shift, limits)
 
 
 class _End(NamedTuple):
@@ -340,7 +340,7 @@ class _Drawing:
         if joint and joint.line.word != 'slide':
             joint.turn = Turn.by(self._builder.drive(Input(name, ANGLE), None))
             limits = self._add_limits(joint, joint.turn.angle)
-            joint.turn = Turn.by(gated_by(joint.turn.angle, limits))
+            joint.turn = Turn.by(valid_within(joint.turn.angle, limits))
             return
         value = self._builder.drive(Input(name, LENGTH, *(
             ends or (real(0.0) if joint is None else -self._magnitude, self._magnitude))), None)
