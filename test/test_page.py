@@ -231,6 +231,7 @@ def test_a_bar_and_its_slider_light_up(start):
     until(lambda: lit('h'))
 
 
+@pytest.mark.nightly
 def test_changes_are_saved_undone_and_reset(start, tmp_path):
     running, seen = start(LEG)
 
@@ -357,6 +358,7 @@ def test_a_joint_follows_the_mouse_and_stops_at_its_reach(start):
     assert running.value('lever.crank.speed') == 0.0
 
 
+@pytest.mark.nightly
 def test_an_input_is_moved_with_the_keys_by_steps_and_in_degrees(start):
     running, seen = start({**LEVER, 'lever.crank.speed': 1.5}, 'lever')
 
@@ -622,6 +624,7 @@ def blank(lever, seen):
     seen.leave()
 
 
+@pytest.mark.nightly
 def test_a_number_has_room_in_its_field_and_all_the_digits_that_have(blank):
     values = [sign * value * 10.0 ** power for sign in (1.0, -1.0)
               for value in (1.0, 1.234567891, 9.99999999) for power in range(-300, 300)]
