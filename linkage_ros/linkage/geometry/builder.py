@@ -509,8 +509,8 @@ class Builder:
         self.transmissions[name] = planar.transmission(found)
 
     def _add_link(self, joint: str, tip: str, bar: Complex, length: Optional[Real],
-              name: Optional[str] = None, parent: Optional[str] = None,
-              start: Optional[Real] = None) -> str:
+                  name: Optional[str] = None, parent: Optional[str] = None,
+                  start: Optional[Real] = None) -> str:
         """
         Add a link that turns about a joint, and return its name.
 
