@@ -63,7 +63,7 @@ def run(name: str, work: Callable, args: Optional[Sequence[str]]) -> int:
         sys.stdout.flush()
         return 0
     except BrokenPipeError:
-        # The reader has all that it wants.
+        # The reader has closed the pipe.
         why: object = ''
     except (RequestError, SceneError, ImportError) as error:
         why = error

@@ -510,7 +510,7 @@ def test_a_line_that_is_pasted_leads_on(seeds):
             assert said[-1] not in said[:-1], said
             pasted += 1
     # Some robots are decided at once, and some refused for good.
-    assert pasted >= 3
+    assert pasted >= max(3, len(seeds) // 10)
 
 
 def test_two_hinges_that_cross_between_two_bodies_hold_them(capsys, tmp_path):

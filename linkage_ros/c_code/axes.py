@@ -8,7 +8,7 @@ from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ..linkage import GROUND, Link, loaded_links, Mechanism, spread
+from ..linkage import GROUND, Link, loaded_links, Mechanism, ROUNDING, spread
 from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion
@@ -17,8 +17,6 @@ from ..words import listed
 # Relative size of a Jacobian below which outputs do not determine the inputs, and the poses in
 # which it is looked at.
 DEPENDENT, SPREAD = 1e-9, 200
-# Part of a turn that is rounding.
-ALIKE = 1e-12
 # States that are tried for a first pose.
 SAMPLES = 4096
 
@@ -139,7 +137,7 @@ def pieces(linkage: Mechanism, output: str, turn: float = math.inf) -> List[Tupl
     """Return parts of a turn in which an output only rises or falls: inputs, and outputs."""
     # In a piece an angle changes by half a turn at most, so that its gaps are known.
     parts, _ = linkage.monotone(output, math.pi if linkage.is_angle(output) else math.inf)
-    end = linkage.inputs[0].low + turn * (1.0 - ALIKE)
+    end = linkage.inputs[0].low + turn * (1.0 - ROUNDING)
     return [part for part in parts if part[2] != part[3] and part[0] < end]
 
 

@@ -153,10 +153,10 @@ class Tables:
         inverses = [*filter(None, map(self._inverse, sides))]
         if all(inverse.closed for inverse in inverses):
             return math.inf
+        uncounted = [axes[k].output for axes in sides
+                     for k in sorted({*range(len(axes))} - gears(self.linkage, axes).keys())]
         return period(self.linkage, [
-            *(output for output, _ in loads(self.mechanism) if sides[0]),
-            *(each.output for axes in sides for k, each in enumerate(axes)
-              if k not in gears(self.linkage, axes))])
+            *(output for output, _ in loads(self.mechanism) if sides[0]), *uncounted])
 
     def _turns(self, axes: Sequence[Axis], turn: float) -> List[float]:
         """Return after how much of each input the positions of axes are the same, or 0."""

@@ -65,9 +65,9 @@ class Scene:
     def changed_from(self, old: 'Scene') -> list[Parameter]:
         """Return the parameters whose values differ from an older scene of the same mechanisms."""
         parts = [(self.general, old.general), *(
-            (mechanism.parameters, before.parameters)
-            for mechanism, before in zip(self.mechanisms.values(), old.mechanisms.values())
-            if mechanism is not before)]
+            (mechanism.parameters, old.mechanisms[name].parameters)
+            for name, mechanism in self.mechanisms.items()
+            if mechanism is not old.mechanisms[name])]
         before = {parameter.name: parameter.value for _, part in parts for parameter in part}
         return [parameter for part, _ in parts for parameter in part
                 if parameter.value != before.get(parameter.name)]

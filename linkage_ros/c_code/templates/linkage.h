@@ -399,6 +399,7 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
         const lkr_axis *axis = &model->axis[side][i];
         value[i] = (position[i] - axis->offset) / axis->factor;
         near[i] = q[i];
+        /* Without a function for solutions, there is one, of counted inputs. */
         x[0][i] = q[i];
     }
     if (model->solutions[side]) {
