@@ -77,8 +77,8 @@ def linkages(_, rng, accelerated):
     rows = []
     for i in range(LINKAGES):
         checks = linkage_checks.CHECKS + (linkage_checks.accelerated,) * (accelerated and not i)
-        problems, measures, _ = linkage_checks.problems(
-            random_linkages.design(rng), rng, checks, GRID) or ((), (), ())
+        problems, measures = linkage_checks.problems(
+            random_linkages.design(rng), rng, checks, GRID) or ((), ())
         rows += [('random linkages', kind, '', math.nan, text) for kind, text in problems]
         for row in measures:
             if row.sensitivity and math.isfinite(row.ratio):

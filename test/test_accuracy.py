@@ -5,7 +5,6 @@
 
 import math
 
-from hypothesis import given, settings, strategies as st
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
@@ -63,9 +62,10 @@ def test_the_catalogue_is_right_to_the_last_digits(kind, dimensions, branches, n
     check(mechanism, awkward(mechanism, np.random.default_rng(1), 3, near))
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize('kind', KINDS)
-@pytest.mark.parametrize('rates, seed, count', [(False, 2, 24), (True, 3, 4)])
+@pytest.mark.parametrize('rates, seed, count', [
+    (False, 1, 3), *(pytest.param(*each, marks=pytest.mark.nightly)
+                     for each in ((False, 2, 24), (True, 3, 4)))])
 def test_random_and_degenerate_dimensions_are_right_too(kind, rates, seed, count):
     for mechanism, rng in some(kind, seed, count):
         thetas = hard_cases.angles(rng, 3, ends(mechanism))
@@ -85,37 +85,6 @@ def test_random_and_degenerate_dimensions_are_right_too(kind, rates, seed, count
 def test_velocities_and_joint_rates_of_the_catalogue_are_right(kind, dimensions, branches):
     mechanism = mechanisms.create(kind, branches=branches, **dimensions)
     check(mechanism, awkward(mechanism, np.random.default_rng(4), 6)[::8], rates=True)
-
-
-@given(theta=st.floats(-1e10, 1e10), a=st.floats(0.01, 100.0), b=st.floats(0.01, 100.0),
-       e=st.floats(-100.0, 100.0).filter(lambda e: e == 0.0 or abs(e) > 1e-6))
-@settings(max_examples=25, derandomize=True)
-def test_any_lever_at_any_angle_is_right(theta, a, b, e):
-    check(mechanisms.create('slotted_lever', a=a, b=b, e=e), [theta])
-
-
-@given(theta=st.floats(-4.0, 4.0), r=st.floats(0.1, 10.0), a=st.floats(0.1, 10.0),
-       b=st.floats(0.1, 10.0))
-@settings(max_examples=25, derandomize=True)
-def test_any_inversor_at_any_angle_is_right(theta, r, a, b):
-    check(mechanisms.create('peaucellier', r=r, a=a, b=b), [theta])
-
-
-@pytest.mark.parametrize('kind', KINDS)
-@pytest.mark.parametrize('power', [-80, 80])
-def test_lengths_times_a_power_of_two_give_the_same_bits(kind, power):
-    scale = 2.0 ** power
-    for mechanism, rng in some(kind, seed=7, count=5):
-        grown = {name: value * scale for name, value in mechanism.dimensions.items()}
-        grown = mechanisms.create(kind, branches=mechanism.branches, **grown)
-        theta, poses = hard_cases.angles(rng, 10, ends(mechanism)), strict(mechanism).poses
-        ours, theirs = (answers(each, theta[:, None], poses, rates=True)
-                        for each in (mechanism, grown))
-        for out in ours:
-            np.testing.assert_array_equal(
-                theirs[out], ours[out] * (1.0 if out.what == 'angle' else scale),
-                err_msg=f'{out} of {mechanism!r}')
-        assert grown.reach() == mechanism.reach()
 
 
 @pytest.mark.parametrize('kind', KINDS)

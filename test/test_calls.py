@@ -11,7 +11,7 @@ from linkage_ros.linkage import Answer, Solution
 import numpy as np
 import pytest
 
-WRONG = 'x', ['x'], None, {}, object(), b'\x01', [[1.0], 'x']
+WRONG = 'x', ['x'], None, {}, object(), b'3', 10 ** 400, 1j, [[1.0], 'x']
 
 
 @pytest.fixture(scope='module')
@@ -57,6 +57,8 @@ def test_results_have_the_shape_of_value_and_near(bars, shape):
         assert np.shape(found) == shape
         np.testing.assert_array_equal(found, np.full(shape, found.flat[0] if shape and value.size
                                                      else found))
+    assert bars.acceleration(value, 2.0, 0.0, ('B',))['B'].shape == (*shape, 2)
+    assert bars.joint_accelerations(value, 2.0, 0.0)['QB'].shape == shape
 
 
 # --- values that are wrong are named ---
@@ -77,6 +79,9 @@ def test_what_is_no_number_is_refused_with_its_name(bars, arm, wrong):
             (lambda: arm.distance_to_dead_point(0.1, wrong), 'others'),
             (lambda: arm.input_for('P.x', 0.1, others=[wrong]), 'others'),
             (lambda: arm.extremes('P.x', others=[wrong]), 'others'),
+            *((lambda ask=ask: getattr(arm, ask)([0.1, wrong]), 'theta') for ask in (
+                'solve', 'velocity', 'joint_angles', 'joint_rates', 'transmission_angles')),
+            *((lambda x=x: bars.solve(x), 'theta') for x in (wrong, bytearray(b'3'))),
             (lambda: bars.servo_for('QB', wrong), 'values'),
             (lambda: bars.input_for('QB', wrong), 'value')):
         with pytest.raises(ValueError, match=name):

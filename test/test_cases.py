@@ -12,9 +12,7 @@ from mpmath import mp, mpc, mpf
 import numpy as np
 import pytest
 from robots import Pinocchio
-from truth import linkage_checks
 from truth.cases import CASES, CRANK, cross, FOOT, IDLER, TIP
-from truth.random_linkages import Design
 
 
 def made(name, size=1.0, branches=None):
@@ -37,30 +35,6 @@ def given(inputs):
 def in_digits(place):
     """Return a joint as a number with many digits."""
     return mpc(*map(float, place))
-
-
-@pytest.mark.nightly(all_but=3)
-@pytest.mark.parametrize('name', CASES)
-def test_a_case_holds_what_any_linkage_must(name):
-    design = Design(CASES[name].joints, CASES[name].numbers, {})
-    found, *_ = linkage_checks.problems(design, np.random.default_rng(0))
-    assert not found, found[0]
-
-
-@pytest.mark.nightly(all_but=6)
-@pytest.mark.parametrize('power', [-80, 80])
-@pytest.mark.parametrize('name', CASES)
-def test_a_case_of_another_size_is_the_same_to_the_bit(name, power):
-    size, plain = 2.0 ** power, made(name)
-    linkage, lengths = made(name, size), np.array([
-        1.0 if input_.turns else size for input_ in plain.inputs])
-    inputs, held = poses(name), poses(name)[0][1:]
-    for joint, place in linkage.solve(given(inputs * lengths)).items():
-        np.testing.assert_array_equal(place, size * plain.solve(given(inputs))[joint])
-    assert linkage.reach(*held * lengths[1:]) == [
-        tuple(end * lengths[0] for end in arc) for arc in plain.reach(*held)]
-    assert linkage.dead_points(*held * lengths[1:]) == [
-        dead * lengths[0] for dead in plain.dead_points(*held)]
 
 
 @pytest.mark.parametrize('name', CASES)

@@ -11,7 +11,6 @@ import pickle
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
-from truth import random_linkages
 
 FIVE_BAR = """\
 # five_bar driven by P.x, P.y
@@ -85,14 +84,6 @@ def test_an_input_that_there_is_not_is_refused(by):
     for ask in (linkage.velocity, linkage.joint_rates):
         with pytest.raises(ValueError, match='by must be the number of an input, from 0 to 1'):
             ask((1.0, 2.0), None, by)
-
-
-def test_a_carriage_has_no_place_beyond_its_way():
-    linkage = custom('G ground 0 0', 'H ground 1 0', 'S carriage G along H 0 1',
-                     'P ground 0.5 2', 'B dyad S P 1.5 1.5 left')
-    assert np.isnan(linkage.solve(1.5)['B']).all() and np.isnan(linkage.solve(-0.1)['S']).any()
-    assert np.isfinite(linkage.solve([0.0, 1.0])['B']).all()
-    assert linkage.reach() == [(0.0, 1.0)]
 
 
 def test_one_input_may_be_asked_for_as_several_are():
@@ -232,14 +223,6 @@ def test_ends_are_two_finite_numbers_in_order(ends):
         mechanisms.create('four_bar').servo_for('B.x', 100.0, ends=ends)
 
 
-def test_there_is_one_value_for_each_output():
-    inverse = mechanisms.create('five_bar').inverse(('P.x', 'P.y'))
-    for ask in (lambda: inverse.over(0.05), lambda: inverse.nearest((0.05,)),
-                lambda: inverse.nearest((0.05, 0.15, 0.2))):
-        with pytest.raises(ValueError, match='five_bar has 2 inputs: values must be as many'):
-            ask()
-
-
 def test_answers_go_to_other_processes():
     answers = mechanisms.create('five_bar').inputs_for(('P.x', 'P.y'), (0.05, 0.15))
     for each in (pickle.loads(pickle.dumps(answers)), deepcopy(answers)):
@@ -279,35 +262,6 @@ def test_a_jump_at_the_end_of_a_turn_is_not_passed(near):
         assert found == pytest.approx(near + 2.0 * away, abs=1e-12)
     (found,), _ = inverse.follow((math.copysign(0.5 * math.pi + 0.05, half),), (near,))
     assert math.isnan(found)
-
-
-@pytest.mark.nightly(all_but=1)
-@pytest.mark.parametrize('seed', range(40))
-def test_what_is_followed_has_the_value(seed):
-    rng, count = np.random.default_rng(seed), 0
-    while count < 12:
-        try:
-            design = random_linkages.design(rng)
-            linkage = custom(*design.joints, branches=design.branches, **design.dimensions)
-        except ValueError:
-            continue
-        if len(linkage.inputs) > 1 or not linkage.reach():
-            continue
-        output = str(rng.choice(outputs_of(linkage)))
-        if output == linkage.inputs[0].name:
-            continue
-        inverse, scale = linkage.inverse(output), (
-            1.0 if linkage.is_angle(output) else linkage.longest)
-        first, = inverse.inputs
-        for near in rng.uniform(1.2 * first.low, 1.2 * first.high, 20).tolist():
-            value = float(linkage.joint_angles(near, [output])[output])
-            value += rng.uniform(-0.2, 0.2) * scale
-            (found,), _ = inverse.follow((value,), (near,))
-            if math.isfinite(found):
-                gap = float(linkage.joint_angles(found, [output])[output]) - value
-                gap = math.remainder(gap, math.tau) if linkage.is_angle(output) else gap
-                assert abs(gap) < 1e-6 * scale, (str(design), output, near, value)
-                count += 1
 
 
 @pytest.mark.nightly(all_but=6)

@@ -307,8 +307,9 @@ def test_links_have_names_of_their_own():
 
 
 @pytest.mark.parametrize('value', [
-    None, '1', b'1', True, 1j, [1j], ['1', '2'], [None, 1.0], [True, False], {}, {1.0}, {'a': 1.0},
-    [[1.0], [1.0, 2.0]], [], [[]], object(), len, np.array([1.0, 'a'], object), iter([1.0]),
+    None, '1', b'1', bytearray(b'3'), True, 1j,
+    [1j], ['1', '2'], [None, 1.0], [True, False], {}, {1.0}, {'a': 1.0}, [[1.0], [1.0, 2.0]], [],
+    [[]], object(), len, np.array([1.0, 'a'], object), iter([1.0]),
     np.datetime64('2026-01-01'), np.array(1j), [[[]]] * 3, slice(1), 10 ** 400, [10 ** 400],
     HUGE, math.nan, math.inf, -math.inf, [1.0, math.nan], -1.0, 0, [1.0, 0.0], 1e301, 1e-301])
 def test_a_dimension_is_a_number_or_an_array_of_numbers(value):

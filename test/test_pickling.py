@@ -1,11 +1,9 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Mechanisms, and those of scenes, are copied and sent to processes, and answer the same there."""
+"""Mechanisms, and those of scenes, are copied and pickled, and answer the same."""
 
 from copy import copy, deepcopy
-from multiprocessing import get_context
-from operator import methodcaller
 from pathlib import Path
 import pickle
 
@@ -89,18 +87,3 @@ def test_scenes_and_what_is_in_them_can_be_sent(file):
         for mechanism, other in zip(sent.mechanisms.values(), got.mechanisms.values()):
             assert answers(other.linkage) == answers(mechanism.linkage)
             assert (other.inputs, other.joints) == (mechanism.inputs, mechanism.joints)
-
-
-@pytest.mark.nightly
-def test_processes_that_share_nothing_answer_the_same():
-    linkages = list(LINKAGES.values())
-    with get_context('spawn').Pool(1) as pool:
-        sent = [pool.apply_async(methodcaller('solve', inputs(linkage)), (linkage,))
-                for linkage in linkages]
-        for linkage, result in zip(linkages, sent):
-            there = result.get(100.0)
-            for name, places in linkage.solve(inputs(linkage)).items():
-                assert bits(there[name]) == bits(places)
-        mechanism = next(iter(scene.load(str(CONFIG / 'excavator.yaml')).mechanisms.values()))
-        assert pool.apply(methodcaller('efforts', [1.0] * len(mechanism.inputs)), (
-            mechanism,)) == mechanism.efforts([1.0] * len(mechanism.inputs))

@@ -3,12 +3,10 @@
 
 """Linkages of rods in space: against 90 digits, a polynomial of degree eight and brute force."""
 
-import ctypes
 import math
 import random
 import re
 
-from c_libraries import loaded
 import gmpy2
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
@@ -484,65 +482,9 @@ def test_a_linkage_a_million_times_the_size_has_the_same_angles(g1):
     np.testing.assert_array_equal(pose(made(lines), (0.1, 0.2)), pose(g1, (0.1, 0.2)))
 
 
-@pytest.fixture(scope='module')
-def compiled(tmp_path_factory):
-    """Return the ankle as C, with its inverse."""
-    folder = tmp_path_factory.mktemp('c')
-    mechanism = scene.read({'mechanisms': ['ankle'], 'ankle.type': 'rods',
-                            'ankle.joints': list(G1)}).mechanisms['ankle']
-    text = header.written(mechanism)
-    calls = """
-int pose_(double x, double y, ankle_pose *p)
-{
-    ankle_rates(x, y, p + 1, p + 2);
-    return ankle_solve(x, y, p);
-}
-
-int there_and_back_(const double *joints, double *actuators, double *again)
-{
-    ankle_memory m;
-    ankle_joints from = {{joints[0], joints[1]}, {0.0, 0.0}, {0.0, 0.0}}, back;
-    ankle_actuators to;
-    int status = !ankle_begin(&m);
-    status |= ankle_joints_to_actuators(&m, &from, &to);
-    status |= ankle_actuators_to_joints(&m, &to, &back);
-    memcpy(actuators, to.position, 2 * sizeof(double));
-    memcpy(again, back.position, 2 * sizeof(double));
-    return status;
-}
-"""
-    return text, loaded(folder, '#include <string.h>\n' + text + calls)
-
-
-@pytest.mark.nightly
-def test_the_pose_in_c_has_no_loop_and_no_heap(compiled):
-    pose_ = compiled[0][compiled[0].index('#endif /* LINKAGE'):compiled[0].index('ANKLE_OK')]
+def test_the_pose_in_c_has_no_loop_and_no_heap():
+    text = header.written(scene.read({'mechanisms': ['ankle'], 'ankle.type': 'rods',
+                                      'ankle.joints': list(G1)}).mechanisms['ankle'])
+    pose_ = text[text.index('#endif /* LINKAGE'):text.index('ANKLE_OK')]
     assert 'ankle_solve' in pose_ and 'ankle_rates' in pose_ and not re.search(
         r'\b(for|while|do|goto|malloc)\b(?! it)', re.sub(r'/\*.*?\*/', '', pose_, flags=re.S))
-
-
-@pytest.mark.nightly
-def test_from_pitch_and_roll_to_motors_and_back_in_c(compiled, g1):
-    turn = compiled[1].there_and_back_
-    turn.argtypes = 3 * [ctypes.c_void_p]
-    inverse = g1.inverse(('pitch', 'roll'))
-    for values in np.random.default_rng(12).uniform([-0.8, -0.2], [0.5, 0.2], (200, 2)):
-        motors, back = np.zeros((2, 2))
-        assert turn(values.ctypes.data, motors.ctypes.data, back.ctypes.data) == 0
-        found, _ = inverse.nearest(values.tolist(), [0.0, 0.0])
-        np.testing.assert_allclose(motors, found, atol=1e-12)
-        np.testing.assert_allclose(back, values, atol=1e-12)
-
-
-@pytest.mark.nightly
-def test_c_is_python(compiled, g1):
-    solve = compiled[1].pose_
-    solve.argtypes = [ctypes.c_double, ctypes.c_double, ctypes.c_void_p]
-    for values in np.random.default_rng(11).uniform(-0.4, 0.4, (300, 2)).tolist():
-        out = np.zeros((3, 4))
-        is_there = solve(*values, out.ctypes.data)
-        found = [g1.joint_angles(values), *(
-            g1.joint_rates(values, by=by) for by in (0, 1))]
-        wanted = np.array([list(each.values()) for each in found])
-        assert bool(is_there) == np.isfinite(wanted[0]).all()
-        np.testing.assert_allclose(out, wanted, rtol=1e-12, atol=1e-14)

@@ -13,6 +13,8 @@ from typing import NamedTuple
 
 from mpmath import mp, mpf
 
+from .random_linkages import Design
+
 
 def cis(angle):
     """Return the unit vector at an angle."""
@@ -35,6 +37,11 @@ class Case(NamedTuple):
     def joints(self):
         """Its lines, one a joint."""
         return [line.strip() for line in self.lines.strip().splitlines()]
+
+    @property
+    def design(self):
+        """What checks take."""
+        return Design(tuple(self.joints), self.numbers, {})
 
 
 # An excavator's idler stands so far from the ground bar when its piston is at zero [rad].

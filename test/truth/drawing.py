@@ -172,6 +172,17 @@ def _option(rest, word, count):
     return rest[at:at + count]
 
 
+def scaled(text, size):
+    """Return a line with all lengths times a number."""
+    line, parts = read(text), text.split()
+    at = len(line.names) + 1
+    for kind, number in zip(line.kinds, line.numbers):
+        at = parts.index(number, at) + 1
+        if kind == 'n':
+            parts[at - 1] = f'({number})*{size!r}'
+    return ' '.join(parts)
+
+
 class Value(NamedTuple):
     """A number in many digits and what rounding its arithmetic to float64 may do to it."""
 

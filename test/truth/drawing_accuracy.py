@@ -472,7 +472,7 @@ def _row(out, given, result, value, spread, due, rule, ulps, allowed):
     elif due == 'nan' or due == 'number' and np.any(np.isnan(result)):
         problem = 'missed NaN'
     elif due in ('number', 'maybe') or due == 'either' and not rate:
-        error = float(_error(out, result, value))
+        error = float(error_of(out, result, value))
         ulp = np.spacing(math.pi if out.what == 'angle' and not rate else np.max(np.abs(result)))
         excess = max(0.0, error - float(ulp) * ulps)
         # What the differencing leaves of a rate of zero is no error.
@@ -485,7 +485,8 @@ def _row(out, given, result, value, spread, due, rule, ulps, allowed):
                error, spread, result, value)
 
 
-def _error(out, result, value):
+def error_of(out, result, value):
+    """Return how far an answer is from a true value."""
     if np.ndim(result):
         return abs(mpc(*map(float, result)) - value)
     if out.what == 'angle' and out.by is None:

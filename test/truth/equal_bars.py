@@ -8,18 +8,27 @@ All lengths are one of two numbers, their sum or their difference, and all joint
 on such a grid: cranks are as long as the ground, dyads have equal bars, and joints coincide.
 """
 
+from functools import partial
+import math
 from typing import NamedTuple, Optional
 
 from gmpy2 import mpc, mpfr
 from linkage_ros import mechanisms
 import numpy as np
 
+from . import drawing_accuracy
 from .drawing import DIGITS, draw, FLOATS, Linkage, precisely
-from .drawing_accuracy import turned_bar
+from .drawing_accuracy import error_of, turned_bar
+from .linkage_checks import checked, spots
 from .random_linkages import Design, INPUTS
 
 # How far from a value its sides are; limits that differ by less are equal; arms below it vanish.
 SIDE, EQUAL, NONE = mpfr(2) ** -150, mpfr(2) ** -50, mpfr(2) ** -280
+# What special values are asked with, and the largest error of a limit: of an angle [rad], or in
+# longest bars.
+STEPS = [0.0, *(sign * step for step in (1e-3, 1e-12, 1e-160, 1e-200, 5e-324)
+                for sign in (1, -1))]
+CLOSE = 1e-9
 # Lengths by their text, with how often each is drawn.
 LENGTHS = {'a': 6, 'b': 2, 'a+b': 1, '2*a': 2}
 LINES = {
@@ -105,14 +114,16 @@ class Limits(NamedTuple):
 
 
 @precisely
-def limits(linkage: Linkage, poses, way, value: float, others=()) -> Limits:
+def limits(subject, value: float) -> Limits:
     """Return the limits of outputs at a value of the first input from both sides."""
+    linkage, way = subject.linkage, subject.ways[0]
     rows, turns = linkage.prepared(linkage.numbers), linkage.turns(linkage.numbers, way)
-    unit = 1 if linkage.inputs[0].turns else linkage.longest
-    drawn = [draw(DIGITS, linkage, rows, [mpfr(value) + side * SIDE * unit, *map(mpfr, others)],
-                  way, turns) for side in (-1, 0, 1)]
+    unit = 1 if subject.turns else linkage.longest
+    drawn = [draw(DIGITS, linkage, rows, [
+        mpfr(value) + side * SIDE * unit, *map(mpfr, subject.held)], way, turns)
+        for side in (-1, 0, 1)]
     sides = [None if any(gap < 0 for gap in each.gaps.values())
-             else [_pose(out, each) for out in poses] for each in drawn[::2]]
+             else [_pose(out, each) for out in subject.poses] for each in drawn[::2]]
     return Limits(*sides, frozenset(
         name for name, arm in drawn[1].arms.items() if arm < NONE * linkage.longest))
 
@@ -124,3 +135,49 @@ def _pose(out, drawn):
         return mpc(drawn.slides[out.parts[0][0]])
     bar = turned_bar(out, drawn)
     return bar * mpc(0, -1) ** out.quarters / (abs(bar) or 1)
+
+
+@checked
+def limited(subject):
+    """
+    Yield what does not hold next to the special values of the first input.
+
+    Nothing is infinite, and one pose is that of an array. Where an arm of the construction has no
+    length, on which a joint stands: if it goes from the ground to the pin of a crank, the joint
+    has the limit if both sides agree, and is NaN if not. On other arms, whose zero only
+    coordinates tell, it has no place there.
+    """
+    mechanism, linkage, poses = subject.mechanism, subject.linkage, subject.poses
+    at = {0.0, *spots(subject), *(0.5 * math.pi * k for k in (-2, -1, 1, 2) if subject.turns)}
+    values = np.unique([spot + step * subject.inputs[0].size for spot in at for step in STEPS])
+    answers = drawing_accuracy.answers(
+        mechanism, np.array([[value, *subject.held] for value in values]), poses)
+    for i, value in enumerate(values.tolist()):
+        alone = drawing_accuracy.answers(mechanism, np.array([value, *subject.held]), poses)
+        near = limits(subject, value)
+        sides = [side for side in (near.before, near.after) if side]
+        for k, out in enumerate(poses):
+            found, single = answers[out][i], alone[out]
+            unit = mechanism.longest if out.what != 'angle' else 1.0
+            text = f'{out} at {value!r} is {found}'
+            if np.isinf(found).any() or np.isinf(single).any():
+                yield 'infinite', text
+            if not np.array_equal(np.isnan(found), np.isnan(single)):
+                yield 'in an array only', f'{single}, {text}'
+            hung = near.vanishing & out.needs
+            if not hung or len(sides) < 2 or not all(
+                    linkage.half_angles[linkage.lines.index(linkage.placing(name))]
+                    for name in hung):
+                continue
+            agree = near.agree(k, unit)
+            # A joint is nowhere if one that it stands on is.
+            whole = all(near.agree(n, mechanism.longest) for n, each in enumerate(poses)
+                        if each.what == 'point' and each.needs <= out.needs)
+            if np.isnan(found).any():
+                if agree and whole:
+                    yield 'no limit', f'{text}, not {complex(sides[0][k])}'
+            elif min(map(precisely(partial(error_of, out, found)), (
+                    side[k] for side in sides))) > CLOSE * unit:
+                yield 'wrong', f'{text}, not {complex(sides[0][k])}'
+            elif not agree and value == 0.0:
+                yield 'a number where the sides differ', text

@@ -44,76 +44,36 @@ def tiny(rng, least=1e-15, exact=0.1):
     return float(rng.choice((-1.0, 1.0)) * log_uniform(rng, least, 1e-1))
 
 
+# Degenerate lengths, from the others. A leg never has a change point: its ground line is oblique, so
+# that rounding would decide. Its crank takes C's and E's dyads this far and near.
+_FAR, _NEAR = 'hypot(a,l)+m', 'abs(hypot(a,l)-m)'
+DEGENERATE = {
+    'water_drop': [], 'peaucellier': ['a=b', 'r=(a+b)/2', 'r=abs(a-b)/2'],
+    'slotted_lever': ['a=b', 'e=abs(b-a)', 'e=a+b', 'e=-a-b'],
+    'jansen': [f'j={_FAR}-b', f'k={_FAR}-c', f'j=b+{_NEAR}', f'k=c+{_NEAR}', 'e=b+d', 'h=g+i']}
+
+
 def dimensions(kind, rng):
-    """Return random dimensions of a linkage, three tenths of them nearly degenerate."""
-    return _DIMENSIONS[kind](rng, rng.random() < 0.3)
-
-
-def _water_drop(rng, _):
-    return {'a': log_uniform(rng, 0.1, 10.0)}
-
-
-def _peaucellier(rng, degenerate):
-    """Cranks rarely too short to reach: 2 r is at least about |a - b|."""
-    r, a, b = (log_uniform(rng, 0.1, 10.0) for _ in range(3))
-    r = max(r, abs(a - b) * log_uniform(rng, 0.45, 2.0))
-    if degenerate:
-        near = 1.0 + tiny(rng)
-        way = rng.integers(3)
-        if way == 0:
-            a = b * near
-        elif way == 1:
-            r = 0.5 * (a + b) * near
-        else:
-            r = 0.5 * abs(a - b) * near
-    return {'r': r, 'a': a, 'b': b}
-
-
-def _slotted_lever(rng, degenerate):
-    a, b = (log_uniform(rng, 0.1, 10.0) for _ in range(2))
-    e = 0.0
-    if rng.random() < 0.6:
-        e = float(rng.choice((-1.0, 1.0))) * log_uniform(rng, 0.01, 10.0)
-    if degenerate:
-        near = 1.0 + tiny(rng)
-        way = rng.integers(3)
-        if way == 0:
-            a = b * near
-        else:
-            e = math.copysign((abs(b - a) if way == 1 else a + b) * near, rng.random() - 0.5)
-    return {'a': a, 'b': b, 'e': e}
-
-
-def _jansen(rng, degenerate):
     """
-    Return a leg within 35 % of the holy numbers, of any size; few other designs can walk at all.
+    Return random dimensions of a linkage, three tenths of them nearly degenerate.
 
-    Never a change point: its ground line is oblique, so that rounding decides about that.
+    A leg is within 35 % of the holy numbers: few others can walk at all. An inversor's crank is
+    rarely too short to reach, 2 r being at least about |a - b|.
     """
     size = log_uniform(rng, 0.01, 1.0)
-    leg = {name: size * number * float(rng.uniform(0.65, 1.35)) for name, number in HOLY.items()}
-    if degenerate:
-        near = 1.0 + tiny(rng, least=1e-13, exact=0.0)
-        arm = math.hypot(leg['a'], leg['l'])
-        far, close = arm + leg['m'], abs(arm - leg['m'])
-        way = rng.integers(6)
-        if way == 0:
-            leg['j'] = far * near - leg['b'] if far > leg['b'] else leg['j']
-        elif way == 1:
-            leg['k'] = far * near - leg['c'] if far > leg['c'] else leg['k']
-        elif way == 2:
-            leg['j'] = leg['b'] + close * near
-        elif way == 3:
-            leg['k'] = leg['c'] + close * near
-        elif way == 4:
-            leg['e'] = (leg['b'] + leg['d']) * near
-        else:
-            leg['h'] = (leg['g'] + leg['i']) * near
-    return leg
-
-
-_DIMENSIONS = {'water_drop': _water_drop, 'jansen': _jansen, 'peaucellier': _peaucellier,
-               'slotted_lever': _slotted_lever}
+    found = {name: size * length * float(rng.uniform(0.65, 1.35)) if kind == 'jansen'
+             else log_uniform(rng, 0.1, 10.0) for name, length in CATALOGUE[kind][0].items()}
+    if kind == 'peaucellier':
+        found['r'] = max(found['r'], abs(found['a'] - found['b']) * log_uniform(rng, 0.45, 2.0))
+    if kind == 'slotted_lever':
+        found['e'] *= float(rng.choice((-1.0, 0.0, 1.0)))
+    if DEGENERATE[kind] and rng.random() < 0.3:
+        name, _, length = str(rng.choice(DEGENERATE[kind])).partition('=')
+        value = eval(length, {**found, 'hypot': math.hypot})
+        near = tiny(rng, 1e-13, 0.0) if kind == 'jansen' else tiny(rng)
+        if value > 0.0 or name == 'e':
+            found[name] = value * (1.0 + near)
+    return found
 
 
 def lever_gap(lengths, lever, half):

@@ -9,18 +9,17 @@ in many digits says the same, so that nothing here is a false alarm next to a li
 """
 
 from contextlib import suppress
+from functools import wraps
 import math
-import time
 from typing import NamedTuple
 import warnings
 
 from linkage_ros import mechanisms
 import numpy as np
 
-from . import drawing_accuracy, random_linkages
-from .drawing import draw, FLOATS, Linkage
+from . import drawing_accuracy, inverse_judge, random_linkages
+from .drawing import draw, FLOATS, Linkage, scaled
 
-TURN = 2 * math.pi
 # Arcs below this width, of an input about as large as an angle, are the rounding of one or two.
 NARROWEST = 1e-12
 # An arm that is shorter than this part of the longest length has no direction to speak of.
@@ -44,8 +43,8 @@ class Subject:
 
     def __init__(self, design, rng, samples=4000):
         self.design, self.rng = design, rng
-        # What has been measured: rows of poses and rates, CPU time of questions to the inverse.
-        self.rows, self.seconds = [], []
+        # What has been measured.
+        self.rows = []
         self.mechanism = mechanisms.create('custom', joints=design.joints,
                                            branches=design.branches, **design.dimensions)
         self.linkage = Linkage(design.joints, design.dimensions, design.branches)
@@ -89,7 +88,7 @@ class Subject:
 
     def _misfit(self, way):
         """Return at how many values the mechanism does not go this way past its change points."""
-        given = np.column_stack([self.rng.uniform(-TURN, TURN, 60) if input_.turns else
+        given = np.column_stack([self.rng.uniform(-math.tau, math.tau, 60) if input_.turns else
                                  self.rng.uniform(input_.low, input_.high, 60)
                                  for input_ in self.inputs])
         drawing, unit = self._drawn(list(given.T), way)
@@ -132,23 +131,11 @@ class Subject:
         arms = self.drawn([value])[0].arms.values()
         return any(not np.all(arm >= SHORTEST) for arm in arms)
 
-    def away(self, value, others, turn=None):
+    def away(self, value, others):
         """Return how far a value of the first input is from the nearest of others, or turns on."""
-        turn = (self.inputs[0].turn if turn is None else turn) if self.turns else math.inf
+        turn = self.inputs[0].turn if self.turns else math.inf
         return min((abs((value - other + turn / 2) % turn - turn / 2) if math.isfinite(turn)
                     else abs(value - other) for other in others), default=math.inf)
-
-    def place(self, output, drawing, unit):
-        """Return an output of a drawing, in metres or radians."""
-        name, _, axis = output.rpartition('.')
-        if name:
-            place = drawing.points[name]
-            return unit * (place.real if axis == 'x' else place.imag) * np.ones(1)
-        pose = next(pose for pose in self.poses if pose.what != 'point' and pose.name == output)
-        if pose.what == 'slide':
-            return unit * drawing.slides[pose.parts[0][0]] * np.ones(1)
-        bar = drawing_accuracy.turned_bar(pose, drawing)
-        return np.angle(bar * (-1j) ** pose.quarters) * np.ones(1)
 
     def reachable(self, drawing):
         """Tell for every sample whether all closures are met."""
@@ -169,21 +156,19 @@ def assembled(seeds):
             yield seed, linkage, rng
 
 
-def checked(kind):
-    """Make an exception that escapes from a check a problem of that kind."""
-    def around(check):
-        def guarded(subject, *args):
-            try:
-                with warnings.catch_warnings():
-                    warnings.simplefilter('error', RuntimeWarning)
-                    return [Problem(found, f'{text}: {subject}')
-                            for found, text in check(subject, *args)]
-            except Exception as error:  # noqa: B902
-                return [Problem(f'{kind}: {type(error).__name__}',
-                                f'{str(error)[:200]}: {subject}')]
-        guarded.__name__ = check.__name__
-        return guarded
-    return around
+def checked(check):
+    """Make what escapes from a check a problem."""
+    @wraps(check)
+    def guarded(subject, *args):
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter('error', RuntimeWarning)
+                return [Problem(found, f'{text}: {subject}')
+                        for found, text in check(subject, *args)]
+        except Exception as error:  # noqa: B902
+            return [Problem(f'{check.__name__}: {type(error).__name__}',
+                            f'{str(error)[:200]}: {subject}')]
+    return guarded
 
 
 # --- poses and rates ----------------------------------------------------------------------------
@@ -207,19 +192,19 @@ def asked(subject, count):
     return given
 
 
-@checked('poses')
+@checked
 def poses(subject, count=4):
     """Compare places, angles and slides with the drawing."""
     yield from _broken(subject, asked(subject, count), False)
 
 
-@checked('rates')
+@checked
 def rates(subject, count=1):
     """Compare velocities and rates with the drawing."""
     yield from _broken(subject, asked(subject, count), True)
 
 
-@checked('accelerations')
+@checked
 def accelerations(subject):
     """Compare accelerations at random speeds of the inputs with the drawing."""
     sizes = [1.0 if input_.turns else input_.high - input_.low for input_ in subject.inputs]
@@ -241,7 +226,7 @@ def _broken(subject, given, with_rates, mechanism=None, motion=None):
 
 # --- one answer in many forms -------------------------------------------------------------------
 
-@checked('forms')
+@checked
 def forms(subject):
     """Ask for arrays of every shape and in one function what is asked for one pose."""
     mechanism, given = subject.mechanism, asked(subject, 6)
@@ -274,7 +259,7 @@ def forms(subject):
                 break
 
 
-@checked('accelerated')
+@checked
 def accelerated(subject):
     """Compare arrays by machine code with the drawing."""
     yield from _broken(subject, asked(subject, 2), True, subject.mechanism.accelerated())
@@ -314,7 +299,7 @@ def _same(name, one, other):
 
 # --- reach and dead points ----------------------------------------------------------------------
 
-@checked('reach')
+@checked
 def reach(subject):
     """Compare the reach with brute force; its ends and what lies on it must have a pose."""
     arcs = subject.mechanism.reach(*subject.held)
@@ -361,7 +346,7 @@ def _some(indices, most=4):
         if len(indices) > most else indices
 
 
-@checked('dead points')
+@checked
 def dead_points(subject):
     """Compare the dead points with where closures vanish; transmission angles lie in [0, pi]."""
     mechanism = subject.mechanism
@@ -462,113 +447,103 @@ def _on_reach(subject, value):
 
 # --- the inverse --------------------------------------------------------------------------------
 
-@checked('inverse')
+def _moved(mechanism):
+    """Return the joint angles, slides and coordinates that move, but for the inputs."""
+    driven = [input_.name for input_ in mechanism.inputs]
+    return [name for name in (*mechanism.joints, *(
+        f'{point}.{axis}' for point in mechanism.points for axis in 'xy'))
+        if mechanism.moves(name) and name not in driven]
+
+
+@checked
 def inverse(subject, count=2):
-    """Ask which values of the first input give values that outputs have."""
+    """Ask which values of the first input give values that outputs have; `inverse_judge` tells."""
+    for output in map(str, subject.rng.permutation(_moved(subject.mechanism))[:count]):
+        found, _ = inverse_judge.judge(
+            subject.mechanism, output, subject.rng, 4, subject.held)
+        for kind, what, *case in found:
+            if kind == 'ordinary' and case:
+                yield f'inverse {what}', f'{output} at {case[2]!r}'
+
+
+@checked
+def followed(subject):
+    """Follow an output to a value beside that of a pose: what is answered has the value."""
     mechanism, rng = subject.mechanism, subject.rng
-    drawing, unit = subject.drawn(subject.values)
-    held = subject.reachable(drawing)
-    moving = [name for name in mechanism.points if name not in subject.linkage.fixed]
-    outputs = [*(f'{name}.{axis}' for name in moving for axis in 'xy'), *mechanism.joints]
-    for output in rng.choice(outputs, min(count, len(outputs)), replace=False):
-        yield from _asked_back(subject, str(output), drawing, unit, held)
+    for output in map(str, rng.permutation(_moved(mechanism))[:1]):
+        names = (output, *(input_.name for input_ in mechanism.inputs[1:]))
+        scale = 1.0 if mechanism.is_angle(output) else mechanism.longest
+
+        def value(theta, output=output):
+            return float(mechanism.joint_angles(_with(subject, theta), [output])[output])
+
+        for near in rng.choice(subject.values, 10).tolist():
+            wanted = value(near) + rng.uniform(-0.2, 0.2) * scale
+            found, _ = mechanism.inverse(names).follow(
+                (wanted, *subject.held), (near, *subject.held))
+            gap = value(found[0]) - wanted if math.isfinite(found[0]) else 0.0
+            gap = math.remainder(gap, math.tau) if mechanism.is_angle(output) else gap
+            if not abs(gap) < 1e-6 * scale:
+                yield 'followed', f'{output} to {wanted!r} from {near!r}: {found} is {gap} off'
 
 
-def _asked_back(subject, output, drawing, unit, held):
-    mechanism, rng = subject.mechanism, subject.rng
-    if output in [input_.name for input_ in mechanism.inputs]:
-        return
-    turns = '.' not in output and not any(
-        pose.what == 'slide' and pose.name == output for pose in subject.poses)
-    scale = 1.0 if turns else unit
-    value = subject.place(output, drawing, unit) * np.ones(subject.values.shape)
-    good = held & np.isfinite(value)
-    wanted, spread = [0.1 * scale], 0.0
-    if good.any():
-        wanted = [float(value[i]) for i in rng.choice(np.flatnonzero(good), 2)]
-        spread = np.ptp(np.unwrap(value[good]) if turns else value[good]) / scale
-    # Answers are those of all turns until all comes round.
-    period = max(input_.period for input_ in mechanism.inputs)
-    for target in wanted:
-        start = time.process_time()
-        try:
-            answers = mechanism.input_for(output, target, others=subject.held)
-        except ValueError:
-            if spread > 1e-9:
-                yield 'inverse refused', f'{output} moves by {spread:.3g}'
-            return
-        subject.seconds.append((time.process_time() - start) / period)
-        answers = np.asarray(answers)
-        answers = answers[np.isfinite(answers)]
-        if spread < 1e-9:
-            # It may move next to a dead point, between samples, and dwell everywhere else.
-            if spread < 1e-15 and len(answers) > 2:
-                yield 'inverse of what stands still', f'{output} = {target!r}: {answers.tolist()}'
-            continue
-        if spread < 1e-6:
-            return
-        if len(answers) > 40 * period:
-            yield 'inverse too many', f'{output} = {target!r}: {len(answers)} answers'
-        yield from _false(subject, output, target, answers, turns, scale)
-        if not any(map(subject.without_direction, answers.tolist())):
-            yield from _lost(subject, output, target, answers, turns, scale, value, good)
+# --- forces and sizes ---------------------------------------------------------------------------
+
+@checked
+def efforts(subject):
+    """Compare the efforts that balance a load with the rates of what it moves."""
+    mechanism, given = subject.mechanism, _given(asked(subject, 1), ())
+    links = {link.name: link for link in mechanism.links}
+    for name in (*mechanism.points, *mechanism.joints):
+        link, moved = links.get(name), [f'{name}.x', f'{name}.y']
+        if link:
+            while link and link.kind == 'prismatic':
+                link = links.get(link.parent)
+            moved = [f'angle({link.joint},{link.tip})'] if link else []
+        load = subject.rng.uniform(-9.0, 9.0, 1 if name in links else 2)
+        rates = np.array([[*mechanism.joint_rates(given, moved, by).values()]
+                          for by in range(len(mechanism.inputs))])
+        found = mechanism.effort(given, {name: load[0] if name in links else load})
+        known = np.isfinite(rates).all(axis=1)
+        rates, close = rates[known], 1e-9 * np.abs(rates[known]).max(initial=0.0)
+        if np.isfinite(found[~known]).any() or not np.allclose(
+                found[known], -rates @ load[:len(moved)], 1e-6, close):
+            yield 'effort', f'{found} for {load} at {name}, {given}; rates {rates.tolist()}'
 
 
-def _gap(value, target, turns):
-    gap = value - target
-    return np.mod(gap + math.pi, TURN) - math.pi if turns else gap
+@checked
+def sizes(subject):
+    """Ask for the same linkage 2^80 times as large or small: all its digits are the same."""
+    mechanism, rows = subject.mechanism, asked(subject, 3)
+    size = 2.0 ** (80 if mechanism.longest < 1.0 else -80)
+    other = mechanisms.create('custom', joints=[
+        scaled(text, size) for text in subject.design.joints], branches=mechanism.branches,
+        **mechanism.dimensions)
+    lengths = [link.name for link in mechanism.links if link.kind == 'prismatic']
+    units = [1.0 if input_.turns else size for input_ in mechanism.inputs]
+    found = _all(other, _given(rows * units, (3,)))
+    for key, value in _all(mechanism, _given(rows, (3,))).items():
+        ask, name, *by = key.split()
+        unit = size if ask in ('solve', 'velocity') or name in lengths else 1.0
+        unit /= units[int(*by)] if by else 1.0
+        if not np.array_equal(found[key], unit * value, equal_nan=True):
+            yield 'size', f'{key} at {rows.tolist()}: {found[key]} is not {unit * value}'
+    others = np.multiply(subject.held, units[1:])
+    for ask in 'reach', 'dead_points':
+        ends, expected = getattr(other, ask)(*others), getattr(mechanism, ask)(*subject.held)
+        if not np.array_equal(ends, units[0] * np.array(expected)):
+            yield 'size', f'{ask} {ends} is not {expected} times {units[0]}'
 
 
-def _false(subject, output, target, answers, turns, scale):
-    """Yield answers that do not give the value back."""
-    for answer in answers[:10]:
-        steps = float(answer) + subject.scale * np.multiply.outer(
-            [-1.0, 1.0], [0.0, 5e-16, 1e-14, 1e-12, 1e-9])
-        drawing, unit = subject.drawn(steps.ravel())
-        gap = np.abs(_gap(subject.place(output, drawing, unit) * np.ones(steps.size), target,
-                          turns))
-        if np.min(gap) > 1e-7 * scale + 2 * np.ptp(gap):
-            yield 'inverse false', (f'{output} = {target!r}: at {float(answer)!r} it is off by '
-                                    f'{gap[0]:.3g} of {scale:.3g}; answers {answers.tolist()}')
-            return
-
-
-def _lost(subject, output, target, answers, turns, scale, value, good):
-    """Yield crossings of the value that are not among the answers."""
-    # Outputs of gears that hardly ever come round have a period of their own.
-    names = (output, *(input_.name for input_ in subject.inputs[1:]))
-    turn = subject.mechanism.inverse(names).inputs[0].turn
-    gap = _gap(value, target, turns)
-    change = (gap[:-1] < 0.0) != (gap[1:] < 0.0)
-    change &= good[:-1] & good[1:] & (np.abs(np.diff(gap)) < 0.2 * scale)
-    for i in np.flatnonzero(change)[:20]:
-        lo, hi = subject.values[i], subject.values[i + 1]
-        below = gap[i] < 0.0
-        for _ in range(12):
-            grid = np.linspace(lo, hi, 17)
-            drawing, unit = subject.drawn(grid)
-            row = _gap(subject.place(output, drawing, unit) * np.ones(17), target, turns)
-            at = max(1, int(np.argmax((row < 0.0) != below)))
-            lo, hi = grid[at - 1], grid[at]
-        if not abs(row[at]) < 1e-7 * scale:
-            continue  # a jump
-        if subject.away(hi, answers, turn) > subject.scale * (1e-5 + 1e3 * abs(row[at]) / scale):
-            slope = abs(value[i + 1] - value[i]) / scale
-            # It may have crossed in a narrow gap of the reach.
-            if slope > 1e-9 and not {'fails', 'slips'} & subject.states(float(hi)):
-                yield 'inverse lost', (f'{output} = {target!r}: {hi!r} is not among '
-                                       f'{answers.tolist()}')
-                return
-
-
-CHECKS = (poses, rates, accelerations, forms, reach, dead_points, inverse)
+CHECKS = (poses, rates, accelerations, forms, reach, dead_points, inverse, followed,
+          efforts, sizes)
 
 
 def problems(design, rng, checks=CHECKS, samples=4000):
-    """Return the problems of a design, measured rows and times, None if it cannot be made."""
+    """Return the problems of a design and all measured rows, None if it cannot be made."""
     try:
         subject = Subject(design, rng, samples)
     except ValueError:
         return None
     found = [problem for check in checks for problem in check(subject)]
-    return found, subject.rows, subject.seconds
+    return found, subject.rows
