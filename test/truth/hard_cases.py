@@ -44,8 +44,8 @@ def tiny(rng, least=1e-15, exact=0.1):
     return float(rng.choice((-1.0, 1.0)) * log_uniform(rng, least, 1e-1))
 
 
-# Degenerate lengths, from the others. A leg never has a change point: its ground line is oblique, so
-# that rounding would decide. Its crank takes C's and E's dyads this far and near.
+# Degenerate lengths, from the others. A leg never has a change point: its ground line is oblique,
+# and rounding would decide. Its crank takes C's and E's dyads this far and near.
 _FAR, _NEAR = 'hypot(a,l)+m', 'abs(hypot(a,l)-m)'
 DEGENERATE = {
     'water_drop': [], 'peaucellier': ['a=b', 'r=(a+b)/2', 'r=abs(a-b)/2'],

@@ -18,7 +18,7 @@ from linkage_ros import mechanisms
 import numpy as np
 
 from . import drawing_accuracy, inverse_judge, random_linkages
-from .drawing import draw, FLOATS, Linkage, scaled
+from .drawing import draw, FLOATS, Linkage
 
 # Arcs below this width, of an input about as large as an angle, are the rounding of one or two.
 NARROWEST = 1e-12
@@ -505,7 +505,8 @@ def efforts(subject):
                           for by in range(len(mechanism.inputs))])
         found = mechanism.effort(given, {name: load[0] if name in links else load})
         known = np.isfinite(rates).all(axis=1)
-        rates, close = rates[known], 1e-9 * np.abs(rates[known]).max(initial=0.0)
+        rates, close = rates[known], 1e-9 * np.abs(rates[known]).max(
+            initial=1.0 if name in links else mechanism.longest)
         if np.isfinite(found[~known]).any() or not np.allclose(
                 found[known], -rates @ load[:len(moved)], 1e-6, close):
             yield 'effort', f'{found} for {load} at {name}, {given}; rates {rates.tolist()}'
@@ -516,9 +517,11 @@ def sizes(subject):
     """Ask for the same linkage 2^80 times as large or small: all its digits are the same."""
     mechanism, rows = subject.mechanism, asked(subject, 3)
     size = 2.0 ** (80 if mechanism.longest < 1.0 else -80)
-    other = mechanisms.create('custom', joints=[
-        scaled(text, size) for text in subject.design.joints], branches=mechanism.branches,
-        **mechanism.dimensions)
+    scaled = subject.linkage.scaled(size)
+    if not scaled:
+        return
+    other = mechanisms.create(
+        'custom', joints=scaled[0], branches=mechanism.branches, **scaled[1])
     lengths = [link.name for link in mechanism.links if link.kind == 'prismatic']
     units = [1.0 if input_.turns else size for input_ in mechanism.inputs]
     found = _all(other, _given(rows * units, (3,)))
