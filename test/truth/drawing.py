@@ -356,10 +356,11 @@ class Linkage:
             joints.append(' '.join(parts))
         dimensions = {name: x if name in re.findall(r'\w+', angles) else x * size
                       for name, x in self.dimensions.items()}
-        found = Linkage(joints, dimensions).numbers
-        return (joints, dimensions) if all(
-            y == (x * size if kind == 'n' else x) for line, *rows in zip(
-                self.lines, self.numbers, found) for kind, x, y in zip(line.kinds, *rows)) else None
+        is_so = all(
+            y == (x * size if kind == 'n' else x)
+            for line, *rows in zip(self.lines, self.numbers, Linkage(joints, dimensions).numbers)
+            for kind, x, y in zip(line.kinds, *rows))
+        return (joints, dimensions) if is_so else None
 
     def _driven(self):
         """Return for each input or geared line the name that its input has."""
