@@ -7,10 +7,9 @@ from importlib.util import find_spec
 import itertools
 import math
 
-from linkage_ros import mechanisms, scene
+from linkage_ros import mechanisms
 import numpy as np
 import pytest
-from test_c_code import compiled, solved
 from truth import equal_bars, linkage_checks
 from truth.random_linkages import Design
 
@@ -101,33 +100,3 @@ def test_machine_code_has_the_limits_too(word):
     for name, places in theirs.items():
         np.testing.assert_allclose(ours[name], places, rtol=1e-15, atol=1e-16, err_msg=name)
         assert np.isfinite(places[0]).all() or word == 'inversor', name
-
-
-def folded_scene():
-    """Return the mechanism of a scene with the folded dyad."""
-    return scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
-        'O ground 0 0', 'Q ground 0.25 0', 'A crank O 0.25',
-        'C dyad A Q 0.25 0.25 left']}).mechanisms['m']
-
-
-@pytest.mark.parametrize('single', [False, True])
-def test_generated_c_has_the_limits_too(tmp_path, single):
-    mechanism = folded_scene()
-    kind = np.float32 if single else np.float64
-    theta = np.array([0.0, 1e-30, -1e-30, 1e-12, 1e-3])
-    *found, whole = solved(
-        compiled(tmp_path, [mechanism], single), mechanism, theta[:, None], kind).T
-    at = 2 * mechanism.linkage.points.index('C')
-    assert whole.all()
-    close = 1e-7 if single else 1e-16
-    np.testing.assert_allclose(found[at], 0.25 * (1.0 + np.cos(theta)), atol=close)
-    np.testing.assert_allclose(found[at + 1], 0.25 * np.sin(theta), atol=close)
-
-
-@pytest.mark.parametrize('start', [0.0, 1e-200])
-def test_a_walker_has_the_limits_too(start):
-    assembly = folded_scene().assembly()
-    solution = assembly.solution(('C',), ('AC', 'QC'))
-    solution.solve([start])
-    assert np.isfinite(solution.values).all() and all(assembly.within_reach(start))
-    assert 0.5 in solution.values.tolist()

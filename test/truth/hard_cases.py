@@ -85,11 +85,11 @@ def lever_gap(lengths, lever, half):
     return np.minimum(a - np.abs(offset), ahead) / (a + b + abs(e))
 
 
-def angles(rng, count, limits=(), turns=1e9):
+def angles(rng, count, limits=()):
     """
     Return crank angles: half of them anywhere, half close to 0, pi or the given limits [rad].
 
-    A tenth of them is moved by whole turns, up to so many.
+    A tenth of them is moved by whole turns, up to 1e9.
     """
     spots = [0.0, math.pi, -math.pi, math.pi / 2, *limits]
     found = []
@@ -98,12 +98,12 @@ def angles(rng, count, limits=(), turns=1e9):
         if rng.random() < 0.5:
             theta = float(rng.choice(spots)) + tiny(rng)
         if rng.random() < 0.1:
-            theta += 2 * math.pi * round(log_uniform(rng, 1.0, turns))
+            theta += 2 * math.pi * round(log_uniform(rng, 1.0, 1e9))
         found.append(theta)
     return np.array(found)
 
 
-def approach(spot, near=1e-1, far=1e-15):
+def approach(spot):
     """Return angles on both sides of a spot, at every decade of distance, and the spot itself."""
-    steps = 10.0 ** -np.arange(-math.log10(near), -math.log10(far) + 0.5)
+    steps = 10.0 ** -np.arange(1.0, 16.0)
     return np.concatenate((spot - steps, [spot], spot + steps[::-1]))

@@ -11,7 +11,7 @@ and given the functions that suit what it works on: those of `math` for one pose
 numpy's for arrays of any shape, whose precision they keep, float32 or float64.
 
 Sources: "Water drop linkage", "Jansen linkage", "Peaucellier-Lipkin linkage" (H. Shigeyoshi,
-gnuplot programs); two Processing sketches of the slotted lever.
+gnuplot programs); a Processing sketch of the slotted lever.
 """
 
 import math
@@ -62,17 +62,6 @@ def solve(kind, dimensions, theta):
         found = pose(theta)
     joints = {**ground, **dict(zip(moving, zip(found[::2], found[1::2])))}
     return {name: _stack(theta, *joint) for name, joint in joints.items()}
-
-
-def lever_angle(theta, a, b):
-    """Return the lever angles [rad] of the first sketch: atan of a quotient."""
-    return np.arctan(a * np.sin(theta) / (a * np.cos(theta) + b))
-
-
-def servo_angle(lever, a, b):
-    """Return the crank angle [rad] of the second sketch, NaN where asin ends."""
-    with np.errstate(invalid='ignore'):
-        return lever + np.arcsin(b * np.sin(lever) / a)
 
 
 def _formulas(functions, kind, dimensions):
