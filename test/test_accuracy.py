@@ -9,7 +9,7 @@ from linkage_ros import mechanisms
 import numpy as np
 import pytest
 from truth import hard_cases, original_formulas
-from truth.drawing_accuracy import answers, broken, judge, measured, strict, summary
+from truth.drawing_accuracy import broken, judge, measured, strict, summary
 
 KINDS = list(hard_cases.CATALOGUE)
 BRANCHES = {
