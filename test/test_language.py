@@ -13,7 +13,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.linkage import joint_lines
 import numpy as np
 import pytest
-from truth.hostile_texts import LEGAL, mutations, TEXTS
+from truth.hostile_texts import LEGAL, mutations, NUMBERS, TEXTS
 
 FOUR_BAR = ('O ground 0 0', 'Q ground g 0', 'A crank O m', 'B dyad A Q b c left')
 # More digits than Python writes.
@@ -438,11 +438,17 @@ def refused(ask, text) -> bool:
     *(pytest.param(role, 1, marks=pytest.mark.nightly) for role in (*ROLES, *OUTPUTS))])
 def test_a_hostile_text_is_refused_in_a_short_sentence(role, every):
     texts = TEXTS[::every]
-    assert len(texts) >= 800 // every
+    assert len(texts) >= 600 // every
     kept = [text for text in texts if not refused({**ROLES, **OUTPUTS}[role], text)]
     assert len(kept) < 0.1 * len(texts) and all(len(text) < 20000 for text in kept)
     if role in PARSED:
         assert len(kept) < 10, kept
+
+
+@pytest.mark.parametrize('role, legal', [
+    ('number', ['1e-400']), ('angle', ['1e-400', '30deg']), ('length', [])])
+def test_of_odd_numbers_hardly_one_is_a_number(role, legal):
+    assert [text for text in NUMBERS if not refused(ROLES[role], text)] == legal
 
 
 @pytest.mark.parametrize('line', LEGAL)
