@@ -267,7 +267,7 @@ def prepare(folder):
     for file, found in zip(missing, in_copies(copies, measured, missing)):
         known[file] = [states[file], *found]
         stored.write_text(json.dumps(known))
-    return copies, {file: found[1:] for file, found in known.items()}
+    return copies, {file: found[1:] for file, found in known.items() if found[1] < math.inf}
 
 
 def in_copies(copies, work, jobs):
