@@ -38,6 +38,8 @@ def test_the_joint_lines_of_an_inverse_are_printed():
     assert str(mechanisms.create('five_bar').inverse(('P.x', 'P.y'))) == FIVE_BAR
     assert str(mechanisms.create('jansen').inverse('G.x')) == (
         'the inverse of jansen for G.x is searched')
+    zeroed = custom('O ground 0 0', 'Z ground 1 -0.5', 'A crank O 1 zero Z')
+    assert '# at 1 crank - 0.463648' in str(zeroed.inverse('crank'))
 
 
 @pytest.mark.nightly(all_but=3)

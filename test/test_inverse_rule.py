@@ -112,6 +112,8 @@ def test_of_two_inputs_no_ordinary_solution_is_lost_or_invented(outputs):
 def test_an_output_that_jumps_has_extremes_on_both_sides(output, most):
     lines, = (case[0] for case in SPECIAL.values() if output in case[2])
     extremes = mechanisms.create('custom', joints=lines).extremes(output)
+    with_rail = mechanisms.create('custom', joints=[*lines, 'Z carriage O along Q 100 200'])
+    assert with_rail.extremes(output, others=[150.0]) == extremes
     assert all(high - low < most + 1e-9 for (low, _), (high, _) in extremes)
 
 

@@ -80,7 +80,7 @@ def test_a_case_has_its_image_in_a_line_askew(name):
                  **CASES[name].numbers)
 
 
-@pytest.mark.nightly
+@pytest.mark.nightly(all_but=8)
 @pytest.mark.parametrize('zero', ['', ' up', ' zero Z'])
 @pytest.mark.parametrize('ground', ['0.6 0', '0 0.6', '-0.48 0.36', '0.36 -0.48', '-0.6 0'])
 @pytest.mark.parametrize('line', ['B dyad A Q 0.6 0.2 left', 'B dyad A Q 0.9 0.5 right',

@@ -92,7 +92,7 @@ def test_a_rod_on_a_hinge_is_right_to_the_last_digits(seed, count):
 
 def offered(lines):
     """Return the window [rad] that is offered where there are no limits; None if there is none."""
-    with pytest.raises(ValueError, match='both hinges need limits') as error:
+    with pytest.raises(ValueError, match='line "roll .*both hinges need limits') as error:
         made(lines)
     found = re.findall(r'within (\S+)deg (\S+)deg', str(error.value))
     return np.array(found, float).T * DEGREE if found else None
@@ -214,7 +214,7 @@ def check_windows(seed, count):
         try:
             made(ankle.within(middle - half, middle + half))
         except WindowError as error:
-            assert re.search('there (is|may be) a second pose', str(error))
+            assert re.match('joint line "roll .*there (is|may be) a second pose', str(error))
             ambiguous += rods.is_ambiguous(ankle, middle - half, middle + half)
             # The largest that is offered instead is as near to a second pose as the proof goes.
             if error.limits:
@@ -380,6 +380,8 @@ def test_in_a_plane_a_rod_is_a_dyad():
     ((G1[0], G1[1].replace('1 0 0 within', '1e-5 1 0 within'), *G1[2:]), 'nearly parallel'),
     ((G1[1], G1[0], *G1[2:]), 'link pitch is placed later, in line 2: move it up'),
     ((*G1, G1[5]), 'link L is placed already'),
+    ((*G1[:4], 'toe motor roll at 0 0 -0.02 axis 0 1 0', G1[4].replace('roll', 'toe'),
+      G1[5].replace('roll', 'toe')), 'toe moves between roll and its end'),
     ((*G1[:5], 'L rod left 0 0 0 left 1 0 0'), 'the links that it is placed from must differ'),
     ((*G1[:5], 'L rod leg 0 0 0 roll 1 0 0'), 'link leg is not placed before; there are: gr'),
     ((*G1[:5], G1[5] + ' length -1'), 'a bar must be longer than zero'),
@@ -438,7 +440,8 @@ def test_a_rod_on_a_slide_and_a_hinge_on_a_moving_link_are_solved():
 
 def test_a_cylinder_turns_a_lever():
     lever = made(('lever hinge ground at 0 0 0 axis 0 1 0',
-                  'C cylinder ground -1 0.2 0.1 lever 0 0 1'))
+                  'C cylinder ground -1 0.2 0.1 lever 0 0 1 within 1.1 1.6'))
+    assert (lever.inputs[0].low, lever.inputs[0].high) == (1.1, 1.6)
     length = np.linspace(1.1, 1.6, 40)
     place = lever.solve(length)
     np.testing.assert_allclose(
