@@ -98,10 +98,12 @@ def test_every_crank_is_asked_for():
         linkage.solve(0.5)
 
 
+@pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('shape', [(), (1,), (3,), (3, 2)])
 @pytest.mark.parametrize('turned', [(), (2,), (1, 2)])
 def test_an_array_of_dimensions_is_broadcast_against_the_angle(shape, turned):
-    swept = np.linspace(2.6, 3.4, int(np.prod(shape))).reshape(shape)
+    # Some cannot be assembled.
+    swept = np.linspace(2.6, 9.4, int(np.prod(shape))).reshape(shape)
     theta = np.linspace(0.1, 0.9, int(np.prod(turned))).reshape(turned)
     try:
         expected = np.broadcast_shapes(shape, turned)
@@ -117,6 +119,13 @@ def test_an_array_of_dimensions_is_broadcast_against_the_angle(shape, turned):
                                    rtol=1e-14)
         np.testing.assert_allclose(linkage.transmission_angles(theta)['B'][index],
                                    one.transmission_angles(float(thetas[index]))['B'], rtol=1e-14)
+
+
+@pytest.mark.filterwarnings('error')
+def test_of_arrays_of_dimensions_one_may_have_no_rate():
+    linkage = mechanisms.create('custom', b=np.array([1.0, 1.5]), joints=(
+        'O ground 0 0', 'Q ground 1 2', 'A crank O 1', 'B dyad A Q b 1 left'))
+    assert np.isfinite(linkage.velocity(0.0)['B']).all(axis=-1).tolist() == [False, True]
 
 
 def test_questions_about_the_reach_are_for_one_set_of_dimensions():
