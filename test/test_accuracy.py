@@ -40,14 +40,6 @@ def awkward(mechanism, rng, count, near=40):
     return np.concatenate([hard_cases.angles(rng, count, spots), close])
 
 
-def some(kind, seed, count):
-    """Yield random mechanisms of a kind with a generator for their angles."""
-    rng = np.random.default_rng(seed)
-    for _ in range(math.ceil(count * SHARE[kind])):
-        branches = BRANCHES[kind][rng.integers(len(BRANCHES[kind]))]
-        yield mechanisms.create(kind, branches=branches, **hard_cases.dimensions(kind, rng)), rng
-
-
 def check(mechanism, thetas, rates=False):
     """Fail with the numbers that reproduce the worst row."""
     rows = measured(mechanism, thetas, rates)
@@ -67,7 +59,7 @@ def test_the_catalogue_is_right_to_the_last_digits(kind, dimensions, branches, n
     (False, 1, 3), *(pytest.param(*each, marks=pytest.mark.nightly)
                      for each in ((False, 2, 24), (True, 3, 4)))])
 def test_random_and_degenerate_dimensions_are_right_too(kind, rates, seed, count):
-    for mechanism, rng in some(kind, seed, count):
+    for mechanism, rng in hard_cases.linkages(kind, seed, math.ceil(count * SHARE[kind])):
         thetas = hard_cases.angles(rng, 3, ends(mechanism))
         try:
             mechanisms.create('custom', joints=mechanism.design.joints, **mechanism.dimensions)

@@ -92,14 +92,6 @@ def test_every_bit_is_the_same(kind):
     assert np.array_equal(by_batch(linkage, thetas), one_by_one(linkage, thetas), equal_nan=True)
 
 
-@pytest.mark.parametrize('kind', TYPES)
-def test_joints_are_solved_at_any_float(kind):
-    linkage = mechanisms.create(kind)
-    for theta in angles(linkage).tolist():
-        places = np.reshape(linkage.function()(theta), (-1, 2))
-        assert np.array_equal([*linkage.solve(theta).values()], places, equal_nan=True)
-
-
 @pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('kind', ['jansen', 'klann'])
 def test_so_it_is_for_the_legs_of_a_walker(kind, monkeypatch, code):

@@ -52,16 +52,6 @@ def test_the_effort_of_an_output_has_the_power_of_the_input(output, theta):
     np.testing.assert_allclose(found * (after - before) / (2.0 * step), 6.0, rtol=1e-7)
 
 
-def test_a_rocker_and_its_crank_share_the_power():
-    bars = mechanisms.create('four_bar')
-    for theta in (0.4, 1.0, 2.2):
-        torque = bars.effort(theta, {'QB': -3.0})[0]
-        assert bars.output_effort('QB', theta, torque) == pytest.approx(3.0)
-    push = mechanisms.create('slider_crank')
-    assert push.output_effort('block', 0.7, push.effort(0.7, {'B': (-8.0, 0.0)})[0]) == (
-        pytest.approx(8.0))
-
-
 def test_next_to_a_dead_point_it_grows_without_bound():
     cell = mechanisms.create('peaucellier')
     end = cell.reach()[0][1]

@@ -11,6 +11,7 @@ dyad that only just reaches, equal arms. Angles crowd around dead points and rea
 
 import math
 
+from linkage_ros import mechanisms
 import numpy as np
 
 HOLY = {'a': 38.0, 'b': 41.5, 'c': 39.3, 'd': 40.1, 'e': 55.8, 'f': 39.4, 'g': 36.7, 'h': 65.7,
@@ -74,6 +75,14 @@ def dimensions(kind, rng):
         if value > 0.0 or name == 'e':
             found[name] = value * (1.0 + near)
     return found
+
+
+def linkages(kind, seed, count):
+    """Yield random mechanisms of a kind, on random branches, with a generator for their angles."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        branches = {name: int(rng.choice((-1, 1))) for name in mechanisms.design(kind).branches}
+        yield mechanisms.create(kind, branches=branches, **dimensions(kind, rng)), rng
 
 
 def lever_gap(lengths, lever, half):

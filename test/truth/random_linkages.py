@@ -12,6 +12,7 @@ cylinders that can be as short as nothing. Gears come with ratios of one, whole 
 """
 
 import cmath
+from functools import partialmethod
 import math
 from typing import NamedTuple
 
@@ -527,15 +528,6 @@ class _Writer:
                                       for body in self._bodies)]
         return found
 
-    def _mirror(self):
-        self._reflected('mirror')
-
-    def _parallelogram(self):
-        self._reflected('parallelogram')
-
-    def _antiparallelogram(self):
-        self._reflected('antiparallelogram')
-
     def _reflected(self, word):
         corners = self._corners()
         if not corners:
@@ -549,6 +541,10 @@ class _Writer:
         self._add(self._name(), f'{word} {point} {first} {second}',
                   o if word == 'parallelogram' or abs(q - p) < 1e-9
                   else p + (q - p) * ((o - p) / (q - p)).conjugate(), first, second)
+
+    _mirror = partialmethod(_reflected, 'mirror')
+    _parallelogram = partialmethod(_reflected, 'parallelogram')
+    _antiparallelogram = partialmethod(_reflected, 'antiparallelogram')
 
     def _inversor(self):
         rng = self._rng

@@ -4,8 +4,8 @@
 """The inputs of a five-bar, a parallelogram arm and an excavator, by circles from the output."""
 
 import cmath
-import math
 
+from . import drawing
 from .cases import cis, cross
 
 LEFT, RIGHT = 1, -1
@@ -13,12 +13,8 @@ LEFT, RIGHT = 1, -1
 
 def meet(one, radius, other, radius_, side):
     """Return where circles about two points meet, to the left of the way from one to the other."""
-    way = other - one
-    along = (abs(way) ** 2 + radius ** 2 - radius_ ** 2) / (2.0 * abs(way))
-    height = radius ** 2 - along ** 2
-    if height >= 0.0:
-        return one + way / abs(way) * complex(along, side * math.sqrt(height))
-    return None
+    place, gap = drawing.meet(drawing.FLOATS, one, radius, other, radius_, side)
+    return complex(place) if gap >= 0.0 else None
 
 
 def side(start, joint, end):
