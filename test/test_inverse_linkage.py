@@ -54,32 +54,6 @@ def test_joint_angles_and_slides_come_apart(kind, outputs):
     assert closed >= outputs
 
 
-@pytest.mark.nightly(all_but=2)
-@pytest.mark.parametrize('kind', [kind for kind in mechanisms.TYPES if kind != 'five_bar'])
-def test_an_assembly_mode_is_a_linkage_that_has_the_pose(kind):
-    linkage, rng = mechanisms.create(kind), np.random.default_rng(2)
-    arc = max(linkage.reach(), key=lambda arc: arc[1] - arc[0])
-    theta = rng.uniform(*arc, 3)
-    for output in outputs_of(linkage):
-        closed = linkage.inverse(output).closed
-        if not closed:
-            continue
-        given = np.array([ratio * linkage.joint_angles(theta, (name,))[name] + offset
-                          for name, ratio, offset in closed.drives.values()])
-        modes = [mode.linkage.built for mode in closed.modes]
-        drawn = [custom(*closed.lines) if not closed.branches else mechanisms.create(
-            'custom', joints=closed.lines, branches=dict(mode.linkage.branches))
-            for mode in closed.modes]
-        places = [each.solve(given[0]) for each in drawn]
-        assert len(modes) == len(drawn)
-        true = linkage.solve(theta)
-        for one, two in ((a, b) for a in true for b in true if a < b and {a, b} <= {*places[0]}):
-            apart = np.hypot(*(true[one] - true[two]).T)
-            found = [np.hypot(*(place[one] - place[two]).T) for place in places]
-            assert np.nanmin(np.abs(np.array(found) - apart), axis=0).max() < \
-                1e-9 * linkage.longest, (output, one, two)
-
-
 @pytest.mark.parametrize('by', [-1, 2, 'crank2', 1.0, None, True])
 def test_an_input_that_there_is_not_is_refused(by):
     linkage = mechanisms.create('five_bar')

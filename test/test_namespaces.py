@@ -11,6 +11,7 @@ from pathlib import Path
 from linkage_ros import mechanisms, scene
 import numpy as np
 import pytest
+from truth.cases import CASES
 
 ROOT = Path(__file__).parents[1]
 # Outputs with an inverse in closed form.
@@ -32,6 +33,8 @@ def linkage(kind):
         return mechanisms.create('custom', joints=(
             'O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'C crank Q 0.5 geared crank -2 0.3',
             'B dyad A C 2 2 left'))
+    if kind in CASES:
+        return mechanisms.create('custom', joints=CASES[kind].joints, **CASES[kind].numbers)
     if kind in files:
         return scene.load(files[kind]).mechanisms[kind].linkage
     return mechanisms.create(kind)
@@ -188,13 +191,16 @@ def test_the_inverse_chooses_as_the_library_does(kind, follows, strict):
 
 
 @pytest.mark.nightly(all_but=3)
-@pytest.mark.parametrize('kind', ['geared', *(
+@pytest.mark.parametrize('kind', ['geared', 'Scotch yoke', 'toggle clamp', *(
     kind for kind in mechanisms.TYPES if kind not in ('jansen', 'five_bar'))])
 def test_every_output_has_the_library_s_choice(kind):
     mechanism, (given,) = linkage(kind), inputs(kind, FEW)
     rng, tried = np.random.default_rng(3), 0
     near = given + rng.uniform(-0.2, 0.2, FEW)
-    for output in (*mechanism.joints, *(f'{p}.{axis}' for p in mechanism.points for axis in 'xy')):
+    first, *_, last = mechanism.points
+    pairs = *mechanism.bars, (first, last), (last, first)
+    for output in (*mechanism.joints, *(f'{p}.{axis}' for p in mechanism.points for axis in 'xy'),
+                   *(f'angle({p},{q})' for p, q in pairs)):
         try:
             inverse = mechanism.inverse(output)
         except ValueError:
