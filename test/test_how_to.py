@@ -10,7 +10,6 @@ import os
 from pathlib import Path
 import re
 import shlex
-import shutil
 import signal
 import subprocess
 import sys
@@ -144,10 +143,9 @@ def test_the_first_ten_minutes(reader):
 
 
 @pytest.mark.nightly
-@pytest.mark.skipif(not shutil.which('cc'), reason='there is no C compiler')
 def test_the_gripper_of_the_tutorial(reader):
     pytest.importorskip('matplotlib')
-    assert reader.follow('tutorial').endswith('out of reach\n')
+    assert 'int gripper_crank_for_T_x(float value, float near, float *crank)' in reader.follow('tutorial')
     assert Path('gripper.png').stat().st_size > 10_000
     # The picture at its head is of what it ends with.
     written, drawn = (yaml.safe_load(file.read_text())
@@ -199,10 +197,9 @@ def test_an_ankle_on_two_rods(graph, reader):
 
 
 @pytest.mark.nightly
-def test_an_ankle_in_a_training_loop(reader, capsys):
+def test_an_ankle_in_a_training_loop(reader):
     pytest.importorskip('torch', reason='torch is not installed')
-    reader.follow('how-to/training')
-    assert capsys.readouterr().out == 'zeros of the encoders [rad]: 0.013 -0.007\n'
+    reader.follow('how-to/training')  # it asserts what it computes
 
 
 def test_a_boom_on_a_cylinder(graph, reader):
@@ -243,14 +240,8 @@ def test_robots_of_each_format(reader):
     names = {called.name: called.of(angles[link]) for link, called in lid.joints.items()
              if called.published}
     assert names == pytest.approx({'pin': 0.0, 'eye': 0.0, 'hinge': 0.0}, abs=1e-12)
-
-
-@pytest.mark.nightly
-def test_the_scene_of_a_whole_robot(reader):
-    reader.follow('how-to/whole-robot')
-    shown = scene.load('robot.yaml')
-    assert len(shown.mechanisms) == 2
-    line = Path('robot.yaml').read_text().splitlines()[1]
+    # A scene says how to start its whole robot.
+    line = Path('leg_found.yaml').read_text().splitlines()[1]
     assert line.startswith('# ros2 launch linkage_ros robot.launch.py robot:=examples/leg.urdf')
 
 
