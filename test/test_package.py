@@ -56,8 +56,8 @@ def test_all_files_name_one_package_and_version():
 
 
 def test_every_source_begins_with_its_licence(kept):
-    notice = re.compile(r'(#!.*\n)?\W*SPDX-FileCopyrightText: 2026 linkage_ros contributors\W+'
-                        r'SPDX-License-Identifier: Apache-2\.0')
+    tags = 'FileCopyrightText: 2026 linkage_ros contributors', r'License-Identifier: Apache-2\.0'
+    notice = re.compile(r'(#!.*\n)?' + ''.join(rf'\W*SPDX-{tag}' for tag in tags))
     sources = [file for file in kept if 'vendor' not in file.parts and file.suffix in (
         '.py', '.c', '.cpp', '.hpp', '.h', '.cmake', '.js')]
     assert len(sources) > 300
