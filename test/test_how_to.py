@@ -38,7 +38,7 @@ from std_msgs.msg import Float64MultiArray  # noqa: E402
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / 'docs'
 # Pages that are followed step by step.
-FOLLOWED = ['first-ten-minutes', 'tutorial', 'commands', 'robot-files', *(
+FOLLOWED = ['first-ten-minutes', 'tutorial', 'commands', 'robot-files', 'rods', *(
     f'how-to/{page.stem}' for page in (DOCS / 'how-to').glob('*.md') if page.stem != 'index')]
 BLOCK = re.compile(r'(?:`([\w.]+)`:\n\n)?^```(\w+)\n(.*?)^```', re.MULTILINE | re.DOTALL)
 NODES = {'kinematics': Kinematics, 'crank_driver': CrankDriver, 'servo_inverse': ServoInverse}
@@ -191,7 +191,7 @@ def test_a_flap_is_put_where_a_planner_wants_it(reader):
 @pytest.mark.nightly
 def test_an_ankle_on_two_rods(graph, reader):
     states = graph.listen(JointState, 'joint_states', 100)
-    assert 'ankle_joints_to_actuators' in reader.follow('how-to/ankle')
+    assert 'ankle_joints_to_actuators' in reader.follow('rods')
     graph.until(lambda: {name for state in states for name in state.name} >= {
         'ankle_pitch', 'ankle_roll', 'motor_left', 'motor_right'})
 
