@@ -103,8 +103,8 @@ POSES = ' must be JOINT=VALUE, its value in rad or m'
     ('four_bar.sdf', ['--driven', 'joint_a'], "there is no joint 'joint_a'; allowed: joint_A, "
      'joint_B, joint_C, joint_D; did you mean joint_A?'),
     ('five_bar.urdf', [], 'no joint of this robot closes a loop'),
-    ('four_bar.sdf', ['--pose', 'joint_D=1'], 'joint_D closes a loop, so that other joints say '
-     'where it is')])
+    ('four_bar.sdf', ['--pose', 'joint_D=1'], 'joint_D closes a loop: its position follows '
+     'from other joints')])
 def test_an_option_that_cannot_be_is_named(capsys, file, args, why):
     assert refused(capsys, ROBOTS / file, *args) == f'from_robot: {why}\n'
 
