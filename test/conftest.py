@@ -10,6 +10,7 @@ import gc
 import math
 import os
 from pathlib import Path
+import runpy
 import shutil
 import subprocess
 
@@ -61,6 +62,22 @@ def kept():
     listed = subprocess.run(['git', 'ls-files', '-co', '--exclude-standard'], cwd=root, check=True,
                             text=True, capture_output=True).stdout.split()
     return {root / name for name in listed if (root / name).is_file()}
+
+
+@pytest.fixture
+def setup_arguments(monkeypatch):
+    """Return a function that returns what setup.py hands to setup() in a command."""
+    import setuptools
+
+    def arguments(command):
+        found = {}
+        monkeypatch.chdir(Path(__file__).parents[1])
+        monkeypatch.setattr('sys.argv', ['setup.py', command])
+        monkeypatch.setattr(setuptools, 'setup', found.update)
+        runpy.run_path('setup.py')
+        return found
+
+    return arguments
 
 
 @pytest.fixture(scope='module')

@@ -12,7 +12,6 @@ from pathlib import Path
 import re
 import runpy
 import shlex
-import sys
 
 from linkage_ros import scene
 from linkage_ros.robot_model import rviz
@@ -134,14 +133,8 @@ def constants():
     return found
 
 
-def test_the_launch_file_starts_executables_that_there_are(constants, monkeypatch):
-    import setuptools
-
-    handed = {}
-    monkeypatch.chdir(ROOT)
-    monkeypatch.setattr(sys, 'argv', ['setup.py', 'install'])
-    monkeypatch.setattr(setuptools, 'setup', handed.update)
-    runpy.run_path('setup.py')
+def test_the_launch_file_starts_executables_that_there_are(constants, setup_arguments):
+    handed = setup_arguments('install')
     installed = [line.split(' = ')[0] for line in handed['entry_points']['console_scripts']]
     config = configparser.ConfigParser()
     config.read(ROOT / 'setup.cfg')

@@ -10,7 +10,6 @@ import json
 import os
 from pathlib import Path
 import re
-import runpy
 import shutil
 import subprocess
 import sys
@@ -18,19 +17,8 @@ import xml.etree.ElementTree as ElementTree
 import zipfile
 
 import pytest
-import setuptools
 
 ROOT = Path(__file__).parents[1]
-
-
-def setup_arguments(monkeypatch, *command):
-    """Return what setup.py hands to setup() in a command."""
-    found = {}
-    monkeypatch.chdir(ROOT)
-    monkeypatch.setattr(sys, 'argv', ['setup.py', *command])
-    monkeypatch.setattr(setuptools, 'setup', found.update)
-    runpy.run_path('setup.py')
-    return found
 
 
 def manifest(folder):
@@ -130,17 +118,17 @@ def test_a_robot_without_a_screen_installs_nothing_to_look_at_it_with():
                    for name in names)
 
 
-def test_every_executable_can_be_called(monkeypatch):
+def test_every_executable_can_be_called(setup_arguments):
     pytest.importorskip('rclpy')
-    lines = setup_arguments(monkeypatch, 'install')['entry_points']['console_scripts']
+    lines = setup_arguments('install')['entry_points']['console_scripts']
     executables = [EntryPoint(*re.split(r'\s*=\s*', line), 'console_scripts') for line in lines]
     assert {'crank_driver', 'kinematics', 'servo_inverse'} <= {e.name for e in executables}
     assert all(callable(e.load()) for e in executables)
 
 
 @pytest.mark.parametrize('command', ['bdist_wheel', 'dist_info', 'editable_wheel'])
-def test_pip_puts_no_command_on_the_path(monkeypatch, command):
-    assert setup_arguments(monkeypatch, command)['entry_points'] == {'console_scripts': []}
+def test_pip_puts_no_command_on_the_path(setup_arguments, command):
+    assert setup_arguments(command)['entry_points'] == {'console_scripts': []}
 
 
 @pytest.fixture
