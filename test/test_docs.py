@@ -78,6 +78,11 @@ def test_what_a_page_says_to_type_is_there():
             assert typed <= set(known), (page, what, typed - set(known))
 
 
+def test_nobody_is_told_to_install_a_release_that_there_is_not():
+    for file in (*PAGES, *(ROOT / 'linkage_ros').rglob('*.py')):
+        assert not re.search(r"pip3? install[^\n]* '?linkage.ros", file.read_text()), file
+
+
 def test_the_pictures_that_are_kept_are_small_and_shown():
     pictures, text = [*(ROOT / 'docs/images').rglob('*.*')], ''.join(map(Path.read_text, PAGES))
     assert sum(file.stat().st_size for file in pictures) < 2.5e6
