@@ -11,7 +11,7 @@ import sys
 import textwrap
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.linkage import joint_lines
+from linkage_ros.linkage import joint_lines, Mechanism
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -114,6 +114,15 @@ def test_the_library_on_a_page_works_as_written(page, code):
 
 
 API = [ROOT / 'docs' / 'api.rst', *sorted((ROOT / 'docs' / 'api').glob('*.rst'))]
+
+
+def test_every_method_that_a_page_calls_is_in_the_reference():
+    called = {name for page in PAGES if page.parent.name != 'design'
+              for name in re.findall(r'\w\.([a-z_]+)\(', page.read_text())}
+    methods = {name for name in called if hasattr(Mechanism, name)}
+    described = ''.join(page.read_text() for page in API)
+    assert len(methods) > 10
+    assert not [name for name in methods if f'Mechanism.{name}\n' not in described]
 
 
 @pytest.mark.usefixtures('catalogue')
