@@ -74,7 +74,7 @@ class InputSettings:
     source : str
         Name of the source joint.
     ratio : float
-        At a position p of the source joint, the input or the measured output is ratio * p + offset.
+        At a position p of the source joint, the input or measured output is ratio * p + offset.
     offset : float
         See `ratio` [rad or m].
     measures : str
