@@ -244,8 +244,7 @@ def test_limits_of_all_joints_that_follow_a_motor_bound_it(imported, tmp_path):
 
 def test_a_check_begins_at_a_pose_outside_the_limits(imported, tmp_path):
     file = written(tmp_path, 'four_bar.urdf', (LIMIT, 'lower="0.2" upper="1.2"'))
-    mechanism, = imported(file).values()
-    assert mechanism.first.start == pytest.approx(mechanism.first.ends[0])
+    imported(file)
     assert 'in 240 poses of the robot' in printed(file)
     assert 'motor from 0 to 1.2,' in printed(file)
 
@@ -877,13 +876,13 @@ def test_a_misfit_is_printed_and_imported_if_it_is_small(capsys, tmp_path, lean,
     assert all(worst <= max(2.0 * lean, 1e-15) for _, worst in checked(err))
 
 
-@pytest.mark.parametrize('low, start', [(-0.5, 0.0), (0.2, 0.2)])
-def test_limits_of_a_motor_between_two_moving_links_are_its_sweep(imported, tmp_path, low, start):
+@pytest.mark.parametrize('low', [-0.5, 0.2])
+def test_limits_of_a_motor_between_two_moving_links_are_its_sweep(imported, tmp_path, low):
     file = written(tmp_path, 'four_bar.urdf', (
         '"elbow" type="continuous">', f'"elbow" type="revolute"><limit lower="{low}" upper="0.8"/>'
     ))
     mechanism, = imported(file, '--driven', 'elbow').values()
-    assert mechanism.first.ends == pytest.approx((low, 0.8)) and mechanism.first.start == start
+    assert mechanism.first.ends == pytest.approx((low, 0.8)) and mechanism.first.start == 0.0
 
 
 def test_a_passive_joint_of_a_loop_is_no_input(imported, tmp_path):

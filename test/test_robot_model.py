@@ -144,7 +144,7 @@ def test_three_formats_show_what_the_scene_has(name):
     built, width = assembled(robot, DENSITY), width or bodies.size(one) / 40
     starts = np.array([np.clip(drive.start, *drive.sweep or (-math.inf, math.inf))
                        for drive in one.inputs.values()])
-    places, moved = posed(one, starts)[1], built.parts[0].robot
+    places, moved = posed(one, starts)[1], built.parts[0]
     frames = {body: turned(*one.pose) @ frame for body, frame in moved.frames.items()}
     homes = {joint.bodies[1]: joint.bodies[0] for joint in moved.joints}
     texts = urdf.write(robot), mjcf.write(built), sdf.write(built)
@@ -305,7 +305,7 @@ def test_what_has_no_length_is_not_drawn():
     lines = ['P ground 0 0', 'O ground 1 0', 'B cylinder P O 1 right']
     one = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.cylinder.start': 1.0,
                       'm.joints': lines}).mechanisms['m']
-    pieces = [piece for pieces in model([one]).parts[0].robot.pieces.values() for piece in pieces]
+    pieces = [piece for pieces in model([one]).parts[0].pieces.values() for piece in pieces]
     assert {(piece.shape, piece.length > 0.0) for piece in pieces} == {
         ('sphere', False), ('cylinder', True)}
 

@@ -30,7 +30,7 @@ def check_read(model, form, folder):
     frames, stands = {model.root: np.eye(4)}, []
     for part in model.parts:
         stands.append(frames[part.base] @ turned(*part.pose) if part.base else np.eye(4))
-        frames.update((name, stands[-1] @ frame) for name, frame in part.robot.frames.items())
+        frames.update((name, stands[-1] @ frame) for name, frame in part.frames.items())
     assert read.root == root and {*frames} - {model.root} <= read.frames.keys()
     size = max(1e-3, *(np.abs(frame[:3, 3]).max() for frame in frames.values()))
     for name, frame in read.frames.items():
@@ -40,11 +40,11 @@ def check_read(model, form, folder):
             assert frame[:3, 3] == pytest.approx(frames[name][:3, 3], abs=1e-12 * size)
     joints = {joint.name: joint for joint in read.joints}
     for part, base in zip(model.parts, stands):
-        check_part(part.robot, base, form, read, joints, (model.root, root), size)
+        check_part(part, base, form, read, joints, (model.root, root), size)
         if form != 'urdf':
-            check_loops(part.robot, form, joints, frames, size)
+            check_loops(part, form, joints, frames, size)
     assert {joint.kind for joint in joints.values()} <= {'fixed'}
-    robots = [part.robot for part in model.parts] if form != 'urdf' else []
+    robots = model.parts if form != 'urdf' else []
     assert read.driven == [name for robot in robots for name in robot.driven]
     assert read.follows.keys() == {name for robot in robots for name in robot.follows}
 
@@ -174,8 +174,8 @@ def test_random_trees_of_a_file_come_back_in_each_format(tmp_path, seed, form):
     file.write_text(random_urdf(np.random.default_rng(seed))[0])
     drawn = readers.drawn(readers.read(str(file)))
     # What moves in MuJoCo weighs something.
-    drawn.parts[0].robot.pieces.update((body, [Piece(BALL, 'joint', 0.1, (0.0, 0.0), (0.1, 0.0))])
-                                       for body in drawn.parts[0].robot.frames)
+    drawn.parts[0].pieces.update((body, [Piece(BALL, 'joint', 0.1, (0.0, 0.0), (0.1, 0.0))])
+                                       for body in drawn.parts[0].frames)
     drawn.density = 1000.0
     check_read(drawn, form, tmp_path)
 

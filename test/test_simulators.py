@@ -170,7 +170,7 @@ def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
     given, said, _ = from_robot.described(readers.read(str(file)))
     assert not any(line.startswith('Left out') for line in said)
     # An SDF has its zeros where it starts.
-    joints = [joint for part in built.parts for joint in part.robot.joints]
+    joints = [joint for part in built.parts for joint in part.joints]
     zeros = {joint.name: joint.start if form is sdf else 0.0 for joint in joints}
     turns = {joint.name: joint.kind == 'hinge' for joint in joints}
     mechanisms = scene.read(given).mechanisms.values()

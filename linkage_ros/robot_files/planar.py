@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 import math
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -76,8 +76,6 @@ class Drawing(Dyads):
         self._robot = robot
         self._flatten(group, drives)
         self.drives: List[check.Source] = []
-        # Tips of triangles that are a dyad: they turn with a link of their own.
-        self._tips: Set[str] = set()
         self.driven = [joint for joint in self.joints if joint.name in drives]
         places = [place for joint in self.joints for place in joint.places]
         size = max(abs(place - other) for place in places for other in places)
@@ -189,34 +187,29 @@ class Drawing(Dyads):
             return part.link, sign, way.real
         pin = self.joint_at(child, joint.places[1]) or ''
         base, body = (parent, child) if self.placed_on[pin] == parent else (child, parent)
-        if self.placed_on[pin] != base:
-            return self._between(pin, parent, child, joint)
         link, hangs, along, slide, _ = self.parts[body]
-        if not link or hangs != pin or slide:
-            # The angle of a triangle on this link is the angle between the two links.
-            tip = self._triangle(body, pin, 'dyad')
-            self._tips.add(tip)
-            along = self.on[body][tip] - self.on[body][pin]
-            link = bar_name(pin, tip)
+        if self.placed_on[pin] != base or hangs != pin or slide or not link:
+            link, along = self._measuring(pin, base, body)
         return link, joint.motion(body), phase(along / self.parts[base].along)
 
-    def _triangle(self, body: str, pin: str, word: str = 'rigid') -> str:
-        """Add a joint to a body, the tip of an equilateral triangle on a joint, by a line."""
-        start, (other, end) = self.on[body][pin], self.other(body, pin)
-        side = self.length_text(abs(end - start))
-        return self.name(start + (end - start) * complex(0.5, 0.75 ** 0.5), body,
-                         f'{word} {pin} {other} {side} {side} left')
-
-    def _between(self, pin: str, base: str, body: str, joint: Joint) -> Tuple[str, float, float]:
-        """Return the link of an angle between two bodies that turn on a pin of a third one."""
-        # A bar parallel to the one body that hangs on the other.
-        tip, end = self.other(body, pin)
-        aside = next((name for name in self.on[base]
-                      if self.placed_on[name] == base and name not in self._tips), '') \
-            or self._triangle(base, pin)
-        along = end - self.on[body][pin]
-        name = self.name(self.on[base][aside] + along, body, f'parallelogram {pin} {aside} {tip}')
-        return bar_name(aside, name), joint.motion(body), phase(along / self.parts[base].along)
+    def _measuring(self, pin: str, base: str, body: str) -> Tuple[str, complex]:
+        """Add a bar that turns on one body as another does; return its link and direction."""
+        (other, end), start = self.other(body, pin), self.on[body][pin]
+        along = end - start
+        corner = along * complex(0.5, 0.75 ** 0.5)
+        if self.placed_on[pin] == base:
+            # A triangle that is a dyad, so that it hangs on the pin.
+            side, foot, along = self.length_text(abs(along)), pin, corner
+            line = f'dyad {pin} {other} {side} {side} left'
+        else:
+            # Of three bodies on a pin, a bar parallel to that of one, on another one.
+            foot = next((name for name in self.on[base] if self.placed_on[name] == base), '') \
+                or self.fixed(base, self.on[base][pin] + corner)[0]
+            line = f'parallelogram {pin} {foot} {other}'
+        name = self.name(self.on[base][foot] + along, body, line)
+        # No other bar of the body hangs there.
+        self.placed_on[name] = ''
+        return bar_name(foot, name), along
 
     def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> Tuple[str, str]:
         """Add an input, as `Dyads` requires; inputs of one source are geared to the first."""
@@ -280,7 +273,6 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
                 low, high = sweep = _sweep(
                     drive, limits[drive.source], mechanism.inputs[drive.name])
                 parameters[f'{name}.{drive.name}.sweep'] = [*sweep]
-                parameters[f'{name}.{drive.name}.start'] = min(max(drive.value, low), high)
             except ValueError as error:
                 low_limit, high_limit = limits[drive.source]
                 reports.append(f'Left out: the limits of {drive.source}, from {low_limit:.4g} to '

@@ -218,9 +218,7 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
     ends = {}
     for drive, (low, high) in zip(mechanism.inputs.values(), _sweeps(mechanism, limits)):
         ends[drive.source] = low - drive.offset, high - drive.offset
-        key = f'{name}.{drive.input.name}'
-        parameters[f'{key}.sweep'] = [float(short(low)), float(short(high))]
-        parameters[f'{key}.start'] = min(max(drive.start, low), high)
+        parameters[f'{name}.{drive.input.name}.sweep'] = [float(short(low)), float(short(high))]
     return check.Imported(name, parameters, reports, [*ends], ends, still=made.still)
 
 
