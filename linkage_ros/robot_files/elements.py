@@ -31,7 +31,8 @@ def parse(path: str) -> Element:
     root = builder.close()
     for part in root.iter():
         if part.tag.startswith('xacro:') or any('${' in text for text in part.attrib.values()):
-            raise RequestError(f'{path} is xacro: run xacro first, as in xacro {path} > robot.urdf')
+            raise RequestError(f'{path} is xacro: run xacro first, as in xacro {path} > '
+                               'robot.urdf')
         part.tag = part.tag.split(':')[-1]
     return root
 

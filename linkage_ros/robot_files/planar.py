@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 import math
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from ..linkage import (
     bar_name,
     Dyads,
     Hinge,
-    Mechanism,
     Motor,
     Pin,
     ROUNDING,
@@ -146,27 +145,12 @@ class Drawing(Dyads):
                     axes=[sign * float(np.sign(hinge.axis @ up))] * 2))
                 self.still += [other.name for other, _ in joint.chain if other is not hinge]
 
-    @property
-    def allowed(self) -> float:
-        """Return the allowed distance of a pose from the file's, of the size."""
-        return max(ROUNDING, 30.0 * self.gap / self.size + self.lean)
-
-    @property
-    def places(self) -> Iterator[Pin]:
-        """Return the places of the lines' joints, on each of their bodies, in the file's pose."""
-        return (pin for body in self.parts for pin in self.on[body].items())
-
-    @property
-    def linkage(self) -> Mechanism:
-        """Return the linkage of the lines."""
-        return mechanisms.create('custom', joints=self.lines)
-
-    def apart(self, linkage: Mechanism, *names: str) -> float:
-        """Return the largest distance of joints from the file's pose, of the linkage's size."""
-        values = [drive.value for drive in self.drives]
-        places = linkage.solve(theta_of(values))
-        return float(np.max([abs(complex(*places[name]) - place) for name, place in self.places
-                             if name in (names or places)])) / self.size
+    def is_in_pose(self, name: str) -> bool:
+        """Return whether a joint of the lines is where the file has it."""
+        linkage = mechanisms.create('custom', joints=self.lines)
+        place = linkage.solve(theta_of([drive.value for drive in self.drives]), name)[name]
+        near = self.size * max(ROUNDING, 30.0 * self.gap / self.size + self.lean)
+        return all(abs(complex(*place) - on[name]) < near for on in self.on.values() if name in on)
 
     def measured_by(self, joint: Joint) -> Tuple[str, float, float]:
         """
@@ -207,8 +191,8 @@ class Drawing(Dyads):
                 or self.fixed(base, self.on[base][pin] + corner)[0]
             line = f'parallelogram {pin} {foot} {other}'
         name = self.name(self.on[base][foot] + along, body, line)
-        # No other bar of the body hangs there.
-        self.placed_on[name] = ''
+        # It is on a link of its own: nothing of the body is to be placed from it.
+        del self.on[body][name]
         return bar_name(foot, name), along
 
     def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> Tuple[str, str]:
@@ -233,7 +217,7 @@ class Drawing(Dyads):
     def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
         """Return the start of a line for bars that mirror others, and so pass dead points."""
         (first, start), (second, end) = one, two
-        for corner, there in self.places:
+        for corner, there in [pin for body in self.parts for pin in self.on[body].items()]:
             links = [{body for body in self.parts
                       if {corner, name} <= self.on[body].keys()} for name in (first, second)]
             if corner in (first, second) or not all(links) or links[0] == links[1]:
@@ -256,6 +240,8 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
     Raises ValueError for loops that are no dyads, or whose pose is another than the robot's.
     """
     drawing = _drawn(robot, group)
+    if not drawing.drives:
+        raise NotDriven(_why(drawing))
     name = check.name_beside(others, plain(drawing.driven[0].name, 60))
     parameters = _parameters(drawing, name)
     mechanism = scene.read({'mechanisms': [name], **parameters}).mechanisms[name]
@@ -281,8 +267,6 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
         low, high = sorted((end - drive.offset) / drive.ratio for end in (
             max(low, start - 2.0 * around), min(high, start + 2.0 * around)))
         ends[drive.source] = low, high
-    if drawing.apart(mechanism.linkage) > drawing.allowed:
-        raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
     slack = drawing.lean + drawing.gap / drawing.size
     if slack > EXACT:
         reports.append(f'Warning: the file is not exact: axes lean by {drawing.lean:.2g} rad, and '
@@ -294,16 +278,14 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
 def _sweep(drive: check.Source, limits: Tuple[float, float], settings: scene.InputSettings
            ) -> Tuple[float, float]:
     """Return the limits of an input within its reach; raise ValueError if it has no such ends."""
-    low, high = (float(short(end, 1e-15)) if abs(end) < FARTHEST else math.copysign(math.inf, end)
-                 for end in (drive.ratio * end + drive.offset
-                             for end in limits[::1 if drive.ratio > 0.0 else -1]))
+    low, high = sorted(float(short(drive.ratio * end + drive.offset, 1e-15)) for end in limits)
     for start, end in () if settings.input.is_whole(settings.reach) else settings.reach:
         turns = math.tau * math.floor((drive.value - start) / math.tau) * settings.input.turns
         if start + turns <= drive.value <= end + turns:
             # An end that is a dead point is not quite reached.
             edge = ROUNDING * (end - start)
             low, high = max(low, start + turns + edge), min(high, end + turns - edge)
-    if not low + 1e-6 * settings.input.size < high < low + math.inf:
+    if not -FARTHEST < low < high - 1e-6 * settings.input.size < FARTHEST:
         raise ValueError('its loops do not reach them')
     return low, high
 
@@ -326,12 +308,10 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
         if not drawings[-1].left:
             break
     best = min(drawings, key=lambda drawing: len(drawing.left))
-    if not best.drives:
-        raise NotDriven(_why(best) if best.left else 'no motor moves it')
-    for i, line in enumerate(best.lines):
-        # At a change point the side in this pose may be the wrong one.
+    for i, line in enumerate(best.lines if best.drives else ()):
+        # In this pose the side of a slot, and of what lies in line, cannot be seen.
         name, *_, side = line.split()
-        if side in _OTHER and not best.apart(best.linkage, name) < best.allowed:
+        if side in _OTHER and not best.is_in_pose(name):
             best.lines[i] = line[:-len(side)] + _OTHER[side]
     return best
 
@@ -341,24 +321,11 @@ def _why(drawing: Drawing) -> str:
     holders = [joint for joint in drawing.joints if {*joint.bodies} & {*drawing.left}]
     freedom = 3 * len(drawing.left) - 2 * len(holders) - sum(
         joint in drawing.driven for joint in holders)
-    between = [joint.name for joint in holders if joint in drawing.driven
-               and {*joint.bodies} <= {*drawing.left}]
-    if between and freedom <= 0:
-        return f'not of dyads, as {", ".join(between)} drives between two of them'
-    if all(_is_ring(drawing, body, holders) for body in drawing.left):
-        return 'idle, as it only turns about a pin of other bodies'
     if freedom < 0:
         return 'held more than once by ' + ', '.join(
             joint.name for joint in holders if joint.position is not None)
     return (f'not of dyads: {", ".join(drawing.left)} hold each other, as on a platform on three '
             'bars (an Assur group of class III or higher)')
-
-
-def _is_ring(drawing: Drawing, body: str, holders: Sequence[Joint]) -> bool:
-    """Return whether the joints of a body are hinges at one place, about which it turns."""
-    places = [joint.place(body) for joint in holders if body in joint.bodies]
-    return all(joint.kind == HINGE for joint in holders) and max(
-        abs(place - places[0]) for place in places) < drawing.near
 
 
 def _parameters(drawing: Drawing, name: str) -> Dict[str, Any]:
@@ -367,7 +334,7 @@ def _parameters(drawing: Drawing, name: str) -> Dict[str, Any]:
         with suppress(ValueError):
             if joint not in drawing.driven:
                 measured.append((joint, *drawing.measured_by(joint)))
-    links = {link.name: link for link in drawing.linkage.links}
+    links = {link.name: link for link in mechanisms.create('custom', joints=drawing.lines).links}
     joints = []
     for joint, link, sign, angle in measured:
         if links[link].kind != 'prismatic':

@@ -204,12 +204,6 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
         angles = ' (angles from the pose of the file)' * (' at ' in error.problem)
         reports.append(f'Limits: {error.problem}{angles}; these are the largest proved to have '
                        f'one pose at most: {ranges}.')
-    for link, joint in made.links.items():
-        low, high = joint.range
-        why = joint.no_limits or f'from {low:.4g} to {high:.4g}: it has no end there' * bool(
-            joint.limits and math.isinf(high - low))
-        if why and joint.name not in sources and link not in made.universals:
-            reports.append(f'Left out: the limits of {joint.name}, {why}.')
     name = check.name_beside(others, f'{made.drives[0].name}_rods')
     parameters = check.parameters(name, 'rods', lines, made.drives, [
         (link, 1.0, joint.name, joint.start) for link, joint in made.links.items()

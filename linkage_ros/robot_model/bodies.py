@@ -242,13 +242,11 @@ def _input_travels(mechanism: SceneMechanism) -> Dict[str, Arc]:
     """Return the outermost ends of each input's reach that is no full rotation."""
     ends: Dict[str, Arc] = {}
     for name, settings in mechanism.inputs.items():
-        arcs, sweep = settings.reach, settings.sweep
-        if not settings.input.is_whole(arcs):
-            low, high = min(low for low, _ in arcs), max(high for _, high in arcs)
+        if settings.sweep and not settings.input.is_whole(settings.reach):
+            low, high = np.min(settings.reach), np.max(settings.reach)
             # A crank's angle is in the turn of its sweep.
-            turns = math.tau * math.floor((sweep[1] - low) / math.tau) if (
-                sweep and settings.input.turns) else 0.0
-            ends[name] = low + turns, high + turns
+            turns = math.tau * ((settings.sweep[1] - low) // math.tau) * settings.input.turns
+            ends[name] = float(low + turns), float(high + turns)
     return ends
 
 

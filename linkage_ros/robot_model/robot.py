@@ -241,21 +241,17 @@ class Robot:
 
     def spanning_tree(self) -> tuple[dict[str, tuple[str, Joint]], list[Joint]]:
         """Return the parent and the joint of each body, and the joints that close loops."""
-        home, cuts = {body: body for body in self.frames}, []
-
-        def joined(body: str) -> str:
-            while home[body] != body:
-                home[body] = body = home[home[body]]
-            return body
-
+        # Of each body all that are joined to it.
+        joined, cuts = {body: {body} for body in self.frames}, []
         near: dict[str, list[tuple[str, Joint]]] = {body: [] for body in self.frames}
         for joint in sorted(self.joints, key=lambda joint: (
                 joint.is_cut, joint.name not in self.driven, _TREE.get(joint.kind, 1))):
-            first, second = map(joined, joint.bodies)
-            if joint.is_cut or first == second:
+            first, second = (joined[body] for body in joint.bodies)
+            if joint.is_cut or first is second:
                 cuts.append(joint)
                 continue
-            home[second] = first
+            first |= second
+            joined.update(dict.fromkeys(second, first))
             for body, other in (joint.bodies, joint.bodies[::-1]):
                 near[body].append((other, joint))
         tree: dict[str, tuple[str, Joint]] = {}
