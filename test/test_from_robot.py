@@ -625,7 +625,8 @@ def test_a_cylinder_in_space_turns_a_foot(tmp_path, capsys, ends, within):
 @pytest.mark.parametrize('old, new, why', [
     (' axis="0.1 -0.4 1.0"', ' axis="0.1 -0.4 0.9"', 'ram does not slide along the line of its '
      'balls'),
-    ('joint="ram"', 'joint="pitch"', 'ball is a joint of type ball and no end of a rod'),
+    ('joint="ram"', 'joint="pitch"', 'ball is a joint of type ball, no end of a rod and no '
+     'cylinder'),
     ('name="pitch" axis="0 1 0" range="-1 1"', 'name="pitch" type="ball"',
      'equality0 holds foot to rod, which hangs on rods alone')])
 def test_what_rods_cannot_be_is_named(capsys, tmp_path, old, new, why):

@@ -242,14 +242,11 @@ def test_the_sweeps_of_an_ankle_s_motors_are_in_its_window(tmp_path, capsys, see
     assert np.isfinite(list(mechanism.linkage.joint_angles(values).values())).all()
 
 
-def test_a_foot_without_one_end_is_said_to_have_none(tmp_path, capsys):
-    _, said = imported(tmp_path, turning(1), ([-math.inf, -0.12], [0.15, 0.12]), capsys)
-    assert 'Left out: the limits of pitch, from -inf to 0.15: it has no end there.' in said
-
-
-@pytest.mark.nightly
-def test_without_limits_the_largest_are_taken_and_said(tmp_path, capsys):
-    mechanism, said = imported(tmp_path, turning(4), None, capsys)
-    assert 'these are the largest proved to have one pose at most: pitch from -' in said
+@pytest.mark.nightly(all_but=1)
+@pytest.mark.parametrize('seed, limits', [(1, ([-math.inf, -0.12], [0.15, 0.12])), (4, None)])
+def test_without_an_end_the_largest_limits_are_taken_and_said(tmp_path, capsys, seed, limits):
+    mechanism, said = imported(tmp_path, turning(seed), limits, capsys)
+    assert 'Limits: both hinges need limits; these are the largest proved to have one pose at ' \
+        'most: pitch from -' in said
     assert all(math.isfinite(end) for held in mechanism.linkage.windows()
                for ends in held.limits for end in ends)
