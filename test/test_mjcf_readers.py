@@ -15,9 +15,11 @@ from xml.sax.saxutils import quoteattr
 
 from linkage_ros.cli import RequestError
 from linkage_ros.robot_files import readers
+from linkage_ros.robot_model.urdf import write
 import numpy as np
 import pytest
-from test_robot_files import check_comes_back, random_robot, words
+from robots import Pinocchio, words
+from test_robot_files import check_comes_back, random_robot
 from test_sdf_readers import frame, quaternion
 
 mujoco = pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
@@ -184,13 +186,29 @@ def check_is_read(folder, seeds):
             joint.is_cut = joint.name.startswith('cut_')
         writer, file = Writer(robot, np.random.default_rng(seed)), folder / f'{seed}.xml'
         file.write_text(writer.text)
+        robot = readers.read(str(file))
+        check_is_tree(file, robot, np.random.default_rng(seed))
         try:
             moved += check_comes_back(
-                linkage, values, readers.read(str(file)), steps if len(steps[0]) > 1
+                linkage, values, robot, steps if len(steps[0]) > 1
                 else steps.ravel(), writer.zeros)[1] > 0
         except RequestError as error:
             assert re.search('closes a loop|not of dyads|it cannot move', str(error)), seed
     assert moved > 0.9 * len(robots)
+
+
+def check_is_tree(file, robot, rng):
+    """Check that the URDF of a robot moves as MuJoCo moves its file, loops open."""
+    model = mujoco.MjModel.from_xml_path(str(file))
+    data = mujoco.MjData(model)
+    positions = {name: float(rng.normal()) for name in robot.positions}
+    for name, value in positions.items():
+        data.joint(name).qpos = value
+    mujoco.mj_kinematics(model, data)
+    bodies = [model.body(i).name for i in range(1, model.nbody)]
+    found = Pinocchio(write(readers.drawn(robot))).places(positions, bodies)
+    for i, body in enumerate(bodies):
+        assert found[body] == pytest.approx(data.xpos[i + 1], abs=1e-12)
 
 
 TIED = """<mujoco><compiler angle="radian"/><worldbody>

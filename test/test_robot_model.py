@@ -17,7 +17,7 @@ from linkage_ros.robot_model.cli import main, show
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, ground_frame, GUIDE, ROD, shapes
 import numpy as np
 import pytest
-from test_robot_files import rotation
+from robots import rotation
 from test_simulators import model, simulated, some_quick
 from test_urdf import in_space, MACHINES, OWN, posed
 

@@ -13,7 +13,7 @@ from linkage_ros.robot_model.bodies import assembled
 from linkage_ros.robot_model.shapes import BALL, Piece
 import numpy as np
 import pytest
-from test_robot_files import random_urdf, ROBOTS
+from robots import ROBOTS
 from test_robot_model import turned
 from test_urdf import ARM
 from truth import random_linkages
@@ -163,6 +163,23 @@ def test_random_robots_come_back(tmp_path, seeds, form):
     assert len(mechanisms) > len(seeds) // 2
     for mechanism in mechanisms:
         check_read(prepared([mechanism], form), form, tmp_path)
+
+
+def random_urdf(rng):
+    """Return a random tree of links."""
+    text, names = '<link name="base"/>', ['base']
+    for i in range(rng.integers(2, 8)):
+        rows = rng.normal(size=(3, 3))
+        # Not all readers make axes as long as one.
+        rows[2] /= np.linalg.norm(rows[2])
+        numbers = [' '.join(map(repr, map(float, row))) for row in rows]
+        kind = rng.choice(['revolute', 'continuous', 'prismatic', 'fixed'])
+        text += (f'<link name="l {i}"/><joint name="j-{i}" type="{kind}"><parent link="'
+                 f'{rng.choice(names)}"/><child link="l {i}"/><origin xyz="{numbers[0]}" '
+                 f'rpy="{numbers[1]}"/><axis xyz="{numbers[2]}"/><limit lower="-9" upper="9" '
+                 'effort="1" velocity="1"/></joint>')
+        names.append(f'l {i}')
+    return f'<robot name="r">{text}</robot>', names
 
 
 @pytest.mark.parametrize('form', FORMATS)

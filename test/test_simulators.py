@@ -13,7 +13,7 @@ from linkage_ros.robot_model import bodies, mjcf, sdf
 from linkage_ros.robot_model.bodies import assembled
 import numpy as np
 import pytest
-from test_robot_files import published
+from robots import published
 from test_urdf import drives, in_space, MACHINES, OWN, posed
 
 # One of each kind; the others are long.

@@ -14,8 +14,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.robot_model import urdf
 import numpy as np
 import pytest
-from robots import LIBRARIES, Pinocchio, Yourdfpy
-from test_robot_files import rotation
+from robots import LIBRARIES, Pinocchio, rotation, Yourdfpy
 from truth.cases import CASES
 
 ROOT = Path(__file__).parents[1]

@@ -278,7 +278,8 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
 def _sweep(drive: check.Source, limits: Tuple[float, float], settings: scene.InputSettings
            ) -> Tuple[float, float]:
     """Return the limits of an input within its reach; raise ValueError if it has no such ends."""
-    low, high = sorted(float(short(drive.ratio * end + drive.offset, 1e-15)) for end in limits)
+    low, high = (float(short(drive.ratio * end + drive.offset, 1e-15))
+                 for end in limits[::1 if drive.ratio > 0.0 else -1])
     for start, end in () if settings.input.is_whole(settings.reach) else settings.reach:
         turns = math.tau * math.floor((drive.value - start) / math.tau) * settings.input.turns
         if start + turns <= drive.value <= end + turns:
