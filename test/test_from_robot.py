@@ -707,7 +707,8 @@ def test_a_file_of_mujoco_needs_no_meshes_and_no_names(tmp_path):
     pytest.importorskip('mujoco')
     robot = readers.read(str(of_text(tmp_path / 'robot.xml', """<mujoco><asset>
       <mesh name="m" file="none.obj"/><hfield name="h" file="none.png" size="1 1 1 1"/>
-      <texture name="t" type="2d" file="none.png"/><material name="c" texture="t"/></asset><worldbody><geom type="hfield" hfield="h"/>
+      <texture name="t" type="2d" file="none.png"/><material name="c" texture="t"/></asset>
+      <worldbody><geom type="hfield" hfield="h"/>
       <body pos="1 2 3"><joint type="slide" axis="0 2 0" ref="0.5" range="0.1 0.7"/>
       <joint axis="1 0 0"/><geom type="mesh" mesh="m" material="c"/></body>
       <body name="free"><freejoint/></body><body name="fixed"><geom size="1"/>

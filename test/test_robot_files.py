@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.cli import RequestError
+from linkage_ros.linkage import theta_of
 from linkage_ros.robot_files import check, cli, closing, readers
 import numpy as np
 import pytest
@@ -740,30 +741,38 @@ def check_comes_back(linkage, values, robot, steps, zeros=None):
     return said, moved
 
 
-def random_robot(seed):
-    """Return a random linkage, inputs, its robot and steps; None where it has no pose."""
+def random_linkage(seed, without=()):
+    """Return a random design, its linkage, inputs and a generator; None where it has no pose."""
     rng = np.random.default_rng(seed)
-    design = random_linkages.design(rng, without=('yoke', 'image'))
+    design = random_linkages.design(rng, without=without)
     try:
         linkage = mechanisms.create('custom', joints=design.joints, branches=design.branches,
                                     **design.dimensions)
     except ValueError:
         return None
     for _ in range(30 if 1e-3 < linkage.longest < 1e3 else 0):
-        values = [rng.uniform(each.low, each.high) for each in linkage.inputs]
-        values = values if len(values) > 1 else values[0]
-        if not any(np.isnan(place).any() for place in linkage.solve(values).values()):
-            robot, count = robot_of(linkage, values), Counter()
-            for line in design.joints:
-                _, word, *more = line.split()
-                called = more[-1] if 'called' in more else ''
-                count[word] += not called
-                if 'geared' in more:
-                    other, ratio = more[more.index('geared') + 1:][:2]
-                    called = called or (f'{word}{count[word]}' if count[word] > 1 else word)
-                    robot.follows[called] = other, float(ratio), 0.0
-            return linkage, values, robot, 0.03 * rng.normal(size=(8, len(linkage.inputs)))
+        values = [rng.uniform(max(each.low, -12.0), min(each.high, 12.0))
+                  for each in linkage.inputs]
+        if not any(np.isnan(place).any() for place in linkage.solve(theta_of(values)).values()):
+            return design, linkage, values, rng
     return None
+
+
+def random_robot(seed):
+    """Return a random linkage, inputs, its robot and steps; None where it has no pose."""
+    if not (made := random_linkage(seed, without=('yoke', 'image'))):
+        return None
+    design, linkage, values, rng = made
+    robot, count = robot_of(linkage, theta_of(values)), Counter()
+    for line in design.joints:
+        _, word, *more = line.split()
+        called = more[-1] if 'called' in more else ''
+        count[word] += not called
+        if 'geared' in more:
+            other, ratio = more[more.index('geared') + 1:][:2]
+            called = called or (f'{word}{count[word]}' if count[word] > 1 else word)
+            robot.follows[called] = other, float(ratio), 0.0
+    return linkage, theta_of(values), robot, 0.03 * rng.normal(size=(8, len(linkage.inputs)))
 
 
 def check_random_robots(seeds):

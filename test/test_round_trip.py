@@ -6,7 +6,7 @@
 from contextlib import suppress
 from pathlib import Path
 
-from linkage_ros import mechanisms, scene
+from linkage_ros import scene
 from linkage_ros.robot_files import readers
 from linkage_ros.robot_model import bodies, mjcf, sdf, urdf
 from linkage_ros.robot_model.bodies import assembled
@@ -14,9 +14,9 @@ from linkage_ros.robot_model.shapes import BALL, Piece
 import numpy as np
 import pytest
 from robots import ROBOTS
+from test_robot_files import random_linkage
 from test_robot_model import turned
 from test_urdf import ARM
-from truth import random_linkages
 
 CONFIGS = sorted(Path(__file__).parents[1].glob('config/*.yaml'))
 FORMATS = {'urdf': urdf.write, 'sdf': sdf.write, 'mjcf': mjcf.write}
@@ -126,31 +126,21 @@ def test_a_hand_on_an_arm_comes_back(tmp_path, link, form):
 
 def random_mechanism(seed):
     """Return a random linkage as a mechanism in a random pose, at a start where it has a pose."""
-    rng = np.random.default_rng(seed)
-    design = random_linkages.design(rng)
-    try:
-        linkage = mechanisms.create('custom', joints=design.joints, branches=design.branches,
-                                    **design.dimensions)
-    except ValueError:
+    if not (made := random_linkage(seed)):
         return None
-    for _ in range(30 if 1e-3 < linkage.longest < 1e3 else 0):
-        values = [rng.uniform(max(each.low, -12.0), min(each.high, 12.0))
-                  for each in linkage.inputs]
-        if not any(np.isnan(place).any() for place in linkage.solve(
-                values if len(values) > 1 else values[0]).values()):
-            given = {
-                'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': design.joints,
-                'm.pose': rng.normal(size=6).tolist(),
-                **{f'm.branches.{key}': side for key, side in (design.branches or {}).items()},
-                **{f'm.dimensions.{key}': value for key, value in design.dimensions.items()},
-                **{f'm.{each.name}.start': value for each, value in zip(linkage.inputs, values)}}
-            with suppress(scene.SceneError):
-                # Not all of it need be in the reach.
-                return scene.read({**given, **{
-                    f'm.{each.name}.sweep': [value - 0.01 * each.size, value + 0.01 * each.size]
-                    for each, value in zip(linkage.inputs, values)}}).mechanisms['m']
-            return scene.read(given).mechanisms['m']
-    return None
+    design, linkage, values, rng = made
+    given = {
+        'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': design.joints,
+        'm.pose': rng.normal(size=6).tolist(),
+        **{f'm.branches.{key}': side for key, side in (design.branches or {}).items()},
+        **{f'm.dimensions.{key}': value for key, value in design.dimensions.items()},
+        **{f'm.{each.name}.start': value for each, value in zip(linkage.inputs, values)}}
+    with suppress(scene.SceneError):
+        # Not all of it need be in the reach.
+        return scene.read({**given, **{
+            f'm.{each.name}.sweep': [value - 0.01 * each.size, value + 0.01 * each.size]
+            for each, value in zip(linkage.inputs, values)}}).mechanisms['m']
+    return scene.read(given).mechanisms['m']
 
 
 @pytest.mark.parametrize('form', FORMATS)
