@@ -58,6 +58,7 @@ FAULTS = {
     '<a/>': ' must be MJCF, SDF or URDF, not <a>',
     '<robot name="r"><xacro:property name="a" value="1"/></robot>':
         ' is xacro: run xacro first, as in xacro ',
+    '<robot name="${name}"/>': ' is xacro: run xacro first, as in xacro ',
     '<robot/>': ': a URDF has one root link, not 0',
     '<sdf/>': ': the SDF has no model with joints',
     '<mujoco><b/></mujoco>': ' cannot be read: ',
