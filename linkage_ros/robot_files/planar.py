@@ -310,7 +310,7 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
             break
     best = min(drawings, key=lambda drawing: len(drawing.left))
     for i, line in enumerate(best.lines if best.drives else ()):
-        # In this pose the side of a slot, and of what lies in line, cannot be seen.
+        # With a change point, the side in this pose may be the wrong one.
         name, *_, side = line.split()
         if side in _OTHER and not best.is_in_pose(name):
             best.lines[i] = line[:-len(side)] + _OTHER[side]
