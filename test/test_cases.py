@@ -6,7 +6,6 @@
 import math
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.render.cli import main
 from linkage_ros.robot_model import urdf
 from mpmath import mp, mpc, mpf
 import numpy as np
@@ -204,25 +203,9 @@ def test_a_rail_that_does_not_begin_at_its_joint_carries_a_motor():
     np.testing.assert_allclose(rail.input_for('B.y', place['B'].imag, others=(0.4, 0.15)), [-0.4])
 
 
-def test_what_drives_nothing_or_has_nowhere_to_go_is_refused():
-    for lines, problem in {
-            ('R carriage O along X 0.2 0.2',): 'must be less than its upper end',
-            ('R carriage O along X 0.2 0.1',): 'must be less than its upper end',
-            ('A crank O 1 geared crank 1 0',): 'a linkage needs a line that drives it',
-            ('B cylinder O X 1 left', 'A crank O 1 geared cylinder 1 0'): 'cannot be geared',
-            ('A crank O 1', 'L block A 1 1'): 'A is not a joint of a block'}.items():
-        with pytest.raises(ValueError, match=problem):
-            mechanisms.create('custom', joints=('O ground 0 0', 'X ground 1 0', *lines))
-
-
-def test_a_carriage_alone_is_a_linkage_and_has_a_picture(tmp_path):
+def test_a_carriage_alone_is_a_linkage():
     rail = ['O ground 0 0', 'X ground 1 0', 'R carriage O along X -0.2 0.7']
-    linkage = mechanisms.create('custom', joints=rail)
-    assert linkage.extremes('R.x') == [((-0.2, -0.2), (0.7, 0.7))]
+    assert mechanisms.create('custom', joints=rail).extremes('R.x') == [((-0.2, -0.2), (0.7, 0.7))]
     mechanism = scene.read({
         'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': rail}).mechanisms['m']
     assert Pinocchio(urdf.describe([mechanism], 'world')).joints == ['m_carriage']
-    path = tmp_path / 'rail.yaml'
-    path.write_text(
-        f'/**: {{ros__parameters: {{mechanisms: [m], m.type: custom, m.joints: {rail}}}}}')
-    assert main([str(path), '--out', str(tmp_path / 'rail.png')]) == 0
