@@ -704,7 +704,8 @@ def robot_of(linkage, values):
                    (way.real, way.imag, 0.0) if slides else (0.0, 0.0, 1.0), position=0.0)
         for name in linkage.frames[link.name]:
             if name in home and (slides or name != link.joint):
-                robot.join(f'cut_{link.name}', 'revolute', (home[name], link.name), frame(name))
+                robot.join(f'cut_{link.name}', 'revolute', (home[name], link.name), frame(name),
+                           position=0.0)
             if slides or name != link.joint:
                 home.setdefault(name, link.name)
     robot.driven = [each.name for each in linkage.inputs]

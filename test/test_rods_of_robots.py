@@ -23,28 +23,28 @@ def less(one, other):
     return text(np.subtract(one, other))
 
 
-def mjcf(ankle, limits, motors=('l', 'r'), pins=None):
+def mjcf(ankle, limits, pins=None, ref=0.0):
     """
     Return an ankle as MJCF; its rods hang on balls, and their eyes are tied to the foot.
 
-    With `pins`, they hang on hinges about these axes of each rod.
+    With `pins`, they hang on hinges about these axes of each rod. `ref` is where its motors are.
     """
     held = ['<joint type="ball" name="ball {i}"/>' if pins is None else ''.join(
-        f'<joint name="pin {i} {k}" axis="{text(axis)}"/>' for k, axis in enumerate(pins[i]))
+        f'<joint name="pin {i} {k}" axis="{text(axis)}" range="-2 2"/>' for k, axis in enumerate(pins[i]))
         for i in (0, 1)]
     legs = ''.join(
         f'<body name="crank {i}" pos="{text(ankle.motors[i])}"><joint name="{name}" '
-        f'axis="{text(ankle.motor_axes[i])}"/>{LIGHT}<body name="rod {i}" '
+        f'axis="{text(ankle.motor_axes[i])}" ref="{ref}"/>{LIGHT}<body name="rod {i}" '
         f'pos="{less(ankle.pivots[i], ankle.motors[i])}">{held[i].format(i=i)}'
         f'{LIGHT}<site name="eye {i}" pos="{less(ankle.ends[i], ankle.pivots[i])}"/></body></body>'
-        for i, name in enumerate(motors))
+        for i, name in enumerate('lr'))
     eyes = ''.join(f'<site name="pin {i}" pos="{less(ankle.ends[i], ankle.second)}"/>'
                    for i in (0, 1))
     ranges = [f'range="{low!r} {high!r}"' if limits is not None else ''
               for low, high in (np.transpose(limits).tolist() if limits is not None
                                 else ((0, 0), (0, 0)))]
     ties = ''.join(f'<connect site1="eye {i}" site2="pin {i}"/>' for i in (0, 1))
-    drives = ''.join(f'<motor joint="{name}"/>' for name in motors)
+    drives = ''.join(f'<motor joint="{name}"/>' for name in 'lr')
     return (
         '<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="shin">'
         f'{LIGHT}<joint name="knee" axis="0 1 0"/><body name="cross" pos="{text(ankle.first)}">'
@@ -139,13 +139,14 @@ def test_hinges_of_rods_are_published(tmp_path, seed, count):
         first = np.cross(rng.normal(size=3), way)
         # The second leans, as it may.
         pins.append([first, np.cross(way, first) / np.linalg.norm(way) + 0.2 * first, way][:count])
-    file = of_text(tmp_path / 'robot.xml', mjcf(ankle, NEAR, pins=pins))
+    file = of_text(tmp_path / 'robot.xml', mjcf(ankle, NEAR, pins, 0.3))
     _, out, err = printed(file)
     assert 'Not published' not in err and ('pin 1 2=0' in out) == (count == 3)
+    assert out.count(' within ') == 2
     mechanism, = imported(file)
     model = mujoco.MjModel.from_xml_path(str(file))
     data, closed = mujoco.MjData(model), 0
-    for left, right in np.random.default_rng(3).uniform(-0.1, 0.1, (30, 2)):
+    for left, right in np.random.default_rng(3).uniform(0.2, 0.4, (30, 2)):
         found = published(mechanism, l=left, r=right)
         assert found.keys() == {'l', 'r', 'pitch', 'roll', *(
             f'pin {i} {k}' for i in (0, 1) for k in (0, 1))}
@@ -164,7 +165,7 @@ def test_hinges_of_rods_are_published(tmp_path, seed, count):
 def test_of_a_rod_on_three_hinges_and_two_the_three_do_not_stay(tmp_path):
     # Three hinges at one end and two at the other all move: none of the three stays.
     ankle = turning(1)
-    written = mjcf(ankle, NEAR, pins=[np.eye(3)] * 2)
+    written = mjcf(ankle, NEAR, [np.eye(3)] * 2)
     for i, end in enumerate(ankle.ends):
         first = np.cross(np.subtract(end, ankle.pivots[i]), [1.0, 0.2, 0.1])
         second = np.cross(np.subtract(end, ankle.pivots[i]), first)
