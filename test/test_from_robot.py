@@ -288,7 +288,7 @@ def test_bars_that_mirror_others_have_a_word_of_their_own(word, base):
     linkage = mechanisms.create('custom', joints=[
         'A ground 0 0', f'B ground {base}', 'C crank A 0.2', f'D {word} A C B'])
     given, reports, still = cli.described(robot_of(linkage, 0.7))
-    ground, _, crank, line = given['crank.joints']
+    ground, _, crank, line, *_ = given['crank.joints']
     assert (ground, crank, line) == ('A ground 0 0', 'C crank A 0.2', f'D {word} A C B')
     assert [line[:9] for line in reports] == ['Checked: '] and not still
 
