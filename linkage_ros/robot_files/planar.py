@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 import math
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -119,16 +119,14 @@ class Drawing(Dyads):
         self.frame = at(base[:3, :3].T @ (origin.places[0] - base[:3, 3]), turned)
         seen = np.linalg.inv(base @ self.frame)
         self.joints: List[Joint] = []
+        self.gap = 0.0
         for joint in group.joints:
-            first, second = ((seen @ [*place, 1.0])[:2] for place in joint.places)
-            axis = seen[:3, :3] @ joint.axis
-            way = complex(*axis[:2])
-            self.joints.append(replace(
-                joint, places=(complex(*first), complex(*second)),
-                axes=[way / abs(way) if joint.kind == SLIDE else float(np.sign(axis[2]))] * 2))
-        gaps = ((joint.places[1] - joint.places[0], joint) for joint in self.joints)
-        self.gap = max(abs((apart / joint.axis).imag if joint.kind == SLIDE else apart)
-                       for apart, joint in gaps)
+            first, second = (complex(*(seen @ [*place, 1.0])[:2]) for place in joint.places)
+            axis, slides = seen[:3, :3] @ joint.axis, joint.kind == SLIDE
+            along = complex(*axis[:2]) / np.hypot(*axis[:2]) if slides else float(np.sign(axis[2]))
+            self.joints.append(replace(joint, places=(first, second), axes=[along] * 2))
+            apart = second - first
+            self.gap = max(self.gap, abs((apart / along).imag if slides else apart))
         self.measured = [joint for joint in self.joints if joint.position is not None]
         self.still: List[str] = []
         up = hinges[0].axis
@@ -234,19 +232,16 @@ class Drawing(Dyads):
 
 def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
               ) -> check.Imported:
-    """
-    Return a mechanism.
-
-    Raises ValueError for loops that are no dyads, or whose pose is another than the robot's.
-    """
+    """Return a mechanism; raise ValueError for loops that are no dyads."""
     drawing = _drawn(robot, group)
-    if not drawing.drives:
+    joints = _joints(drawing) if drawing.drives else []
+    if not joints:
         raise NotDriven(_why(drawing))
     name = check.name_beside(others, plain(drawing.driven[0].name, 60))
-    parameters = _parameters(drawing, name)
+    parameters = check.parameters(
+        name, 'custom', drawing.lines, drawing.drives, joints, frame_id=drawing.ground,
+        pose=[float(short(value)) for value in coordinates(drawing.frame)])
     mechanism = scene.read({'mechanisms': [name], **parameters}).mechanisms[name]
-    if not any(called.published for called in mechanism.joints.values()):
-        raise NotDriven(_why(drawing))
     limits, reports = robot.limits(drawing.driven)
     if drawing.left:
         reports.append(f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.')
@@ -329,7 +324,8 @@ def _why(drawing: Drawing) -> str:
             'bars (an Assur group of class III or higher)')
 
 
-def _parameters(drawing: Drawing, name: str) -> Dict[str, Any]:
+def _joints(drawing: Drawing) -> List[Tuple[str, float, str, float]]:
+    """Return the link, the sign, the name and the position of each joint that links measure."""
     measured = []
     for joint in drawing.measured:
         with suppress(ValueError):
@@ -341,6 +337,4 @@ def _parameters(drawing: Drawing, name: str) -> Dict[str, Any]:
         if links[link].kind != 'prismatic':
             angle = math.remainder(angle - float(np.asarray(links[link].zero)), math.tau)
         joints.append((link, sign, joint.name, joint.start - sign * angle))
-    return check.parameters(
-        name, 'custom', drawing.lines, drawing.drives, joints, frame_id=drawing.ground,
-        pose=[float(short(value)) for value in coordinates(drawing.frame)])
+    return joints
