@@ -30,8 +30,8 @@ def mjcf(ankle, limits, pins=None, ref=0.0):
     With `pins`, they hang on hinges about these axes of each rod. `ref` is where its motors are.
     """
     held = ['<joint type="ball" name="ball {i}"/>' if pins is None else ''.join(
-        f'<joint name="pin {i} {k}" axis="{text(axis)}" range="-2 2"/>' for k, axis in enumerate(pins[i]))
-        for i in (0, 1)]
+        f'<joint name="pin {i} {k}" axis="{text(axis)}" range="-2 2"/>'
+        for k, axis in enumerate(pins[i])) for i in (0, 1)]
     legs = ''.join(
         f'<body name="crank {i}" pos="{text(ankle.motors[i])}"><joint name="{name}" '
         f'axis="{text(ankle.motor_axes[i])}" ref="{ref}"/>{LIGHT}<body name="rod {i}" '

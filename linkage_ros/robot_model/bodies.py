@@ -28,7 +28,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from . import shapes
-from .robot import FIXED, HINGE, posed, Robot, SLIDE
+from .robot import HINGE, posed, Robot, SLIDE
 from .shapes import BALL, BOX, CYLINDER, Piece, Place, weight
 from .. import palette
 from ..linkage import Arc, extremes, GROUND, Leg, Link, Mechanism
@@ -317,10 +317,7 @@ def _started(part: Robot, density: float) -> Robot:
                     driven=[], servos={}, follows={})
     robot = posed(robot, {name: positions[name] for name in robot.positions})
     _add_slots(mechanism, robot)
-    still = {robot.root, *(joint.bodies[1] for joint in robot.joints
-                           if joint.kind == FIXED and joint.bodies[0] == robot.root)}
-    mass = sum(weight(pieces, density)[0] for body, pieces in robot.pieces.items()
-               if pieces and body not in still)
+    mass = sum(weight(pieces, density)[0] for pieces in robot.pieces.values() if pieces)
     tips = {link.name: link.tip for link in linkage.links}
     for name in inputs:
         joint, arm = joints[name], mechanism.scale * math.hypot(*linkage.frames[name][tips[name]])
