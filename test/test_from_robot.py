@@ -195,6 +195,9 @@ REFUSED = [
      "four_bar.xml: it uses the plugin 'mujoco.none', which this MuJoCo does not have: remove"),
     # What follows a joint that is held is held.
     ('four_bar.urdf', [('<limit', '<mimic joint="elbow"/><limit')], HELD, '--hold', 'elbow=0'),
+    # A fold, without motors.
+    (FOLDED, [('<transmission name="t"><joint name="motor"/></transmission>', '')],
+     'bars lie in line where the file has them, and it moves on with '),
     # Bars that are just as long as the ground.
     (FOLDED, [('<origin xyz="0.3 0 0"/>', '<origin xyz="0.7 0 0"/>'),
               ('link="rocker" xyz="0.2', 'link="rocker" xyz="-0.2')],

@@ -162,6 +162,16 @@ def test_hinges_of_rods_are_published(tmp_path, seed, count):
     assert closed > 8
 
 
+def test_hinges_of_which_the_first_is_along_a_rod_are_not_published(tmp_path):
+    ankle, pins = turning(1), []
+    for pivot, end in zip(ankle.pivots, ankle.ends):
+        way = np.subtract(end, pivot)
+        pins.append([way, across := np.cross(way, [1.0, 0.2, 0.1]), np.cross(way, across)])
+    file = of_text(tmp_path / 'robot.xml', mjcf(ankle, NEAR, pins))
+    assert 'Not published: pin 0 0, pin 0 1, pin 0 2, pin 1 0, pin 1 1, pin 1 2: ' in said(file)
+    check_rods(ankle, *imported(file))
+
+
 def test_of_a_rod_on_three_hinges_and_two_the_three_do_not_stay(tmp_path):
     # Three hinges at one end and two at the other all move: none of the three stays.
     ankle = turning(1)
