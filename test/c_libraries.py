@@ -47,8 +47,8 @@ def loaded(folder, code, *flags):
     if not library.exists() or source.read_text() != code:
         source.write_text(code)
         subprocess.run([
-            COMPILER, '-std=c99', '-DLKR_MAX_INPUTS=3', '-DLKR_MAX_SOLUTIONS=512', *STRICT, *flags,
-            '-shared', '-fPIC', source, '-o', library, '-lm'], check=True)
+            COMPILER, '-std=c99', '-DLKR_MAX_INPUTS=3', '-DLKR_MAX_SOLUTIONS=1024', *STRICT,
+            *flags, '-shared', '-fPIC', source, '-o', library, '-lm'], check=True)
     return ctypes.CDLL(str(library))
 
 

@@ -176,27 +176,72 @@ def test_a_header_says_what_it_has(mechanisms, name, single, times, inputs, join
     assert not OUTPUTS.get(name) or 'where there is none. */' in text
 
 
-@pytest.mark.parametrize('name, output', [
-    (name, output) for name, outputs in OUTPUTS.items() for output in outputs])
-def test_the_inverse_finds_the_nearest_input(mechanisms, tmp_path, name, output):
-    mechanism, rng = mechanisms[name], np.random.default_rng(2)
-    linkage, drive = mechanism.linkage, mechanism.first
+ENDING = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1.5', 'B dyad A Q 1 1 left',
+          'C rigid A B 0.6 0.8 left']
+END = mechanisms.create('custom', joints=ENDING).reach()[0][1]
+MOTOR = ['O ground 0 0', 'M crank O 0.01']
+NEAR_ENDS = np.array([0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1])
+# A linkage, an output, inputs or parts of the reach, values next to which C is asked for them, or
+# parts of the reach from them, and the error that an end allows.
+INVERSES = [
+    *((name, output, {}) for name, outputs in OUTPUTS.items() for output in outputs),
+    ('slotted_lever', 'lever', {'nears': [math.tau * 100, math.tau * 10_000]}),
+    # At an end of the reach an output changes infinitely fast, which is no excuse for an error.
+    (ENDING, 'C.y', {'inputs': [END, END - 1e-12, END - 1e-9, END - 1e-6],
+                     'nears': [END, END - 1e-3, END + 1.0], 'close': 2e-8}),
+    # An angle that turns by more than half a turn from one extreme to the other.
+    (['O ground 0 0', 'Q ground 0.5 0.25', 'A crank O 0.8',
+      'D crank Q 0.288 geared crank 0.5 0.96', 'B dyad A D 2.05 2.54 left'], 'angle(A,B)',
+     {'inputs': [6.151306541], 'nears': [6.52, 6.2, 6.15, 5.0]}),
+    # It has modes that no single pose shows.
+    (['A ground 0 0', 'B ground 0 1.4', 'C cylinder B A 1.0157 right',
+      'D E F inversor B C 1.2375 0.3369'], 'DE', {'parts': np.linspace(0.02, 0.98, 41)}),
+    # The motor of a slow and of a fast gear goes on in its turn.
+    *(([*MOTOR, f'A crank O 1 geared crank {ratio} 0'], 'A.x', {
+        'inputs': [0.4, 83.0, 83.0 + 320.0 * math.pi], 'beside': [1e-3], 'close': 1e-10})
+      for ratio in ('1/80', '180')),
+    *(({'type': kind, f'dimensions.{key}': factor * mechanisms.create(kind).dimensions[key]},
+       output, {'parts': [*NEAR_ENDS, *(1.0 - NEAR_ENDS)], 'beside': [0.0, 0.1], 'close': 1e-7})
+      for kind, key, factor, output in (('jansen', 'k', 0.8, 'G.x'), ('jansen', 'e', 1.25, 'G.y'),
+                                        ('klann', 'i', 0.8, 'CF')))]
+
+
+@pytest.mark.parametrize('linkage, output, given', INVERSES)
+def test_the_inverse_finds_the_nearest_input(mechanisms, tmp_path, linkage, output, given):
+    settings = linkage if isinstance(linkage, dict) else {'type': 'custom', 'joints': linkage}
+    mechanism = mechanisms[linkage] if isinstance(linkage, str) else scene.read({
+        'mechanisms': ['m'], **{f'm.{key}': value for key, value in settings.items()}}
+        ).mechanisms['m']
+    check_nearest(tmp_path, mechanism, output, **given)
+
+
+def check_nearest(folder, mechanism, output, inputs=None, nears=None, beside=None, close=2e-14,
+                  parts=None):
+    """Check that C finds inputs of an output, and none that is farther away than Python's."""
+    linkage, drive, rng = mechanism.linkage, mechanism.first, np.random.default_rng(2)
     unit, size = mechanism.scale_of(drive.input.name), mechanism.scale_of(output)
-    invert = inverter(tmp_path, mechanism, output)
     low, high = drive.ends or drive.reach[0]
-    for theta in rng.uniform(low, high, 12):
-        value = float(linkage.joint_angles(theta / unit, [output])[output]) * size
-        near = theta + rng.uniform(-0.3, 0.3) * (high - low) + (
-            drive.input.turns and float(rng.integers(-3, 4)) * 2.0 * np.pi)
-        answer = invert(value, near)
-        again = float(linkage.joint_angles(answer / unit, [output])[output]) * size
-        best = linkage.input_for(output, value / size, near / unit) * unit
-        gap = again - value
-        gap -= linkage.is_angle(output) and 2.0 * np.pi * np.round(gap / (2.0 * np.pi))
-        assert abs(gap) <= 2e-14 * max(1.0, size * linkage.longest)
-        assert abs(abs(answer - near) - abs(best - near)) < 1e-6
-    for value in (1e3, -1e3, np.nan, np.inf):
-        assert linkage.is_angle(output) and np.isfinite(value) or invert(value, 0.0) is None
+    inputs = inputs or np.clip(low + (high - low) * np.array(
+        rng.uniform(size=12) if parts is None else parts), low, high)
+    turn = drive.input.turns * math.tau
+    beside = beside or rng.uniform(-0.3, 0.3, 2) * (high - low) + turn * rng.integers(-3, 4, 2)
+    invert = inverter(folder, mechanism, output)
+
+    def out(inputs):
+        return linkage.joint_angles(np.divide(inputs, unit), [output])[output]
+
+    for theta in inputs:
+        # Between two floats there may be no input that has the value exactly.
+        value = out([theta, np.nextafter(theta, 0.5 * (low + high))]).mean()
+        for near in nears or theta + np.array(beside):
+            answer = invert(value * size, near)
+            best = linkage.input_for(output, value, near / unit) * unit
+            assert abs(answer - near) == pytest.approx(abs(best - near), abs=1e-6)
+            gap = out(answer * (1.0 + 2e-16 * np.arange(-4, 5))) - value
+            gap -= linkage.is_angle(output) * math.tau * np.round(gap / math.tau)
+            assert size * np.nanmin(np.abs(gap)) <= close * max(1.0, size * linkage.longest)
+    for value in (1e3, -1e3, math.nan, math.inf):
+        assert linkage.is_angle(output) and math.isfinite(value) or invert(value, 0.0) is None
 
 
 @pytest.mark.nightly(all_but=2)
@@ -300,63 +345,6 @@ def test_single_precision_is_as_good_as_the_page_says(mechanisms, tmp_path, name
     # So are angles and rates.
     np.testing.assert_allclose(found[:, points:-1], exact[:, points:], rtol=1e-3, atol=1e-3 * max(
         1.0, size))
-
-
-def test_an_inverse_is_found_after_any_number_of_turns(mechanisms, tmp_path):
-    mechanism = mechanisms['slotted_lever']
-    invert = inverter(tmp_path, mechanism, 'lever')
-    for whole in (math.tau * 100, math.tau * 10_000):
-        for value in np.linspace(-0.4, 0.4, 50):
-            assert invert(value, whole) - whole == pytest.approx(
-                mechanism.linkage.input_for('lever', value, 0.0), abs=1e-15 * whole)
-
-
-GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
-          'D crank Q 0.27 geared crank -2 -1.4', 'B dyad A D 2.661 2.4 left']
-ENDING = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1.5', 'B dyad A Q 1 1 left',
-          'C rigid A B 0.6 0.8 left']
-END = mechanisms.create('custom', joints=ENDING).reach()[0][1]
-STEEP = ['O ground 0 0', 'Q ground 0.5 0.25', 'A crank O 0.8',
-         'D crank Q 0.288 geared crank 0.5 0.96', 'B dyad A D 2.05 2.54 left']
-
-
-@pytest.mark.parametrize('joints, output, inputs, nears', [
-    # A geared link counts turns, so that one input is right.
-    (GEARED, 'crank2', [-0.86844, 40.0], [2.3, 0.0, -5.3]),
-    # At an end of the reach an output changes infinitely fast, which is no excuse for an error.
-    (ENDING, 'C.y', [END, END - 1e-12, END - 1e-9, END - 1e-6], [END, END - 1e-3, END + 1.0]),
-    # An angle that turns by more than half a turn from one extreme to the other.
-    (STEEP, 'angle(A,B)', [6.151306541], [6.52, 6.2, 6.15, 5.0])])
-def test_the_input_of_an_output_is_found_from_anywhere(tmp_path, joints, output, inputs, nears):
-    mechanism, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': joints}
-                            ).mechanisms.values()
-    invert, angles = inverter(tmp_path, mechanism, output), mechanism.linkage.joint_angles
-    for value in inputs:
-        wanted = float(angles(value, [output])[output])
-        for answer in (invert(wanted, near) for near in nears):
-            assert answer == pytest.approx(value, abs=1e-8)
-            answer = min(answer, END) if joints is ENDING else answer
-            assert angles(answer, [output])[output] == pytest.approx(wanted, abs=2e-8)
-
-
-@pytest.mark.nightly(all_but=1)
-@pytest.mark.parametrize('kind, key, factor, output', [
-    ('jansen', 'k', 0.8, 'G.x'), ('jansen', 'e', 1.25, 'G.y'), ('klann', 'i', 0.8, 'CF')])
-def test_a_search_finds_inputs_up_to_the_ends_of_the_reach(tmp_path, kind, key, factor, output):
-    length = factor * mechanisms.create(kind).dimensions[key]
-    mechanism, = scene.read({'mechanisms': ['m'], 'm.type': kind, f'm.dimensions.{key}': length}
-                            ).mechanisms.values()
-    linkage, invert = mechanism.linkage, inverter(tmp_path, mechanism, output)
-    parts = np.array([0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1])
-    for low, high in linkage.reach():
-        for crank in low + (high - low) * np.concatenate([parts, 1.0 - parts]):
-            # Between two floats there is no input that has the value exactly.
-            value = np.mean(linkage.joint_angles(
-                [crank, np.nextafter(crank, 0.5 * (low + high))], [output])[output])
-            for near in (crank, 0.5 * (low + high)):
-                answer = min(max(invert(value, near), low), high)
-                assert linkage.joint_angles(answer, [output])[output] == pytest.approx(
-                    value, abs=1e-7 * linkage.longest)
 
 
 @pytest.mark.nightly

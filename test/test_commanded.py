@@ -12,7 +12,7 @@ refused, and answers with another pose: not the one asked for, and farther away.
 from contextlib import suppress
 import ctypes
 
-from c_libraries import COMPILER, inverter, loaded, SAMPLE
+from c_libraries import COMPILER, loaded, SAMPLE
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import joints
@@ -113,20 +113,6 @@ def questions(folder, cases, number):
         library[f'{case.mechanism.name}_counts'](ctypes.c_long(300), counts[case.mechanism.name])
     assert {name: each[:] for name, each in counts.items() if any(each[1:])} == {}
     return [each[0] for each in counts.values()]
-
-
-@pytest.mark.parametrize('output, joint_lines', FAULTS)
-def test_a_closed_form_knows_every_assembly_mode(tmp_path, output, joint_lines):
-    mechanism = read('fault', joint_lines).mechanism
-    linkage, invert = mechanism.linkage, inverter(tmp_path, mechanism, output)
-    (low, high), = linkage.reach()
-    for given in np.linspace(low, high, 41)[1:-1]:
-        value = float(linkage.joint_angles(given, [output])[output])
-        for near in (low, 0.5 * (low + high), high, given):
-            answer, best = invert(value, near), linkage.input_for(output, value, near)
-            assert abs(answer - near) == pytest.approx(abs(best - near), abs=1e-6)
-            assert float(linkage.joint_angles(answer, [output])[output]) == pytest.approx(
-                value, abs=1e-12)
 
 
 @pytest.mark.nightly

@@ -325,39 +325,36 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
 static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position, lkr_real *q,
     lkr_point *p)
 {
-    lkr_real gap[LKR_MAX_INPUTS], change[LKR_MAX_INPUTS], moved[LKR_MAX_INPUTS];
-    lkr_real left;
+    lkr_real gap[LKR_MAX_INPUTS], x[LKR_MAX_INPUTS];
+    lkr_real left = LKR_OTHER;
     lkr_real steepest = 1;
     int i, j, step;
-    if (!model->at(q, model->is_rated, p)) {
-        return 0;
-    }
-    left = lkr_gap(model, side, position, p, gap);
-    if (left <= LKR_ENOUGH) {
-        return 1;
-    }
-    if (!(left <= LKR_OTHER) || (!model->is_rated && !model->at(q, 1, p))) {
-        return 0;
-    }
-    for (step = 0; step < LKR_MAX_STEPS && left > LKR_ENOUGH; step++) {
+    memcpy(x, q, sizeof x);
+    for (step = 0; step <= LKR_MAX_STEPS; step++) {
         lkr_point next;
-        lkr_real now;
-        if (!lkr_input_change(model, side, p, LKR_LEAST, gap, change)) {
-            break;
+        lkr_real now = LKR_FAR;
+        if (model->at(x, step > 0 || model->is_rated, &next)) {
+            now = lkr_gap(model, side, position, &next, gap);
         }
-        for (i = 0; i < model->inputs; i++) {
-            moved[i] = q[i] + change[i];
-        }
-        if (!model->at(moved, 1, &next)) {
-            break;
-        }
-        now = lkr_gap(model, side, position, &next, gap);
         if (!(now < left)) {
             break;
         }
         left = now;
         *p = next;
-        memcpy(q, moved, sizeof moved);
+        memcpy(q, x, sizeof x);
+        if (left <= LKR_ENOUGH) {
+            return 1;
+        }
+        if ((step == 0 && !model->is_rated && !model->at(q, 1, p))
+            || !lkr_input_change(model, side, p, LKR_LEAST, gap, x)) {
+            break;
+        }
+        for (i = 0; i < model->inputs; i++) {
+            x[i] += q[i];
+        }
+    }
+    if (!(left < LKR_OTHER)) {
+        return 0;
     }
     /* What is left may be rounding: of the inputs, where a position changes fast; at an end of the
        reach the rate is infinite, yet rounding is not. */
@@ -516,19 +513,12 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
 {
     const int n = model->inputs;
     lkr_point p;
-    lkr_real q[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS];
-    int is_there;
+    lkr_real q[LKR_MAX_INPUTS];
     if (!lkr_are_finite(n, position)) {
         return LKR_NOT_KNOWN;
     }
-    /* Where it is already needs no inverse; but a command has to be in the sweeps. */
-    is_there = m->newest != LKR_NEITHER
-        && lkr_gap(model, side, position, &m->point, gap) <= LKR_ENOUGH
-        && lkr_bring(model, side, m->q, m->q, q) == 0;
-    p = m->point;
     memcpy(q, m->q, sizeof q);
-    if ((!is_there && !lkr_inverse(model, side, position, q, &p))
-        || !lkr_are_finite(n, p.position[1 - side])) {
+    if (!lkr_inverse(model, side, position, q, &p) || !lkr_are_finite(n, p.position[1 - side])) {
         return LKR_OUT_OF_REACH;
     }
     m->newest = side;
@@ -692,7 +682,8 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     const float v48 = sqrtf((v41 * v41) + (v45 * v45));
     const float v49 = v41 / v48;
     const float v56 = v45 / v48;
-    const float v81 = lkr_root(k73 + v32, k80);
+    const float v74 = k73 + v32;
+    const float v81 = lkr_root(v74, k80);
     const float v88 = ((length_a * (k82 + (k83 * v31))) / v33) + 0.0f;
     p->L_x = v49 * k54;
     p->L_y = k2 + (v56 * k54);
@@ -702,7 +693,8 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     by_crank->L_y = (v88 * v49) * k54;
     by_crank->angle_lever = v88;
     by_crank->slide_slide = (-((((v7 * 0.5f) * v9) * 2.0f) * k30)) / (2.0f * v81);
-    return 1;
+    const float valid = lkr_valid_where(0.0f, v74, k80);
+    return isfinite(valid);
 }
 
 /* Place the joints. Return 0 if not all can be assembled: NaN is what cannot. */

@@ -306,39 +306,36 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
 static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position, lkr_real *q,
     lkr_point *p)
 {
-    lkr_real gap[LKR_MAX_INPUTS], change[LKR_MAX_INPUTS], moved[LKR_MAX_INPUTS];
-    lkr_real left;
+    lkr_real gap[LKR_MAX_INPUTS], x[LKR_MAX_INPUTS];
+    lkr_real left = LKR_OTHER;
     lkr_real steepest = 1;
     int i, j, step;
-    if (!model->at(q, model->is_rated, p)) {
-        return 0;
-    }
-    left = lkr_gap(model, side, position, p, gap);
-    if (left <= LKR_ENOUGH) {
-        return 1;
-    }
-    if (!(left <= LKR_OTHER) || (!model->is_rated && !model->at(q, 1, p))) {
-        return 0;
-    }
-    for (step = 0; step < LKR_MAX_STEPS && left > LKR_ENOUGH; step++) {
+    memcpy(x, q, sizeof x);
+    for (step = 0; step <= LKR_MAX_STEPS; step++) {
         lkr_point next;
-        lkr_real now;
-        if (!lkr_input_change(model, side, p, LKR_LEAST, gap, change)) {
-            break;
+        lkr_real now = LKR_FAR;
+        if (model->at(x, step > 0 || model->is_rated, &next)) {
+            now = lkr_gap(model, side, position, &next, gap);
         }
-        for (i = 0; i < model->inputs; i++) {
-            moved[i] = q[i] + change[i];
-        }
-        if (!model->at(moved, 1, &next)) {
-            break;
-        }
-        now = lkr_gap(model, side, position, &next, gap);
         if (!(now < left)) {
             break;
         }
         left = now;
         *p = next;
-        memcpy(q, moved, sizeof moved);
+        memcpy(q, x, sizeof x);
+        if (left <= LKR_ENOUGH) {
+            return 1;
+        }
+        if ((step == 0 && !model->is_rated && !model->at(q, 1, p))
+            || !lkr_input_change(model, side, p, LKR_LEAST, gap, x)) {
+            break;
+        }
+        for (i = 0; i < model->inputs; i++) {
+            x[i] += q[i];
+        }
+    }
+    if (!(left < LKR_OTHER)) {
+        return 0;
     }
     /* What is left may be rounding: of the inputs, where a position changes fast; at an end of the
        reach the rate is infinite, yet rounding is not. */
@@ -497,19 +494,12 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
 {
     const int n = model->inputs;
     lkr_point p;
-    lkr_real q[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS];
-    int is_there;
+    lkr_real q[LKR_MAX_INPUTS];
     if (!lkr_are_finite(n, position)) {
         return LKR_NOT_KNOWN;
     }
-    /* Where it is already needs no inverse; but a command has to be in the sweeps. */
-    is_there = m->newest != LKR_NEITHER
-        && lkr_gap(model, side, position, &m->point, gap) <= LKR_ENOUGH
-        && lkr_bring(model, side, m->q, m->q, q) == 0;
-    p = m->point;
     memcpy(q, m->q, sizeof q);
-    if ((!is_there && !lkr_inverse(model, side, position, q, &p))
-        || !lkr_are_finite(n, p.position[1 - side])) {
+    if (!lkr_inverse(model, side, position, q, &p) || !lkr_are_finite(n, p.position[1 - side])) {
         return LKR_OUT_OF_REACH;
     }
     m->newest = side;
