@@ -11,8 +11,9 @@ refused, and answers with another pose: not the one asked for, and farther away.
 
 from contextlib import suppress
 import ctypes
+import subprocess
 
-from c_libraries import COMPILER, loaded, SAMPLE
+from c_libraries import COMPILER, loaded, SAMPLE, SANITIZED
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import joints
@@ -100,19 +101,46 @@ def drawn(seeds):
                         others, len(linkage.inputs), replace=False)] for k in (1, 2)]
 
 
+def code(cases, number='double'):
+    """Return the C of cases, with functions that put questions."""
+    return header.printed(cases, number == 'float') + SAMPLE + ''.join(
+        QUESTIONS.format(name=case.mechanism.name, number=number, n=len(case.mechanism.inputs),
+                         slack='1e-2f' if number == 'float' else '1e-6',
+                         ranges=ranges(case.mechanism)) for case in cases)
+
+
 def questions(folder, cases, number):
     """Return how many questions were put to each case, and raise if there were misses."""
     folder.mkdir(parents=True, exist_ok=True)
-    library = loaded(folder, header.printed(cases, number == 'float') + SAMPLE + ''.join(
-        QUESTIONS.format(name=case.mechanism.name, number=number, n=len(case.mechanism.inputs),
-                         slack='1e-2f' if number == 'float' else '1e-6',
-                         ranges=ranges(case.mechanism)) for case in cases), '-O1')
-    counts = {}
+    library, counts = loaded(folder, code(cases, number), '-O1'), {}
     for case in cases:
         counts[case.mechanism.name] = (ctypes.c_long * 3)()
         library[f'{case.mechanism.name}_counts'](ctypes.c_long(300), counts[case.mechanism.name])
     assert {name: each[:] for name, each in counts.items() if any(each[1:])} == {}
     return [each[0] for each in counts.values()]
+
+
+def test_sanitizers_find_nothing(tmp_path):
+    def ran(name, text):
+        (tmp_path / f'{name}.c').write_text(text)
+        for command_line in ([COMPILER, '-std=c99', *SANITIZED, tmp_path / f'{name}.c', '-o',
+                              tmp_path / name, '-lm'], [tmp_path / name]):
+            ended = subprocess.run(command_line, capture_output=True, text=True)
+            if ended.returncode:
+                return ended.stderr[:2000]
+        return ended.stdout
+
+    if ran('none', 'int main(void) { return 0; }\n'):
+        pytest.skip('no program with sanitizers is linked or runs here')
+    cases = [read('lever', FAULTS[0][1]), *map(header.Request, scene.read({
+        'mechanisms': ['leg'], 'leg.type': 'five_bar', 'leg.loads': ['P=3 -20']}
+        ).mechanisms.values())]
+    printed = ran('asked', '#include <stdio.h>\n' + code(cases) + 'int main(void)\n{\n' + ''.join(
+        f"""long {name}[3] = {{ 0, 0, 0 }};
+{name}_counts(2000, {name});
+printf("%d", {name}[0] > 1000 && !{name}[1] && !{name}[2]);
+""" for name in ('lever', 'leg')) + '}\n')
+    assert printed == '11'
 
 
 @pytest.mark.nightly

@@ -8,8 +8,6 @@ ros2_control is not on the Python package index: what is generated is compiled a
 of its interface, `test/ros2_control`, written for these tests. No controller manager is run.
 """
 
-import ast
-from contextlib import suppress
 import ctypes
 import math
 from pathlib import Path
@@ -20,7 +18,7 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-from c_libraries import COMPILER, loaded, ROS, SAMPLE, shared, STAND_IN, STRICT
+from c_libraries import counted, expected, loaded, outputs, PLUGIN, SANITIZED, shared, STAND_IN
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header, transmission
 from linkage_ros.c_code.axes import actuators, joints
@@ -28,10 +26,9 @@ from linkage_ros.c_code.names import template
 from linkage_ros.c_code.package import package, ranges
 import numpy as np
 import pytest
-from truth import random_linkages
+from test_commanded import drawn
 
 ROOT = Path(__file__).parents[1]
-SANITIZED = ('-g', '-O1', '-fsanitize=address,undefined', '-fno-sanitize-recover=all')
 COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
     not shutil.which(name), reason=f'{name} is not installed')) for name in ('g++', 'clang++')]
 SCENES = [*sorted((ROOT / 'config').glob('*.yaml')), ROOT / 'examples' / 'leg.yaml']
@@ -82,12 +79,12 @@ int {name}_sent(int side, const double *from, double *to)
     lkr_side given, found;
     int i, status;
     for (i = 0; i < N; i++) {{
-        given.position[i] = from[i];
-        given.velocity[i] = from[N + i];
-        given.effort[i] = from[2 * N + i];
-        found.position[i] = to[i];
-        found.velocity[i] = to[N + i];
-        found.effort[i] = to[2 * N + i];
+        given.position[i] = ({number})from[i];
+        given.velocity[i] = ({number})from[N + i];
+        given.effort[i] = ({number})from[2 * N + i];
+        found.position[i] = ({number})to[i];
+        found.velocity[i] = ({number})to[N + i];
+        found.effort[i] = ({number})to[2 * N + i];
     }}
     status = side ? {name}_joints_to_actuators(&{name}_m, &given, &found)
         : {name}_actuators_to_joints(&{name}_m, &given, &found);
@@ -100,34 +97,17 @@ int {name}_sent(int side, const double *from, double *to)
 }}
 """
 
-# States all over the inputs' ranges, measured and commanded; returns how many are OK.
-WALK = """
-static long {name}_walked(long states)
-{
-    static const double ranges[][2] = {ranges};
-    static {name}_memory m;
-    lkr_side from = { { 0 }, { 0 }, { 0 } }, to = from;
-    lkr_point p;
-    double q[LKR_MAX_INPUTS] = { 0 };
-    long i, good = 0;
-    (void){name}_begin(&m);
-    for (i = 1; i <= states; i++) {
-        sample({name}_model.inputs, ranges, i, q);
-        if (!{name}_at(q, 1, &p))
-            continue;
-        memcpy(from.position, p.position[LKR_ACTUATORS], sizeof from.position);
-        good += {name}_actuators_to_joints(&m, &from, &to) == LKR_OK
-            && {name}_joints_to_actuators(&m, &to, &from) == LKR_OK;
-    }
-    return good;
-}
-"""
+def caller(mechanism, number='double'):
+    """Return functions of C that begin with a mechanism, and transmit, in double."""
+    return CALLER.format(name=mechanism.name, n=len(mechanism.inputs), number=number)
 
 
-def compiled(folder, mechanisms, *names, flags=()):
+def compiled(folder, mechanisms, *names, single=False):
     """Return a library with the actuators and joints of mechanisms."""
-    return loaded(folder, ''.join(header.written(mechanism, joints=names) + CALLER.format(
-        name=mechanism.name, n=len(mechanism.inputs)) for mechanism in mechanisms), *flags)
+    return loaded(folder, ''.join(
+        header.written(mechanism, (), single, names) + caller(mechanism, 'float' if single else
+                                                              'double')
+        for mechanism in mechanisms))
 
 
 class Memory:
@@ -159,35 +139,6 @@ def states(mechanism, count, seed=1):
         if np.isfinite(values).all():
             found.append(own)
     return found
-
-
-def outputs(mechanism, inputs, names, by=None):
-    """Return outputs, or their rates by an input, in the scene's units, at such inputs."""
-    units = [mechanism.scale_of(name) for name in mechanism.inputs]
-    own = [value / unit for value, unit in zip(inputs, units)]
-    ask = mechanism.linkage.joint_angles if by is None else mechanism.linkage.joint_rates
-    values = ask(own if len(own) > 1 else own[0], names, *([] if by is None else [by]))
-    return np.array([float(values[name]) * mechanism.scale_of(name) / (
-        1.0 if by is None else units[by]) for name in names])
-
-
-def expected(mechanism, inputs):
-    """Return positions of actuators and joints at inputs, and their Jacobians, from the scene."""
-    n, drives = len(mechanism.inputs), list(mechanism.inputs.values())
-    told = [drive.measures or name for name, drive in mechanism.inputs.items()]
-    ratio, offset = (np.array([getattr(drive, key) for drive in drives])
-                     for key in ('ratio', 'offset'))
-    position = (outputs(mechanism, inputs, told) - offset) / ratio
-    rates = np.array([outputs(mechanism, inputs, told, by) for by in range(n)]).T / ratio[:, None]
-    chosen = [each.output for each in joints(mechanism)]
-    prefix = next(iter(mechanism.assembly().legs))
-    called = [mechanism.joints[name if name in mechanism.inputs else prefix + name]
-              for name in chosen]
-    joint = np.array([name.of(value) for name, value in zip(
-        called, outputs(mechanism, inputs, chosen))])
-    signs = np.array([name.sign for name in called])
-    turning = np.array([outputs(mechanism, inputs, chosen, by) for by in range(n)]).T
-    return position, rates, joint, signs[:, None] * turning
 
 
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
@@ -295,7 +246,7 @@ def choosing(tmp_path_factory):
                 'type': 'custom', 'joints': joints_, **given}.items()}}).mechanisms.values()
         code += header.written(mechanism, joints=[
             each if each == 'wheel' else f'm{i}_{each}' for each in names])
-        code += CALLER.format(name=f'm{i}', n=1)
+        code += caller(mechanism)
     with shared(tmp_path_factory, 'choosing') as folder:
         return loaded(folder, code)
 
@@ -312,21 +263,53 @@ def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
 def test_a_new_position_takes_one_pose(mechanisms, tmp_path):
     """Actuators count inputs, and these joints have closed forms."""
     chosen = [mechanisms[name] for name in ('leg', 'boom', 'beast', 'rocker')]
-    text = re.sub(r'(int \w+_at\([^;]*?\)\n{\n)', r'\1    taken++;\n', header.printed(
-        [header.Request(mechanism) for mechanism in chosen]))
-    library = loaded(tmp_path, f'static int taken;\n{text}' + ''.join(
-        CALLER.format(name=mechanism.name, n=len(mechanism.inputs)) for mechanism in chosen) + (
-        'int poses(void) { int before = taken; taken = 0; return before; }\n'))
+    library = loaded(tmp_path, counted(header.printed([*map(header.Request, chosen)]) + ''.join(
+        caller(mechanism) for mechanism in chosen)))
     for mechanism in chosen:
         memory = Memory(library, mechanism.name, len(mechanism.inputs))
         first, second, *_ = states(mechanism, 4)
         for inputs in (first, second, first):
             actuator, _, joint, _ = expected(mechanism, inputs)
-            library.poses()
-            assert memory.send(0, actuator)[0] & 1 == 0 and library.poses() == 1
+            library.poses_taken()
+            assert memory.send(0, actuator)[0] & 1 == 0 and library.poses_taken() == 1
             memory.send(0, expected(mechanism, second if inputs is first else first)[0])
-            library.poses()
-            assert memory.send(1, joint)[0] & 1 == 0 and library.poses() == 1
+            library.poses_taken()
+            assert memory.send(1, joint)[0] & 1 == 0 and library.poses_taken() == 1
+
+
+@pytest.mark.parametrize('single, step, beyond', [(False, 1e-12, 1e-11), (True, 2e-5, 5e-5)])
+def test_small_steps_up_to_an_extreme_are_not_lost(tmp_path, single, step, beyond):
+    linkage = mechanisms.create('slotted_lever')
+    mechanism = scene.read({'mechanisms': ['m'], 'm.type': 'slotted_lever'}).mechanisms['m']
+    library = compiled(tmp_path, [mechanism], single=single)
+
+    def command(memory, value):
+        status, (crank, *_) = memory.send(1, [value])
+        return status & 1, crank
+
+    memory, cranks = Memory(library, 'm', 1), 0.3 + np.arange(1000) * step
+    for crank, value in zip(cranks, linkage.joint_angles(cranks, ['lever'])['lever']):
+        assert command(memory, value) == (0, pytest.approx(crank, abs=step))
+    # What is hardly beyond is out of reach, there, too, where it is at the extreme already.
+    for (least, _), (greatest, _) in linkage.extremes('lever'):
+        for extreme, out in ((least, -beyond), (greatest, beyond)):
+            for before in (0.5 * extreme, extreme - 0.1 * out):
+                for part, is_out in zip((-10.0, 1000.0, 10.0, 1.0), (0, 1, 1, 1)):
+                    memory = Memory(library, 'm', 1)
+                    assert command(memory, before)[0] == 0
+                    assert command(memory, extreme + part * out)[0] == is_out
+
+
+@pytest.mark.nightly
+def test_an_ankle_in_single_precision_is_that_of_python(tmp_path):
+    mechanism, = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).mechanisms.values()
+    memory = Memory(compiled(tmp_path, [mechanism], single=True), 'ankle', 2)
+    for inputs in np.random.default_rng(4).uniform(-0.2, 0.2, (300, 2)):
+        actuator, _, joint, _ = expected(mechanism, inputs)
+        status, (found, *_) = memory.send(0, actuator)
+        assert status == 0 and found == pytest.approx(joint, abs=1e-5)
+        status, (found, *_) = memory.send(1, joint)
+        assert status & 1 == 0 and found == pytest.approx(actuator, abs=1e-4)
 
 
 def test_joints_that_move_with_no_input_are_refused():
@@ -414,30 +397,20 @@ def test_the_joints_are_chosen_by_their_names(mechanisms):
 @pytest.mark.nightly
 @pytest.mark.parametrize('seeds', [range(3), range(3, 12), range(12, 22)])
 def test_random_linkages_are_measured(tmp_path, seeds):
-    mechanisms = []
-    for seed in seeds:
-        drawn, name = random_linkages.design(np.random.default_rng(seed)), f'm{seed}'
-        given = {'mechanisms': [name], f'{name}.type': 'custom', f'{name}.joints': drawn.joints,
-                 **{f'{name}.dimensions.{key}': float(value)
-                    for key, value in drawn.dimensions.items()}}
-        with suppress(scene.SceneError):  # of lengths that allow no pose
-            mechanisms += scene.read(given).mechanisms.values()
-    library, measured = compiled(tmp_path, mechanisms, flags=['-O2']), 0
-    rng = np.random.default_rng(1)
+    mechanisms = [case.mechanism for case in drawn(seeds) if not case.joints]
+    library, rng, measured = compiled(tmp_path, mechanisms), np.random.default_rng(1), 0
     for mechanism in mechanisms:
         if library[f'{mechanism.name}_started']() == 0:
             continue
         memory = Memory(library, mechanism.name, len(mechanism.inputs))
+        points = [f'{point}.{axis}' for point in mechanism.linkage.points for axis in 'xy']
         for _ in range(40):
-            inputs = [rng.uniform(*(drive.ends or drive.reach[0]))
-                      for drive in mechanism.inputs.values()]
+            inputs = [rng.uniform(*(settings.ends or settings.reach[0]))
+                      for settings in mechanism.inputs.values()]
             actuator, _, joint, _ = expected(mechanism, inputs)
-            own = [value / mechanism.scale_of(name)
-                   for value, name in zip(inputs, mechanism.inputs)]
-            places = mechanism.linkage.solve(own if len(own) > 1 else own[0]).values()
             status, (position, *_) = memory.send(0, actuator)
             # All of it can be assembled, or it is said that it cannot.
-            assert (status & 1 == 0) == np.isfinite(list(places)).all(), (mechanism.name, inputs)
+            assert (status & 1 == 0) == np.isfinite(outputs(mechanism, inputs, points)).all()
             if status == 0:
                 gap = np.abs(position - joint)
                 assert np.minimum(gap, np.abs(gap - math.tau)).max() < 1e-11
@@ -485,39 +458,14 @@ def proved(package, mechanism, compiler, count, *flags):
     code = (package / 'src' / f'{name}.hpp').read_text()
     class_, space = re.search(r'struct (\w+)Code', code)[1], re.search(r'namespace (\w+)', code)[1]
     program = package / f'proof_{name}'
-    subprocess.run([compiler, '-std=c++17', *STRICT, '-O2', *flags, f'-DNAME={name}',
-                    f'-DCLASS={class_}', f'-DNAMESPACE={space}',
-                    f'-DRANGES={ranges(mechanism)}', '-isystem', STAND_IN / 'include',
-                    '-I', package / 'src', '-I', package / 'include', STAND_IN / 'proof.cpp',
-                    '-o', program, *ROS], check=True)
+    subprocess.run([compiler, *PLUGIN, '-O2', *flags, f'-DNAME={name}', f'-DCLASS={class_}',
+                    f'-DNAMESPACE={space}', f'-DRANGES={ranges(mechanism)}', '-I', package / 'src',
+                    '-I', package / 'include', STAND_IN / 'proof.cpp', '-o', program, *PLUGIN],
+                   check=True)
     ended = subprocess.run([program, str(count)], capture_output=True, text=True)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     tried, good = map(int, re.search(r'(\d+) states, (\d+)', ended.stdout).groups())
     assert tried == count and good > 0.9 * count
-
-
-@pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
-def test_sanitizers_find_nothing(mechanisms, tmp_path):
-    # A lever with sweep and loads, and a leg of two inputs; all scenes are nightly.
-    def ran(name, text):
-        (tmp_path / f'{name}.c').write_text(text)
-        for command_line in ([COMPILER, '-std=c99', *SANITIZED, tmp_path / f'{name}.c', '-o',
-                              tmp_path / name, '-lm'], [tmp_path / name]):
-            ended = subprocess.run(command_line, capture_output=True, text=True)
-            if ended.returncode:
-                return None, ended.stderr[:2000]
-        return ended.stdout, ''
-
-    if ran('none', 'int main(void) { return 0; }\n')[0] is None:
-        pytest.skip('no program with sanitizers is linked or runs here')
-    names = ['lever', 'leg']
-    printed, error = ran('walk', '#include <stdio.h>\n' + header.printed(
-        [header.Request(mechanisms[name]) for name in names]) + SAMPLE + ''.join(
-        WALK.replace('{name}', name).replace('{ranges}', ranges(mechanisms[name]))
-        for name in names) + 'int main(void)\n{\n' + ''.join(
-            f'    printf("%ld ", {name}_walked(2000));\n' for name in names) + '}\n')
-    assert printed is not None, error
-    assert min(map(int, printed.split())) > 500
 
 
 @pytest.mark.parametrize('compiler', COMPILERS)
@@ -583,23 +531,11 @@ AXES = {'leg': ({'leg_crank': 'crank', 'leg_crank2': 'crank2'},
         'lever': ({'servo': 'crank'}, {'flap': 'lever'})}
 
 
-@pytest.fixture(scope='module')
-def files(mechanisms):
-    """Return the files of a package by their paths, as texts."""
-    made = package('robot_1', 'a<b>*/.yaml', [(mechanisms[name], []) for name in AXES])
-    return {str(path): text for path, text in made.items()}
-
-
-def test_a_package_is_complete(files):
-    assert {*files} == {
-        'CMakeLists.txt', 'package.xml', 'README.md', 'plugins.xml', 'urdf/transmissions.xml',
-        'src/plugins.cpp', 'src/transmission-of.hpp', 'src/linkage.h',
-        'include/linkage_ros/linkage_transmission.hpp', *(
-            path.format(name) for name in AXES for path in (
-                'src/{}.hpp', 'src/{}_linkage.h', 'test/test_{}.cpp'))}
+def test_a_package_names_what_the_scene_names(mechanisms):
+    files = {str(path): text for path, text in package(
+        'robot_1', 'a<b>*/.yaml', [(mechanisms[name], []) for name in AXES]).items()}
     assert not any(re.search(r'@\w+@', text) for text in files.values())
-    assert {'robot_1_plugins'} == {found for text in files.values() for found in re.findall(
-        r'\b(\w+_plugins)\b|$', text) if found}
+    assert files['src/linkage.h'] == template('linkage.h')
     described = ElementTree.fromstring(files['package.xml'])
     assert described.findtext('name') == 'robot_1'
     assert 'Linkages of a<b>* /.yaml as' in described.findtext('description')
@@ -608,36 +544,17 @@ def test_a_package_is_complete(files):
     assert f'foreach(mechanism {" ".join(AXES)})' in files['CMakeLists.txt']
     assert '| `robot_1/Leg` | leg_crank, leg_crank2 | leg_crank, leg_AP |' in files['README.md']
     assert '| `robot_1/Int` | a* / "b"/ ? ?/?%s ? | while/1:x |' in files['README.md']
-
-
-def test_a_package_names_what_the_scene_names(files, mechanisms):
-    plugins = ElementTree.fromstring(files['plugins.xml'])
-    pasted = ElementTree.fromstring(f'<all>{files["urdf/transmissions.xml"]}</all>',
-                                    ElementTree.XMLParser(target=ElementTree.TreeBuilder(
-                                        insert_comments=True)))
-    assert plugins.get('path') == 'robot_1' and len(plugins) == len(AXES)
-    assert re.findall(r'CLASS\(\s*(.*?), transmission_interface::TransmissionLoader\)',
-                      files['src/plugins.cpp']) == [each.get('type') for each in plugins]
-    assert re.findall('#include "(.*).hpp"', files['src/plugins.cpp'])[:-1] == [*AXES]
-    for (name, axes), plugin, own in zip(
-            AXES.items(), plugins, (each for each in pasted if each.tag == 'transmission')):
-        assert own.get('name') == name and own.findtext('plugin') == plugin.get('name')
-        assert {**plugin.attrib} == {
-            'name': f'robot_1/{name.title()}', 'type': f'robot_1_plugins::{name.title()}Loader',
-            'base_class_type': 'transmission_interface::TransmissionLoader'}
-        if name != 'int':
-            assert plugin.findtext('description') == (
-                f'The linkage {name} between {", ".join(axes[0])} and {", ".join(axes[1])}.')
-        for side, named in zip(('actuator', 'joint'), axes):
-            assert [{**each.attrib} for each in own.iter(side)] == [
-                {'name': each, 'role': role} for each, role in named.items()]
-            row, = re.findall(rf'array<Axis, \w+> {side}s{{{{(.*)}}}};', files[f'src/{name}.hpp'])
-            pairs = [tuple(ast.literal_eval(f'b"{text}"').decode() for text in each)
-                     for each in re.findall(r'{"(.*?)", "(.*?)"}', row)]
-            assert pairs[:len(named)] == [*named.items()]
-        text = files[f'src/{name}_linkage.h']
-        assert '#include "linkage.h"\n' in text and '#define LKR_MAX_INPUTS 2\n' in text
-    assert files['src/linkage.h'] == template('linkage.h')
+    pasted = ElementTree.fromstring(f'<all>{files["urdf/transmissions.xml"]}</all>')
+    assert [(own.get('name'), own.findtext('plugin'), *({
+        each.get('name'): each.get('role') for each in own.iter(side)}
+        for side in ('actuator', 'joint'))) for own in pasted] == [
+            (name, f'robot_1/{name.title()}', *axes) for name, axes in AXES.items()]
+    # The names of plugins, of their classes and of what a library exports.
+    assert [(each.get('name'), each.get('type')) for each in ElementTree.fromstring(
+        files['plugins.xml'])] == [(f'robot_1/{class_}', f'robot_1_plugins::{class_}Loader')
+                                   for class_ in map(str.title, AXES)]
+    assert re.findall(r'CLASS\(\s*robot_1_plugins::(\w+)Loader, transmission_interface::T\w+r\)',
+                      files['src/plugins.cpp']) == [*map(str.title, AXES)]
 
 
 @pytest.mark.parametrize('arguments, said', [

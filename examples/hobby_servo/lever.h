@@ -325,7 +325,8 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
 static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position, lkr_real *q,
     lkr_point *p)
 {
-    lkr_real gap[LKR_MAX_INPUTS], x[LKR_MAX_INPUTS];
+    lkr_real gap[LKR_MAX_INPUTS] = { 0 };
+    lkr_real x[LKR_MAX_INPUTS];
     lkr_real left = LKR_OTHER;
     lkr_real steepest = 1;
     int i, j, step;
@@ -414,10 +415,10 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
     for (i = 0; i < model->inputs; i++) {
         const lkr_axis *axis = &model->axis[side][i];
         value[i] = (position[i] - axis->offset) / axis->factor;
-        near[i] = q[i];
-        /* Without a function for solutions, there is one, of counted inputs. */
-        x[0][i] = q[i];
     }
+    memcpy(near, q, sizeof near);
+    /* Without a function for solutions, there is one, of counted inputs. */
+    memcpy(x[0], q, sizeof near);
     if (model->solutions[side]) {
         count = model->solutions[side](value, x);
     }
@@ -466,7 +467,7 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
 static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *value, const lkr_real *near,
     lkr_real *inputs)
 {
-    lkr_real q[LKR_MAX_INPUTS];
+    lkr_real q[LKR_MAX_INPUTS] = { 0 };
     lkr_point p;
     int i;
     for (i = 0; i < model->inputs; i++) {
