@@ -70,61 +70,38 @@ GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
           'D crank Q 0.27 geared crank -2 0', 'B dyad A D 2.661 2.4 left']
 SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 out 0.08']
 UNWRITTEN = 0.123456789
+# All that is given and written is an lkr_side: positions, velocities, efforts.
 CALLER = """
 static {name}_memory {name}_m;
 int {name}_started(void) {{ return {name}_begin(&{name}_m); }}
-int {name}_sent(int side, const double *from, double *to)
+int {name}_sent(int side, const lkr_side *from, lkr_side *to)
 {{
-    enum {{ N = {n} }};
-    lkr_side given, found;
-    int i, status;
-    for (i = 0; i < N; i++) {{
-        given.position[i] = ({number})from[i];
-        given.velocity[i] = ({number})from[N + i];
-        given.effort[i] = ({number})from[2 * N + i];
-        found.position[i] = ({number})to[i];
-        found.velocity[i] = ({number})to[N + i];
-        found.effort[i] = ({number})to[2 * N + i];
-    }}
-    status = side ? {name}_joints_to_actuators(&{name}_m, &given, &found)
-        : {name}_actuators_to_joints(&{name}_m, &given, &found);
-    for (i = 0; i < N; i++) {{
-        to[i] = found.position[i];
-        to[N + i] = found.velocity[i];
-        to[2 * N + i] = found.effort[i];
-    }}
-    return status;
+    return side ? {name}_joints_to_actuators(&{name}_m, from, to)
+        : {name}_actuators_to_joints(&{name}_m, from, to);
 }}
 """
-
-def caller(mechanism, number='double'):
-    """Return functions of C that begin with a mechanism, and transmit, in double."""
-    return CALLER.format(name=mechanism.name, n=len(mechanism.inputs), number=number)
 
 
 def compiled(folder, mechanisms, *names, single=False):
     """Return a library with the actuators and joints of mechanisms."""
-    return loaded(folder, ''.join(
-        header.written(mechanism, (), single, names) + caller(mechanism, 'float' if single else
-                                                              'double')
-        for mechanism in mechanisms))
+    return loaded(folder, ''.join(header.written(mechanism, (), single, names) + CALLER.format(
+        name=mechanism.name) for mechanism in mechanisms))
 
 
 class Memory:
-    """The memory of one mechanism in C."""
+    """The memory of one mechanism in C, with so many inputs."""
 
-    def __init__(self, library, name, n):
-        self._send, self._n = library[f'{name}_sent'], n
+    def __init__(self, library, name, n, kind=float):
+        self._send, self._n, self._kind = library[f'{name}_sent'], n, kind
         assert library[f'{name}_started']() == 1
 
-    def send(self, side, position, velocity=None, effort=None):
+    def send(self, side, position, velocity=0.0, effort=0.0):
         """Return the status and the other side's positions, velocities, efforts: or UNWRITTEN."""
-        n = self._n
-        given = np.array([position, np.zeros(n) if velocity is None else velocity,
-                          np.zeros(n) if effort is None else effort], float).reshape(3 * n)
-        found = np.full(3 * n, UNWRITTEN)
+        given, found = np.zeros((3, 3), self._kind), np.full((3, 3), UNWRITTEN, self._kind)
+        for row, values in zip(given, (position, velocity, effort)):
+            row[:self._n] = values
         status = self._send(side, *(ctypes.c_void_p(x.ctypes.data) for x in (given, found)))
-        return status, found.reshape(3, n)
+        return status, found[:, :self._n]
 
 
 def states(mechanism, count, seed=1):
@@ -246,7 +223,7 @@ def choosing(tmp_path_factory):
                 'type': 'custom', 'joints': joints_, **given}.items()}}).mechanisms.values()
         code += header.written(mechanism, joints=[
             each if each == 'wheel' else f'm{i}_{each}' for each in names])
-        code += caller(mechanism)
+        code += CALLER.format(name=f'm{i}')
     with shared(tmp_path_factory, 'choosing') as folder:
         return loaded(folder, code)
 
@@ -264,7 +241,7 @@ def test_a_new_position_takes_one_pose(mechanisms, tmp_path):
     """Actuators count inputs, and these joints have closed forms."""
     chosen = [mechanisms[name] for name in ('leg', 'boom', 'beast', 'rocker')]
     library = loaded(tmp_path, counted(header.printed([*map(header.Request, chosen)]) + ''.join(
-        caller(mechanism) for mechanism in chosen)))
+        CALLER.format(name=mechanism.name) for mechanism in chosen)))
     for mechanism in chosen:
         memory = Memory(library, mechanism.name, len(mechanism.inputs))
         first, second, *_ = states(mechanism, 4)
@@ -281,13 +258,13 @@ def test_a_new_position_takes_one_pose(mechanisms, tmp_path):
 def test_small_steps_up_to_an_extreme_are_not_lost(tmp_path, single, step, beyond):
     linkage = mechanisms.create('slotted_lever')
     mechanism = scene.read({'mechanisms': ['m'], 'm.type': 'slotted_lever'}).mechanisms['m']
-    library = compiled(tmp_path, [mechanism], single=single)
+    library, kind = compiled(tmp_path, [mechanism], single=single), np.float32 if single else float
 
     def command(memory, value):
         status, (crank, *_) = memory.send(1, [value])
         return status & 1, crank
 
-    memory, cranks = Memory(library, 'm', 1), 0.3 + np.arange(1000) * step
+    memory, cranks = Memory(library, 'm', 1, kind), 0.3 + np.arange(1000) * step
     for crank, value in zip(cranks, linkage.joint_angles(cranks, ['lever'])['lever']):
         assert command(memory, value) == (0, pytest.approx(crank, abs=step))
     # What is hardly beyond is out of reach, there, too, where it is at the extreme already.
@@ -295,7 +272,7 @@ def test_small_steps_up_to_an_extreme_are_not_lost(tmp_path, single, step, beyon
         for extreme, out in ((least, -beyond), (greatest, beyond)):
             for before in (0.5 * extreme, extreme - 0.1 * out):
                 for part, is_out in zip((-10.0, 1000.0, 10.0, 1.0), (0, 1, 1, 1)):
-                    memory = Memory(library, 'm', 1)
+                    memory = Memory(library, 'm', 1, kind)
                     assert command(memory, before)[0] == 0
                     assert command(memory, extreme + part * out)[0] == is_out
 
@@ -303,7 +280,7 @@ def test_small_steps_up_to_an_extreme_are_not_lost(tmp_path, single, step, beyon
 @pytest.mark.nightly
 def test_an_ankle_in_single_precision_is_that_of_python(tmp_path):
     mechanism, = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).mechanisms.values()
-    memory = Memory(compiled(tmp_path, [mechanism], single=True), 'ankle', 2)
+    memory = Memory(compiled(tmp_path, [mechanism], single=True), 'ankle', 2, np.float32)
     for inputs in np.random.default_rng(4).uniform(-0.2, 0.2, (300, 2)):
         actuator, _, joint, _ = expected(mechanism, inputs)
         status, (found, *_) = memory.send(0, actuator)
@@ -604,12 +581,16 @@ def test_joint_limits_are_those_of_all_poses(capsys, path):
             assert high - slack <= np.nanmax(values) <= high + 1e-9
 
 
-def test_a_joint_that_turns_has_no_limits(capsys, tmp_path):
+@pytest.mark.parametrize('name, more, limits', [
+    ('QB', '', False), ('crank', '', False), ('crank2', '', False),
+    ('crank2', 'crank.sweep: [-1.0, 20.0], ', (-40.0, 2.0)), ('crank', 'crank.sweep: [0.0, 9.0], ',
+                                                             (0.0, 9.0))])
+def test_a_joint_that_turns_has_no_limits(capsys, tmp_path, name, more, limits):
     file = tmp_path / 'turning.yaml'
-    file.write_text('/**: {ros__parameters: {mechanisms: [drag], drag: {type: custom, joints: ['
-                    'O ground 0 0, Q ground 0.3 0, A crank O 1, B dyad A Q 0.9 1.1 left]}}}')
-    assert limits_of(capsys, file) == {'drag_QB': False}
-    assert limits_of(capsys, file, '--joints', 'drag_crank') == {'drag_crank': False}
+    file.write_text('/**: {ros__parameters: {mechanisms: [drag], drag: {type: custom, ' + more
+                    + 'joints: [O ground 0 0, Q ground 0.3 0, A crank O 1, B dyad A Q 0.9 1.1 '
+                    'left, D crank Q 0.3 geared crank -2 0]}}}')
+    assert limits_of(capsys, file, '--joints', f'drag_{name}') == {f'drag_{name}': limits}
 
 
 def test_a_package_is_written_again(tmp_path, capsys, monkeypatch):

@@ -29,7 +29,7 @@ pytestmark = [
 
 # A motor with a gear, one in a sweep, a five-bar, and one that measures what it moves.
 SCENE = {
-    'mechanisms': ['knee', 'lever', 'leg', 'lift'],
+    'mechanisms': ['knee', 'lever', 'leg', 'lift', 'drag'],
     'knee.type': 'custom', 'knee.crank.source': 'knee_motor', 'knee.crank.ratio': -0.1,
     'knee.crank.sweep': [-0.45, 0.7],
     'knee.joints': ['O ground 0 0', 'Q ground 0 -0.25', 'A crank O 0.045',
@@ -41,10 +41,10 @@ SCENE = {
     'leg.loads': ['P=3 -20'],
     'lift.type': 'custom', 'lift.joints': [
         'O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left'],
-    'lift.crank.measures': 'QB', 'lift.crank.start': 0.5, 'lift.crank.sweep': [0.2, 2.2]}
-OTHER = {'mechanisms': ['rocker', 'drag'], 'rocker.type': 'four_bar', 'rocker.crank.start': 1.0,
-         'drag.type': 'custom', 'drag.joints': [
-             'O ground 0 0', 'Q ground 0.3 0', 'A crank O 1', 'B dyad A Q 0.9 1.1 left']}
+    'lift.crank.measures': 'QB', 'lift.crank.start': 0.5, 'lift.crank.sweep': [0.2, 2.2],
+    'drag.type': 'custom', 'drag.joints': [
+        'O ground 0 0', 'Q ground 0.3 0', 'A crank O 1', 'B dyad A Q 0.9 1.1 left']}
+OTHER = {'mechanisms': ['rocker'], 'rocker.type': 'four_bar', 'rocker.crank.start': 1.0}
 ACTUATORS = {'knee': {'knee_motor': 'crank'}, 'lever': {'servo': 'crank'},
              'leg': {'leg_crank': 'crank', 'leg_crank2': 'crank2'},
              'lift': {'lift_crank': 'crank'},
