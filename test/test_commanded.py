@@ -43,13 +43,13 @@ void {name}_counts(long poses, long *counts)
         lkr_side measured = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }};
         lkr_side asked = measured, found = measured;
         sample({n}, ranges, i, q);
-        if (!{name}_at(q, 1, &p))
+        if (!{name}_at(q, &p))
             continue;
         for (k = 0; k < {n}; k++)
             beside[k] = q[k] + (i & 1 << k ? 1 : -1) * ({number})1e-3;
         for (side = 0; side < 2; side++) {{
             goal = p;
-            if (side && !{name}_at(beside, 1, &goal))
+            if (side && !{name}_at(beside, &goal))
                 continue;
             for (k = 0; k < {n}; k++)
                 measured.position[k] = p.position[0][k];

@@ -209,7 +209,7 @@ CHOICES = [
     (SLOT, {'crank.start': 0.5, 'crank.sweep': [0.2, 0.8]}, ['A.y'], 1,
      [(0.02 * math.cos(0.9), None), (0.02 * math.cos(0.8), 0.8), (0.02 * math.cos(0.2), 0.2)]),
     # What is beyond it by more weighs ten times.
-    (SLOT, {'crank.measures': 'A.y', 'crank.start': 0.1, 'crank.sweep': [-1.0, 0.1]},
+    (SLOT, {'crank.measures': 'A.y', 'crank.start': 0.2, 'crank.sweep': [-1.0, 0.2]},
      ['crank'], 0, [(0.02 * math.cos(0.3), -0.3)])]
 
 

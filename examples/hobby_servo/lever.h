@@ -3,7 +3,7 @@
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * It can be assembled in [-3.14159, 3.14159] rad.
- * A call takes at most 15 poses.
+ * A call takes at most 12 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -177,10 +177,8 @@ typedef struct {
 /* A linkage. Inputs q are in rad or in sizes. */
 typedef struct {
     int inputs;
-    /* Whether the first pose of an inverse is to have rates and loads. */
-    int is_rated;
-    /* The pose at inputs, with rates and loads or without; 0 if it cannot be assembled. */
-    int (*at)(const lkr_real *q, int is_rated, lkr_point *p);
+    /* The pose at inputs; returns 0 if it cannot be assembled. */
+    int (*at)(const lkr_real *q, lkr_point *p);
     /* All inputs that a side's outputs may have, NaN where there is none; returns their number. 0 where
        the axes count all inputs. */
     int (*solutions[2])(const lkr_real *value, lkr_real (*q)[LKR_MAX_INPUTS]);
@@ -334,7 +332,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
     for (step = 0; step <= LKR_MAX_STEPS; step++) {
         lkr_point next;
         lkr_real now = LKR_FAR;
-        if (model->at(x, step > 0 || model->is_rated, &next)) {
+        if (model->at(x, &next)) {
             now = lkr_gap(model, side, position, &next, gap);
         }
         if (!(now < left)) {
@@ -346,8 +344,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
         if (left <= LKR_ENOUGH) {
             return 1;
         }
-        if ((step == 0 && !model->is_rated && !model->at(q, 1, p))
-            || !lkr_input_change(model, side, p, LKR_LEAST, gap, x)) {
+        if (!lkr_input_change(model, side, p, LKR_LEAST, gap, x)) {
             break;
         }
         for (i = 0; i < model->inputs; i++) {
@@ -495,7 +492,7 @@ static inline int lkr_begin(const lkr_model *model, lkr_memory *m)
         m->held[LKR_ACTUATORS].position[i] = LKR_NAN;
         m->held[LKR_JOINTS].position[i] = LKR_NAN;
     }
-    return model->at(m->q, 1, &m->point);
+    return model->at(m->q, &m->point);
 }
 
 /* Copy the values that are finite. */
@@ -752,25 +749,23 @@ static inline int lever_solutions_angle_lever(const float *value,
 }
 
 /* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be assembled. */
-static inline int lever_at(const float *q, int is_rated, lkr_point *p)
+static inline int lever_at(const float *q, lkr_point *p)
 {
     lever_pose s, by_crank;
     if (!lever_formulas(q[0], &s, &by_crank)) {
         return 0;
     }
     p->position[0][0] = s.angle_crank;
+    p->rate[0][0][0] = by_crank.angle_crank;
     p->position[1][0] = s.angle_lever;
-    if (is_rated) {
-        p->rate[0][0][0] = by_crank.angle_crank;
-        p->rate[1][0][0] = by_crank.angle_lever;
-        p->load[0] = 0.0f;
-    }
+    p->rate[1][0][0] = by_crank.angle_lever;
+    p->load[0] = 0.0f;
     return isfinite(p->position[0][0] + p->position[1][0]);
 }
 
 /* Tables of the actuators and joints, see lkr_model. */
 static const lkr_model lever_model = {
-    1, 1, lever_at, { 0, lever_solutions_angle_lever },
+    1, lever_at, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, and after how much of each input they repeat. */
     { { { 1.0f, 0.0f, 0, 1.0f, 0.0f } },
       { { 1.0f, 6.2831855f, -1, 1.0f, 0.0f } } },
@@ -780,23 +775,21 @@ static const lkr_model lever_model = {
 };
 
 /* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be assembled. */
-static inline int lever_at_angle_lever(const float *q, int is_rated, lkr_point *p)
+static inline int lever_at_angle_lever(const float *q, lkr_point *p)
 {
     lever_pose s, by_crank;
     if (!lever_formulas(q[0], &s, &by_crank)) {
         return 0;
     }
     p->position[1][0] = s.angle_lever;
-    if (is_rated) {
-        p->rate[1][0][0] = by_crank.angle_lever;
-        p->load[0] = 0.0f;
-    }
+    p->rate[1][0][0] = by_crank.angle_lever;
+    p->load[0] = 0.0f;
     return isfinite(p->position[1][0]);
 }
 
 /* Tables of the inverse, see lkr_model. */
 static const lkr_model lever_model_angle_lever = {
-    1, 0, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
+    1, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, and after how much of each input they repeat. */
     { { { 0, 0, -1, 0, 0 } },
       { { 1.0f, 6.2831855f, -1, 1.0f, 0.0f } } },

@@ -22,9 +22,9 @@ from ..linkage import Mechanism
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
-# Poses from a solution of an inverse or from the near inputs, as in `linkage.h`: Newton's method,
-# and one without rates.
-POSES = 5
+# Poses of a solution of an inverse or of the near inputs: the first, and LKR_MAX_STEPS of Newton's
+# method.
+POSES = 4
 
 
 class Request(NamedTuple):

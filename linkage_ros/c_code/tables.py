@@ -73,7 +73,7 @@ class Tables:
         return filled(template('model.h.in'), {
             'name': self.mechanism.name, 'tag': tag, 'number': self._code.number,
             'about': 'the inverse' if tag else 'the actuators and joints',
-            'n': len(self._sizes), 'is_rated': int(not tag), 'names': ', '.join(names),
+            'n': len(self._sizes), 'names': ', '.join(names),
             'solutions': '\n'.join(filter(None, functions)),
             'at': '\n'.join(indented(self._at(sides))),
             'actuators': self._rows(sides[0]), 'joints': self._rows(sides[1]),
@@ -103,17 +103,14 @@ class Tables:
         yield from (f'if (!{formulas.call()}) {{', '    return 0;', '}')
         for place, each in places.items():
             yield from self._position(f'p->position{place}', each)
-        yield 'if (is_rated) {'
-        for place, each in places.items():
-            yield from (f'    {line}' for line in self._rates(f'p->rate{place}', each))
+            yield from self._rates(f'p->rate{place}', each)
         # An inverse alone needs no efforts.
         powers = [*loads(self.mechanism)] if sides[0] else []
         for j, (by, unit) in enumerate(zip(formulas.by, self._units)):
             terms = [code.times(f'{by}.{formulas.fields[output]}',
                                 -load * unit / self.mechanism.scale_of(output))
                      for output, load in powers]
-            yield f'    p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
-        yield '}'
+            yield f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
         yield f'return isfinite({" + ".join(f"p->position{place}" for place in places)});'
 
     def _position(self, place: str, axis: Axis) -> List[str]:

@@ -158,10 +158,8 @@ typedef struct {
 /* A linkage. Inputs q are in rad or in sizes. */
 typedef struct {
     int inputs;
-    /* Whether the first pose of an inverse is to have rates and loads. */
-    int is_rated;
-    /* The pose at inputs, with rates and loads or without; 0 if it cannot be assembled. */
-    int (*at)(const lkr_real *q, int is_rated, lkr_point *p);
+    /* The pose at inputs; returns 0 if it cannot be assembled. */
+    int (*at)(const lkr_real *q, lkr_point *p);
     /* All inputs that a side's outputs may have, NaN where there is none; returns their number. 0 where
        the axes count all inputs. */
     int (*solutions[2])(const lkr_real *value, lkr_real (*q)[LKR_MAX_INPUTS]);
@@ -315,7 +313,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
     for (step = 0; step <= LKR_MAX_STEPS; step++) {
         lkr_point next;
         lkr_real now = LKR_FAR;
-        if (model->at(x, step > 0 || model->is_rated, &next)) {
+        if (model->at(x, &next)) {
             now = lkr_gap(model, side, position, &next, gap);
         }
         if (!(now < left)) {
@@ -327,8 +325,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
         if (left <= LKR_ENOUGH) {
             return 1;
         }
-        if ((step == 0 && !model->is_rated && !model->at(q, 1, p))
-            || !lkr_input_change(model, side, p, LKR_LEAST, gap, x)) {
+        if (!lkr_input_change(model, side, p, LKR_LEAST, gap, x)) {
             break;
         }
         for (i = 0; i < model->inputs; i++) {
@@ -476,7 +473,7 @@ static inline int lkr_begin(const lkr_model *model, lkr_memory *m)
         m->held[LKR_ACTUATORS].position[i] = LKR_NAN;
         m->held[LKR_JOINTS].position[i] = LKR_NAN;
     }
-    return model->at(m->q, 1, &m->point);
+    return model->at(m->q, &m->point);
 }
 
 /* Copy the values that are finite. */
