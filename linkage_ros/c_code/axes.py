@@ -27,7 +27,7 @@ class Axis(NamedTuple):
 
     `output` is one of the linkage, in its own units. `size` is the scale of its position; the
     position has the period `turn`, if that is not 0: those of inputs and geared links count turns.
-    If it `wraps`, it is published within half a turn of zero.
+    If it `wraps`, it is published within half a turn of zero. `role` is its name in the linkage.
     """
 
     name: str
@@ -37,6 +37,7 @@ class Axis(NamedTuple):
     size: float
     turn: float
     wraps: bool
+    role: str
 
 
 def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float = 1.0,
@@ -47,14 +48,15 @@ def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float =
     is_angle = linkage.is_angle(output)
     turns = is_angle and output not in (*mechanism.inputs, *linkage.geared)
     return Axis(name, output, factor, offset, abs(factor) * (1.0 if is_angle else linkage.longest),
-                math.tau * abs(factor) * turns, wraps and turns)
+                math.tau * abs(factor) * turns, wraps and turns, output)
 
 
 def actuators(mechanism: SceneMechanism) -> List[Axis]:
     """Return the axes of the sources of a mechanism's inputs."""
     return invertible(mechanism, [
         axis(mechanism, settings.measures or name, settings.source, 1.0 / settings.ratio,
-             -settings.offset / settings.ratio) for name, settings in mechanism.inputs.items()])
+             -settings.offset / settings.ratio)._replace(role=name)
+        for name, settings in mechanism.inputs.items()])
 
 
 def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:

@@ -87,7 +87,7 @@ class Tables:
         lines = [f'{self.mechanism.name}_pose s, {", ".join(self._formulas.by)};',
                  f'(void){self._formulas.call()};']
         for i, each in enumerate(axes):
-            lines += self._position(f'position[{i}]', each) + self._rates(f'rate[{i}]', each)
+            lines += self._assigned(each, f'position[{i}]', f'rate[{i}]')
         return filled(template('passive.h.in'), {
             'name': self.mechanism.name, 'number': self._code.number,
             'body': '\n'.join(indented(lines))})
@@ -102,8 +102,7 @@ class Tables:
         yield f'{self.mechanism.name}_pose s, {", ".join(formulas.by)};'
         yield from (f'if (!{formulas.call()}) {{', '    return 0;', '}')
         for place, each in places.items():
-            yield from self._position(f'p->position{place}', each)
-            yield from self._rates(f'p->rate{place}', each)
+            yield from self._assigned(each, f'p->position{place}', f'p->rate{place}')
         # An inverse alone needs no efforts.
         powers = [*loads(self.mechanism)] if sides[0] else []
         for j, (by, unit) in enumerate(zip(formulas.by, self._units)):
@@ -113,20 +112,16 @@ class Tables:
             yield f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
         yield f'return isfinite({" + ".join(f"p->position{place}" for place in places)});'
 
-    def _position(self, place: str, axis: Axis) -> List[str]:
-        """Return the statements for the position of an axis."""
+    def _assigned(self, axis: Axis, position: str, rate: str) -> List[str]:
+        """Return the statements for the position of an axis, and its rates by each input."""
+        code, field = self._code, self._formulas.fields[axis.output]
         factor = axis.factor / self.mechanism.scale_of(axis.output)
-        value = self._code.times(f's.{self._formulas.fields[axis.output]}', factor)
-        offset = f' + {self._code.literal(axis.offset)}' if axis.offset else ''
-        return [f'{place} = {value}{offset};'] + [
-            f'{place} -= lkr_turns({place}, {self._code.literal(math.tau)});'] * axis.wraps
-
-    def _rates(self, place: str, axis: Axis) -> List[str]:
-        """Return the statements for the rates of an axis by each input."""
-        factor = axis.factor / self.mechanism.scale_of(axis.output)
-        field = self._formulas.fields[axis.output]
-        return [f'{place}[{j}] = {self._code.times(f"{by}.{field}", factor * unit)};'
-                for j, (by, unit) in enumerate(zip(self._formulas.by, self._units))]
+        offset = f' + {code.literal(axis.offset)}' if axis.offset else ''
+        return [
+            f'{position} = {code.times(f"s.{field}", factor)}{offset};',
+            *[f'{position} -= lkr_turns({position}, {code.literal(math.tau)});'] * axis.wraps,
+            *(f'{rate}[{j}] = {code.times(f"{by}.{field}", factor * unit)};'
+              for j, (by, unit) in enumerate(zip(self._formulas.by, self._units)))]
 
     # --- tables ---
 
