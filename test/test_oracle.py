@@ -117,17 +117,6 @@ def test_what_a_sensor_cannot_say_is_no_pose(graph, bad):
     assert bench.model.states['a'].values == [pytest.approx(0.54, abs=0.1)]
 
 
-@pytest.mark.parametrize('turn', [-3, 1, 1000])
-def test_the_reach_is_the_same_in_any_turn(graph, turn):
-    parameters = {'mechanisms': ['b'], 'b.type': 'peaucellier'}
-    angles = [sign * (END + gap) + turn * math.tau
-              for sign in (1.0, -1.0) for gap in (-1.0, -1e-6, 1e-6, 0.5)]
-    bench = Bench(graph, parameters)
-    bench.run([
-        *everything(parameters), message({'b_crank': 0.1}),
-        *(message({'b_crank': angle}) for angle in angles)])
-
-
 @pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('name', ['an excavator', 'a reach that ends',
                                   'more legs than are solved one by one'])

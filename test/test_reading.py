@@ -110,11 +110,19 @@ def big_endian(made):
     return bytes(text)
 
 
-def test_bytes_of_another_order_are_always_deserialised(reader):
+@pytest.mark.parametrize('names', [['a', 'bc'], []])
+def test_bytes_of_another_order_are_always_deserialised(reader, names):
     for seed in range(4):
-        sent = message(['a', 'bc'], effort=True, frame='x', seed=seed)
+        sent = message(names, effort=True, frame='x', seed=seed)
         compare(reader, big_endian(sent), sent)
     assert reader.looked == 4
+
+
+def test_a_sender_whose_first_number_is_none_is_learnt(reader):
+    for numbers in ([math.nan, -0.0], [1.0, math.inf]):
+        sent = JointState(name=['a', 'b'], position=numbers)
+        assert repr(reader.read(serialize_message(sent))[1][1:]) == repr((*numbers,))
+    assert reader.looked == 1
 
 
 @pytest.mark.parametrize('senders', [1, 8, 9, 64, 256])

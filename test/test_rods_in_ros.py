@@ -12,10 +12,8 @@ import pytest
 pytest.importorskip('rclpy')
 pytest.importorskip('linkage_interfaces')
 
-from linkage_interfaces.srv import InputsFor  # noqa: E402
 from linkage_ros import mechanisms  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from test_command_stream import Stream  # noqa: E402
 from test_rods import G1  # noqa: E402
@@ -50,14 +48,19 @@ def test_the_hinges_of_an_ankle_are_published_with_velocities_and_the_motors_eff
 def test_markers_are_in_space(graph):
     graph.start(Kinematics, SCENE)
     turn, heard = graph.crank(['motor_a', 'motor_b']), graph.listen(MarkerArray, 'ankle/markers')
-    lines, joints = turn([0.1, -0.05], heard).markers
+    lines, joints, cranks = turn([0.1, -0.05], heard).markers
     linkage = mechanisms.create('rods', joints=G1)
-    place = linkage.solve((0.1, -0.05))
-    np.testing.assert_allclose([(p.x, p.y, p.z) for p in joints.points],
-                               list(place.values()), atol=1e-15)
-    ends = np.array([(p.x, p.y, p.z) for p in lines.points]).reshape(-1, 2, 3)
-    lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
-    np.testing.assert_allclose(lengths, list(linkage.bar_lengths.values()), atol=1e-15)
+    place = dict(zip(linkage.points, [(p.x, p.y, p.z) for p in joints.points]))
+    np.testing.assert_allclose(
+        [*place.values()], [*linkage.solve((0.1, -0.05)).values()], atol=1e-15)
+    bars, turned = ({frozenset(map(tuple, ends)) for ends in np.reshape(
+        [(p.x, p.y, p.z) for p in marker.points], (-1, 2, 3)).tolist()}
+        for marker in (lines, cranks))
+    # The arms of the motors are drawn as cranks.
+    arms = {bar for bar in linkage.bars if bar[0] in ('right_origin', 'left_origin')}
+    assert len(arms) == 2
+    for found, wanted in ((turned, arms), (bars, {*linkage.bars} - arms)):
+        assert found == {frozenset(place[name] for name in bar) for bar in wanted}
 
 
 @pytest.mark.nightly
@@ -79,26 +82,6 @@ def test_a_stream_of_pitch_and_roll_becomes_commands_of_the_motors(graph, capfd)
         assert stream.want(names, [pitch, 0.1 - roll], [1.0, 1.0]) == last
     assert 'cannot be 0.6, 0.05: pitch, roll at 0.6, 0.05 is outside the reach' \
         in capfd.readouterr().err
-
-
-def test_a_service_gives_the_motors_of_a_pose_in_the_turn_that_is_nearest(graph):
-    node, linkage = graph.start(ServoInverse, SCENE), mechanisms.create('rods', joints=G1)
-    client = graph.node.create_client(InputsFor, 'inputs_for')
-    pose = {'outputs': ['pitch', 'roll'], 'values': [-0.1, 0.05]}
-    response = graph.call(client, InputsFor.Request(**pose))
-    assert response.success and response.names == ['motor_a', 'motor_b']
-    answers = np.reshape(response.positions, (-1, 2))
-    assert len(answers) == len(response.modes) == 1 and not any(response.singular)
-    for answer in answers:
-        back = linkage.joint_angles(answer, ['pitch', 'roll'])
-        np.testing.assert_allclose([*back.values()], pose['values'], atol=1e-14)
-        near = (answer + [0.3 + 2.0 * math.pi, -0.3]).tolist()
-        first = node.answer_inputs_for(InputsFor.Request(near=near, **pose), InputsFor.Response())
-        np.testing.assert_allclose(first.positions[:2], answer + [2.0 * math.pi, 0.0], atol=1e-12)
-    for values in ((0.6, 0.0), (0.0, -0.3)):
-        refused = graph.call(client, InputsFor.Request(**{**pose, 'values': values}))
-        assert not refused.success and not refused.positions
-        assert 'is outside the reach' in refused.message
 
 
 def test_the_example_s_rods_are_closed_in_its_own_urdf(graph):

@@ -26,9 +26,7 @@ pytest.importorskip('linkage_interfaces')
 import browser  # noqa: E402
 from browser import until  # noqa: E402
 from linkage_ros import palette, scene  # noqa: E402
-from linkage_ros.web import poses, server  # noqa: E402
 from linkage_ros.web.viewer import Viewer  # noqa: E402
-from ros_harness import Process  # noqa: E402
 from viewer_harness import LEG, needs_browser, PAGE, Page, resident, ROOT  # noqa: E402
 
 NONSENSE = [
@@ -36,13 +34,14 @@ NONSENSE = [
     '9' * 60000, '{"op": "drag", "angle": ' + '[' * 3000 + ']' * 3000 + '}', b'\xff\xfe', b'{}']
 
 
-@pytest.mark.parametrize('text', NONSENSE, ids=range(len(NONSENSE)))
-def test_nonsense_is_answered(lever, text):
+def test_nonsense_is_answered(lever):
     with Page(lever.url) as page:
-        page.send(text, aiohttp.WSMsgType.BINARY if isinstance(text, bytes) else
-                  aiohttp.WSMsgType.TEXT)
-        assert page.message('answer', id=None)['reason']
+        for text in NONSENSE:
+            page.send(text, aiohttp.WSMsgType.BINARY if isinstance(text, bytes) else
+                      aiohttp.WSMsgType.TEXT)
         assert 'unknown request' in page.ask('fly')['reason']
+        answers = [one for one in page.messages if one['op'] == 'answer' and one['id'] is None]
+        assert len(answers) == len(NONSENSE) and all(one['reason'] for one in answers)
 
 
 # What is set, and how a refusal says that it is not a number that can be set.
@@ -83,11 +82,6 @@ def test_a_request_is_answered_whatever_it_holds(lever, page):
         assert re.search(reason, answer['reason']), (op[:20], reason, answer['reason'])
         assert len(answer['reason']) < 300 and answer.keys() == {'op', 'id', 'reason'}
     assert (lever.value('lever.crank.speed'), lever.value('lever.leg_pairs')) == (1.0, 1)
-
-
-def test_a_request_that_fails_is_answered_and_logged(page, monkeypatch, capfd):
-    monkeypatch.setattr(poses, 'number', lambda text: 1 // 0)
-    assert page.ask('read', text='1')['reason'].startswith('the request fails: ZeroDivision')
 
 
 def test_of_many_requests_at_once_each_is_answered(lever):
@@ -193,8 +187,7 @@ def test_a_client_that_does_not_read_costs_little_and_harms_nobody(show, what):
 
 @pytest.mark.nightly
 @pytest.mark.parametrize('last', [b'', b'nonsense'])
-def test_a_client_that_does_not_read_is_sent_home(show, monkeypatch, last):
-    monkeypatch.setattr(server, 'MAX_READ_S', 0.3)
+def test_a_client_that_does_not_read_is_sent_home(show, last):
     with Deaf(show(LEG).url) as deaf:
         deaf.upgrade()
         end = time.monotonic() + browser.DEADLINE
@@ -344,8 +337,10 @@ def test_where_a_port_is_taken_another_is_used_or_the_viewer_says_how(graph):
                 '^the viewer cannot be started: .*in use; for another port use -p port:=8021, '
                 'with ros2 launch port:=8021, with make view PORT=8021; port 0 is any free one$')):
             graph.start(Viewer, {'port': port})
-    with pytest.raises(scene.SceneError, match='^the viewer cannot be started: .*[^e]$'):
-        graph.start(Viewer, {'port': 0, 'host': '192.0.2.1', 'or_any_port': True})
+    for given in ({'port': 0, 'host': '192.0.2.1', 'or_any_port': True}, {'port': 70000},
+                  {'port': 'eighty'}):
+        with pytest.raises(scene.SceneError, match='^the viewer cannot be started: .*[^e]$'):
+            graph.start(Viewer, given)
     graph.end(other)
 
 
@@ -403,22 +398,3 @@ def test_make_view_and_make_demo_end_quietly_when_nobody_reads_what_they_print(a
     said = process.stderr.read()
     assert process.wait(browser.DEADLINE) == 0
     assert [line for line in said.splitlines() if '[INFO]' not in line] == []
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('parameters, arguments, named', [
-    ({'port': 'taken'}, (), 'address already in use.*make view PORT=8021'),
-    ({'port': 70000}, (), 'port'), ({'port': 'eighty'}, (), 'port'),
-    ({'port': 0}, ('--port', '8050'), "'--port'")])
-def test_a_viewer_that_cannot_listen_ends_in_one_sentence(
-        tmp_path, parameters, arguments, named):
-    file = tmp_path / 'scene.yaml'
-    with socket.socket() as taken:
-        taken.bind(('127.0.0.1', 0))
-        taken.listen()
-        if parameters['port'] == 'taken':
-            parameters = {'port': taken.getsockname()[1]}
-        file.write_text(json.dumps({'/**': {'ros__parameters': parameters}}))
-        code, printed = Process('viewer', file, *arguments).end()
-    said, = (line for line in printed.splitlines() if '[FATAL]' in line)
-    assert code == 1 and 'Traceback' not in printed and re.search(named, said)

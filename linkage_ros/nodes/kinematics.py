@@ -63,6 +63,9 @@ class Kinematics(scene_node.SceneNode):
         self._stamp = NEVER
         self._joint_names: frozenset = frozenset()
         self._unknown = Once(MAX_NAMES)
+        # An internal error in one mechanism leaves the others alone.
+        self._outgoing, self._solved = (self.guarded('crank_states', solve) for solve in (
+            MechanismTopics.outgoing, MechanismTopics.solved))
         self._missing_timer = self.create_timer(
             MISSING_AFTER_S, self.guarded('the check for missing inputs', self._warn_of_missing),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -154,11 +157,12 @@ class Kinematics(scene_node.SceneNode):
         """Publish mechanisms at their present inputs, and the joint states of the scene."""
         in_scene = self._scene_joint_states.joint_states.has_subscribers
         # Solving all before publishing any takes less time: the caches of the CPU are small.
-        outgoing = [message for mechanism in moved for message in mechanism.outgoing(in_scene)]
+        outgoing = [message for mechanism in moved
+                    for message in self._outgoing(mechanism, in_scene) or ()]
         if in_scene:
             outgoing += self._scene_joint_states.outgoing(self._stamp, tuple(
                 (mechanism.model, state) for mechanism in self._mechanisms.values()
-                if (state := mechanism.solved(in_scene))))
+                if (state := self._solved(mechanism, in_scene))))
         for publish, data in outgoing:
             publish(data)
 

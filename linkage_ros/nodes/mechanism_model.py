@@ -22,8 +22,9 @@ from ..linkage import LinkPoint
 from ..robot_model import bodies, shapes, urdf
 from ..scene.legs import Solution
 
-# Cached messages: a walker's legs may leave their reach one by one, each with another message.
-MAX_MESSAGES = 128
+# Cached messages of a mechanism, and of a scene: legs of walkers may leave their reach one by one,
+# each with another message.
+MAX_MESSAGES = 32
 
 
 class AssemblyState(NamedTuple):
@@ -203,7 +204,10 @@ class MechanismModel:
 def _shown(mechanism: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
     """Return the markers' points and, by marker id, the point indices of each line or plate."""
     linkage, names = mechanism.linkage, mechanism.points
-    cranks, plates, marks, drawn = ([], [], [], []) if mechanism.in_space else (
+    turned = {f'{name}_origin' for name in mechanism.inputs}
+    cranks, plates, marks, drawn = (
+        [bar for bar in linkage.bars if bar[0] in turned], [], [], []
+    ) if mechanism.in_space else (
         shapes.cranks(linkage), shapes.plates(linkage, names), shapes.marks(linkage, names),
         shapes.drawn(mechanism, names))
     # The edges of a plate are not drawn as bars, too: the message is smaller.

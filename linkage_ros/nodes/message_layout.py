@@ -21,7 +21,6 @@ from rclpy.serialization import deserialize_message, serialize_message
 # Length of the encapsulation header [bytes]; alignment counts from its end.
 HEADER = 4
 LEAD = bytes(8 - HEADER)
-LITTLE_ENDIAN = b'\0\1'
 # Shorter messages [bytes] are refused: a middleware that trusts the padding length in the header
 # reads beyond their end, and may crash.
 MIN_BYTES = 8
