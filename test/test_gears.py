@@ -39,6 +39,13 @@ def two(ratio):
         f'D crank R 1 geared crank {ratio} 0.3', 'B dyad A Q 2.5 2 left', 'E dyad B D 9 8 left'])
 
 
+def chained(ratio):
+    """Return a crank that is geared to a geared one."""
+    return mechanisms.create('custom', joints=[
+        'O ground 0 0', 'R ground 10 0', 'A crank O 1', f'D crank R 1 geared crank {ratio} 0.3',
+        'E crank O 2 geared crank2 sqrt(2) 0.1'])
+
+
 def limited(ratio):
     """Return two cranks that can be assembled in a part of the turns."""
     return mechanisms.create('custom', joints=[
@@ -129,8 +136,9 @@ def test_the_reach_is_where_it_can_be_assembled(ratio):
 
 
 def test_a_linkage_is_the_same_whole_turns_on():
-    for ratio, turns in itertools.product(('1/3', 'sqrt(2)', '1.2345678'), (32, -640)):
-        found = two(ratio)
+    for make, ratio, turns in itertools.product(
+            (two, chained), ('1/3', 'sqrt(2)', '1.2345678'), (32, -640)):
+        found = make(ratio)
         there, start = found.turned(turns), math.tau * turns
         for theta in (-1.0, 0.3, 90.0):
             assert there.solve(theta)['E'] == pytest.approx(

@@ -25,6 +25,10 @@ AT, NEXT = 1e-7, 3e-5
 MOST, ALLOWED = 64.0, 1e-9
 # Samples of the range of an input, and steps of a bisection.
 SAMPLES, STEPS = 721, 60
+# Ends, extremes and dead points of an output that are questions, at most.
+SPECIALS = 30
+# Random poses of several inputs, of which the first that can be assembled are questions.
+TRIES = 50
 KINDS = 'ordinary', 'next to ends', 'ends', 'extremes', 'dead points'
 # The rule says nothing where the next floats change the output by more than this, and of several
 # inputs nothing where the margin is less.
@@ -122,7 +126,9 @@ class Output:
         special += [('extremes', at, 1.0) for at in self.extremes()]
         special += [('dead points', at, side) for at in self.linkage.dead_points(*self.others)
                     for side in (1.0, -1.0)]
-        for kind, at, side in special:
+        # An output over many turns has thousands of them.
+        chosen = sorted(rng.permutation(len(special))[:SPECIALS])
+        for kind, at, side in (special[i] for i in chosen):
             yield kind, float(at)
             for away in AWAY:
                 yield 'next to ends', float(at + side * away * self.first.size)
@@ -192,11 +198,13 @@ def judge_several(linkage, names, rng, count=6):
     inverse = linkage.inverse(names)
     sizes = [input_.size for input_ in linkage.inputs]
     scales = [1.0 if linkage.is_angle(name) else linkage.longest for name in names]
-    for _ in range(count):
-        pose = [float(rng.uniform(input_.low, input_.high)) for input_ in linkage.inputs]
-        row = np.array(linkage.compiled('checked', names).at(*pose)[:len(names)])
-        if not np.isfinite(row).all() or not Solution(pose, inverse).margin > SINGULAR:
-            continue
+    poses = [[float(rng.uniform(input_.low, input_.high)) for input_ in linkage.inputs]
+             for _ in range(TRIES)]
+    checked = linkage.compiled('checked', names)
+    regular = [pose for pose in poses if np.isfinite(checked.at(*pose)).all()
+               and Solution(pose, inverse).margin > SINGULAR]
+    for pose in regular[:count]:
+        row = np.array(checked.at(*pose)[:len(names)])
         answers = inverse.all(row.tolist())
         found['ordinary', 'questions'] += 1
         margin = Solution(pose, inverse).margin
@@ -206,7 +214,7 @@ def judge_several(linkage, names, rng, count=6):
             found['ordinary', 'lost'] += 1
             found['ordinary', 'lost at', linkage, names, tuple(pose), ()] += 1
         for answer in answers:
-            there = np.array(linkage.compiled('checked', names).at(*answer.inputs)[:len(names)])
+            there = np.array(checked.at(*answer.inputs)[:len(names)])
             if _differ(linkage, names, there - row, scales):
                 found['ordinary', 'invented'] += 1
                 found['ordinary', 'invented at', linkage, names, tuple(pose), ()] += 1

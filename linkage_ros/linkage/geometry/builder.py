@@ -92,9 +92,9 @@ class _Vector(NamedTuple):
 class Builder:
     """The joints, links and limits of a linkage, as expressions of its dimensions and inputs."""
 
-    def __init__(self, turned: Optional[Mapping[str, float]] = None) -> None:
+    def __init__(self, turned: Optional[Mapping[str, Any]] = None) -> None:
         # Whole turns from which inputs are counted.
-        self._turned = turned or {}
+        self._turned = {**(turned or {})}
         self.points: Dict[str, Point] = {}
         self.links: List[Link] = []
         self.bars: List[Bar] = []
@@ -237,9 +237,12 @@ class Builder:
                 raise ConstructionError(f'it cannot be geared to {geared.input}; allowed: '
                                         f'{", ".join(alike) or "none"}')
             value = geared.ratio * driving + geared.offset
-            if count := self._turned.get(geared.input):
-                turns = geared.ratio * count
-                value = value + 2.0 * pi * (turns - nearest_integer(turns))
+            if geared.input in self._turned:
+                turns = geared.ratio * self._turned[geared.input]
+                # What is geared to this one counts from the whole turns that are left out here.
+                whole = nearest_integer(turns)
+                self._turned[input_.name] = whole
+                value = value + 2.0 * pi * (turns - whole)
         self.driven[input_.name] = input_, value
         return value
 
