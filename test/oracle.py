@@ -56,7 +56,6 @@ KINDS = {0: Marker.LINE_LIST, 1: Marker.SPHERE_LIST, 3: Marker.LINE_LIST, 4: Mar
          5: Marker.LINE_LIST, 6: Marker.LINE_LIST, 7: Marker.TRIANGLE_LIST,
          8: Marker.TRIANGLE_LIST}
 GROUND = 8
-LAYERS = range(-3, 5)
 
 
 class Mismatch(AssertionError):
@@ -627,16 +626,9 @@ class Bench:
                            f'{marker.header.frame_id!r} instead of {frame!r}')
         if any(p.z for p in marker.points):
             raise Mismatch(f'{topic}: marker {marker.id} leaves its plane')
-        x, y, z, roll, pitch, yaw = mechanism.pose
-        turned = rotation(roll, pitch, yaw)
         q = marker.pose.orientation
-        if not np.abs(turned - matrix(q.x, q.y, q.z, q.w)).max() < 1e-12:
+        if not np.abs(rotation(*mechanism.pose[3:]) - matrix(q.x, q.y, q.z, q.w)).max() < 1e-12:
             raise Mismatch(f'{topic}: marker {marker.id} is turned')
-        at, step = marker.pose.position, bodies.size(mechanism) / 250.0
-        heights = [(x, y, z) + step * layer * turned[:, 2] for layer in LAYERS]
-        near = 1e-9 * (step + max(map(abs, (x, y, z))))
-        if np.abs(np.array(heights) - (at.x, at.y, at.z)).max(axis=1).min() > near:
-            raise Mismatch(f'{topic}: marker {marker.id} is in no layer')
 
     def _check_latched(self):
         """Compare loci and robot models with what has to be there."""
@@ -657,8 +649,8 @@ class Bench:
             text = self.model.descriptions[name] if name else self.model.description
             return (message.data if message else '') == text
         curve = self.model.locus(name)
-        if message is None or message.action == Marker.DELETE:
-            return not curve
+        if message is None or not curve:
+            return bool(message) and message.action == Marker.DELETE
         mirrored = self.model.scene.mechanisms[name].mirrored
         return ([[p.x, p.y] for p in message.points] == curve
                 and message.type == (Marker.LINE_LIST if mirrored else Marker.LINE_STRIP)

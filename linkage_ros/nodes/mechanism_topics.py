@@ -137,12 +137,11 @@ class MechanismTopics:
         self._delete(self._displayed - model.marker_array.ids)
 
     def publish_latched(self, description: str, locus: Optional[Marker]) -> None:
-        """Publish the robot model if it has changed, and the locus if there is any."""
+        """Publish the robot model if it has changed; publish the locus, or delete it if None."""
         if description != self._described:
             self._described = description
             self._description.publish(String(data=description))
-        if locus:
-            self._locus.publish(locus)
+        self._locus.publish(locus or messages.deleted(self.name, messages.LOCUS_ID))
 
     def clear(self, deadline: float) -> None:
         """Delete markers and locus; wait for acknowledgements, up to a monotonic time [s]."""
