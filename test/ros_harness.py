@@ -260,6 +260,14 @@ class Process:
                  '--params-file', str(parameter_file)], stdout=file, stderr=subprocess.STDOUT,
                 env={**os.environ, **(env or {}), 'ROS_DOMAIN_ID': str(self.domain)})
 
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if not self.has_ended:
+            self._process.kill()
+            self.end()
+
     def interrupt(self, signal):
         """Send a signal."""
         self._process.send_signal(signal)

@@ -10,21 +10,17 @@ import time
 
 from builtin_interfaces.msg import Duration
 from linkage_ros import mechanisms, scene
+from linkage_ros.nodes import log
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.servo_inverse import ServoInverse
 from linkage_ros.scene.inverse_request import InverseRequest
 import numpy as np
 import pytest
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from truth.cases import CASES
 from truth.working_modes import excavator, five_bar
-
-pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
-
-from linkage_ros.nodes import log  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from std_msgs.msg import Float64MultiArray  # noqa: E402
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
 
 # A hobby servo with a gear of 2 turns a crank of 80, 150 from the pivot of a lever.
 LEVER = {'mechanisms': ['lever', 'bar'], 'lever.type': 'slotted_lever',

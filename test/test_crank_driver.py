@@ -5,16 +5,13 @@
 
 import math
 
+from linkage_ros.nodes.crank_driver import CrankDriver
 import pytest
 from pytest import approx
-
-pytest.importorskip('rclpy')
-
-from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
-from rclpy.clock import ClockType  # noqa: E402
-from rclpy.duration import Duration  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
+from rclpy.clock import ClockType
+from rclpy.duration import Duration
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
 
 SECOND = 10 ** 9
 

@@ -8,18 +8,15 @@ import struct
 from types import SimpleNamespace
 import warnings
 
+from linkage_ros.nodes import kinematics, log
+from linkage_ros.nodes.kinematics import Kinematics
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
-from linkage_ros.nodes import kinematics, log  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from rclpy.logging import LoggingSeverity  # noqa: E402
-from rclpy.serialization import serialize_message  # noqa: E402
-from ros_harness import hastened  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from visualization_msgs.msg import MarkerArray  # noqa: E402
+from rclpy.logging import LoggingSeverity
+from rclpy.serialization import serialize_message
+from ros_harness import hastened
+from sensor_msgs.msg import JointState
+from visualization_msgs.msg import MarkerArray
 
 FIVE_BAR = {'mechanisms': ['five_bar']}
 

@@ -6,16 +6,13 @@
 import math
 from pathlib import Path
 
+from linkage_ros import mechanisms, palette, scene
+from linkage_ros.nodes.kinematics import Kinematics
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
-from linkage_ros import mechanisms, palette, scene  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from visualization_msgs.msg import Marker, MarkerArray
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 WALKER = {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.scale': 0.01,

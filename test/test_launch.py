@@ -18,8 +18,7 @@ from linkage_ros import scene
 from linkage_ros.robot_model import rviz
 import numpy as np
 import pytest
-
-yaml = pytest.importorskip('yaml')
+import yaml
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / 'config'

@@ -13,23 +13,19 @@ import subprocess
 import sys
 import time
 
+from linkage_interfaces.srv import InputsFor, ServoInverse as Service
+from linkage_ros.nodes import shutdown
+from linkage_ros.nodes.crank_driver import CrankDriver
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.servo_inverse import ServoInverse
 import pytest
-
-pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
-
-from linkage_interfaces.srv import InputsFor, ServoInverse as Service  # noqa: E402
-from linkage_ros.nodes import shutdown  # noqa: E402
-from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from rclpy.logging import LoggingSeverity  # noqa: E402
-from rclpy.publisher import Publisher  # noqa: E402
-from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from ros_harness import DEADLINE, Graph, Process  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
-from visualization_msgs.msg import MarkerArray  # noqa: E402
+from rclpy.logging import LoggingSeverity
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_harness import DEADLINE, Graph, Process
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from visualization_msgs.msg import MarkerArray
 
 CONFIG = Path(__file__).parents[1] / 'config'
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -215,17 +211,6 @@ def test_after_a_slip_the_next_command_is_given(graph, slips, log, topic, kind, 
 SIGNALS = [signal.SIGINT, signal.SIGTERM]
 
 
-@pytest.fixture
-def processes():
-    """Return a list of processes, all of which are ended."""
-    started = []
-    yield started
-    for process in started:
-        if not process.has_ended:
-            process.interrupt(signal.SIGKILL)
-            process.end()
-
-
 def cpu(process):
     """Return the time that a process has computed [s]."""
     fields = Path(f'/proc/{process.id}/stat').read_text().rpartition(')')[2].split()
@@ -258,21 +243,19 @@ def ends_quietly(process, number):
     ('crank_driver', 0), ('servo_inverse', 0), ('kinematics', 0), ('kinematics', 100),
     ('scene', 0), ('scene', 100)])
 def test_a_signal_ends_the_start_of_a_thousand_mechanisms(
-        processes, tmp_path, name, publishers, number):
+        tmp_path, name, publishers, number):
     path = tmp_path / 'many.yaml'
     names = [f'm{i}' for i in range(1000)]
     path.write_text(f'/**:\n  ros__parameters:\n    mechanisms: [{", ".join(names)}]\n' + ''.join(
         f'    {each}.type: {"slotted_lever" if i % 2 else "jansen"}\n'
         for i, each in enumerate(names)))
-    process = Process(name, path)
-    processes.append(process)
     node = 'kinematics' if name == 'scene' else name
 
     def begun():
         return process.has_ended or node in graph.node.get_node_names() and publishers <= len(
             graph.node.get_publisher_names_and_types_by_node(node, '/'))
 
-    with Graph(process.domain) as graph:
+    with Process(name, path) as process, Graph(process.domain) as graph:
         graph.until(begun)
         assert not process.has_ended
         ends_quietly(process, number)
@@ -281,12 +264,10 @@ def test_a_signal_ends_the_start_of_a_thousand_mechanisms(
 @pytest.mark.nightly
 @pytest.mark.parametrize('number', SIGNALS)
 @pytest.mark.parametrize('name', ['servo_inverse', 'scene'])
-def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
+def test_a_signal_ends_a_long_trajectory(tmp_path, name, number):
     path = tmp_path / 'scene.yaml'
     path.write_text('/**:\n  ros__parameters:\n    mechanisms: [m]\n    m.type: five_bar\n')
-    process = Process(name, path)
-    processes.append(process)
-    with Graph(process.domain) as graph:
+    with Process(name, path) as process, Graph(process.domain) as graph:
         graph.listen(JointTrajectory, 'servo_trajectory')
         publisher = graph.publisher(JointTrajectory, 'wanted_trajectory')
         graph.until(lambda: graph.node.count_publishers('servo_trajectory'))
@@ -307,11 +288,10 @@ def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
 
 @pytest.mark.nightly
 @pytest.mark.parametrize('number', SIGNALS)
-def test_a_signal_ends_a_node_that_compiles(processes, number):
+def test_a_signal_ends_a_node_that_compiles(number):
     # Only the legs of a walker are compiled.
-    process = Process('kinematics', CONFIG / 'strandbeest.yaml')
-    processes.append(process)
-    with Graph(process.domain) as graph:
+    with Process('kinematics', CONFIG / 'strandbeest.yaml') as process, \
+            Graph(process.domain) as graph:
         graph.listen(MarkerArray, 'strandbeest/markers')
         graph.crank(['strandbeest_crank'])(
             [0.1], graph.listen(JointState, 'strandbeest/joint_states'))

@@ -10,12 +10,9 @@ import subprocess
 import sys
 
 import numpy as np
+from oracle import Bench, everything, history, message, Mismatch, SCENES
 import pytest
-
-pytest.importorskip('rclpy')
-
-from oracle import Bench, everything, history, message, Mismatch, SCENES  # noqa: E402
-from ros_harness import Graph  # noqa: E402
+from ros_harness import Graph
 
 # Of each scene: 13 histories in all, 143 and 624; nightly all of them without llvmlite, too.
 SEEDS = [pytest.param(range(1), id='few'),

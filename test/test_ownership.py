@@ -4,26 +4,22 @@
 """Each parameter has one owner, which announces it; the other nodes that use it follow."""
 
 
+from linkage_interfaces.srv import ServoInverse as Service
+from linkage_ros import scene
+from linkage_ros.nodes import log, scene_node
+from linkage_ros.nodes.crank_driver import CrankDriver
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.ownership import LATCHED, TOPIC
+from linkage_ros.nodes.servo_inverse import ServoInverse
 import pytest
-
-pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
-
-from linkage_interfaces.srv import ServoInverse as Service  # noqa: E402
-from linkage_ros import scene  # noqa: E402
-from linkage_ros.nodes import log, scene_node  # noqa: E402
-from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.ownership import LATCHED, TOPIC  # noqa: E402
-from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from rcl_interfaces.msg import (  # noqa: E402
-    Parameter as ParameterMessage,  # noqa: E402
+from rcl_interfaces.msg import (
+    Parameter as ParameterMessage,
     ParameterEvent,
     ParameterValue,
 )
-from rclpy.impl.rcutils_logger import RcutilsLogger  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
-from ros_harness import hastened  # noqa: E402
+from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.parameter import Parameter
+from ros_harness import hastened
 
 SOON = 2.0
 LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
@@ -180,9 +176,11 @@ def test_other_mechanisms_are_said_and_the_rest_is_followed(graph, warned):
 
 def test_of_values_that_change_and_change_back_the_last_holds(graph):
     service = graph.start(ServoInverse, LEVER)
-    announce, scale = graph.announcer(), 'lever.scale'
+    announce, other, scale = graph.announcer(), graph.announcer('/other'), 'lever.scale'
     for values in ({'mechanisms': ['lever'], A: 80.0, scale: 1.0}, {A: 90.0}, {A: 80.0},
                    {scale: 2.0}):
+        # Those of another node are none of its business.
+        other({A: 95.0})
         announce(values)
     graph.until(lambda: of(service, scale) == 2.0)
     assert of(service) == 80.0

@@ -8,35 +8,31 @@ import json
 import math
 import threading
 
-import pytest
-
-pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
-
 from effort import few_calls
 from linkage_ros import scene
 from linkage_ros.nodes import ownership, scene_node as nodes
-from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
+from linkage_ros.nodes.crank_driver import CrankDriver
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.servo_inverse import ServoInverse
+import pytest
 from rcl_interfaces.msg import (
-    FloatingPointRange,  # noqa: E402
-    IntegerRange,  # noqa: E402
-    Parameter as ParameterMessage,  # noqa: E402
-    ParameterDescriptor,  # noqa: E402
-    ParameterEvent,  # noqa: E402
-    ParameterValue,  # noqa: E402
-    SetParametersResult,  # noqa: E402
+    FloatingPointRange,
+    IntegerRange,
+    Parameter as ParameterMessage,
+    ParameterDescriptor,
+    ParameterEvent,
+    ParameterValue,
+    SetParametersResult,
 )
-from rcl_interfaces.srv import (  # noqa: E402
+from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameterTypes,
     SetParameters,
     SetParametersAtomically,
 )
-from rclpy.executors import SingleThreadedExecutor  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
 
 LEG = {'mechanisms': ['leg'], 'leg.type': 'jansen'}
 EVERYTHING = {

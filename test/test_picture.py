@@ -7,19 +7,16 @@ import math
 import re
 import signal
 
+from linkage_ros import palette, scene
+from linkage_ros.nodes import messages
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.publishers import LATCHED
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
-from linkage_ros import palette, scene  # noqa: E402
-from linkage_ros.nodes import messages  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.publishers import LATCHED  # noqa: E402
-from ros_harness import Graph, Process  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
-from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+from ros_harness import Graph, Process
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from visualization_msgs.msg import Marker, MarkerArray
 
 CELL = {'mechanisms': ['cell'], 'cell.type': 'peaucellier'}
 # The markers of a leg, by id, and of a cell, which has no plates; each with its locus.

@@ -14,22 +14,18 @@ import shutil
 import subprocess
 from xml.etree import ElementTree
 
-import numpy as np
-import pytest
-
-for module in ('matplotlib', 'yaml'):
-    pytest.importorskip(module)
-
-from linkage_ros import mechanisms, palette, scene  # noqa: E402
-from linkage_ros.render import (  # noqa: E402
+from linkage_ros import mechanisms, palette, scene
+from linkage_ros.render import (
     layers,
-    main,  # noqa: E402
+    main,
 )
-from linkage_ros.render.cycle import Cycle  # noqa: E402
-from linkage_ros.render.parts import DEFAULT, PARTS, TRACES  # noqa: E402
-from linkage_ros.render.picture import Picture  # noqa: E402
-from matplotlib.colors import to_rgb  # noqa: E402
-from PIL import Image  # noqa: E402
+from linkage_ros.render.cycle import Cycle
+from linkage_ros.render.parts import DEFAULT, PARTS, TRACES
+from linkage_ros.render.picture import Picture
+from matplotlib.colors import to_rgb
+import numpy as np
+from PIL import Image
+import pytest
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / 'config'

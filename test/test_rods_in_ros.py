@@ -6,18 +6,14 @@
 import math
 from pathlib import Path
 
+from linkage_ros import mechanisms
+from linkage_ros.nodes.kinematics import Kinematics
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
-
-from linkage_ros import mechanisms  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from test_command_stream import Stream  # noqa: E402
-from test_rods import G1  # noqa: E402
-from visualization_msgs.msg import MarkerArray  # noqa: E402
+from sensor_msgs.msg import JointState
+from test_command_stream import Stream
+from test_rods import G1
+from visualization_msgs.msg import MarkerArray
 
 EXAMPLES = Path(__file__).parents[1] / 'examples'
 SCENE = {'mechanisms': ['ankle'], 'ankle.type': 'rods', 'ankle.joints': list(G1),

@@ -7,16 +7,12 @@ import math
 import threading
 from types import SimpleNamespace
 
+from linkage_interfaces.srv import InputsFor, ServoInverse as Service
+from linkage_ros import mechanisms, scene
+from linkage_ros.nodes.servo_inverse import ServoInverse
 import numpy as np
 import pytest
 from truth.working_modes import five_bar
-
-pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
-
-from linkage_interfaces.srv import InputsFor, ServoInverse as Service  # noqa: E402
-from linkage_ros import mechanisms, scene  # noqa: E402
-from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
 
 TWO = {'mechanisms': ['left', 'right', 'drop'], 'left.type': 'slotted_lever',
        'right.type': 'slotted_lever', 'right.dimensions.a': 200.0, 'drop.type': 'water_drop'}

@@ -84,13 +84,13 @@ def _operations(linkage, *points):
 def test_the_locus_is_sent_once_and_a_late_subscriber_gets_it(graph):
     node = graph.start(Kinematics)
     early, other = (graph.listen(Marker, f'{name}/locus', LATCHED)
-                    for name in ('jansen', 'water_drop'))
+                    for name in ('jansen', 'slotted_lever'))
     turn, heard = graph.crank(CRANKS), graph.listen(MarkerArray, 'jansen/markers')
     for theta in (0.1, 0.2, 0.3):
         turn([theta] * 4, heard)
     late = graph.listen(Marker, 'jansen/locus', LATCHED)
     graph.until(lambda: late and other)
-    assert graph.set(node, water_drop__dimensions__a=2.0).successful
+    assert graph.set(node, slotted_lever__dimensions__a=81.0).successful
     graph.until(lambda: len(other) == 2)
     assert len(early) == len(late) == 1
 
