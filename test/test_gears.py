@@ -135,6 +135,21 @@ def test_the_reach_is_where_it_can_be_assembled(ratio):
     assert first.is_part == all(first.on(reach, 1e6 + k) for k in range(99))
 
 
+def test_a_crank_that_has_turned_for_long_is_answered_where_it_is():
+    # A gear typed as 0.333 repeats after 1000 turns, which a machine passes in minutes.
+    bars = 'O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'B dyad A Q 2.5 2 left'
+    plain = mechanisms.create('custom', joints=bars)
+    found = mechanisms.create('custom', joints=(*bars, 'D crank Q 1 geared crank 0.333 0.3'))
+    for theta in (2.0, 4000.25, -1e5):
+        value = float(plain.solve(theta)['B'][0])
+        # What the gear does not move repeats as without it.
+        assert len(found.inverse('B.x').all(value)) == len(plain.inverse('B.x').all(value)) == 2
+        for output in ('B.x', 'D.x'):
+            point, axis = output.split('.')
+            value = float(found.solve(theta)[point]['xy'.index(axis)])
+            assert found.input_for(output, value, theta) == pytest.approx(theta, abs=1e-9)
+
+
 def test_a_linkage_is_the_same_whole_turns_on():
     for make, ratio, turns in itertools.product(
             (two, chained), ('1/3', 'sqrt(2)', '1.2345678'), (32, -640)):

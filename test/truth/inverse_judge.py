@@ -9,6 +9,7 @@ answer is invented if its own pose has another value, and a duplicate if it is n
 """
 
 from collections import Counter
+import copy
 import math
 
 from linkage_ros.linkage import Solution
@@ -55,8 +56,13 @@ class Output:
 
     def at(self, theta):
         """Return the output at inputs, NaN where any joint cannot be assembled."""
-        theta = np.asarray(theta, float)
-        return self._pose.over(theta, *self.others)[0]
+        return self._pose.over(np.asarray(theta, float), *self.others)[0]
+
+    def held_at(self, others):
+        """Return the output at other inputs, which an inverse may have rounded."""
+        held = copy.copy(self)
+        held.others = tuple(others)
+        return held
 
     def away(self, value, other):
         """Return the distance of two values, without whole turns."""
@@ -148,8 +154,11 @@ def judge(linkage, name, rng, count=6, others=()):
         value = float(output.at(at))
         if value != value:
             continue
-        answers = [answer.inputs[0] for answer in inverse.all([value, *others], [at, *others])]
-        if others and Solution((at, *others), inverse).margin < SINGULAR:
+        solutions = inverse.all([value, *others], [at, *others])
+        answers = [solution.inputs[0] for solution in solutions]
+        # Of several inputs the rule promises regular solutions only.
+        if others and any(solution.margin < SINGULAR for solution in (
+                Solution((at, *others), inverse), *solutions)):
             kind = 'singular'
         elif output.ulp_changes(at) > SINGULAR * output.size:
             kind = 'no direction'
@@ -166,7 +175,8 @@ def judge(linkage, name, rng, count=6, others=()):
                 found[kind, 'lost at', linkage, name, at, others] += 1
                 break
         for k, x in enumerate(answers):
-            error, reached, beside = _error(output, x, value)
+            error, reached, beside = _error(
+                output.held_at(solutions[k].inputs[1:]), first, x, value)
             beyond = 0.0 if kind == 'ordinary' else max(2.0 * ALLOWED * output.size, beside)
             if not error <= MOST and not output.away(reached, value) <= beyond:
                 found[kind, 'invented'] += 1
@@ -179,11 +189,13 @@ def judge(linkage, name, rng, count=6, others=()):
     return found, worst
 
 
-def _error(output, x, value):
+def _error(output, first, x, value):
     """Return the error of an answer in units of the rule, and the output there."""
-    first = output.first
     step = 2.0 * np.spacing(max(abs(x), 1e-3 * first.size))
     reached, *beside = output.at(np.array([x, x + step, x - step])).tolist()
+    if reached != reached and first.wraps and not first.low <= x <= first.high:
+        # The turns that were added to an end rounded it.
+        reached = max(beside, key=np.isfinite)
     # What an ulp of the input changes, on the side where there is a pose; and what 64 do.
     change = np.nanmax([0.0, *output.away(beside, reached)]) / 4.0
     far = 64.0 * np.spacing(max(abs(x), first.size))
@@ -209,7 +221,7 @@ def judge_several(linkage, names, rng, count=6):
         found['ordinary', 'questions'] += 1
         margin = Solution(pose, inverse).margin
         if not any(max(input_.apart(x, y) / size for input_, x, y, size in zip(
-                linkage.inputs, answer.inputs, pose, sizes)) < 1e-9 / margin
+                inverse.inputs, answer.inputs, pose, sizes)) < 1e-9 / margin
                 for answer in answers):
             found['ordinary', 'lost'] += 1
             found['ordinary', 'lost at', linkage, names, tuple(pose), ()] += 1

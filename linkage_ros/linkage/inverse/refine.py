@@ -25,6 +25,9 @@ from ..tolerances import ONE, SINGULAR
 
 # A larger error [sizes], or a longer step [rad, sizes], leads to another solution.
 FAR = 0.1
+# Beside a candidate without a pose one is looked for so many times, each time 16 times as far as
+# before from two ulps on: where the margin is 1e-6, rounding of the outputs leads as far out.
+OUTSIDE = 6
 
 
 def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Bracket, Row]
@@ -35,9 +38,10 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
     n, inputs, at = problem.n, candidate, problem.newton.at
     best = at(*inputs, *values)
     if not best[0] < math.inf:
-        # Rounding may have led out of the reach.
-        around = ((*inputs[:by], inputs[by] + ulps * math.ulp(inputs[by]), *inputs[by + 1:])
-                  for ulps in (2.0, -2.0, 16.0, -16.0) for by in range(n))
+        # Rounding of the outputs may have led out of the reach.
+        around = ((*inputs[:by], inputs[by] + side * 16.0 ** k * math.ulp(inputs[by]),
+                   *inputs[by + 1:])
+                  for k in range(OUTSIDE) for side in (2.0, -2.0) for by in range(n))
         inputs = next((x for x in around if at(*x, *values)[0] < math.inf), inputs)
         best = at(*inputs, *values)
     following = best[2 + n:2 + 2 * n]

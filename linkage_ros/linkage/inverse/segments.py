@@ -106,21 +106,28 @@ class Segments:
         After how much the output is the same, or inf.
     size : float
         The unit of the output.
+    offset : float
+        Whole turns [rad] that are added to solutions; see `Mechanism.turned`.
 
     """
 
     def __init__(self, curve: Callable, arcs: Sequence[Arc], near_zeros: Sequence[NearZero],
-                 input_: Input, period: float, size: float):
+                 input_: Input, period: float, size: float, offset: float):
         self._curve, self._period, self._size = curve, period, size
         self._input, self._unit = input_, input_.step
         self._rounding = TOLERANCE * size
-        self._normalized = normalized = input_.normalized()
+        normalized = input_.normalized()
         special = distinct((near.value for near in near_zeros if near.gap <= near.rounding),
                            normalized)
         marks = distinct((near.value for near in near_zeros if near.gap <= NEAR * near.size),
                          normalized)
         self.jumps: List[float] = []
-        self._ends = {end for arc in arcs for end in arc if not normalized.is_cut(end)}
+        # Next to an end of the reach there is a pose also when turns are added, and behind gears.
+        farthest = math.pi if input_.is_part else normalized.high
+        ulps = 2.0 if input_.period == 1 else 4.0
+        self._inside = [tuple(end + side * ulps * (not normalized.is_cut(end)) * math.ulp(
+            max(abs(end) + offset / self._unit, farthest))
+            for end, side in zip(arc, (1.0, -1.0))) for arc in arcs]
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
         if not 0 < len(runs) <= MAX_ENDS * max(1.0, sum(hi - lo for lo, hi in arcs) / math.tau) \
                 or not self._moves(runs):
@@ -138,11 +145,8 @@ class Segments:
         least, greatest = float(value[0] - slack[0]), float(value[-1] + slack[1])
         # Values so near to an end of the segment are the end's.
         near = np.minimum(slack, ONE * self._size)
-        # At an end of the reach there is a pose also when a period is added, and behind gears.
-        ulps = 2.0 if self._input.period == 1 else 4.0
-        start, end = (x + side * ulps * math.ulp(max(abs(x), self._normalized.high)) * (
-            x in self._ends) for x, side in zip(theta[[0, -1]].tolist(), (1.0, -1.0)))
-        theta = np.array([start, *theta.clip(start, end), end]) * self._unit
+        low, high = min(self._inside, key=lambda arc: max(arc[0] - theta[0], theta[-1] - arc[1]))
+        theta = np.pad(theta.clip(low, high), 1, 'edge') * self._unit
         value = np.pad(value.clip(value[0] + near[0], value[-1] - near[1]), 1, 'edge')
         return Table(least, greatest, sign, theta.tolist(), value.tolist())
 
@@ -365,7 +369,8 @@ def segments_of(linkage: Kinematics, output: str, others: Sequence[float] = (),
         period = math.inf if not linkage.is_angle(output) else (
             math.tau if output != first.name else first.turn if first.wraps else math.inf)
         return Segments(analysis.curve('output', output), analysis.reach(), analysis.near_zeros(),
-                        first, period, 1.0 if linkage.is_angle(output) else linkage.longest)
+                        first, period, 1.0 if linkage.is_angle(output) else linkage.longest,
+                        math.tau * abs(dict(linkage.design.turned).get(first.name, 0.0)))
 
     return linkage.cache.get_or_make(('segments', output, first.period, *others), make)
 
