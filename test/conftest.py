@@ -97,7 +97,7 @@ def graph(monkeypatch):
     from ros_harness import Graph
 
     # However slow the machine is, what is logged now and then is logged once.
-    monkeypatch.setattr(log, 'THROTTLE_S', math.inf)
+    monkeypatch.setattr(log.Throttle, 'seconds', math.inf)
     with Graph() as one:
         yield one
 

@@ -9,11 +9,10 @@ import re
 import time
 
 from builtin_interfaces.msg import Duration
-from linkage_ros import mechanisms, scene
+from linkage_ros import mechanisms
 from linkage_ros.nodes import log
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.servo_inverse import ServoInverse
-from linkage_ros.scene.inverse_request import InverseRequest
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
@@ -193,28 +192,6 @@ def test_commands_move_the_picture(stream, graph):
     graph.until(lambda: stream.want(['flap'], [-0.2]) and shown)
     message = shown[-1]
     assert dict(zip(message.name, message.position))['flap'] == pytest.approx(-0.2, abs=1e-14)
-
-
-# --- in turn, and all round ---
-
-@pytest.mark.nightly(all_but=2)
-@pytest.mark.parametrize('type_, output, part', [
-    ('four_bar', 'QB', 1.0), ('jansen', 'G.x', 1.0), ('slider_crank', 'block', 1.0),
-    ('watt', 'P.y', 1.0), ('whitworth', 'lever', 3.0)])
-def test_a_turning_crank_is_found_again_without_a_jump(type_, output, part):
-    mechanism = scene.read({'mechanisms': ['one'], 'one.type': type_}).mechanisms['one']
-    linkage, wanted = mechanism.linkage, InverseRequest(mechanism, [output])
-    (_, start), (_, end) = linkage.extremes(output)[0]
-    near = start + 0.02 * part * (end - start)
-    for k in range(2, 98):
-        crank = start + 0.01 * k * part * (end - start)
-        value = float(linkage.joint_angles(crank, [output])[output])
-        (found,), (actuator,), _ = wanted.command([value], None, [near])
-        assert actuator == found and abs(found - near) < 0.3
-        again = float(linkage.joint_angles(found, [output])[output])
-        assert math.remainder(again - value, math.tau) == pytest.approx(0.0, abs=1e-12 * max(
-            1.0, linkage.longest))
-        near = found
 
 
 # --- several inputs ---

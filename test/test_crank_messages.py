@@ -100,15 +100,13 @@ def test_ten_thousand_joints_hold_nobody_up(graph):
     assert 'joint0, joint1' in said and '... (9999)' in said and len(said) < 400
 
 
-def test_a_warning_is_repeated_when_its_time_is_over(graph, monkeypatch):
-    hand = Hand(graph, 'cell', {'mechanisms': ['cell'], 'cell.type': 'peaucellier'})
-    for seconds, count in ((60.0, 1), (0.0, 4), (60.0, 4)):
-        monkeypatch.setattr(log, 'THROTTLE_S', seconds)
-        for angle in (2.0, 2.1, 2.2):
-            hand.send(['cell_crank'], [angle])
-        hand.moved(['cell_crank'], [0.5 + 0.01 * count])
-        graph.all_logged(hand.node, hand.said)
-        assert len(hand.warnings('cannot be assembled')) == count
+def test_a_warning_is_repeated_when_its_time_is_over():
+    said = []
+    throttle = log.Throttle(SimpleNamespace(warning=said.append))
+    for throttle.seconds, count in ((60.0, 1), (0.0, 4), (60.0, 4)):
+        for _ in range(3):
+            throttle.warn('a', lambda: 'a')
+        assert len(said) == count
 
 
 def test_what_was_logged_is_forgotten_when_it_is_too_much():

@@ -121,23 +121,6 @@ def test_a_signal_ends_what_is_still_being_imported(harness, tmp_path, name, sto
     assert process.end() == (0, '')
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize('name', EXECUTABLES)
-def test_a_thread_that_computes_does_not_hold_up_the_end(harness, name):
-    done = subprocess.run([sys.executable, '-c', textwrap.dedent(f"""
-        from threading import Thread
-        from time import sleep
-
-        from linkage_ros import executables
-
-        Thread(target=sleep, args=(600.0,)).start()
-        print('started')
-        executables.{name}()
-        """), '--foo'], cwd=ROOT, capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stdout) == (1, 'started\n')
-    assert one_sentence(done.stderr, ARGUMENTS[0][1])
-
-
 ARGUMENTS = [
     (['--foo'], "bad arguments: unknown argument '--foo': allowed are only those of ROS, "
      'after --ros-args'),

@@ -286,18 +286,6 @@ def test_a_signal_ends_a_long_trajectory(tmp_path, name, number):
         ends_quietly(process, number)
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize('number', SIGNALS)
-def test_a_signal_ends_a_node_that_compiles(number):
-    # Only the legs of a walker are compiled.
-    with Process('kinematics', CONFIG / 'strandbeest.yaml') as process, \
-            Graph(process.domain) as graph:
-        graph.listen(MarkerArray, 'strandbeest/markers')
-        graph.crank(['strandbeest_crank'])(
-            [0.1], graph.listen(JointState, 'strandbeest/joint_states'))
-        ends_quietly(process, number)
-
-
 SCRIPT = """
 import rclpy
 from linkage_ros.nodes.kinematics import Kinematics

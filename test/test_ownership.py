@@ -126,7 +126,7 @@ def test_a_set_on_a_follower_is_refused_with_the_node_where_it_works(graph):
 
 def test_other_values_at_the_start_of_either_are_said_once_and_followed(
         graph, warned, monkeypatch):
-    monkeypatch.setattr(log, 'THROTTLE_S', 0.0)
+    monkeypatch.setattr(log.Throttle, 'seconds', 0.0)
     service = graph.start(ServoInverse, {**LEVER, A: 81.0})
     owner = graph.start(Kinematics, {**LEVER, A: 82.0})
     graph.until(lambda: of(service) == 82.0)

@@ -271,15 +271,7 @@ def held_up(graph, client):
     graph.until(lambda: len(node.begun) > begun)
 
 
-def test_a_scene_is_prepared_in_a_worker_and_adopted_by_the_executor(graph):
-    node = graph.start(Slow, LEG)
-    assert Client(graph, node).set(('leg.scale', 2.0))[0].successful
-    settled(graph, node)
-    assert node.prepared[-1][0] is not threading.main_thread()
-    assert node.adopted[-1] == (threading.main_thread(), 2.0)
-
-
-def test_a_change_is_answered_and_messages_are_handled_while_it_is_prepared(graph):
+def test_a_change_is_answered_and_messages_are_handled_while_a_worker_prepares_it(graph):
     node = graph.start(Slow, LEG)
     client, ticks = Client(graph, node), []
     node.create_timer(0.01, lambda: ticks.append(0))
@@ -290,7 +282,8 @@ def test_a_change_is_answered_and_messages_are_handled_while_it_is_prepared(grap
     assert not node.is_settled and node.adopted[-1][1] == 1.0
     node.free.set()
     settled(graph, node)
-    assert node.adopted[-1][1] == 1.5
+    assert node.prepared[-1][0] is not threading.main_thread()
+    assert node.adopted[-1] == (threading.main_thread(), 1.5)
 
 
 def test_of_a_hundred_changes_each_is_answered_and_the_newest_prepared_and_announced(graph):
@@ -444,18 +437,6 @@ def test_an_executor_that_awaits_no_service_answers_at_once(graph):
     assert (leg.scale, leg.pose, leg.frame_id) == (3.0, (1.0,) * 6, 'base')
 
 
-def test_a_set_within_the_process_is_at_once_and_is_kept(graph):
-    node = graph.start(Slow, LEG)
-    held_up(graph, Client(graph, node))
-    for name, value in (('leg.pose', [1.0] * 6), ('leg.scale', 3.0)):
-        assert node.set_parameters([Parameter(name, value=value)])[0].successful
-    mechanism = node.scene.mechanisms['leg']
-    assert (mechanism.scale, mechanism.pose) == (3.0, (1.0,) * 6)
-    node.free.set()
-    settled(graph, node)
-    assert node.adopted[-1][1] == 3.0 and node.scene.mechanisms['leg'] is mechanism
-
-
 def test_a_mistake_while_a_scene_is_prepared_leaves_the_one_before(graph):
     said = graph.log()
     node = graph.start(Slow, LEG)
@@ -502,12 +483,6 @@ def test_what_others_have_to_say_about_a_parameter_counts(graph):
     results = Client(graph, node).set(('leg.scale', 2.0), ('leg.points', ['G']))
     assert [(r.successful, r.reason) for r in results] == [(False, 'not by me')] * 2
     assert node.scene.mechanisms['leg'].scale == 1.0
-
-
-def test_the_time_to_be_used_can_be_set_as_ever(graph):
-    client = Client(graph, graph.start(Slow, LEG))
-    good, bad = client.set(('use_sim_time', True), ('use_sim_time', 3))
-    assert good.successful and not bad.successful and bad.reason
 
 
 def test_a_node_ends_while_its_worker_is_busy(graph):

@@ -11,7 +11,6 @@ from linkage_ros.nodes.kinematics import Kinematics
 import numpy as np
 import pytest
 from sensor_msgs.msg import JointState
-from test_command_stream import Stream
 from test_rods import G1
 from visualization_msgs.msg import MarkerArray
 
@@ -57,27 +56,6 @@ def test_markers_are_in_space(graph):
     assert len(arms) == 2
     for found, wanted in ((turned, arms), (bars, {*linkage.bars} - arms)):
         assert found == {frozenset(place[name] for name in bar) for bar in wanted}
-
-
-@pytest.mark.nightly
-def test_a_stream_of_pitch_and_roll_becomes_commands_of_the_motors(graph, capfd):
-    stream, linkage = Stream(graph, SCENE), mechanisms.create('rods', joints=G1)
-    drawn = linkage.driven_by('pitch', 'roll')
-    names, motors = ['left_ankle_pitch', 'left_ankle_roll'], ('right', 'left')
-    for pitch, roll in ((0.0, 0.0), (-0.4, 0.1), (0.3, -0.2), (0.4, 0.1), (-0.8, 0.0)):
-        command = stream.want(names, [pitch, 0.1 - roll], [1.0, -2.0])
-        angles = drawn.joint_angles((pitch, roll), motors)
-        rates = [drawn.joint_rates((pitch, roll), motors, by) for by in (0, 1)]
-        for source, motor in zip(('motor_a', 'motor_b'), motors):
-            position, velocity = command[source]
-            assert position == pytest.approx(angles[motor], abs=1e-13)
-            assert velocity == pytest.approx(
-                1.0 * rates[0][motor] + 2.0 * rates[1][motor], rel=1e-9)
-    last = {source: (position, 0.0) for source, (position, _) in command.items()}
-    for pitch, roll in ((0.6, 0.05), (0.0, 0.3), (math.nan, 0.0)):
-        assert stream.want(names, [pitch, 0.1 - roll], [1.0, 1.0]) == last
-    assert 'cannot be 0.6, 0.05: pitch, roll at 0.6, 0.05 is outside the reach' \
-        in capfd.readouterr().err
 
 
 def test_the_example_s_rods_are_closed_in_its_own_urdf(graph):
