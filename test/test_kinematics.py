@@ -115,8 +115,11 @@ def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, g
         assert [scale.x, scale.y, scale.z] == pytest.approx([width] + [width * whole] * 2)
         assert [rgba.r, rgba.g, rgba.b, rgba.a] == pytest.approx(
             [*palette.rgb(getattr(palette, colour)), 1.0], abs=1e-7)
-        assert 2.0 * np.array([q.x * q.z + q.w * q.y, q.y * q.z - q.w * q.x]) == pytest.approx(
-            up[:2])
+        # The first and the third column, of the quaternion.
+        assert 2.0 * np.array([
+            0.5 - q.y ** 2 - q.z ** 2, q.x * q.y + q.w * q.z, q.x * q.z - q.w * q.y,
+            q.x * q.z + q.w * q.y, q.y * q.z - q.w * q.x,
+            0.5 - q.x ** 2 - q.y ** 2]) == pytest.approx([cy * cp, sy * cp, -sp, *up])
         face = palette.rgb(palette.PLATE if marker.id == 7 else getattr(palette, colour))
         assert [pytest.approx([*face, 1.0], abs=1e-7)] * len(marker.colors) == [
             [one.r, one.g, one.b, one.a] for one in marker.colors]

@@ -8,7 +8,7 @@ import math
 import struct
 from types import FunctionType, ModuleType
 
-from linkage_ros.nodes import joint_state_reader, message_layout
+from linkage_ros.nodes import message_layout
 from linkage_ros.nodes.message_layout import MIN_BYTES, Unreadable
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def reader():
         made.looked += 1
         return message.name
 
-    made = joint_state_reader.Reader(interpret)
+    made = message_layout.Reader(interpret)
     made.looked = 0
     return made
 
@@ -130,9 +130,9 @@ def test_what_is_remembered_is_bounded_whatever_comes(reader):
         return held(reader)
 
     first = held(reader)
-    full = after(range(joint_state_reader.MAX_SENDERS))
-    assert first + joint_state_reader.MAX_SENDERS < full
-    assert after(range(joint_state_reader.MAX_SENDERS, 1000)) <= full
+    full = after(range(message_layout.MAX_SENDERS))
+    assert first + message_layout.MAX_SENDERS < full
+    assert after(range(message_layout.MAX_SENDERS, 1000)) <= full
 
 
 def outcome(said, *args):

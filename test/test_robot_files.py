@@ -768,7 +768,7 @@ def test_world_of_drake_is_no_second_root(imported, tmp_path):
     file = written(tmp_path, 'four_bar.urdf', ('<link name="base_link"/>',
                                                '<link name="world"/><link name="base_link"/>'))
     mechanism, = imported(file).values()
-    assert mechanism.values == plain.values and mechanism.frame_id == 'base_link'
+    assert mechanism == plain and mechanism.frame_id == 'base_link'
     more = written(tmp_path, 'four_bar.urdf', ('<link name="base_link"/>',
                                                '<link name="earth"/><link name="base_link"/>'))
     with pytest.raises(readers.RequestError, match='a URDF has one root link, not 2'):

@@ -155,7 +155,8 @@ def test_a_client_that_does_not_read_costs_little_and_harms_nobody(show, what):
 @pytest.mark.nightly
 def test_requests_on_one_connection_whose_answers_nobody_reads_are_few(lever):
     host, port = urlsplit(lever.url).netloc.split(':')
-    with socket.create_connection((host, int(port))) as other, pytest.raises(OSError):
+    with socket.create_connection((host, int(port))) as other, pytest.raises(
+            ConnectionError):
         other.settimeout(browser.DEADLINE)
         for _ in range(10_000):
             other.sendall(100 * f'GET /panel.js HTTP/1.1\r\nHost: {host}:{port}\r\n\r\n'.encode())
