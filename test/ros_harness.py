@@ -41,14 +41,14 @@ class Graph:
     `node` is there to publish, subscribe and call with; nothing moves but in `until`.
     """
 
-    def __init__(self, domain=None):
-        self._domain, self._is_logged = domain, False
+    def __init__(self, domain=None, executor=SingleThreadedExecutor):
+        self._domain, self._is_logged, self._executor = domain, False, executor
 
     def __enter__(self):
         self._own = None if self._domain else Domain()
         self.context = rclpy.Context()
         rclpy.init(context=self.context, domain_id=self._domain or self._own.id)
-        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor = self._executor(context=self.context)
         self._nodes = []
         self.node = self._add(rclpy.create_node('tester', context=self.context))
         return self

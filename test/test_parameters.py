@@ -32,6 +32,7 @@ from rcl_interfaces.srv import (
 )
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from ros_harness import Graph
 from sensor_msgs.msg import JointState
 
 LEG = {'mechanisms': ['leg'], 'leg.type': 'jansen'}
@@ -373,50 +374,27 @@ class Counting(Kinematics):
 
 
 @pytest.mark.parametrize('executor', [SingleThreadedExecutor, nodes.Executor])
-def test_messages_are_handled_between_requests_that_come_at_once(graph, executor):
-    node = Counting(context=graph.context, parameter_overrides=[
-        Parameter(name, value=value) for name, value in LEG.items()])
-    handled, asked, over = [], threading.Event(), threading.Event()
-    node.add_post_set_parameters_callback(lambda parameters: handled.append(parameters[0].value))
-    subscription, = (one for one in node.subscriptions if one.topic_name == '/crank_states')
-    crank = graph.node.create_publisher(JointState, 'crank_states', 1)
+def test_messages_are_handled_between_requests_that_come_at_once(executor):
+    with Graph(executor=executor) as graph:
+        node, handled = graph.start(Counting, LEG), []
+        client, crank = Client(graph, node), graph.publisher(JointState, 'crank_states', 1)
+        assert client.set(('leg.scale', 0.5))[0].successful
+        node.add_post_set_parameters_callback(lambda changed: handled.append(changed[0].value))
+        subscription, = (one for one in node.subscriptions if one.topic_name == '/crank_states')
 
-    def again(_):
-        """Note that a message is handled, and publish the next one."""
-        asked.wait(60.0)
-        handled.append(None)
-        crank.publish(JointState(name=['leg_crank']))
+        def again(_):
+            """Note that a message is handled, and publish the next one."""
+            handled.append(None)
+            crank.publish(JointState(name=['leg_crank']))
 
-    subscription.callback = again
-    own = executor(context=graph.context)
-    own.add_node(node)
-
-    def spin():
-        while not over.is_set():
-            own.spin_once(timeout_sec=0.1)
-
-    thread = threading.Thread(target=spin)
-    thread.start()
-    try:
-        client = Client(graph, node)
-        graph.until(crank.get_subscription_count)
-        client.about(['leg.scale'])
-        wanted = [1.0 + 0.01 * i for i in range(50)]
-        client.ask(SetParameters, parameters=[_message('leg.scale', 0.5)])
-        graph.until(lambda: handled == [0.5])
-        crank.publish(JointState(name=['leg_crank']))
+        subscription.callback = again
         # The last one is refused.
+        wanted = [1.0 + 0.01 * i for i in range(50)]
         for value in [*wanted, -1.0]:
             client.ask(SetParameters, parameters=[_message('leg.scale', value)])
-        asked.set()
+        crank.publish(JointState(name=['leg_crank']))
         graph.until(lambda: wanted[-1] in handled and node.is_settled)
-    finally:
-        asked.set()
-        over.set()
-        thread.join()
-        own.shutdown()
-        node.destroy_node()
-    assert [value for value in handled if value is not None] == [0.5, *wanted]
+    assert [value for value in handled if value is not None] == wanted
     between = handled[handled.index(wanted[0]):handled.index(wanted[-1])]
     # Jazzy's EventsExecutor awaits no service.
     if executor is SingleThreadedExecutor or not version('rclpy').startswith('7.'):
