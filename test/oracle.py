@@ -45,6 +45,7 @@ from ros_harness import DEADLINE
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from test_reading import big_endian
+from test_rods import G1
 from visualization_msgs.msg import Marker, MarkerArray
 
 # Of fewer bytes no message is made.
@@ -133,8 +134,10 @@ class Solver:
         inputs = self.mechanism.linkage.inputs
         own = [leg.start + leg.side * (value - leg.lag) if input_.turns else value / leg.size
                for value, input_ in zip(values, inputs)]
-        xy = self._places(*own)
-        places = [(x * (leg.side * leg.size), y * leg.size) for x, y in zip(xy[::2], xy[1::2])]
+        axes = len(self.mechanism.linkage.axes)
+        found = self._places(*own)
+        places = [(x * (leg.side * leg.size), *(part * leg.size for part in others))
+                  for x, *others in zip(*(found[i::axes] for i in range(axes)))]
         angles = [leg.side * angle * size for angle, size in zip(self._angles(*own), self._sizes)]
         if speeds is None:
             return places, angles, []
@@ -173,6 +176,10 @@ def _on_each_side(legs):
 def _shown(mechanism):
     """Return what each marker shows, by its id: joints, ends of lines or corners."""
     linkage, wanted = mechanism.linkage, mechanism.points
+    if mechanism.in_space:
+        arms = [bar for bar in linkage.bars if bar[0].removesuffix('_origin') in mechanism.inputs]
+        return {0: [bar for bar in linkage.bars if bar not in arms],
+                1: [(name,) for name in wanted], 5: arms}
     cranks, plates = shapes.cranks(linkage), shapes.plates(linkage, wanted)
     edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}
     bars = [bar for bar in linkage.bars if bar not in cranks and frozenset(bar) not in edges]
@@ -213,10 +220,10 @@ class Model:
         frames = {name: mechanism.frame_id or new.frame_id
                   for name, mechanism in new.mechanisms.items()}
         robots = {name: bodies.robot([mechanism], frames[name])
-                  for name, mechanism in new.mechanisms.items()}
-        self.descriptions = {name: urdf.write(robot) for name, robot in robots.items()}
-        own = [robots[name] for name, mechanism in new.mechanisms.items()
-               if not mechanism.only_named]
+                  for name, mechanism in new.mechanisms.items() if not mechanism.in_space}
+        self.descriptions = {name: urdf.write(robots[name]) if name in robots else ''
+                             for name in new.mechanisms}
+        own = [robot for name, robot in robots.items() if not new.mechanisms[name].only_named]
         try:
             whole = urdf.write(bodies.merged(own)) if own else ''
         except scene.SceneError:
@@ -604,7 +611,10 @@ class Bench:
     def _same_drawing(self, topic, markers, content):
         if content is None:
             raise Mismatch(f'{topic}: drawn where it cannot be assembled')
-        found = {marker.id: [(p.x, p.y) for p in marker.points] for marker in markers}
+        mechanism = self.model.scene.mechanisms[topic.partition('/')[0]]
+        axes = mechanism.linkage.axes
+        found = {marker.id: [tuple(getattr(p, axis) for axis in axes) for p in marker.points]
+                 for marker in markers}
         wanted = {id_: [tuple(point) for point in points]
                   for id_, points in content.points.items()}
         for id_ in {*found} | {*wanted}:
@@ -613,7 +623,6 @@ class Bench:
                 own, other = ({*zip(*[iter(points)] * 3)} for points in (own, other))
             if own != other:
                 raise Mismatch(f'{topic}: marker {id_}: {differences([own], [other])}')
-        mechanism = self.model.scene.mechanisms[topic.partition('/')[0]]
         for marker in markers:
             self._same_look(topic, marker, mechanism)
             self._same_stamp(topic, marker.header.stamp, content.stamp)
@@ -623,7 +632,7 @@ class Bench:
         if (marker.type, marker.header.frame_id) != (KINDS[marker.id], frame):
             raise Mismatch(f'{topic}: marker {marker.id} is a {marker.type} in '
                            f'{marker.header.frame_id!r} instead of {frame!r}')
-        if any(p.z for p in marker.points):
+        if not mechanism.in_space and any(p.z for p in marker.points):
             raise Mismatch(f'{topic}: marker {marker.id} leaves its plane')
         # In which layer, and how it is turned, test_kinematics.py tests.
         at, place = marker.pose.position, mechanism.pose[:3]
@@ -784,7 +793,7 @@ class Generator:
         return (value - drive.offset) / drive.ratio
 
     def _input(self, drive):
-        low, high = drive.reach[self._random.integers(len(drive.reach))]
+        low, high = drive.arcs[self._random.integers(len(drive.arcs))]
         kind = self._random.random()
         if kind < 0.2:
             # Next to an end, where a sensor's noise goes in and out.
@@ -934,6 +943,12 @@ SCENES = {
     'more legs than are solved one by one': {
         'mechanisms': ['m'], 'm.type': 'jansen', 'm.leg_pairs': 20,
         'm.points': ['G'], 'm.joint_names': ['left3_EF=ankle'], 'm.only_named': True},
+    'rods in space': {
+        'mechanisms': ['ankle'], 'ankle.type': 'rods',
+        'ankle.joints': list(G1), 'ankle.right.sweep': [-0.25, 0.25],
+        'ankle.left.sweep': [-0.2, 0.2],
+        'ankle.joint_names': ['pitch=left_ankle_pitch', 'roll=-left_ankle_roll+0.1'],
+        'ankle.loads': ['pitch=12.0', 'roll=-3.0']},
     'tiny and huge': {
         'mechanisms': ['m', 'n'], 'm.type': 'jansen', 'm.scale': 1e-30, 'n.type': 'peaucellier',
         'n.scale': 1e27},

@@ -35,7 +35,11 @@ def test_whatever_happens_the_node_publishes_what_the_library_says(name, seeds):
 FIVE_BAR = {'mechanisms': ['m'], 'm.type': 'five_bar'}
 LEG = {'mechanisms': ['m'], 'm.type': 'jansen'}
 BOTH = {'mechanisms': ['a', 'b'], 'a.type': 'jansen', 'b.type': 'slotted_lever'}
+ANKLE = SCENES['rods in space']
 SHORT = {
+    'two rods in space': (ANKLE, [*everything(ANKLE), *(
+        message({'ankle_right': right, 'ankle_left': left}, [1.0, 2.0])
+        for right, left in ((0.0, 0.0), (0.1, -0.05), (2.0, 0.0), (-0.2, 0.1)))]),
     'markers that a change leaves nothing of': (LEG, [
         *everything(LEG), message({'m_crank': 0.5}), ('set', {'m.points': ['O', 'G']})]),
     'a scene that nobody listens to': (LEG, [message({'m_crank': 0.5})] * 3),
