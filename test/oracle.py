@@ -296,14 +296,13 @@ class Model:
         pose = self._pose(name)
         return self._joint_states(self.states[name].stamp, {name: pose} if pose else {})
 
-    def all_joints(self, sources=()):
-        """Return the joint states of the scene, without what sources say on the same topic."""
+    def all_joints(self):
+        """Return the joint states of the scene."""
         poses = {name: pose for name in self.scene.mechanisms if (pose := self._pose(name))}
-        return self._joint_states(self.stamp, poses, sources)
+        return self._joint_states(self.stamp, poses)
 
-    def _joint_states(self, stamp, poses, sources=()):
-        rows = [row for name, pose in poses.items() for row in self._rows(name, pose)
-                if row[0] not in sources]
+    def _joint_states(self, stamp, poses):
+        rows = [row for name, pose in poses.items() for row in self._rows(name, pose)]
         if not rows:
             return None
         names, positions, velocities, efforts = map(list, zip(*rows))
@@ -395,14 +394,12 @@ class Bench:
         Where it lives.
     parameters : dict
         What it is started with.
-    patience : float
-        How long what has to be published is waited for [s].
 
     """
 
-    def __init__(self, graph, parameters, patience=DEADLINE, **kwargs):
-        self._graph, self.model, self._patience = graph, Model(parameters), patience
-        self.node = graph.start(Kinematics, parameters, **kwargs)
+    def __init__(self, graph, parameters):
+        self._graph, self.model = graph, Model(parameters)
+        self.node = graph.start(Kinematics, parameters)
         self._executor, self._handled = graph.executor, 0
         self._crank = graph.node.create_publisher(JointState, 'crank_states', 100)
         self.listeners = {}
@@ -457,7 +454,7 @@ class Bench:
         if predicate():
             return True
         self._drain()
-        deadline = time.monotonic() + self._patience
+        deadline = time.monotonic() + DEADLINE
         while not predicate():
             if time.monotonic() > deadline:
                 return False
