@@ -123,7 +123,11 @@ class MechanismModel:
             solution.parts['efforts'] = efforts
             is_finite = is_finite and all(map(math.isfinite, efforts))
         if not self._is_plain:
-            self._convert(solution.values, *self._conversions[solution.layout])
+            values, (factors, offsets, wrapped) = (
+                solution.values, self._conversions[solution.layout])
+            values *= factors
+            values += offsets
+            values[wrapped] -= math.tau * np.round(values[wrapped] / math.tau)
         within = self.assembly.within_reach(inputs[0]) if self.assembly.is_limited else ()
         return regular if is_finite and all(within) else self._check_assembly(regular, within)
 
@@ -141,16 +145,8 @@ class MechanismModel:
             regular.has_velocities and bool(np.isfinite(rates).all()),
             regular.has_efforts and bool(np.isfinite(parts['efforts']).all()))
 
-    def _convert(self, values: np.ndarray, factors: np.ndarray, offsets: np.ndarray,
-                 wrapped: np.ndarray) -> None:
-        """Convert joint values, in place, to their published signs, offsets and turns."""
-        with np.errstate(invalid='ignore'):
-            values *= factors
-            values += offsets
-            values[wrapped] -= math.tau * np.round(values[wrapped] / math.tau)
-
     def _conversion(self, layout: np.dtype) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the arguments of `_convert`: factors, offsets, and indices of angles to wrap."""
+        """Return factors and offsets of published values, and the indices of angles to wrap."""
         places = positions, *_ = self._places(layout)
         factors, offsets = np.ones(layout.itemsize // 8), np.zeros(layout.itemsize // 8)
         for indices in places:
