@@ -153,11 +153,13 @@ def limited(subject):
     answers = drawing_accuracy.answers(
         mechanism, np.array([[value, *subject.held] for value in values]), poses)
     for i, value in enumerate(values.tolist()):
-        alone = drawing_accuracy.answers(mechanism, np.array([value, *subject.held]), poses)
+        given = [value, *subject.held] if subject.held else value
+        angles = mechanism.joint_angles(given)
+        alone = {'point': mechanism.solve(given), 'angle': angles, 'slide': angles}
         near = limits(subject, value)
         sides = [side for side in (near.before, near.after) if side]
         for k, out in enumerate(poses):
-            found, single = answers[out][i], alone[out]
+            found, single = answers[out][i], alone[out.what][out.name]
             unit = mechanism.longest if out.what != 'angle' else 1.0
             text = f'{out} at {value!r} is {found}'
             if np.isinf(found).any() or np.isinf(single).any():

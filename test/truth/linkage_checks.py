@@ -462,7 +462,7 @@ def inverse(subject, count=2):
         found, _ = inverse_judge.judge(
             subject.mechanism, output, subject.rng, 4, subject.held)
         for kind, what, *case in found:
-            if kind == 'ordinary' and case:
+            if (kind, what) in (('ordinary', 'lost at'), ('ordinary', 'invented at')):
                 yield f'inverse {what}', f'{output} at {case[2]!r}'
 
 
