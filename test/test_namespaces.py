@@ -33,10 +33,10 @@ def linkage(kind):
         return mechanisms.create('custom', joints=(
             'O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'C crank Q 0.5 geared crank -2 0.3',
             'B dyad A C 2 2 left'))
-    if kind in CASES:
-        return mechanisms.create('custom', joints=CASES[kind].joints, **CASES[kind].numbers)
     if kind in files:
         return scene.load(files[kind]).mechanisms[kind].linkage
+    if kind in CASES:
+        return mechanisms.create('custom', joints=CASES[kind].joints, **CASES[kind].numbers)
     return mechanisms.create(kind)
 
 
