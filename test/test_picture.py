@@ -17,6 +17,7 @@ from ros_harness import Graph, Process
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
+
 # The markers of a leg and its locus, by id.
 LEG_IDS = set(range(9)) - {3, 4, 6}
 
