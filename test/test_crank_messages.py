@@ -145,5 +145,5 @@ def test_inputs_that_nobody_sends_are_said_once(graph, sent, missing):
     hand.moved(['five_bar_crank', 'five_bar_crank2'], [0.4, 0.5])
     graph.all_logged(hand.node, hand.said)
     assert timer.is_canceled() and hand.warnings('was received, without') == [
-        f'crank_states: no position of {missing} was received, without which '
+        f'/crank_states: no position of {missing} was received, without which '
         'five_bar cannot move'] * bool(missing)
