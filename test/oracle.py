@@ -372,6 +372,7 @@ class Listener:
     subscription: object
     kind: type
     drawn: set = field(default_factory=set)
+    deleted: set = field(default_factory=set)
     arrived: list = field(default_factory=list)
 
     def take(self):
@@ -382,6 +383,13 @@ class Listener:
             if taken is None:
                 return
             self.arrived.append(taken[0])
+            for marker in getattr(taken[0], 'markers', ()):
+                if marker.action != Marker.DELETE:
+                    self.deleted.discard(marker.id)
+                elif marker.id in self.deleted:
+                    raise Mismatch(f'marker {marker.id} is deleted once more')
+                else:
+                    self.deleted.add(marker.id)
 
 
 class Bench:

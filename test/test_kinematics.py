@@ -165,7 +165,7 @@ def test_motors_and_passive_joints_share_a_topic_and_nobody_hears_himself(graph)
     assert dict(zip(state.name, state.position, strict=True)) == pytest.approx({
         'left_shin': own['AB'], 'left_ankle': math.remainder(7.0 - own['QB'], math.tau),
         'right_lever': slid['lever'], 'right_slide': -slid['slide']})
-    unknown = ('crank_states: no input is called wheel; the inputs are left_knee_motor, '
+    unknown = ('/joint_states: no input is called wheel; the inputs are left_knee_motor, '
                'right_hip_motor')
     graph.until(lambda: [m for m in heard if m.msg == unknown])
     graph.crank(['left_knee_motor'], 'joint_states')([1.0], answers)

@@ -35,6 +35,17 @@ def test_whatever_happens_the_node_publishes_what_the_library_says(name, seeds):
 FIVE_BAR = {'mechanisms': ['m'], 'm.type': 'five_bar'}
 LEG = {'mechanisms': ['m'], 'm.type': 'jansen'}
 BOTH = {'mechanisms': ['a', 'b'], 'a.type': 'jansen', 'b.type': 'slotted_lever'}
+LOADED = {
+    'a lever': {'mechanisms': ['a', 'b'], 'a.type': 'slotted_lever', 'b.type': 'jansen',
+                'a.loads': ['L=0 -9.81']},
+    'a cylinder': {'mechanisms': ['a', 'b'], 'b.type': 'jansen', 'a.type': 'custom', 'a.joints': [
+        'O ground 0 0', 'Q ground 3 0', 'A cylinder O Q 1.5 left'], 'a.loads': ['A=1 -2'],
+        'a.cylinder.source': 'a_crank'},
+    # Where its two bars lie in one line, no force of the cylinder is large enough.
+    'one of two without bound': {
+        'mechanisms': ['a', 'b'], 'b.type': 'slotted_lever', 'b.loads': ['L=0 -9.81'],
+        'a.type': 'custom', 'a.joints': ['O ground 0 0', 'P ground 1 0', 'B cylinder P O 1 left'],
+        'a.loads': ['OB=-1.0'], 'a.cylinder.source': 'a_crank'}}
 ANKLE = SCENES['rods in space']
 SHORT = {
     'two rods in space': (ANKLE, [*everything(ANKLE), *(
@@ -53,33 +64,19 @@ SHORT = {
         ('listen', 'joint_states', True), message({'a_crank': 0.3})]),
     'an input of two': (FIVE_BAR, [
         *everything(FIVE_BAR), message({'m_crank': 0.5}), message({'m_crank': 0.6}),
-        message({'m_crank2': 0.1})])}
+        message({'m_crank2': 0.1})]),
+    # Efforts are there whoever sets the message off.
+    **{f'loads of {name}': (given, [
+        *everything(given), message({'a_crank': 2.0}), ('compiled',), *(
+            step for i in range(10) for step in (
+                message({'b_crank': 0.1 * i}, [1.0]),
+                message({'a_crank': 2.0 + 0.01 * i}, [1.0])))])
+       for name, given in LOADED.items()}}
 
 
 @pytest.mark.parametrize('parameters, steps', SHORT.values(), ids=SHORT)
 def test_a_short_history_is_published_as_the_library_says(graph, parameters, steps):
     Bench(graph, parameters).run(steps)
-
-
-LOADED = {
-    'a lever': {'mechanisms': ['a', 'b'], 'a.type': 'slotted_lever', 'b.type': 'jansen',
-                'a.loads': ['L=0 -9.81']},
-    'a cylinder': {'mechanisms': ['a', 'b'], 'b.type': 'jansen', 'a.type': 'custom', 'a.joints': [
-        'O ground 0 0', 'Q ground 3 0', 'A cylinder O Q 1.5 left'], 'a.loads': ['A=1 -2'],
-        'a.cylinder.source': 'a_crank'},
-    # Where its two bars lie in one line, no force of the cylinder is large enough.
-    'one of two without bound': {
-        'mechanisms': ['a', 'b'], 'b.type': 'slotted_lever', 'b.loads': ['L=0 -9.81'],
-        'a.type': 'custom', 'a.joints': ['O ground 0 0', 'P ground 1 0', 'B cylinder P O 1 left'],
-        'a.loads': ['OB=-1.0'], 'a.cylinder.source': 'a_crank'}}
-
-
-@pytest.mark.parametrize('parameters', LOADED.values(), ids=LOADED)
-def test_efforts_are_there_whoever_sets_the_message_off(graph, parameters):
-    Bench(graph, parameters).run([
-        *everything(parameters), message({'a_crank': 2.0}), ('compiled',),
-        *(step for i in range(10) for step in (
-            message({'b_crank': 0.1 * i}, [1.0]), message({'a_crank': 2.0 + 0.01 * i}, [1.0])))])
 
 
 PAIR = {'mechanisms': ['a', 'b'], 'a.type': 'jansen', 'b.type': 'peaucellier'}

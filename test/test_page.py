@@ -21,6 +21,7 @@ import numpy as np
 from PIL import Image
 import pytest
 from sensor_msgs.msg import JointState
+from truth.working_modes import lever_of
 from viewer_harness import (
     BLUE,
     coloured,
@@ -28,7 +29,6 @@ from viewer_harness import (
     GREEN,
     LEG,
     LEVER,
-    lever_of,
     needs_browser,
     PURPLE,
     RATE,

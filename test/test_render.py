@@ -88,23 +88,18 @@ def test_an_mp4_has_the_frames_asked_for_and_the_same_bytes_each_time(tmp_path):
     assert re.search(rb'Duration: 00:00:00.60,.*\n.*h264.* 320x240.* 5 fps', raw.stderr)
 
 
-def test_without_ffmpeg_there_is_no_mp4_but_a_reason(tmp_path, monkeypatch, capsys):
-    monkeypatch.setenv('PATH', str(tmp_path))
-    assert main([str(CONFIG / 'jansen.yaml'), '--out', str(tmp_path / 'leg.mp4')]) == 1
-    assert capsys.readouterr().err == ('render: ffmpeg, which writes .mp4, is not installed: apt '
-                                       'install ffmpeg, or choose .gif\n')
-    assert not list(tmp_path.iterdir())
-
-
-def test_why_ffmpeg_fails_is_said(tmp_path, monkeypatch, capsys):
-    failing = tmp_path / 'ffmpeg'
-    failing.write_text('#!/bin/sh\necho no such codec >&2\nexit 1\n')
-    failing.chmod(0o755)
-    monkeypatch.setenv('PATH', str(tmp_path), prepend=os.pathsep)
+@pytest.mark.parametrize('script, said', [
+    ('', 'ffmpeg, which writes .mp4, is not installed: apt install ffmpeg, or choose .gif'),
+    ('#!/bin/sh\necho no such codec >&2\nexit 1\n', 'ffmpeg failed: no such codec')])
+def test_why_there_is_no_mp4_is_said(tmp_path, monkeypatch, capsys, script, said):
+    ffmpeg = tmp_path / 'ffmpeg'
+    ffmpeg.write_text(script)
+    ffmpeg.chmod(0o755 if script else 0o644)
+    monkeypatch.setenv('PATH', str(tmp_path), prepend=os.pathsep if script else None)
     assert main([str(CONFIG / 'jansen.yaml'), '--out', str(tmp_path / 'leg.mp4'), '--frames', '1',
                  '--size', '200x200', '--hide', 'axes,title']) == 1
-    assert capsys.readouterr().err.splitlines()[-1] == 'render: ffmpeg failed: no such codec'
-    assert [*tmp_path.iterdir()] == [failing]
+    assert capsys.readouterr().err.splitlines()[-1] == f'render: {said}'
+    assert [*tmp_path.iterdir()] == [ffmpeg]
 
 
 def test_a_gif_has_the_frames_the_rate_the_loops_and_the_size_asked_for(tmp_path):

@@ -535,7 +535,7 @@ def test_names_of_a_file_stay_names(tmp_path):
 def test_world_of_drake_is_no_second_root(tmp_path):
     base, world = '<link name="base_link"/>', '<link name="world"/>'
     mechanism, = imported(written(tmp_path, 'four_bar.urdf', (base, world + base)))
-    assert mechanism.values == imported('four_bar.urdf')[0].values
+    assert mechanism == imported('four_bar.urdf')[0]
     assert mechanism.frame_id == 'base_link'
     assert 'a URDF has one root link, not 2' in refused(written(
         tmp_path, 'four_bar.urdf', (base, world.replace('world', 'earth') + base)))

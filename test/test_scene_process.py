@@ -3,7 +3,6 @@
 
 """A scene's three nodes in one process: nobody can tell them from three processes."""
 
-import math
 
 from linkage_interfaces.srv import ServoInverse as ServoInverseType
 from linkage_ros.nodes import scene_process
@@ -12,6 +11,7 @@ from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.servo_inverse import ServoInverse
 import pytest
 from sensor_msgs.msg import JointState
+from truth.working_modes import lever_of
 
 LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever', 'lever.crank.speed': 2.0}
 
@@ -28,15 +28,10 @@ def told(message):
     return (stamp.sec, stamp.nanosec), dict(zip(message.name, message.position))
 
 
-def lever_at(crank):
-    """Return the angle of the lever: a crank of 80 stands 150 from its pivot."""
-    return math.atan2(80.0 * math.sin(crank), 150.0 + 80.0 * math.cos(crank))
-
-
 def is_true(message):
     """Tell whether the lever is where the crank in the same message puts it."""
     _, at = told(message)
-    return at['lever_lever'] == pytest.approx(lever_at(at['lever_crank']), abs=1e-14)
+    return at['lever_lever'] == pytest.approx(lever_of(at['lever_crank']), abs=1e-14)
 
 
 def test_a_lever_moves_with_cranks_that_nobody_else_hears(graph, nodes):
@@ -66,7 +61,7 @@ def test_the_service_answers_on_the_working_branch_wherever_the_crank_is(graph, 
     for start in (0.4, 2.9):
         graph.set(driver, lever__crank__start=start, lever__crank__speed=0.0)
         graph.until(lambda start=start: cranks and cranks[-1].position[0] == start)
-        found = graph.call(client, ServoInverseType.Request(lever_angle=[lever_at(0.4)]))
+        found = graph.call(client, ServoInverseType.Request(lever_angle=[lever_of(0.4)]))
         assert found.success and found.servo_angle[0] == pytest.approx(0.4, abs=1e-9)
 
 

@@ -12,17 +12,12 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.nodes.servo_inverse import ServoInverse
 import numpy as np
 import pytest
-from truth.working_modes import five_bar
+from truth.working_modes import five_bar, lever_of
 
 TWO = {'mechanisms': ['left', 'right', 'drop'], 'left.type': 'slotted_lever',
        'right.type': 'slotted_lever', 'right.dimensions.a': 200.0, 'drop.type': 'water_drop'}
 SWEPT = {'mechanisms': ['slotted_lever'], 'slotted_lever.crank.sweep': [-1.3, 0.8]}
 KINDS = [kind for kind in mechanisms.TYPES if len(mechanisms.create(kind).inputs) == 1]
-
-
-def lever_of(servo, a=80.0, b=150.0):
-    """Return the lever angle from the pin's place: the loop closure, written out."""
-    return math.atan2(a * math.sin(servo), b + a * math.cos(servo))
 
 
 def test_each_servo_angle_puts_the_lever_where_it_is_wanted(graph):

@@ -27,11 +27,11 @@ from rcl_interfaces.msg import (
 )
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
+from truth.working_modes import lever_of
 from viewer_harness import (
     example,
     LEG,
     LEVER,
-    lever_of,
     markers_of,
     NODES,
     Page,

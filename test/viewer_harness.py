@@ -62,11 +62,6 @@ def mechanism_of(name, **changed):
     return mechanism, [drive.start for drive in mechanism.inputs.values()]
 
 
-def lever_of(servo, a=80.0, b=150.0):
-    """Return the lever angle from the pin's place: the loop closure, written out."""
-    return math.atan2(a * math.sin(servo), b + a * math.cos(servo))
-
-
 class Show(contextlib.ExitStack):
     """The nodes of a scene and a viewer, at work in a thread of their own."""
 

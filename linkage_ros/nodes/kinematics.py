@@ -162,12 +162,12 @@ class Kinematics(scene_node.SceneNode):
                 (mechanism.model, state) for mechanism in self._mechanisms.values()
                 if (state := self._alone(mechanism.solved, in_scene))))
         for publish, data in outgoing:
-            publish(data)
+            self._alone(publish, data)
 
-    def _alone(self, solve: Callable[[bool], Any], in_scene: bool) -> Any:
-        """Solve a mechanism; report an internal error, which leaves the others alone."""
+    def _alone(self, function: Callable[[Any], Any], argument: Any) -> Any:
+        """Call a function; report an internal error, which leaves other mechanisms alone."""
         try:
-            return solve(in_scene)
+            return function(argument)
         except Exception as error:
             self.report('crank_states', error)
             return None

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The inputs of a five-bar, a parallelogram arm and an excavator, by circles from the output."""
+"""A slotted lever; inputs of a five-bar, an arm and an excavator, by circles from the output."""
 
 import cmath
 
@@ -9,6 +9,11 @@ from . import drawing
 from .cases import cis, cross
 
 LEFT, RIGHT = 1, -1
+
+
+def lever_of(crank, a=80.0, b=150.0):
+    """Return the angle of a slotted lever from the pin's place: the loop closure, written out."""
+    return math.atan2(a * math.sin(crank), b + a * math.cos(crank))
 
 
 def meet(one, radius, other, radius_, side):
