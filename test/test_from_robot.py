@@ -60,6 +60,7 @@ FAULTS = {
         ' is xacro: run xacro first, as in xacro ',
     '<robot name="${name}"/>': ' is xacro: run xacro first, as in xacro ',
     '<robot/>': ': a URDF has one root link, not 0',
+    f'<robot name="r">{AB}</robot>': ': a URDF has one root link, not 2',
     '<sdf/>': ': the SDF has no model with joints',
     '<mujoco><b/></mujoco>': ' cannot be read: ',
     TREE(ABC, '', hinge('j', 'b', 'c')): ": two joints are called 'j'",
@@ -193,6 +194,8 @@ REFUSED = [
     ('four_bar.xml', [('<worldbody>', '<extension><plugin plugin="mujoco.none"/></extension>'
                        '<worldbody>')],
      "four_bar.xml: it uses the plugin 'mujoco.none', which this MuJoCo does not have: remove"),
+    ('four_bar.urdf', [], 'motor, shoulder drive it, and hold each other, as 1 of them tell where '
+     'all is: add --driven motor to the command', '--driven', 'motor', 'shoulder'),
     # What follows a joint that is held is held.
     ('four_bar.urdf', [('<limit', '<mimic joint="elbow"/><limit')], HELD, '--hold', 'elbow=0'),
     # A fold, without motors.
