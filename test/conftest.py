@@ -9,6 +9,10 @@ import contextlib
 import gc
 import math
 import os
+from pathlib import Path
+import runpy
+import shutil
+import subprocess
 
 from domains import Domain
 from hypothesis import settings
@@ -47,6 +51,33 @@ def pytest_collection_finish():
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
     gc.enable()
+
+
+@pytest.fixture(scope='session')
+def kept():
+    """Return the files that git keeps, or would keep."""
+    root = Path(__file__).parents[1]
+    if not shutil.which('git') or not (root / '.git').exists():
+        pytest.skip('no clone')
+    listed = subprocess.run(['git', 'ls-files', '-co', '--exclude-standard'], cwd=root, check=True,
+                            text=True, capture_output=True).stdout.split()
+    return {root / name for name in listed if (root / name).is_file()}
+
+
+@pytest.fixture
+def setup_arguments(monkeypatch):
+    """Return a function that returns what setup.py hands to setup() in a command."""
+    import setuptools
+
+    def arguments(command):
+        found = {}
+        monkeypatch.chdir(Path(__file__).parents[1])
+        monkeypatch.setattr('sys.argv', ['setup.py', command])
+        monkeypatch.setattr(setuptools, 'setup', found.update)
+        runpy.run_path('setup.py')
+        return found
+
+    return arguments
 
 
 @pytest.fixture(scope='module')

@@ -114,7 +114,7 @@ def test_names_that_are_no_inputs_are_said_once(graph):
     hand.moved(['jansen_crank'], [0.7])
     graph.until(lambda: hand.warnings('called wheel'))
     assert hand.warnings('no input is called') == [
-        f'crank_states: no input is called {name}; the inputs are jansen_crank'
+        f'/crank_states: no input is called {name}; the inputs are jansen_crank'
         for name in ('jansen_krank', 'wheel')]
 
 
@@ -165,5 +165,5 @@ def test_inputs_that_nobody_sends_are_said_once(graph, sent, missing):
     hand.moved(['five_bar_crank', 'five_bar_crank2'], [0.4, 0.5])
     graph.all_logged(hand.node, hand.said)
     assert timer.is_canceled() and hand.warnings('was received, without') == [
-        f'crank_states: no position of {missing} was received, without which '
+        f'/crank_states: no position of {missing} was received, without which '
         'five_bar cannot move'] * bool(missing)

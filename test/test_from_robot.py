@@ -117,8 +117,8 @@ POSES = ' must be JOINT=VALUE, its value in rad or m'
     ('four_bar.sdf', ['--driven', 'joint_a'], "there is no joint 'joint_a'; allowed: joint_A, "
      'joint_B, joint_C, joint_D; did you mean joint_A?'),
     ('five_bar.urdf', [], 'no joint of this robot closes a loop'),
-    ('four_bar.sdf', ['--pose', 'joint_D=1'], 'joint_D closes a loop, so that other joints say '
-     'where it is')])
+    ('four_bar.sdf', ['--pose', 'joint_D=1'], 'joint_D closes a loop: its position follows '
+     'from other joints')])
 def test_an_option_that_cannot_be_is_named(file, args, why):
     assert refused(file, *args) == f'from_robot: {why}\n'
 
@@ -609,6 +609,7 @@ def test_the_table_of_messages_has_all_refusals_and_no_others():
     assert len(rows) >= 20
     assert not [each for each in refusals() if each not in known]
     quotes = [quote.strip(' :') for row in rows for quote in re.findall('`(.*?)`', row)]
+    assert len(quotes) > 30
     others = {'add', 'to the command', 'not driven'}
     assert not [quote for quote in quotes if quote not in said and quote not in others
                 and not quote.startswith('m, more')]

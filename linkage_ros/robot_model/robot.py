@@ -438,7 +438,7 @@ def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
     """Return a robot with some joints moved; raise RequestError for an unknown joint."""
     robot.check_names(values)
     if cuts := sorted(values.keys() - robot.tree_joints):
-        raise RequestError(f'{cuts[0]} closes a loop, so that other joints say where it is')
+        raise RequestError(f'{cuts[0]} closes a loop: its position follows from other joints')
     moves = {}
     for body, (base, joint) in robot.spanning_tree()[0].items():
         if joint.name in values and joint.position is not None:

@@ -164,7 +164,7 @@ class SceneMechanism:
 
     @cached_property
     def ends(self) -> list[Optional[Arc]]:
-        """Return the sweeps that a user has set, before scale; None: no limit but the reach."""
+        """Return the sweeps that a user has set, before scale, and None for other inputs."""
         return [settings.ends and (settings.ends[0] / scale, settings.ends[1] / scale)
                 for settings, scale in zip(self.inputs.values(), self.scales)]
 
@@ -209,7 +209,7 @@ class SceneMechanism:
 
     @property
     def tracer(self) -> str:
-        """Return the joint that draws the locus: the tracer if in `points`, else their last."""
+        """Return the joint that draws the locus, the tracer if in `points`, else their last."""
         return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
 
 
