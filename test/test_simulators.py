@@ -24,7 +24,8 @@ FOLDS = {'water_drop'}
 def simulated(name):
     """Return a mechanism of about a metre that starts in the middle of its reach."""
     one = {**MACHINES, **OWN}[name]()
-    given = {**one.values, 'm.scale': one.scale / bodies.size(one)}
+    given = {**{each.name: each.value for each in one.parameters if each.value != ()},
+             'm.scale': one.scale / bodies.size(one)}
     one = scene.read({'mechanisms': ['m'], **given}).mechanisms['m']
     rows = drives(one)
     given.update((f'm.{key}.start', value) for key, value in zip(

@@ -17,8 +17,7 @@ from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Optional, Seque
 import numpy as np
 
 from .shapes import Piece
-from ..cli import RequestError
-from ..words import listed, meant
+from ..words import listed, meant, RequestError
 
 HINGE, SLIDE, BALL, FIXED, UNIVERSAL, FREE = (
     'hinge', 'slide', 'ball', 'fixed', 'universal', 'free')
