@@ -564,10 +564,11 @@ def undecided(seed):
     if made is None:
         return None
     robot, kind = made[2], rng.integers(3)
+    names = [name for name in robot.positions if name in robot.tree_joints]
     if kind == 0:
-        robot.driven = robot.driven[1:] + [*robot.positions][:not robot.driven[1:]]
+        robot.driven = robot.driven[1:] + names[:not robot.driven[1:]]
     if kind == 1:
-        robot.driven = [*dict.fromkeys([*robot.driven, *rng.permutation([*robot.positions])[:1]])]
+        robot.driven = [*dict.fromkeys([*robot.driven, *rng.permutation(names)[:1]])]
     return posed(robot, {name: float(rng.uniform(-0.5, 0.5)) for name in robot.tree_joints
                          if kind == 2 and name in robot.positions})
 
