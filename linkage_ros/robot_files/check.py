@@ -142,9 +142,8 @@ class _Loops:
                             if published({name: mechanism}) & component.positions.keys()]
         self._motors = {name: robot.source(name) for made in parts for name in made.driven}
         # Where each source starts, and between which positions it moves.
-        self._start = {drive.source: robot.positions.get(
-            drive.source, (drive.start - drive.offset) / drive.ratio)
-            for mechanism in self._mechanisms for drive in mechanism.inputs.values()}
+        self._start = {drive.source: robot.positions[drive.source]
+                       for mechanism in self._mechanisms for drive in mechanism.inputs.values()}
         self._ends: Ranges = {}
         for source, ends in (item for made in parts for item in made.ends.items()):
             low, high = self._ends.get(source, ends)
