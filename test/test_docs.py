@@ -97,7 +97,7 @@ def test_every_word_has_its_drawing_with_the_very_lines_that_it_shows():
     shown = {name: lines.splitlines() for name, lines in rows}
     assert len(rows) == len(shown) and set(shown) == set(mechanisms)
     for name, lines in shown.items():
-        written = mechanisms[name].values[f'{name}.joints']
+        written = mechanisms[name].linkage.design.joints
         assert lines == [line for line in written if line in lines]
         assert lines[-1] == written[-1]
     drawn = {part for lines in shown.values() for part in lines[-1].split()}

@@ -17,8 +17,7 @@ from linkage_ros import scene
 from linkage_ros.robot_model import rviz
 import numpy as np
 import pytest
-
-yaml = pytest.importorskip('yaml')
+import yaml
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / 'config'
@@ -214,16 +213,6 @@ def test_what_cannot_be_is_refused_with_what_is_allowed():
             ('use_sim_time', '', '"use_sim_time" .*"" is not valid')):
         with pytest.raises(RuntimeError, match=complaint):
             started(**{name: text})
-
-
-def test_viewers_that_are_launched_together_take_ports_of_their_own(graph):
-    viewer = pytest.importorskip('linkage_ros.web.viewer')
-    ports = [int(re.search(r':(\d+)/$', graph.start(
-        viewer.Viewer, {'or_any_port': True}, namespace=space).url)[1])
-        for space in ('left', 'right')]
-    assert ports[0] != ports[1]
-    with pytest.raises(scene.SceneError, match='address already in use'):
-        graph.start(viewer.Viewer, {'port': ports[0]})
 
 
 ROBOT, ROBOTS = LAUNCH.with_name('robot.launch.py'), Path(__file__).with_name('robot_files')

@@ -12,11 +12,11 @@ from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Sequence, Tu
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 
-from . import joint_state_reader, scene_node, shutdown
+from . import scene_node, shutdown
 from .log import MAX_NAMES, Once
 from .mechanism_model import MechanismModel
 from .mechanism_topics import MechanismTopics
-from .message_layout import NEVER
+from .message_layout import NEVER, subscribe
 from .scene_joint_states import SceneJointStates
 from .. import scene
 from ..robot_model import bodies, urdf
@@ -69,7 +69,7 @@ class Kinematics(scene_node.SceneNode):
             clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
         self._log_machine_code()
-        joint_state_reader.subscribe(self, 'crank_states', self._interpret, self._receive)
+        subscribe(self, 'crank_states', self._interpret, self._receive)
 
     def _log_machine_code(self) -> None:
         """Log why there is no machine code for the legs of walkers, if there is none."""
@@ -155,13 +155,22 @@ class Kinematics(scene_node.SceneNode):
         """Publish mechanisms at their present inputs, and the joint states of the scene."""
         in_scene = self._scene_joint_states.joint_states.has_subscribers
         # Solving all before publishing any takes less time: the caches of the CPU are small.
-        outgoing = [message for mechanism in moved for message in mechanism.outgoing(in_scene)]
+        outgoing = [message for mechanism in moved
+                    for message in self._alone(mechanism.outgoing, in_scene) or ()]
         if in_scene:
             outgoing += self._scene_joint_states.outgoing(self._stamp, tuple(
                 (mechanism.model, state) for mechanism in self._mechanisms.values()
-                if (state := mechanism.solved(in_scene))))
+                if (state := self._alone(mechanism.solved, in_scene))))
         for publish, data in outgoing:
             publish(data)
+
+    def _alone(self, solve: Callable[[bool], Any], in_scene: bool) -> Any:
+        """Solve a mechanism; report an internal error, which leaves the others alone."""
+        try:
+            return solve(in_scene)
+        except Exception as error:
+            self.report('crank_states', error)
+            return None
 
     def _interpret(self, message: JointState) -> Routes:
         """Return the inputs that a sender's messages set, and the mechanisms that they move."""
