@@ -510,13 +510,19 @@ static inline void lkr_copy(int n, const lkr_real *from, lkr_real *to)
 static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, const lkr_real *position)
 {
     const int n = model->inputs;
-    lkr_point p;
-    lkr_real q[LKR_MAX_INPUTS];
+    lkr_point p = m->point;
+    lkr_real q[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS];
+    int is_there;
     if (!lkr_are_finite(n, position)) {
         return LKR_NOT_KNOWN;
     }
+    /* Where it is already it stays, whatever rounding says; but a command has to be in the sweeps. */
+    is_there = m->newest != LKR_NEITHER
+        && lkr_gap(model, side, position, &p, gap) <= LKR_ENOUGH
+        && lkr_bring(model, side, m->q, m->q, q) == 0;
     memcpy(q, m->q, sizeof q);
-    if (!lkr_inverse(model, side, position, q, &p) || !lkr_are_finite(n, p.position[1 - side])) {
+    if ((!is_there && !lkr_inverse(model, side, position, q, &p))
+        || !lkr_are_finite(n, p.position[1 - side])) {
         return LKR_OUT_OF_REACH;
     }
     m->newest = side;
@@ -674,8 +680,7 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     const float v48 = sqrtf((v41 * v41) + (v45 * v45));
     const float v49 = v41 / v48;
     const float v56 = v45 / v48;
-    const float v74 = k73 + v32;
-    const float v81 = lkr_root(v74, k80);
+    const float v81 = lkr_root(k73 + v32, k80);
     const float v88 = ((length_a * (k82 + (k83 * v31))) / v33) + 0.0f;
     p->L_x = v49 * k54;
     p->L_y = k2 + (v56 * k54);
@@ -685,7 +690,7 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     by_crank->L_y = (v88 * v49) * k54;
     by_crank->angle_lever = v88;
     by_crank->slide_slide = (-((((v7 * 0.5f) * v9) * 2.0f) * k30)) / (2.0f * v81);
-    const float valid = lkr_valid_where(0.0f, v74, k80);
+    const float valid = 0.0f;
     return isfinite(valid);
 }
 

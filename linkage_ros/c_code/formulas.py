@@ -66,6 +66,9 @@ class Formulas:
         structure = self._linkage.structure
         blocks = [(about, self._assigned(outputs)) for about, outputs in self._groups()]
         limits = [limit for limit in structure.built.limits if limit.margin.varies]
+        if len(self.inputs) == 1 and self._linkage.inputs[0].is_whole(self._linkage.reach()):
+            # It can be assembled at any input, whatever rounding says.
+            limits = []
         valid = real(0.0)
         for limit in limits:
             valid = valid_where(valid, limit.margin, limit.tolerance)

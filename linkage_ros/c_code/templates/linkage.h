@@ -491,13 +491,19 @@ static inline void lkr_copy(int n, const lkr_real *from, lkr_real *to)
 static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, const lkr_real *position)
 {
     const int n = model->inputs;
-    lkr_point p;
-    lkr_real q[LKR_MAX_INPUTS];
+    lkr_point p = m->point;
+    lkr_real q[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS];
+    int is_there;
     if (!lkr_are_finite(n, position)) {
         return LKR_NOT_KNOWN;
     }
+    /* Where it is already it stays, whatever rounding says; but a command has to be in the sweeps. */
+    is_there = m->newest != LKR_NEITHER
+        && lkr_gap(model, side, position, &p, gap) <= LKR_ENOUGH
+        && lkr_bring(model, side, m->q, m->q, q) == 0;
     memcpy(q, m->q, sizeof q);
-    if (!lkr_inverse(model, side, position, q, &p) || !lkr_are_finite(n, p.position[1 - side])) {
+    if ((!is_there && !lkr_inverse(model, side, position, q, &p))
+        || !lkr_are_finite(n, p.position[1 - side])) {
         return LKR_OUT_OF_REACH;
     }
     m->newest = side;
