@@ -4,6 +4,7 @@
 """A slotted lever; inputs of a five-bar, an arm and an excavator, by circles from the output."""
 
 import cmath
+import math
 
 from . import drawing
 from .cases import cis, cross
