@@ -5,7 +5,8 @@
 The segments of the reach on which an output is monotone: candidates of one unknown input.
 
 Special inputs cut the reach: ends, dead points, extremes of the output and its jumps. Between two
-of them the output has each value of its range once; docs/design/accuracy.md has the rule for its ends.
+of them the output has each value of its range once. The rule for its ends is in
+docs/design/accuracy.md.
 """
 
 from __future__ import annotations
