@@ -240,7 +240,7 @@ class Robot:
 
     def spanning_tree(self) -> tuple[dict[str, tuple[str, Joint]], list[Joint]]:
         """Return the parent and the joint of each body, and the joints that close loops."""
-        # Of each body all that are joined to it.
+        # Of each body all that are joined to it; the fewer are added to the more.
         joined, cuts = {body: {body} for body in self.frames}, []
         near: dict[str, list[tuple[str, Joint]]] = {body: [] for body in self.frames}
         for joint in sorted(self.joints, key=lambda joint: (
@@ -249,6 +249,7 @@ class Robot:
             if joint.is_cut or first is second:
                 cuts.append(joint)
                 continue
+            first, second = sorted((first, second), key=len, reverse=True)
             first |= second
             joined.update(dict.fromkeys(second, first))
             for body, other in (joint.bodies, joint.bodies[::-1]):
