@@ -200,11 +200,9 @@ class MechanismModel:
 def _shown(mechanism: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
     """Return the markers' points and, by marker id, the point indices of each line or plate."""
     linkage, names = mechanism.linkage, mechanism.points
-    turned = {f'{name}_origin' for name in mechanism.inputs}
-    cranks, plates, marks, drawn = (
-        [bar for bar in linkage.bars if bar[0] in turned], [], [], []
-    ) if mechanism.in_space else (
-        shapes.cranks(linkage), shapes.plates(linkage, names), shapes.marks(linkage, names),
+    cranks = shapes.cranks(linkage)
+    plates, marks, drawn = ([], [], []) if mechanism.in_space else (
+        shapes.plates(linkage, names), shapes.marks(linkage, names),
         shapes.drawn(mechanism, names))
     # The edges of a plate are not drawn as bars, too: the message is smaller.
     edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}

@@ -107,8 +107,14 @@ def drawn(mechanism: SceneMechanism, names: Collection[str]) -> List[Shape]:
 
 def cranks(linkage: Mechanism) -> List[Tuple[str, str]]:
     """Return the bars that inputs turn, from centre to pin."""
-    names = [input_.name for input_ in linkage.inputs if input_.turns]
-    return [(link.joint, link.tip) for link in linkage.links if link.name in names]
+    in_space = len(linkage.axes) > 2
+    names = [input_.name for input_ in linkage.inputs if input_.turns or in_space]
+    links = [link for link in linkage.links if link.name in names]
+    if in_space:
+        # A link has no tip there: rods end on it.
+        centres = {link.joint for link in links}
+        return [bar for bar in linkage.bars if bar[0] in centres]
+    return [(link.joint, link.tip) for link in links]
 
 
 def plates(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, str, str]]:
