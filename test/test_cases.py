@@ -150,33 +150,6 @@ def test_a_rack_steers_both_wheels_alike_and_the_inner_one_more():
 # --- gears, strokes and rails, asked where they are awkward --------------------------------------
 
 
-def test_a_cylinder_may_close_to_nothing():
-    boom = mechanisms.create('custom', joints=[
-        'O ground 0 0', 'P ground 0.5 0', 'B cylinder P O 0.5 left'])
-    assert boom.reach() == [(0.0, 1.0)] and boom.dead_points() == [0.0, 1.0]
-    length = np.array([0.0, 0.02, 0.3, 0.99, 1.0])
-    np.testing.assert_allclose(np.hypot(*(boom.solve(length)['B'] - (0.5, 0.0)).T), length,
-                               rtol=1e-14, atol=1e-16)
-    np.testing.assert_allclose(np.abs(boom.joint_angles(length)['OB']),
-                               2.0 * np.arcsin(length), rtol=1e-14)
-
-
-def test_a_rail_that_does_not_begin_at_its_joint_carries_a_motor():
-    rail = mechanisms.create('custom', joints=[
-        'O ground 0 0', 'X ground 0 2', 'R carriage O along X -0.7 -0.2', 'L block R -0.5 0.1',
-        'A crank R 0.3 zero L', 'S carriage R along L 0.1 0.2', 'B dyad S A 0.3 0.3 left'])
-    assert [input_.name for input_ in rail.inputs] == ['carriage', 'crank', 'carriage2']
-    assert rail.reach(0.4, 0.15) == [(-0.7, -0.2)] and rail.dead_points(0.4, 0.15) == []
-    place = {name: at @ (1, 1j) for name, at in rail.solve([-0.4, 0.4, 0.15]).items()}
-    along = -0.5j - 0.1
-    assert place['R'] == -0.4j and place['L'] == pytest.approx(-0.4j + along, rel=1e-15)
-    assert place['A'] - place['R'] == pytest.approx(
-        0.3 * np.exp(0.4j) * along / abs(along), rel=1e-15)
-    for by, rate in enumerate((1j, 0.0, 0.0)):
-        assert rail.velocity([-0.4, 0.4, 0.15], by=by)['L'] @ (1, 1j) == rate
-    np.testing.assert_allclose(rail.input_for('B.y', place['B'].imag, others=(0.4, 0.15)), [-0.4])
-
-
 def test_a_carriage_alone_is_a_linkage():
     rail = ['O ground 0 0', 'X ground 1 0', 'R carriage O along X -0.2 0.7']
     assert mechanisms.create('custom', joints=rail).extremes('R.x') == [((-0.2, -0.2), (0.7, 0.7))]

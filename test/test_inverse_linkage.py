@@ -62,12 +62,6 @@ def test_an_input_that_there_is_not_is_refused(by):
             ask((1.0, 2.0), None, by)
 
 
-def test_one_input_may_be_asked_for_as_several_are():
-    leg = mechanisms.create('jansen')
-    assert [answer.inputs for answer in leg.inputs_for(('G.x',), (-31.0,))] == [
-        (theta,) for theta in leg.input_for('G.x', -31.0)]
-
-
 def test_an_output_that_only_rounding_moves_has_no_answers():
     # The corner is the pivot itself, and the mirror's line has no length.
     linkage = custom('A ground 0 0', 'B ground -0.803093 2.0884554493679546',

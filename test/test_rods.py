@@ -357,17 +357,6 @@ def test_the_reach_of_one_rod_ends_where_it_is_stretched():
     assert np.allclose(linkage.dead_points(), (low, high))
 
 
-def test_in_a_plane_a_rod_is_a_dyad():
-    space = made(('out hinge ground at 3 0 0 axis 0 0 1', 'crank motor ground at 0 0 0 axis 0 0 1',
-                  'R rod crank 1 0 0.5 out 3 2 0.5 length 2.5'))
-    flat = mechanisms.create('custom', joints=(
-        'O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'B dyad A Q 2.5 2 left'))
-    theta = np.linspace(-3.0, 3.0, 101)
-    turned = space.joint_angles(theta, ['out'])['out'] + 0.5 * math.pi
-    assert np.abs(np.exp(1j * turned) - np.exp(1j * flat.joint_angles(theta, ['QB'])['QB'])
-                  ).max() < 1e-14
-
-
 @pytest.mark.parametrize('lines, problem', [
     ((*G1, 'S rod pitch 0.1 0 0 left 0.1 0 0.2'),
      'all joints between its ends are placed already'),
