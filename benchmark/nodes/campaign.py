@@ -97,7 +97,7 @@ class Bench:
         ready = self.ready(scene)
         subject.Floor.ready = subject.ready(pickle.loads(ready.read_bytes()))
         kinds = ['kinematics', 'floor', *BESIDE.get(scene, ())]
-        given = [Parameter(name, value=value) for name, value in scenes.given(scene).items()]
+        given = [Parameter(name, value=value) for name, value in scenes.SCENES[scene].items()]
         nodes = {kind: subject.KINDS[kind](
             namespace=f'/{kind}', parameter_overrides=given) for kind in kinds}
         ears = [Process(kind, *SUBJECT, 'ear', '--ready', str(ready)) for kind in kinds]
