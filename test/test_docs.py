@@ -10,6 +10,8 @@ import re
 import sys
 import textwrap
 
+from benchmark import calls, document
+from benchmark.nodes import report
 from linkage_ros import mechanisms, scene
 from linkage_ros.linkage import joint_lines, Mechanism
 import pytest
@@ -25,10 +27,9 @@ FENCE = re.compile(r'^```(\w*)\n(.*?)^```', re.MULTILINE | re.DOTALL)
 
 
 @pytest.fixture
-def catalogue(monkeypatch):
+def catalogue():
     for module in ('matplotlib', 'yaml'):
         pytest.importorskip(module)
-    monkeypatch.syspath_prepend(ROOT / 'docs')
     import catalogue
     return catalogue
 
@@ -169,19 +170,9 @@ def test_text_of_a_docstring_becomes_markdown(catalogue):
         'What it is.', '```text\nY line\n```', r'In a\*b\*c \<d\> \[e\] `f*g`: √(θ²) → \|h\|']
 
 
-@pytest.fixture
-def measured(monkeypatch):
-    pytest.importorskip('mpmath')
-    monkeypatch.syspath_prepend(ROOT)
-    import benchmark.document
-    import benchmark.nodes.report
-    return benchmark
-
-
-def test_what_a_scene_costs_is_what_was_measured(measured):
+def test_what_a_scene_costs_is_what_was_measured():
     results = json.loads((ROOT / 'benchmark' / 'results' / 'nodes.json').read_text())
-    made = measured.nodes.report.document(results).strip()
-    assert measured.document.written('design/performance.md') == made
+    assert document.written('design/performance.md') == report.document(results).strip()
 
 
 def test_what_is_measured_is_of_a_commit():
@@ -242,8 +233,7 @@ def test_every_file_that_the_architecture_names_is_there():
             'linkage_ros/mechanisms/roberts.py', 'config/roberts.yaml'}
 
 
-def test_every_call_that_the_pages_show_is_timed(measured, tmp_path, monkeypatch):
-    from benchmark import calls, document
+def test_every_call_that_the_pages_show_is_timed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shown = [[page, f'`{calls.short(call)}`'] for page, code in calls.code_of_pages().items()
              for call, _ in calls.calls(code)]
