@@ -4,7 +4,6 @@
 """The package as colcon, pip and a reader of the changelog see it."""
 
 import configparser
-import hashlib
 from importlib.metadata import EntryPoint
 import json
 import os
@@ -41,16 +40,6 @@ def test_all_files_name_one_package_and_version():
     urls = [{url.get('type'): url.text for url in each.iter('url')}
             for each in (of_ros, of_services)]
     assert urls[0] == urls[1] and set(urls[0]) == {'website', 'repository', 'bugtracker'}
-
-
-def test_every_source_begins_with_its_licence(kept):
-    tags = 'FileCopyrightText: 2026 linkage_ros contributors', r'License-Identifier: Apache-2\.0'
-    notice = re.compile(r'(#!.*\n)?' + ''.join(rf'\W*SPDX-{tag}' for tag in tags))
-    sources = [file for file in kept if 'vendor' not in file.parts and file.suffix in (
-        '.py', '.c', '.cpp', '.hpp', '.h', '.cmake', '.js')]
-    assert len(sources) > 300
-    # Printed by a command.
-    assert [file.name for file in sources if not notice.match(file.read_text())] == ['lever.h']
 
 
 def without_comments(text):
@@ -97,7 +86,9 @@ def pins(file):
 def test_all_that_make_installs_is_locked_with_hashes():
     makefile, script = ((ROOT / name).read_text() for name in ('Makefile', 'wheels/install.sh'))
     assert not re.search(r'pip\b.* install', makefile)
-    assert len(re.findall(r'pip install', script)) == 1 and '--require-hashes' in script
+    # Given an extra, pip 23.2 looks for the newest release, whatever is pinned: hence --no-deps.
+    assert re.findall(r'pip install.*', script) == [
+        'pip install -q --no-deps --require-hashes --no-build-isolation "$@" \\']
     locked = {file: pins(file) for file in (ROOT / 'wheels' / 'lock').glob('*.txt')}
     assert all(found and all(hashed for *_, hashed in found) for found in locked.values())
     direct = [*(ROOT / 'wheels').glob('*.txt'), ROOT / 'docs' / 'requirements.txt',
@@ -162,9 +153,6 @@ def test_a_wheel_has_the_library_and_the_page_and_no_commands(copy, tmp_path):
     '--base-paths src src/linkage_ros/linkage_interfaces'])
 def test_the_ordinary_colcon_build_of_a_workspace_is_enough(copy, tmp_path, layout):
     pytest.importorskip('rclpy')
-    is_named = 'linkage_interfaces' in layout
-    if is_named:
-        depend_on_the_interfaces(tmp_path / 'src' / 'asker')
     # What building against wheels needs besides.
     flags = [f'-DCMAKE_PREFIX_PATH={sys.prefix}', f'-DPython3_EXECUTABLE={sys.executable}',
              f'-DCMAKE_PROJECT_INCLUDE={ROOT}/wheels/prefix.cmake', '-DBUILD_TESTING=OFF']
@@ -182,7 +170,6 @@ print(servo_inverse.__file__, ServoInverse.__module__)' && echo $AMENT_PREFIX_PA
     ended = subprocess.run(['bash', '-c', script], cwd=tmp_path, env=clean, timeout=300,
                            text=True, capture_output=True)
     assert ended.returncode == 0, ended.stderr
-    assert (tmp_path / 'install' / 'asker').exists() == is_named
     module, prefixes = ended.stdout.splitlines()
     assert module.startswith(str(tmp_path))
     assert module.endswith('linkage_interfaces.srv._servo_inverse')
@@ -190,22 +177,6 @@ print(servo_inverse.__file__, ServoInverse.__module__)' && echo $AMENT_PREFIX_PA
                    for file in Path(prefix, 'lib', 'linkage_ros').glob('*')}
     assert executables == {'c_code', 'crank_driver', 'from_robot', 'kinematics', 'render', 'scene',
                            'servo_inverse', 'transmission', 'urdf', 'viewer'}
-
-
-def depend_on_the_interfaces(asker):
-    """Write a package that depends on the nested one."""
-    asker.mkdir()
-    manifest = (ROOT / 'linkage_interfaces' / 'package.xml').read_text()
-    needs = '<name>asker</name><depend>linkage_interfaces</depend>'
-    (asker / 'package.xml').write_text(re.sub(
-        '<(member_of_group|build_depend|exec_depend|depend)>.*', '', manifest).replace(
-            '<name>linkage_interfaces</name>', needs))
-    (asker / 'CMakeLists.txt').write_text("""\
-        cmake_minimum_required(VERSION 3.10)
-        project(asker)
-        find_package(ament_cmake REQUIRED)
-        find_package(linkage_interfaces REQUIRED)
-        ament_package()""")
 
 
 def wrapped(folder, *lines):
@@ -249,33 +220,6 @@ def test_the_build_says_in_one_line_that_there_is_no_python(copy, tmp_path):
         (tmp_path / command).symlink_to(shutil.which(command))
     said = only_line(['make', 'build'], copy, {'PATH': str(tmp_path)})
     assert 'No Python from 3.10 to 3.14 was found' in said
-
-
-@pytest.mark.nightly
-def test_a_release_that_is_newer_than_the_lock_file_is_not_installed(tmp_path):
-    # Given an extra, pip 23.2 looks for the newest release, whatever is pinned.
-    for name, version, says in (('asks', '1', 'Requires-Dist: asked[more]'),
-                                ('asked', '1', 'Provides-Extra: more'),
-                                ('asked', '2', 'Provides-Extra: more')):
-        about = f'{name}-{version}.dist-info'
-        with zipfile.ZipFile(tmp_path / f'{name}-{version}-py3-none-any.whl', 'w') as wheel:
-            wheel.writestr(f'{about}/METADATA',
-                           f'Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n{says}\n')
-            wheel.writestr(f'{about}/WHEEL', 'Wheel-Version: 1.0\nTag: py3-none-any\n')
-            wheel.writestr(f'{about}/RECORD', '')
-    lock = tmp_path / 'lock.txt'
-    lock.write_text(''.join(
-        f'{name}==1 --hash=sha256:{hashlib.sha256(file.read_bytes()).hexdigest()}\n'
-        for name in ('asks', 'asked') for file in tmp_path.glob(f'{name}-1-*')))
-    (tmp_path / 'bin').mkdir()
-    wrapped(tmp_path / 'bin')
-    ended = subprocess.run(
-        [ROOT / 'wheels/install.sh', sys.executable, tmp_path, lock], text=True, timeout=60,
-        capture_output=True, env={**os.environ, 'PIP_TARGET': str(tmp_path / 'made'),
-                                  'PIP_NO_INDEX': '1', 'PIP_FIND_LINKS': str(tmp_path)})
-    assert ended.returncode == 0, ended.stderr
-    assert {file.name for file in (tmp_path / 'made').iterdir()} == {
-        'asks-1.dist-info', 'asked-1.dist-info'}
 
 
 @pytest.mark.nightly
