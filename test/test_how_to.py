@@ -68,14 +68,13 @@ class Reader:
 
     def _type(self, line, printed):
         line, _, file = line.replace('$PWD', str(Path.cwd())).partition(' > ')
-        words = shlex.split(line.removeprefix('timeout 5 ').removesuffix(' &'))
+        words = shlex.split(re.sub(r'timeout 5 | --once| -r \d+| &$', '', line))
         match words:
             case ['make' | 'rviz2', *_] | ['ros2', 'launch', *_]:
                 return None  # whether there is such a thing is known to test_docs.py
-            case ['ros2', 'topic', 'echo', '--once', topic]:
+            case ['ros2', 'topic', 'echo', topic]:
                 return self._echo(topic, wait=not line.endswith('&'))
-            case ['ros2', 'topic', 'pub', '--once', topic, type_, text] | \
-                    ['ros2', 'topic', 'pub', '-r', _, topic, type_, text]:
+            case ['ros2', 'topic', 'pub', topic, type_, text]:
                 publisher = self._graph.node.create_publisher(message_type(type_), topic, 10)
                 message = message_type(type_)(**yaml.safe_load(text))
                 return self._graph.until(lambda: self.received or publisher.publish(message))[0]

@@ -11,7 +11,7 @@ from unittest.mock import Mock
 
 from hypothesis import given, settings, strategies as st
 from linkage_ros import palette, scene
-from linkage_ros.cli import chosen, Parser, RequestError, run
+from linkage_ros.cli import RequestError, run
 from linkage_ros.optional import needs
 from linkage_ros.words import elided, listed, meant, plain_text, quoted, sentence
 import numpy as np
@@ -118,39 +118,14 @@ def test_a_reader_that_has_gone_ends_a_command_quietly_and_a_full_disk_with_a_se
             assert (ended.returncode, ended.stderr) == (code, text)
 
 
-def test_a_file_that_is_not_there_is_suggested_by_its_name(capsys, tmp_path, monkeypatch):
+def test_a_file_that_is_not_there_is_suggested_by_its_name(capsys, tmp_path):
     (tmp_path / 'scene.yaml').touch()
-    monkeypatch.chdir(tmp_path)
-    for folder, end in ((f'{tmp_path}/', '; did you mean scene.yaml?'), ('none/', ''),
-                        ('', '; did you mean scene.yaml?')):
-        run('draw', lambda arguments: open(*arguments), [f'{folder}scen.yaml'])
-        assert capsys.readouterr().err == (
-            f'draw: {folder}scen.yaml: No such file or directory{end}\n')
-    run('draw', Mock(side_effect=PermissionError(13, 'no', 'scen.yaml')), [])
-    assert capsys.readouterr().err == 'draw: scen.yaml: no\n'
-
-
-def test_a_parser_names_the_option_that_was_meant():
-    parser = Parser('draw')
-    parser.add_argument('file', nargs='?')
-    parser.add_argument('--scale')
-    assert parser.parse_args(['x', '--scale', '2']).scale == '2'
-    for arguments, text in (
-            (['x', '--skale'], 'unrecognized arguments: --skale; did you mean --scale?'),
-            (['x', '-q', 'y'], 'unrecognized arguments: -q y'),
-            (['--scale'], 'argument --scale: expected one argument')):
-        with pytest.raises(RequestError) as refused:
-            parser.parse_args(arguments)
-        assert str(refused.value) == text
-
-
-def test_mechanisms_are_chosen_by_their_names_in_order():
-    mechanisms = scene.read({'mechanisms': ['klann', 'watt']}).mechanisms
-    assert [each.name for each in chosen(mechanisms, [])] == ['klann', 'watt']
-    assert [each.name for each in chosen(mechanisms, ['watt', 'klann'])] == ['watt', 'klann']
-    with pytest.raises(RequestError, match=r"^there is no mechanism 'wat'; allowed: klann, watt; "
-                       r'did you mean watt\?$'):
-        chosen(mechanisms, ['klann', 'wat'])
+    for error, end in (
+            (FileNotFoundError(2, 'no', f'{tmp_path}/scen.yaml'), '; did you mean scene.yaml?'),
+            (FileNotFoundError(2, 'no', 'none/scen.yaml'), ''),
+            (PermissionError(13, 'no', f'{tmp_path}/scen.yaml'), '')):
+        run('draw', Mock(side_effect=error), [])
+        assert capsys.readouterr().err == f'draw: {error.filename}: no{end}\n'
 
 
 def test_a_package_that_another_one_needs_is_the_one_at_fault():
