@@ -257,14 +257,12 @@ def test_ros2_control_moves_the_motors_of_the_scene(graph, reader):
 
 
 @pytest.mark.nightly
-def test_what_is_typed_without_the_ros2_command_line_works_as_written():
-    code, = (text for _, language, text in BLOCK.findall((DOCS / 'install.md').read_text())
-             if language == 'python' and 'rclpy' in text)
+def test_the_example_without_the_ros2_command_line_works():
     running = Process('scene', ROOT / 'config' / 'all.yaml')
     try:
         done = subprocess.run(
-            [sys.executable, '-c', code], text=True, capture_output=True, timeout=60.0,
-            env={**os.environ, 'ROS_DOMAIN_ID': str(running.domain)})
+            [sys.executable, ROOT / 'examples' / 'without_ros2.py'], text=True,
+            capture_output=True, timeout=60.0, env={**os.environ, 'ROS_DOMAIN_ID': str(running.domain)})
     finally:
         running.interrupt(signal.SIGINT)
         running.end()
