@@ -262,7 +262,8 @@ def test_the_example_without_the_ros2_command_line_works():
     try:
         done = subprocess.run(
             [sys.executable, ROOT / 'examples' / 'without_ros2.py'], text=True,
-            capture_output=True, timeout=60.0, env={**os.environ, 'ROS_DOMAIN_ID': str(running.domain)})
+            capture_output=True, timeout=60.0,
+            env={**os.environ, 'ROS_DOMAIN_ID': str(running.domain)})
     finally:
         running.interrupt(signal.SIGINT)
         running.end()
