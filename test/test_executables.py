@@ -162,21 +162,3 @@ def test_a_signal_while_a_message_is_published_is_no_failure():
         sys.exit(run([Ended], 'ended', args=[]))
         """)], cwd=ROOT, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0 and 'Traceback' not in done.stderr
-
-
-@pytest.mark.nightly
-def test_the_library_works_where_there_is_no_ros():
-    done = subprocess.run([sys.executable, '-c', textwrap.dedent("""
-        import sys
-        sys.modules['rclpy'] = None
-        from linkage_ros import scene
-        from linkage_ros.scene import motion
-        mechanism = scene.read({}).mechanisms['jansen']
-        assert mechanism.assembly().solution(('G',)).rows.shape == (1, 2)
-        assert motion.Motion(1.0).at(10 ** 9) == (1.0, 1.0)
-        try:
-            import linkage_ros.nodes.kinematics
-        except ImportError as error:
-            print(error.name.partition('.')[0])
-        """)], cwd=ROOT, capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stdout) == (0, 'rclpy\n'), done.stderr
