@@ -49,7 +49,7 @@ def without_comments(text):
 PROMISES = [(ROOT / name).read_text() for name in ('README.md', 'CONTRIBUTING.md')]
 SCRIPT, WORKFLOW = ((ROOT / name).read_text() for name in ('.ci/run', '.github/workflows/ci.yml'))
 PROGRAM = (r'(make [a-z]+|(?:ros2|colcon|python|source|pip|git|pre-commit|rosdep)(?= [a-z.-])'
-           r'|bloom-\w+|catkin_\w+_version|\.ci/run)')
+           r'|bloom-\w+|catkin_\w+|\.ci/run)')
 
 
 def test_what_is_promised_is_run_or_is_said_not_to_be():
