@@ -35,7 +35,8 @@ SCENES = [*sorted((ROOT / 'config').glob('*.yaml')), ROOT / 'examples' / 'leg.ya
 
 # All that a scene may say of actuators and joints.
 SCENE = {
-    'mechanisms': ['lever', 'leg', 'boom', 'lift', 'rocker', 'beast', 'rack', 'int', 'foot'],
+    'mechanisms': ['lever', 'leg', 'boom', 'lift', 'rocker', 'beast', 'rack', 'int', 'foot',
+                   'sled'],
     'lever.type': 'slotted_lever', 'lever.scale': 1e-3, 'lever.crank.source': 'servo',
     'lever.crank.ratio': -0.5, 'lever.crank.offset': 0.3, 'lever.crank.sweep': [-0.4, 0.4],
     'lever.joint_names': ['lever=-flap+0.1'],
@@ -64,6 +65,11 @@ SCENE = {
         'R rod right 0.0395 -0.0164 0.2112 roll 0.022 -0.015 -0.0096',
         'L rod left 0.035 0.0165 0.1469 roll 0.022 0.015 -0.0096'],
     'foot.loads': ['L_roll=1 2 -30', 'roll=2.0'],
+    # One joint counts an input that has another size than 1, and the other depends on both.
+    'sled.type': 'custom', 'sled.only_named': True,
+    'sled.joint_names': ['carriage=sledge', 'DB=arm+0.2'], 'sled.joints': [
+        'O ground 0 0', 'R ground 1 0', 'D carriage O along R 3 9', 'Q ground 5 4',
+        'E crank Q 2', 'B dyad D E 6 5 left'],
     'int.type': 'four_bar', 'int.crank.source': 'a*/ "b"\\ ??/\n%s é',
     'int.joint_names': ['QB=while/1:x']}
 GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
@@ -244,7 +250,7 @@ def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
 
 def test_a_new_position_takes_one_pose(mechanisms, tmp_path):
     """Actuators count inputs, and these joints have closed forms."""
-    chosen = [mechanisms[name] for name in ('leg', 'boom', 'beast', 'rocker')]
+    chosen = [mechanisms[name] for name in ('leg', 'boom', 'beast', 'rocker', 'sled')]
     library = loaded(tmp_path, counted(header.printed([*map(header.Request, chosen)]) + ''.join(
         CALLER.format(name=mechanism.name) for mechanism in chosen)))
     for mechanism in chosen:

@@ -116,9 +116,8 @@ class Tables:
         """Return the statements for the position of an axis, and its rates by each input."""
         code, field = self._code, self._formulas.fields[axis.output]
         factor = axis.factor / self.mechanism.scale_of(axis.output)
-        offset = f' + {code.literal(axis.offset)}' if axis.offset else ''
         return [
-            f'{position} = {code.times(f"s.{field}", factor)}{offset};',
+            f'{position} = {code.line(f"s.{field}", factor, axis.offset)};',
             *[f'{position} -= lkr_turns({position}, {code.literal(math.tau)});'] * axis.wraps,
             *(f'{rate}[{j}] = {code.times(f"{by}.{field}", factor * unit)};'
               for j, (by, unit) in enumerate(zip(self._formulas.by, self._units)))]
@@ -148,8 +147,8 @@ class Tables:
 
     def _solutions(self, axes: Sequence[Axis]) -> Tuple[str, str]:
         """Return the name of the function for all inputs of outputs, and it, if it is new."""
-        outputs = tuple(each.output for each in axes)
-        if len(gears(self.linkage, axes)) == len(axes):
+        outputs, counted = tuple(each.output for each in axes), gears(self.linkage, axes)
+        if len(counted) == len(axes):
             return '0', ''
         name = '_'.join([f'{self.mechanism.name}_solutions', *(
             self._formulas.fields[output] for output in outputs)])
@@ -157,8 +156,11 @@ class Tables:
             return name, ''
         self._written.add(name)
         closed = self.linkage.inverse(outputs).closed
-        count, function = self._closed(name, closed, outputs) if closed else self._series(
-            name, *outputs)
+        # The value of an axis that counts an input is that of the input, in its size.
+        lines = {k: (ratio * self._sizes[i], shift) for k, (i, ratio, shift) in counted.items()}
+        count, function = self._closed(name, closed, outputs[0], [
+            self._code.line(f'value[{k}]', *lines.get(k, (1.0, 0.0)))
+            for k in range(len(outputs))]) if closed else self._series(name, *outputs)
         self.solutions = max(self.solutions, count)
         return name, function
 
@@ -179,11 +181,11 @@ class Tables:
             *indented(rows), '    };',
             f'    return lkr_series({len(rows)}, piece, {", ".join(sizes)}, value[0], q);', '}'])
 
-    def _closed(self, name: str, closed: InverseLinkage, outputs: Sequence[str]
+    def _closed(self, name: str, closed: InverseLinkage, output: str, values: Sequence[str]
                 ) -> Tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
         code = self._code
-        modes = self._modes_in_reach(outputs[0], closed)
+        modes = self._modes_in_reach(output, closed)
         # If an input has a period of several turns, each turn has its own pose.
         turns = [*product(*closed.turns)]
         blocks = [(', '.join(
@@ -199,8 +201,7 @@ class Tables:
             f'/* The inputs in each assembly mode of the inverse linkage, NAN where there is '
             f'none:\n{lines}\n*/\nstatic inline int {name}(const {code.number} *value,\n'
             f'    {code.number} (*q)[LKR_MAX_INPUTS])',
-            [f'value[{i}]' for i in range(len(outputs))],
-            blocks, f'return {count};', closed.arguments)
+            values, blocks, f'return {count};', closed.arguments)
 
     def _modes_in_reach(self, output: str, closed: InverseLinkage) -> Sequence[Mode]:
         """Return the assembly modes in which the linkage is anywhere in its reach, if known."""
