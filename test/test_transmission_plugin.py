@@ -309,9 +309,9 @@ JOINT, MOTOR = 'joint_handle\tknee_QB', 'actuator_handle\tknee_motor'
     ('knee', ['actuator_handle\telbow\tposition\t0'], {}, ''),
     # Each interface: one handle, on all axes or on none.
     ('knee', [f'{JOINT}\tposition\t5'], {},
-     "joint 'knee_QB' has two handles for one interface: 'position' and 'position'"),
-    ('knee', [f'{JOINT}\ttorque\t5'], {}, "'torque' and 'effort'"),
-    ('leg', ['actuator_handle\tleg_crank2\tforce\t5'], {}, "'leg_crank2' has two handles"),
+     "joint 'knee_QB' has several handles for position"),
+    ('knee', [f'{JOINT}\ttorque\t5'], {}, "joint 'knee_QB' has several handles for effort"),
+    ('leg', ['actuator_handle\tleg_crank2\tforce\t5'], {}, "'leg_crank2' has several handles"),
     ('knee', [f'{JOINT}\ttemperature\t5'], {}, ''),
     ('knee', [f'{JOINT}\tvelocity\t0'], {}, 'need a handle for velocity'),
     ('knee', [f'{MOTOR}\tvelocity\t0'], {}, 'need a handle for velocity'),
