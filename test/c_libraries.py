@@ -19,6 +19,8 @@ from linkage_ros.scene.joint_names import JointName
 import numpy as np
 import pytest
 
+# What nothing writes.
+UNWRITTEN = 0.123456789
 STAND_IN = Path(__file__).parent / 'ros2_control'
 # What finds rcutils, whose log transmissions use; nothing if it is not installed.
 ROS = next(([f'-isystem{include}', f'-L{prefix}/lib', '-lrcutils', f'-Wl,-rpath,{prefix}/lib']
@@ -68,19 +70,31 @@ int poses_taken(void) {{ int before = taken; taken = 0; return before; }}
 """
 
 
-def inverter(folder, mechanism, output):
-    """Return the inverse of a mechanism's only input in C: value, near -> input and poses."""
-    text = header.written(mechanism, [output])
+def inverter(folder, mechanism, *outputs):
+    """
+    Return the inverse of a mechanism in C: values and near inputs -> inputs or None, and poses.
+
+    It checks that no more poses are computed than the header says.
+    """
+    text, n = header.written(mechanism, outputs), len(outputs)
     name, = re.findall(r'int (\w+_for_\w+)', text)
+    most = int(re.search(r'call takes at most (\d+) poses', text)[1])
+    given = 'value, near' if n > 1 else '*value, *near'
     library = loaded(folder, f"""{counted(text)}
-int inverted(double value, double near, double *input) {{ return {name}(value, near, input); }}
+int inverted(const double *value, const double *near, double *inputs)
+{{
+    return {name}({given}, inputs);
+}}
 """)
-    answer = ctypes.c_double()
 
     def invert(value, near):
-        is_there = library.inverted(ctypes.c_double(value), ctypes.c_double(near),
-                                    ctypes.byref(answer))
-        return answer.value if is_there else None, library.poses_taken()
+        made = (ctypes.c_double * n)(*[UNWRITTEN] * n)
+        is_there = library.inverted(*((ctypes.c_double * n)(*np.ravel(each))
+                                      for each in (value, near)), made)
+        assert is_there or {*made} == {UNWRITTEN}
+        taken = library.poses_taken()
+        assert taken <= most
+        return (made[:] if n > 1 else made[0]) if is_there else None, taken
 
     return invert
 
