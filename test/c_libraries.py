@@ -13,8 +13,10 @@ import shutil
 import subprocess
 import sys
 
+from linkage_ros import scene
 from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import joints
+from linkage_ros.c_code.package import ranges
 from linkage_ros.scene.joint_names import JointName
 import numpy as np
 import pytest
@@ -45,6 +47,16 @@ def shared(tmp_path_factory, name):
     with open(folder / f'{name}.lock', 'w') as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield folder / name
+
+
+def alone(linkage, name='m', **settings):
+    """Return the mechanism of a type or of joint lines, alone in its scene."""
+    if not isinstance(linkage, dict):
+        linkage = {'type': linkage} if isinstance(linkage, str) else {
+            'type': 'custom', 'joints': [*linkage]}
+    return scene.read({'mechanisms': [name], **{
+        f'{name}.{key}': value for key, value in {**linkage, **settings}.items()}}
+        ).mechanisms[name]
 
 
 def loaded(folder, code, *flags):
@@ -128,3 +140,19 @@ def expected(mechanism, inputs, chosen=()):
     return ((outputs(mechanism, inputs, measured) - offset) / ratio, rates / ratio[:, None],
             np.array([*map(JointName.of, named, outputs(mechanism, inputs, chosen))]),
             np.array([name.sign for name in named])[:, None] * turning)
+
+
+def prove(package, mechanism, compiler):
+    """Compile the proof for a mechanism of a package and run it, with sanitizers, too."""
+    name, program = mechanism.name, package / f'proof_{mechanism.name}'
+    code = (package / 'src' / f'{name}.hpp').read_text()
+    class_, space = re.search(r'struct (\w+)Code', code)[1], re.search(r'namespace (\w+)', code)[1]
+    for count, flags in ((100_000, ()), (5000, SANITIZED)):
+        subprocess.run([
+            compiler, *PLUGIN, '-O2', *flags, f'-DNAME={name}', f'-DCLASS={class_}',
+            f'-DNAMESPACE={space}', f'-DRANGES={ranges(mechanism)}', '-I', package / 'src',
+            '-I', package / 'include', STAND_IN / 'proof.cpp', '-o', program, *PLUGIN], check=True)
+        ended = subprocess.run([program, str(count)], capture_output=True, text=True)
+        assert ended.returncode == 0, ended.stdout + ended.stderr
+        tried, good = map(int, re.search(r'(\d+) states, (\d+)', ended.stdout).groups())
+        assert tried == count and good > 0.9 * count

@@ -10,7 +10,7 @@ import re
 import shutil
 import subprocess
 
-from c_libraries import COMPILER, inverter, loaded, STRICT
+from c_libraries import alone, COMPILER, inverter, loaded, STRICT
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import cli, header
 import numpy as np
@@ -176,10 +176,7 @@ INVERSES = [
 
 @pytest.mark.parametrize('linkage, output, given', INVERSES)
 def test_the_inverse_finds_the_nearest_input(mechanisms, tmp_path, linkage, output, given):
-    settings = linkage if isinstance(linkage, dict) else {'type': 'custom', 'joints': linkage}
-    mechanism = mechanisms[linkage] if isinstance(linkage, str) else scene.read({
-        'mechanisms': ['m'], **{f'm.{key}': value for key, value in settings.items()}}
-        ).mechanisms['m']
+    mechanism = mechanisms[linkage] if linkage in SCENE['mechanisms'] else alone(linkage)
     check_nearest(tmp_path, mechanism, output, **given)
 
 

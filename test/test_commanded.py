@@ -13,7 +13,7 @@ from contextlib import suppress
 import ctypes
 import subprocess
 
-from c_libraries import COMPILER, loaded, SAMPLE, SANITIZED
+from c_libraries import alone, COMPILER, loaded, SAMPLE, SANITIZED
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import joints
@@ -74,9 +74,7 @@ void {name}_counts(long poses, long *counts)
 
 def read(name, joint_lines, names=(), **given):
     """Return a mechanism of joint lines, with the names of its commanded joints."""
-    mechanism, = scene.read({
-        'mechanisms': [name], f'{name}.type': 'custom', f'{name}.joints': list(joint_lines),
-        **{f'{name}.{key}': value for key, value in given.items()}}).mechanisms.values()
+    mechanism = alone(joint_lines, name, **given)
     joints(mechanism, names)
     return header.Request(mechanism, (), tuple(names))
 
@@ -132,9 +130,8 @@ def test_sanitizers_find_nothing(tmp_path):
 
     if ran('none', 'int main(void) { return 0; }\n'):
         pytest.skip('no program with sanitizers is linked or runs here')
-    cases = [read('lever', FAULTS[0][1]), *map(header.Request, scene.read({
-        'mechanisms': ['leg'], 'leg.type': 'five_bar', 'leg.loads': ['P=3 -20']}
-        ).mechanisms.values())]
+    cases = [read('lever', FAULTS[0][1]),
+             header.Request(alone('five_bar', 'leg', loads=['P=3 -20']))]
     printed = ran('asked', '#include <stdio.h>\n' + code(cases) + 'int main(void)\n{\n' + ''.join(
         f"""long {name}[3] = {{ 0, 0, 0 }};
 {name}_counts(2000, {name});
@@ -146,8 +143,7 @@ printf("%d", {name}[0] > 1000 && !{name}[1] && !{name}[2]);
 @pytest.mark.nightly
 @NUMBERS
 def test_the_catalogue_and_what_was_refused(tmp_path, number):
-    catalogue = scene.read({'mechanisms': [*mechanisms.TYPES], **{
-        f'{name}.type': name for name in mechanisms.TYPES}}).mechanisms.values()
+    catalogue = [alone(name, name) for name in mechanisms.TYPES]
     faults = [read(f'fault{i}', joint_lines, [f'fault{i}_{output}'])
               for i, (output, joint_lines) in enumerate(FAULTS)]
     assert min(questions(tmp_path, [*map(header.Request, catalogue), *faults], number)) > 200
