@@ -35,8 +35,7 @@ void {name}_counts(long poses, long *counts)
     static {name}_memory m;
     long i;
     int k, side;
-    if (!{name}_begin(&m))
-        return;
+    {name}_begin(&m);
     for (i = 1; i <= poses; i++) {{
         {number} q[{n}], beside[{n}], gap[{n}], least;
         lkr_point p, goal;

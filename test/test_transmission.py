@@ -79,7 +79,7 @@ UNWRITTEN = 0.123456789
 # All that is given and written is an lkr_side: positions, velocities, efforts.
 CALLER = """
 static {name}_memory {name}_m;
-int {name}_started(void) {{ return {name}_begin(&{name}_m); }}
+void {name}_started(void) {{ {name}_begin(&{name}_m); }}
 int {name}_sent(int side, const lkr_side *from, lkr_side *to)
 {{
     return side ? {name}_joints_to_actuators(&{name}_m, from, to)
@@ -100,7 +100,7 @@ class Memory:
     def __init__(self, library, mechanism, kind=float):
         self._send, self._n, self._kind = (
             library[f'{mechanism.name}_sent'], len(mechanism.inputs), kind)
-        assert library[f'{mechanism.name}_started']() == 1
+        library[f'{mechanism.name}_started']()
 
     def send(self, side, position, velocity=0.0, effort=0.0):
         """Return the status and the other side's positions, velocities, efforts: or UNWRITTEN."""
@@ -170,16 +170,6 @@ def test_what_is_not_assembled_is_out_of_reach_whatever_is_commanded(tmp_path):
     (low, high), = mechanism.first.reach
     own = angles[np.isfinite(mechanism.linkage.joint_angles(angles, ['B.x'])['B.x'])]
     assert own[0] < low - 0.1 and own[-1] > high + 0.1
-
-
-def test_a_first_pose_is_found_in_a_small_workspace(tmp_path):
-    # Two cranks that have to point at each other, within 0.3 rad: 0.7 % of all their poses.
-    mechanisms = [alone([
-        'O ground 0 0', f'Q ground {4.0 * math.cos(turned)} {4.0 * math.sin(turned)}',
-        'A crank O 1', 'C crank Q 1', 'P dyad A C 1.05 1.05 left'], f'm{turned}')
-        for turned in range(0, 6, 2)]
-    library = compiled(tmp_path, mechanisms)
-    assert all(Memory(library, mechanism) for mechanism in mechanisms)
 
 
 LIFT = ['O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left']
@@ -376,8 +366,6 @@ def test_random_linkages_are_measured(tmp_path, seeds):
     mechanisms = [case.mechanism for case in drawn(seeds) if not case.joints]
     library, rng, measured = compiled(tmp_path, mechanisms), np.random.default_rng(1), 0
     for mechanism in mechanisms:
-        if library[f'{mechanism.name}_started']() == 0:
-            continue
         memory = Memory(library, mechanism)
         points = [f'{point}.{axis}' for point in mechanism.linkage.points for axis in 'xy']
         for _ in range(40):

@@ -481,8 +481,8 @@ static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *value, 
 
 /* --- actuators and joints --- */
 
-/* Initialize the memory; returns 0 if the linkage cannot be assembled where it starts. */
-static inline int lkr_begin(const lkr_model *model, lkr_memory *m)
+/* Initialize the memory. */
+static inline void lkr_begin(const lkr_model *model, lkr_memory *m)
 {
     int i;
     memset(m, 0, sizeof *m);
@@ -492,7 +492,6 @@ static inline int lkr_begin(const lkr_model *model, lkr_memory *m)
         m->held[LKR_ACTUATORS].position[i] = LKR_NAN;
         m->held[LKR_JOINTS].position[i] = LKR_NAN;
     }
-    return model->at(m->q, &m->point);
 }
 
 /* Copy the values that are finite. */
@@ -776,7 +775,7 @@ static const lkr_model lever_model = {
       { { 1.0f, 6.2831855f, -1, 1.0f, 0.0f } } },
     { { 0.0f }, { 6.2831855f } },
     /* Of the inputs: units, start, sweeps. */
-    { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } }
+    { 1.0f }, { 0.0f }, { { -INFINITY, INFINITY } }
 };
 
 /* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be assembled. */
@@ -800,7 +799,7 @@ static const lkr_model lever_model_angle_lever = {
       { { 1.0f, 6.2831855f, -1, 1.0f, 0.0f } } },
     { { 6.2831855f }, { 6.2831855f } },
     /* Of the inputs: units, start, sweeps. */
-    { 1.0f }, { 0.0f }, { { -LKR_FAR, LKR_FAR } }
+    { 1.0f }, { 0.0f }, { { -INFINITY, INFINITY } }
 };
 
 /* The crank for lever [rad], nearest to `near`, whole turns included. Returns 0, and
@@ -810,10 +809,11 @@ static inline int lever_crank_for_angle_lever(float value, float near, float *cr
     return lkr_inputs_for(&lever_model_angle_lever, &value, &near, crank_);
 }
 
-/* Initialize the memory; returns 0 if there is no pose. */
+/* Initialize the memory; returns 1. */
 static inline int lever_begin(lever_memory *m)
 {
-    return lkr_begin(&lever_model, m);
+    lkr_begin(&lever_model, m);
+    return 1;
 }
 
 /* From actuators to joints, see lkr_transmit; returns a status. */

@@ -462,8 +462,8 @@ static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *value, 
 
 /* --- actuators and joints --- */
 
-/* Initialize the memory; returns 0 if the linkage cannot be assembled where it starts. */
-static inline int lkr_begin(const lkr_model *model, lkr_memory *m)
+/* Initialize the memory. */
+static inline void lkr_begin(const lkr_model *model, lkr_memory *m)
 {
     int i;
     memset(m, 0, sizeof *m);
@@ -473,7 +473,6 @@ static inline int lkr_begin(const lkr_model *model, lkr_memory *m)
         m->held[LKR_ACTUATORS].position[i] = LKR_NAN;
         m->held[LKR_JOINTS].position[i] = LKR_NAN;
     }
-    return model->at(m->q, &m->point);
 }
 
 /* Copy the values that are finite. */

@@ -258,9 +258,7 @@ public:
           (kind ? ", or none of them" : ": velocities and efforts depend on the pose"));
       }
     }
-    if (!lkr_begin(&Code::model, &memory_)) {
-      refuse("it cannot be assembled");
-    }
+    lkr_begin(&Code::model, &memory_);
   }
 
   void actuator_to_joint() override
