@@ -8,7 +8,6 @@ ros2_control is not on the Python package index: what is generated is compiled a
 of its interface, `test/ros2_control`, written for these tests. No controller manager is run.
 """
 
-import ctypes
 import math
 from pathlib import Path
 import re
@@ -18,6 +17,7 @@ import sys
 from xml.etree import ElementTree
 
 from c_libraries import alone, counted, expected, loaded, outputs, prove, shared, STAND_IN
+from c_memories import compiled, memories, Memory, UNWRITTEN
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header, transmission
 from linkage_ros.c_code.axes import actuators, joints
@@ -25,7 +25,6 @@ from linkage_ros.c_code.names import template
 from linkage_ros.c_code.package import package
 import numpy as np
 import pytest
-from test_commanded import drawn
 
 ROOT = Path(__file__).parents[1]
 COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
@@ -74,41 +73,6 @@ SCENE = {
 GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
           'D crank Q 0.27 geared crank -2 0', 'B dyad A D 2.661 2.4 left']
 SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 out 0.08']
-# What nothing writes.
-UNWRITTEN = 0.123456789
-# All that is given and written is an lkr_side: positions, velocities, efforts.
-CALLER = """
-static {name}_memory {name}_m;
-void {name}_started(void) {{ {name}_begin(&{name}_m); }}
-int {name}_sent(int side, const lkr_side *from, lkr_side *to)
-{{
-    return side ? {name}_joints_to_actuators(&{name}_m, from, to)
-        : {name}_actuators_to_joints(&{name}_m, from, to);
-}}
-"""
-
-
-def compiled(folder, mechanisms, *names, single=False):
-    """Return a library with the actuators and joints of mechanisms."""
-    return loaded(folder, ''.join(header.written(mechanism, (), single, names) + CALLER.format(
-        name=mechanism.name) for mechanism in mechanisms))
-
-
-class Memory:
-    """The memory of one mechanism in C."""
-
-    def __init__(self, library, mechanism, kind=float):
-        self._send, self._n, self._kind = (
-            library[f'{mechanism.name}_sent'], len(mechanism.inputs), kind)
-        library[f'{mechanism.name}_started']()
-
-    def send(self, side, position, velocity=0.0, effort=0.0):
-        """Return the status and the other side's positions, velocities, efforts: or UNWRITTEN."""
-        given, found = np.zeros((3, 3), self._kind), np.full((3, 3), UNWRITTEN, self._kind)
-        for row, values in zip(given, (position, velocity, effort)):
-            row[:self._n] = values
-        status = self._send(side, *(ctypes.c_void_p(x.ctypes.data) for x in (given, found)))
-        return status, found[:, :self._n]
 
 
 def states(mechanism, count, seed=1):
@@ -215,12 +179,11 @@ CHOICES = [
 def choosing(tmp_path_factory):
     """Return the mechanisms of CHOICES, and their library."""
     made = [alone(lines, f'm{i}', **given) for i, (lines, given, *_) in enumerate(CHOICES)]
-    code = ''.join(header.written(mechanism, joints=[
+    text = memories([header.Request(mechanism, (), [
         each if each == 'wheel' else f'{mechanism.name}_{each}' for each in names])
-        + CALLER.format(name=mechanism.name) for mechanism, (_, _, names, *_) in zip(
-            made, CHOICES))
+        for mechanism, (_, _, names, *_) in zip(made, CHOICES)])
     with shared(tmp_path_factory, 'choosing') as folder:
-        return made, loaded(folder, code)
+        return made, loaded(folder, text)
 
 
 @pytest.mark.parametrize('i', range(len(CHOICES)))
@@ -235,8 +198,7 @@ def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
 def test_a_new_position_takes_one_pose(mechanisms, tmp_path):
     """Actuators count inputs, and these joints have closed forms."""
     chosen = [mechanisms[name] for name in ('leg', 'boom', 'beast', 'rocker', 'sled')]
-    library = loaded(tmp_path, counted(header.printed([*map(header.Request, chosen)]) + ''.join(
-        CALLER.format(name=mechanism.name) for mechanism in chosen)))
+    library = loaded(tmp_path, counted(memories([*map(header.Request, chosen)])))
     for mechanism in chosen:
         memory = Memory(library, mechanism)
         first, second, *_ = states(mechanism, 4)
@@ -358,28 +320,6 @@ def test_the_joints_are_chosen_by_their_names(mechanisms):
     for names in (['knee'], ['P.x', 'P.y'], ['leg_AP'], ['leg_AP', 'leg_AP']):
         with pytest.raises(ValueError, match='leg has 2 inputs: as many of its joints are needed'):
             joints(leg, names)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('seeds', [range(3), range(3, 12), range(12, 22)])
-def test_random_linkages_are_measured(tmp_path, seeds):
-    mechanisms = [case.mechanism for case in drawn(seeds) if not case.joints]
-    library, rng, measured = compiled(tmp_path, mechanisms), np.random.default_rng(1), 0
-    for mechanism in mechanisms:
-        memory = Memory(library, mechanism)
-        points = [f'{point}.{axis}' for point in mechanism.linkage.points for axis in 'xy']
-        for _ in range(40):
-            inputs = [rng.uniform(*(settings.ends or settings.reach[0]))
-                      for settings in mechanism.inputs.values()]
-            actuator, _, joint, _ = expected(mechanism, inputs)
-            status, (position, *_) = memory.send(0, actuator)
-            # All of it can be assembled, or it is said that it cannot.
-            assert (status & 1 == 0) == np.isfinite(outputs(mechanism, inputs, points)).all()
-            if status == 0:
-                gap = np.abs(position - joint)
-                assert np.minimum(gap, np.abs(gap - math.tau)).max() < 1e-11
-                measured += 1
-    assert measured > 20 * len(mechanisms)
 
 
 def test_all_ground_links_of_the_catalogue_but_one_are_closed_forms():
