@@ -196,6 +196,5 @@ def _tell(mechanism: SceneMechanism, outputs: Sequence[str]) -> bool:
     sizes = np.array([1.0 if linkage.is_angle(each) else linkage.longest for each in outputs])
     units = np.array([each.size for each in linkage.inputs])
     scaled = np.moveaxis(np.nan_to_num(rates * units[:, None, None] / sizes[:, None]), -1, 0)
-    values = np.linalg.svd(scaled, compute_uv=False)
-    return values.shape[1] == len(outputs) and bool(
-        (values[:, -1] > DEPENDENT * np.maximum(1.0, values[:, 0])).any())
+    least = DEPENDENT * np.maximum(1.0, np.abs(scaled).max(axis=(1, 2)))
+    return len(outputs) in np.linalg.matrix_rank(scaled, least)
