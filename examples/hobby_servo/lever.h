@@ -165,13 +165,14 @@ typedef struct {
     lkr_real load[LKR_MAX_INPUTS];
 } lkr_point;
 
-/* An actuator or a joint: its position is factor * value + offset. */
+/* An actuator or a joint: its position is factor * value + offset, with the value of an output. */
 typedef struct {
     /* One over the size of its position, and what it may change by without effect, or 0. */
     lkr_real scale, turn;
-    /* The input whose value it has, whole turns included; -1 if it has that of an output. */
-    int input;
     lkr_real factor, offset;
+    /* The input of which the value is ratio * input + shift, whole turns included; -1: of none. */
+    int input;
+    lkr_real ratio, shift;
 } lkr_axis;
 
 /* A linkage. Inputs q are in rad or in sizes. */
@@ -420,10 +421,10 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
         count = model->solutions[side](value, x);
     }
     for (i = 0; i < model->inputs; i++) {
-        const int input = model->axis[side][i].input;
-        for (k = 0; k < count && input >= 0; k++) {
-            near[input] = value[i];
-            x[k][input] = value[i];
+        const lkr_axis *axis = &model->axis[side][i];
+        for (k = 0; k < count && axis->input >= 0; k++) {
+            near[axis->input] = (value[i] - axis->shift) / axis->ratio;
+            x[k][axis->input] = near[axis->input];
         }
     }
     for (k = 0; k < count; k++) {
@@ -450,7 +451,7 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
                 for (i = 0; i < model->inputs; i++) {
                     const lkr_axis *axis = &model->axis[s][i];
                     if (axis->input >= 0) {
-                        p->position[s][i] += axis->factor
+                        p->position[s][i] += axis->factor * axis->ratio
                             * (q[axis->input] - x[nearest][axis->input]);
                     }
                 }
@@ -771,8 +772,8 @@ static inline int lever_at(const float *q, lkr_point *p)
 static const lkr_model lever_model = {
     1, lever_at, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, and after how much of each input they repeat. */
-    { { { 1.0f, 0.0f, 0, 1.0f, 0.0f } },
-      { { 1.0f, 6.2831855f, -1, 1.0f, 0.0f } } },
+    { { { 1.0f, 0.0f, 1.0f, 0.0f, 0, 1.0f, 0.0f } },
+      { { 1.0f, 6.2831855f, 1.0f, 0.0f, -1, 0.0f, 0.0f } } },
     { { 0.0f }, { 6.2831855f } },
     /* Of the inputs: units, start, sweeps. */
     { 1.0f }, { 0.0f }, { { -INFINITY, INFINITY } }
@@ -795,8 +796,8 @@ static inline int lever_at_angle_lever(const float *q, lkr_point *p)
 static const lkr_model lever_model_angle_lever = {
     1, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, and after how much of each input they repeat. */
-    { { { 0, 0, -1, 0, 0 } },
-      { { 1.0f, 6.2831855f, -1, 1.0f, 0.0f } } },
+    { { { 0, 0, 0, 0, -1, 0, 0 } },
+      { { 1.0f, 6.2831855f, 1.0f, 0.0f, -1, 0.0f, 0.0f } } },
     { { 6.2831855f }, { 6.2831855f } },
     /* Of the inputs: units, start, sweeps. */
     { 1.0f }, { 0.0f }, { { -INFINITY, INFINITY } }

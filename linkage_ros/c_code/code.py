@@ -78,10 +78,6 @@ class Code:
         """Return code times a number."""
         return bare(code) if factor == 1.0 else f'{self.literal(factor)} * {code}'
 
-    def line(self, code: str, factor: float, offset: float) -> str:
-        """Return code times a number, plus another."""
-        return self.times(code, factor) + (f' + {self.literal(offset)}' if offset else '')
-
     def function(self, head: str, arguments: Sequence[str],
                  blocks: Sequence[Tuple[str, Mapping[str, Real]]], last: str,
                  replaced: Mapping[Real, Real] = {}) -> str:

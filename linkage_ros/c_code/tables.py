@@ -116,8 +116,9 @@ class Tables:
         """Return the statements for the position of an axis, and its rates by each input."""
         code, field = self._code, self._formulas.fields[axis.output]
         factor = axis.factor / self.mechanism.scale_of(axis.output)
+        offset = f' + {code.literal(axis.offset)}' if axis.offset else ''
         return [
-            f'{position} = {code.line(f"s.{field}", factor, axis.offset)};',
+            f'{position} = {code.times(f"s.{field}", factor)}{offset};',
             *[f'{position} -= lkr_turns({position}, {code.literal(math.tau)});'] * axis.wraps,
             *(f'{rate}[{j}] = {code.times(f"{by}.{field}", factor * unit)};'
               for j, (by, unit) in enumerate(zip(self._formulas.by, self._units)))]
@@ -128,14 +129,12 @@ class Tables:
         """Return the rows of a side's axes."""
         rows, counted = [], gears(self.linkage, axes)
         for k, each in enumerate(axes):
-            i, factor, offset = -1, each.factor, each.offset
-            if k in counted:
-                i, ratio, shift = counted[k]
-                factor, offset = factor * ratio * self._sizes[i], factor * shift + offset
-            scale, turn, *line = map(self._code.literal, (
-                1.0 / each.size, each.turn, factor, offset))
-            rows.append(f'{{ {scale}, {turn}, {i}, {", ".join(line)} }}')
-        return ', '.join(rows) or '{ 0, 0, -1, 0, 0 }'
+            i, ratio, shift = counted.get(k, (-1, 0.0, 0.0))
+            scale, turn, factor, offset, ratio, shift = map(self._code.literal, (
+                1.0 / each.size, each.turn, each.factor, each.offset,
+                ratio * self._sizes[i], shift))
+            rows.append(f'{{ {scale}, {turn}, {factor}, {offset}, {i}, {ratio}, {shift} }}')
+        return ', '.join(rows) or '{ 0, 0, 0, 0, -1, 0, 0 }'
 
     def _turns(self, axes: Sequence[Axis]) -> List[float]:
         """Return after how much of each input the positions of axes are the same, or 0."""
@@ -147,17 +146,14 @@ class Tables:
 
     def _solutions(self, axes: Sequence[Axis]) -> str:
         """Return the name of the function for all inputs of outputs, and note it; 0: none."""
-        outputs, counted = tuple(each.output for each in axes), gears(self.linkage, axes)
-        if len(counted) == len(axes):
+        outputs = tuple(each.output for each in axes)
+        if len(gears(self.linkage, axes)) == len(axes):
             return '0'
         name = '_'.join([f'{self.mechanism.name}_solutions', *(
             self._formulas.fields[output] for output in outputs)])
         closed = self.linkage.inverse(outputs).closed
-        # The value of an axis that counts an input is that of the input, in its size.
-        lines = {k: (ratio * self._sizes[i], shift) for k, (i, ratio, shift) in counted.items()}
-        count, self.functions[name] = self._closed(name, closed, outputs[0], [
-            self._code.line(f'value[{k}]', *lines.get(k, (1.0, 0.0)))
-            for k in range(len(outputs))]) if closed else self._series(name, *outputs)
+        count, self.functions[name] = self._closed(
+            name, closed, outputs) if closed else self._series(name, *outputs)
         self.solutions = max(self.solutions, count)
         return name
 
@@ -178,11 +174,11 @@ class Tables:
             *indented(rows), '    };',
             f'    return lkr_series({len(rows)}, piece, {", ".join(sizes)}, value[0], q);', '}'])
 
-    def _closed(self, name: str, closed: InverseLinkage, output: str, values: Sequence[str]
+    def _closed(self, name: str, closed: InverseLinkage, outputs: Sequence[str]
                 ) -> Tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
         code = self._code
-        modes = self._modes_in_reach(output, closed)
+        modes = self._modes_in_reach(outputs[0], closed)
         # If an input has a period of several turns, each turn has its own pose.
         turns = [*product(*closed.turns)]
         blocks = [(', '.join(
@@ -198,7 +194,8 @@ class Tables:
             f'/* The inputs in each assembly mode of the inverse linkage, NAN where there is '
             f'none:\n{lines}\n*/\nstatic inline int {name}(const {code.number} *value,\n'
             f'    {code.number} (*q)[LKR_MAX_INPUTS])',
-            values, blocks, f'return {count};', closed.arguments)
+            [f'value[{i}]' for i in range(len(outputs))],
+            blocks, f'return {count};', closed.arguments)
 
     def _modes_in_reach(self, output: str, closed: InverseLinkage) -> Sequence[Mode]:
         """Return the assembly modes in which the linkage is anywhere in its reach, if known."""
