@@ -167,12 +167,12 @@ typedef struct {
 
 /* An actuator or a joint: its position is factor * value + offset, with the value of an output. */
 typedef struct {
-    /* One over the size of its position, and what it may change by without effect, or 0. */
-    lkr_real scale, turn;
-    lkr_real factor, offset;
     /* The input of which the value is ratio * input + shift, whole turns included; -1: of none. */
     int input;
     lkr_real ratio, shift;
+    lkr_real factor, offset;
+    /* One over the size of its position, and what it may change by without effect, or 0. */
+    lkr_real scale, turn;
 } lkr_axis;
 
 /* A linkage. Inputs q are in rad or in sizes. */
@@ -772,8 +772,8 @@ static inline int lever_at(const float *q, lkr_point *p)
 static const lkr_model lever_model = {
     1, lever_at, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, and after how much of each input they repeat. */
-    { { { 1.0f, 0.0f, 1.0f, 0.0f, 0, 1.0f, 0.0f } },
-      { { 1.0f, 6.2831855f, 1.0f, 0.0f, -1, 0.0f, 0.0f } } },
+    { { { 0, 1.0f, 0.0f, 1.0f, 0.0f, 1.0f, 0.0f } },
+      { { -1, 0.0f, 0.0f, 1.0f, 0.0f, 1.0f, 6.2831855f } } },
     { { 0.0f }, { 6.2831855f } },
     /* Of the inputs: units, start, sweeps. */
     { 1.0f }, { 0.0f }, { { -INFINITY, INFINITY } }
@@ -796,8 +796,8 @@ static inline int lever_at_angle_lever(const float *q, lkr_point *p)
 static const lkr_model lever_model_angle_lever = {
     1, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, and after how much of each input they repeat. */
-    { { { 0, 0, 0, 0, -1, 0, 0 } },
-      { { 1.0f, 6.2831855f, 1.0f, 0.0f, -1, 0.0f, 0.0f } } },
+    { { { -1, 0, 0, 0, 0, 0, 0 } },
+      { { -1, 0.0f, 0.0f, 1.0f, 0.0f, 1.0f, 6.2831855f } } },
     { { 6.2831855f }, { 6.2831855f } },
     /* Of the inputs: units, start, sweeps. */
     { 1.0f }, { 0.0f }, { { -INFINITY, INFINITY } }

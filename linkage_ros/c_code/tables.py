@@ -130,11 +130,10 @@ class Tables:
         rows, counted = [], gears(self.linkage, axes)
         for k, each in enumerate(axes):
             i, ratio, shift = counted.get(k, (-1, 0.0, 0.0))
-            scale, turn, factor, offset, ratio, shift = map(self._code.literal, (
-                1.0 / each.size, each.turn, each.factor, each.offset,
-                ratio * self._sizes[i], shift))
-            rows.append(f'{{ {scale}, {turn}, {factor}, {offset}, {i}, {ratio}, {shift} }}')
-        return ', '.join(rows) or '{ 0, 0, 0, 0, -1, 0, 0 }'
+            numbers = map(self._code.literal, (
+                ratio * self._sizes[i], shift, each.factor, each.offset, 1.0 / each.size, each.turn))
+            rows.append(f'{{ {i}, {", ".join(numbers)} }}')
+        return ', '.join(rows) or '{ -1, 0, 0, 0, 0, 0, 0 }'
 
     def _turns(self, axes: Sequence[Axis]) -> List[float]:
         """Return after how much of each input the positions of axes are the same, or 0."""

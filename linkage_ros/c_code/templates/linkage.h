@@ -148,12 +148,12 @@ typedef struct {
 
 /* An actuator or a joint: its position is factor * value + offset, with the value of an output. */
 typedef struct {
-    /* One over the size of its position, and what it may change by without effect, or 0. */
-    lkr_real scale, turn;
-    lkr_real factor, offset;
     /* The input of which the value is ratio * input + shift, whole turns included; -1: of none. */
     int input;
     lkr_real ratio, shift;
+    lkr_real factor, offset;
+    /* One over the size of its position, and what it may change by without effect, or 0. */
+    lkr_real scale, turn;
 } lkr_axis;
 
 /* A linkage. Inputs q are in rad or in sizes. */
