@@ -131,7 +131,8 @@ class Tables:
         for k, each in enumerate(axes):
             i, ratio, shift = counted.get(k, (-1, 0.0, 0.0))
             numbers = map(self._code.literal, (
-                ratio * self._sizes[i], shift, each.factor, each.offset, 1.0 / each.size, each.turn))
+                ratio * self._sizes[i], shift, each.factor, each.offset, 1.0 / each.size,
+                each.turn))
             rows.append(f'{{ {i}, {", ".join(numbers)} }}')
         return ', '.join(rows) or '{ -1, 0, 0, 0, 0, 0, 0 }'
 
