@@ -265,9 +265,7 @@ public:
   {
     transmit(LKR_ACTUATORS, actuators_, joints_);
     if constexpr (passive_count > 0) {
-      if (memory_.newest == LKR_ACTUATORS) {
-        write_passive();
-      }
+      write_passive();
     }
   }
 
@@ -303,7 +301,7 @@ private:
     to.write(result);
   }
 
-  /// Write states of the joints that are not commanded, at the inputs of the newest measurement.
+  /// Write states of the joints that are not commanded: where the newest measurement is, or standing.
   void write_passive()
   {
     double position[passive_count], rate[passive_count][LKR_MAX_INPUTS];
@@ -311,7 +309,9 @@ private:
     for (std::size_t i = 0; i < passive_count; ++i) {
       const double velocity = std::inner_product(
         rate[i], rate[i] + Code::size, memory_.speed, 0.0);
-      joints_.write(Code::size + i, position[i], std::isfinite(velocity) ? velocity : 0.0);
+      joints_.write(
+        Code::size + i, memory_.newest == LKR_ACTUATORS ? position[i] : LKR_NAN,
+        std::isfinite(velocity) ? velocity : 0.0);
     }
   }
 
