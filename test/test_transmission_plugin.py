@@ -297,7 +297,7 @@ JOINT, MOTOR = 'joint_handle\tknee_QB', 'actuator_handle\tknee_motor'
     ('knee', [f'{JOINT}\ttemperature\t5'], {}, ''),
     ('knee', [f'{JOINT}\tvelocity\t0'], {}, 'need a handle for velocity'),
     ('knee', [f'{MOTOR}\teffort\t0'], {'kinds': ['position']}, 'need a handle for effort'),
-    ('knee', [f'{JOINT}\tposition\t0'], {'kinds': ['effort']}, 'need a handle for position'),
+    ('knee', [], {'kinds': ['effort']}, 'need a handle for position'),
     ('leg', [f'joint_handle\t{each}\tvelocity\t0' for each in JOINTS['leg']], {},
      'need a handle for velocity'),
     # A handle without a value is none.

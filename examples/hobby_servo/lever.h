@@ -610,9 +610,9 @@ static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, 
         /* What was commanded before a pause is not held after it. */
         memset(held->effort, 0, sizeof held->effort);
     }
-    lkr_copy(position & missing ? 0 : n, held->position, to->position);
-    lkr_copy(velocity & missing ? 0 : n, held->velocity, to->velocity);
-    lkr_copy(effort & missing ? 0 : n, held->effort, to->effort);
+    lkr_copy((position & missing) ? 0 : n, held->position, to->position);
+    lkr_copy((velocity & missing) ? 0 : n, held->velocity, to->velocity);
+    lkr_copy((effort & missing) ? 0 : n, held->effort, to->effort);
     return position | velocity | effort;
 }
 
