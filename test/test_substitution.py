@@ -10,6 +10,7 @@ from unittest.mock import patch
 
 from linkage_ros import scene
 from linkage_ros.cli import RequestError
+from linkage_ros.linkage import theta_of
 from linkage_ros.robot_files import check, readers
 from linkage_ros.robot_files.cli import described
 import numpy as np
@@ -62,7 +63,7 @@ KINDS = with_sign, with_offset, with_side, with_length
 
 def is_found(robot, mechanism, values, made):
     """Tell whether the check finds a fault; what changes no position is none."""
-    name, ends = mechanism.name, made.ends
+    name = mechanism.name
     try:
         wrong = scene.read({'mechanisms': [name], **{
             f'{name}.{key}': value for key, value in values.items()}}).mechanisms[name]
@@ -70,10 +71,9 @@ def is_found(robot, mechanism, values, made):
             return True
     except scene.SceneError:
         return True
-    parts = [[drive.ratio * np.linspace(*ends[drive.source], 9) + drive.offset
-              for drive in mechanism.inputs.values()]] * 2
-    (one, other) = (each.linkage.joint_angles(part if len(part) > 1 else part[0])
-                    for each, part in zip((mechanism, wrong), parts))
+    values = theta_of([np.linspace(*drive.ends or (drive.start - 0.1, drive.start + 0.1), 9)
+                       for drive in mechanism.inputs.values()])
+    one, other = (each.linkage.joint_angles(values) for each in (mechanism, wrong))
     off = [mechanism.joints[link].of(one[link]) - wrong.joints[link].of(other[link])
            for link in mechanism.joints if mechanism.joints[link].published]
     return np.nanmax(np.abs(off - math.tau * np.round(np.divide(off, math.tau)))) < 1e-9
@@ -101,9 +101,6 @@ def faults(robot, seed):
     for robot, mechanisms, made in ((*call.args[:2], made) for call in spy.call_args_list
                                     for made in call.args[2] if made.name in given['mechanisms']):
         mechanism = mechanisms[made.name]
-        made = made._replace(ends={
-            name: (max(low, robot.positions[name] - 0.1), min(high, robot.positions[name] + 0.1))
-            for name, (low, high) in made.ends.items()})
         own = {key.partition('.')[2]: value for key, value in given.items()
                if key.startswith(f'{mechanism.name}.')}
         for _ in range(FAULTS):
