@@ -95,8 +95,6 @@ FAULTS = {
 
 @pytest.mark.parametrize('text', FAULTS, ids=range(len(FAULTS)))
 def test_a_fault_of_a_file_is_named(tmp_path, text):
-    if '<mujoco' in text:
-        pytest.importorskip('mujoco')
     file = of_text(tmp_path / 'robot.urdf', text)
     assert refused(file).startswith(f'from_robot: {file}{FAULTS[text]}')
 
@@ -215,8 +213,6 @@ REFUSED = [
 @pytest.mark.parametrize('file, changes, why, args', [
     (*row[:3], row[3:]) for row in REFUSED], ids=range(len(REFUSED)))
 def test_what_makes_no_scene_is_said(tmp_path, file, changes, why, args):
-    if file.endswith('.xml'):
-        pytest.importorskip('mujoco')
     assert why in refused(changed(tmp_path, file, changes), *args)
 
 
@@ -677,7 +673,6 @@ def test_what_rods_cannot_be_is_named(tmp_path, old, new, why):
 
 
 def test_a_file_of_mujoco_needs_no_meshes_and_no_names(tmp_path):
-    pytest.importorskip('mujoco')
     robot = readers.read(str(of_text(tmp_path / 'robot.xml', """<mujoco><asset>
       <mesh name="m" file="none.obj"/><hfield name="h" file="none.png" size="1 1 1 1"/>
       <texture name="t" type="2d" file="none.png"/><material name="c" texture="t"/></asset>

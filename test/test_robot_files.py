@@ -459,16 +459,10 @@ def test_a_name_of_the_file_is_never_more_than_text_in_the_terminal(tmp_path, mo
         assert all(line.isprintable() for line in out.splitlines())
 
 
-def sprung(tmp_path):
-    """Return a gripper with a spring in a finger."""
-    pytest.importorskip('mujoco')
-    body = '<body name="right_coupler" pos="0 0.0315 -0.0041">'
-    return written(tmp_path, 'gripper.xml', (body, f'{body}<joint name="spring" axis="1 0 0"/>'))
-
-
 def test_a_passive_joint_of_a_loop_is_no_input(tmp_path):
-    # A spring beside the motor's loop leaves a second one undetermined.
-    spring = sprung(tmp_path)
+    # A spring in a finger, beside the motor's loop, leaves a second one undetermined.
+    body = '<body name="right_coupler" pos="0 0.0315 -0.0041">'
+    spring = written(tmp_path, 'gripper.xml', (body, f'{body}<joint name="spring" axis="1 0 0"/>'))
     mechanisms = {one.name: one for one in imported(spring)}
     robot, line = readers.read(str(spring)), said(spring)
     rest, lost = cli.others(robot, mechanisms, {})
@@ -592,7 +586,6 @@ def test_a_universal_joint_of_an_sdf_is_a_pin(tmp_path, joints):
     (5e-6, 'from_robot: Warning: the file is not exact: axes lean by 5e-06 rad, and loops stay'),
     (0.0, ''), (2e-3, 'are 0.115 degrees from it, more than 0.057; ')])
 def test_a_misfit_is_printed_and_imported_if_it_is_small(tmp_path, lean, why):
-    pytest.importorskip('mujoco')
     code, out, err = printed(written(tmp_path, 'four_bar.xml', (
         'axis="0 -1 0"', f'axis="{lean} -1 0"')))
     assert code == (lean > 1e-3) and why in err and bool(why) == ('rad, and' in err or code > 0)

@@ -13,7 +13,6 @@ from robots import imported, of_text, printed, published, said, words as text
 from test_robot_files import compared
 from truth import rods
 
-pytest.importorskip('mujoco')
 # Limits of pitch and roll.
 NEAR = [-0.15, -0.12], [0.15, 0.12]
 LIGHT = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
