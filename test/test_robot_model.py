@@ -217,8 +217,8 @@ def test_gazebo_has_a_plugin_for_each_cut_and_each_motor():
 YOKE = ['O ground 0 0', 'X ground 1 0', 'A crank O 1', 'C yoke A O along X', 'D block C {} 0']
 LEGS = {'mechanisms': ['leg', 'leg_left0'], 'leg.type': 'jansen', 'leg_left0.type': 'jansen'}
 TWO = 'leg.joints, leg_left0.joints must have other names: the robot model would have two {}'
-BASES = ('frame_id must be the same for all mechanisms of one robot model, or a link of another one '
-         'of them, not {}')
+BASES = ('frame_id must be the same for all mechanisms of one robot model, or a link of another '
+         'one of them, not {}')
 LONG = 'm.scale and m.dimensions must make the longest bar from 1e-30 to 1e+30 m long, not {}'
 
 
