@@ -32,72 +32,13 @@ from robots import (
 from test_robot_files import CUT, loops_of, random_robot, robot_of
 import yaml
 
-TREE = ('<robot name="r">{}<joint name="j" type="revolute"><parent link="a"/><child link="b"/>{}'
-        '</joint>{}</robot>').format
-AB, ABC = '<link name="a"/><link name="b"/>', '<link name="a"/><link name="b"/><link name="c"/>'
+FAULTS = yaml.safe_load((ROBOTS / 'faults.yaml').read_text())
 
 
-def hinge(name, parent, child, more=''):
-    return (f'<joint name="{name}" type="revolute"><parent link="{parent}"/>'
-            f'<child link="{child}"/>{more}</joint>')
-
-
-def sdf(*parts):
-    return ('<sdf version="1.9"><model name="m"><link name="a"/><link name="b"/>'
-            f'{pin("j", "a", "b")}{"".join(parts)}</model></sdf>')
-
-
-def pin(name, parent, child, more=''):
-    return (f'<joint name="{name}" type="revolute"><parent>{parent}</parent><child>{child}</child>'
-            f'{more}</joint>')
-
-
-FAULTS = {
-    '<robot': ' is no XML: ',
-    '<?xml version="1.0" encoding="foo-1"?><robot/>': ' is no XML: unknown encoding: foo-1',
-    '<?xml version="1.0" encoding="utf-7"?><robot/>': ' is no XML: multi-byte encodings',
-    '<a/>': ' must be MJCF, SDF or URDF, not <a>',
-    '<robot name="r"><xacro:property name="a" value="1"/></robot>':
-        ' is xacro: run xacro first, as in xacro ',
-    '<robot name="${name}"/>': ' is xacro: run xacro first, as in xacro ',
-    '<robot/>': ': a URDF has one root link, not 0',
-    f'<robot name="r">{AB}</robot>': ': a URDF has one root link, not 2',
-    '<sdf/>': ': the SDF has no model with joints',
-    '<mujoco><b/></mujoco>': ' cannot be read: ',
-    TREE(ABC, '', hinge('j', 'b', 'c')): ": two joints are called 'j'",
-    TREE(ABC, '', hinge('', 'b', 'c')): ': a joint has no name',
-    TREE(AB, '<mimic joint="k"/>', ''): ": j follows 'k', which is no joint",
-    TREE(ABC, '', hinge('k', 'b', 'c') + hinge('l', 'c', 'b')):
-        ": there are two of <joint> for 'b', which may have one",
-    TREE(ABC + '<link name="d"/>', '', hinge('k', 'c', 'd') + hinge('l', 'd', 'c')):
-        ' has links or frames that hang on themselves',
-    TREE(AB + '<link name="b"/>', '', ''): ": there are two of <link> for 'b', which may have one",
-    TREE(AB, '', hinge('k', 'b', 'c')): " names 'c', which is not there",
-    TREE(AB, '<origin xyz="1e9 0 0"/>', ''):
-        " cannot be read: '1e9 0 0 0 0 0' must be 6 numbers within 1e+09",
-    TREE(ABC, '<origin xyz="6e8 0 0"/>', hinge('k', 'b', 'c', '<origin xyz="6e8 0 0"/>')):
-        ': joint k must be within 1e+09 m',
-    TREE(AB, '<axis xyz="0 a"/>', ''): " cannot be read: could not convert string to float: 'a'",
-    TREE(AB, '<axis xyz="0 0 0"/>', ''): ': the axis of joint j has no length',
-    TREE(AB, '', '<loop_joint name="w" type="revolute"><link1 link="a"/><link2 link="x"/>'
-         '</loop_joint>'): " names 'x', which is not there",
-    sdf(pin('k', 'a', 'f'), '<frame name="f" attached_to="g"/><frame name="g" attached_to="f"/>'):
-        ' has links or frames that hang on themselves',
-    sdf(pin('k', 'a', 'x')): ": k names 'x', which is not there",
-    sdf('<link name="c"><pose relative_to="y"/></link>'): ": c names 'y', which is not there",
-    sdf('<link name="a"/>'): ": there are two of <link> for 'a', which may have one",
-    sdf('<model name="n">', pin('k', 'q', 'q'), '</model>'):
-        ": n::k names 'q', which is not there",
-    sdf('<include><uri>arm</uri></include>'):
-        ": the model includes 'arm', which is not read: write it in its place",
-    sdf('<model name="n" placement_frame="c"><link name="c"/></model>'):
-        ': the model n has a placement_frame, which is not read: give it a pose of its own'}
-
-
-@pytest.mark.parametrize('text', FAULTS, ids=range(len(FAULTS)))
-def test_a_fault_of_a_file_is_named(tmp_path, text):
-    file = of_text(tmp_path / 'robot.urdf', text)
-    assert refused(file).startswith(f'from_robot: {file}{FAULTS[text]}')
+@pytest.mark.parametrize('fault', FAULTS, ids=range(len(FAULTS)))
+def test_a_fault_of_a_file_is_named(tmp_path, fault):
+    file = of_text(tmp_path / 'robot.urdf', fault['text'])
+    assert refused(file).startswith(f'from_robot: {file}{fault["says"]}')
 
 
 POSES = ' must be JOINT=VALUE, its value in rad or m'
@@ -268,9 +209,12 @@ def test_a_loop_is_where_a_dialect_says(tmp_path, dialect):
 
 def test_joints_that_no_mechanism_publishes_are_one_of_cranks(tmp_path):
     # What is held stays where it is held, what follows another goes with it.
-    robot = readers.read(str(of_text(tmp_path / 'robot.urdf', TREE(
-        ABC + '<link name="d"/>', '', hinge('k 2', 'b', 'c', (
-            '<mimic joint="j" multiplier="-0.5" offset="0.1"/>')) + hinge('l', 'c', 'd')))))
+    robot = readers.read(str(of_text(tmp_path / 'robot.urdf', """<robot name="r">
+      <link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+      <joint name="j" type="revolute"><parent link="a"/><child link="b"/></joint>
+      <joint name="k 2" type="revolute"><parent link="b"/><child link="c"/>
+        <mimic joint="j" multiplier="-0.5" offset="0.1"/></joint>
+      <joint name="l" type="revolute"><parent link="c"/><child link="d"/></joint></robot>""")))
     given, lost = cli.others(robot, {}, {'l': 0.25, 'nobody': 1.0})
     assert not lost and given == {
         'mechanisms': ['others'], 'others.type': 'custom', 'others.only_named': True,
@@ -522,11 +466,10 @@ def test_a_file_of_mujoco_needs_no_meshes_and_no_names(tmp_path):
     assert robot.joints[0].axes[0].tolist() == [0.0, 1.0, 0.0] and not robot.driven
 
 
-@pytest.mark.parametrize('said', ['', ' canonical_link="d"'])
-def test_a_model_of_an_sdf_stands_for_its_link(tmp_path, said):
-    file = of_text(tmp_path / 'model.sdf', sdf(
-        f'<model name="n"{said}><model name="o"><link name="c"/></model><link name="d"/></model>',
-        pin('k', 'b', 'n'), pin('l', 'n', 'a')))
-    ends = [joint.bodies for joint in readers.read(str(file)).joints]
-    there = 'n::d' if said else 'n::o::c'
-    assert ends == [('a', 'b'), ('b', there), (there, 'a')]
+@pytest.mark.parametrize('canonical, link', [('', 'n::o::c'), ('canonical_link="d"', 'n::d')])
+def test_a_model_of_an_sdf_stands_for_its_link(tmp_path, canonical, link):
+    file = of_text(tmp_path / 'model.sdf', f"""<sdf version="1.9"><model name="m"><link name="a"/>
+      <model name="n" {canonical}><model name="o"><link name="c"/></model><link name="d"/></model>
+      <joint name="k" type="revolute"><parent>a</parent><child>n</child></joint></model></sdf>""")
+    joint, = readers.read(str(file)).joints
+    assert joint.bodies == ('a', link)
