@@ -288,26 +288,15 @@ def test_a_mechanism_that_differs_from_its_robot_is_refused(four_bar, old, new, 
     assert re.match(f'with motor at .* {why}', compared(robot, given, 'motor'))
 
 
-BALL = ('<link name="a"/><link name="b"/><joint name="elbow_y" type="continuous">'
-        '<parent link="crank"/><child link="a"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>'
-        '</joint><joint name="elbow_x" type="continuous"><parent link="a"/><child link="b"/>'
-        '<axis xyz="1 0 0"/></joint><joint name="elbow" type="continuous">'
-        '<parent link="b"/><child link="coupler"/><axis xyz="0 0 1"/>')
-PIN_OF_ROD = ('<joint name="elbow" type="continuous">\n    <parent link="crank"/><child link='
-         '"coupler"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>')
-ROD = [(PIN_OF_ROD, BALL), ('name="wrist" type="revolute"', 'name="wrist" type="spherical"')]
-
-
 def test_hinges_that_cross_at_the_end_of_a_rod_are_a_ball(tmp_path):
-    file = written(tmp_path, 'four_bar.urdf', *ROD)
-    _, out, err = printed(file)
+    _, out, err = printed('rod.urdf')
     assert "hold:='elbow_x=0 elbow=0'" in out and 'Not published' not in err
-    mechanism, = imported(file)
+    mechanism, = imported('rod.urdf')
     # About the normal of the plane first, so that the rod's other hinges stay.
     for angle in (-1.1, 0.4, 1.2):
         assert published(mechanism, motor=angle) == pytest.approx(
             {'motor': angle, 'shoulder': -angle, 'elbow_y': -angle}, abs=1e-14)
-    loose = written(tmp_path, 'four_bar.urdf', *ROD, (
+    loose = written(tmp_path, 'rod.urdf', (
         'name="shoulder" type="continuous"', 'name="shoulder" type="spherical"'))
     assert re.search('not planar: (coupler|rocker) hangs on balls alone, and is no rod',
                      refused(loose))
@@ -315,7 +304,7 @@ def test_hinges_that_cross_at_the_end_of_a_rod_are_a_ball(tmp_path):
 
 def test_hinges_of_a_rod_that_its_other_end_needs_do_not_stay(tmp_path):
     # A universal joint does not let the rod turn in the plane alone: it spins, too.
-    file = written(tmp_path, 'four_bar.urdf', *ROD, (
+    file = written(tmp_path, 'rod.urdf', (
         '</robot>', '<link name="cross"/><joint name="wrist_1" type="continuous">'
         '<parent link="rocker"/><child link="cross"/><origin xyz="0 0 0.2"/><axis xyz="0 1 1"/>'
         '</joint></robot>'), (
@@ -443,9 +432,13 @@ def test_a_long_comment_costs_no_more_than_its_letters(tmp_path, long):
     assert {*robot.positions} == {'motor', 'elbow', 'shoulder'}
 
 
-@pytest.mark.parametrize('more', [['\x9b2J'] * 4, ['\x1b]0;title\x07'] * 4, [
-    1500 * each for each in ('x', '', 'x y ', 'x')]], ids=range(3))
-def test_a_name_of_the_file_is_never_more_than_text_in_the_terminal(tmp_path, more):
+@pytest.mark.parametrize('code, more', [
+    (0, ['\x9b2J'] * 4), (1, ['\x1b]0;title\x07'] * 4),
+    (1, [1500 * each for each in ('x', '', 'x y ', 'x')]),
+    (0, ['\n/crank_driver: {ros__parameters: {rate: 1.0}}\n#', '\u2028evil: 1\x85', '-1', '"\\'])],
+    ids=range(4))
+def test_a_name_of_a_file_is_only_a_name_in_a_scene_and_in_a_terminal(tmp_path, code, more):
+    yaml = pytest.importorskip('yaml')
     names = ('coupler', 'rocker', 'elbow', 'motor')
     called = {name: name + each for name, each in zip(names, more)}
     root = ElementTree.fromstring((ROBOTS / 'four_bar.urdf').read_text())
@@ -453,13 +446,19 @@ def test_a_name_of_the_file_is_never_more_than_text_in_the_terminal(tmp_path, mo
         for key in ('name', 'link', 'joint'):
             if part.get(key) in called:
                 part.set(key, called[part.get(key)])
-    file = of_text(tmp_path / 'named.urdf', ElementTree.tostring(root, 'unicode'))
+    file = of_text(tmp_path / 'robot\nevil: 2\n#.urdf', ElementTree.tostring(root, 'unicode'))
     for args in ['--driven', 'nobody'], []:
-        _, out, err = printed(file, *args)
+        found, out, err = printed(file, *args)
         for line in err.splitlines():
             assert line.isprintable() and len(line) < 5000
             assert max(map(len, line.split()), default=0) <= 300
         assert all(line.isprintable() for line in out.splitlines())
+    assert found == code
+    if not code:
+        mechanism, = imported(file)
+        assert yaml.safe_load(out).keys() == {'/**'}
+        assert published(mechanism, **{called['motor']: 0.4}).keys() == {
+            called['elbow'], called['motor'], 'shoulder'}
 
 
 def test_a_passive_joint_of_a_loop_is_no_input(tmp_path):
@@ -516,18 +515,6 @@ def test_a_pose_at_the_end_of_its_loops_is_left_on_the_other_side(tmp_path):
     for more in re.findall('--pose (.*?) (?:or (?=--)|to the command)', line):
         assert f'motor, from -2 to -1: {BEYOND}' in said(
             file, '--driven', 'motor', '--pose', *more.split())
-
-
-def test_names_of_a_file_stay_names(tmp_path):
-    yaml = pytest.importorskip('yaml')
-    name = 'jy\n/crank_driver: {ros__parameters: {rate: 1.0}}\n#'
-    text = name.replace('\n', '&#10;')
-    file = written(tmp_path, 'four_bar.urdf', ('"shoulder"', f'"{text}"'), (
-        '"elbow"', '"finger-1"'), ('"wrist"', '"&#x2028;evil: 1&#x85;"'))
-    evil = file.rename(tmp_path / 'robot\nevil: 2\n#.urdf')
-    mechanism, = imported(evil)
-    assert published(mechanism, motor=0.4).keys() == {name, 'finger-1', 'motor'}
-    assert yaml.safe_load(printed(evil)[1]).keys() == {'/**'}
 
 
 def test_world_of_drake_is_no_second_root(tmp_path):
