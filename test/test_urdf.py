@@ -193,17 +193,6 @@ def test_a_crank_of_several_legs_has_no_ends():
     assert limits(mechanism('peaucellier', mirrored=True))['crank'] is None
 
 
-@pytest.mark.parametrize('library', LIBRARIES)
-def test_several_mechanisms_make_one_robot(library):
-    mechanisms = scene.read({'frame_id': 'base', 'jansen.leg_pairs': 2}).mechanisms
-    text = urdf.describe(mechanisms.values(), 'base')
-    assert ElementTree.fromstring(text).get('name') == 'linkages'
-    assert links(text)[0] == 'base'
-    assert set(links(text)) == {link for one in mechanisms.values()
-                                for link in links(urdf.describe([one], 'base'))}
-    assert len(library(text).joints) == sum(len(limits(one)) for one in mechanisms.values())
-
-
 def test_the_model_is_valid():
     assert Yourdfpy(description(mechanism('jansen', leg_pairs=3))).robot.validate()
 

@@ -142,9 +142,8 @@ class _Loops:
         for drive in (drive for made in parts for drive in mechanisms[made.name].inputs.values()):
             around = math.pi if drive.input.turns else 0.5 * component.size
             low, high = drive.ends or (drive.start - around, drive.start + around)
-            start = min(max(drive.start, low), high)
             ends = sorted((end - drive.offset) / drive.ratio for end in (
-                max(low, start - 2.0 * around), min(high, start + 2.0 * around)))
+                max(low, drive.start - 2.0 * around), min(high, drive.start + 2.0 * around)))
             low, high = self._ends.get(drive.source, ends)
             self._ends[drive.source] = max(low, ends[0]), min(high, ends[1])
         self._slack = MISFIT * max(made.slack for made in parts)
