@@ -93,18 +93,14 @@ def visuals(text, frames):
 
 
 def scene_seen(one, thetas, width):
-    """Return what is seen of the links of a scene, and the balls of the points on each."""
+    """Return what is seen of the links of a scene but balls."""
     _, places = posed(one, thetas)
-    found, points = {}, {}
-    shown = shapes(one)
+    found, shown = {}, shapes(one)
     ends = one.assembly().solution([end for shape in shown for end in (shape.start, shape.end)])
     ends.solve(thetas.tolist())
 
     def add(link, *visual):
         found.setdefault(f'm_{link}_link', []).append(row(*visual))
-
-    def ball(place):
-        return row('sphere', GREY, width, place, place)
 
     def colour(link):
         return ORANGE if link in one.inputs else BLUE
@@ -112,15 +108,11 @@ def scene_seen(one, thetas, width):
     for prefix, leg_ends in zip(one.assembly().legs, ends.rows):
         spots = {name[len(f'm_{prefix}'):]: in_space(one.pose, place)
                  for name, place in places.items() if name.startswith(f'm_{prefix}')}
-        joints = {link.name: link.joint for link in one.linkage.links}
-        for link, frame in {'ground': ground_frame(one.linkage), **one.linkage.frames}.items():
-            name = link if link == 'ground' else prefix + link
-            points.setdefault(f'm_{name}_link', {}).update(
-                (f'm_{prefix}{point}', [ball(spots[point])]) for point in frame
-                if point != joints.get(link))
-            for start, end in one.linkage.bars if link != 'ground' else ():
+        for link, frame in one.linkage.frames.items():
+            for start, end in one.linkage.bars:
                 if {start, end} <= set(frame):
-                    add(name, 'cylinder', colour(link), width / 2, spots[start], spots[end])
+                    add(prefix + link, 'cylinder', colour(link), width / 2, spots[start],
+                        spots[end])
         for shape, (start, end) in zip(shown, leg_ends.reshape(-1, 2, 2)):
             link, slide = shape.start.link, shape.slide.name
             look = {GUIDE: ('box', GREY, width / 2), BLOCK: ('box', colour(slide), 2.0 * width),
@@ -129,11 +121,7 @@ def scene_seen(one, thetas, width):
             drawn = (*look, in_space(one.pose, start), in_space(one.pose, end))
             if link != 'ground' or row(*drawn) not in found.get('m_ground_link', []):
                 add(link if link == 'ground' else prefix + link, *drawn)
-    return found, points
-
-
-def bare(name):
-    return name.partition('_cut')[0]
+    return found
 
 
 @pytest.mark.parametrize('name', some_quick([*MACHINES, *OWN], QUICK))
@@ -147,21 +135,19 @@ def test_three_formats_show_what_the_scene_has(name):
                        for drive in one.inputs.values()])
     places, moved = posed(one, starts)[1], built.parts[0]
     frames = {body: turned(*one.pose) @ frame for body, frame in moved.frames.items()}
-    homes = {joint.bodies[1]: joint.bodies[0] for joint in moved.joints}
     texts = urdf.write(robot), mjcf.write(built), sdf.write(built)
     # People read it: a line for each element.
     assert all(text.count('\n') >= text.count('/>') + text.count('</') - 1 for text in texts)
     tree, loops, gazebo = (visuals(text, frames) for text in texts)
-    wanted, points = scene_seen(one, starts, width)
-    for link, rows in tree.items():
-        if link.endswith('_link'):
-            # A moving link of which nothing else is seen is a ball at its own joint.
-            place = frames[link][:3, 3]
-            check_seen({link: rows}, {link: wanted.get(link) or [
-                row('sphere', GREY, width, place, place)] * (link != 'm_ground_link')})
-    for link, balls in points.items():
-        check_seen({bare(child): tree[child] for child in tree
-                    if homes.get(child) == link and not child.endswith('_link')}, balls)
+    # A body of which nothing else is seen, such as a point, is a ball.
+    balls = {name: [row('sphere', GREY, width, frame[:3, 3], frame[:3, 3])]
+             for name, frame in frames.items() if name != 'm_ground_link'}
+    wanted = {**balls, **scene_seen(one, starts, width)}
+    for found in tree, loops, gazebo:
+        check_seen(found, {name: wanted.get(name, []) for name in found})
+    # Bodies in the slots of yokes are of simulators alone.
+    assert tree.keys() == robot.parts[0].frames.keys() and frames.keys() == loops.keys()
+    assert frames.keys() == gazebo.keys()
     limits = ElementTree.fromstring(texts[0]).iter('limit')
     assert {(each.get('effort'), each.get('velocity')) for each in limits} <= {('0', '0')}
     simulator, (root,) = map(ElementTree.fromstring, texts[1:])
@@ -169,16 +155,6 @@ def test_three_formats_show_what_the_scene_has(name):
               for link in root.iter('link') if link.find('inertial') is not None}
     assert masses.keys() == {name for name in gazebo if gazebo[name]}
     check_mjcf(one, simulator, starts, places, 9.81 * sum(masses.values()))
-    # What runs in a yoke's slot, and its pin, is where the point in the slot is.
-    for name in loops.keys() - tree.keys():
-        link = re.fullmatch('m_(.*)_(slot_link|pin)', name)[1]
-        pin = next(pin for yoke, pin in one.linkage.yokes.items() if link.endswith(yoke))
-        place = in_space(one.pose, next(
-            place for point, place in places.items() if point.endswith(pin)))
-        for file in loops, gazebo:
-            check_seen({'': file.pop(name)}, {'': [row('sphere', GREY, width, place, place)]})
-    check_seen(loops, tree)
-    check_seen(gazebo, tree)
 
 
 def check_mjcf(one, root, starts, places, weight):
