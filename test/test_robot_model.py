@@ -5,7 +5,6 @@
 
 import copy
 import math
-import re
 from unittest.mock import ANY
 from xml.etree import ElementTree
 
@@ -15,7 +14,7 @@ from linkage_ros.robot_files import readers
 from linkage_ros.robot_model import bodies, mjcf, robot, rviz, sdf, urdf
 from linkage_ros.robot_model.bodies import assembled
 from linkage_ros.robot_model.cli import main
-from linkage_ros.robot_model.shapes import BARREL, BLOCK, ground_frame, GUIDE, ROD, shapes
+from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
 import numpy as np
 import pytest
 from robots import rotation
