@@ -124,6 +124,27 @@ class Pinocchio:
                 for name in names}
 
 
+class MuJoCo:
+    """A model of MuJoCo, which knows its loops."""
+
+    def __init__(self, text):
+        self.library = pytest.importorskip('mujoco', reason='pip install mujoco')
+        self.model = self.library.MjModel.from_xml_string(text)
+        self.data = self.library.MjData(self.model)
+        self.joints = [self.model.joint(i).name for i in range(self.model.njnt)]
+
+    def place(self, positions):
+        """Put joints at positions, and what they move."""
+        for name, value in positions.items():
+            self.data.joint(name).qpos = value
+        self.library.mj_forward(self.model, self.data)
+
+    def open(self):
+        """Return how far what is tied together is apart [m]."""
+        self.library.mj_forward(self.model, self.data)
+        return np.abs(self.data.efc_pos[:self.data.ne]).max(initial=0.0)
+
+
 def words(numbers):
     """Return numbers as a file has them, with all their digits."""
     return ' '.join(repr(float(number)) for number in numbers)

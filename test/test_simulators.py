@@ -13,7 +13,7 @@ from linkage_ros.robot_model import bodies, mjcf, sdf
 from linkage_ros.robot_model.bodies import assembled
 import numpy as np
 import pytest
-from robots import of_text, published
+from robots import MuJoCo, of_text, published
 from test_urdf import drives, in_space, MACHINES, OWN, posed
 
 SCENES = sorted(Path(__file__).parents[1].glob('config/*.yaml'))
@@ -47,23 +47,16 @@ def model(mechanisms, frame_id='world', **given):
     return assembled(bodies.robot(mechanisms, frame_id), **given)
 
 
-class MuJoCo:
+class Simulation(MuJoCo):
     """A model in MuJoCo, at its start."""
 
     def __init__(self, text):
-        self.library = pytest.importorskip('mujoco', reason='pip install mujoco')
-        self.model = self.library.MjModel.from_xml_string(text)
-        self.data = self.library.MjData(self.model)
+        super().__init__(text)
         self.library.mj_resetDataKeyframe(self.model, self.data, 0)
         self.library.mj_kinematics(self.model, self.data)
 
     def places(self, names):
         return {name: self.data.body(name).xpos.copy() for name in names}
-
-    def open(self):
-        """Return how far a loop is open [m]."""
-        self.library.mj_forward(self.model, self.data)
-        return np.abs(self.data.efc_pos[:self.data.ne]).max(initial=0.0)
 
     def run(self, seconds, inputs=None):
         """Yield from time to time, with inputs at what a function of time says."""
@@ -80,7 +73,7 @@ class MuJoCo:
 @pytest.mark.parametrize('file', some_scenes('all', 'excavator', 'rack_steering'))
 def test_gravity_tears_no_scene(file):
     found = scene.load(str(file))
-    robot = MuJoCo(mjcf.write(model(found.mechanisms.values(), found.frame_id)))
+    robot = Simulation(mjcf.write(model(found.mechanisms.values(), found.frame_id)))
     bar = min(map(bodies.size, found.mechanisms.values()))
     assert max(robot.open() for _ in robot.run(1.0)) < 1e-5 * bar
 
@@ -109,7 +102,7 @@ def follow(one, robot, seconds):
 @pytest.mark.parametrize('file', some_scenes('excavator', 'jansen', 'rack_steering'))
 def test_servos_drive_the_linkage_through_the_poses_of_solve(file):
     for one in scene.load(str(file)).mechanisms.values():
-        robot = MuJoCo(mjcf.write(model([one])))
+        robot = Simulation(mjcf.write(model([one])))
         assert max(follow(one, robot, 2.0)) < 2e-3 * bodies.size(one)
 
 
@@ -153,7 +146,7 @@ def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
 @pytest.mark.parametrize('name', ['engine', 'boom and arm'])
 def test_bodies_weigh_in_an_sdf_what_mujoco_finds_their_shapes_to_weigh(name):
     built = model([simulated(name)], density=1000.0)
-    robot = MuJoCo(mjcf.write(built))
+    robot = Simulation(mjcf.write(built))
     links = {link.get('name'): link.find('inertial')
              for link in ElementTree.fromstring(sdf.write(built)).iter('link')}
     for body in built.parts[0].bodies():
