@@ -63,7 +63,7 @@ REQUESTS = [
         '{"joint": [], "place": [1, 2]}', '{"joint": "A", "up": 2}',
         '{"joint": "A", "place": [1]}', '{"joint": "A", "place": [1, 2], "leg": 1}')),
     ('pose', '"key": []', 'the request fails'), ('tune', '"key": ""', 'there is no'),
-    ('curve', '"output": "Z.x"', "slotted_lever has no output 'Z.x'; allowed: .*"),
+    ('curve', '"output": "Z.x"', "slotted_lever has no joint 'Z.x'; allowed: .*"),
     ('curve', '"kind": "transmission angle", "output": "L.x"', 'lever'),
     ('curve', '"colour": 1', 'the request fails'), ('export', '"a": 1', 'the request fails'),
     (50000 * 'x', '"a": 1', "unknown request 'x*[.]{3}x*'$"),
