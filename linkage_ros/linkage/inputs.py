@@ -25,8 +25,9 @@ ANGLE, LENGTH = 'angle', 'length'
 MAX_PERIOD = 100
 # Greatest denominator of a gear ratio with a period, and greatest ratio.
 MOST_TURNS, FASTEST = 10 ** 6, 1000
-# Poses that are compared with those a period later.
-PERIODIC = 64
+# Poses that are compared with those a period later. One more is a prime: of a range of whole turns
+# each is at another angle.
+PERIODIC = 66
 
 
 class Input(NamedTuple):
@@ -194,14 +195,18 @@ def wrapped(theta: Any, turn: float = math.tau) -> Any:
     return np.where((theta >= -half) & (theta < half), theta, turned)
 
 
-def is_periodic(places: Callable, input_: Input) -> bool:
+def is_periodic(places: Callable, input_: Input, turn: float,
+                arcs: Sequence[Arc] = ()) -> bool:
     """
-    Return whether poses are the same a period of an input later.
+    Return whether all poses over an input are the same a turn [rad] later.
 
-    `places` takes values of the input, shape (n,), and returns coordinates (any, n).
+    `places` takes values of the input, shape (n,), and returns coordinates (any, n), NaN outside
+    some arcs. Between arcs it is asked, too: samples alone miss narrow gaps.
     """
-    theta = np.linspace(input_.low, input_.high, PERIODIC + 2)[1:-1]
-    now, later = (places(theta + turn) for turn in (0.0, input_.turn))
+    gaps = [0.5 * (end + start) for (_, end), (start, _) in zip(arcs, arcs[1:])]
+    theta = np.concatenate([
+        np.linspace(input_.low, input_.high, PERIODIC + 2)[1:-1], gaps])
+    now, later = places(theta), places(theta + turn)
     with np.errstate(invalid='ignore'):
         size = np.fmax.reduce(np.abs(now), axis=None, initial=0.0)
         alike = np.abs(now - later) <= SINGULAR * size

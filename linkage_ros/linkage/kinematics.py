@@ -225,7 +225,7 @@ class Kinematics:
         if turns > most or not self._passes_change_point(by):
             return turns
         return turns if is_periodic(lambda theta: self._points_over(by, theta), Input(
-            '', low=-math.pi * turns, high=math.pi * turns, period=turns)) else 2 * turns
+            '', low=-math.pi * turns, high=math.pi * turns), math.tau * turns) else 2 * turns
 
     def _passes_change_point(self, by: int) -> bool:
         """Return whether a dyad of a crank has a gap of nothing but rounding."""

@@ -21,6 +21,7 @@ from ..formulas import LinkageFormulas
 from ..inputs import Input, is_periodic, spread
 from ..kinematics import Kinematics
 from ..motion.curves import LEAST
+from ..motion.reach import reach_of
 from ..tolerances import SINGULAR
 from ...cache import cached
 from ...formula.expression import argument, dimension, greater, nearest_integer, Real, real, where
@@ -76,9 +77,10 @@ class InverseProblem:
             return input_
         rates = [self.linkage.gear(name, by)[0] for name in self.linkage.geared_to(by)]
         periods = (1.0, *(1.0 / abs(rate) for rate in rates if rate))
+        over, arcs = partial(self._outputs_over, by), reach_of(self.linkage) if self.n == 1 else ()
         return next((each for each in (input_._replace(
             period=period, low=-math.pi * period, high=math.pi * period) for period in periods)
-                     if each.wraps and is_periodic(partial(self._outputs_over, by), each)), input_)
+                     if each.wraps and is_periodic(over, input_, each.turn, arcs)), input_)
 
     def _outputs_over(self, by: int, values: np.ndarray) -> np.ndarray:
         """Return the outputs, angles as directions, over one input; the others are spread."""

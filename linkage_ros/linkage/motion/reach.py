@@ -69,7 +69,7 @@ def _reach(linkage: Kinematics, others: Tuple[float, ...]) -> List[Arc]:
                  if (margins(np.array([lo + INSIDE * (hi - lo)]))[rows] >= 0.0).all()
                  for end in _limits(margins, lo, hi)]
     arcs = reachable_arcs(ends, assembled, input_, lambda: is_periodic(
-        over_first(linkage, 'points', linkage.points, others), input_))
+        over_first(linkage, 'points', linkage.points, others), input_, input_.turn))
     if not input_.is_whole(arcs):
         arcs = [_trimmed(assembled, *arc) for arc in arcs]
     return [(lo * step, hi * step) for lo, hi in arcs if lo < hi]
