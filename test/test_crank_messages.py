@@ -90,16 +90,6 @@ def test_any_speed_is_handled_without_a_warning_of_numpy(graph, speed):
             assert np.isfinite(state.velocity).all() and np.isfinite(state.position).all()
 
 
-def test_ten_thousand_joints_hold_nobody_up(graph):
-    hand = Hand(graph)
-    names = [f'joint{i}' for i in range(9999)] + ['jansen_crank']
-    for theta in (0.1, 0.2, 0.3):
-        hand.send(names, [0.0] * 9999 + [theta])
-        graph.until(lambda theta=theta: hand.joints and hand.joints[-1].position[0] == theta)
-    said, = hand.warnings('no input is called')
-    assert 'joint0, joint1' in said and '... (9999)' in said and len(said) < 400
-
-
 def test_a_warning_is_repeated_when_its_time_is_over():
     said = []
     throttle = log.Throttle(SimpleNamespace(warning=said.append))

@@ -167,6 +167,8 @@ def test_the_pairs_of_a_walker_pale_from_the_first_to_the_last(tmp_path):
     legs = next(layer for layer in made.panels[0].moving if isinstance(layer, layers.Legs))
     brightness = {leg: np.mean(artists['bars'].get_colors()[0][:3]) for leg, artists in legs.legs}
     assert brightness[0] == brightness[1] < brightness[2] == brightness[3] < brightness[4]
+    # The two plates of a leg are filled.
+    assert [len(artists['plates'].get_paths()) for _, artists in legs.legs] == 6 * [2]
 
 
 def test_a_crank_on_a_moving_link_draws_no_circle():

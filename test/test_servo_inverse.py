@@ -124,23 +124,6 @@ def test_all_working_modes_of_a_foot_are_told_and_the_nearest_comes_first(graph)
         assert again.positions[:2].tolist() == pytest.approx(near) and again.modes[0] == mode
 
 
-@pytest.mark.parametrize('turn', [-2, 0, 1])
-def test_of_several_inputs_one_in_a_sweep_of_another_turn_is_answered_there(graph, turn):
-    sweep = [turn * math.tau + end for end in (1.0, 3.0)]
-    node = graph.start(ServoInverse, {
-        'mechanisms': ['leg'], 'leg.type': 'five_bar', 'leg.crank.sweep': sweep,
-        'leg.crank.start': sweep[0] + 0.9, 'leg.crank2.start': 1.24})
-    response = node.answer_inputs_for(
-        InputsFor.Request(outputs=['P.x', 'P.y'], values=[0.06, 0.15], near=[1.9, 1.24]),
-        InputsFor.Response())
-    expected = [inputs for inputs, _ in five_bar(mechanisms.create('five_bar').dimensions,
-                                                 0.06 + 0.15j) if 1.0 <= inputs[0] <= 3.0]
-    answers = np.reshape(response.positions, (-1, 2))
-    assert len(expected) == len(answers) == 2
-    assert sorted(answers[:, 0] - turn * math.tau) == pytest.approx(
-        sorted(inputs[0] for inputs in expected), abs=1e-12)
-
-
 INPUTS_REFUSED = [
     ({'values': [0.12]}, 'values must have 2 numbers and near as many or none, not 1 and 0'),
     ({'near': [0.0]}, 'values must have 2 numbers and near as many or none, not 2 and 1'),

@@ -122,26 +122,6 @@ def test_announcements_that_make_no_sense_change_nothing(graph, show):
     assert answer['reason'] == '' and 'crank' in answer['inputs']
 
 
-def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
-    running = show(LEVER)
-    page = running.page()
-    answer = page.pose('/lever', output='lever', value=0.4)
-    assert answer['reason'] == ''
-
-    def is_there():
-        joints = page.drawn('/lever', 'joints')
-        return len(joints) and abs(math.atan2(
-            joints[1, 0] - joints[3, 0], joints[3, 1] - joints[1, 1]) - 0.4) < 1e-6
-
-    until(is_there)
-    servo, lever = answer['inputs']['crank'], answer['outputs']['lever']
-    assert lever_of(servo) == pytest.approx(0.4, abs=1e-12)
-    slope = (lever_of(servo + 1e-6) - lever_of(servo - 1e-6)) / 2e-6
-    assert lever['rates'] == [pytest.approx(slope, abs=1e-8)]
-    assert running.value('lever.crank.speed') == 0.0
-    assert running.value('lever.crank.start') == servo
-
-
 TWO_ARCS = {**RATE, 'mechanisms': ['bar'], 'bar.type': 'four_bar', 'bar.crank.start': 1.0,
             **{f'bar.dimensions.{name}': length
                for name, length in zip('abcd', (3.0, 2.0, 2.5, 3.0))}}
