@@ -27,6 +27,8 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 # A failure prints how to repeat it; a run depends on no earlier one.
 settings.register_profile('repeatable', database=None, print_blob=True, deadline=None)
 settings.load_profile('repeatable')
+# Its failures show both sides, as those of tests do.
+pytest.register_assert_rewrite('oracle')
 # Of whatever a test starts that is not told another.
 _domain = Domain()
 atexit.register(_domain.release)
