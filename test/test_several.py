@@ -250,10 +250,10 @@ def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
     swept = {'mechanisms': ['leg'], 'leg.type': 'five_bar', 'leg.crank.sweep': [6.0, 9.0]}
     wanted = InverseRequest(scene.read(swept).mechanisms['leg'], ('P.x', 'P.y'))
     answers = wanted.answers((0.05, 0.15), (0.0, 0.0))
-    assert answers and all(6.0 <= answer.inputs[0] <= 9.0 for answer in answers)
-    assert answers[0].inputs[0] == pytest.approx(min(answer.inputs[0] for answer in answers))
+    assert answers and all(6.0 <= inputs[0] <= 9.0 for inputs, _ in answers)
+    assert answers[0][0][0] == pytest.approx(min(inputs[0] for inputs, _ in answers))
     found, _, _ = wanted.command((0.05, 0.15), None, (0.0, 0.0), jumps=True)
-    assert found == pytest.approx(answers[0].inputs)
+    assert found == pytest.approx(answers[0][0])
     swept['leg.crank.sweep'] = [3.0, 3.5]
     wanted = InverseRequest(scene.read(swept).mechanisms['leg'], ('P.x', 'P.y'))
     assert wanted.answers((0.05, 0.15), (3.2, 0.0)) == []
