@@ -11,7 +11,7 @@ from mpmath import mp, mpc, mpf
 import numpy as np
 import pytest
 from robots import Pinocchio
-from truth.cases import CASES, CRANK, cross, FOOT, IDLER, TIP
+from truth.cases import CASES, CRANK, cross, FOOT, IDLER
 
 
 def made(name, size=1.0, branches=None):
@@ -47,18 +47,6 @@ def test_a_dead_point_is_where_a_transmission_angle_is_flat(name):
         assert linkage.distance_to_dead_point(value, *held) == 0.0
 
 
-@pytest.mark.parametrize('name', [*CASES, *mechanisms.TYPES])
-def test_a_pose_has_the_same_bits_beside_rates_that_are_infinite(name):
-    linkage = made(name) if name in CASES else mechanisms.create(name)
-    held = poses(name)[0][1:] if name in CASES else np.zeros(len(linkage.inputs) - 1)
-    alone = linkage.function(None, linkage.joints)
-    together = linkage.function(None, linkage.joints, linkage.joints)
-    for value in {*linkage.dead_points(*held), *np.ravel(linkage.reach(*held))}:
-        inputs = float(value), *held.tolist()
-        expected = alone(*inputs)
-        assert np.array_equal(together(*inputs)[:len(expected)], expected, equal_nan=True)
-
-
 # --- what is published about them --------------------------------------------------------------
 
 def turned(linkage, theta, first, second):
@@ -89,13 +77,6 @@ def test_an_excavator_turns_by_the_law_of_cosines(piston):
                          (angle('H', 'E', 'J'), corner(n['g'], across, n['i'])
                           + corner(across, n['m'], n['k']))):
         assert abs(found - min(exact, 2 * mp.pi - exact)) < 8e-15
-
-
-def test_a_finger_that_mimics_its_driver_is_off_by_two_degrees():
-    finger, theta = made('2F-85 finger'), np.linspace(0.0, 0.8, 81)
-    follower = np.degrees(turned(finger, theta, 'P', 'F'))
-    assert np.ptp(follower) == pytest.approx(1.85, abs=0.005)
-    np.testing.assert_allclose(finger.solve(0.0)['T'] @ (1, 1j), TIP, atol=1e-16)
 
 
 def test_the_side_of_a_nearly_folded_dyad_is_not_that_of_its_zero_pose():

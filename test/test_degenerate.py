@@ -8,8 +8,6 @@ import tracemalloc
 
 from effort import few_calls
 from linkage_ros import mechanisms
-from linkage_ros.linkage.inputs import CRANK
-from linkage_ros.linkage.motion.singularities import distinct
 import numpy as np
 import pytest
 
@@ -105,21 +103,6 @@ def test_one_change_point_a_turn_doubles_the_period(lengths, period):
         0.0, input_.turn, math.tau))
     np.testing.assert_allclose(later, now, atol=1e-14 * max(lengths))
     assert (period == 1) == np.allclose(between, now, atol=1e-3 * max(lengths))
-
-
-@pytest.mark.parametrize('theta', [3.1415926535897927, math.pi, -math.pi, 1e9, -7.0, 0.0])
-def test_a_dead_point_is_between_minus_pi_and_pi(theta):
-    wrapped = distinct([theta], CRANK)
-    assert -math.pi <= wrapped[0] < math.pi
-    assert abs(math.remainder(wrapped[0] - theta, math.tau)) < 1e-6
-    assert wrapped == [theta] or not -math.pi <= theta < math.pi
-
-
-@pytest.mark.parametrize('lengths, expected', [
-    ({'a': 2.0, 'b': 3.0, 'c': 2.0, 'd': 3.0}, [-math.pi, 0.0]),
-    ({'a': 2.0, 'b': 4.0, 'c': 3.0, 'd': 3.0}, [-math.tau, 0.0])])
-def test_a_dead_point_at_zero_is_zero(lengths, expected):
-    assert mechanisms.create('four_bar', **lengths).dead_points() == expected
 
 
 def test_a_reach_is_found_that_has_no_pose_in_its_middle():

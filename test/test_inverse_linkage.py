@@ -96,13 +96,6 @@ def test_a_value_alone_has_the_answers_that_it_has_in_an_array(kind):
                     *alone[0], *alone[1]], rtol=1e-10, atol=1e-13)
 
 
-def test_the_order_of_the_outputs_does_not_matter():
-    arm = mechanisms.create('five_bar')
-    place = arm.solve((1.9, 1.24), ('P',))['P'].tolist()
-    assert [answer.inputs for answer in arm.inputs_for(('P.y', 'P.x'), place[::-1])] == [
-        answer.inputs for answer in arm.inputs_for(('P.x', 'P.y'), place)]
-
-
 @pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('outputs', [*permutations(('P.x', 'A.y', 'AP', 'angle(A,P)'), 2)])
 def test_any_two_outputs_that_determine_two_inputs_tell_them(outputs):

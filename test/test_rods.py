@@ -232,16 +232,6 @@ def test_limits_with_a_second_or_a_singular_pose_are_refused(seed, count):
     assert check_windows(seed, count) > 0.3 * count
 
 
-@pytest.mark.nightly
-def test_of_limits_that_are_too_wide_the_largest_that_can_be_are_named():
-    wide = [line.replace('-50deg 30deg', '-170deg 150deg') for line in G1]
-    with pytest.raises(ValueError, match='there is a second pose in these limits: with right at '
-                       '.*, left at .*, pitch at .*, roll at .* as well as pitch at .*; the '
-                       r'largest proved to have one at most: pitch within -\d.*deg, roll '
-                       r'within -\d.*deg'):
-        made(wide)
-
-
 @pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('seed', [1, 2])
 def test_the_two_poses_of_refused_limits_are_two_poses(seed):
