@@ -398,6 +398,7 @@ class Kinematics:
         self.check_there(output)
         return self.structure.is_angle(output)
 
+
     def moves(self, output: str, by: int = 0) -> bool:
         """Return whether an output depends on one of the inputs."""
         return isinstance(output, str) and self.structure.moves(output, self._checked_by(by))

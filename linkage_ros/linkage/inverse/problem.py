@@ -20,8 +20,7 @@ import numpy as np
 from ..formulas import LinkageFormulas
 from ..inputs import Input
 from ..kinematics import Kinematics
-from ..motion.curves import LEAST
-from ..tolerances import SINGULAR
+from ..tolerances import LEAST, SINGULAR
 from ...cache import cached
 from ...formula.expression import argument, dimension, greater, nearest_integer, Real, real, where
 from ...formula.program import CompiledFunction, Program
