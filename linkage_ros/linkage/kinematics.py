@@ -251,9 +251,9 @@ class Kinematics:
         pose, rows = self.compiled(kind, outputs), []
         for inputs[by] in (now, later):
             # As directions: angles are the same up to whole turns.
-            rows.append([np.exp(1j * row / (1.0 if self.is_angle(name) else self.longest))
-                         for name, row in zip(outputs, pose.searched(*inputs))])
-        return np.allclose(*rows, 0.0, SINGULAR, equal_nan=True)
+            rows.append(np.exp([1j * row / (1.0 if self.is_angle(name) else self.longest)
+                                for name, row in zip(outputs, pose.searched(*inputs))]))
+        return np.allclose(rows[1], rows[0], 0.0, SINGULAR, equal_nan=True)
 
     def _with_limits(self, by: int, input_: Input) -> Input:
         """Return an input with the limits [rad or m] of all poses."""
@@ -397,7 +397,6 @@ class Kinematics:
         """Return whether an output is an angle [rad], not a length [m]."""
         self.check_there(output)
         return self.structure.is_angle(output)
-
 
     def moves(self, output: str, by: int = 0) -> bool:
         """Return whether an output depends on one of the inputs."""

@@ -117,9 +117,10 @@ class Mechanism(Kinematics):
         inverse = self.inverse((output, *(input_.name for input_ in self.inputs[1:])))
         if near is not None:
             return inverse.nearest((value, *fixed), (near, *fixed))[0][0]
-        if type(value) is not float and numbers('value', value).ndim:
+        value = numbers('value', value)
+        if value.ndim:
             return inverse.over(value, *fixed)[0][0]
-        found = inverse.all((value, *fixed))
+        found = inverse.all((float(value), *fixed))
         return np.array([answer.inputs[0] for answer in found] or [math.nan])
 
     def _fixed(self, others: Any) -> Tuple[float, ...]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 import math
-from typing import Any, Callable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
