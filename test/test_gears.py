@@ -148,6 +148,22 @@ def test_a_crank_that_has_turned_for_long_is_answered_where_it_is():
             assert found.input_for(output, value, theta) == pytest.approx(theta, abs=1e-9)
 
 
+@pytest.mark.parametrize('seed', [3.0, -5000.5])
+def test_a_gear_that_repeats_is_not_answered_where_a_rare_gap_of_the_reach_is(seed):
+    # Both cranks pull the dyad apart for a few degrees in a hundred turns.
+    found = mechanisms.create('custom', joints=(
+        'A ground 0 0', 'B ground 4 0', 'C crank A 1',
+        'D crank B 1 geared crank sqrt(2) 0 called drive', 'E dyad C D 2.99 2.99 left'))
+    value = 0.02
+    angles = (value + math.tau * np.arange(-5000, 5000)) / math.sqrt(2.0)
+    angles = angles[abs(angles - seed) < 100.0]
+    assembled = np.isfinite(found.solve(angles)['E'][:, 0])
+    answers = [solution.inputs[0] for solution in found.inverse('drive').all(value, seed)]
+    nearest = [min(abs(theta - answer) for answer in answers) for theta in angles.tolist()]
+    assert (np.array(nearest) < 1e-8).tolist() == assembled.tolist()
+    assert 0 < np.count_nonzero(assembled) < len(angles)
+
+
 def test_a_linkage_is_the_same_whole_turns_on():
     for make, ratio, turns in itertools.product(
             (two, chained), ('1/3', 'sqrt(2)', '1.2345678'), (32, -640)):

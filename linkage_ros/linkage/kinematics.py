@@ -31,8 +31,9 @@ from ..words import listed, meant, plain_text, quoted
 
 # Quantities of joints; all others are of links.
 OF_POINTS = 'points', 'velocities', 'point accelerations'
-# Poses that are compared with those a period later.
-COMPARED = 64
+# Poses that are compared with those a period later. One more is a prime: of a range of whole turns
+# each is at another angle.
+COMPARED = 66
 
 Own = TypeVar('Own', bound='Kinematics')
 # One input, or a sequence of several; each a number or an array [rad or m].
@@ -231,7 +232,7 @@ class Kinematics:
             return math.inf
         turns = math.lcm(*(fraction.denominator for fraction in fractions))
         if turns > most or not self._passes_change_point(by) or self.repeats(
-                by, turns, 'angles', self.coordinates):
+                by, turns, 'angles', self.coordinates, math.pi * turns):
             return turns
         return 2 * turns
 
@@ -243,11 +244,16 @@ class Kinematics:
         return any(np.ndim(tolerance + start + end) == 0 and min(abs(start), abs(end)) <= tolerance
                    for tolerance, start, end in values)
 
-    def repeats(self, by: int, turns: float, kind: str, outputs: Tuple[str, ...]) -> bool:
-        """Return whether outputs are the same so many turns of an input later."""
-        inputs = spread([self._with_stroke(x) for x in self.structure.built.inputs], COMPARED)
-        now = math.pi * turns * np.linspace(-1.0, 1.0, COMPARED + 2)[1:-1]
+    def repeats(self, by: int, turns: float, kind: str, outputs: Tuple[str, ...], high: float,
+                gaps: Sequence[float] = ()) -> bool:
+        """
+        Return whether outputs are the same so many turns of an input later, from -high to high.
+
+        They are asked in gaps of the reach, too: samples alone miss narrow ones.
+        """
+        now = np.append(high * np.linspace(-1.0, 1.0, COMPARED + 2)[1:-1], gaps)
         later = now + math.tau * turns
+        inputs = spread([self._with_stroke(x) for x in self.structure.built.inputs], len(now))
         pose, rows = self.compiled(kind, outputs), []
         for inputs[by] in (now, later):
             # As directions: angles are the same up to whole turns.

@@ -145,7 +145,8 @@ def judge(linkage, name, rng, count=6, others=()):
     output, found, worst = Output(linkage, name, others), Counter(), 0.0
     values = output.values[np.isfinite(output.values)]
     # An output that stands still, except where an arm nearly vanishes, tells no input.
-    if len(values) < 20 or np.ptp(np.quantile(values, (0.05, 0.95))) < 1e-6 * output.size:
+    middle = np.quantile(values, 0.5, method='nearest') if len(values) else 0.0
+    if len(values) < 20 or np.quantile(output.away(values, middle), 0.9) < 1e-6 * output.size:
         return found, worst
     names = (name, *(input_.name for input_ in linkage.inputs[1:]))
     inverse = linkage.inverse(names)
@@ -163,7 +164,11 @@ def judge(linkage, name, rng, count=6, others=()):
         elif output.ulp_changes(at) > SINGULAR * output.size:
             kind = 'no direction'
         found[kind, 'questions'] += 1
-        expected = [at] if kind != 'ordinary' else [at, *output.roots(value)]
+        expected = [at]
+        if kind == 'ordinary':
+            # Of a part of a period, a quarter on both sides of the seed is promised.
+            expected += [root for root in output.roots(value) if first.wraps or not first.turns
+                         or abs(root - at) <= 0.25 * (first.high - first.low)]
         close = (AT if kind == 'ordinary' else NEXT) * first.size
         for root in expected:
             gaps = [first.apart(root, x) for x in answers]

@@ -20,6 +20,7 @@ import numpy as np
 from ..formulas import LinkageFormulas
 from ..inputs import Input
 from ..kinematics import Kinematics
+from ..motion.reach import reach_of
 from ..tolerances import LEAST, SINGULAR
 from ...cache import cached
 from ...formula.expression import argument, dimension, greater, nearest_integer, Real, real, where
@@ -68,12 +69,16 @@ class InverseProblem:
 
     def _with_period(self, by: int, input_: Input) -> Input:
         """Return an input with the period of the outputs if its own has too many turns."""
+        if not input_.is_part:
+            return input_
         linkage, periods = self.linkage, [1.0]
         periods += [1.0 / abs(linkage.gear(name, by)[0]) for name in linkage.geared_to(by)]
+        arcs = reach_of(linkage) if self.n == 1 else []
+        gaps = [0.5 * (end + start) for (_, end), (start, _) in zip(arcs, arcs[1:])]
         # A value repeats only where the linkage can be assembled again.
         return next((input_._replace(period=turns, low=-math.pi * turns, high=math.pi * turns)
-                     for turns in periods if input_.is_part and linkage.repeats(
-                         by, turns, 'checked', self.outputs)), input_)
+                     for turns in periods if linkage.repeats(
+                         by, turns, 'checked', self.outputs, input_.high, gaps)), input_)
 
     @cached_property
     def newton(self) -> CompiledFunction:
