@@ -71,8 +71,9 @@ class InverseProblem:
         """Return an input with the period of the outputs if its own has too many turns."""
         if not input_.is_part:
             return input_
-        linkage, periods = self.linkage, [1.0]
-        periods += [1.0 / abs(linkage.gear(name, by)[0]) for name in linkage.geared_to(by)]
+        linkage = self.linkage
+        rates = [linkage.gear(name, by)[0] for name in linkage.geared_to(by)]
+        periods = (1.0, *(1.0 / abs(rate) for rate in rates if rate))
         arcs = reach_of(linkage) if self.n == 1 else []
         gaps = [0.5 * (end + start) for (_, end), (start, _) in zip(arcs, arcs[1:])]
         # A value repeats only where the linkage can be assembled again.
