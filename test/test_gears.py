@@ -5,7 +5,6 @@
 
 import ctypes
 from fractions import Fraction
-import itertools
 import math
 
 from c_libraries import inverter, loaded
@@ -72,8 +71,12 @@ def test_a_motor_is_known_in_the_turns_of_its_gear():
     for ratio in ('1/3', *RATIOS)])
 def test_a_pose_is_answered_in_the_turn_in_which_it_is(ratio):
     found, size = two(ratio), 1.0 + abs(motor(ratio).gear('crank2')[0])
+    crank, = found.inputs
     for output in ('E.x', 'QB', 'D.y', 'angle(B,D)'):
         for theta in (0.4 + math.tau * turns for turns in TURNS):
+            if crank.is_part and theta < crank.low:
+                assert math.isnan(found.follow(output, 0.0, theta)[0])
+                continue
             value, rate = (float(ask(theta, (output,))[output])
                            for ask in (found.joint_angles, found.joint_rates))
             close = 1e-9 + 8.0 * size * math.ulp(theta) / min(1.0, abs(rate))
@@ -126,15 +129,6 @@ def test_the_reach_is_where_it_can_be_assembled(ratio):
     assert len(wrong) < 5
     # Beyond a part of the period the reach says nothing.
     assert first.is_part == all(first.on(reach, 1e6 + k) for k in range(99))
-
-
-def test_a_linkage_is_the_same_whole_turns_on():
-    for ratio, turns in itertools.product(('1/3', 'sqrt(2)', '1.2345678'), (32, -640)):
-        found = two(ratio)
-        there, start = found.turned(turns), math.tau * turns
-        for theta in (-1.0, 0.3, 90.0):
-            assert there.solve(theta)['E'] == pytest.approx(
-                found.solve(theta + start)['E'], abs=1e-11)
 
 
 @pytest.mark.parametrize('ratio', ['1001', '-2e3', '1e9'])

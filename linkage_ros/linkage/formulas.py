@@ -70,7 +70,7 @@ class LinkageFormulas:
     """Formulas of a design with its branches, which all its mechanisms share."""
 
     def __init__(self, design: Design, branches: Mapping[str, Any]):
-        self.built = Builder(dict(design.turned))
+        self.built = Builder()
         symbols = {name: dimension(name, positive=name not in design.signed)
                    for name in design.dimensions}
         given = {'inputs': design.inputs} if design.inputs else {}

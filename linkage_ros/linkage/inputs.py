@@ -82,14 +82,6 @@ class Input(NamedTuple):
         """Whether it is an angle of which only a part of the period is computed."""
         return self.turns and not self.wraps
 
-    def whole_turns(self, near: float) -> float:
-        """Return the turns around which values are computed, if not those around zero."""
-        if not self.is_part:
-            return 0.0
-        # Half of what is computed lies on both sides of a value by at least a quarter of it.
-        half = math.floor((self.high - self.low) / (2.0 * math.tau))
-        return float(half * round(near / (half * math.tau)))
-
     @property
     def step(self) -> float:
         """Return a unit, a power of two [rad or m], in which all of it moves a turn at most."""

@@ -174,18 +174,6 @@ class Kinematics:
         made.check()
         return made
 
-    def turned(self: Own, *turns: float) -> Own:
-        """
-        Return the same linkage, each input counted from so many whole turns on.
-
-        Gears make it another one. Of an input whose period is very long, reach, dead points and
-        inverse are those of the turns around zero, and so of any others.
-        """
-        counts = tuple((input_.name, float(count)) for input_, count in zip(self.inputs, turns))
-        return self.cache.get_or_make(('turned', counts), lambda: type(self)(
-            replace(self.design, turned=counts), self.dimensions, self.branches,
-            self.is_accelerated))
-
     def accelerated(self: Own) -> Own:
         """
         Return a copy that solves arrays by compiled code, large ones on all cores.

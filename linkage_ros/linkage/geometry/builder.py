@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import takewhile
 from math import pi
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 from . import planar
 from ..inputs import ANGLE, Input, LENGTH
@@ -25,7 +25,6 @@ from ...formula.expression import (
     cosine,
     cross,
     dot,
-    nearest_integer,
     Number,
     Real,
     real,
@@ -92,9 +91,7 @@ class _Vector(NamedTuple):
 class Builder:
     """The joints, links and limits of a linkage, as expressions of its dimensions and inputs."""
 
-    def __init__(self, turned: Optional[Mapping[str, float]] = None) -> None:
-        # Whole turns from which inputs are counted.
-        self._turned = turned or {}
+    def __init__(self) -> None:
         self.points: Dict[str, Point] = {}
         self.links: List[Link] = []
         self.bars: List[Bar] = []
@@ -237,9 +234,6 @@ class Builder:
                 raise ConstructionError(f'it cannot be geared to {geared.input}; allowed: '
                                         f'{", ".join(alike) or "none"}')
             value = geared.ratio * driving + geared.offset
-            if count := self._turned.get(geared.input):
-                turns = geared.ratio * count
-                value = value + 2.0 * pi * (turns - nearest_integer(turns))
         self.driven[input_.name] = input_, value
         return value
 

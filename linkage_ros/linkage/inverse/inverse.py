@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from functools import cached_property
 import math
-from operator import add, sub
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -126,13 +125,13 @@ class Inverse:
     outputs : tuple of str
         Names of the outputs; see `Mechanism.has_output`.
     inputs : tuple of Input
-        The inputs of the linkage; see `InverseProblem`. One that `is_part` has the solutions of
-        the turns around zero, or around given inputs.
+        The inputs of the linkage. One that `is_part` has the solutions of the turns around zero.
 
     """
 
     def __init__(self, linkage: Kinematics, outputs: Tuple[str, ...]):
-        self.linkage, self.outputs, self._n = linkage, outputs, len(outputs)
+        self.linkage, self.inputs = linkage, linkage.inputs
+        self.outputs, self._n = outputs, len(outputs)
         if len(outputs) != len(linkage.inputs):
             raise ValueError(f'{linkage.type} has {len(linkage.inputs)} inputs: as many outputs '
                              f'are needed, got {listed(outputs)}')
@@ -141,8 +140,6 @@ class Inverse:
         check_dependence(linkage, outputs)
         self.problem = InverseProblem(linkage, outputs)
         self._choice = Choice(self.problem)
-        self.inputs = self.problem.inputs
-        self._is_part = any(each.is_part for each in self.inputs)
         if not self.is_quick:
             assert self._source  # raises ValueError for dependent outputs
 
@@ -151,7 +148,7 @@ class Inverse:
         """Joint lines and assembly modes of the inverse linkage; None if there is none."""
         # An inverse linkage has each input in one period, or else in one turn.
         make = decompose if self.linkage.axes == 'xy' else rods.decompose
-        return None if self._is_part else make(self.linkage, self.outputs)
+        return None if any(x.is_part for x in self.inputs) else make(self.linkage, self.outputs)
 
     @property
     def is_quick(self) -> bool:
@@ -162,7 +159,7 @@ class Inverse:
     def _source(self) -> Union[Segments, Modes, Grid]:
         """Return what yields candidates."""
         if self._n == 1:
-            return segments_of(self.linkage, self.outputs[0], (), self.inputs[0])
+            return segments_of(self.linkage, self.outputs[0])
         return Modes(self.problem, self.closed) if self.closed else Grid(self.problem)
 
     def __reduce__(self) -> Tuple[Any, ...]:
@@ -207,7 +204,7 @@ class Inverse:
 
         """
         seed = () if near is None else self._numbers(near, 'near', finite=True)
-        solutions = [row[:self._n] for row in self._all(self._numbers(values), seed)]
+        solutions = [row[:self._n] for row in self._all(self._numbers(values))]
         if seed:
             solutions = sorted(
                 (self.problem.nearest_equivalent(inputs, seed) for inputs in solutions),
@@ -232,31 +229,7 @@ class Inverse:
             solutions.shape[1], *rows[0].shape, len(solutions))
         return solutions[:self._n], solutions[self._n:]
 
-    def _all(self, values: Row, seed: Row = ()) -> List[Row]:
-        """Return all solutions in order, those in the turns around `seed` if these are many."""
-        if seed and self._is_part:
-            return self._in_turns(values, seed, Inverse._solved)
-        return self._solved(values)
-
-    def _in_turns(self, values: Row, seed: Row, solve: Callable) -> List[Row]:
-        """
-        Return solve(inverse, values, seed) for the inverse in the turns around a seed.
-
-        Of an input with very many turns, an inverse has the solutions of those around zero.
-        """
-        if not all(map(math.isfinite, (*values, *seed))):
-            return []
-        turns = [input_.whole_turns(x) for input_, x in zip(self.inputs, seed)]
-        if not any(turns):
-            return solve(self, values, seed)
-        offsets = {input_.name: math.tau * count for input_, count in zip(self.inputs, turns)}
-        rows = solve(
-            inverse_of(self.linkage.turned(*turns), self.outputs),
-            tuple([x - offsets.get(name, 0.0) for name, x in zip(self.outputs, values)]),
-            tuple(map(sub, seed, offsets.values())))
-        return [(*map(add, row, offsets.values()), *row[self._n:]) for row in rows]
-
-    def _solved(self, values: Row, _: Row = ()) -> List[Row]:
+    def _all(self, values: Row) -> List[Row]:
         """Return all solutions in order, none for values that are not finite."""
         if not all(map(math.isfinite, values)):
             return []
@@ -265,22 +238,15 @@ class Inverse:
         return distinct(problem, [row for candidate in self._source.candidates(values)
                                   if (row := refine(problem, values, candidate))])
 
-    def _continued(self, values: Row, seed: Row) -> List[Row]:
-        """Return the solution that is continuous from a seed, if there is one."""
-        row = follow(self.problem, self.problem.reduced(values), seed, self._source)
-        return [row] if row else []
-
-    def _all_arrays(self, values: np.ndarray, seed: Any = ()) -> np.ndarray:
+    def _all_arrays(self, values: np.ndarray) -> np.ndarray:
         """
         Return all solutions for values (outputs, m) in order, padded with NaN.
 
-        Each has the solutions of the turns around its `seed` (inputs, m), if these are many.
         Their shape is (solutions, inputs and rates, m), with one solution at least.
         """
         problem, n, count = self.problem, self._n, values.shape[1]
-        if count <= FEW_POSES or isinstance(self._source, Grid) or self._is_part and len(seed):
-            rows = [self._all(column[:n], column[n:])
-                    for column in map(tuple, np.vstack([values, *seed]).T.tolist())]
+        if count <= FEW_POSES or isinstance(self._source, Grid):
+            rows = [self._all(column) for column in map(tuple, values.T.tolist())]
             solutions = np.full((max(map(len, rows), default=0) or 1, n + n * n, count), math.nan)
             for k, row in enumerate(rows):
                 solutions[:len(row), :, k] = row or math.nan
@@ -367,12 +333,12 @@ class Inverse:
         n, limits, values = self._n, self._limits(ends), self._each(values)
         seed = () if near is None else self._each(near, 'near')
         if {float} == {*map(type, values), *map(type, seed)}:
-            row = self._choice.of(self._all(values, seed), seed, limits)
+            row = self._choice.of(self._all(values), seed, limits)
             return tuple(row[:n]), tuple(row[n:])
         rows = np.broadcast_arrays(*(*values, *seed))
         flat = np.stack([row.ravel() for row in rows])
         chosen = [row.reshape(rows[0].shape) for row in self._choice.of(
-            self._all_arrays(flat[:n], flat[n:]), flat[n:], limits)]
+            self._all_arrays(flat[:n]), flat[n:], limits)]
         return tuple(chosen[:n]), tuple(chosen[n:])
 
     def path(self, values: Sequence[ArrayLike], near: Optional[ArrayLike] = None,
@@ -399,9 +365,7 @@ class Inverse:
         rows = [np.atleast_1d(row) for row in np.broadcast_arrays(*self._each(values))]
         if rows[0].ndim > 1:
             raise self._miscounted(values, 'values')
-        solutions = self._all_arrays(np.stack(rows), np.repeat(
-            np.reshape(seed, (-1, 1)), len(rows[0]), axis=1))
-        chosen = self._choice.along(solutions, seed, limits)
+        chosen = self._choice.along(self._all_arrays(np.stack(rows)), seed, limits)
         return tuple(chosen[:self._n]), tuple(chosen[self._n:])
 
     def follow(self, values: ArrayLike, near: ArrayLike) -> Tuple[Row, Row]:
@@ -424,9 +388,9 @@ class Inverse:
             leaves the reach.
 
         """
-        rows = self._in_turns(self._numbers(values), self._numbers(near, 'near'),
-                              Inverse._continued)
-        row, = rows or [(math.nan,) * (self._n + self._n ** 2)]
+        values, seed = self._numbers(values), self._numbers(near, 'near')
+        row = follow(self.problem, self.problem.reduced(values), seed, self._source) \
+            or (math.nan,) * (self._n + self._n ** 2)
         return row[:self._n], row[self._n:]
 
     # --- arrays of other packages ---

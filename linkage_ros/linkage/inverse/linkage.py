@@ -338,8 +338,7 @@ class _Sketch(Dyads):
 
     def _read(self, by: int, input_: Input) -> _Read:
         """Return where an input is read: from its own link, or from one that is geared to it."""
-        counted = not input_.is_part
-        for name in (input_.name, *(self._linkage.geared_to(by) if counted else ())):
+        for name in (input_.name, *self._linkage.geared_to(by)):
             try:
                 joints, value = self._value(self._links[name])
                 break

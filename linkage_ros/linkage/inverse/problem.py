@@ -10,7 +10,7 @@ them (`refine`), and what chooses one (`choice`) or continues one (`follow`).
 
 from __future__ import annotations
 
-from functools import cached_property, partial, reduce
+from functools import cached_property, reduce
 from itertools import combinations
 import math
 from typing import Dict, Sequence, Tuple
@@ -18,7 +18,6 @@ from typing import Dict, Sequence, Tuple
 import numpy as np
 
 from ..formulas import LinkageFormulas
-from ..inputs import Input, is_periodic, spread
 from ..kinematics import Kinematics
 from ..motion.curves import LEAST
 from ..tolerances import SINGULAR
@@ -44,11 +43,6 @@ class InverseProblem:
     ----------
     n : int
         The number of outputs, and of inputs.
-    inputs : tuple of Input
-        Those of the linkage. If one repeats only after very many turns, its period is that of the
-        outputs, if they repeat earlier.
-    angular : list of bool
-        For each output, whether it is an angle.
     scales, sizes : list of float
         The unit of each output and of each input in which they are compared [rad or m].
     periods, turns : list of float
@@ -60,35 +54,13 @@ class InverseProblem:
         self.linkage, self.outputs, self.n = linkage, outputs, len(outputs)
         if any(map(np.ndim, linkage.dimensions.values())):
             raise ValueError('the inverse is for one set of dimensions, not for arrays')
-        self.angular = [linkage.is_angle(name) for name in outputs]
-        self.scales = [1.0 if angular else linkage.longest for angular in self.angular]
+        self.scales = [1.0 if linkage.is_angle(name) else linkage.longest for name in outputs]
         self.sizes = [input_.size for input_ in linkage.inputs]
-        self.inputs = tuple(map(self._with_period, range(self.n), linkage.inputs))
-        self.turns = [input_.turn if input_.wraps else math.inf for input_ in self.inputs]
+        self.turns = [input_.turn if input_.wraps else math.inf for input_ in linkage.inputs]
         # An output that is an input has its period.
-        own = {input_.name: turn for input_, turn in zip(self.inputs, self.turns)}
-        self.periods = [own.get(name, math.tau) if angular else math.inf
-                        for name, angular in zip(outputs, self.angular)]
-
-    def _with_period(self, by: int, input_: Input) -> Input:
-        """Return an input with the period of the outputs if its own has too many turns."""
-        if not input_.is_part:
-            return input_
-        rates = [self.linkage.gear(name, by)[0] for name in self.linkage.geared_to(by)]
-        periods = (1.0, *(1.0 / abs(rate) for rate in rates if rate))
-        return next((each for each in (input_._replace(
-            period=period, low=-math.pi * period, high=math.pi * period) for period in periods)
-                     if each.wraps and is_periodic(partial(self._outputs_over, by), each)), input_)
-
-    def _outputs_over(self, by: int, values: np.ndarray) -> np.ndarray:
-        """Return the outputs, angles as directions, over one input; the others are spread."""
-        inputs = spread(self.linkage.inputs, len(values))
-        inputs[by] = values
-        # A value repeats only where the linkage can be assembled again.
-        pose = self.linkage.compiled('checked', self.outputs)
-        rows = zip(pose.over(*inputs), self.angular, self.scales)
-        return np.concatenate([[np.cos(row), np.sin(row)] if angular else [row / scale]
-                               for row, angular, scale in rows])
+        own = {input_.name: turn for input_, turn in zip(linkage.inputs, self.turns)}
+        self.periods = [own.get(name, math.tau) if linkage.is_angle(name) else math.inf
+                        for name in outputs]
 
     @cached_property
     def newton(self) -> CompiledFunction:
@@ -96,7 +68,7 @@ class InverseProblem:
         program = newton(self.linkage.structure, self.outputs, tuple(self.periods),
                          tuple(self.turns))
         return program.bind({**self.linkage.dimensions, LONGEST_BAR: self.linkage.longest, **{
-            f'[{input_.name}]': size for input_, size in zip(self.inputs, self.sizes)}}, {},
+            f'[{input_.name}]': size for input_, size in zip(self.linkage.inputs, self.sizes)}}, {},
             self.linkage.is_accelerated)
 
     def reduced(self, values: Row) -> Row:
@@ -120,7 +92,7 @@ class InverseProblem:
     def nearest_equivalent(self, inputs: Sequence[float], seed: Sequence[float]) -> Row:
         """Return inputs plus the whole periods that bring them closest to others."""
         return tuple([input_.nearest_equivalent(x, y)
-                      for input_, x, y in zip(self.inputs, inputs, seed)])
+                      for input_, x, y in zip(self.linkage.inputs, inputs, seed)])
 
     def scaled(self, jacobian: np.ndarray) -> np.ndarray:
         """Return a Jacobian in units of outputs and inputs."""

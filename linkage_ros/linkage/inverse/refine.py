@@ -158,7 +158,7 @@ def distinct_arrays(problem: InverseProblem, solutions: np.ndarray) -> np.ndarra
     solutions = np.take_along_axis(solutions, order[:, None], 0)
     pairs = np.triu_indices(len(solutions), 1)
     distances = np.max([input_.apart(*(solutions[k, by] for k in pairs)) / size for by, (
-        input_, size) in enumerate(zip(problem.inputs, problem.sizes))], axis=0)
+        input_, size) in enumerate(zip(problem.linkage.inputs, problem.sizes))], axis=0)
     for k in np.flatnonzero((distances <= SINGULAR).any(axis=0)).tolist():
         rows = distinct(problem, [row for row in map(tuple, solutions[:, :, k].tolist())
                                   if row[0] == row[0]])

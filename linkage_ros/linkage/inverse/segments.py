@@ -355,19 +355,16 @@ class Segments:
                 self._difference(other.value[0] - segment.value[-1])) <= CLOSE * self._size)
 
 
-def segments_of(linkage: Kinematics, output: str, others: Sequence[float] = (),
-                first: Optional[Input] = None) -> Segments:
+def segments_of(linkage: Kinematics, output: str, others: Sequence[float] = ()) -> Segments:
     """Return the segments of an output over the first input; see `Analysis`."""
-    first = first or linkage.inputs[0]
-
     def make() -> Segments:
-        analysis = Analysis(linkage, others, first)
+        analysis, first = Analysis(linkage, others), linkage.inputs[0]
         period = math.inf if not linkage.is_angle(output) else (
             math.tau if output != first.name else first.turn if first.wraps else math.inf)
         return Segments(analysis.curve('output', output), analysis.reach(), analysis.near_zeros(),
                         first, period, 1.0 if linkage.is_angle(output) else linkage.longest)
 
-    return linkage.cache.get_or_make(('segments', output, first.period, *others), make)
+    return linkage.cache.get_or_make(('segments', output, *others), make)
 
 
 def extremes_of(linkage: Kinematics, output: str, arcs: Optional[Sequence[Arc]],

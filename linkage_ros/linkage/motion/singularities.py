@@ -11,7 +11,7 @@ area of a kite or parallelogram.
 
 from __future__ import annotations
 
-from typing import Callable, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -70,16 +70,11 @@ def distinct(values: Iterable[float], input_: Input) -> List[float]:
 
 
 class Analysis:
-    """
-    Motion of a linkage with its first input; the other inputs are fixed.
+    """Motion of a linkage with its first input; the other inputs are fixed."""
 
-    `first` is the first input over a part of its period, by default over all of it.
-    """
-
-    def __init__(self, linkage: Kinematics, others: Sequence[float] = (),
-                 first: Optional[Input] = None):
+    def __init__(self, linkage: Kinematics, others: Sequence[float] = ()):
         self._linkage, self._others = linkage, tuple(others)
-        self._first = first or linkage.inputs[0]
+        self._first = linkage.inputs[0]
 
     # From here on the first input is in units of its step.
 
@@ -97,9 +92,6 @@ class Analysis:
         """Return the reach in arcs, none of them on both sides of an end of a turn."""
         size, first = self._first.step, self._first.normalized()
         arcs = [(lo / size, hi / size) for lo, hi in reach_of(self._linkage, self._others)]
-        if self._first.turn < self._linkage.inputs[0].turn:
-            arcs = [(max(lo, first.low), min(hi, first.high)) for lo, hi in arcs
-                    if lo < first.high and hi > first.low]
         return [part for arc in arcs for part in first.within(*arc)]
 
     def curve(self, kind: str, name: object) -> Callable:
@@ -115,7 +107,7 @@ class Analysis:
     def near_zeros(self) -> List[NearZero]:
         """Return the inputs at which a dyad stretches or folds, or nearly does."""
         return self._linkage.cache.get_or_make(
-            ('near zeros', self._first.period, *self._others), lambda: [
+            ('near zeros', *self._others), lambda: [
                 near for arc in (self.reach() if self._linkage.structure.closures else ())
                 for near in self._near_zeros(*arc)])
 

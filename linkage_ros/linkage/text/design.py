@@ -20,8 +20,7 @@ class Design:
     The `tracer` is the joint of the locus; `signed` dimensions may be zero or
     negative. Lines `in_space` are those of `rod_lines`, with `inputs` as the given joints, by
     default the driven ones; `is_written` says that all lines are a user's, in which a triangle
-    must exist. `turned` are whole turns, by input, from which its inputs are counted; see
-    `Mechanism.turned`.
+    must exist.
     """
 
     name: str
@@ -32,7 +31,6 @@ class Design:
     in_space: bool = False
     is_written: bool = False
     inputs: Tuple[str, ...] = ()
-    turned: Tuple[Tuple[str, float], ...] = ()
 
     @property
     def words(self) -> Any:
