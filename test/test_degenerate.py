@@ -245,23 +245,17 @@ def test_what_drives_is_a_number_wherever_it_is(geared, rate):
     assert found.joint_rates(given)['crank2'] == rate
 
 
-@pytest.mark.parametrize('name, ratio', [('QB', 1.0), ('SD', math.sqrt(2.0)), ('E.x', None)])
-def test_gears_that_hardly_come_round_are_answered_in_the_turn_that_is_asked_for(name, ratio):
+@pytest.mark.parametrize('name', ['QB', 'SD', 'E.x'])
+def test_gears_that_hardly_come_round_are_answered_in_the_turns_around_zero(name):
     # A four-bar, another one geared to it, and a distance that depends on both.
     found = linkage('O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'B dyad A Q 3 2 left',
                     'R ground 10 0', 'S ground 13 0', 'C crank R 1 geared crank sqrt(2) 0.3',
                     'D dyad C S 3 2 left', 'E dyad B D 9 9 left')
-    inverse = found.inverse(name)
-    for theta in (0.4, 0.4 + 300 * 2.0 * math.pi, -1.1 - 31 * 2.0 * math.pi):
+    for theta in (0.4, 0.4 + 40 * 2.0 * math.pi, -1.1 - 31 * 2.0 * math.pi):
         value = float(found.joint_angles(theta, [name])[name])
-        (answer,), _ = inverse.nearest((value,), (theta,))
-        if ratio:
-            assert answer == pytest.approx(theta, abs=1e-9)
-            assert inverse.inputs[0].period == pytest.approx(1.0 / ratio)
-            assert found.follow(name, value, theta)[0] == pytest.approx(theta, abs=1e-9)
-        assert answer == pytest.approx(theta, abs=1e-9)
-        assert float(found.joint_angles(answer, [name])[name]) == \
-            pytest.approx(value, abs=1e-9)
+        assert found.input_for(name, value, near=theta) == pytest.approx(theta, abs=1e-9)
+        assert found.follow(name, value, theta)[0] == pytest.approx(theta, abs=1e-9)
+        assert math.isnan(found.follow(name, value, theta + 100 * 2.0 * math.pi)[0])
 
 
 @pytest.mark.parametrize('ratio, arcs', [('-2', 1), ('0.5', 2), ('sqrt(2)', 100)])

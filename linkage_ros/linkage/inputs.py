@@ -10,11 +10,11 @@ This module alone handles the periodicity of angles.
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
+from typing import Any, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .tolerances import ONE, ROUNDING, SINGULAR
+from .tolerances import ONE, ROUNDING
 
 Arc = Tuple[float, float]
 
@@ -25,8 +25,6 @@ ANGLE, LENGTH = 'angle', 'length'
 MAX_PERIOD = 100
 # Greatest denominator of a gear ratio with a period, and greatest ratio.
 MOST_TURNS, FASTEST = 10 ** 6, 1000
-# Poses that are compared with those a period later.
-PERIODIC = 64
 
 
 class Input(NamedTuple):
@@ -184,17 +182,3 @@ def wrapped(theta: Any, turn: float = math.tau) -> Any:
     turned = theta - turn * np.floor((theta + half) / turn)
     turned = np.where((turned < -half) | (turned >= half), -half, turned)
     return np.where((theta >= -half) & (theta < half), theta, turned)
-
-
-def is_periodic(places: Callable, input_: Input) -> bool:
-    """
-    Return whether poses are the same a period of an input later.
-
-    `places` takes values of the input, shape (n,), and returns coordinates (any, n).
-    """
-    theta = np.linspace(input_.low, input_.high, PERIODIC + 2)[1:-1]
-    now, later = (places(theta + turn) for turn in (0.0, input_.turn))
-    with np.errstate(invalid='ignore'):
-        size = np.fmax.reduce(np.abs(now), axis=None, initial=0.0)
-        alike = np.abs(now - later) <= SINGULAR * size
-    return bool(np.all(alike | (np.isnan(now) & np.isnan(later))))

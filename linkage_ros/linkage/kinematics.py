@@ -17,10 +17,11 @@ from numpy.typing import ArrayLike
 
 from .formulas import formulas_of, LinkPoint, Points
 from .geometry.spatial import IN_SINGLE
-from .inputs import FASTEST, Input, is_periodic, MAX_PERIOD, MOST_TURNS, spread
+from .inputs import FASTEST, Input, MAX_PERIOD, MOST_TURNS, spread
 from .text import joint_lines
 from .text.arguments import checked_dimensions, numbers
 from .text.design import Design
+from .tolerances import SINGULAR
 from ..cache import Cache
 from ..formula.expression import derivative, Real, real
 from ..formula.namespace import array_function
@@ -30,6 +31,8 @@ from ..words import listed, meant, plain_text, quoted
 
 # Quantities of joints; all others are of links.
 OF_POINTS = 'points', 'velocities', 'point accelerations'
+# Poses that are compared with those a period later.
+COMPARED = 64
 
 Own = TypeVar('Own', bound='Kinematics')
 # One input, or a sequence of several; each a number or an array [rad or m].
@@ -210,10 +213,9 @@ class Kinematics:
                for fraction, ratio in zip(fractions, ratios)):
             return math.inf
         turns = math.lcm(*(fraction.denominator for fraction in fractions))
-        if turns > most or not self._passes_change_point(by):
+        if turns > most or not self._passes_change_point(by) or self._repeats(by, turns):
             return turns
-        return turns if is_periodic(lambda theta: self._points_over(by, theta), Input(
-            '', low=-math.pi * turns, high=math.pi * turns, period=turns)) else 2 * turns
+        return 2 * turns
 
     def _passes_change_point(self, by: int) -> bool:
         """Return whether a dyad of a crank has a gap of nothing but rounding."""
@@ -223,11 +225,15 @@ class Kinematics:
         return any(np.ndim(tolerance + start + end) == 0 and min(abs(start), abs(end)) <= tolerance
                    for tolerance, start, end in values)
 
-    def _points_over(self, by: int, values: np.ndarray) -> np.ndarray:
-        """Return the coordinates of all joints over one input; the others are spread."""
-        inputs = spread([self._with_stroke(x) for x in self.structure.built.inputs], len(values))
-        inputs[by] = values
-        return self.compiled('points', self.points).searched(*inputs)
+    def _repeats(self, by: int, turns: float) -> bool:
+        """Return whether poses are the same so many turns of an input later."""
+        inputs = spread([self._with_stroke(x) for x in self.structure.built.inputs], COMPARED)
+        inputs[by] = math.pi * turns * np.linspace(-1.0, 1.0, COMPARED + 2)[1:-1]
+        pose = self.compiled('points', self.points)
+        now = pose.searched(*inputs)
+        inputs[by] += math.tau * turns
+        size = np.fmax.reduce(np.abs(now), axis=None, initial=0.0)
+        return np.allclose(pose.searched(*inputs), now, 0.0, SINGULAR * size, equal_nan=True)
 
     def _with_limits(self, by: int, input_: Input) -> Input:
         """Return an input with the limits [rad or m] of all poses."""

@@ -65,11 +65,11 @@ class InverseProblem:
     @cached_property
     def newton(self) -> CompiledFunction:
         """Return the code for a step of Newton's method; see `newton`."""
-        program = newton(self.linkage.structure, self.outputs, tuple(self.periods),
-                         tuple(self.turns))
-        return program.bind({**self.linkage.dimensions, LONGEST_BAR: self.linkage.longest, **{
-            f'[{input_.name}]': size for input_, size in zip(self.linkage.inputs, self.sizes)}}, {},
-            self.linkage.is_accelerated)
+        linkage = self.linkage
+        program = newton(linkage.structure, self.outputs, tuple(self.periods), tuple(self.turns))
+        return program.bind({**linkage.dimensions, LONGEST_BAR: linkage.longest, **{
+            f'[{input_.name}]': size for input_, size in zip(linkage.inputs, self.sizes)}}, {},
+            linkage.is_accelerated)
 
     def reduced(self, values: Row) -> Row:
         """Return values with large angles reduced to one period, exactly."""
