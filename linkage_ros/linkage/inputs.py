@@ -14,7 +14,7 @@ from typing import Any, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .tolerances import ONE, ROUNDING
+from .tolerances import LEAST, ONE, ROUNDING
 
 Arc = Tuple[float, float]
 
@@ -146,14 +146,20 @@ class Input(NamedTuple):
             if start < end:
                 yield start, end
 
+    def distinct(self, values: Iterable[float]) -> List[float]:
+        """Return values in order, wrapped, one of those that differ by rounding."""
+        found: List[float] = []
+        for x in sorted(float(self.wrapped(0.0 if abs(x) < LEAST else x)) for x in values):
+            if not found or x - found[-1] > ONE:
+                found.append(x)
+        if self.wraps and len(found) > 1 and found[0] + self.turn - found[-1] <= ONE:
+            found.pop()
+        return found
+
     def between(self, ends: Iterable[float]) -> List[Arc]:
         """Return the arcs between values, in order; the last of a turn ends where it began."""
-        marks: List[float] = []
-        inside = (end - self.turns_of(end) for end in ends) if self.wraps else (
-            end for end in (self.low, *ends, self.high) if self.low <= end <= self.high)
-        for end in sorted(inside):
-            if not marks or end - marks[-1] > ONE:
-                marks.append(end)
+        marks = self.distinct(ends if self.wraps else (
+            end for end in (self.low, *ends, self.high) if self.low <= end <= self.high))
         if not marks:
             return [(self.low, self.high)]
         return list(zip(marks, marks[1:] + [marks[0] + self.turn] * self.wraps))

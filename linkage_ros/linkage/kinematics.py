@@ -378,6 +378,13 @@ class Kinematics:
         self.check_there(output)
         return self.structure.is_angle(output)
 
+    def period_of(self, output: str) -> float:
+        """Return after how much an output is the same [rad], or inf."""
+        own = next((input_ for input_ in self.inputs if input_.name == output), None)
+        if not self.is_angle(output) or own and not own.wraps:
+            return math.inf
+        return own.turn if own else math.tau
+
     def moves(self, output: str, by: int = 0) -> bool:
         """Return whether an output depends on one of the inputs."""
         return isinstance(output, str) and self.structure.moves(output, self._checked_by(by))

@@ -19,8 +19,7 @@ import numpy as np
 
 from ..formulas import LinkageFormulas
 from ..kinematics import Kinematics
-from ..motion.curves import LEAST
-from ..tolerances import SINGULAR
+from ..tolerances import LEAST, SINGULAR
 from ...cache import cached
 from ...formula.expression import argument, dimension, greater, nearest_integer, Real, real, where
 from ...formula.program import CompiledFunction, Program
@@ -56,11 +55,8 @@ class InverseProblem:
             raise ValueError('the inverse is for one set of dimensions, not for arrays')
         self.scales = [1.0 if linkage.is_angle(name) else linkage.longest for name in outputs]
         self.sizes = [input_.size for input_ in linkage.inputs]
-        self.turns = [input_.turn if input_.wraps else math.inf for input_ in linkage.inputs]
-        # An output that is an input has its period.
-        own = {input_.name: turn for input_, turn in zip(linkage.inputs, self.turns)}
-        self.periods = [own.get(name, math.tau) if linkage.is_angle(name) else math.inf
-                        for name in outputs]
+        self.periods = list(map(linkage.period_of, outputs))
+        self.turns = [linkage.period_of(input_.name) for input_ in linkage.inputs]
 
     @cached_property
     def newton(self) -> CompiledFunction:

@@ -16,18 +16,18 @@ from typing import Any, Callable, Iterator, List, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from ..inputs import Arc, Input
+from ..inputs import Arc
 from ..kinematics import Kinematics
-from ..motion.curves import ascending, CUTS, extremes, LEAST, refined, sampled, turning_points
+from ..motion.curves import ascending, CUTS, extremes, refined, sampled, turning_points
 from ..motion.reach import MAX_ENDS, reach_of
-from ..motion.singularities import Analysis, distinct, NEAR, NearZero
-from ..tolerances import CLOSE, ONE, ROUNDING, SINGULAR, TOLERANCE
+from ..motion.singularities import Analysis, NEAR
+from ..tolerances import CLOSE, LEAST, ONE, ROUNDING, SINGULAR, TOLERANCE
 
 # Rounding of a pose, which that of all joints may explain: so many ulps of an input, or multiples
 # of the rounding of one sum.
 ULPS = 64.0
-# The output's error between samples, and the least jump [parts of its range].
-EXPLAINED, JUMP = 1e-4, 0.05
+# The least jump of the output [parts of its range].
+JUMP = 0.05
 # More additional samples of an arc are those of a linkage that is singular nearly everywhere.
 MAX_SAMPLES = 10000
 
@@ -90,35 +90,22 @@ class Table(NamedTuple):
 
 class Segments:
     """
-    An output over the reach, in segments on which it is monotone.
+    An output over the first input's reach, in segments on which it is monotone.
 
-    Parameters
-    ----------
-    curve : callable
-        From values of the input, shape (n,), to the output and its rate, shape (2, n).
-    arcs : sequence of (float, float)
-        The reach; no arc extends to both sides of -pi or pi.
-    near_zeros : sequence of NearZero
-        Where a dyad is or nearly is at a dead point.
-    input_ : Input
-        The input; in all samples it is in its size.
-    period : float
-        After how much the output is the same, or inf.
-    size : float
-        The unit of the output.
-
+    In all samples the input is in its step.
     """
 
-    def __init__(self, curve: Callable, arcs: Sequence[Arc], near_zeros: Sequence[NearZero],
-                 input_: Input, period: float, size: float):
-        self._curve, self._period, self._size = curve, period, size
-        self._input, self._unit = input_, input_.step
-        self._rounding = TOLERANCE * size
-        self._normalized = normalized = input_.normalized()
-        special = distinct((near.value for near in near_zeros if near.gap <= near.rounding),
-                           normalized)
-        marks = distinct((near.value for near in near_zeros if near.gap <= NEAR * near.size),
-                         normalized)
+    def __init__(self, linkage: Kinematics, output: str, others: Sequence[float]):
+        analysis, self._input = Analysis(linkage, others), linkage.inputs[0]
+        self._curve, arcs = analysis.curve('output', output), analysis.reach()
+        self._period = linkage.period_of(output)
+        self._size = 1.0 if linkage.is_angle(output) else linkage.longest
+        self._rounding, self._unit = TOLERANCE * self._size, self._input.step
+        self._normalized = normalized = self._input.normalized()
+        # Where a dyad is at a dead point, and where it nearly is.
+        near_zeros = analysis.near_zeros()
+        special = normalized.distinct(x.value for x in near_zeros if x.gap <= x.rounding)
+        marks = normalized.distinct(x.value for x in near_zeros if x.gap <= NEAR * x.size)
         self.jumps: List[float] = []
         self._ends = {end for arc in arcs for end in arc if not normalized.is_cut(end)}
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
@@ -290,8 +277,7 @@ class Segments:
                 wide = (width > SINGULAR) & (missed > ULPS * self._rounding)
                 # Two extremes may hide where the change is less than half of what rates say.
                 hidden = (slopes[0] * slopes[1] > 0.0) & (missed > 0.5 * np.abs(mean))
-                place = np.flatnonzero((missed > JUMP * size) | wide & (
-                    hidden | (missed > EXPLAINED * size)))
+                place = np.flatnonzero((missed > JUMP * size) | wide & hidden)
             neighbours = np.nextafter(theta[place], theta[place + 1]) == theta[place + 1]
             jumped = place[neighbours & (np.abs(change[place]) > JUMP * size)]
             place = place[~neighbours]
@@ -356,15 +342,9 @@ class Segments:
 
 
 def segments_of(linkage: Kinematics, output: str, others: Sequence[float] = ()) -> Segments:
-    """Return the segments of an output over the first input; see `Analysis`."""
-    def make() -> Segments:
-        analysis, first = Analysis(linkage, others), linkage.inputs[0]
-        period = math.inf if not linkage.is_angle(output) else (
-            math.tau if output != first.name else first.turn if first.wraps else math.inf)
-        return Segments(analysis.curve('output', output), analysis.reach(), analysis.near_zeros(),
-                        first, period, 1.0 if linkage.is_angle(output) else linkage.longest)
-
-    return linkage.cache.get_or_make(('segments', output, *others), make)
+    """Return the segments of an output over the first input, of which others are fixed."""
+    return linkage.cache.get_or_make(
+        ('segments', output, *others), lambda: Segments(linkage, output, others))
 
 
 def extremes_of(linkage: Kinematics, output: str, arcs: Optional[Sequence[Arc]],

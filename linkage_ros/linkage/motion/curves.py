@@ -15,14 +15,14 @@ from typing import Callable, Tuple
 
 import numpy as np
 
+from ..tolerances import LEAST
+
 # Even samples of a whole turn; halvings of a distance after which few of its digits are left.
 TURN_SAMPLES, HALVINGS = 360, 48
 # Peaks of a curve that are refined for its extremes.
 REFINED_PEAKS = 4
 # Fractions at which a bracket is divided; an odd number of them, so that one is its middle.
 CUTS = np.arange(1, 16) / 16
-# Angles below this [rad] are zero: the rounding of any other angle is coarser.
-LEAST = 1e-18
 
 
 def sampled(lo: float, hi: float, count: int = 0) -> np.ndarray:

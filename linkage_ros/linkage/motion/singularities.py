@@ -11,15 +11,15 @@ area of a kite or parallelogram.
 
 from __future__ import annotations
 
-from typing import Callable, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
+from typing import Callable, Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .curves import LEAST, refined, sampled
+from .curves import refined, sampled
 from .reach import over_first, reach_of
-from ..inputs import Arc, Input
+from ..inputs import Arc
 from ..kinematics import Kinematics
-from ..tolerances import CLOSE, ONE, TOLERANCE
+from ..tolerances import CLOSE, TOLERANCE
 
 # Outputs change quickly where a closure is below this fraction of its size.
 NEAR = 1e-2
@@ -58,17 +58,6 @@ def _approaches(theta: np.ndarray, values: np.ndarray, rates: np.ndarray,
         return np.nonzero((before < 0.0) & (after >= 0.0) & ~(bound > near))
 
 
-def distinct(values: Iterable[float], input_: Input) -> List[float]:
-    """Return values of an input in order, wrapped, one of those that differ by rounding."""
-    found: List[float] = []
-    for x in sorted(float(input_.wrapped(0.0 if abs(x) < LEAST else x)) for x in values):
-        if not found or x - found[-1] > ONE:
-            found.append(x)
-    if input_.wraps and len(found) > 1 and found[0] + input_.turn - found[-1] <= ONE:
-        found.pop()
-    return found
-
-
 class Analysis:
     """Motion of a linkage with its first input; the other inputs are fixed."""
 
@@ -86,7 +75,7 @@ class Analysis:
         touched = [near.value for near in self.near_zeros()
                    if near.gap <= near.rounding
                    and all(first.apart(near.value, end) > CLOSE for end in ends)]
-        return distinct([*ends, *touched], first)
+        return first.distinct([*ends, *touched])
 
     def reach(self) -> List[Arc]:
         """Return the reach in arcs, none of them on both sides of an end of a turn."""
