@@ -111,25 +111,19 @@ class Analysis:
         values, rates = np.reshape(curve(theta), (len(folds), 2, -1)).swapaxes(0, 1)
         size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
         # A closure as small as its rounding counts as zero. One that is never larger, such as the
-        # area of a kite that is always flat, is ignored.
-        ignored = size <= FLAT * rounding
-        rounding = rounding + TOLERANCE ** 2 * size
+        # area of a kite that is always flat, never does.
+        rounding, size = np.where(
+            size > FLAT * rounding, (rounding + TOLERANCE ** 2 * size, size), -1.0)
 
         def near(row: np.ndarray, value: np.ndarray, gap: np.ndarray) -> Iterator[NearZero]:
-            return (NearZero(*numbers) for *numbers, flat in zip(
-                value.tolist(), gap.tolist(), rounding[row].tolist(), size[row].tolist(),
-                ignored[row].tolist()) if not flat)
+            return map(NearZero, *(x.tolist() for x in (value, gap, rounding[row], size[row])))
 
-        for end in (0, -1):
-            if self._first.normalized().is_cut(theta[end]):
-                yield from near(np.arange(len(folds)), np.full(len(folds), theta[end]),
-                                np.abs(values[:, end]))
         # A sample may be the zero itself, with a rate of either sign.
-        inner, before, after = (np.abs(values[:, 1:-1]), np.abs(values[:, :-2]),
-                                np.abs(values[:, 2:]))
+        gaps = np.pad(np.abs(values), ((0, 0), (1, 1)), constant_values=np.inf)
+        before, inner, after = gaps[:, :-2], gaps[:, 1:-1], gaps[:, 2:]
         row, place = np.nonzero(
             (inner <= rounding[:, None]) & (inner < before) & (inner <= after))
-        yield from near(row, theta[place + 1], inner[row, place])
+        yield from near(row, theta[place], inner[row, place])
         searched = ((_crossings(values, folds), values),
                     (_approaches(theta, values, rates, NEAR * size[:, None]), rates))
         for kind, ((row, place), samples) in enumerate(searched):
