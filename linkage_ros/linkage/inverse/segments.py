@@ -233,7 +233,7 @@ class Segments:
             gap / self._period)
 
     def _runs(self, lo: float, hi: float, marks: Sequence[float]) -> Iterator[Tuple]:
-        """Yield samples as inputs, values, rates and noise, cut where the output jumps."""
+        """Yield samples as inputs, values and rates, cut where the output jumps."""
         theta = np.concatenate([sampled(*arc) for arc in _cut([(lo, hi)], marks)])
         theta = ascending(theta)
         if len(theta) < 2:
@@ -258,7 +258,7 @@ class Segments:
             if len(clear) > 1 and theta[run[-1]] - theta[run[0]] > ROUNDING:
                 run = run[clear[0]:clear[-1] + 1]
                 yield (theta[run], np.unwrap(value[0, run], period=self._period) if self._period
-                       < math.inf else value[0, run], rate[0, run], noise[run])
+                       < math.inf else value[0, run], rate[0, run])
 
     def _divided(self, theta: np.ndarray, most: int) -> Tuple[np.ndarray, np.ndarray]:
         """Return samples that explain the output, and after which of them it jumps."""
@@ -291,17 +291,16 @@ class Segments:
 
     def _moves(self, runs: Sequence[Tuple]) -> bool:
         """Return whether the output changes by more than rounding."""
-        _, values, _, noise = (np.concatenate(part) for part in zip(*runs))
-        # Medians; np.median and np.unique would import masked arrays, which takes 10 ms.
-        typical, usual = (np.sort(numbers)[len(numbers) // 2] for numbers in (values, noise))
-        noise = ULPS * (noise + usual) + self._rounding
-        return bool(np.any(np.abs(self._difference(values - typical)) > noise))
+        values = np.concatenate([value for _, value, _ in runs])
+        # The median; np.median would import masked arrays, which takes 10 ms.
+        away = np.abs(self._difference(values - np.sort(values)[len(values) // 2]))
+        return bool((away > ULPS * self._rounding).any())
 
-    def _monotone(self, theta: np.ndarray, value: np.ndarray, rate: np.ndarray,
-                  noise: np.ndarray) -> Iterator[Segment]:
+    def _monotone(self, theta: np.ndarray, value: np.ndarray, rate: np.ndarray
+                  ) -> Iterator[Segment]:
         """Yield the segments of a run, cut at its extremes."""
         with np.errstate(invalid='ignore'):
-            places = turning_points(value, rate, 4.0 * (noise + self._rounding))
+            places = turning_points(value, rate, 8.0 * self._rounding)
             rising = rate[places] >= 0.0
             at, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
                 x.shape) == rising[:, None], theta[places], theta[places + 1])
