@@ -236,8 +236,6 @@ class Segments:
         """Yield samples as inputs, values and rates, cut where the output jumps."""
         theta = np.concatenate([sampled(*arc) for arc in _cut([(lo, hi)], marks)])
         theta = ascending(theta)
-        if len(theta) < 2:
-            return
         most = MAX_SAMPLES + 4 * len(theta)
         theta, jumped = self._divided(theta, most)
         if len(theta) > most:
