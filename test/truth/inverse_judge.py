@@ -9,6 +9,7 @@ answer is invented if its own pose has another value, and a duplicate if it is n
 """
 
 from collections import Counter
+import copy
 import math
 
 from linkage_ros.linkage import Solution
@@ -25,6 +26,10 @@ AT, NEXT = 1e-7, 3e-5
 MOST, ALLOWED = 64.0, 1e-9
 # Samples of the range of an input, and steps of a bisection.
 SAMPLES, STEPS = 721, 60
+# Ends, extremes and dead points of an output that are questions, at most.
+SPECIALS = 30
+# Random poses of several inputs, of which the first that can be assembled are questions.
+TRIES = 50
 KINDS = 'ordinary', 'next to ends', 'ends', 'extremes', 'dead points'
 # The rule says nothing where the next floats change the output by more than this, and of several
 # inputs nothing where the margin is less.
@@ -51,8 +56,13 @@ class Output:
 
     def at(self, theta):
         """Return the output at inputs, NaN where any joint cannot be assembled."""
-        theta = np.asarray(theta, float)
-        return self._pose.over(theta, *self.others)[0]
+        return self._pose.over(np.asarray(theta, float), *self.others)[0]
+
+    def held_at(self, others):
+        """Return the output at other inputs, which an inverse may have rounded."""
+        held = copy.copy(self)
+        held.others = tuple(others)
+        return held
 
     def away(self, value, other):
         """Return the distance of two values, without whole turns."""
@@ -122,7 +132,9 @@ class Output:
         special += [('extremes', at, 1.0) for at in self.extremes()]
         special += [('dead points', at, side) for at in self.linkage.dead_points(*self.others)
                     for side in (1.0, -1.0)]
-        for kind, at, side in special:
+        # An output over many turns has thousands of them.
+        chosen = sorted(rng.permutation(len(special))[:SPECIALS])
+        for kind, at, side in (special[i] for i in chosen):
             yield kind, float(at)
             for away in AWAY:
                 yield 'next to ends', float(at + side * away * self.first.size)
@@ -142,8 +154,11 @@ def judge(linkage, name, rng, count=6, others=()):
         value = float(output.at(at))
         if value != value:
             continue
-        answers = [answer.inputs[0] for answer in inverse.all([value, *others], [at, *others])]
-        if others and Solution((at, *others), inverse).margin < SINGULAR:
+        solutions = inverse.all([value, *others], [at, *others])
+        answers = [solution.inputs[0] for solution in solutions]
+        # Of several inputs the rule promises regular solutions only.
+        if others and any(solution.margin < SINGULAR for solution in (
+                Solution((at, *others), inverse), *solutions)):
             kind = 'singular'
         elif output.ulp_changes(at) > SINGULAR * output.size:
             kind = 'no direction'
@@ -160,7 +175,8 @@ def judge(linkage, name, rng, count=6, others=()):
                 found[kind, 'lost at', linkage, name, at, others] += 1
                 break
         for k, x in enumerate(answers):
-            error, reached, beside = _error(output, x, value)
+            error, reached, beside = _error(
+                output.held_at(solutions[k].inputs[1:]), first, x, value)
             beyond = 0.0 if kind == 'ordinary' else max(2.0 * ALLOWED * output.size, beside)
             if not error <= MOST and not output.away(reached, value) <= beyond:
                 found[kind, 'invented'] += 1
@@ -173,11 +189,13 @@ def judge(linkage, name, rng, count=6, others=()):
     return found, worst
 
 
-def _error(output, x, value):
+def _error(output, first, x, value):
     """Return the error of an answer in units of the rule, and the output there."""
-    first = output.first
     step = 2.0 * np.spacing(max(abs(x), 1e-3 * first.size))
     reached, *beside = output.at(np.array([x, x + step, x - step])).tolist()
+    if reached != reached and first.wraps and not first.low <= x <= first.high:
+        # The turns that were added to an end rounded it.
+        reached = max(beside, key=np.isfinite)
     # What an ulp of the input changes, on the side where there is a pose; and what 64 do.
     change = np.nanmax([0.0, *output.away(beside, reached)]) / 4.0
     far = 64.0 * np.spacing(max(abs(x), first.size))
@@ -192,21 +210,23 @@ def judge_several(linkage, names, rng, count=6):
     inverse = linkage.inverse(names)
     sizes = [input_.size for input_ in linkage.inputs]
     scales = [1.0 if linkage.is_angle(name) else linkage.longest for name in names]
-    for _ in range(count):
-        pose = [float(rng.uniform(input_.low, input_.high)) for input_ in linkage.inputs]
-        row = np.array(linkage.compiled('checked', names).at(*pose)[:len(names)])
-        if not np.isfinite(row).all() or not Solution(pose, inverse).margin > SINGULAR:
-            continue
+    poses = [[float(rng.uniform(input_.low, input_.high)) for input_ in linkage.inputs]
+             for _ in range(TRIES)]
+    checked = linkage.compiled('checked', names)
+    regular = [pose for pose in poses if np.isfinite(checked.at(*pose)).all()
+               and Solution(pose, inverse).margin > SINGULAR]
+    for pose in regular[:count]:
+        row = np.array(checked.at(*pose)[:len(names)])
         answers = inverse.all(row.tolist())
         found['ordinary', 'questions'] += 1
         margin = Solution(pose, inverse).margin
         if not any(max(input_.apart(x, y) / size for input_, x, y, size in zip(
-                linkage.inputs, answer.inputs, pose, sizes)) < 1e-9 / margin
+                inverse.inputs, answer.inputs, pose, sizes)) < 1e-9 / margin
                 for answer in answers):
             found['ordinary', 'lost'] += 1
             found['ordinary', 'lost at', linkage, names, tuple(pose), ()] += 1
         for answer in answers:
-            there = np.array(linkage.compiled('checked', names).at(*answer.inputs)[:len(names)])
+            there = np.array(checked.at(*answer.inputs)[:len(names)])
             if _differ(linkage, names, there - row, scales):
                 found['ordinary', 'invented'] += 1
                 found['ordinary', 'invented at', linkage, names, tuple(pose), ()] += 1

@@ -25,6 +25,8 @@ from ..tolerances import ONE, SINGULAR
 
 # A larger error [sizes], or a longer step [rad, sizes], leads to another solution.
 FAR = 0.1
+# Distances to a pose beside a candidate that has none [ulps]: rates down to 1e-4 of the units.
+OUTSIDE = 2.0, -2.0, 32.0, -32.0, 512.0, -512.0, 8192.0, -8192.0
 
 
 def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Bracket, Row]
@@ -35,9 +37,9 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
     n, inputs, at = problem.n, candidate, problem.newton.at
     best = at(*inputs, *values)
     if not best[0] < math.inf:
-        # Rounding may have led out of the reach.
+        # Rounding of the outputs may have led out of the reach.
         around = ((*inputs[:by], inputs[by] + ulps * math.ulp(inputs[by]), *inputs[by + 1:])
-                  for ulps in (2.0, -2.0, 16.0, -16.0) for by in range(n))
+                  for ulps in OUTSIDE for by in range(n))
         inputs = next((x for x in around if at(*x, *values)[0] < math.inf), inputs)
         best = at(*inputs, *values)
     following = best[2 + n:2 + 2 * n]

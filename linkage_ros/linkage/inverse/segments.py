@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 import math
-from typing import Any, Callable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -101,13 +101,17 @@ class Segments:
         self._period = linkage.period_of(output)
         self._size = 1.0 if linkage.is_angle(output) else linkage.longest
         self._rounding, self._unit = TOLERANCE * self._size, self._input.step
-        self._normalized = normalized = self._input.normalized()
+        normalized = self._input.normalized()
         # Where a dyad is at a dead point, and where it nearly is.
         near_zeros = analysis.near_zeros()
         special = normalized.distinct(x.value for x in near_zeros if x.gap <= x.rounding)
         marks = normalized.distinct(x.value for x in near_zeros if x.gap <= NEAR * x.size)
         self.jumps: List[float] = []
-        self._ends = {end for arc in arcs for end in arc if not normalized.is_cut(end)}
+        # Next to an end of the reach there is a pose also when turns are added, and behind gears.
+        ulps = 2.0 if self._input.period == 1 else 4.0
+        self._inside = [tuple(end + side * ulps * (not normalized.is_cut(end)) * math.ulp(
+            max(abs(end), normalized.high)) for end, side in zip(arc, (1.0, -1.0)))
+            for arc in arcs]
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
         if not 0 < len(runs) <= MAX_ENDS * max(1.0, sum(hi - lo for lo, hi in arcs) / math.tau) \
                 or not self._moves(runs):
@@ -125,11 +129,8 @@ class Segments:
         least, greatest = float(value[0] - slack[0]), float(value[-1] + slack[1])
         # Values so near to an end of the segment are the end's.
         near = np.minimum(slack, ONE * self._size)
-        # At an end of the reach there is a pose also when a period is added, and behind gears.
-        ulps = 2.0 if self._input.period == 1 else 4.0
-        start, end = (x + side * ulps * math.ulp(max(abs(x), self._normalized.high)) * (
-            x in self._ends) for x, side in zip(theta[[0, -1]].tolist(), (1.0, -1.0)))
-        theta = np.array([start, *theta.clip(start, end), end]) * self._unit
+        low, high = min(self._inside, key=lambda arc: max(arc[0] - theta[0], theta[-1] - arc[1]))
+        theta = np.pad(theta.clip(low, high), 1, 'edge') * self._unit
         value = np.pad(value.clip(value[0] + near[0], value[-1] - near[1]), 1, 'edge')
         return Table(least, greatest, sign, theta.tolist(), value.tolist())
 
