@@ -26,8 +26,8 @@ import numpy as np
 from . import document
 
 # Mechanisms and outputs: what a joint follows, and what the inverse is asked for.
-CASES = (('slotted_lever', ('lever',)), ('four_bar', ('QB',)), ('jansen', ('BC',)),
-         ('jansen', ('EF',)), ('five_bar', ('P.x', 'P.y')), ('klann', ('CF',)))
+CASES = (('slotted_lever', ('lever',)), ('four_bar', ('QB',)), ('jansen', ('EF',)),
+         ('five_bar', ('P.x', 'P.y')), ('klann', ('CF',)))
 # Poses at which times are taken.
 POSES = 16
 SIDE = ' '.join(f'side.{what}[{{i}}] = {value};' for what, value in (

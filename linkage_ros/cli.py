@@ -11,14 +11,7 @@ import sys
 from typing import Any, Callable, List, Mapping, NoReturn, Optional, Sequence
 
 from .scene import SceneError, SceneMechanism
-from .words import meant, sentence
-
-
-class RequestError(Exception):
-    """An invalid request; the text is one sentence."""
-
-    def __init__(self, text: Any):
-        super().__init__(sentence(text))
+from .words import meant, RequestError, sentence
 
 
 class Parser(argparse.ArgumentParser):

@@ -32,6 +32,13 @@ def sentence(text: Any) -> str:
     return elided(' '.join(elided(word, MESSAGE) for word in str(text).split()), MAX_LINE)
 
 
+class RequestError(Exception):
+    """An invalid request to a command; the text is one sentence."""
+
+    def __init__(self, text: Any):
+        super().__init__(sentence(text))
+
+
 def quoted(value: Any) -> str:
     """Return a value as Python writes it, at most MAX_QUOTED letters of it."""
     try:

@@ -14,6 +14,9 @@ import subprocess
 import sys
 
 from linkage_ros.c_code import header
+from linkage_ros.c_code.axes import joints
+from linkage_ros.scene.joint_names import JointName
+import numpy as np
 import pytest
 
 STAND_IN = Path(__file__).parent / 'ros2_control'
@@ -24,7 +27,10 @@ ROS = next(([f'-isystem{include}', f'-L{prefix}/lib', '-lrcutils', f'-Wl,-rpath,
             if Path(include, 'rcutils', 'logging_macros.h').is_file()), [])
 COMPILER = shutil.which('cc') or shutil.which('gcc')
 SAMPLE = (STAND_IN / 'sample.h').read_text()
+SANITIZED = ('-g', '-O1', '-fsanitize=address,undefined', '-fno-sanitize-recover=all')
 STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror')
+# For what is written for ros2_control.
+PLUGIN = ('-std=c++17', *STRICT, '-isystem', STAND_IN / 'include', *ROS)
 
 
 @contextmanager
@@ -47,28 +53,64 @@ def loaded(folder, code, *flags):
     if not library.exists() or source.read_text() != code:
         source.write_text(code)
         subprocess.run([
-            COMPILER, '-std=c99', '-DLKR_MAX_INPUTS=3', '-DLKR_MAX_SOLUTIONS=512', *STRICT, *flags,
-            '-shared', '-fPIC', source, '-o', library, '-lm'], check=True)
+            COMPILER, '-std=c99', '-DLKR_MAX_INPUTS=3', '-DLKR_MAX_SOLUTIONS=1024', *STRICT,
+            *flags, '-shared', '-fPIC', source, '-o', library, '-lm'], check=True)
     return ctypes.CDLL(str(library))
 
 
-def inverter(folder, mechanism, output, single=False):
-    """Return the inverse of a mechanism's only input in C: value, near -> input, None: refused."""
-    number, text = 'float' if single else 'double', header.written(mechanism, [output], single)
+def counted(text):
+    """Return C with a function `poses_taken`, which returns how many poses there were since."""
+    counting = re.sub(r'(int \w+_at\w*\([^;]*?\)\n{\n)', r'\1    taken++;\n', text)
+    assert 'taken++' in counting
+    return f"""static int taken;
+{counting}
+int poses_taken(void) {{ int before = taken; taken = 0; return before; }}
+"""
+
+
+def inverter(folder, mechanism, output):
+    """Return the inverse of a mechanism's only input in C: value, near -> input and poses."""
+    text = header.written(mechanism, [output])
     name, = re.findall(r'int (\w+_for_\w+)', text)
-    call = loaded(folder, f"""{text}
-int inverted(double value, double near, double *input)
-{{
-    {number} answer = 0;
-    const int is_there = {name}(({number})value, ({number})near, &answer);
-    *input = answer;
-    return is_there;
-}}
-""").inverted
+    library = loaded(folder, f"""{counted(text)}
+int inverted(double value, double near, double *input) {{ return {name}(value, near, input); }}
+""")
     answer = ctypes.c_double()
 
     def invert(value, near):
-        is_there = call(ctypes.c_double(value), ctypes.c_double(near), ctypes.byref(answer))
-        return answer.value if is_there else None
+        is_there = library.inverted(ctypes.c_double(value), ctypes.c_double(near),
+                                    ctypes.byref(answer))
+        return answer.value if is_there else None, library.poses_taken()
 
     return invert
+
+
+def outputs(mechanism, inputs, names, by=None):
+    """Return outputs, or their rates by an input, in the scene's units, at such inputs."""
+    units = [mechanism.scale_of(name) for name in mechanism.inputs]
+    own = np.divide(inputs, units).tolist()
+    ask = mechanism.linkage.joint_angles if by is None else mechanism.linkage.joint_rates
+    values = ask(own if len(own) > 1 else own[0], names, *([] if by is None else [by]))
+    return np.array([float(values[name]) * mechanism.scale_of(name) / (
+        1.0 if by is None else units[by]) for name in names])
+
+
+def expected(mechanism, inputs, chosen=()):
+    """
+    Return positions of actuators and joints at inputs, each with its Jacobian, from the scene.
+
+    The joints are those of the links in `chosen`, by default the commanded ones.
+    """
+    by, settings = range(len(inputs)), mechanism.inputs.values()
+    measured = [each.measures or name for name, each in mechanism.inputs.items()]
+    ratio, offset = (np.array([getattr(each, key) for each in settings])
+                     for key in ('ratio', 'offset'))
+    chosen = [*chosen] or [each.output for each in joints(mechanism)]
+    prefix = next(iter(mechanism.assembly().legs))
+    named = [mechanism.joints[name if name in mechanism.inputs else prefix + name]
+             for name in chosen]
+    rates, turning = (np.array([outputs(mechanism, inputs, names, k) for k in by]).T
+                      for names in (measured, chosen))
+    return ((outputs(mechanism, inputs, measured) - offset) / ratio, rates / ratio[:, None],
+            np.array([*map(JointName.of, named, outputs(mechanism, inputs, chosen))]),
+            np.array([name.sign for name in named])[:, None] * turning)

@@ -7,8 +7,14 @@ import atexit
 from collections import defaultdict
 import contextlib
 import gc
+from importlib.util import find_spec
 import math
 import os
+from pathlib import Path
+import re
+import runpy
+import shutil
+import subprocess
 
 from domains import Domain
 from hypothesis import settings
@@ -25,6 +31,27 @@ settings.load_profile('repeatable')
 _domain = Domain()
 atexit.register(_domain.release)
 os.environ['ROS_DOMAIN_ID'] = str(_domain.id)
+# Packages that may be missing, and what files import that need them.
+NEEDS = {
+    'rclpy': r'rclpy|\w+_msgs|oracle|ros_harness|viewer_harness|linkage_ros\.(?:nodes|web)',
+    'linkage_interfaces': r'linkage_interfaces|viewer_harness|linkage_ros\.nodes\.servo_inverse',
+    'aiohttp': 'aiohttp|browser|viewer_harness',
+    'matplotlib': r'matplotlib|linkage_ros\.render', 'yaml': 'yaml'}
+MISSING = [name for name in NEEDS if not find_spec(name)]
+
+
+def pytest_report_header():
+    """Name the packages that are missing."""
+    return [f'{name} is not installed: what imports it is left out' for name in MISSING]
+
+
+def pytest_ignore_collect(collection_path):
+    """Leave out files that import what is not installed."""
+    imported = '|'.join(NEEDS[name] for name in MISSING)
+    if imported and collection_path.suffix == '.py':
+        return bool(re.search(
+            rf'^(?:from|import) (?:{imported})\b', collection_path.read_text(), re.M)) or None
+    return None
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -47,6 +74,33 @@ def pytest_collection_finish():
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
     gc.enable()
+
+
+@pytest.fixture(scope='session')
+def kept():
+    """Return the files that git keeps, or would keep."""
+    root = Path(__file__).parents[1]
+    if not shutil.which('git') or not (root / '.git').exists():
+        pytest.skip('no clone')
+    listed = subprocess.run(['git', 'ls-files', '-co', '--exclude-standard'], cwd=root, check=True,
+                            text=True, capture_output=True).stdout.split()
+    return {root / name for name in listed if (root / name).is_file()}
+
+
+@pytest.fixture
+def setup_arguments(monkeypatch):
+    """Return a function that returns what setup.py hands to setup() in a command."""
+    import setuptools
+
+    def arguments(command):
+        found = {}
+        monkeypatch.chdir(Path(__file__).parents[1])
+        monkeypatch.setattr('sys.argv', ['setup.py', command])
+        monkeypatch.setattr(setuptools, 'setup', found.update)
+        runpy.run_path('setup.py')
+        return found
+
+    return arguments
 
 
 @pytest.fixture(scope='module')
@@ -74,7 +128,7 @@ def graph(monkeypatch):
     from ros_harness import Graph
 
     # However slow the machine is, what is logged now and then is logged once.
-    monkeypatch.setattr(log, 'THROTTLE_S', math.inf)
+    monkeypatch.setattr(log.Throttle, 'seconds', math.inf)
     with Graph() as one:
         yield one
 

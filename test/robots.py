@@ -1,13 +1,85 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Robot models as libraries see them that know nothing of this package."""
+"""Robot models as libraries see them that know nothing of this package; the command from_robot."""
 
-from io import BytesIO
+from contextlib import redirect_stderr, redirect_stdout
+from functools import lru_cache
+from io import BytesIO, StringIO
 import math
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
+from linkage_ros import scene
+from linkage_ros.robot_files import cli
 import numpy as np
 import pytest
+
+ROBOTS = Path(__file__).with_name('robot_files')
+
+
+def written(folder, file, *changes):
+    """Return a file that is another with some of its text changed."""
+    text = (ROBOTS / file).read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    return of_text(folder / file, text)
+
+
+def of_text(path, text):
+    """Return a file with a text."""
+    path.write_text(text, encoding='utf-8')
+    return path
+
+
+def printed(file, *args):
+    """Return the exit code of the command, and what it prints as output and as errors."""
+    if str(file).endswith('.xml'):
+        pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
+    pytest.importorskip('yaml')
+    args = [str(ROBOTS / file), *map(str, args)]
+    return _printed(*args, texts=tuple(
+        Path(arg).read_bytes() for arg in args if Path(arg).is_file()))
+
+
+@lru_cache(None)
+def _printed(*args, texts):
+    with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
+        code = cli.main([*args])
+    return code, out.getvalue(), err.getvalue()
+
+
+def refused(file, *args):
+    """Return the sentence that refuses a file."""
+    code, out, err = printed(file, *args)
+    assert code == 1 and not out and err.count('\n') == 1 and 'Traceback' not in err
+    return err
+
+
+def said(file, *args):
+    """Return what is said of a file from which a scene is made."""
+    code, _, err = printed(file, *args)
+    assert code == 0, err
+    return err
+
+
+def imported(file, *args):
+    """Return the mechanisms of the scene of a file."""
+    code, out, err = printed(file, *args)
+    assert code == 0, err
+    with TemporaryDirectory() as folder:
+        return [*scene.load(str(of_text(Path(folder, 'scene.yaml'), out))).mechanisms.values()]
+
+
+def published(mechanism, **motors):
+    """Return the positions of a robot's joints where its motors are, motors included."""
+    values = [drive.ratio * motors[drive.source] + drive.offset
+              for drive in mechanism.inputs.values()]
+    angles = mechanism.linkage.joint_angles(values if len(values) > 1 else values[0])
+    assert mechanism.only_named
+    return {**motors, **{called.name: float(called.of(angles[link]))
+                         for link, called in mechanism.joints.items() if called.published}}
 
 
 class Yourdfpy:
@@ -45,8 +117,24 @@ class Pinocchio:
             ends = [value] if joint.nq == 1 else [math.cos(value), math.sin(value)]
             q[joint.idx_q:joint.idx_q + joint.nq] = ends
         self._library.framesForwardKinematics(self._model, self._data, q)
-        return {name: self._data.oMf[self._model.getFrameId(name)].translation.copy()
+        link = self._library.FrameType.BODY
+        return {name: self._data.oMf[self._model.getFrameId(name, link)].translation.copy()
                 for name in names}
+
+
+def words(numbers):
+    """Return numbers as a file has them, with all their digits."""
+    return ' '.join(repr(float(number)) for number in numbers)
+
+
+def rotation(angles):
+    """Return the rotation by angles about fixed x, y, z in turn."""
+    turned = np.eye(3)
+    for angle, (i, j) in zip(angles, ((1, 2), (2, 0), (0, 1))):
+        step = np.eye(3)
+        step[[i, j], [i, j]], step[j, i], step[i, j] = np.cos(angle), np.sin(angle), -np.sin(angle)
+        turned = step @ turned
+    return turned
 
 
 def in_frame(pose, point):

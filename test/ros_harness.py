@@ -14,8 +14,9 @@ import time
 
 from domains import Domain
 from linkage_ros import scene
+from linkage_ros.nodes import ownership
 from linkage_ros.nodes.kinematics import Kinematics
-from rcl_interfaces.msg import Log
+from rcl_interfaces.msg import Log, ParameterEvent
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -40,14 +41,14 @@ class Graph:
     `node` is there to publish, subscribe and call with; nothing moves but in `until`.
     """
 
-    def __init__(self, domain=None):
-        self._domain = domain
+    def __init__(self, domain=None, executor=SingleThreadedExecutor):
+        self._domain, self._is_logged, self._executor = domain, False, executor
 
     def __enter__(self):
         self._own = None if self._domain else Domain()
         self.context = rclpy.Context()
         rclpy.init(context=self.context, domain_id=self._domain or self._own.id)
-        self.executor = SingleThreadedExecutor(context=self.context)
+        self.executor = self._executor(context=self.context)
         self._nodes = []
         self.node = self._add(rclpy.create_node('tester', context=self.context))
         return self
@@ -68,8 +69,11 @@ class Graph:
     def start(self, node_class, parameters=None, **kwargs):
         """Start a node of this package with parameter values by name."""
         overrides = [Parameter(name, value=value) for name, value in (parameters or {}).items()]
-        return self._add(node_class(
+        node = self._add(node_class(
             context=self.context, parameter_overrides=overrides, **kwargs))
+        if self._is_logged:
+            self.until(lambda: node.count_subscribers('/rosout'))
+        return node
 
     def end(self, node):
         """End a node."""
@@ -82,6 +86,18 @@ class Graph:
         gathered = []
         self.node.create_subscription(type_, topic, gathered.append, qos)
         return gathered
+
+    def publisher(self, type_, topic, qos=10):
+        """Return a publisher of a topic once somebody subscribes to that."""
+        publisher = self.node.create_publisher(type_, topic, qos)
+        self.until(publisher.get_subscription_count)
+        return publisher
+
+    def announcer(self, node='/owner'):
+        """Return a function that announces values by name as those of a node."""
+        publisher = self.publisher(ParameterEvent, ownership.TOPIC, ownership.LATCHED)
+        return lambda values: publisher.publish(ParameterEvent(node=node, changed_parameters=[
+            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]))
 
     def until(self, predicate, seconds=DEADLINE):
         """Let the nodes work until something holds; return what the predicate returned."""
@@ -100,6 +116,7 @@ class Graph:
         # An ended node of the same name that is not collected yet would still own their loggers.
         gc.collect()
         gc.freeze()
+        self._is_logged = True
         return self.listen(Log, '/rosout', 1000)
 
     def all_logged(self, node, log):
@@ -242,6 +259,14 @@ class Process:
                 [sys.executable, *start, *arguments, '--ros-args',
                  '--params-file', str(parameter_file)], stdout=file, stderr=subprocess.STDOUT,
                 env={**os.environ, **(env or {}), 'ROS_DOMAIN_ID': str(self.domain)})
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if not self.has_ended:
+            self._process.kill()
+            self.end()
 
     def interrupt(self, signal):
         """Send a signal."""

@@ -11,7 +11,7 @@ import runpy
 import shutil
 import subprocess
 
-from c_libraries import COMPILER, inverter, loaded
+from c_libraries import COMPILER, inverter, loaded, STRICT
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import cli, header
 import numpy as np
@@ -99,8 +99,11 @@ def values(mechanism, count):
         low, high = (-9.0, 9.0) if drive.input.turns else (
             drive.input.low - 0.1, min(drive.input.high, 4.0) + 0.1)
         own = rng.uniform(low, high, count)
-        ends = [end for arc in drive.reach for end in arc][:count // 2]
-        own[:len(ends)] = ends
+        turn = drive.input.turns * drive.input.turn
+        ends = np.add.outer([0.0, 1e-9, 1e-6, -1e-9, -1e-6], [
+            end + turns * turn for arc in drive.reach for end in arc for turns in (0, 3)]).ravel()
+        own[:len(ends)] = ends[:count]
+        own[-1] = math.nan
         rows.append(own)
     return np.column_stack(rows)
 
@@ -122,30 +125,9 @@ def test_so_they_are_at_a_hundred_thousand_poses(library, mechanisms, name):
     test_poses_and_rates_are_those_of_python(library, mechanisms, name, 100_000)
 
 
-@pytest.mark.parametrize('name', SCENE['mechanisms'])
-def test_the_reach_is_that_of_python(library, mechanisms, name):
-    mechanism = mechanisms[name]
-    said = re.search('It can be assembled in (.*).\n', header.written(mechanism))
-    # Of two inputs, and of a part of a period, there is none.
-    assert bool(said) == (name not in ('five_bar', 'bent'))
-    if said:
-        arcs, drive = mechanism.first.reach, mechanism.first
-        assert said[1] == f'{" or ".join("[%.6g, %.6g]" % arc for arc in arcs)} {drive.input.unit}'
-        unit = mechanism.scale_of(drive.input.name)
-        inside = [low + part * (high - low) for low, high in arcs for part in (
-            0.0, 1e-9, 0.3, 0.7, 1.0 - 1e-9, 1.0)]
-        beyond = [end for low, high in arcs for end in (low - 1e-6, high + 1e-6)]
-        turns = (0, 3, -1) if drive.input.turns else (0,)
-        given = np.array([[value + turn * drive.input.turn] for value in (
-            *inside, *beyond, *values(mechanism, 20)[:, 0], math.nan, math.inf) for turn in turns])
-        with np.errstate(invalid='ignore'):
-            places = np.array([*mechanism.linkage.solve(given[:, 0] / unit).values()])
-        np.testing.assert_array_equal(solved(library, mechanism, given)[:, -1].astype(bool),
-                                      np.isfinite(places).all(axis=(0, 2)))
-
-
 @pytest.mark.parametrize('name, single, times, inputs, joints', [
     ('boom', True, ', times 2', 'cylinder [m]', 'boom_OB [rad]'),
+    ('cam', False, '', 'crank [rad]', 'cam_QB [rad]'),
     *(('five_bar', single, '', 'crank [rad], crank2 [rad]',
        'five_bar_crank [rad], five_bar_AP [rad]') for single in (False, True)),
     ('slotted_lever', False, ', times 0.001', 'crank [rad]', 'slotted_lever_lever [rad]')])
@@ -155,6 +137,10 @@ def test_a_header_says_what_it_has(mechanisms, name, single, times, inputs, join
     head, code = text.split('*/')[0], re.sub(
         r'/\*[^@]*?\*/|".*"', '', text[text.index('struct {', text.index('#endif /* LINKAGE')):])
     lengths = re.search(r'Lengths \[m\](.*?): (.*)\.\n', head)
+    # Of two inputs there is no reach.
+    said = re.search('It can be assembled in (.*).\n', head)
+    assert (name == 'five_bar') if not said else said[1] == ' or '.join(
+        '[%.6g, %.6g]' % arc for arc in mechanism.first.reach) + f' {mechanism.first.input.unit}'
     assert f'{name}: {mechanism.linkage.type}, written' in head and lengths[1] == times
     assert {key: float(value) for key, value in (
         each.split(' = ') for each in lengths[2].split(', ') if '=' in each)} == pytest.approx(
@@ -176,27 +162,72 @@ def test_a_header_says_what_it_has(mechanisms, name, single, times, inputs, join
     assert not OUTPUTS.get(name) or 'where there is none. */' in text
 
 
-@pytest.mark.parametrize('name, output', [
-    (name, output) for name, outputs in OUTPUTS.items() for output in outputs])
-def test_the_inverse_finds_the_nearest_input(mechanisms, tmp_path, name, output):
-    mechanism, rng = mechanisms[name], np.random.default_rng(2)
-    linkage, drive = mechanism.linkage, mechanism.first
+ENDING = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1.5', 'B dyad A Q 1 1 left',
+          'C rigid A B 0.6 0.8 left']
+END = mechanisms.create('custom', joints=ENDING).reach()[0][1]
+MOTOR = ['O ground 0 0', 'M crank O 0.01']
+NEAR_ENDS = np.array([0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1])
+# A linkage, an output, inputs or parts of the reach, values next to which C is asked for them, or
+# parts of the reach from them, and the error that an end allows.
+INVERSES = [
+    *((name, output, {}) for name, outputs in OUTPUTS.items() for output in outputs),
+    ('slotted_lever', 'lever', {'nears': [math.tau * 100, math.tau * 10_000]}),
+    # At an end of the reach an output changes infinitely fast, which is no excuse for an error.
+    (ENDING, 'C.y', {'inputs': [END, END - 1e-12, END - 1e-9, END - 1e-6],
+                     'nears': [END, END - 1e-3, END + 1.0], 'close': 2e-8}),
+    # An angle that turns by more than half a turn from one extreme to the other.
+    (['O ground 0 0', 'Q ground 0.5 0.25', 'A crank O 0.8',
+      'D crank Q 0.288 geared crank 0.5 0.96', 'B dyad A D 2.05 2.54 left'], 'angle(A,B)',
+     {'inputs': [6.151306541], 'nears': [6.52, 6.2, 6.15, 5.0]}),
+    # It has modes that no single pose shows.
+    (['A ground 0 0', 'B ground 0 1.4', 'C cylinder B A 1.0157 right',
+      'D E F inversor B C 1.2375 0.3369'], 'DE', {'parts': np.linspace(0.02, 0.98, 41)}),
+    # The motor of a slow and of a fast gear goes on in its turn.
+    *(([*MOTOR, f'A crank O 1 geared crank {ratio} 0'], 'A.x', {
+        'inputs': [0.4, 83.0, 83.0 + 320.0 * math.pi], 'beside': [1e-3], 'close': 1e-10})
+      for ratio in ('1/80', '180')),
+    *(({'type': kind, f'dimensions.{key}': factor * mechanisms.create(kind).dimensions[key]},
+       output, {'parts': [*NEAR_ENDS, *(1.0 - NEAR_ENDS)], 'beside': [0.0, 0.1], 'close': 1e-7})
+      for kind, key, factor, output in (('jansen', 'k', 0.8, 'G.x'), ('jansen', 'e', 1.25, 'G.y'),
+                                        ('klann', 'i', 0.8, 'CF')))]
+
+
+@pytest.mark.parametrize('linkage, output, given', INVERSES)
+def test_the_inverse_finds_the_nearest_input(mechanisms, tmp_path, linkage, output, given):
+    settings = linkage if isinstance(linkage, dict) else {'type': 'custom', 'joints': linkage}
+    mechanism = mechanisms[linkage] if isinstance(linkage, str) else scene.read({
+        'mechanisms': ['m'], **{f'm.{key}': value for key, value in settings.items()}}
+        ).mechanisms['m']
+    check_nearest(tmp_path, mechanism, output, **given)
+
+
+def check_nearest(folder, mechanism, output, inputs=None, nears=None, beside=None, close=2e-14,
+                  parts=None):
+    """Check that C finds inputs of an output, and none that is farther away than Python's."""
+    linkage, drive, rng = mechanism.linkage, mechanism.first, np.random.default_rng(2)
     unit, size = mechanism.scale_of(drive.input.name), mechanism.scale_of(output)
-    invert = inverter(tmp_path, mechanism, output)
     low, high = drive.ends or drive.reach[0]
-    for theta in rng.uniform(low, high, 12):
-        value = float(linkage.joint_angles(theta / unit, [output])[output]) * size
-        near = theta + rng.uniform(-0.3, 0.3) * (high - low) + (
-            drive.input.turns and float(rng.integers(-3, 4)) * 2.0 * np.pi)
-        answer = invert(value, near)
-        again = float(linkage.joint_angles(answer / unit, [output])[output]) * size
-        best = linkage.input_for(output, value / size, near / unit) * unit
-        gap = again - value
-        gap -= linkage.is_angle(output) and 2.0 * np.pi * np.round(gap / (2.0 * np.pi))
-        assert abs(gap) <= 2e-14 * max(1.0, size * linkage.longest)
-        assert abs(abs(answer - near) - abs(best - near)) < 1e-6
-    for value in (1e3, -1e3, np.nan, np.inf):
-        assert linkage.is_angle(output) and np.isfinite(value) or invert(value, 0.0) is None
+    inputs = inputs or np.clip(low + (high - low) * np.array(
+        rng.uniform(size=12) if parts is None else parts), low, high)
+    turn = drive.input.turns * math.tau
+    beside = beside or rng.uniform(-0.3, 0.3, 2) * (high - low) + turn * rng.integers(-3, 4, 2)
+    invert = inverter(folder, mechanism, output)
+
+    def out(inputs):
+        return linkage.joint_angles(np.divide(inputs, unit), [output])[output]
+
+    for theta in inputs:
+        # Between two floats there may be no input that has the value exactly.
+        value = out([theta, np.nextafter(theta, 0.5 * (low + high))]).mean()
+        for near in nears or theta + np.array(beside):
+            answer, _ = invert(value * size, near)
+            best = linkage.input_for(output, value, near / unit) * unit
+            assert abs(answer - near) == pytest.approx(abs(best - near), abs=1e-6)
+            gap = out(answer * (1.0 + 2e-16 * np.arange(-4, 5))) - value
+            gap -= linkage.is_angle(output) * math.tau * np.round(gap / math.tau)
+            assert size * np.nanmin(np.abs(gap)) <= close * max(1.0, size * linkage.longest)
+    for value in (1e3, -1e3, math.nan, math.inf):
+        assert linkage.is_angle(output) and math.isfinite(value) or not invert(value, 0.0)[0]
 
 
 @pytest.mark.nightly(all_but=2)
@@ -205,26 +236,13 @@ def test_the_inverse_finds_the_nearest_input(mechanisms, tmp_path, name, output)
     ('peaucellier', 'BC'), ('klann', 'CF')])
 def test_an_inverse_takes_no_more_poses_than_its_header_says(mechanisms, tmp_path, name, output):
     mechanism, rng = mechanisms[name], np.random.default_rng(6)
-    text = header.written(mechanism, (output,))
-    said = re.search(r'call takes at most (\d+) poses', text)[1]
-    counted = re.sub(rf'(int {name}_at\w*\([^;]*?\)\n{{\n)', r'\1    taken++;\n', text)
-    assert counted.count('taken++') and 'where there is none. */' in text
-    library = loaded(tmp_path, f"""
-static int taken;
-{counted}
-int poses(double value, double near)
-{{
-    double found;
-    taken = 0;
-    (void){name}_crank_for_angle_{output}(value, near, &found);
-    return taken;
-}}
-""")
+    said = re.search(r'call takes at most (\d+) poses', header.written(mechanism, (output,)))[1]
+    invert = inverter(tmp_path, mechanism, output)
     (low, high), = mechanism.first.reach
     edge = 0.01 * (high - low)
     values = mechanism.linkage.joint_angles(np.concatenate([
         rng.uniform(low + edge, high - edge, 200), [low, high]]), [output])[output]
-    taken = [library.poses(*map(ctypes.c_double, (value, near))) for value, near in zip(
+    taken = [invert(value, near)[1] for value, near in zip(
         [*values, *rng.uniform(-7.0, 7.0, 200)], rng.uniform(-9.0, 9.0, 402))]
     assert max(taken) <= int(said)
     # Inside the reach a closed form is checked, and so is a series: neither is corrected.
@@ -241,7 +259,7 @@ def test_a_search_misses_none_of_ten_thousand(mechanisms, tmp_path, name, output
     (low, high), = mechanism.first.reach
     inputs, nears = rng.uniform(low, high, 10_000), rng.uniform(-9.0, 9.0, 10_000)
     values = linkage.joint_angles(inputs, [output])[output]
-    cranks = np.array([*map(invert, values * scale, nears)])
+    cranks = np.array([found for found, _ in map(invert, values * scale, nears)])
     gap = linkage.joint_angles(cranks, [output])[output] - values
     gap -= linkage.is_angle(output) * math.tau * np.round(gap / math.tau)
     assert np.abs(gap).max() < 1e-13 * max(1.0, linkage.longest)
@@ -302,88 +320,6 @@ def test_single_precision_is_as_good_as_the_page_says(mechanisms, tmp_path, name
         1.0, size))
 
 
-def test_an_inverse_is_found_after_any_number_of_turns(mechanisms, tmp_path):
-    mechanism = mechanisms['slotted_lever']
-    invert = inverter(tmp_path, mechanism, 'lever')
-    for whole in (math.tau * 100, math.tau * 10_000):
-        for value in np.linspace(-0.4, 0.4, 50):
-            assert invert(value, whole) - whole == pytest.approx(
-                mechanism.linkage.input_for('lever', value, 0.0), abs=1e-15 * whole)
-
-
-GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
-          'D crank Q 0.27 geared crank -2 -1.4', 'B dyad A D 2.661 2.4 left']
-ENDING = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1.5', 'B dyad A Q 1 1 left',
-          'C rigid A B 0.6 0.8 left']
-END = mechanisms.create('custom', joints=ENDING).reach()[0][1]
-STEEP = ['O ground 0 0', 'Q ground 0.5 0.25', 'A crank O 0.8',
-         'D crank Q 0.288 geared crank 0.5 0.96', 'B dyad A D 2.05 2.54 left']
-
-
-@pytest.mark.parametrize('joints, output, inputs, nears', [
-    # A geared link counts turns, so that one input is right.
-    (GEARED, 'crank2', [-0.86844, 40.0], [2.3, 0.0, -5.3]),
-    # At an end of the reach an output changes infinitely fast, which is no excuse for an error.
-    (ENDING, 'C.y', [END, END - 1e-12, END - 1e-9, END - 1e-6], [END, END - 1e-3, END + 1.0]),
-    # An angle that turns by more than half a turn from one extreme to the other.
-    (STEEP, 'angle(A,B)', [6.151306541], [6.52, 6.2, 6.15, 5.0])])
-def test_the_input_of_an_output_is_found_from_anywhere(tmp_path, joints, output, inputs, nears):
-    mechanism, = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': joints}
-                            ).mechanisms.values()
-    invert, angles = inverter(tmp_path, mechanism, output), mechanism.linkage.joint_angles
-    for value in inputs:
-        wanted = float(angles(value, [output])[output])
-        for answer in (invert(wanted, near) for near in nears):
-            assert answer == pytest.approx(value, abs=1e-8)
-            answer = min(answer, END) if joints is ENDING else answer
-            assert angles(answer, [output])[output] == pytest.approx(wanted, abs=2e-8)
-
-
-@pytest.mark.nightly(all_but=1)
-@pytest.mark.parametrize('kind, key, factor, output', [
-    ('jansen', 'k', 0.8, 'G.x'), ('jansen', 'e', 1.25, 'G.y'), ('klann', 'i', 0.8, 'CF')])
-def test_a_search_finds_inputs_up_to_the_ends_of_the_reach(tmp_path, kind, key, factor, output):
-    length = factor * mechanisms.create(kind).dimensions[key]
-    mechanism, = scene.read({'mechanisms': ['m'], 'm.type': kind, f'm.dimensions.{key}': length}
-                            ).mechanisms.values()
-    linkage, invert = mechanism.linkage, inverter(tmp_path, mechanism, output)
-    parts = np.array([0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1])
-    for low, high in linkage.reach():
-        for crank in low + (high - low) * np.concatenate([parts, 1.0 - parts]):
-            # Between two floats there is no input that has the value exactly.
-            value = np.mean(linkage.joint_angles(
-                [crank, np.nextafter(crank, 0.5 * (low + high))], [output])[output])
-            for near in (crank, 0.5 * (low + high)):
-                answer = min(max(invert(value, near), low), high)
-                assert linkage.joint_angles(answer, [output])[output] == pytest.approx(
-                    value, abs=1e-7 * linkage.longest)
-
-
-@pytest.mark.nightly
-def test_an_ankle_in_single_precision_is_that_of_python(tmp_path):
-    mechanism, = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).mechanisms.values()
-    library = loaded(tmp_path, header.written(mechanism, single=True) + """
-int pose(float right, float left, float *angle)
-{
-    ankle_pose p;
-    lkr_side motors = { { right, left }, { 0 }, { 0 } }, joints, back;
-    ankle_memory m;
-    int is_whole = ankle_solve(right, left, &p) && ankle_begin(&m);
-    angle[0] = p.angle_pitch;
-    angle[1] = p.angle_roll;
-    is_whole = is_whole && !ankle_actuators_to_joints(&m, &motors, &joints);
-    is_whole = is_whole && !ankle_joints_to_actuators(&m, &joints, &back);
-    return is_whole && fabsf(back.position[0] - right) + fabsf(back.position[1] - left) < 1e-4f;
-}
-""")
-    inputs = np.random.default_rng(4).uniform(-0.2, 0.2, (300, 2)).astype(np.float32)
-    for given in inputs:
-        found = (ctypes.c_float * 2)()
-        angles = mechanism.linkage.joint_angles([*map(float, given)])
-        assert library.pose(*map(ctypes.c_float, given), found)
-        assert list(found) == pytest.approx([angles['pitch'], angles['roll']], abs=1e-5)
-
-
 def test_the_sketch_has_the_header_of_its_scene():
     sketch = ROOT / 'examples' / 'hobby_servo'
     text = (sketch / 'lever.h').read_text()
@@ -391,48 +327,6 @@ def test_the_sketch_has_the_header_of_its_scene():
     assert called and called <= set(re.findall(r'\blever_\w+', text))
     mechanism, = scene.load(str(sketch / 'lever.yaml')).mechanisms.values()
     assert text == header.written(mechanism, ['lever'], single=True) + '\n'
-
-
-@pytest.mark.parametrize('number, step, beyond', [('double', 1e-12, 1e-11),
-                                                  ('float', 2e-5, 5e-5)])
-def test_small_steps_up_to_an_extreme_are_not_lost(mechanisms, tmp_path, number, step, beyond):
-    mechanism = mechanisms['slotted_lever']
-    library = loaded(tmp_path, header.written(mechanism, (), number == 'float') + f"""
-static slotted_lever_memory m;
-int begun(void) {{ return slotted_lever_begin(&m); }}
-int commanded(double value, double *crank)
-{{
-    lkr_side desired = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, answer = desired;
-    int status;
-    desired.position[0] = ({number})value;
-    status = slotted_lever_joints_to_actuators(&m, &desired, &answer);
-    *crank = answer.position[0];
-    return status;
-}}
-double lever(double crank)
-{{
-    slotted_lever_pose p;
-    return slotted_lever_solve(({number})crank, &p) ? p.angle_lever : LKR_NAN;
-}}
-""")
-    library.lever.restype, answer = ctypes.c_double, ctypes.c_double()
-
-    def command(value):
-        return library.commanded(ctypes.c_double(value), ctypes.byref(answer)) & 1
-
-    assert library.begun() == 1
-    kind = np.float64 if number == 'double' else np.float32
-    for crank in kind(0.3 + np.arange(1000) * step):
-        assert command(library.lever(ctypes.c_double(crank))) == 0
-        assert abs(answer.value - crank) <= step
-    # What is hardly beyond is out of reach, there, too, where it is at the extreme already.
-    angles = mechanism.linkage.joint_angles(np.linspace(-math.pi, math.pi, 100_001), ['lever'])
-    for extreme, out in ((angles['lever'].min(), -beyond), (angles['lever'].max(), beyond)):
-        for before in (0.5 * extreme, extreme - 0.1 * out):
-            parts = -10.0, 1000.0, 10.0, 1.0
-            for part, is_out in zip(parts, (0, 1, 1, 1)):
-                assert library.begun() == 1 and command(before) == 0
-                assert command(extreme + part * out) == is_out
 
 
 def test_a_scene_file_is_printed_as_c(capsys, monkeypatch):
@@ -452,7 +346,9 @@ def test_a_scene_file_is_printed_as_c(capsys, monkeypatch):
     assert capsys.readouterr().out == printed + '\n'
 
 
-def test_any_names_of_a_scene_are_names_in_c(tmp_path):
+@pytest.fixture(scope='module')
+def named(tmp_path_factory):
+    """Return a folder of C files of linkages with any names and loads: double.c and float.c."""
     inputs = ['q', 'p', 'near', 'value', 'x0', 'new', 'for', 'sin', 'double', 'NAN', 'linux']
     given = {'mechanisms': [
         'Arm', 'arm', 'ARM', 'linkage', 'LKR', 'Lkr', 'rail',
@@ -466,40 +362,23 @@ def test_any_names_of_a_scene_are_names_in_c(tmp_path):
     for i, name in enumerate(inputs):
         given.update({f'm{i}.type': 'custom', f'm{i}.joints': [
             'O ground 0 0', 'Q ground 1 0', f'A crank O 0.3 called {name}']})
-    outputs = {'Arm': ['Arm_Tip', 'angle(Arm,Tip)', 'Arm_Tip'], 'm0': ['q'], 'm1': ['A.x']}
-    file = tmp_path / 'code.c'
-    file.write_text(''.join(header.written(mechanism, outputs.get(name, ()))
-                            for name, mechanism in scene.read(given).mechanisms.items()))
-    text = file.read_text()
-    assert 'Arm_crank_for_angle_Arm_Tip_2(' in text and 'slide_x_2;' in text
-    for language in ('c', 'c++'):
-        ended = subprocess.run([COMPILER, '-x', language, '-fsyntax-only', '-Wall', '-Wextra',
-                                '-Werror', '-Wno-unused-function', file],
-                               capture_output=True, text=True)
-        assert not ended.returncode, ended.stderr[:2000]
-
-
-LOADED = [['B=0 -9.81'], ['B=3 0', 'A=0 1', 'QB=0'], ['C=1 2', 'AB=-0.0', 'B=0 0']]
-
-
-@pytest.fixture(scope='module')
-def with_loads(tmp_path_factory):
-    """Return a folder of C files of linkages with LOADED: double.c and float.c."""
-    mechanisms = [*scene.read({
-        'mechanisms': [f'm{i}' for i in range(len(LOADED))],
-        **{f'm{i}.{key}': value for i, loads in enumerate(LOADED) for key, value in {
-            'type': 'custom', 'loads': loads, 'crank.sweep': [-1.0, 1.0], 'joints': [
-                'O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left',
-                'C rigid A B 0.6 0.6 left']}.items()}}).mechanisms.values()]
-    # A compiler does not warn of what a header that is included does not use.
-    folder = tmp_path_factory.mktemp('loads')
-    for single in (False, True):
-        kind = 'float' if single else 'double'
-        (folder / f'{kind}.h').write_text(header.printed([
-            header.Request(mechanism, [output]) for mechanism, output in zip(
-                mechanisms, ['QB', 'B.y', 'C.x'])], single))
-        (folder / f'{kind}.c').write_text(
-            f'#include "{kind}.h"\nint main(void) {{ return 0; }}\n')
+    for i, loads in enumerate([['B=0 -9.81'], ['B=3 0', 'A=0 1', 'QB=0'],
+                               ['C=1 2', 'AB=-0.0', 'B=0 0']]):
+        given['mechanisms'] += [f'l{i}']
+        given.update({f'l{i}.type': 'custom', f'l{i}.loads': loads, f'l{i}.crank.sweep': [-1, 1],
+                      f'l{i}.joints': ['O ground 0 0', 'Q ground 1 0', 'A crank O 0.3',
+                                       'B dyad A Q 1 0.6 left', 'C rigid A B 0.6 0.6 left']})
+    outputs = {'Arm': ['Arm_Tip', 'angle(Arm,Tip)', 'Arm_Tip'], 'm0': ['q'], 'm1': ['A.x'],
+               'l0': ['QB'], 'l1': ['B.y'], 'l2': ['C.x']}
+    folder = tmp_path_factory.mktemp('names')
+    for number in ('double', 'float'):
+        text = header.printed([header.Request(mechanism, outputs.get(name, ())) for name, mechanism
+                               in scene.read(given).mechanisms.items()], number == 'float')
+        assert 'Arm_crank_for_angle_Arm_Tip_2(' in text and 'slide_x_2;' in text
+        # A compiler does not warn of what a header that is included does not use.
+        (folder / f'{number}.h').write_text(text)
+        (folder / f'{number}.c').write_text(
+            f'#include "{number}.h"\nint main(void) {{ return 0; }}\n')
     return folder
 
 
@@ -510,12 +389,11 @@ def with_loads(tmp_path_factory):
     for compiler, language in (('gcc', 'c99'), ('g++', 'c++17'), ('clang', 'c99'),
                                ('clang++', 'c++17'), ('tcc', 'c99'))])
 @pytest.mark.parametrize('number', ['double', 'float'])
-def test_loads_compile_without_a_warning(with_loads, tmp_path, number, compiler, language):
+def test_names_and_loads_compile_without_a_warning(named, tmp_path, number, compiler, language):
     ended = subprocess.run([
         compiler, *(['-c', '-o', tmp_path / 'code.o'] if compiler == 'tcc' else [
             '-fsyntax-only', '-x', language.rstrip('179')]),
-        f'-std={language}', '-Wall', '-Wextra', '-Wconversion', '-Wpedantic', '-Wshadow',
-        '-Werror', with_loads / f'{number}.c'], capture_output=True, text=True)
+        f'-std={language}', *STRICT, named / f'{number}.c'], capture_output=True, text=True)
     assert not ended.returncode, ended.stderr[:2000]
 
 

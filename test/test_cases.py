@@ -6,7 +6,6 @@
 import math
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.render.cli import main
 from linkage_ros.robot_model import urdf
 from mpmath import mp, mpc, mpf
 import numpy as np
@@ -139,15 +138,6 @@ def test_the_side_of_a_nearly_folded_dyad_is_not_that_of_its_zero_pose():
     assert abs(foot(toe, 0.0)) > 0.1
 
 
-def test_the_closed_four_bar_of_gazebo_stays_a_parallelogram():
-    four_bar, theta = made('closed SDF four-bar'), np.linspace(-math.pi, math.pi, 91)
-    place = four_bar.solve(theta)
-    np.testing.assert_allclose(place['B'] - place['A'], [(0.3, 0.0)] * len(theta), atol=1e-15)
-    below = four_bar.solve(-0.5 * math.pi)
-    (x, y), (u, v) = below['Q'] - below['A'], below['B'] - below['A']
-    assert x * v - y * u < 0.0  # seen there, B is right of A -> Q; it is written left
-
-
 def test_a_scissor_lift_follows_from_the_cylinder_between_its_arms():
     lift = scene.load('config/scissor_lift.yaml').mechanisms['lift'].linkage
     foot = np.linspace(0.6, 1.7, 31)
@@ -186,26 +176,6 @@ def test_a_rack_steers_both_wheels_alike_and_the_inner_one_more():
 # --- gears, strokes and rails, asked where they are awkward --------------------------------------
 
 
-def test_a_chain_of_gears_turns_exactly_as_it_is_geared():
-    chain = mechanisms.create('custom', joints=[
-        'O ground 0 0', 'A crank O 1', 'B crank A 1 zero O geared crank 2 0',
-        'C crank B 1 zero A geared crank2 -3 0.1', 'D crank C 1 zero B geared crank3 1/8 0'])
-    theta = np.linspace(-3.0, 3.0, 13)
-    angles, rates = chain.joint_angles(theta), chain.joint_rates(theta)
-    for name, ratio, offset in (('crank2', 2, 0.0), ('crank3', -6, 0.1),
-                                ('crank4', -0.75, 0.0125)):
-        np.testing.assert_allclose(angles[name], ratio * theta + offset, rtol=4e-16)
-        assert (rates[name] == ratio).all()
-    total = theta[:, None] * np.cumsum([1, 2, -6, -0.75]) + np.cumsum([0, 0, 0.1, 0.0125])
-    bars = np.exp(1j * total) * (1, -1, 1, -1)
-    np.testing.assert_allclose(chain.solve(theta)['D'] @ (1, 1j), bars.sum(axis=1), atol=4e-15)
-    # All comes round after four turns.
-    np.testing.assert_allclose(chain.input_for('crank2', 1.0),
-                               0.5 + math.pi * np.arange(-4, 4), rtol=1e-14)
-    np.testing.assert_allclose(chain.input_for('crank3', 1.0),
-                               -0.15 + math.pi / 3.0 * np.arange(-11, 13), rtol=1e-14)
-
-
 def test_a_cylinder_may_close_to_nothing():
     boom = mechanisms.create('custom', joints=[
         'O ground 0 0', 'P ground 0.5 0', 'B cylinder P O 0.5 left'])
@@ -233,26 +203,9 @@ def test_a_rail_that_does_not_begin_at_its_joint_carries_a_motor():
     np.testing.assert_allclose(rail.input_for('B.y', place['B'].imag, others=(0.4, 0.15)), [-0.4])
 
 
-def test_what_drives_nothing_or_has_nowhere_to_go_is_refused():
-    for lines, problem in {
-            ('R carriage O along X 0.2 0.2',): 'must be less than its upper end',
-            ('R carriage O along X 0.2 0.1',): 'must be less than its upper end',
-            ('A crank O 1 geared crank 1 0',): 'a linkage needs a line that drives it',
-            ('B cylinder O X 1 left', 'A crank O 1 geared cylinder 1 0'): 'cannot be geared',
-            ('A crank O 1', 'L block A 1 1'): 'A is not a joint of a block'}.items():
-        with pytest.raises(ValueError, match=problem):
-            mechanisms.create('custom', joints=('O ground 0 0', 'X ground 1 0', *lines))
-
-
-def test_a_carriage_alone_is_a_linkage_and_has_a_picture(tmp_path):
+def test_a_carriage_alone_is_a_linkage():
     rail = ['O ground 0 0', 'X ground 1 0', 'R carriage O along X -0.2 0.7']
-    linkage = mechanisms.create('custom', joints=rail)
-    assert linkage.reach() == [(-0.2, 0.7)] and linkage.input_for('R.x', 0.3) == [0.3]
-    assert linkage.extremes('R.x') == [((-0.2, -0.2), (0.7, 0.7))]
+    assert mechanisms.create('custom', joints=rail).extremes('R.x') == [((-0.2, -0.2), (0.7, 0.7))]
     mechanism = scene.read({
         'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': rail}).mechanisms['m']
     assert Pinocchio(urdf.describe([mechanism], 'world')).joints == ['m_carriage']
-    path = tmp_path / 'rail.yaml'
-    path.write_text(
-        f'/**: {{ros__parameters: {{mechanisms: [m], m.type: custom, m.joints: {rail}}}}}')
-    assert main([str(path), '--out', str(tmp_path / 'rail.png')]) == 0

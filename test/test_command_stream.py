@@ -6,27 +6,20 @@
 import itertools
 import math
 import re
-import threading
 import time
 
 from builtin_interfaces.msg import Duration
-from linkage_ros import mechanisms, scene
-from linkage_ros.scene.inverse_request import InverseRequest
+from linkage_ros import mechanisms
+from linkage_ros.nodes import log
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.servo_inverse import ServoInverse
 import numpy as np
 import pytest
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from truth.cases import CASES
 from truth.working_modes import excavator, five_bar
-
-pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
-
-from linkage_ros.nodes import log  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from linkage_ros.nodes.worker import Worker  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from std_msgs.msg import Float64MultiArray  # noqa: E402
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
 
 # A hobby servo with a gear of 2 turns a crank of 80, 150 from the pivot of a lever.
 LEVER = {'mechanisms': ['lever', 'bar'], 'lever.type': 'slotted_lever',
@@ -119,8 +112,7 @@ def test_outputs_of_several_mechanisms_in_one_message(stream, graph):
 
 
 def test_the_first_command_is_next_to_where_the_crank_is(stream, graph):
-    cranks = graph.node.create_publisher(JointState, 'crank_states', 10)
-    graph.until(cranks.get_subscription_count)
+    cranks = graph.publisher(JointState, 'crank_states')
     for _ in range(3):
         cranks.publish(JointState(name=['bar_crank'], position=[-2.0]))
     four_bar = mechanisms.create('four_bar')
@@ -139,8 +131,7 @@ def test_what_cannot_be_had_is_held_and_said(stream, capfd):
 
 
 def test_before_the_first_good_command_there_is_none(stream, graph):
-    publisher = graph.node.create_publisher(JointState, 'wanted_states', 10)
-    graph.until(publisher.get_subscription_count)
+    publisher = graph.publisher(JointState, 'wanted_states')
     for _ in range(5):
         publisher.publish(JointState(name=['flap', 'bar_QB'], position=[5.0, 9.0]))
     assert 'bar_crank' in stream.want(['flap', 'bar_QB'], [5.0, 1.2])
@@ -203,28 +194,6 @@ def test_commands_move_the_picture(stream, graph):
     assert dict(zip(message.name, message.position))['flap'] == pytest.approx(-0.2, abs=1e-14)
 
 
-# --- in turn, and all round ---
-
-@pytest.mark.nightly(all_but=2)
-@pytest.mark.parametrize('type_, output, part', [
-    ('four_bar', 'QB', 1.0), ('jansen', 'G.x', 1.0), ('slider_crank', 'block', 1.0),
-    ('watt', 'P.y', 1.0), ('whitworth', 'lever', 3.0)])
-def test_a_turning_crank_is_found_again_without_a_jump(type_, output, part):
-    mechanism = scene.read({'mechanisms': ['one'], 'one.type': type_}).mechanisms['one']
-    linkage, wanted = mechanism.linkage, InverseRequest(mechanism, [output])
-    (_, start), (_, end) = linkage.extremes(output)[0]
-    near = start + 0.02 * part * (end - start)
-    for k in range(2, 98):
-        crank = start + 0.01 * k * part * (end - start)
-        value = float(linkage.joint_angles(crank, [output])[output])
-        (found,), (actuator,), _ = wanted.command([value], None, [near])
-        assert actuator == found and abs(found - near) < 0.3
-        again = float(linkage.joint_angles(found, [output])[output])
-        assert math.remainder(again - value, math.tau) == pytest.approx(0.0, abs=1e-12 * max(
-            1.0, linkage.longest))
-        near = found
-
-
 # --- several inputs ---
 
 def actuators(foot, bucket):
@@ -284,8 +253,7 @@ SEARCHED = ['digger_H.x', 'digger_J.y', 'digger_distance(P,J)']
 
 
 def test_without_a_closed_form_a_first_command_does_not_jump_and_no_message_waits_for_a_search(
-        graph, capfd, monkeypatch):
-    monkeypatch.setattr(InverseRequest, 'reason', None)
+        graph, capfd):
     stream = Stream(graph, SEVERAL)
     linkage = stream.node.scene.mechanisms['digger'].linkage
     outputs = linkage.function((), tuple(name.split('_')[1] for name in SEARCHED))
@@ -312,16 +280,16 @@ def several_plan(graph):
 
 def planner(graph):
     """Return a function that sends a trajectory and returns what finds the actuators'."""
-    publisher = graph.node.create_publisher(JointTrajectory, 'wanted_trajectory', 10)
+    publisher = graph.publisher(JointTrajectory, 'wanted_trajectory')
     planned = graph.listen(JointTrajectory, 'servo_trajectory')
-    graph.until(publisher.get_subscription_count)
     ids = itertools.count(1)
 
     def send(names, *points):
         message = JointTrajectory(joint_names=names, points=[
             JointTrajectoryPoint(positions=positions, velocities=velocities,
-                                 time_from_start=Duration(sec=second))
-            for second, (positions, velocities) in enumerate(points)])
+                                 time_from_start=Duration(sec=sec, nanosec=nanosec))
+            for second, (positions, velocities, *time) in enumerate(points)
+            for sec, nanosec in (time or [(second, 0)])])
         message.header.frame_id = mark = str(next(ids))
         publisher.publish(message)
         return lambda: [one for one in planned if one.header.frame_id == mark]
@@ -376,11 +344,14 @@ REFUSED = [
      'point 0: the motion of bar_A.x reverses there; its speed must be zero'),
     (['bar_A.x'], [([1e3], [])], 'point 0: bar_A.x cannot be 1000: .*'),
     (['flap'], [([math.nan], [])], 'point 0: flap cannot be nan: a value must be finite'),
-    (['flap'], [([0.1], [])] * 5, 'it has 5 points; send up to 4')]
+    (['flap'], [([0.1], [])] * 10_001, 'it has 10001 points; send up to 10000'),
+    *((['flap'], [([0.1], [], time) for time in times], reason) for times, reason in (
+        ([(1, 0), (0, 999_999_999)], 'point 1 is at 1 s, before 1 s: .*'),
+        ([(-1, 0)], 'point 0 is at -1 s, before 0 s: time_from_start must not decrease'),
+        ([(0, 0), (3, 0), (2, 5 * 10 ** 8)], 'point 2 is at 2.5 s, before 3 s: .*')))]
 
 
-def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd, monkeypatch):
-    monkeypatch.setattr('linkage_ros.nodes.command_stream.MAX_POINTS', 4)
+def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd):
     logged = []
 
     def reasons():
@@ -393,54 +364,18 @@ def test_a_trajectory_that_cannot_be_is_refused_as_a_whole(graph, plan, capfd, m
         graph.until(lambda: len(reasons()) == len(refused))
     for found, (_, _, reason) in zip(reasons(), REFUSED):
         assert re.fullmatch(reason, found), (found, reason)
-    good, = graph.until(plan(['flap'], *[([flap(0.3)], [])] * 4))
+    times = [(0, 5), (0, 5), (1, 0), (0, 2 * 10 ** 9)]
+    good, = graph.until(plan(['flap'], *(([flap(0.3)], [], time) for time in times)))
     assert [point.positions.tolist() for point in good.points] == [
         [pytest.approx(0.3, abs=1e-12)]] * 4
+    assert [point.time_from_start for point in good.points] == [
+        Duration(sec=sec, nanosec=nanosec) for sec, nanosec in times]
     assert not any(point.velocities for point in good.points)
     assert not any(one() for one in refused)
 
 
-@pytest.mark.parametrize('times, reason', [
-    ([(0, 5), (0, 5), (1, 0)], ''), ([(0, 0)], ''), ([(0, 2 * 10 ** 9), (2, 1)], ''),
-    ([(1, 0), (0, 999_999_999)], 'point 1 is at 1 s, before 1 s'),
-    ([(-1, 0)], 'point 0 is at -1 s, before 0 s: time_from_start must not decrease'),
-    ([(0, 0), (3, 0), (2, 5 * 10 ** 8)], 'point 2 is at 2.5 s, before 3 s')])
-def test_a_trajectory_goes_forwards_in_time(graph, stream, capfd, times, reason):
-    planned, logged = graph.listen(JointTrajectory, 'servo_trajectory'), []
-    publisher = graph.node.create_publisher(JointTrajectory, 'wanted_trajectory', 10)
-    graph.until(publisher.get_subscription_count)
-    graph.until(lambda: stream.node.count_subscribers('servo_trajectory'))
-    points = [JointTrajectoryPoint(positions=[flap(0.3)], time_from_start=Duration(
-        sec=sec, nanosec=nanosec)) for sec, nanosec in times]
-    publisher.publish(JointTrajectory(joint_names=['flap'], points=points))
-    graph.until(lambda: logged.append(capfd.readouterr().err) or planned
-                or 'wanted_trajectory is refused: ' in ''.join(logged))
-    assert reason in ''.join(logged) and bool(planned) != bool(reason)
-    assert [point.time_from_start for one in planned for point in one.points] == (
-        [] if reason else [point.time_from_start for point in points])
-
-
-def test_a_newer_trajectory_ends_the_older_one(graph, plan, monkeypatch):
-    begun, both_queued, kinds, solved = threading.Event(), threading.Event(), [], []
-    queue, command = Worker.queue, InverseRequest.command
-
-    def queued(worker, kind, job, **how):
-        queue(worker, kind, job, **how)
-        kinds.append(kind)
-        if kinds.count('wanted_trajectory') == 2:
-            both_queued.set()
-
-    def after_both_are_there(*args):
-        begun.set()
-        assert both_queued.wait(20.0)
-        solved.append(args)
-        return command(*args)
-
-    monkeypatch.setattr(Worker, 'queue', queued)
-    monkeypatch.setattr(InverseRequest, 'command', after_both_are_there)
-    older = plan(['flap'], *(([flap(0.3)], []) for _ in range(50)))
-    graph.until(begun.is_set)
-    newer = plan(['flap'], ([flap(0.2)], []))
+def test_a_newer_trajectory_ends_the_older_one(graph, several_plan):
+    # Alone, the older one takes seconds.
+    older = several_plan(FOOT, *[(LINE[:2].tolist(), [])] * 10_000)
+    newer = several_plan(FOOT, (LINE[:2].tolist(), []))
     assert graph.until(newer) and not older()
-    # Of the older one no more than the point that was being solved.
-    assert len(solved) <= 2

@@ -11,8 +11,9 @@ refused, and answers with another pose: not the one asked for, and farther away.
 
 from contextlib import suppress
 import ctypes
+import subprocess
 
-from c_libraries import COMPILER, inverter, loaded, SAMPLE
+from c_libraries import COMPILER, loaded, SAMPLE, SANITIZED
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import joints
@@ -42,13 +43,13 @@ void {name}_counts(long poses, long *counts)
         lkr_side measured = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }};
         lkr_side asked = measured, found = measured;
         sample({n}, ranges, i, q);
-        if (!{name}_at(q, 1, &p))
+        if (!{name}_at(q, &p))
             continue;
         for (k = 0; k < {n}; k++)
             beside[k] = q[k] + (i & 1 << k ? 1 : -1) * ({number})1e-3;
         for (side = 0; side < 2; side++) {{
             goal = p;
-            if (side && !{name}_at(beside, 1, &goal))
+            if (side && !{name}_at(beside, &goal))
                 continue;
             for (k = 0; k < {n}; k++)
                 measured.position[k] = p.position[0][k];
@@ -100,14 +101,18 @@ def drawn(seeds):
                         others, len(linkage.inputs), replace=False)] for k in (1, 2)]
 
 
+def code(cases, number='double'):
+    """Return the C of cases, with functions that put questions."""
+    return header.printed(cases, number == 'float') + SAMPLE + ''.join(
+        QUESTIONS.format(name=case.mechanism.name, number=number, n=len(case.mechanism.inputs),
+                         slack='1e-2f' if number == 'float' else '1e-6',
+                         ranges=ranges(case.mechanism)) for case in cases)
+
+
 def questions(folder, cases, number):
     """Return how many questions were put to each case, and raise if there were misses."""
     folder.mkdir(parents=True, exist_ok=True)
-    library = loaded(folder, header.printed(cases, number == 'float') + SAMPLE + ''.join(
-        QUESTIONS.format(name=case.mechanism.name, number=number, n=len(case.mechanism.inputs),
-                         slack='1e-2f' if number == 'float' else '1e-6',
-                         ranges=ranges(case.mechanism)) for case in cases), '-O1')
-    counts = {}
+    library, counts = loaded(folder, code(cases, number), '-O1'), {}
     for case in cases:
         counts[case.mechanism.name] = (ctypes.c_long * 3)()
         library[f'{case.mechanism.name}_counts'](ctypes.c_long(300), counts[case.mechanism.name])
@@ -115,18 +120,27 @@ def questions(folder, cases, number):
     return [each[0] for each in counts.values()]
 
 
-@pytest.mark.parametrize('output, joint_lines', FAULTS)
-def test_a_closed_form_knows_every_assembly_mode(tmp_path, output, joint_lines):
-    mechanism = read('fault', joint_lines).mechanism
-    linkage, invert = mechanism.linkage, inverter(tmp_path, mechanism, output)
-    (low, high), = linkage.reach()
-    for given in np.linspace(low, high, 41)[1:-1]:
-        value = float(linkage.joint_angles(given, [output])[output])
-        for near in (low, 0.5 * (low + high), high, given):
-            answer, best = invert(value, near), linkage.input_for(output, value, near)
-            assert abs(answer - near) == pytest.approx(abs(best - near), abs=1e-6)
-            assert float(linkage.joint_angles(answer, [output])[output]) == pytest.approx(
-                value, abs=1e-12)
+def test_sanitizers_find_nothing(tmp_path):
+    def ran(name, text):
+        (tmp_path / f'{name}.c').write_text(text)
+        for command_line in ([COMPILER, '-std=c99', *SANITIZED, tmp_path / f'{name}.c', '-o',
+                              tmp_path / name, '-lm'], [tmp_path / name]):
+            ended = subprocess.run(command_line, capture_output=True, text=True)
+            if ended.returncode:
+                return ended.stderr[:2000]
+        return ended.stdout
+
+    if ran('none', 'int main(void) { return 0; }\n'):
+        pytest.skip('no program with sanitizers is linked or runs here')
+    cases = [read('lever', FAULTS[0][1]), *map(header.Request, scene.read({
+        'mechanisms': ['leg'], 'leg.type': 'five_bar', 'leg.loads': ['P=3 -20']}
+        ).mechanisms.values())]
+    printed = ran('asked', '#include <stdio.h>\n' + code(cases) + 'int main(void)\n{\n' + ''.join(
+        f"""long {name}[3] = {{ 0, 0, 0 }};
+{name}_counts(2000, {name});
+printf("%d", {name}[0] > 1000 && !{name}[1] && !{name}[2]);
+""" for name in ('lever', 'leg')) + '}\n')
+    assert printed == '11'
 
 
 @pytest.mark.nightly

@@ -3,11 +3,9 @@
 
 """Gears of any ratio: the inverse, the reach and the motion in any turn."""
 
-import ctypes
 from fractions import Fraction
 import math
 
-from c_libraries import inverter, loaded
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
 from linkage_ros.scene.motion import Motion
@@ -149,41 +147,6 @@ def test_a_driver_goes_on_without_a_jump_until_all_comes_round(ratio):
         # 2 pi is rounded, once a turn.
         assert mechanism.linkage.solve(angle)['A'] == pytest.approx(
             [math.cos(turned), math.sin(turned)], abs=1e-14 * seconds + 1e-9)
-
-
-def test_c_goes_on_in_the_turn_of_near(tmp_path):
-    for name, ratio in (('slow', '1/80'), ('fast', '180')):
-        mechanism = scene.read({'mechanisms': [name], f'{name}.type': 'custom', f'{name}.joints': [
-            'O ground 0 0', 'M crank O 0.01', f'A crank O 1 geared crank {ratio} 0']}
-        ).mechanisms[name]
-        (tmp_path / name).mkdir()
-        invert = inverter(tmp_path / name, mechanism, 'A.x')
-        for near in (0.4, 83.0, 83.0 + 320.0 * math.pi):
-            value = mechanism.linkage.solve(near)['A'][0]
-            assert invert(value, near + 1e-3) == pytest.approx(near, abs=1e-9)
-
-
-def test_c_repeats_as_both_sides_do(tmp_path):
-    # The commanded output repeats 40 times a turn, the measured one once.
-    mechanism = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
-        'O ground 0 0', 'M crank O 1', 'C ground 3 0', 'B dyad M C 3 2 left',
-        'A crank O 0.3 geared crank 40 0.2'], 'm.crank.measures': 'CB'}).mechanisms['m']
-    move = loaded(tmp_path, header.written(mechanism, joints=['m_A.x']) + """
-void move(double value, double *crank, double *measured)
-{
-    lkr_point p;
-    lkr_inverse(&m_model, LKR_JOINTS, &value, crank, &p);
-    *measured = p.position[LKR_ACTUATORS][0];
-}
-""").move
-    crank, measured = ctypes.c_double(), ctypes.c_double()
-    for near in (-50.0, -2.0, 0.3, 1.1, 20.0):
-        crank.value = near + 1e-3
-        move(ctypes.c_double(mechanism.linkage.solve(near)['A'][0]), ctypes.byref(crank),
-             ctypes.byref(measured))
-        assert crank.value == pytest.approx(near, abs=1e-9)
-        assert measured.value == pytest.approx(
-            mechanism.linkage.joint_angles(near, ['CB'])['CB'], abs=1e-9)
 
 
 def test_what_cannot_be_searched_in_c_is_refused():

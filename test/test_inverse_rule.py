@@ -192,3 +192,16 @@ def test_next_to_an_extreme_a_pose_is_found_with_another_input_held_too():
     value = linkage.solve((at, held))['M'][0]
     solutions = linkage.inverse(('M.x', 'drive')).all((value, held))
     assert min((abs(each.inputs[0] - at) for each in solutions), default=1.0) < 1e-10
+
+
+def test_an_end_of_the_reach_is_found_with_another_input_held_too():
+    linkage = mechanisms.create('custom', joints=[
+        'B ground 0 0.45', 'C ground -0.03624 2.66982656119', 'D ground -1.64594 -0.4492922',
+        'E crank C 0.8 up', 'F cylinder B D 1.267 right called drive', 'G yoke E C along B',
+        'K dyad E G 2.23494351 2.306645367473 left'])
+    # The output moves so little with the crank that its rounding leads 100 ulps out of the reach.
+    held = 0.6125269407665871
+    for end in np.ravel(linkage.reach(held)).tolist():
+        value = linkage.solve((end, held))['G'][0]
+        solutions = linkage.inverse(('G.x', 'drive')).all((value, held))
+        assert min((abs(each.inputs[0] - end) for each in solutions), default=1.0) < 1e-12

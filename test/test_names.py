@@ -21,9 +21,6 @@ def member(text):
     return Enum('Joint', {'ONE': text}, type=str).ONE
 
 
-of_any_class = pytest.mark.parametrize('made', [np.str_, member])
-
-
 def fresh(kind=str):
     """Return a lever nobody has asked for anything, its texts of a class, and its last joint."""
     last = f'Z{next(NUMBERS)}'
@@ -74,52 +71,48 @@ def test_text_of_any_class_is_a_name_and_later_callers_are_not_harmed(texts, nam
             assert all(np.array_equal(value, values[0], equal_nan=True) for value in values)
 
 
-@of_any_class
-def test_dimensions_and_types_have_such_names_too(made):
-    leg = mechanisms.create(made('jansen'), **{made('m'): 14.0})
-    assert type(leg.type) is str and set(map(type, leg.dimensions)) == {str}
-    other = mechanisms.create('jansen').with_dimensions(**{made('m'): 14.0})
-    assert leg.dimensions == other.dimensions == {**mechanisms.defaults(made('jansen')), 'm': 14.0}
+GIVEN = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
+LEVER = scene.read(GIVEN)
+FIVE_BAR = mechanisms.create('five_bar')
+# What is asked with names, which a function makes of texts.
+ASKED = {
+    'dimensions': lambda made: mechanisms.create(made('jansen'), **{made('m'): 14.0}).dimensions,
+    'changed dimensions': lambda made: mechanisms.create('jansen').with_dimensions(
+        **{made('m'): 14.0}).dimensions,
+    'type': lambda made: mechanisms.create(made('jansen')).type,
+    'header': lambda made: header.written(LEVER.mechanisms['lever'], [made('lever')]),
+    'several outputs': lambda made: FIVE_BAR.inputs_for(
+        [made('P.x'), made('P.y')], FIVE_BAR.solve((0.5, 2.0), 'P')['P']),
+    'scene': lambda made: scene.read({
+        made(name): value for name, value in GIVEN.items()}).parameters,
+    'changed scene': lambda made: [each.name for each in scene.changed(
+        LEVER, {made('lever.dimensions.e'): 1.5}).changed_from(LEVER)]}
 
 
-@of_any_class
-def test_a_header_is_the_same_for_outputs_of_any_class(made):
-    given = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
-    mechanism = scene.read(given).mechanisms['lever']
-    assert header.written(mechanism, [made('lever')]) == header.written(mechanism, ['lever'])
+@pytest.mark.parametrize('made', [np.str_, member])
+@pytest.mark.parametrize('what', ASKED)
+def test_what_is_asked_by_names_of_any_class_is_the_same(made, what):
+    found, expected = ASKED[what](made), ASKED[what](str)
+    assert found == expected and len(found) > 0
+    assert {*map(type, found)} == {*map(type, expected)}
 
 
-@of_any_class
+@pytest.mark.parametrize('made', [np.str_, member])
 def test_what_is_no_name_is_refused_as_ever(made):
     linkage, _ = fresh()
     for ask in (linkage.solve, linkage.joint_angles, linkage.velocity):
         with pytest.raises(ValueError, match='custom has no (point|joint).*; allowed: '):
             ask(0.5, (made('none'),))
-    with pytest.raises(ValueError, match='has no output .*; allowed: '):
-        linkage.input_for(made('none'), 0.5)
-    with pytest.raises(ValueError, match='^O.x of custom does not move with the crank$'):
-        linkage.input_for(made('O.x'), 0.5)
-
-
-@of_any_class
-def test_several_outputs_have_such_names_too(made):
-    linkage, outputs = mechanisms.create('five_bar'), ('P.x', 'P.y')
-    wanted = [linkage.solve((0.5, 2.0), 'P')['P'][axis] for axis in (0, 1)]
-    odd = list(map(made, outputs))
-    assert linkage.inputs_for(odd, wanted) == linkage.inputs_for(outputs, wanted) != []
-    with pytest.raises(ValueError, match='five_bar has no output'):
-        linkage.inputs_for([made('none'), 'C.x'], wanted)
-
-
-@of_any_class
-def test_parameters_have_such_names_too(made):
-    given = {'mechanisms': ['leg'], 'leg.type': 'jansen', 'leg.dimensions.m': 14.0}
-    read = scene.read({made(name): value for name, value in given.items()})
-    assert read.parameters == scene.read(given).parameters
-    changed = scene.changed(read, {made('leg.dimensions.m'): 14.5})
-    assert [each.name for each in changed.changed_from(read)] == ['leg.dimensions.m']
-    with pytest.raises(scene.SceneError, match=r'^leg\.colour is not a parameter of the scene'):
-        scene.changed(read, {made('leg.colour'): 1.0})
+    for ask, why in (
+            (lambda: linkage.input_for(made('none'), 0.5), 'has no output .*; allowed: '),
+            (lambda: linkage.input_for(made('O.x'), 0.5),
+             '^O.x of custom does not move with the crank$'),
+            (lambda: FIVE_BAR.inputs_for([made('none'), 'C.x'], (0.0, 0.0)),
+             'five_bar has no output'),
+            (lambda: scene.changed(LEVER, {made('lever.colour'): 1.0}),
+             r'^lever\.colour is not a parameter of the scene')):
+        with pytest.raises(ValueError, match=why):
+            ask()
 
 
 @pytest.mark.parametrize('wrong', [bytearray(b'3'), b'3', memoryview(b'3'), '3'])
@@ -131,8 +124,7 @@ def test_bytes_are_no_numbers(wrong):
 
 
 def test_an_error_names_the_argument_that_is_wrong():
-    five_bar = mechanisms.create('five_bar')
     with pytest.raises(ValueError, match='rate must be a sequence of as many values'):
-        five_bar.acceleration((0.3, 0.4), 1.0, 0.0)
+        FIVE_BAR.acceleration((0.3, 0.4), 1.0, 0.0)
     with pytest.raises(ValueError, match=r'no output .*; allowed: distance\(A,B\)'):
         mechanisms.create('jansen').extremes('distance(O, G)')

@@ -13,26 +13,19 @@ import subprocess
 import sys
 import time
 
+from linkage_interfaces.srv import InputsFor, ServoInverse as Service
+from linkage_ros.nodes import shutdown
+from linkage_ros.nodes.crank_driver import CrankDriver
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.servo_inverse import ServoInverse
 import pytest
-
-pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
-
-from linkage_interfaces.srv import InputsFor, ServoInverse as Service  # noqa: E402
-from linkage_ros import scene  # noqa: E402
-from linkage_ros.nodes import shutdown  # noqa: E402
-from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from rcl_interfaces.msg import ParameterEvent  # noqa: E402
-from rclpy.logging import LoggingSeverity  # noqa: E402
-from rclpy.parameter import Parameter  # noqa: E402
-from rclpy.publisher import Publisher  # noqa: E402
-from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from ros_harness import DEADLINE, Graph, Process  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint  # noqa: E402
-from visualization_msgs.msg import MarkerArray  # noqa: E402
+from rclpy.logging import LoggingSeverity
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from ros_harness import DEADLINE, Graph, Process
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from visualization_msgs.msg import MarkerArray
 
 CONFIG = Path(__file__).parents[1] / 'config'
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -77,7 +70,6 @@ def test_after_a_slip_the_next_crank_message_is_answered(graph, slips, log, topi
     node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': 'jansen'})
     turn = graph.crank(['m_crank'])
     answers = graph.listen(MarkerArray if topic == 'm/markers' else JointState, topic, 100)
-    graph.until(lambda: node.count_subscribers('/rosout'))
     turn([0.1], answers)
     slips[topic] = 1
     turn.send([0.2])
@@ -102,7 +94,7 @@ def test_after_a_slip_of_the_worker_messages_are_answered(graph, slips, log, top
 def test_after_a_slip_the_timer_goes_on(graph, slips, log):
     heard = graph.listen(JointState, 'crank_states', 100)
     node = graph.start(CrankDriver, LEVER)
-    graph.until(lambda: heard and node.count_subscribers('/rosout'))
+    graph.until(lambda: heard)
     slips['crank_states'] = 1
     graph.until(lambda: not slips['crank_states'])
     heard.clear()
@@ -110,44 +102,60 @@ def test_after_a_slip_the_timer_goes_on(graph, slips, log):
     logged_once(graph, node, log)
 
 
-@pytest.mark.parametrize('node_class, name', [
+def slip(*_, **__):
+    raise ZeroDivisionError('slip')
+
+
+def slipping(kind):
+    """Return a kind of node that, while it `slips`, raises when it checks a scene."""
+    class Slipping(kind):
+        slips = False
+
+        def check(self, new):
+            return slip() if self.slips else super().check(new)
+
+    return Slipping
+
+
+def test_a_slip_in_one_mechanism_leaves_the_others_alone(graph, log):
+    class Slipping(Kinematics):
+        def prepare(self, new):
+            models = super().prepare(new)
+            models['a'].solve = slip
+            return models
+
+    node = graph.start(Slipping, {
+        'mechanisms': ['a', 'b'], 'a.type': 'jansen', 'b.type': 'four_bar'})
+    turn = graph.crank(['a_crank', 'b_crank'])
+    own, other, all_ = (graph.listen(JointState, topic) for topic in (
+        'a/joint_states', 'b/joint_states', 'joint_states'))
+    for answers in (other, all_):
+        assert set(turn([0.1, 0.2], answers).name) == {'b_crank', 'b_AB', 'b_QB'}
+    assert not own
+    logged_once(graph, node, log, 'crank_states')
+
+
+@pytest.mark.parametrize('kind, name', [
     (Kinematics, 'lever.dimensions.a'), (CrankDriver, 'lever.crank.speed')])
-def test_after_a_slip_parameters_can_be_set(graph, monkeypatch, log, node_class, name):
-    node = graph.start(node_class, LEVER)
-    graph.until(lambda: node.count_subscribers('/rosout'))
-    with monkeypatch.context() as context:
-        for function in ('read', 'changed'):
-            context.setattr(scene, function, slip)
-        result = graph.set(node, **{name: 81.0})
+def test_after_a_slip_parameters_can_be_set(graph, log, kind, name):
+    node = graph.start(slipping(kind), LEVER)
+    node.slips = True
+    result = graph.set(node, meanwhile=lambda: setattr(node, 'slips', False), **{name: 81.0})
     assert not result.successful and 'slip' in result.reason
     assert graph.set(node, **{name: 82.0}).successful
     assert node.get_parameter(name).value == 82.0
     logged_once(graph, node, log)
 
 
-def slip(*_, **__):
-    raise ZeroDivisionError('slip')
-
-
-@pytest.mark.parametrize('node_class', [CrankDriver, ServoInverse])
-def test_after_a_slip_the_owner_is_followed_and_nothing_is_lost(
-        graph, monkeypatch, log, node_class):
-    node = graph.start(node_class, LEVER)
-    graph.until(lambda: node.count_subscribers('/rosout'))
-    publisher = graph.node.create_publisher(ParameterEvent, 'scene_parameters', LATCHED)
-    graph.until(publisher.get_subscription_count)
-
-    def announce(**values):
-        publisher.publish(ParameterEvent(node='/kinematics', changed_parameters=[
-            Parameter(name.replace('__', '.'), value=value).to_parameter_msg()
-            for name, value in values.items()]))
-
-    with monkeypatch.context() as context:
-        for name in ('read', 'changed'):
-            context.setattr(scene, name, slip)
-        announce(mechanisms=['lever'], lever__type='slotted_lever', lever__dimensions__a=81.0)
-        graph.until(lambda: errors(log))
-    announce(lever__scale=2.0)
+@pytest.mark.parametrize('kind', [CrankDriver, ServoInverse])
+def test_after_a_slip_the_owner_is_followed_and_nothing_is_lost(graph, log, kind):
+    node = graph.start(slipping(kind), LEVER)
+    announce = graph.announcer()
+    node.slips = True
+    announce({**LEVER, 'lever.dimensions.a': 81.0})
+    graph.until(lambda: errors(log))
+    node.slips = False
+    announce({'lever.scale': 2.0})
     lever = graph.until(lambda: node.scene.mechanisms['lever'].scale == 2.0
                         and node.scene.mechanisms['lever'])
     assert lever.linkage.dimensions['a'] == 81.0
@@ -158,14 +166,17 @@ def test_after_a_slip_the_owner_is_followed_and_nothing_is_lost(
     ('servo_inverse', Service, Service.Request(lever_angle=[0.1])),
     ('inputs_for', InputsFor, InputsFor.Request(outputs=['P.x', 'P.y'], values=[0.5, 0.9]))],
     ids=['servo_inverse', 'inputs_for'])
-def test_after_a_slip_a_service_answers(graph, monkeypatch, log, service, kind, request_):
-    node = graph.start(ServoInverse, {'mechanisms': ['lever', 'five'], 'five.type': 'five_bar',
-                                      'lever.type': 'slotted_lever'})
+def test_after_a_slip_a_service_answers(graph, log, service, kind, request_):
+    class Slipping(ServoInverse):
+        slips = False
+        scene = property(lambda self: slip() if self.slips else super(Slipping, self).scene)
+
+    node = graph.start(Slipping, {
+        'mechanisms': ['lever', 'five'], 'five.type': 'five_bar', 'lever.type': 'slotted_lever'})
     client = graph.node.create_client(kind, service)
-    graph.until(lambda: node.count_subscribers('/rosout'))
-    with monkeypatch.context() as context:
-        context.setattr(ServoInverse, 'scene', property(slip))
-        answer = graph.call(client, request_)
+    node.slips = True
+    answer = graph.call(client, request_)
+    node.slips = False
     assert not answer.success and 'slip' in answer.message
     assert 'slip' not in graph.call(client, request_).message
     logged_once(graph, node, log)
@@ -185,10 +196,8 @@ def trajectory(count, **middles):
     ids=['wanted_states', 'wanted_trajectory'])
 def test_after_a_slip_the_next_command_is_given(graph, slips, log, topic, kind, answer, wanted):
     node = graph.start(ServoInverse, LEVER)
-    publisher = graph.node.create_publisher(kind, topic, 10)
-    answers = graph.listen(JointState if kind is JointState else kind, answer)
-    graph.until(lambda: publisher.get_subscription_count() and node.count_subscribers('/rosout')
-                and node.count_subscribers(answer))
+    publisher, answers = graph.publisher(kind, topic), graph.listen(kind, answer)
+    graph.until(lambda: node.count_subscribers(answer))
     slips[answer] = 1
     publisher.publish(wanted)
     graph.until(lambda: not slips[answer])
@@ -200,17 +209,6 @@ def test_after_a_slip_the_next_command_is_given(graph, slips, log, topic, kind, 
 # --- signals ---------------------------------------------------------------------------------
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM]
-
-
-@pytest.fixture
-def processes():
-    """Return a list of processes, all of which are ended."""
-    started = []
-    yield started
-    for process in started:
-        if not process.has_ended:
-            process.interrupt(signal.SIGKILL)
-            process.end()
 
 
 def cpu(process):
@@ -239,57 +237,40 @@ def ends_quietly(process, number):
     return printed
 
 
-@pytest.fixture
-def many(tmp_path):
-    """Return a scene of a thousand mechanisms."""
+@pytest.mark.nightly
+@pytest.mark.parametrize('number', SIGNALS)
+@pytest.mark.parametrize('name, publishers', [
+    ('crank_driver', 0), ('servo_inverse', 0), ('kinematics', 0), ('kinematics', 100),
+    ('scene', 0), ('scene', 100)])
+def test_a_signal_ends_the_start_of_a_thousand_mechanisms(
+        tmp_path, name, publishers, number):
     path = tmp_path / 'many.yaml'
     names = [f'm{i}' for i in range(1000)]
     path.write_text(f'/**:\n  ros__parameters:\n    mechanisms: [{", ".join(names)}]\n' + ''.join(
-        f'    {name}.type: {"slotted_lever" if i % 2 else "jansen"}\n'
-        for i, name in enumerate(names)))
-    return path
-
-
-@pytest.mark.nightly(all_but=0)
-@pytest.mark.parametrize('number', SIGNALS)
-@pytest.mark.parametrize('publishers', [
-    0, pytest.param(100, marks=pytest.mark.nightly)])
-@pytest.mark.parametrize('name', [
-    'kinematics', pytest.param('crank_driver', marks=pytest.mark.nightly),
-    pytest.param('servo_inverse', marks=pytest.mark.nightly),
-    pytest.param('scene', marks=pytest.mark.nightly)])
-def test_a_signal_ends_the_start_of_a_thousand_mechanisms(processes, many, name, publishers,
-                                                          number):
-    process = Process(name, many)
-    processes.append(process)
+        f'    {each}.type: {"slotted_lever" if i % 2 else "jansen"}\n'
+        for i, each in enumerate(names)))
     node = 'kinematics' if name == 'scene' else name
 
     def begun():
         return process.has_ended or node in graph.node.get_node_names() and publishers <= len(
             graph.node.get_publisher_names_and_types_by_node(node, '/'))
 
-    with Graph(process.domain) as graph:
-        # How many there are depends on the node.
-        if name in ('kinematics', 'scene') or publishers == 0:
-            graph.until(begun)
-            assert not process.has_ended
-            ends_quietly(process, number)
+    with Process(name, path) as process, Graph(process.domain) as graph:
+        graph.until(begun)
+        assert not process.has_ended
+        ends_quietly(process, number)
 
 
-@pytest.mark.nightly(all_but=0)
+@pytest.mark.nightly
 @pytest.mark.parametrize('number', SIGNALS)
-@pytest.mark.parametrize('name', [
-    'servo_inverse', pytest.param('scene', marks=pytest.mark.nightly)])
-def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
+@pytest.mark.parametrize('name', ['servo_inverse', 'scene'])
+def test_a_signal_ends_a_long_trajectory(tmp_path, name, number):
     path = tmp_path / 'scene.yaml'
     path.write_text('/**:\n  ros__parameters:\n    mechanisms: [m]\n    m.type: five_bar\n')
-    process = Process(name, path)
-    processes.append(process)
-    with Graph(process.domain) as graph:
+    with Process(name, path) as process, Graph(process.domain) as graph:
         graph.listen(JointTrajectory, 'servo_trajectory')
-        publisher = graph.node.create_publisher(JointTrajectory, 'wanted_trajectory', 10)
-        graph.until(lambda: publisher.get_subscription_count()
-                    and graph.node.count_publishers('servo_trajectory'))
+        publisher = graph.publisher(JointTrajectory, 'wanted_trajectory')
+        graph.until(lambda: graph.node.count_publishers('servo_trajectory'))
         before = cpu(process)
         published = -math.inf
 
@@ -302,19 +283,6 @@ def test_a_signal_ends_a_long_trajectory(processes, tmp_path, name, number):
             return cpu(process) > before + 0.2
 
         graph.until(works)
-        ends_quietly(process, number)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('number', SIGNALS)
-def test_a_signal_ends_a_node_that_compiles(processes, number):
-    # Only the legs of a walker are compiled.
-    process = Process('kinematics', CONFIG / 'strandbeest.yaml')
-    processes.append(process)
-    with Graph(process.domain) as graph:
-        graph.listen(MarkerArray, 'strandbeest/markers')
-        graph.crank(['strandbeest_crank'])(
-            [0.1], graph.listen(JointState, 'strandbeest/joint_states'))
         ends_quietly(process, number)
 
 

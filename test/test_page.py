@@ -9,24 +9,19 @@ from pathlib import Path
 import re
 import time
 
+from browser import until
+from linkage_ros import mechanisms, scene
+from linkage_ros.c_code import header
+from linkage_ros.nodes.crank_driver import CrankDriver
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.robot_model import urdf
+from linkage_ros.web import curves
+from linkage_ros.web.viewer import Viewer
 import numpy as np
+from PIL import Image
 import pytest
-
-pytest.importorskip('aiohttp')
-pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
-
-from browser import until  # noqa: E402
-from linkage_ros import mechanisms, scene  # noqa: E402
-from linkage_ros.c_code import header  # noqa: E402
-from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.robot_model import urdf  # noqa: E402
-from linkage_ros.web import curves  # noqa: E402
-from linkage_ros.web.viewer import Viewer  # noqa: E402
-from PIL import Image  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from viewer_harness import (  # noqa: E402
+from sensor_msgs.msg import JointState
+from viewer_harness import (
     BLUE,
     coloured,
     example,
@@ -42,7 +37,7 @@ from viewer_harness import (  # noqa: E402
     spoilt,
     walker,
 )
-from visualization_msgs.msg import MarkerArray  # noqa: E402
+from visualization_msgs.msg import MarkerArray
 
 pytestmark = needs_browser
 STILL_LEVER = {**LEVER, 'lever.crank.speed': 0.0}

@@ -6,16 +6,14 @@
 from pathlib import Path
 import re
 
+from linkage_ros import scene
+from linkage_ros.scene.parameter_file import overrides, sections
 import numpy as np
 import pytest
-
-rclpy = pytest.importorskip('rclpy')
-yaml = pytest.importorskip('yaml')
-
-from linkage_ros import scene  # noqa: E402
-from linkage_ros.scene.parameter_file import overrides, sections  # noqa: E402
-from rcl_interfaces.msg import ParameterDescriptor  # noqa: E402
-from rclpy.node import Node  # noqa: E402
+from rcl_interfaces.msg import ParameterDescriptor
+import rclpy
+from rclpy.node import Node
+import yaml
 
 ROOT = Path(__file__).parents[1]
 # `{b:1}` is left out: libyaml reads it one way or another, by its version.

@@ -9,10 +9,7 @@ from pathlib import Path
 import re
 
 import pytest
-
-pytest.importorskip('rclpy')
-
-from rclpy import client, clock, executors, node, publisher, service, subscription, timer  # noqa: E402
+from rclpy import client, clock, executors, node, publisher, service, subscription, timer
 
 PACKAGE = Path(__file__).parents[1] / 'linkage_ros'
 SOURCES = [path for room in ('nodes', 'web') for path in sorted((PACKAGE / room).glob('*.py'))]

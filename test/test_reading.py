@@ -8,16 +8,12 @@ import math
 import struct
 from types import FunctionType, ModuleType
 
+from linkage_ros.nodes import message_layout
+from linkage_ros.nodes.message_layout import MIN_BYTES, Unreadable
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
-from linkage_ros.nodes import joint_state_reader, message_layout  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.message_layout import MIN_BYTES, Unreadable  # noqa: E402
-from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import JointState
 
 
 def message(names, velocities=True, effort=False, frame='', seed=0):
@@ -33,26 +29,23 @@ def message(names, velocities=True, effort=False, frame='', seed=0):
 
 
 @pytest.fixture
-def reader(monkeypatch):
+def reader():
     """Return a reader whose `looked` counts the messages that it had to deserialise."""
-    made = joint_state_reader.Reader(lambda message: message.name)
-    made.looked = 0
-
-    def counted(*args):
+    def interpret(message):
         made.looked += 1
-        return message_layout.deserialized(*args)
+        return message.name
 
-    monkeypatch.setattr(joint_state_reader, 'deserialized', counted)
+    made = message_layout.Reader(interpret)
+    made.looked = 0
     return made
 
 
 @pytest.fixture
 def check(graph, reader):
     """Return a function that sends a message, reads what arrives, and compares."""
-    publisher = graph.node.create_publisher(JointState, 'sent', 10)
     arrived = []
     graph.node.create_subscription(JointState, 'sent', arrived.append, 10, raw=True)
-    graph.until(publisher.get_subscription_count)
+    publisher = graph.publisher(JointState, 'sent')
 
     def check(sent):
         arrived.clear()
@@ -80,15 +73,6 @@ def test_a_sender_is_hardly_ever_deserialised(reader, check, names, velocities, 
     assert reader.looked == 1
 
 
-def test_what_differs_in_more_than_numbers_is_deserialised(reader, check):
-    check(message(['a', 'b']))
-    check(message(['a', 'c']))
-    check(message(['a', 'b'], frame='x'))
-    check(message(['a', 'b'], velocities=False))
-    check(message(['a', 'b', 'c']))
-    assert reader.looked == 5
-
-
 def big_endian(made):
     """Return joint states as a machine of the other byte order writes them."""
     text = bytearray(b'\0\0\0\0')
@@ -110,20 +94,19 @@ def big_endian(made):
     return bytes(text)
 
 
-def test_bytes_of_another_order_are_always_deserialised(reader):
+@pytest.mark.parametrize('names', [['a', 'bc'], []])
+def test_bytes_of_another_order_are_always_deserialised(reader, names):
     for seed in range(4):
-        sent = message(['a', 'bc'], effort=True, frame='x', seed=seed)
+        sent = message(names, effort=True, frame='x', seed=seed)
         compare(reader, big_endian(sent), sent)
     assert reader.looked == 4
 
 
-@pytest.mark.parametrize('senders', [1, 8, 9, 64, 256])
-def test_any_number_of_senders_is_learnt(reader, senders):
-    texts = [serialize_message(message([f'robot{i}_crank'])) for i in range(senders)]
-    for _ in range(10):
-        for text in texts:
-            reader.read(text)
-    assert reader.looked == senders
+def test_a_sender_whose_first_number_is_none_is_learnt(reader):
+    for numbers in ([math.nan, -0.0], [1.0, math.inf]):
+        sent = JointState(name=['a', 'b'], position=numbers)
+        assert repr(reader.read(serialize_message(sent))[1][1:]) == repr((*numbers,))
+    assert reader.looked == 1
 
 
 def held(owner):
@@ -137,44 +120,19 @@ def held(owner):
     return len(found)
 
 
-def test_what_is_remembered_is_bounded_whatever_comes(reader, monkeypatch):
-    monkeypatch.setattr(joint_state_reader, 'MAX_SENDERS', 32)
-
+def test_what_is_remembered_is_bounded_whatever_comes(reader):
     def after(senders):
         for i in senders:
-            text = serialize_message(message(['a' * (i % 7), f'{i:09}'][i % 2:]))
+            text = serialize_message(message([f'{i:09}']))
             reader.read(text)
             reader.read(text)
+        assert reader.looked == senders[-1] + 1
         return held(reader)
 
     first = held(reader)
-    many = after(range(500))
-    assert first + 100 < many
-    assert after(range(500, 1000)) < many + 100  # at least 500 if each of them left something
-
-
-def test_a_sender_that_cannot_be_learnt_excludes_itself_alone(reader):
-    odd, good = message(['a']), message(['b', 'c'])
-    for _ in range(10):
-        compare(reader, big_endian(odd), odd)
-        compare(reader, serialize_message(good), good)
-    assert reader.looked == 10 + 1
-
-
-def test_no_bytes_at_all_are_of_no_sender(reader):
-    for text in (big_endian(message(['a'])), serialize_message(message(['b']))):
-        reader.read(text)
-        with pytest.raises(Unreadable):
-            reader.read(b'')
-
-
-def test_a_name_that_is_no_text_excludes_its_sender_alone(reader):
-    sent = message(['a_crank', 'b'])
-    good, bad = (serialize_message(sent), serialize_message(sent).replace(b'a_c', b'\xff\xfec'))
-    for _ in range(5):
-        compare(reader, good, sent)
-        assert reader.read(bad)[0] == deserialize_message(bad, JointState).name
-    assert reader.looked == 2
+    full = after(range(message_layout.MAX_SENDERS))
+    assert first + message_layout.MAX_SENDERS < full
+    assert after(range(message_layout.MAX_SENDERS, 1000)) <= full
 
 
 def outcome(said, *args):
@@ -259,12 +217,3 @@ def test_a_name_with_odd_ends_stands_for_no_other(reader, name):
     text = base.replace(b'abc\0', name)
     for tried in (text, text, text, base, base, base, text.replace(b'\4\0\0\0', b'\2\0\0\0')):
         assert outcome(reader.read, tried) == outcome(plainly, tried)
-
-
-def test_the_node_hardly_ever_deserialises_a_message_of_a_sender(graph, reader):
-    graph.start(Kinematics)
-    turn = graph.crank(['jansen_crank'])
-    heard = graph.listen(JointState, 'jansen/joint_states')
-    for theta in range(20):
-        assert turn([float(theta)], heard, [1.0]).position[0] == theta
-    assert reader.looked == 1

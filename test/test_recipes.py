@@ -78,13 +78,3 @@ def test_a_recipe_can_be_followed_to_the_letter(tmp_path, title):
         name for name in names if MADE.fullmatch(name)])
     for step in steps(title):
         follow(copy, *step)
-
-
-def test_every_step_of_a_recipe_names_a_file_that_is_there():
-    text = PAGE.read_text().partition('## Recipes\n')[2]
-    new = {f'`{code}`' for code in ('linkage_ros/mechanisms/roberts.py', 'config/roberts.yaml')}
-    named = set(re.findall(r'`[\w/]+\.\w+`', re.sub(r' *```.*?```', '', text, flags=re.DOTALL)))
-    assert new < named
-    for name in sorted(named - new):
-        path = name.strip('`')
-        assert any((ROOT / folder / path).exists() for folder in ('', 'linkage_ros')), path

@@ -156,13 +156,6 @@ def files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def test_the_scene_may_be_an_argument(capsys):
-    assert main([str(CATALOGUE), '--mechanism', 'jansen', 'water_drop']) == 0
-    found = scene.load(str(CATALOGUE))
-    mechanisms = [found.mechanisms[name] for name in ('jansen', 'water_drop')]
-    assert capsys.readouterr().out == urdf.describe(mechanisms, found.frame_id) + '\n'
-
-
 def test_arguments_may_follow_those_for_ros(capsys):
     assert main(['--ros-args', '-p', 'jansen.scale:=0.5', '--', '--mechanism', 'jansen']) == 0
     assert '<robot name="jansen">' in capsys.readouterr().out

@@ -1,104 +1,17 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""An ankle of two rods in the nodes: hinges by the robot's names, markers in space."""
+"""An ankle of two rods in the nodes: its rods are closed in the robot's own model."""
 
 import math
 from pathlib import Path
 
+from linkage_ros.nodes.kinematics import Kinematics
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
-
-from linkage_interfaces.srv import InputsFor  # noqa: E402
-from linkage_ros import mechanisms  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from test_command_stream import Stream  # noqa: E402
-from test_rods import G1  # noqa: E402
-from visualization_msgs.msg import MarkerArray  # noqa: E402
+from sensor_msgs.msg import JointState
 
 EXAMPLES = Path(__file__).parents[1] / 'examples'
-SCENE = {'mechanisms': ['ankle'], 'ankle.type': 'rods', 'ankle.joints': list(G1),
-         'ankle.joint_names': ['pitch=left_ankle_pitch', 'roll=-left_ankle_roll+0.1'],
-         'ankle.loads': ['pitch=12.0', 'roll=-3.0'],
-         'ankle.right.source': 'motor_a', 'ankle.left.source': 'motor_b'}
-
-
-def test_the_hinges_of_an_ankle_are_published_with_velocities_and_the_motors_efforts(graph):
-    graph.start(Kinematics, SCENE)
-    turn, heard = graph.crank(['motor_a', 'motor_b']), graph.listen(
-        JointState, 'ankle/joint_states')
-    linkage = mechanisms.create('rods', joints=G1)
-    for motors in ((0.0, 0.0), (0.1, -0.05), (-0.2, 0.1)):
-        message = turn(list(motors), heard, [1.0, 2.0])
-        position, velocity, effort = (dict(zip(message.name, values)) for values in (
-            message.position, message.velocity, message.effort))
-        angles = linkage.joint_angles(motors, ['pitch', 'roll'])
-        rates = [linkage.joint_rates(motors, ['pitch', 'roll'], by) for by in (0, 1)]
-        assert math.isclose(position['left_ankle_pitch'], angles['pitch'], abs_tol=1e-15)
-        assert math.isclose(position['left_ankle_roll'], 0.1 - angles['roll'], abs_tol=1e-15)
-        assert math.isclose(velocity['left_ankle_roll'], -sum(
-            rate['roll'] * speed for rate, speed in zip(rates, (1.0, 2.0))), rel_tol=1e-12)
-        held = linkage.effort(motors, {'pitch': 12.0, 'roll': -3.0})
-        assert np.allclose([effort['ankle_right'], effort['ankle_left']], held, rtol=1e-13)
-
-
-def test_markers_are_in_space(graph):
-    graph.start(Kinematics, SCENE)
-    turn, heard = graph.crank(['motor_a', 'motor_b']), graph.listen(MarkerArray, 'ankle/markers')
-    lines, joints = turn([0.1, -0.05], heard).markers
-    linkage = mechanisms.create('rods', joints=G1)
-    place = linkage.solve((0.1, -0.05))
-    np.testing.assert_allclose([(p.x, p.y, p.z) for p in joints.points],
-                               list(place.values()), atol=1e-15)
-    ends = np.array([(p.x, p.y, p.z) for p in lines.points]).reshape(-1, 2, 3)
-    lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
-    np.testing.assert_allclose(lengths, list(linkage.bar_lengths.values()), atol=1e-15)
-
-
-@pytest.mark.nightly
-def test_a_stream_of_pitch_and_roll_becomes_commands_of_the_motors(graph, capfd):
-    stream, linkage = Stream(graph, SCENE), mechanisms.create('rods', joints=G1)
-    drawn = linkage.driven_by('pitch', 'roll')
-    names, motors = ['left_ankle_pitch', 'left_ankle_roll'], ('right', 'left')
-    for pitch, roll in ((0.0, 0.0), (-0.4, 0.1), (0.3, -0.2), (0.4, 0.1), (-0.8, 0.0)):
-        command = stream.want(names, [pitch, 0.1 - roll], [1.0, -2.0])
-        angles = drawn.joint_angles((pitch, roll), motors)
-        rates = [drawn.joint_rates((pitch, roll), motors, by) for by in (0, 1)]
-        for source, motor in zip(('motor_a', 'motor_b'), motors):
-            position, velocity = command[source]
-            assert position == pytest.approx(angles[motor], abs=1e-13)
-            assert velocity == pytest.approx(
-                1.0 * rates[0][motor] + 2.0 * rates[1][motor], rel=1e-9)
-    last = {source: (position, 0.0) for source, (position, _) in command.items()}
-    for pitch, roll in ((0.6, 0.05), (0.0, 0.3), (math.nan, 0.0)):
-        assert stream.want(names, [pitch, 0.1 - roll], [1.0, 1.0]) == last
-    assert 'cannot be 0.6, 0.05: pitch, roll at 0.6, 0.05 is outside the reach' \
-        in capfd.readouterr().err
-
-
-def test_a_service_gives_the_motors_of_a_pose_in_the_turn_that_is_nearest(graph):
-    node, linkage = graph.start(ServoInverse, SCENE), mechanisms.create('rods', joints=G1)
-    client = graph.node.create_client(InputsFor, 'inputs_for')
-    pose = {'outputs': ['pitch', 'roll'], 'values': [-0.1, 0.05]}
-    response = graph.call(client, InputsFor.Request(**pose))
-    assert response.success and response.names == ['motor_a', 'motor_b']
-    answers = np.reshape(response.positions, (-1, 2))
-    assert len(answers) == len(response.modes) == 1 and not any(response.singular)
-    for answer in answers:
-        back = linkage.joint_angles(answer, ['pitch', 'roll'])
-        np.testing.assert_allclose([*back.values()], pose['values'], atol=1e-14)
-        near = (answer + [0.3 + 2.0 * math.pi, -0.3]).tolist()
-        first = node.answer_inputs_for(InputsFor.Request(near=near, **pose), InputsFor.Response())
-        np.testing.assert_allclose(first.positions[:2], answer + [2.0 * math.pi, 0.0], atol=1e-12)
-    for values in ((0.6, 0.0), (0.0, -0.3)):
-        refused = graph.call(client, InputsFor.Request(**{**pose, 'values': values}))
-        assert not refused.success and not refused.positions
-        assert 'is outside the reach' in refused.message
 
 
 def test_the_example_s_rods_are_closed_in_its_own_urdf(graph):

@@ -6,48 +6,45 @@
 import math
 import re
 
-from linkage_ros import scene
 from linkage_ros.robot_files import cli, closing, readers
-from linkage_ros.robot_files.cli import main as from_robot
 import numpy as np
 import pytest
+from robots import imported, of_text, printed, published, said, words as text
 from test_robot_files import compared
 from truth import rods
 
 pytest.importorskip('mujoco')
+# Limits of pitch and roll.
+NEAR = [-0.15, -0.12], [0.15, 0.12]
 LIGHT = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
-
-
-def text(vector):
-    return ' '.join(map(repr, map(float, vector)))
 
 
 def less(one, other):
     return text(np.subtract(one, other))
 
 
-def mjcf(ankle, limits, motors=('l', 'r'), pins=None):
+def mjcf(ankle, limits, pins=None, ref=0.0):
     """
     Return an ankle as MJCF; its rods hang on balls, and their eyes are tied to the foot.
 
-    With `pins`, they hang on hinges about these axes of each rod.
+    With `pins`, they hang on hinges about these axes of each rod. `ref` is where its motors are.
     """
     held = ['<joint type="ball" name="ball {i}"/>' if pins is None else ''.join(
-        f'<joint name="pin {i} {k}" axis="{text(axis)}"/>' for k, axis in enumerate(pins[i]))
-        for i in (0, 1)]
+        f'<joint name="pin {i} {k}" axis="{text(axis)}" range="-2 2"/>'
+        for k, axis in enumerate(pins[i])) for i in (0, 1)]
     legs = ''.join(
         f'<body name="crank {i}" pos="{text(ankle.motors[i])}"><joint name="{name}" '
-        f'axis="{text(ankle.motor_axes[i])}"/>{LIGHT}<body name="rod {i}" '
+        f'axis="{text(ankle.motor_axes[i])}" ref="{ref}"/>{LIGHT}<body name="rod {i}" '
         f'pos="{less(ankle.pivots[i], ankle.motors[i])}">{held[i].format(i=i)}'
         f'{LIGHT}<site name="eye {i}" pos="{less(ankle.ends[i], ankle.pivots[i])}"/></body></body>'
-        for i, name in enumerate(motors))
+        for i, name in enumerate('lr'))
     eyes = ''.join(f'<site name="pin {i}" pos="{less(ankle.ends[i], ankle.second)}"/>'
                    for i in (0, 1))
     ranges = [f'range="{low!r} {high!r}"' if limits is not None else ''
               for low, high in (np.transpose(limits).tolist() if limits is not None
                                 else ((0, 0), (0, 0)))]
     ties = ''.join(f'<connect site1="eye {i}" site2="pin {i}"/>' for i in (0, 1))
-    drives = ''.join(f'<motor joint="{name}"/>' for name in motors)
+    drives = ''.join(f'<motor joint="{name}"/>' for name in 'lr')
     return (
         '<mujoco><compiler angle="radian" autolimits="true"/><worldbody><body name="shin">'
         f'{LIGHT}<joint name="knee" axis="0 1 0"/><body name="cross" pos="{text(ankle.first)}">'
@@ -55,16 +52,6 @@ def mjcf(ankle, limits, motors=('l', 'r'), pins=None):
         f'<body name="foot" pos="{less(ankle.second, ankle.first)}"><joint name="roll" '
         f'axis="{text(ankle.second_axis)}" {ranges[1]}/>{LIGHT}{eyes}</body></body>{legs}</body>'
         f'</worldbody><equality>{ties}</equality><actuator>{drives}</actuator></mujoco>')
-
-
-def imported(folder, ankle, limits, capsys):
-    """Return what from_robot makes of an ankle, and what it says."""
-    (folder / 'robot.xml').write_text(mjcf(ankle, limits))
-    assert from_robot([str(folder / 'robot.xml')]) == 0
-    said = capsys.readouterr()
-    (folder / 'robot.yaml').write_text(said.out)
-    (mechanism,) = scene.load(folder / 'robot.yaml').mechanisms.values()
-    return mechanism, said.err
 
 
 def turning(seed):
@@ -76,14 +63,25 @@ def turning(seed):
             return ankle
 
 
+def check_rods(ankle, mechanism):
+    """Check that a foot and a joint are published with which the rods keep their lengths."""
+    assert {called.name for called in mechanism.joints.values() if called.published} == {
+        'pitch', 'roll'}
+    motors = np.random.default_rng(3).uniform(-0.1, 0.1, (2, 40))
+    found = np.stack(list(mechanism.linkage.joint_angles(motors, ['pitch', 'roll']).values()))
+    there = np.isfinite(found[0])
+    assert there.sum() > 10
+    assert np.abs(np.array(rods.gaps(ankle, motors, *found))[:, there]).max() < 1e-15
+
+
 @pytest.mark.parametrize('seed', [1, 2])
-def test_an_ankle_is_imported_with_the_limits_of_its_file(tmp_path, capsys, seed):
+def test_an_ankle_is_imported_with_the_limits_of_its_file(tmp_path, seed):
     ankle, half = turning(seed), np.array([0.15, 0.12])
-    mechanism, said = imported(tmp_path, ankle, (-half, half), capsys)
-    assert 'in 240 poses of the robot' in said
-    assert 'Limits' not in said
-    names = {called.name for called in mechanism.joints.values() if called.published}
-    assert names == {'pitch', 'roll'} and mechanism.frame_id == 'shin'
+    file = of_text(tmp_path / 'robot.xml', mjcf(ankle, (-half, half)))
+    _, out, err = printed(file)
+    assert 'in 240 poses of the robot' in err and 'Limits' not in err
+    mechanism, = imported(file)
+    assert mechanism.frame_id == 'shin'
     assert {drive.source for drive in mechanism.inputs.values()} == {'l', 'r'}
     axes = [axis / np.linalg.norm(axis) for axis in (
         ankle.first_axis, ankle.second_axis, *ankle.motor_axes)]
@@ -93,23 +91,17 @@ def test_an_ankle_is_imported_with_the_limits_of_its_file(tmp_path, capsys, seed
                for name, place, axis in zip('lr', ankle.motors, axes[2:])),
              *(f'ball_{i} rod {name} {text(pivot)} roll {text(end)} length {math.dist(pivot, end)}'
                for i, (name, pivot, end) in enumerate(zip('lr', ankle.pivots, ankle.ends)))]
-    given = ' '.join((tmp_path / 'robot.yaml').read_text().split()).partition('joints: - ')[2]
+    given = ' '.join(out.split()).partition('joints: - ')[2]
     for word, there in zip(' - '.join(lines).split(), given.split()):
         assert there == word or float(there) == pytest.approx(float(word), abs=1e-12)
-    motors = np.random.default_rng(3).uniform(-0.1, 0.1, (2, 40))
-    found = np.stack(list(mechanism.linkage.joint_angles(motors, ['pitch', 'roll']).values()))
-    there = np.isfinite(found[0])
-    assert there.sum() > 10
-    gaps = rods.gaps(ankle, motors, *found)
-    assert np.abs(np.array(gaps)[:, there]).max() < 1e-15
+    check_rods(ankle, mechanism)
 
 
 @pytest.fixture(scope='module')
 def ankle_of_a_robot(tmp_path_factory):
     """Return a robot with an ankle, and the scene that it is described by."""
-    file = tmp_path_factory.mktemp('ankle') / 'robot.xml'
-    file.write_text(mjcf(turning(1), ([-0.15, -0.12], [0.15, 0.12])))
-    robot = closing.closed(readers.read(str(file))).robot
+    robot = closing.closed(readers.read(str(of_text(
+        tmp_path_factory.mktemp('ankle') / 'robot.xml', mjcf(turning(1), NEAR))))).robot
     return robot, cli.described(robot)[0]
 
 
@@ -130,23 +122,15 @@ def test_an_ankle_that_differs_from_its_robot_is_refused(ankle_of_a_robot, old, 
 
 
 @pytest.mark.parametrize('seed', [1, 3])
-def test_an_ankle_on_a_cross_is_imported(tmp_path, capsys, seed):
+def test_an_ankle_on_a_cross_is_imported(tmp_path, seed):
     # As most are: both hinges of the foot cross in a point, and are no ball all the same.
     ankle = turning(seed)
     ankle = ankle._replace(second=ankle.first)
-    mechanism, _ = imported(tmp_path, ankle, ([-0.15, -0.12], [0.15, 0.12]), capsys)
-    assert {called.name for called in mechanism.joints.values() if called.published} == {
-        'pitch', 'roll'}
-    motors = np.random.default_rng(4).uniform(-0.1, 0.1, (2, 40))
-    found = np.stack(list(mechanism.linkage.joint_angles(motors, ['pitch', 'roll']).values()))
-    there = np.isfinite(found[0])
-    assert there.sum() > 10
-    assert np.abs(np.array(rods.gaps(ankle, motors, *found))[:, there]).max() < 1e-15
+    check_rods(ankle, *imported(of_text(tmp_path / 'robot.xml', mjcf(ankle, NEAR))))
 
 
-@pytest.mark.parametrize('seed', [1, 2])
-@pytest.mark.parametrize('count', [2, 3])
-def test_hinges_of_rods_are_published(tmp_path, capsys, seed, count):
+@pytest.mark.parametrize('seed, count', [(1, 2), (2, 3)])
+def test_hinges_of_rods_are_published(tmp_path, seed, count):
     # Two hinges across the rod; a third one along it stays.
     mujoco, (ankle, rng) = pytest.importorskip('mujoco'), (turning(seed), np.random.default_rng(9))
     pins = []
@@ -155,25 +139,19 @@ def test_hinges_of_rods_are_published(tmp_path, capsys, seed, count):
         first = np.cross(rng.normal(size=3), way)
         # The second leans, as it may.
         pins.append([first, np.cross(way, first) / np.linalg.norm(way) + 0.2 * first, way][:count])
-    file = tmp_path / 'robot.xml'
-    file.write_text(mjcf(ankle, ([-0.15, -0.12], [0.15, 0.12]), pins=pins))
-    assert from_robot([str(file)]) == 0
-    out, said = capsys.readouterr()
-    assert 'Not published' not in said and ('pin 1 2=0' in out) == (count == 3)
-    (tmp_path / 'robot.yaml').write_text(out)
-    (mechanism,) = scene.load(tmp_path / 'robot.yaml').mechanisms.values()
-    names = {link: called for link, called in mechanism.joints.items() if called.published}
-    assert {called.name for called in names.values()} == {
-        'pitch', 'roll', *(f'pin {i} {k}' for i in (0, 1) for k in (0, 1))}
+    file = of_text(tmp_path / 'robot.xml', mjcf(ankle, NEAR, pins, 0.3))
+    _, out, err = printed(file)
+    assert 'Not published' not in err and ('pin 1 2=0' in out) == (count == 3)
+    assert out.count(' within ') == 2
+    mechanism, = imported(file)
     model = mujoco.MjModel.from_xml_path(str(file))
     data, closed = mujoco.MjData(model), 0
-    for values in np.random.default_rng(3).uniform(-0.1, 0.1, (30, 2)):
-        angles = mechanism.linkage.joint_angles(values)
-        found = {called.name: float(called.of(angles[link])) for link, called in names.items()}
+    for left, right in np.random.default_rng(3).uniform(0.2, 0.4, (30, 2)):
+        found = published(mechanism, l=left, r=right)
+        assert found.keys() == {'l', 'r', 'pitch', 'roll', *(
+            f'pin {i} {k}' for i in (0, 1) for k in (0, 1))}
         if np.isnan([*found.values()]).any():
             continue
-        for (drive, value) in zip(mechanism.inputs.values(), values):
-            data.joint(drive.source).qpos = value
         for name, value in found.items():
             data.joint(name).qpos = value
         mujoco.mj_kinematics(model, data)
@@ -184,10 +162,20 @@ def test_hinges_of_rods_are_published(tmp_path, capsys, seed, count):
     assert closed > 8
 
 
-def test_of_a_rod_on_three_hinges_and_two_the_three_do_not_stay(tmp_path, capsys):
+def test_hinges_of_which_the_first_is_along_a_rod_are_not_published(tmp_path):
+    ankle, pins = turning(1), []
+    for pivot, end in zip(ankle.pivots, ankle.ends):
+        way = np.subtract(end, pivot)
+        pins.append([way, across := np.cross(way, [1.0, 0.2, 0.1]), np.cross(way, across)])
+    file = of_text(tmp_path / 'robot.xml', mjcf(ankle, NEAR, pins))
+    assert 'Not published: pin 0 0, pin 0 1, pin 0 2, pin 1 0, pin 1 1, pin 1 2: ' in said(file)
+    check_rods(ankle, *imported(file))
+
+
+def test_of_a_rod_on_three_hinges_and_two_the_three_do_not_stay(tmp_path):
     # Three hinges at one end and two at the other all move: none of the three stays.
-    ankle, pins, file = turning(1), [], tmp_path / 'robot.xml'
-    written = mjcf(ankle, ([-0.15, -0.12], [0.15, 0.12]), pins=[np.eye(3)] * 2)
+    ankle = turning(1)
+    written = mjcf(ankle, NEAR, [np.eye(3)] * 2)
     for i, end in enumerate(ankle.ends):
         first = np.cross(np.subtract(end, ankle.pivots[i]), [1.0, 0.2, 0.1])
         second = np.cross(np.subtract(end, ankle.pivots[i]), first)
@@ -199,57 +187,46 @@ def test_of_a_rod_on_three_hinges_and_two_the_three_do_not_stay(tmp_path, capsys
         written = written.replace(site, f'<body name="eye {i}" pos="{less(end, ankle.second)}">'
                                   f'{pins}{LIGHT}</body>').replace(
             tie, f'<weld body1="rod {i}" body2="eye {i}"/>')
-    file.write_text(written)
-    assert from_robot([str(file)]) == 0
-    out, said = capsys.readouterr()
-    assert 'in 240 poses' in said and 'Left out' not in said
-    assert 'Not published: pin 0 0, pin 0 1, pin 0 2, pin 1 0, pin 1 1, pin 1 2: ' in said
+    _, out, err = printed(of_text(tmp_path / 'robot.xml', written))
+    assert 'in 240 poses' in err and 'Left out' not in err
+    assert 'Not published: pin 0 0, pin 0 1, pin 0 2, pin 1 0, pin 1 1, pin 1 2: ' in err
     assert all(f'="eye {i} {k}"' in out for i in (0, 1) for k in (0, 1))
     assert '="pin' not in out and 'hold:=' not in out
 
 
-@pytest.mark.parametrize('left, right, sweep', [
-    ('-0.1 0.08', '0.02 0.1', (0.02, 0.1)), ('-0.1 0.08', '-inf 0.02', None)])
-def test_limits_of_its_motors_are_sweeps(tmp_path, capsys, left, right, sweep):
-    ankle, file = turning(1), tmp_path / 'robot.xml'
-    written = mjcf(ankle, ([-0.15, -0.12], [0.15, 0.12]))
-    for name, ends in ('l', left), ('r', right):
+def limited(folder, seed, limits, **motors):
+    """Return the inputs of an ankle, by source, whose motors have limits."""
+    written = mjcf(turning(seed), limits)
+    for name, ends in motors.items():
         joint = f'<joint name="{name}" '
         written = written.replace(joint, f'{joint}limited="true" range="{ends}" ')
-    file.write_text(written)
-    assert from_robot([str(file)]) == 0
-    file.with_suffix('.yaml').write_text(capsys.readouterr().out)
-    (mechanism,) = scene.load(file.with_suffix('.yaml')).mechanisms.values()
-    drives = {drive.source: drive for drive in mechanism.inputs.values()}
-    if sweep:
-        assert drives['l'].ends == pytest.approx((-0.1, 0.08))
-        assert drives['r'].ends == pytest.approx(sweep) and drives['r'].start == sweep[0]
-    else:
-        assert drives['r'].ends[1] == 0.02 and drives['r'].start == 0.0
+    mechanism, = imported(of_text(folder / 'robot.xml', written))
+    return mechanism, {drive.source: drive for drive in mechanism.inputs.values()}
+
+
+def test_limits_of_its_motors_are_sweeps(tmp_path):
+    _, drives = limited(tmp_path, 1, NEAR, l='-0.1 0.08', r='0.02 0.1')
+    assert drives['l'].ends == pytest.approx((-0.1, 0.08))
+    assert drives['r'].ends == pytest.approx((0.02, 0.1))
+    _, drives = limited(tmp_path, 1, NEAR, l='-0.1 0.08', r='-inf 0.02')
+    assert drives['r'].ends[1] == 0.02
 
 
 @pytest.mark.parametrize('seed', [1, 2])
-@pytest.mark.parametrize('turn', ['', 'limited="true" range="-1.5 1.5"'])
-def test_the_sweeps_of_an_ankle_s_motors_are_in_its_window(tmp_path, capsys, seed, turn):
-    file = tmp_path / 'robot.xml'
-    file.write_text(mjcf(turning(seed), ([-0.5, -0.3], [0.4, 0.3])).replace(
-        '<joint name="l" ', f'<joint name="l" {turn} '))
-    assert from_robot([str(file)]) == 0
-    file.with_suffix('.yaml').write_text(capsys.readouterr().out)
-    (mechanism,) = scene.load(file.with_suffix('.yaml')).mechanisms.values()
-    values = np.meshgrid(*(np.linspace(*drive.ends, 50) for drive in mechanism.inputs.values()))
-    assert min(drive.ends[1] - drive.ends[0] for drive in mechanism.inputs.values()) > 0.1
+@pytest.mark.parametrize('motors', [{}, {'l': '-1.5 1.5'}], ids=['', 'limited'])
+def test_the_sweeps_of_an_ankle_s_motors_are_in_its_window(tmp_path, seed, motors):
+    mechanism, drives = limited(tmp_path, seed, ([-0.5, -0.3], [0.4, 0.3]), **motors)
+    ends = [drive.ends for drive in drives.values()]
+    assert np.ptp(ends, axis=1).min() > 0.1
+    values = np.meshgrid(*(np.linspace(*each, 50) for each in ends))
     assert np.isfinite(list(mechanism.linkage.joint_angles(values).values())).all()
 
 
-def test_a_foot_without_one_end_is_said_to_have_none(tmp_path, capsys):
-    _, said = imported(tmp_path, turning(1), ([-math.inf, -0.12], [0.15, 0.12]), capsys)
-    assert 'Left out: the limits of pitch, from -inf to 0.15: it has no end there.' in said
-
-
-@pytest.mark.nightly
-def test_without_limits_the_largest_are_taken_and_said(tmp_path, capsys):
-    mechanism, said = imported(tmp_path, turning(4), None, capsys)
-    assert 'these are the largest proved to have one pose at most: pitch from -' in said
-    assert all(math.isfinite(end) for held in mechanism.linkage.windows()
+@pytest.mark.nightly(all_but=1)
+@pytest.mark.parametrize('seed, limits', [(1, ([-math.inf, -0.12], [0.15, 0.12])), (4, None)])
+def test_without_an_end_the_largest_limits_are_taken_and_said(tmp_path, seed, limits):
+    file = of_text(tmp_path / 'robot.xml', mjcf(turning(seed), limits))
+    assert 'Limits: both hinges need limits; these are the largest proved to have one pose at ' \
+        'most: pitch from -' in said(file)
+    assert all(math.isfinite(end) for held in imported(file)[0].linkage.windows()
                for ends in held.limits for end in ends)

@@ -6,17 +6,17 @@
 from contextlib import suppress
 from pathlib import Path
 
-from linkage_ros import mechanisms, scene
+from linkage_ros import scene
 from linkage_ros.robot_files import readers
 from linkage_ros.robot_model import bodies, mjcf, sdf, urdf
 from linkage_ros.robot_model.bodies import assembled
 from linkage_ros.robot_model.shapes import BALL, Piece
 import numpy as np
 import pytest
-from test_robot_files import random_urdf, ROBOTS
+from robots import ROBOTS
+from test_robot_files import random_linkage
 from test_robot_model import turned
 from test_urdf import ARM
-from truth import random_linkages
 
 CONFIGS = sorted(Path(__file__).parents[1].glob('config/*.yaml'))
 FORMATS = {'urdf': urdf.write, 'sdf': sdf.write, 'mjcf': mjcf.write}
@@ -30,7 +30,7 @@ def check_read(model, form, folder):
     frames, stands = {model.root: np.eye(4)}, []
     for part in model.parts:
         stands.append(frames[part.base] @ turned(*part.pose) if part.base else np.eye(4))
-        frames.update((name, stands[-1] @ frame) for name, frame in part.robot.frames.items())
+        frames.update((name, stands[-1] @ frame) for name, frame in part.frames.items())
     assert read.root == root and {*frames} - {model.root} <= read.frames.keys()
     size = max(1e-3, *(np.abs(frame[:3, 3]).max() for frame in frames.values()))
     for name, frame in read.frames.items():
@@ -40,11 +40,11 @@ def check_read(model, form, folder):
             assert frame[:3, 3] == pytest.approx(frames[name][:3, 3], abs=1e-12 * size)
     joints = {joint.name: joint for joint in read.joints}
     for part, base in zip(model.parts, stands):
-        check_part(part.robot, base, form, read, joints, (model.root, root), size)
+        check_part(part, base, form, read, joints, (model.root, root), size)
         if form != 'urdf':
-            check_loops(part.robot, form, joints, frames, size)
+            check_loops(part, form, joints, frames, size)
     assert {joint.kind for joint in joints.values()} <= {'fixed'}
-    robots = [part.robot for part in model.parts] if form != 'urdf' else []
+    robots = model.parts if form != 'urdf' else []
     assert read.driven == [name for robot in robots for name in robot.driven]
     assert read.follows.keys() == {name for robot in robots for name in robot.follows}
 
@@ -126,31 +126,21 @@ def test_a_hand_on_an_arm_comes_back(tmp_path, link, form):
 
 def random_mechanism(seed):
     """Return a random linkage as a mechanism in a random pose, at a start where it has a pose."""
-    rng = np.random.default_rng(seed)
-    design = random_linkages.design(rng)
-    try:
-        linkage = mechanisms.create('custom', joints=design.joints, branches=design.branches,
-                                    **design.dimensions)
-    except ValueError:
+    if not (made := random_linkage(seed)):
         return None
-    for _ in range(30 if 1e-3 < linkage.longest < 1e3 else 0):
-        values = [rng.uniform(max(each.low, -12.0), min(each.high, 12.0))
-                  for each in linkage.inputs]
-        if not any(np.isnan(place).any() for place in linkage.solve(
-                values if len(values) > 1 else values[0]).values()):
-            given = {
-                'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': design.joints,
-                'm.pose': rng.normal(size=6).tolist(),
-                **{f'm.branches.{key}': side for key, side in (design.branches or {}).items()},
-                **{f'm.dimensions.{key}': value for key, value in design.dimensions.items()},
-                **{f'm.{each.name}.start': value for each, value in zip(linkage.inputs, values)}}
-            with suppress(scene.SceneError):
-                # Not all of it need be in the reach.
-                return scene.read({**given, **{
-                    f'm.{each.name}.sweep': [value - 0.01 * each.size, value + 0.01 * each.size]
-                    for each, value in zip(linkage.inputs, values)}}).mechanisms['m']
-            return scene.read(given).mechanisms['m']
-    return None
+    design, linkage, values, rng = made
+    given = {
+        'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': design.joints,
+        'm.pose': rng.normal(size=6).tolist(),
+        **{f'm.branches.{key}': side for key, side in (design.branches or {}).items()},
+        **{f'm.dimensions.{key}': value for key, value in design.dimensions.items()},
+        **{f'm.{each.name}.start': value for each, value in zip(linkage.inputs, values)}}
+    with suppress(scene.SceneError):
+        # Not all of it need be in the reach.
+        return scene.read({**given, **{
+            f'm.{each.name}.sweep': [value - 0.01 * each.size, value + 0.01 * each.size]
+            for each, value in zip(linkage.inputs, values)}}).mechanisms['m']
+    return scene.read(given).mechanisms['m']
 
 
 @pytest.mark.parametrize('form', FORMATS)
@@ -165,6 +155,23 @@ def test_random_robots_come_back(tmp_path, seeds, form):
         check_read(prepared([mechanism], form), form, tmp_path)
 
 
+def random_urdf(rng):
+    """Return a random tree of links."""
+    text, names = '<link name="base"/>', ['base']
+    for i in range(rng.integers(2, 8)):
+        rows = rng.normal(size=(3, 3))
+        # Not all readers make axes as long as one.
+        rows[2] /= np.linalg.norm(rows[2])
+        numbers = [' '.join(map(repr, map(float, row))) for row in rows]
+        kind = rng.choice(['revolute', 'continuous', 'prismatic', 'fixed'])
+        text += (f'<link name="l {i}"/><joint name="j-{i}" type="{kind}"><parent link="'
+                 f'{rng.choice(names)}"/><child link="l {i}"/><origin xyz="{numbers[0]}" '
+                 f'rpy="{numbers[1]}"/><axis xyz="{numbers[2]}"/><limit lower="-9" upper="9" '
+                 'effort="1" velocity="1"/></joint>')
+        names.append(f'l {i}')
+    return f'<robot name="r">{text}</robot>', names
+
+
 @pytest.mark.parametrize('form', FORMATS)
 @pytest.mark.parametrize('seed', range(8))
 def test_random_trees_of_a_file_come_back_in_each_format(tmp_path, seed, form):
@@ -174,8 +181,8 @@ def test_random_trees_of_a_file_come_back_in_each_format(tmp_path, seed, form):
     file.write_text(random_urdf(np.random.default_rng(seed))[0])
     drawn = readers.drawn(readers.read(str(file)))
     # What moves in MuJoCo weighs something.
-    drawn.parts[0].robot.pieces.update((body, [Piece(BALL, 'joint', 0.1, (0.0, 0.0), (0.1, 0.0))])
-                                       for body in drawn.parts[0].robot.frames)
+    drawn.parts[0].pieces.update((body, [Piece(BALL, 'joint', 0.1, (0.0, 0.0), (0.1, 0.0))])
+                                       for body in drawn.parts[0].frames)
     drawn.density = 1000.0
     check_read(drawn, form, tmp_path)
 

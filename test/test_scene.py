@@ -53,6 +53,8 @@ def test_without_parameters_the_scene_is_the_catalogue():
         assert mechanism.linkage.dimensions == mechanisms.defaults(name)
         assert mechanism.first.speed == 1.0 and mechanism.first.start == 0.0
     assert scene.read({}).rate == 50.0
+    # A parameter of the client library is none of the scene's business.
+    assert scene.read({'use_sim_time': True}).parameters == scene.read({}).parameters
 
 
 @pytest.mark.nightly(all_but=4)
@@ -66,19 +68,14 @@ def test_a_scene_is_written_as_the_few_values_that_tell_it(file, tmp_path):
     assert len(kept) < len(before.parameters) / 2
 
 
-def test_names_that_ros_takes_for_values_are_written_as_texts(tmp_path):
+def test_names_that_ros_takes_for_values_are_written_as_texts_and_empty_lists_not(tmp_path):
     before = scene.read({'mechanisms': ['y', 'nan', 'Inf', 'on'], 'frame_id': '1e5', **{
         f'{name}.type': 'klann' for name in ('y', 'nan', 'Inf', 'on')},
         'y.frame_id': '08', 'nan.frame_id': '0x1F', 'nan.crank.source': '1_0'})
+    assert 'loads' not in writing.in_yaml({'y.joint_names': [], 'y.loads': (), 'rate': 1.0})
     again = tmp_path / 'again.yaml'
     again.write_text(writing.in_yaml(writing.without_defaults(before)))
     assert scene.load(str(again)).parameters == before.parameters
-
-
-def test_a_list_of_nothing_is_not_written_as_ros_reads_none(tmp_path):
-    text = writing.in_yaml({'mechanisms': ['jansen'], 'jansen.joint_names': [],
-                            'jansen.loads': ()})
-    assert '[]' not in text and 'joint_names' not in text and 'loads' not in text
 
 
 @pytest.mark.parametrize('name', ['my thigh', 'Hüfte', 'toe 1/2 "left" <a&b>', "o'k: #3", '大腿',
@@ -168,6 +165,7 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
      r'peaucellier.crank.sweep must be inside the reach \[-1.17137, 1.17137\] rad'),
     ({'rate': -1.0}, 'rate must be .* from 0 to 1000'),
     ({'rate': 10 ** 5000}, 'rate must be .* from 0 to 1000'),
+    ({'qos_overrides./crank_states.publisher.depth': 5}, 'qos_overrides.* is not a parameter'),
     ({'frame_id': 3}, 'frame_id must be a text'),
     *[({'frame_id': text}, 'frame_id must be a text .* 1 to 100 characters') for text in (
         '', ' ', '/world', ' world', 'world\n', 'w\0', '\t', '-x', 'w' * 101, 'w' * 10 ** 6,
@@ -266,15 +264,6 @@ def test_a_start_outside_the_sweep_or_the_reach_is_the_nearer_end(given, start):
     assert Motion.of(mechanism.first).at(0)[0] == pytest.approx(start, rel=1e-6)
 
 
-def test_parameters_of_the_client_library_are_none_of_the_scenes_business():
-    scene.read({'use_sim_time': True})
-
-
-def test_overrides_of_quality_of_service_would_not_act_and_are_refused():
-    with pytest.raises(scene.SceneError, match='qos_overrides.* is not a parameter'):
-        scene.read({'qos_overrides./crank_states.publisher.depth': 5})
-
-
 def test_a_crank_that_cannot_turn_swings_within_its_reach():
     mechanism = scene.read(CELL).mechanisms['cell']
     (low, high), = mechanism.reach
@@ -336,12 +325,10 @@ SIGNED = {**OWN, 'own.joints': ['O ground 0 0', 'Q ground 4.0 h', 'A crank O 1',
 SWEPT = {**SIGNED, 'own.dimensions.r': 3.0, 'own.crank.sweep': [-0.5, 0.5]}
 
 
-def lengths(given):
-    """Return the scene, and name, value and slider of each length."""
-    made = scene.read(given)
-    return made, [(p.name, p.value, slider.ends(mechanism, p))
-                  for mechanism in made.mechanisms.values() for p in mechanism.parameters
-                  if '.dimensions.' in p.name]
+def ends(given, name):
+    """Return the ends of the slider of a parameter of a scene."""
+    mechanism, = scene.read(given).mechanisms.values()
+    return slider.ends(mechanism, next(p for p in mechanism.parameters if p.name == name))
 
 
 @pytest.mark.nightly(all_but=3)
@@ -360,46 +347,20 @@ def test_every_slider_has_its_value_between_finite_ends(given):
 
 @pytest.mark.parametrize('ratio', [-2.0, 1.0])
 def test_the_sliders_of_ratio_and_offset_move_an_input(ratio):
-    own = scene.read({**SIGNED, 'own.crank.ratio': ratio}).mechanisms['own']
-    found = {p.name: slider.ends(own, p) for p in own.parameters
-             if p.name in ('own.crank.ratio', 'own.crank.offset')}
-    assert found['own.crank.ratio'] == pytest.approx(sorted((0.1 * ratio, 10.1 * ratio)), abs=0.2)
-    assert found['own.crank.offset'] == pytest.approx((-math.pi, math.pi), abs=0.1)
-
-
-@pytest.mark.nightly(all_but=2)
-@pytest.mark.parametrize('given, stops', [
-    *((given, 3) for given in (*map(TYPES.get, ('water_drop', 'peaucellier', 'slotted_lever')),
-                               SMALL, SIGNED, SWEPT)),
-    *(pytest.param(given, 9, marks=pytest.mark.nightly) for given in TYPES.values())])
-def test_nearly_all_of_a_sliders_travel_keeps_a_crank_turning(given, stops):
-    made, sliders = lengths(given)
-    fits = []
-    for name, value, (low, high) in sliders:
-        assert high - low > 1e-3 * abs(value), name
-        for moved in np.linspace(low, high, stops + 2)[1:-1]:
-            try:
-                after = scene.changed(made, {name: float(moved)})
-            except scene.SceneError:
-                fits.append(False)
-                continue
-            mechanism, old = (next(iter(s.mechanisms.values())) for s in (after, made))
-            turned, turns = (each.first.input.is_whole(each.reach) for each in (old, mechanism))
-            fits.append(not turned or turns or 'own.crank.sweep' in given)
-    assert sum(fits) >= 0.9 * len(fits)
+    given = {**SIGNED, 'own.crank.ratio': ratio}
+    assert ends(given, 'own.crank.ratio') == pytest.approx(
+        sorted((0.1 * ratio, 10.1 * ratio)), abs=0.2)
+    assert ends(given, 'own.crank.offset') == pytest.approx((-math.pi, math.pi), abs=0.1)
 
 
 def test_a_slider_goes_nearly_as_far_as_a_crank_can_turn():
     """Grashof: with bars 1, r, 3 and a base of 4 the crank turns where r is from 2 to 6."""
-    _, sliders = lengths({**SIGNED, 'own.dimensions.r': 3.0})
-    (low, high), = [ends for name, _, ends in sliders if name.endswith('.r')]
+    low, high = ends({**SIGNED, 'own.dimensions.r': 3.0}, 'own.dimensions.r')
     assert 2.0 <= low < 2.2 and 5.8 < high <= 6.0
 
 
 def test_the_slider_of_a_length_that_nothing_limits_changes_it_by_nine_times_itself():
-    _, sliders = lengths(SIGNED)
-    ends, = [ends for name, _, ends in sliders if name.endswith('.v')]
-    assert ends == pytest.approx((-3.0, 2.4), abs=0.06)
+    assert ends(SIGNED, 'own.dimensions.v') == pytest.approx((-3.0, 2.4), abs=0.06)
 
 
 ACTUATED = {**OWN, 'own.dimensions.h': 0.0, 'own.dimensions.c': 2.0, 'own.joints': [
@@ -622,15 +583,6 @@ def test_the_legs_of_a_walker_are_one_leg_a_part_of_a_turn_behind_or_mirrored():
             side, crank = 1 - i % 2 * 2, theta - math.tau * (i // 2) / 3
             own, = places(one, crank if side > 0 else math.pi - crank, jansen.points)
             assert leg == pytest.approx(0.01 * own * [side, 1.0], abs=1e-12)
-
-
-def test_joint_rates_are_the_slopes_of_joint_angles():
-    assembly = Assembly(mechanisms.create('jansen'), 3, True)
-    step, joints = 1e-6, assembly.joints
-    slopes = (solved(assembly, 0.7 + step, (), joints)
-              - solved(assembly, 0.7 - step, (), joints)) / (2.0 * step)
-    rates = solved(assembly, 0.7, (), joints, joints)[:, len(joints):]
-    assert rates == pytest.approx(slopes, abs=1e-7)
 
 
 def test_an_end_of_the_reach_is_within_it_any_turn_and_nothing_beyond_is():

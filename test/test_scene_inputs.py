@@ -16,6 +16,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.scene.inverse_request import InverseRequest, present_inputs
 import numpy as np
 import pytest
+from test_rods import G1
 from truth.working_modes import five_bar
 
 BOOM = ('O ground 0 0', 'P ground x -y', 'B cylinder P O l right called boom',
@@ -47,6 +48,9 @@ CASES = {
     'mixed': ('custom', LENGTHS, ARM, {
         'scale': 0.5, 'boom.start': 0.5, 'boom.ratio': 2.0, 'arm.start': 0.5},
         ('OB', 'H.y'), [(0.5, 0.6), (0.62, 0.45)]),
+    'ankle': ('rods', {}, G1, {
+        'scale': 1.0, 'right.ratio': -2.0, 'right.offset': 0.1, 'right.sweep': [-0.4, 0.4],
+        'loads': ['pitch=12', 'roll=-3']}, ('pitch', 'roll'), [(0.1, -0.05), (-0.2, 0.1)]),
 }
 
 
@@ -71,10 +75,9 @@ class Case:
     def at(self, inputs, outputs=()):
         """Return outputs at inputs at full size, each a number or an array."""
         theta = inputs if len(self.drives) > 1 else inputs[0]
-        found = {**self.linkage.joint_angles(theta), **{
-            f'{name}.{axis}': place[..., 'xy'.index(axis)]
-            for name, place in self.linkage.solve(theta).items() for axis in 'xy'}}
-        return [found[name][()] for name in outputs or self.outputs]
+        outputs = outputs or self.outputs
+        found = self.linkage.joint_angles(theta, outputs)
+        return [found[name][()] for name in outputs]
 
     def jacobian(self, inputs, outputs=()):
         """Return d output / d input, (outputs, inputs), by differences."""

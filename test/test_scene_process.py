@@ -4,24 +4,15 @@
 """A scene's three nodes in one process: nobody can tell them from three processes."""
 
 import math
-from pathlib import Path
-import re
-import signal
 
+from linkage_interfaces.srv import ServoInverse as ServoInverseType
+from linkage_ros.nodes import scene_process
+from linkage_ros.nodes.crank_driver import CrankDriver
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.servo_inverse import ServoInverse
 import pytest
+from sensor_msgs.msg import JointState
 
-pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
-
-from linkage_interfaces.srv import ServoInverse as ServoInverseType  # noqa: E402
-from linkage_ros.nodes import scene_process  # noqa: E402
-from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.servo_inverse import ServoInverse  # noqa: E402
-from ros_harness import Process  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-
-CONFIG = Path(__file__).parents[1] / 'config'
 LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever', 'lever.crank.speed': 2.0}
 
 
@@ -77,17 +68,6 @@ def test_the_service_answers_on_the_working_branch_wherever_the_crank_is(graph, 
         graph.until(lambda start=start: cranks and cranks[-1].position[0] == start)
         found = graph.call(client, ServoInverseType.Request(lever_angle=[lever_at(0.4)]))
         assert found.success and found.servo_angle[0] == pytest.approx(0.4, abs=1e-9)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_them_quietly(number):
-    process = Process('scene', CONFIG / 'all.yaml')
-    said = [process.line() for _ in range(3)]
-    assert [re.search(r'\[(\w+)\]: ready: .*water_drop', line)[1] for line in said] == [
-        'kinematics', 'servo_inverse', 'crank_driver']
-    process.interrupt(number)
-    assert process.end() == (0, '')
 
 
 def test_a_bad_scene_ends_them_all_in_one_sentence(capfd):

@@ -15,7 +15,7 @@ from xml.sax.saxutils import quoteattr
 from linkage_ros.robot_files import readers
 import numpy as np
 import pytest
-from test_robot_files import words
+from robots import words
 
 VERSIONS = '1.4', '1.5', '1.6', '1.7', '1.9', '1.11'
 

@@ -8,32 +8,26 @@ import json
 import math
 import re
 
+from browser import until
+from linkage_ros import mechanisms, scene
+from linkage_ros.c_code import header
+from linkage_ros.nodes import ownership
+from linkage_ros.nodes.crank_driver import CrankDriver
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.robot_model import urdf
+from linkage_ros.scene import slider
+from linkage_ros.web import curves, scene_view
+from linkage_ros.web.scene_view import LATCHED
 import numpy as np
 import pytest
-import yaml
-
-pytest.importorskip('aiohttp')
-pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
-
-from browser import until  # noqa: E402
-from linkage_ros import mechanisms, scene  # noqa: E402
-from linkage_ros.c_code import header  # noqa: E402
-from linkage_ros.nodes import ownership  # noqa: E402
-from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.robot_model import urdf  # noqa: E402
-from linkage_ros.scene import slider  # noqa: E402
-from linkage_ros.web import curves, scene_view  # noqa: E402
-from linkage_ros.web.scene_view import LATCHED  # noqa: E402
-from rcl_interfaces.msg import (  # noqa: E402
+from rcl_interfaces.msg import (
     Parameter as ParameterMessage,
     ParameterEvent,
     ParameterValue,
 )
-from rclpy.parameter import Parameter  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from viewer_harness import (  # noqa: E402
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+from viewer_harness import (
     example,
     LEG,
     LEVER,
@@ -47,7 +41,8 @@ from viewer_harness import (  # noqa: E402
     spoilt,
     walker,
 )
-from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray
+import yaml
 
 
 def test_what_is_drawn_is_where_the_catalogue_says(show):

@@ -6,16 +6,12 @@
 import json
 import math
 
+from linkage_ros.web.feed import Feed
 import numpy as np
 import pytest
-
-pytest.importorskip('aiohttp')
-pytest.importorskip('rclpy')
-
-from linkage_ros.web.feed import Feed  # noqa: E402
-from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
-from viewer_harness import framed, markers_of, parts, spoilt, walker  # noqa: E402
-from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+from rclpy.serialization import deserialize_message, serialize_message
+from viewer_harness import framed, markers_of, parts, spoilt, walker
+from visualization_msgs.msg import Marker, MarkerArray
 
 
 def frame_of(markers):

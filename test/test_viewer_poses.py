@@ -11,16 +11,12 @@ import itertools
 import json
 import math
 
+from linkage_ros import mechanisms, scene
+from linkage_ros.web import curves, poses
+from linkage_ros.web.nearest_pose import nearest_inputs, theta_of
 import numpy as np
 import pytest
-
-pytest.importorskip('aiohttp')
-pytest.importorskip('rclpy')
-
-from linkage_ros import mechanisms, scene  # noqa: E402
-from linkage_ros.web import curves, poses  # noqa: E402
-from linkage_ros.web.nearest_pose import nearest_inputs, theta_of  # noqa: E402
-from viewer_harness import DOUBLE, example, EXAMPLES, mechanism_of  # noqa: E402
+from viewer_harness import DOUBLE, example, EXAMPLES, mechanism_of
 
 
 @pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)

@@ -17,8 +17,8 @@ import sys
 
 from linkage_ros import scene
 from linkage_ros.nodes import scene_node
-from linkage_ros.nodes.joint_state_reader import ANY
 from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.message_layout import ANY
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args

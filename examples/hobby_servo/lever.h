@@ -3,7 +3,7 @@
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * It can be assembled in [-3.14159, 3.14159] rad.
- * A call takes at most 15 poses.
+ * A call takes at most 12 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -177,10 +177,8 @@ typedef struct {
 /* A linkage. Inputs q are in rad or in sizes. */
 typedef struct {
     int inputs;
-    /* Whether the first pose of an inverse is to have rates and loads. */
-    int is_rated;
-    /* The pose at inputs, with rates and loads or without; 0 if it cannot be assembled. */
-    int (*at)(const lkr_real *q, int is_rated, lkr_point *p);
+    /* The pose at inputs; returns 0 if it cannot be assembled. */
+    int (*at)(const lkr_real *q, lkr_point *p);
     /* All inputs that a side's outputs may have, NaN where there is none; returns their number. 0 where
        the axes count all inputs. */
     int (*solutions[2])(const lkr_real *value, lkr_real (*q)[LKR_MAX_INPUTS]);
@@ -325,39 +323,36 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
 static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position, lkr_real *q,
     lkr_point *p)
 {
-    lkr_real gap[LKR_MAX_INPUTS], change[LKR_MAX_INPUTS], moved[LKR_MAX_INPUTS];
-    lkr_real left;
+    lkr_real gap[LKR_MAX_INPUTS] = { 0 };
+    lkr_real x[LKR_MAX_INPUTS];
+    lkr_real left = LKR_OTHER;
     lkr_real steepest = 1;
     int i, j, step;
-    if (!model->at(q, model->is_rated, p)) {
-        return 0;
-    }
-    left = lkr_gap(model, side, position, p, gap);
-    if (left <= LKR_ENOUGH) {
-        return 1;
-    }
-    if (!(left <= LKR_OTHER) || (!model->is_rated && !model->at(q, 1, p))) {
-        return 0;
-    }
-    for (step = 0; step < LKR_MAX_STEPS && left > LKR_ENOUGH; step++) {
+    memcpy(x, q, sizeof x);
+    for (step = 0; step <= LKR_MAX_STEPS; step++) {
         lkr_point next;
-        lkr_real now;
-        if (!lkr_input_change(model, side, p, LKR_LEAST, gap, change)) {
-            break;
+        lkr_real now = LKR_FAR;
+        if (model->at(x, &next)) {
+            now = lkr_gap(model, side, position, &next, gap);
         }
-        for (i = 0; i < model->inputs; i++) {
-            moved[i] = q[i] + change[i];
-        }
-        if (!model->at(moved, 1, &next)) {
-            break;
-        }
-        now = lkr_gap(model, side, position, &next, gap);
         if (!(now < left)) {
             break;
         }
         left = now;
         *p = next;
-        memcpy(q, moved, sizeof moved);
+        memcpy(q, x, sizeof x);
+        if (left <= LKR_ENOUGH) {
+            return 1;
+        }
+        if (!lkr_input_change(model, side, p, LKR_LEAST, gap, x)) {
+            break;
+        }
+        for (i = 0; i < model->inputs; i++) {
+            x[i] += q[i];
+        }
+    }
+    if (!(left < LKR_OTHER)) {
+        return 0;
     }
     /* What is left may be rounding: of the inputs, where a position changes fast; at an end of the
        reach the rate is infinite, yet rounding is not. */
@@ -417,10 +412,10 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
     for (i = 0; i < model->inputs; i++) {
         const lkr_axis *axis = &model->axis[side][i];
         value[i] = (position[i] - axis->offset) / axis->factor;
-        near[i] = q[i];
-        /* Without a function for solutions, there is one, of counted inputs. */
-        x[0][i] = q[i];
     }
+    memcpy(near, q, sizeof near);
+    /* Without a function for solutions, there is one, of counted inputs. */
+    memcpy(x[0], q, sizeof near);
     if (model->solutions[side]) {
         count = model->solutions[side](value, x);
     }
@@ -469,7 +464,7 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
 static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *value, const lkr_real *near,
     lkr_real *inputs)
 {
-    lkr_real q[LKR_MAX_INPUTS];
+    lkr_real q[LKR_MAX_INPUTS] = { 0 };
     lkr_point p;
     int i;
     for (i = 0; i < model->inputs; i++) {
@@ -497,7 +492,7 @@ static inline int lkr_begin(const lkr_model *model, lkr_memory *m)
         m->held[LKR_ACTUATORS].position[i] = LKR_NAN;
         m->held[LKR_JOINTS].position[i] = LKR_NAN;
     }
-    return model->at(m->q, 1, &m->point);
+    return model->at(m->q, &m->point);
 }
 
 /* Copy the values that are finite. */
@@ -516,19 +511,12 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
 {
     const int n = model->inputs;
     lkr_point p;
-    lkr_real q[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS];
-    int is_there;
+    lkr_real q[LKR_MAX_INPUTS];
     if (!lkr_are_finite(n, position)) {
         return LKR_NOT_KNOWN;
     }
-    /* Where it is already needs no inverse; but a command has to be in the sweeps. */
-    is_there = m->newest != LKR_NEITHER
-        && lkr_gap(model, side, position, &m->point, gap) <= LKR_ENOUGH
-        && lkr_bring(model, side, m->q, m->q, q) == 0;
-    p = m->point;
     memcpy(q, m->q, sizeof q);
-    if ((!is_there && !lkr_inverse(model, side, position, q, &p))
-        || !lkr_are_finite(n, p.position[1 - side])) {
+    if (!lkr_inverse(model, side, position, q, &p) || !lkr_are_finite(n, p.position[1 - side])) {
         return LKR_OUT_OF_REACH;
     }
     m->newest = side;
@@ -616,15 +604,9 @@ static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, 
         /* What was commanded before a pause is not held after it. */
         memset(held->effort, 0, sizeof held->effort);
     }
-    if (!(position & missing)) {
-        lkr_copy(n, held->position, to->position);
-    }
-    if (!(velocity & missing)) {
-        lkr_copy(n, held->velocity, to->velocity);
-    }
-    if (!(effort & missing)) {
-        lkr_copy(n, held->effort, to->effort);
-    }
+    lkr_copy(position & missing ? 0 : n, held->position, to->position);
+    lkr_copy(velocity & missing ? 0 : n, held->velocity, to->velocity);
+    lkr_copy(effort & missing ? 0 : n, held->effort, to->effort);
     return position | velocity | effort;
 }
 
@@ -692,7 +674,8 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     const float v48 = sqrtf((v41 * v41) + (v45 * v45));
     const float v49 = v41 / v48;
     const float v56 = v45 / v48;
-    const float v81 = lkr_root(k73 + v32, k80);
+    const float v74 = k73 + v32;
+    const float v81 = lkr_root(v74, k80);
     const float v88 = ((length_a * (k82 + (k83 * v31))) / v33) + 0.0f;
     p->L_x = v49 * k54;
     p->L_y = k2 + (v56 * k54);
@@ -702,7 +685,8 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     by_crank->L_y = (v88 * v49) * k54;
     by_crank->angle_lever = v88;
     by_crank->slide_slide = (-((((v7 * 0.5f) * v9) * 2.0f) * k30)) / (2.0f * v81);
-    return 1;
+    const float valid = lkr_valid_where(0.0f, v74, k80);
+    return isfinite(valid);
 }
 
 /* Place the joints. Return 0 if not all can be assembled: NaN is what cannot. */
@@ -765,25 +749,23 @@ static inline int lever_solutions_angle_lever(const float *value,
 }
 
 /* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be assembled. */
-static inline int lever_at(const float *q, int is_rated, lkr_point *p)
+static inline int lever_at(const float *q, lkr_point *p)
 {
     lever_pose s, by_crank;
     if (!lever_formulas(q[0], &s, &by_crank)) {
         return 0;
     }
     p->position[0][0] = s.angle_crank;
+    p->rate[0][0][0] = by_crank.angle_crank;
     p->position[1][0] = s.angle_lever;
-    if (is_rated) {
-        p->rate[0][0][0] = by_crank.angle_crank;
-        p->rate[1][0][0] = by_crank.angle_lever;
-        p->load[0] = 0.0f;
-    }
+    p->rate[1][0][0] = by_crank.angle_lever;
+    p->load[0] = 0.0f;
     return isfinite(p->position[0][0] + p->position[1][0]);
 }
 
 /* Tables of the actuators and joints, see lkr_model. */
 static const lkr_model lever_model = {
-    1, 1, lever_at, { 0, lever_solutions_angle_lever },
+    1, lever_at, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, and after how much of each input they repeat. */
     { { { 1.0f, 0.0f, 0, 1.0f, 0.0f } },
       { { 1.0f, 6.2831855f, -1, 1.0f, 0.0f } } },
@@ -793,23 +775,21 @@ static const lkr_model lever_model = {
 };
 
 /* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be assembled. */
-static inline int lever_at_angle_lever(const float *q, int is_rated, lkr_point *p)
+static inline int lever_at_angle_lever(const float *q, lkr_point *p)
 {
     lever_pose s, by_crank;
     if (!lever_formulas(q[0], &s, &by_crank)) {
         return 0;
     }
     p->position[1][0] = s.angle_lever;
-    if (is_rated) {
-        p->rate[1][0][0] = by_crank.angle_lever;
-        p->load[0] = 0.0f;
-    }
+    p->rate[1][0][0] = by_crank.angle_lever;
+    p->load[0] = 0.0f;
     return isfinite(p->position[1][0]);
 }
 
 /* Tables of the inverse, see lkr_model. */
 static const lkr_model lever_model_angle_lever = {
-    1, 0, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
+    1, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, and after how much of each input they repeat. */
     { { { 0, 0, -1, 0, 0 } },
       { { 1.0f, 6.2831855f, -1, 1.0f, 0.0f } } },

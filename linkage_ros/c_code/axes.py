@@ -8,7 +8,7 @@ from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ..linkage import GROUND, Link, loaded_links, Mechanism, ROUNDING, spread
+from ..linkage import GROUND, Link, loaded_links, Mechanism, spread
 from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion
@@ -26,8 +26,8 @@ class Axis(NamedTuple):
     An actuator or a joint, whose position [rad or m] is factor * output + offset.
 
     `output` is one of the linkage, in its own units. `size` is the scale of its position; the
-    position has the period `turn`, if that is not 0. If it `wraps`, it is published within half a
-    turn of zero.
+    position has the period `turn`, if that is not 0: those of inputs and geared links count turns.
+    If it `wraps`, it is published within half a turn of zero. `role` is its name in the linkage.
     """
 
     name: str
@@ -37,6 +37,7 @@ class Axis(NamedTuple):
     size: float
     turn: float
     wraps: bool
+    role: str
 
 
 def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float = 1.0,
@@ -44,16 +45,18 @@ def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float =
     """Return the axis of an output, with a factor and an offset from its value in the scene."""
     linkage = mechanism.linkage
     factor *= mechanism.scale_of(output)
-    counts_turns = output in (*mechanism.inputs, *linkage.geared) and not wraps
-    angular = linkage.is_angle(output)
-    return Axis(name, output, factor, offset, abs(factor) * (1.0 if angular else linkage.longest),
-                math.tau * abs(factor) if angular and not counts_turns else 0.0, wraps)
+    is_angle = linkage.is_angle(output)
+    turns = is_angle and output not in (*mechanism.inputs, *linkage.geared)
+    return Axis(name, output, factor, offset, abs(factor) * (1.0 if is_angle else linkage.longest),
+                math.tau * abs(factor) * turns, wraps and turns, output)
 
 
 def actuators(mechanism: SceneMechanism) -> List[Axis]:
     """Return the axes of the sources of a mechanism's inputs."""
-    return [axis(mechanism, settings.measures or name, settings.source, 1.0 / settings.ratio,
-                 -settings.offset / settings.ratio) for name, settings in mechanism.inputs.items()]
+    return invertible(mechanism, [
+        axis(mechanism, settings.measures or name, settings.source, 1.0 / settings.ratio,
+             -settings.offset / settings.ratio)._replace(role=name)
+        for name, settings in mechanism.inputs.items()])
 
 
 def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
@@ -82,8 +85,7 @@ def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
     if names and not _tell(mechanism, outputs):
         raise ValueError(f'{listed(names)} of {mechanism.name} moves with none of the inputs, or '
                          'only together with another joint')
-    check_inverse(mechanism, [axis(mechanism, output) for output in outputs])
-    return [_joint(mechanism, output) for output in outputs]
+    return invertible(mechanism, [_joint(mechanism, output) for output in outputs])
 
 
 def passive(mechanism: SceneMechanism, commanded: Sequence[Axis]) -> List[Axis]:
@@ -113,54 +115,32 @@ def gears(linkage: Mechanism, axes: Sequence[Axis]) -> Dict[int, Tuple[int, floa
     """Return input, ratio and offset of the axes that count an input, maybe geared, by number."""
     return {k: (i, 1.0, 0.0) if each.output == input_.name else (i, *linkage.gear(each.output, i))
             for k, each in enumerate(axes) for i, input_ in enumerate(linkage.inputs)
-            if each.output == input_.name
-            or each.output in linkage.geared_to(i) and not each.wraps}
+            if each.output in (input_.name, *linkage.geared_to(i))}
 
 
-def check_inverse(mechanism: SceneMechanism, axes: Sequence[Axis]) -> None:
-    """Raise ValueError if positions of axes give the inputs neither in closed form nor safely."""
+def invertible(mechanism: SceneMechanism, axes: List[Axis]) -> List[Axis]:
+    """Return axes; raise ValueError if positions of them do not give the inputs for certain."""
     linkage, names = mechanism.linkage, [each.output for each in axes]
-    if len(gears(linkage, axes)) == len(axes) or linkage.inverse(tuple(names)).closed:
-        return
+    what = f'{listed(names)} of {mechanism.name}'
+    if len(gears(linkage, axes)) == len(axes):
+        return axes
+    if any(input_.is_part for input_ in linkage.inputs):
+        raise ValueError(f'{what} has no inverse, since it repeats after too many turns')
+    if linkage.inverse(tuple(names)).closed:
+        return axes
     if len(axes) > 1:
-        raise ValueError(f'{listed(names)} of {mechanism.name} have no inverse in closed form, '
-                         'and a search of several inputs may miss; choose other joints, or the '
-                         'inputs')
-    if linkage.inputs[0].is_part:
-        raise ValueError(f'{names[0]} of {mechanism.name} has no inverse in closed form, and '
-                         'repeats after too many turns for a search')
-    if not pieces(linkage, names[0]):
-        raise ValueError(f'{names[0]} of {mechanism.name} moves nowhere')
+        raise ValueError(f'{what} have no inverse in closed form, and a search of several inputs '
+                         'may miss; choose other joints, or the inputs')
+    if not pieces(linkage, *names):
+        raise ValueError(f'{what} moves nowhere')
+    return axes
 
 
-def pieces(linkage: Mechanism, output: str, turn: float = math.inf) -> List[Tuple[float, ...]]:
+def pieces(linkage: Mechanism, output: str) -> List[Tuple[float, ...]]:
     """Return parts of a turn in which an output only rises or falls: inputs, and outputs."""
     # In a piece an angle changes by half a turn at most, so that its gaps are known.
     parts, _ = linkage.monotone(output, math.pi if linkage.is_angle(output) else math.inf)
-    end = linkage.inputs[0].low + turn * (1.0 - ROUNDING)
-    return [part for part in parts if part[2] != part[3] and part[0] < end]
-
-
-def period(linkage: Mechanism, outputs: Sequence[str]) -> float:
-    """Return after how much of the only input outputs repeat, or infinity."""
-    input_, = linkage.inputs
-    if not input_.wraps:
-        return math.inf
-    inputs = np.concatenate([
-        np.linspace(low, high, SPREAD)[1:-1] for low, high in linkage.reach()])
-    pose = linkage.posed((), tuple(outputs))
-
-    def places(shift: float) -> np.ndarray:
-        """Return the outputs later, in sizes, and angles as directions."""
-        return np.concatenate([
-            [np.cos(row), np.sin(row)] if linkage.is_angle(output) else [row / linkage.longest]
-            for output, row in zip(outputs, pose.over(inputs + shift))])
-
-    now = places(0.0)
-    # Gears make them repeat earlier than the linkage.
-    return next((turn for turn in (
-        input_.turn / count for count in range(round(input_.speed * input_.period), 1, -1))
-        if (np.abs(places(turn) - now) <= DEPENDENT).all()), input_.turn)
+    return [part for part in parts if part[2] != part[3]]
 
 
 def loads(mechanism: SceneMechanism) -> Iterator[Tuple[str, float]]:
@@ -205,7 +185,7 @@ def _chain(mechanism: SceneMechanism) -> List[str]:
         for _ in mechanism.inputs:
             chosen.append(min((link for link in links if link.name not in chosen
                                and _tell(mechanism, [*chosen, link.name])), key=rank).name)
-        check_inverse(mechanism, [axis(mechanism, output) for output in chosen])
+        invertible(mechanism, [_joint(mechanism, output) for output in chosen])
         return chosen
     except ValueError:
         # There is none, or it has no inverse.

@@ -9,7 +9,7 @@ import math
 import re
 import sys
 from textwrap import wrap
-from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence
+from typing import Any, Dict, Iterable, List, Mapping, Sequence, Tuple
 
 import numpy as np
 
@@ -25,14 +25,6 @@ _NAMED = re.compile(r'\b[kx]\d+\b')
 _CONDITIONS = ('less', 'less_equal')
 # Longest line of code, and longest formula of a constant in its comment.
 LINE, MAX_FORMULA = 100, 50
-
-
-class Block(NamedTuple):
-    """A part of a function: its comment, what it computes, and the lines made of that."""
-
-    about: str
-    outputs: Sequence[Real]
-    ending: Callable[[List[str]], List[str]]
 
 
 class _Call(str):
@@ -86,10 +78,16 @@ class Code:
         """Return code times a number."""
         return bare(code) if factor == 1.0 else f'{self.literal(factor)} * {code}'
 
-    def function(self, head: str, arguments: Sequence[str], blocks: Sequence[Block],
-                 replaced: Optional[Mapping[Real, Real]] = None) -> str:
-        """Return a C function of blocks, from the code of its arguments; see `Program`."""
-        results = substituted([x for block in blocks for x in block.outputs], replaced or {})
+    def function(self, head: str, arguments: Sequence[str],
+                 blocks: Sequence[Tuple[str, Mapping[str, Real]]], last: str,
+                 replaced: Mapping[Real, Real] = {}) -> str:
+        """
+        Return a C function, from the code of its arguments; see `Program`.
+
+        Each of its `blocks` is a comment and the values that it assigns, by their places. `last`
+        is its last statement. Values take the place of `replaced` expressions.
+        """
+        results = substituted([x for _, assigned in blocks for x in assigned.values()], replaced)
         program = Program(results, len(arguments))
         exact: Dict[Real, Any] = {}
         program.bind(self.linkage.dimensions, exact)
@@ -100,13 +98,13 @@ class Code:
         constants, statements, codes = pose.statements(self._dialect)
         # A value is computed in the first block that needs it.
         numbers, reached, body = pose.variant.listing.outputs, -1, []
-        for about, outputs, ending in blocks:
-            n = len(outputs)
+        for about, assigned in blocks:
+            n = len(assigned)
             reached = max([reached, *numbers[:n]])
             ready = [line for line in statements if int(line[0][1:]) <= reached]
             body += [f'/* {comment(about)} */'] * bool(about)
             body += [f'const {self.number} {name} = {bare(code)};' for name, code in ready]
-            body += ending(codes[:n])
+            body += [f'{place} = {bare(code)};' for place, code in zip(assigned, codes)]
             statements, numbers, codes = statements[len(ready):], numbers[n:], codes[n:]
         # How constants follow from lengths, as text where that is short.
         formulas: Dict[Real, str] = {}
@@ -125,7 +123,7 @@ class Code:
             if node.op == 'dimension' and node.args[0].isidentifier()}
         declared = {names.get(name, name): self.literal(value) + ';' + abouts.get(name, '')
                     for name, value in constants.items()}
-        text = _NAMED.sub(lambda name: names.get(name[0], name[0]), '\n'.join(body))
+        text = _NAMED.sub(lambda name: names.get(name[0], name[0]), '\n'.join([*body, last]))
         used = {*_NAMED.findall(text)}
         lines = [f'const {self.number} {name} = {declared[name]}'
                  for name in sorted(declared, key=lambda name: name.startswith('k'))]

@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Iterator, List, Sequence, Tuple
+from itertools import product
+from typing import Dict, Iterator, List, Sequence, Tuple
 
-from .code import Block, Code
+from .code import Code
 from .names import distinct, field
+from ..formula.expression import Real, real, valid_where
 from ..scene import SceneMechanism
 
 
@@ -62,21 +63,12 @@ class Formulas:
 
     def function(self) -> str:
         """Return the function for all fields and their rates."""
-        structure, inputs = self._linkage.structure, self._linkage.inputs
-        blocks = []
-        for about, outputs in self._groups():
-            rates = structure.checked(tuple(outputs))[len(outputs):]
-            blocks.append(Block(about, [*map(structure.output, outputs), *rates],
-                                partial(self._assigned, outputs)))
+        structure = self._linkage.structure
+        blocks = [(about, self._assigned(outputs)) for about, outputs in self._groups()]
         limits = [limit for limit in structure.built.limits if limit.margin.varies]
-        if len(inputs) == 1 and inputs[0].is_whole(self._linkage.reach()):
-            # It can be assembled at any input: no limit needs to be checked.
-            limits = []
-        blocks.append(Block(
-            '', [part for limit in limits for part in (limit.margin, limit.tolerance)],
-            lambda codes: ['return ' + (' && '.join(
-                f'{margin} >= -{tolerance}' for margin, tolerance in zip(codes[::2], codes[1::2]))
-                or '1') + ';']))
+        valid = real(0.0)
+        for limit in limits:
+            valid = valid_where(valid, limit.margin, limit.tolerance)
         name, number = self._mechanism.name, self._code.number
         poses = ', '.join(f'{name}_pose *{each}' for each in ['p', *self.by])
         return self._code.function(
@@ -84,7 +76,8 @@ class Formulas:
             f'is exceeded. */\nLKR_FORMULA int {name}_formulas('
             f'{", ".join(f"{number} {each}" for each in self.parameters)}, {poses})',
             [self._code.times(each, 1.0 / self._mechanism.scale_of(name))
-             for each, name in zip(self.parameters, self.inputs)], blocks)
+             for each, name in zip(self.parameters, self.inputs)],
+            [*blocks, ('', {f'const {number} valid': valid})], 'return isfinite(valid);')
 
     def _groups(self) -> Iterator[Tuple[str, List[str]]]:
         """Yield the joint lines, with the outputs that each adds."""
@@ -104,14 +97,14 @@ class Formulas:
             if outputs:
                 yield about, outputs
 
-    def _assigned(self, outputs: Sequence[str], codes: Sequence[str]) -> List[str]:
-        """Return the assignments of outputs and of their rates by each input."""
-        scale_of, n = self._mechanism.scale_of, len(outputs)
+    def _assigned(self, outputs: Sequence[str]) -> Dict[str, Real]:
+        """Return outputs and their rates by each input, by their places in C."""
+        structure, scale_of = self._linkage.structure, self._mechanism.scale_of
+        values = [*map(structure.output, outputs), *structure.parts(((), (), tuple(outputs)))]
         units = [1.0, *map(scale_of, self.inputs)]
-        return [f'{pose}->{self.fields[output]} = '
-                f'{self._code.times(codes[k * n + i], scale_of(output) / unit)};'
-                for k, (pose, unit) in enumerate(zip(['p', *self.by], units))
-                for i, output in enumerate(outputs)]
+        return {f'{pose}->{self.fields[output]}': value * (scale_of(output) / unit)
+                for ((pose, unit), output), value in zip(
+                    product(zip(['p', *self.by], units), outputs), values)}
 
     def call(self) -> str:
         """Return a call of the function for inputs q in their sizes, to s and the rates."""

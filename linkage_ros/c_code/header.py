@@ -13,7 +13,7 @@ from __future__ import annotations
 from itertools import chain, repeat
 from typing import Any, Dict, Iterable, Iterator, List, NamedTuple, Sequence
 
-from .axes import actuators, Axis, axis, check_inverse, joints, loads
+from .axes import actuators, Axis, axis, invertible, joints, loads
 from .code import Code, indented
 from .formulas import Formulas
 from .names import comment, constants, distinct, field, filled, prefix, template
@@ -22,9 +22,9 @@ from ..linkage import Mechanism
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
-# Poses from a solution of an inverse or from the near inputs, as in `linkage.h`: Newton's method,
-# and one without rates.
-POSES = 5
+# Poses of a solution of an inverse or of the near inputs: the first, and LKR_MAX_STEPS of Newton's
+# method.
+POSES = 4
 
 
 class Request(NamedTuple):
@@ -119,10 +119,9 @@ def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> Dict[str, List
     if outputs and n > 1 and len(outputs) != n:
         raise ValueError(f'{mechanism.name} has {n} inputs: as many outputs are needed, '
                          f'got {listed(outputs)}')
-    groups = [[axis(mechanism, output, output) for output in outputs[i:i + n]]
+    groups = [invertible(mechanism, [axis(mechanism, output, output)
+                                     for output in outputs[i:i + n]])
               for i in range(0, len(outputs), n)]
-    for axes in groups:
-        check_inverse(mechanism, axes)
     return dict(zip(distinct('_'.join(['', *(field(mechanism.linkage, each.output)
                                              for each in axes)]) for axes in groups), groups))
 

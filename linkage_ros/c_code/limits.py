@@ -29,21 +29,19 @@ def text(mechanism: SceneMechanism, names: Sequence[str] = ()) -> str:
 def joint_limits(mechanism: SceneMechanism, names: Sequence[str] = ()
                  ) -> Iterator[Tuple[str, float, float]]:
     """Yield the name of each commanded joint, and its limits [rad or m]; infinite: it turns."""
-    linkage = mechanism.linkage
+    linkage, inputs = mechanism.linkage, mechanism.inputs
     # The arcs of each input, in the linkage's own units.
     arcs = [np.divide(settings.arcs, mechanism.scale_of(name))
-            for name, settings in mechanism.inputs.items()]
+            for name, settings in inputs.items()]
     for axis in joints(mechanism, names):
-        if len(arcs) > 1:
-            values = _values(mechanism, axis, arcs)
-        elif axis.output == linkage.inputs[0].name:
-            is_whole = not mechanism.first.ends and linkage.inputs[0].is_whole(arcs[0].tolist())
-            values = np.array([-math.inf, math.inf]) if is_whole else arcs[0]
-        else:
-            values = np.array(linkage.extremes(axis.output, arcs[0].tolist()))[..., 0]
+        values = np.array(linkage.extremes(axis.output, arcs[0].tolist()))[..., 0] if len(
+            arcs) == 1 else _values(mechanism, axis, arcs)
         low, high = sorted(axis.factor * end + axis.offset
                            for end in (float(np.nanmin(values)), float(np.nanmax(values))))
-        is_turning = axis.turn and high - low >= axis.turn * (1.0 - 1e-9)
+        # What counts turns may do so in a sweep only.
+        turns = axis.turn or linkage.is_angle(axis.output) and not any(
+            settings.ends for settings in inputs.values())
+        is_turning = turns and high - low >= math.tau * abs(axis.factor) * (1.0 - 1e-9)
         yield (axis.name, -math.inf, math.inf) if is_turning else (axis.name, low, high)
 
 

@@ -87,23 +87,18 @@ def ranges(mechanism: SceneMechanism) -> str:
 def _values(package_name: str, class_: str, mechanism: SceneMechanism, commanded: Sequence[Axis],
             others: Sequence[Axis]) -> Mapping[str, str]:
     """Return the values of a mechanism's templates."""
-    def rows(roles: Mapping[str, Axis]) -> str:
-        return ', '.join(f'{{{literal(axis.name)}, {literal(role)}}}'
-                         for role, axis in roles.items())
+    def rows(axes: Sequence[Axis]) -> str:
+        return ', '.join(f'{{{literal(axis.name)}, {literal(axis.role)}}}' for axis in axes)
 
-    driven = dict(zip(mechanism.inputs, actuators(mechanism)))
-    by_output = {axis.output: axis for axis in commanded}
-    named = [escape(comment(', '.join(axis.name for axis in axes.values())))
-             for axes in (driven, by_output)]
+    sides = actuators(mechanism), commanded
+    named = [escape(comment(', '.join(axis.name for axis in axes))) for axes in sides]
     return {
         'package': package_name, 'namespace': f'{package_name}_plugins', 'class': class_,
-        'name': mechanism.name, 'n': str(len(driven)), 'ranges': ranges(mechanism),
-        'actuators': rows(driven),
-        'joints': rows({**by_output, **{axis.output: axis for axis in others}}),
+        'name': mechanism.name, 'n': str(len(commanded)), 'ranges': ranges(mechanism),
+        'actuators': rows(sides[0]), 'joints': rows([*commanded, *others]),
         'joint_count': str(len(commanded) + len(others)),
         'passive_function': f'{mechanism.name}_passive' if others else 'nullptr',
         'axes': ' and '.join(named),
-        'lines': '\n'.join(f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(role)}/>'
-                           for kind, axes in (('actuator', driven), ('joint', by_output))
-                           for role, axis in axes.items()),
+        'lines': '\n'.join(f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(axis.role)}/>'
+                           for kind, axes in zip(('actuator', 'joint'), sides) for axis in axes),
         'row': f'| `{package_name}/{class_}` | {named[0]} | {named[1]} |'}

@@ -4,12 +4,12 @@
 """Inverses without a closed form, as series of Chebyshev polynomials in parts of the reach."""
 
 import math
-from typing import Iterator, Sequence, Tuple
+from typing import Sequence
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from ..linkage import Mechanism
+from ..linkage import Mechanism, ROUNDING
 
 # Terms of a series in double and in single precision, as in `linkage.h`, and how far it may miss
 # an output [rad, longest bar]: so little that its pose needs no correction.
@@ -21,55 +21,68 @@ CORRECTED, SHORT, SHORTEST = 1e-9, 1.0 / 32.0, 1e-5
 HALVINGS = 60
 
 
-def series(linkage: Mechanism, output: str, part: Sequence[float], single: bool
-           ) -> Iterator[Tuple[np.ndarray, np.ndarray]]:
+def series(linkage: Mechanism, output: str, parts: Sequence[Sequence[float]], single: bool
+           ) -> np.ndarray:
     """
-    Yield the pieces of a part, in which an output only rises or only falls: inputs and outputs.
+    Return the pieces of parts in which an output only rises or only falls: inputs and outputs.
 
-    Each is an `lkr_piece` of `linkage.h`, with inputs in their sizes: the numbers before its
-    terms, and the terms. The root in it makes the input smooth where the output has an extreme.
+    Each row is an `lkr_piece` of `linkage.h`, with inputs in their sizes. The root in it makes
+    the input smooth where the output has an extreme.
     """
-    unit = linkage.inputs[0].size
-    low, high, first, last = np.divide(part, [unit, unit, 1.0, 1.0])
-    pose, is_angle = linkage.posed((), (output,)), linkage.is_angle(output)
-    size, terms = 1.0 if is_angle else linkage.longest, TERMS[single]
+    unit, pose = linkage.inputs[0].size, linkage.posed((), (output,))
+    is_angle, terms = linkage.is_angle(output), TERMS[single]
+    size = 1.0 if is_angle else linkage.longest
     # A fast link's angle has the rounding of the input, times its speed.
     close = max(CLOSE[single], linkage.inputs[0].speed * CLOSE[False])
     nodes = chebyshev.chebpts1(terms)
     # Ever denser towards both ends.
     checked = np.tanh(np.linspace(-18.0, 18.0, 129))
 
-    def parts(inputs: np.ndarray, end: float, change: float) -> np.ndarray:
+    def passed(inputs: np.ndarray, end: np.ndarray, change: np.ndarray) -> np.ndarray:
         """Return which parts of a change from an end the output has behind it."""
         gap = pose.over(unit * inputs)[0] - end
         return (gap - is_angle * math.tau * np.round((gap - 0.5 * change) / math.tau)) / change
 
-    def halved(wanted: np.ndarray, start: float, stop: float, *change: float) -> np.ndarray:
+    def halved(wanted: np.ndarray, start: np.ndarray, stop: np.ndarray, *change: np.ndarray
+               ) -> np.ndarray:
         """Return where parts are wanted ones, by halving."""
         below, above = np.full_like(wanted, start), np.full_like(wanted, stop)
         for _ in range(HALVINGS):
             inputs = 0.5 * (below + above)
-            is_below = parts(inputs, *change) < wanted
+            is_below = passed(inputs, *change) < wanted
             below, above = np.where(is_below, inputs, below), np.where(is_below, above, inputs)
         return below
 
-    cut, = halved(np.array([0.5]), low, high, first, last - first)
-    for start, end in ((low, first), (high, last)):
-        change, roots = 0.5 * (first + last) - end, [(0.0, 1.0)]
-        while roots:
-            before, after = roots.pop()
-            center, half = 0.5 * (before + after), 0.5 * (after - before)
-            fitted = chebyshev.chebfit(nodes, halved(
-                (center + half * nodes) ** 2, start, cut, end, change), terms - 1)
-            inputs = chebyshev.chebval(checked, fitted).clip(*sorted((start, cut)))
-            missed = np.abs(parts(inputs, end, change) - (center + half * checked) ** 2).max()
-            enough = close if half > SHORT else max(close, CORRECTED)
-            if missed * abs(change) <= enough * size or half < SHORTEST:
-                squares = np.square([before, after])
-                middle, reach = change * squares.mean(), 0.5 * abs(change) * np.ptp(squares)
-                left, right = sorted(halved(squares, start, cut, end, change))
-                scale = 1.0 / (change * half * half)
-                yield np.array([end + middle, reach, left, right, scale, middle * scale,
-                                center / half]), fitted
-            else:
-                roots += [(center, after), (before, center)]
+    # Each part in two halves, from its ends to where the output is half way.
+    low, high, first, last = np.transpose(np.divide(parts, [unit, unit, 1.0, 1.0]))[..., None]
+    cut = halved(np.full_like(low, 0.5), low, high, first, last - first)
+    halves = np.vstack([np.hstack([start, cut, end, 0.5 * (first + last) - end])
+                        for start, end in ((low, first), (high, last))])
+    rows = np.empty((0, 7 + terms))
+    # Between roots of the parts of a half's change: those that are too long are cut in two.
+    own, roots = np.arange(len(halves)), np.tile([0.0, 1.0], (len(halves), 1))
+    while len(own):
+        start, cut, end, change = halves[own].T[..., None]
+        center, half = roots.mean(axis=1, keepdims=True), 0.5 * np.diff(roots)
+        fitted = chebyshev.chebfit(nodes, halved(
+            (center + half * nodes) ** 2, start, cut, end, change).T, terms - 1)
+        inputs = chebyshev.chebval(checked, fitted).clip(
+            np.minimum(start, cut), np.maximum(start, cut))
+        missed = np.abs(passed(inputs, end, change) - (center + half * checked) ** 2).max(
+            axis=1, keepdims=True)
+        enough = np.where(half > SHORT, close, max(close, CORRECTED))
+        # Beside an end of the reach a part may be as short as the rounding of its inputs.
+        is_done = ((missed * np.abs(change) <= enough * size) | (half < SHORTEST)
+                   | (np.abs(cut - start) < ROUNDING))[:, 0]
+        squares = roots ** 2
+        middle = change * squares.mean(axis=1, keepdims=True)
+        scale = 1.0 / (change * half * half)
+        pieces = np.hstack([
+            end + middle, 0.5 * np.abs(change) * np.diff(squares),
+            np.sort(halved(squares, start, cut, end, change)), scale, middle * scale,
+            center / half, fitted.T.round(17)])
+        rows = np.vstack([rows, pieces[is_done]])
+        ends = np.insert(roots[~is_done], [1], center[~is_done], axis=1)
+        roots = np.vstack([ends[:, :2], ends[:, 1:]])
+        own = np.tile(own[~is_done], 2)
+    return rows[rows[:, 2].argsort(kind='stable')]

@@ -10,20 +10,19 @@ exact Jacobians, efforts by their transposes, so that power is conserved.
 
 from __future__ import annotations
 
-from functools import partial
 from itertools import product
 import math
-from typing import Iterator, List, Optional, Sequence, Set, Tuple
+from typing import Iterator, List, Sequence, Set, Tuple
 
 import numpy as np
 
-from .axes import Axis, gears, loads, period, pieces, start
-from .code import Block, Code, indented
+from .axes import Axis, gears, loads, pieces, start
+from .code import Code, indented
 from .formulas import Formulas
 from .names import comment, filled, template
 from .series import series
 from ..formula.program import Program
-from ..linkage import Inverse, InverseLinkage, Mode
+from ..linkage import InverseLinkage, Mode
 from ..scene import SceneMechanism
 
 # Samples of each part of the reach, for the assembly modes that are there.
@@ -67,19 +66,18 @@ class Tables:
         `sides` are the actuators and the joints; an inverse alone has no actuators, and a `tag`
         at the end of its names.
         """
-        turn = self._turn(sides)
-        names, functions = zip(*(self._solutions(axes, turn) for axes in sides))
+        names, functions = zip(*map(self._solutions, sides))
         row, inputs = self._code.row, [*zip(self.mechanism.inputs.values(), self._units)]
         sweeps = ['{ -LKR_FAR, LKR_FAR }' if tag or not settings.ends else
                   row(np.divide(settings.ends, unit)) for settings, unit in inputs]
         return filled(template('model.h.in'), {
             'name': self.mechanism.name, 'tag': tag, 'number': self._code.number,
             'about': 'the inverse' if tag else 'the actuators and joints',
-            'n': len(self._sizes), 'is_rated': int(not tag), 'names': ', '.join(names),
+            'n': len(self._sizes), 'names': ', '.join(names),
             'solutions': '\n'.join(filter(None, functions)),
             'at': '\n'.join(indented(self._at(sides))),
             'actuators': self._rows(sides[0]), 'joints': self._rows(sides[1]),
-            'turns': ', '.join(row(self._turns(axes, turn)) for axes in sides),
+            'turns': ', '.join(row(self._turns(axes)) for axes in sides),
             'units': row(self._units), 'start': row(np.divide(
                 start(self.mechanism), self._sizes)),
             'sweeps': ', '.join(sweeps)})
@@ -89,7 +87,7 @@ class Tables:
         lines = [f'{self.mechanism.name}_pose s, {", ".join(self._formulas.by)};',
                  f'(void){self._formulas.call()};']
         for i, each in enumerate(axes):
-            lines += self._position(f'position[{i}]', each) + self._rates(f'rate[{i}]', each)
+            lines += self._assigned(each, f'position[{i}]', f'rate[{i}]')
         return filled(template('passive.h.in'), {
             'name': self.mechanism.name, 'number': self._code.number,
             'body': '\n'.join(indented(lines))})
@@ -104,34 +102,26 @@ class Tables:
         yield f'{self.mechanism.name}_pose s, {", ".join(formulas.by)};'
         yield from (f'if (!{formulas.call()}) {{', '    return 0;', '}')
         for place, each in places.items():
-            yield from self._position(f'p->position{place}', each)
-        yield 'if (is_rated) {'
-        for place, each in places.items():
-            yield from (f'    {line}' for line in self._rates(f'p->rate{place}', each))
+            yield from self._assigned(each, f'p->position{place}', f'p->rate{place}')
         # An inverse alone needs no efforts.
         powers = [*loads(self.mechanism)] if sides[0] else []
         for j, (by, unit) in enumerate(zip(formulas.by, self._units)):
             terms = [code.times(f'{by}.{formulas.fields[output]}',
                                 -load * unit / self.mechanism.scale_of(output))
                      for output, load in powers]
-            yield f'    p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
-        yield '}'
+            yield f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
         yield f'return isfinite({" + ".join(f"p->position{place}" for place in places)});'
 
-    def _position(self, place: str, axis: Axis) -> List[str]:
-        """Return the statements for the position of an axis."""
+    def _assigned(self, axis: Axis, position: str, rate: str) -> List[str]:
+        """Return the statements for the position of an axis, and its rates by each input."""
+        code, field = self._code, self._formulas.fields[axis.output]
         factor = axis.factor / self.mechanism.scale_of(axis.output)
-        value = self._code.times(f's.{self._formulas.fields[axis.output]}', factor)
-        offset = f' + {self._code.literal(axis.offset)}' if axis.offset else ''
-        return [f'{place} = {value}{offset};'] + [
-            f'{place} -= lkr_turns({place}, {self._code.literal(math.tau)});'] * axis.wraps
-
-    def _rates(self, place: str, axis: Axis) -> List[str]:
-        """Return the statements for the rates of an axis by each input."""
-        factor = axis.factor / self.mechanism.scale_of(axis.output)
-        field = self._formulas.fields[axis.output]
-        return [f'{place}[{j}] = {self._code.times(f"{by}.{field}", factor * unit)};'
-                for j, (by, unit) in enumerate(zip(self._formulas.by, self._units))]
+        offset = f' + {code.literal(axis.offset)}' if axis.offset else ''
+        return [
+            f'{position} = {code.times(f"s.{field}", factor)}{offset};',
+            *[f'{position} -= lkr_turns({position}, {code.literal(math.tau)});'] * axis.wraps,
+            *(f'{rate}[{j}] = {code.times(f"{by}.{field}", factor * unit)};'
+              for j, (by, unit) in enumerate(zip(self._formulas.by, self._units)))]
 
     # --- tables ---
 
@@ -148,56 +138,35 @@ class Tables:
             rows.append(f'{{ {scale}, {turn}, {i}, {", ".join(line)} }}')
         return ', '.join(rows) or '{ 0, 0, -1, 0, 0 }'
 
-    def _turn(self, sides: Tuple[Sequence[Axis], Sequence[Axis]]) -> float:
-        """Return after how much of the only input all that a pose has is the same, or infinity."""
-        inverses = [*filter(None, map(self._inverse, sides))]
-        if all(inverse.closed for inverse in inverses):
-            return math.inf
-        uncounted = [axes[k].output for axes in sides
-                     for k in sorted({*range(len(axes))} - gears(self.linkage, axes).keys())]
-        return period(self.linkage, [
-            *(output for output, _ in loads(self.mechanism) if sides[0]), *uncounted])
-
-    def _turns(self, axes: Sequence[Axis], turn: float) -> List[float]:
+    def _turns(self, axes: Sequence[Axis]) -> List[float]:
         """Return after how much of each input the positions of axes are the same, or 0."""
-        inverse = self._inverse(axes)
-        if inverse and not inverse.closed:
-            return [turn if turn < math.inf else 0.0]
         counted = {i for i, _, _ in gears(self.linkage, axes).values()}
-        # Outputs may repeat earlier than the linkage.
-        inputs = inverse.inputs if inverse else self.linkage.inputs
         return [input_.turn if input_.wraps and i not in counted else 0.0
-                for i, input_ in enumerate(inputs)]
+                for i, input_ in enumerate(self.linkage.inputs)]
 
     # --- inverses ---
 
-    def _inverse(self, axes: Sequence[Axis]) -> Optional[Inverse]:
-        """Return the inverse of axes, or None if each counts an input."""
-        if len(gears(self.linkage, axes)) == len(axes):
-            return None
-        return self.linkage.inverse(tuple(each.output for each in axes))
-
-    def _solutions(self, axes: Sequence[Axis], turn: float) -> Tuple[str, str]:
+    def _solutions(self, axes: Sequence[Axis]) -> Tuple[str, str]:
         """Return the name of the function for all inputs of outputs, and it, if it is new."""
-        inverse, outputs = self._inverse(axes), tuple(each.output for each in axes)
-        if not inverse:
+        outputs = tuple(each.output for each in axes)
+        if len(gears(self.linkage, axes)) == len(axes):
             return '0', ''
         name = '_'.join([f'{self.mechanism.name}_solutions', *(
             self._formulas.fields[output] for output in outputs)])
         if name in self._written:
             return name, ''
         self._written.add(name)
-        count, function = self._closed(name, inverse.closed, outputs) if inverse.closed else (
-            self._series(name, outputs[0], turn))
+        closed = self.linkage.inverse(outputs).closed
+        count, function = self._closed(name, closed, outputs) if closed else self._series(
+            name, *outputs)
         self.solutions = max(self.solutions, count)
         return name, function
 
-    def _series(self, name: str, output: str, turn: float) -> Tuple[int, str]:
+    def _series(self, name: str, output: str) -> Tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""
-        code, monotone = self._code, pieces(self.linkage, output, turn)
-        rows = [f'    {{ {", ".join(map(code.literal, numbers))}, '
-                f'{code.row(np.round(terms, 17))} }},' for part in monotone
-                for numbers, terms in series(self.linkage, output, part, code.single)]
+        code, monotone = self._code, pieces(self.linkage, output)
+        rows = [f'    {{ {", ".join(map(code.literal, row[:7]))}, {code.row(row[7:])} }},'
+                for row in series(self.linkage, output, monotone, code.single).tolist()]
         is_angle = self.linkage.is_angle(output)
         sizes = map(code.literal, (1.0 if is_angle else self.linkage.longest,
                                    math.tau if is_angle else 0.0))
@@ -217,16 +186,12 @@ class Tables:
         modes = self._modes_in_reach(outputs[0], closed)
         # If an input has a period of several turns, each turn has its own pose.
         turns = [*product(*closed.turns)]
-
-        def assigned(k: int, codes: List[str]) -> List[str]:
-            return [f'q[{k + j}][{i}] = ' + code.times(
-                f'({value} + {code.literal(turn)})' if turn else value, 1.0 / size) + ';'
-                for j, turned in enumerate(turns)
-                for i, (value, turn, size) in enumerate(zip(codes, turned, self._sizes))]
-
-        blocks = [Block(', '.join(
+        blocks = [(', '.join(
             f'{joint} {"left" if mode.linkage.branches[joint] > 0 else "right"}'
-            for joint in closed.branches), mode.inputs, partial(assigned, k * len(turns)))
+            for joint in closed.branches), {
+                f'q[{k * len(turns) + j}][{i}]': (value + turn) * (1.0 / size)
+                for j, turned in enumerate(turns)
+                for i, (value, turn, size) in enumerate(zip(mode.inputs, turned, self._sizes))})
             for k, mode in enumerate(modes)]
         count = len(modes) * len(turns)
         lines = '\n'.join(f'     {comment(line)}' for line in closed.lines)
@@ -235,13 +200,12 @@ class Tables:
             f'none:\n{lines}\n*/\nstatic inline int {name}(const {code.number} *value,\n'
             f'    {code.number} (*q)[LKR_MAX_INPUTS])',
             [f'value[{i}]' for i in range(len(outputs))],
-            [*blocks, Block('', (), lambda _: [f'return {count};'])], closed.arguments)
+            blocks, f'return {count};', closed.arguments)
 
     def _modes_in_reach(self, output: str, closed: InverseLinkage) -> Sequence[Mode]:
         """Return the assembly modes in which the linkage is anywhere in its reach, if known."""
         linkage, modes, (first, *others) = self.linkage, closed.modes, self.linkage.inputs
-        # Of very long periods only a part is computed.
-        if others or first.is_part:
+        if others:
             return modes
         parts, _ = linkage.monotone(output, math.inf)
         # Where the inverse linkage has a dead point of its own, the mode changes.
@@ -249,8 +213,6 @@ class Tables:
         inputs = np.ravel([low + steps * (high - low) for low, high, *_ in parts])
         starts = linkage.bind(Program([mode.inputs[0] for mode in modes], 1, closed.arguments)
                               ).over(linkage.posed((), (output,)).over(inputs)[0])
-        apart = np.nan_to_num(first.apart(np.add.outer(closed.turns[0], starts), inputs),
-                              nan=math.inf).min(axis=0)
-        is_there = (apart <= np.maximum(apart.min(axis=0), ALIKE * first.size)) & (
-            apart < math.inf)
-        return [mode for mode, any_ in zip(modes, is_there.any(axis=1)) if any_] or modes
+        apart = first.apart(np.add.outer(closed.turns[0], starts), inputs)
+        is_there = (apart <= ALIKE * first.size).any(axis=(0, 2))
+        return [mode for mode, any_ in zip(modes, is_there) if any_] or modes

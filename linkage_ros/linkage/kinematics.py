@@ -196,8 +196,8 @@ class Kinematics:
         Return the number of turns of an input after which the pose repeats: `inputs[by].period`.
 
         It is above one if the input drives cranks by fractional gears, or if it passes one change
-        point per turn, and infinite if a gear ratio is no fraction with a denominator up to
-        MOST_TURNS. With arrays of dimensions, change points are ignored.
+        point per turn, and infinite if a gear ratio is no fraction with a denominator up to a
+        million. With arrays of dimensions, change points are ignored.
         """
         return self.inputs[self._checked_by(by)].period
 

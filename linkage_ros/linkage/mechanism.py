@@ -115,11 +115,12 @@ class Mechanism(Kinematics):
         """
         fixed = self._fixed(others) if len(self.inputs) > 1 or others else ()
         inverse = self.inverse((output, *(input_.name for input_ in self.inputs[1:])))
+        values: Any = (value, *fixed)
         if near is not None:
-            return inverse.nearest((value, *fixed), (near, *fixed))[0][0]
+            return inverse.nearest(values, (near, *fixed))[0][0]
         if type(value) is not float and numbers('value', value).ndim:
-            return inverse.over(value, *fixed)[0][0]
-        found = inverse.all((value, *fixed))
+            return inverse.over(*values)[0][0]
+        found = inverse.all(values)
         return np.array([answer.inputs[0] for answer in found] or [math.nan])
 
     def _fixed(self, others: Any) -> Tuple[float, ...]:

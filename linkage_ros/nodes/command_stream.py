@@ -13,9 +13,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from . import joint_state_reader
 from .log import MAX_NAMES, Once, Throttle
-from .message_layout import unpack
+from .message_layout import subscribe, unpack
 from .messages import joint_states
 from .publishers import TrackedPublisher
 from ..scene.inverse_request import ActuatorCommand, InverseRequest
@@ -92,7 +91,7 @@ class CommandStream:
         self._mechanisms: Mapping[str, SceneMechanism] = {}
         self._last: dict[str, ActuatorCommand] = {}
         self._worker, self._newest = node.worker, JointTrajectory()
-        self._reader = joint_state_reader.subscribe(
+        self._reader = subscribe(
             node, 'wanted_states', self._interpret, self._receive)
         node.create_subscription(JointTrajectory, 'wanted_trajectory', node.guarded(
             'wanted_trajectory', self._receive_trajectory), 10)

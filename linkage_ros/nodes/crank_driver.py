@@ -28,7 +28,7 @@ MAX_PERIOD_NS = 1e18
 class CrankDriver(scene_node.SceneNode):
     """Publishes the scene's source joints on `crank_states`, as functions of the node's time."""
 
-    task = 'drives {mechanisms} on crank_states at {rate:g} Hz'
+    task = 'drives {mechanisms} at {rate:g} Hz'
     # System time [ns], used unless `use_sim_time` is set.
     system_time = staticmethod(time_ns)
 

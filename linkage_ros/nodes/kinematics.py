@@ -12,11 +12,11 @@ from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Sequence, Tu
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 
-from . import joint_state_reader, scene_node, shutdown
+from . import scene_node, shutdown
 from .log import MAX_NAMES, Once
 from .mechanism_model import MechanismModel
 from .mechanism_topics import MechanismTopics
-from .message_layout import NEVER
+from .message_layout import NEVER, subscribe
 from .scene_joint_states import SceneJointStates
 from .. import scene
 from ..robot_model import bodies, urdf
@@ -45,7 +45,7 @@ Routes = Tuple[List[InputSource], List[MechanismTopics]]
 class Kinematics(scene_node.SceneNode):
     """Solves mechanisms at the inputs from `crank_states`, only for topics with subscribers."""
 
-    task = 'moves {mechanisms} by crank_states'
+    task = 'moves {mechanisms}'
 
     def __init__(self, **kwargs: Any):
         self._mechanisms: Dict[str, MechanismTopics] = {}
@@ -59,6 +59,7 @@ class Kinematics(scene_node.SceneNode):
         self._scene_joint_states = SceneJointStates(self, self._inputs)
         self._mechanisms.update((name, MechanismTopics(self, mechanism))
                                 for name, mechanism in self.scene.mechanisms.items())
+        self._states_topic = self.resolve_topic_name('crank_states')
         # That of the last message that set an input.
         self._stamp = NEVER
         self._joint_names: frozenset = frozenset()
@@ -68,7 +69,7 @@ class Kinematics(scene_node.SceneNode):
             clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.begin()
         self._log_machine_code()
-        joint_state_reader.subscribe(self, 'crank_states', self._interpret, self._receive)
+        subscribe(self, 'crank_states', self._interpret, self._receive)
 
     def _log_machine_code(self) -> None:
         """Log why there is no machine code for the legs of walkers, if there is none."""
@@ -154,13 +155,22 @@ class Kinematics(scene_node.SceneNode):
         """Publish mechanisms at their present inputs, and the joint states of the scene."""
         in_scene = self._scene_joint_states.joint_states.has_subscribers
         # Solving all before publishing any takes less time: the caches of the CPU are small.
-        outgoing = [message for mechanism in moved for message in mechanism.outgoing(in_scene)]
+        outgoing = [message for mechanism in moved
+                    for message in self._alone(mechanism.outgoing, in_scene) or ()]
         if in_scene:
             outgoing += self._scene_joint_states.outgoing(self._stamp, tuple(
                 (mechanism.model, state) for mechanism in self._mechanisms.values()
-                if (state := mechanism.solved(in_scene))))
+                if (state := self._alone(mechanism.solved, in_scene))))
         for publish, data in outgoing:
             publish(data)
+
+    def _alone(self, solve: Callable[[bool], Any], in_scene: bool) -> Any:
+        """Solve a mechanism; report an internal error, which leaves the others alone."""
+        try:
+            return solve(in_scene)
+        except Exception as error:
+            self.report('crank_states', error)
+            return None
 
     def _interpret(self, message: JointState) -> Routes:
         """Return the inputs that a sender's messages set, and the mechanisms that they move."""
@@ -179,7 +189,7 @@ class Kinematics(scene_node.SceneNode):
                                     and name not in self._joint_names)
         if unknown:
             self.get_logger().warning(
-                f'crank_states: no input is called {listed(unknown, 150)}; the inputs are '
+                f'{self._states_topic}: no input is called {listed(unknown, 150)}; the inputs are '
                 f'{listed(self._inputs, 150)}{self._unknown.ending}')
 
     def _warn_of_missing(self) -> None:
@@ -189,8 +199,8 @@ class Kinematics(scene_node.SceneNode):
                    for mechanism, i in inputs if self._mechanisms[mechanism].inputs[i] is None}
         if waiting:
             self.get_logger().warning(
-                f'crank_states: no position of {listed(waiting, 150)} was received, without which '
-                f'{listed(dict.fromkeys(waiting.values()), 150)} cannot move')
+                f'{self._states_topic}: no position of {listed(waiting, 150)} was received, '
+                f'without which {listed(dict.fromkeys(waiting.values()), 150)} cannot move')
 
 
 def main(args: Any = None) -> int:

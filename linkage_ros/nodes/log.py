@@ -15,23 +15,24 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 
 RCLError = rclpy_implementation.RCLError
 InvalidHandle = rclpy_implementation.InvalidHandle
-# Shortest time between two warnings about one subject [s]; most subjects that are throttled; most
-# kinds of errors that are logged; unknown names after which further ones are not logged: a sender
-# that makes up names would fill the log.
-THROTTLE_S, MAX_SUBJECTS, MAX_ERRORS, MAX_NAMES = 5.0, 1000, 100, 20
+# Most subjects that are throttled; most kinds of errors that are logged; unknown names after which
+# further ones are not logged: a sender that makes up names would fill the log.
+MAX_SUBJECTS, MAX_ERRORS, MAX_NAMES = 1000, 100, 20
 
 
 class Throttle:
-    """Logs warnings, about each subject at most one in `THROTTLE_S`."""
+    """Logs warnings, about each subject at most one in some `seconds`."""
+
+    seconds = 5.0
 
     def __init__(self, logger: Any):
         self._logger = logger
         self._logged: Dict[Any, float] = {}
 
     def warn(self, subject: Any, text: Callable[[], str]) -> None:
-        """Log the result of `text`, unless the subject was logged within the last `THROTTLE_S`."""
+        """Log the result of `text`, unless the subject was logged within the last `seconds`."""
         now = time.monotonic()
-        if now < self._logged.get(subject, -math.inf) + THROTTLE_S:
+        if now < self._logged.get(subject, -math.inf) + self.seconds:
             return
         if len(self._logged) == MAX_SUBJECTS:
             self._logged.clear()

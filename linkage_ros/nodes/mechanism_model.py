@@ -22,8 +22,9 @@ from ..linkage import LinkPoint
 from ..robot_model import bodies, shapes, urdf
 from ..scene.legs import Solution
 
-# Cached messages: a walker's legs may leave their reach one by one, each with another message.
-MAX_MESSAGES = 128
+# Cached messages of a mechanism, and of a scene: legs of walkers may leave their reach one by one,
+# each with another message.
+MAX_MESSAGES = 32
 
 
 class AssemblyState(NamedTuple):
@@ -122,7 +123,11 @@ class MechanismModel:
             solution.parts['efforts'] = efforts
             is_finite = is_finite and all(map(math.isfinite, efforts))
         if not self._is_plain:
-            self._convert(solution.values, *self._conversions[solution.layout])
+            values, (factors, offsets, wrapped) = (
+                solution.values, self._conversions[solution.layout])
+            values *= factors
+            values += offsets
+            values[wrapped] -= math.tau * np.round(values[wrapped] / math.tau)
         within = self.assembly.within_reach(inputs[0]) if self.assembly.is_limited else ()
         return regular if is_finite and all(within) else self._check_assembly(regular, within)
 
@@ -140,16 +145,8 @@ class MechanismModel:
             regular.has_velocities and bool(np.isfinite(rates).all()),
             regular.has_efforts and bool(np.isfinite(parts['efforts']).all()))
 
-    def _convert(self, values: np.ndarray, factors: np.ndarray, offsets: np.ndarray,
-                 wrapped: np.ndarray) -> None:
-        """Convert joint values, in place, to their published signs, offsets and turns."""
-        with np.errstate(invalid='ignore'):
-            values *= factors
-            values += offsets
-            values[wrapped] -= math.tau * np.round(values[wrapped] / math.tau)
-
     def _conversion(self, layout: np.dtype) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the arguments of `_convert`: factors, offsets, and indices of angles to wrap."""
+        """Return factors and offsets of published values, and the indices of angles to wrap."""
         places = positions, *_ = self._places(layout)
         factors, offsets = np.ones(layout.itemsize // 8), np.zeros(layout.itemsize // 8)
         for indices in places:
@@ -203,7 +200,10 @@ class MechanismModel:
 def _shown(mechanism: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
     """Return the markers' points and, by marker id, the point indices of each line or plate."""
     linkage, names = mechanism.linkage, mechanism.points
-    cranks, plates, marks, drawn = ([], [], [], []) if mechanism.in_space else (
+    turned = {f'{name}_origin' for name in mechanism.inputs}
+    cranks, plates, marks, drawn = (
+        [bar for bar in linkage.bars if bar[0] in turned], [], [], []
+    ) if mechanism.in_space else (
         shapes.cranks(linkage), shapes.plates(linkage, names), shapes.marks(linkage, names),
         shapes.drawn(mechanism, names))
     # The edges of a plate are not drawn as bars, too: the message is smaller.

@@ -12,14 +12,11 @@ import numpy as np
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from .mechanism_model import AssemblyState, MechanismModel
+from .mechanism_model import AssemblyState, MAX_MESSAGES, MechanismModel
 from .message_layout import Outgoing, PatchedMessages
 from .messages import joint_states
 from .publishers import LATCHED, TrackedPublisher
 from ..cache import Cache
-
-# Cached messages: the legs of walkers may leave their reach one by one.
-MAX_MESSAGES = 16
 
 # The model and the state of each mechanism in a message.
 Parts = Tuple[Tuple[MechanismModel, AssemblyState], ...]

@@ -65,6 +65,8 @@ class SceneNode(Node):
 
     # What the node does, for its first log message.
     task = '{mechanisms}'
+    # Whether the executor awaits callbacks of services.
+    awaits = AWAITS
 
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
@@ -134,7 +136,7 @@ class SceneNode(Node):
         """Create a service; if its callback raises, the response is a failure with a reason."""
         if srv_type is SetParameters:
             callback = partial(self._set_parameters, callback)
-        is_in_turn = AWAITS and srv_type in (SetParameters, SetParametersAtomically)
+        is_in_turn = self.awaits and srv_type in (SetParameters, SetParametersAtomically)
         respond = partial(self._respond_in_turn if is_in_turn else self._respond, callback)
         return super().create_service(srv_type, srv_name, respond, **kwargs)
 

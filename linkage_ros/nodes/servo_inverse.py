@@ -12,8 +12,9 @@ from typing import Any, Callable, Dict, List, Mapping, Sequence, Tuple
 import numpy as np
 from sensor_msgs.msg import JointState
 
-from . import joint_state_reader, scene_node, shutdown
+from . import scene_node, shutdown
 from .command_stream import CommandStream
+from .message_layout import subscribe
 from .. import scene
 from ..cache import Cache
 from ..optional import needs
@@ -42,7 +43,7 @@ class ServoInverse(scene_node.SceneNode):
         self._requests = Cache(self._request)
         self._sources: frozenset = frozenset()
         self._positions: Dict[str, float] = {}
-        joint_state_reader.subscribe(self, 'crank_states', self._interpret, self._receive)
+        subscribe(self, 'crank_states', self._interpret, self._receive)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
         self.create_service(InputsFor, 'inputs_for', self.answer_inputs_for)
         self._stream = CommandStream(self, self.scene.mechanisms, lambda mechanism: present_inputs(

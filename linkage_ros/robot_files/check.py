@@ -151,7 +151,7 @@ class _Loops:
             self._ends[source] = max(low, ends[0]), min(high, ends[1])
         self._slack = MISFIT * max(made.slack for made in parts)
         self._allowed = (EXACT + self._slack) * component.size
-        self._pose = component.at_start()
+        self._pose = component.start
         self._misfit = component.errors(self._pose)[0]
 
     def report(self) -> str:

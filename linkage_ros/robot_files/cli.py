@@ -96,8 +96,7 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]
                     if not group.why:
                         raise
                     continue
-                placed = {joint.name for joint in part.joints}
-                joints = [joint for joint in joints if joint.name not in placed]
+                joints = [joint for joint in joints if joint not in part.joints]
             if joints:
                 imported.append(rods.described(robot, group._replace(joints=joints), imported))
         except (ArithmeticError, ValueError) as error:

@@ -111,14 +111,10 @@ def _closed(robot: Robot, seed: int) -> Closed:
     return made._replace(robot=displaced(robot, moves, positions))
 
 
-def option(word: str, values: Iterable[str]) -> str:
-    """Return an option of a command line, to be pasted."""
-    return f'--{word} {shlex.join(values)}'
-
-
-def added(*options: str) -> str:
-    """Return what to do with options of which one leads on; a word follows each, and no stop."""
-    return f'add {" or ".join(options)} to the command'
+def _added(*options: Tuple[str, Iterable[str]]) -> str:
+    """Return which option to paste, by word and values; a word follows each, and no stop."""
+    return 'add ' + ' or '.join(
+        f'--{word} {shlex.join(values)}' for word, values in options) + ' to the command'
 
 
 def _check_driven(component: Component, pose: np.ndarray, motors: List[str], followers: List[str]
@@ -134,7 +130,7 @@ def _check_driven(component: Component, pose: np.ndarray, motors: List[str], fol
     if count < len(motors):
         raise NotDriven(
             f'{listed(motors)} drive it, and hold each other, as {count} of them tell where all '
-            f'is: {added(option("driven", chosen))}')
+            f'is: {_added(("driven", chosen))}')
     loose, motions = component.loose(pose, motors + followers)
     if not loose:
         return
@@ -146,8 +142,7 @@ def _check_driven(component: Component, pose: np.ndarray, motors: List[str], fol
     raise NotDriven(
         f'not driven: {len(more)} of {listed(loose)} must be moved, named by --driven, or held, '
         'named by --hold: '
-        + added(option('driven', [*motors, *more]),
-                option('hold', (f'{name}={at[name]}' for name in more)))
+        + _added(('driven', [*motors, *more]), ('hold', (f'{name}={at[name]}' for name in more)))
         + f'; the limits of {listed(stiff)} leave no range' * bool(stiff))
 
 
@@ -156,8 +151,8 @@ def _choice(questions: Sequence[Question], why: str) -> ValueError:
     texts, *sides = zip(*questions)
     poses = [{name: value for side in choices for name, value in side.items()}
              for choices in sides]
-    return ValueError(f'{why} {", and ".join(texts)}: ' + added(*(
-        option('pose', (f'{name}={value}' for name, value in pose.items())) for pose in poses)))
+    return ValueError(f'{why} {", and ".join(texts)}: ' + _added(*(
+        ('pose', (f'{name}={value}' for name, value in pose.items())) for pose in poses)))
 
 
 def _question(component: Component, poses: np.ndarray, which: np.ndarray,
@@ -219,7 +214,7 @@ def nearest(component: Component, motors: List[str], followers: List[str], seed:
     joint but these are closed on their own. Raises ValueError with all loops of which two poses
     are equally near.
     """
-    start, fixed = component.at_start(), component.is_of(motors)
+    start, fixed = component.start, component.is_of(motors)
     gap = float(component.gap(start)[0])
     # Slightly inclined axes must not move undriven joints far.
     poses = component.closed(start, fixed, soft=1e-7)

@@ -19,25 +19,22 @@ Element = ElementTree.Element
 
 def parse(path: str) -> Element:
     """Return the root element of a file; names lose the prefix of their namespace."""
+    # Files use prefixes, such as Drake's, without declaring them, which ElementTree refuses.
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
-    has_xacro = False
-
-    def start(tag: str, attributes: Dict[str, str]) -> None:
-        nonlocal has_xacro
-        has_xacro |= tag.startswith('xacro:') or any('${' in text for text in attributes.values())
-        builder.start(tag.split(':')[-1], attributes)
-
-    parser.StartElementHandler = start
-    parser.EndElementHandler = lambda tag: builder.end(tag.split(':')[-1])
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
     try:
         with open(path, 'rb') as file:
             parser.Parse(file.read(), True)
     except (expat.ExpatError, LookupError, ValueError) as error:
         raise RequestError(f'{path} is no XML: {error}') from None
-    if has_xacro:
-        raise RequestError(f'{path} is xacro: run xacro first, as in xacro {path} > robot.urdf')
-    return builder.close()
+    root = builder.close()
+    for part in root.iter():
+        if part.tag.startswith('xacro:') or any('${' in text for text in part.attrib.values()):
+            raise RequestError(f'{path} is xacro: run xacro first, as in xacro {path} > '
+                               'robot.urdf')
+        part.tag = part.tag.split(':')[-1]
+    return root
 
 
 def once(parts: Iterable[Tuple[str, Element]]) -> Dict[str, Element]:

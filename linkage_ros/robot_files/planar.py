@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 import math
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Set, Tuple
+from typing import Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from ..linkage import (
     bar_name,
     Dyads,
     Hinge,
-    Mechanism,
     Motor,
     Pin,
     ROUNDING,
@@ -76,8 +75,6 @@ class Drawing(Dyads):
         self._robot = robot
         self._flatten(group, drives)
         self.drives: List[check.Source] = []
-        # Tips of triangles that are a dyad: they turn with a link of their own.
-        self._tips: Set[str] = set()
         self.driven = [joint for joint in self.joints if joint.name in drives]
         places = [place for joint in self.joints for place in joint.places]
         size = max(abs(place - other) for place in places for other in places)
@@ -122,16 +119,14 @@ class Drawing(Dyads):
         self.frame = at(base[:3, :3].T @ (origin.places[0] - base[:3, 3]), turned)
         seen = np.linalg.inv(base @ self.frame)
         self.joints: List[Joint] = []
+        self.gap = 0.0
         for joint in group.joints:
-            first, second = ((seen @ [*place, 1.0])[:2] for place in joint.places)
-            axis = seen[:3, :3] @ joint.axis
-            way = complex(*axis[:2])
-            self.joints.append(replace(
-                joint, places=(complex(*first), complex(*second)),
-                axes=[way / abs(way) if joint.kind == SLIDE else float(np.sign(axis[2]))] * 2))
-        gaps = ((joint.places[1] - joint.places[0], joint) for joint in self.joints)
-        self.gap = max(abs((apart / joint.axis).imag if joint.kind == SLIDE else apart)
-                       for apart, joint in gaps)
+            first, second = (complex(*(seen @ [*place, 1.0])[:2]) for place in joint.places)
+            axis, slides = seen[:3, :3] @ joint.axis, joint.kind == SLIDE
+            along = complex(*axis[:2]) / np.hypot(*axis[:2]) if slides else float(np.sign(axis[2]))
+            self.joints.append(replace(joint, places=(first, second), axes=[along] * 2))
+            apart = second - first
+            self.gap = max(self.gap, abs((apart / along).imag if slides else apart))
         self.measured = [joint for joint in self.joints if joint.position is not None]
         self.still: List[str] = []
         up = hinges[0].axis
@@ -148,27 +143,12 @@ class Drawing(Dyads):
                     axes=[sign * float(np.sign(hinge.axis @ up))] * 2))
                 self.still += [other.name for other, _ in joint.chain if other is not hinge]
 
-    @property
-    def allowed(self) -> float:
-        """Return the allowed distance of a pose from the file's, of the size."""
-        return max(ROUNDING, 30.0 * self.gap / self.size + self.lean)
-
-    @property
-    def places(self) -> Iterator[Pin]:
-        """Return the places of the lines' joints, on each of their bodies, in the file's pose."""
-        return (pin for body in self.parts for pin in self.on[body].items())
-
-    @property
-    def linkage(self) -> Mechanism:
-        """Return the linkage of the lines."""
-        return mechanisms.create('custom', joints=self.lines)
-
-    def apart(self, linkage: Mechanism, *names: str) -> float:
-        """Return the largest distance of joints from the file's pose, of the linkage's size."""
-        values = [drive.value for drive in self.drives]
-        places = linkage.solve(theta_of(values))
-        return float(np.max([abs(complex(*places[name]) - place) for name, place in self.places
-                             if name in (names or places)])) / self.size
+    def is_in_pose(self, name: str) -> bool:
+        """Return whether a joint of the lines is where the file has it."""
+        linkage = mechanisms.create('custom', joints=self.lines)
+        place = linkage.solve(theta_of([drive.value for drive in self.drives]), name)[name]
+        near = self.size * max(ROUNDING, 30.0 * self.gap / self.size + self.lean)
+        return all(abs(complex(*place) - on[name]) < near for on in self.on.values() if name in on)
 
     def measured_by(self, joint: Joint) -> Tuple[str, float, float]:
         """
@@ -189,34 +169,29 @@ class Drawing(Dyads):
             return part.link, sign, way.real
         pin = self.joint_at(child, joint.places[1]) or ''
         base, body = (parent, child) if self.placed_on[pin] == parent else (child, parent)
-        if self.placed_on[pin] != base:
-            return self._between(pin, parent, child, joint)
         link, hangs, along, slide, _ = self.parts[body]
-        if not link or hangs != pin or slide:
-            # The angle of a triangle on this link is the angle between the two links.
-            tip = self._triangle(body, pin, 'dyad')
-            self._tips.add(tip)
-            along = self.on[body][tip] - self.on[body][pin]
-            link = bar_name(pin, tip)
+        if self.placed_on[pin] != base or hangs != pin or slide or not link:
+            link, along = self._measuring(pin, base, body)
         return link, joint.motion(body), phase(along / self.parts[base].along)
 
-    def _triangle(self, body: str, pin: str, word: str = 'rigid') -> str:
-        """Add a joint to a body, the tip of an equilateral triangle on a joint, by a line."""
-        start, (other, end) = self.on[body][pin], self.other(body, pin)
-        side = self.length_text(abs(end - start))
-        return self.name(start + (end - start) * complex(0.5, 0.75 ** 0.5), body,
-                         f'{word} {pin} {other} {side} {side} left')
-
-    def _between(self, pin: str, base: str, body: str, joint: Joint) -> Tuple[str, float, float]:
-        """Return the link of an angle between two bodies that turn on a pin of a third one."""
-        # A bar parallel to the one body that hangs on the other.
-        tip, end = self.other(body, pin)
-        aside = next((name for name in self.on[base]
-                      if self.placed_on[name] == base and name not in self._tips), '') \
-            or self._triangle(base, pin)
-        along = end - self.on[body][pin]
-        name = self.name(self.on[base][aside] + along, body, f'parallelogram {pin} {aside} {tip}')
-        return bar_name(aside, name), joint.motion(body), phase(along / self.parts[base].along)
+    def _measuring(self, pin: str, base: str, body: str) -> Tuple[str, complex]:
+        """Add a bar that turns on one body as another does; return its link and direction."""
+        (other, end), start = self.other(body, pin), self.on[body][pin]
+        along = end - start
+        corner = along * complex(0.5, 0.75 ** 0.5)
+        if self.placed_on[pin] == base:
+            # A triangle that is a dyad, so that it hangs on the pin.
+            side, foot, along = self.length_text(abs(along)), pin, corner
+            line = f'dyad {pin} {other} {side} {side} left'
+        else:
+            # Of three bodies on a pin, a bar parallel to that of one, on another one.
+            foot = next((name for name in self.on[base] if self.placed_on[name] == base), '') \
+                or self.fixed(base, self.on[base][pin] + corner)[0]
+            line = f'parallelogram {pin} {foot} {other}'
+        name = self.name(self.on[base][foot] + along, body, line)
+        # It is on a link of its own: nothing of the body is to be placed from it.
+        del self.on[body][name]
+        return bar_name(foot, name), along
 
     def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> Tuple[str, str]:
         """Add an input, as `Dyads` requires; inputs of one source are geared to the first."""
@@ -240,7 +215,7 @@ class Drawing(Dyads):
     def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
         """Return the start of a line for bars that mirror others, and so pass dead points."""
         (first, start), (second, end) = one, two
-        for corner, there in self.places:
+        for corner, there in [pin for body in self.parts for pin in self.on[body].items()]:
             links = [{body for body in self.parts
                       if {corner, name} <= self.on[body].keys()} for name in (first, second)]
             if corner in (first, second) or not all(links) or links[0] == links[1]:
@@ -257,17 +232,16 @@ class Drawing(Dyads):
 
 def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
               ) -> check.Imported:
-    """
-    Return a mechanism.
-
-    Raises ValueError for loops that are no dyads, or whose pose is another than the robot's.
-    """
+    """Return a mechanism; raise ValueError for loops that are no dyads."""
     drawing = _drawn(robot, group)
-    name = check.name_beside(others, plain(drawing.driven[0].name, 60))
-    parameters = _parameters(drawing, name)
-    mechanism = scene.read({'mechanisms': [name], **parameters}).mechanisms[name]
-    if not any(called.published for called in mechanism.joints.values()):
+    joints = _joints(drawing) if drawing.drives else []
+    if not joints:
         raise NotDriven(_why(drawing))
+    name = check.name_beside(others, plain(drawing.driven[0].name, 60))
+    parameters = check.parameters(
+        name, 'custom', drawing.lines, drawing.drives, joints, frame_id=drawing.ground,
+        pose=[float(short(value)) for value in coordinates(drawing.frame)])
+    mechanism = scene.read({'mechanisms': [name], **parameters}).mechanisms[name]
     limits, reports = robot.limits(drawing.driven)
     if drawing.left:
         reports.append(f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.')
@@ -280,7 +254,6 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
                 low, high = sweep = _sweep(
                     drive, limits[drive.source], mechanism.inputs[drive.name])
                 parameters[f'{name}.{drive.name}.sweep'] = [*sweep]
-                parameters[f'{name}.{drive.name}.start'] = min(max(drive.value, low), high)
             except ValueError as error:
                 low_limit, high_limit = limits[drive.source]
                 reports.append(f'Left out: the limits of {drive.source}, from {low_limit:.4g} to '
@@ -289,8 +262,6 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
         low, high = sorted((end - drive.offset) / drive.ratio for end in (
             max(low, start - 2.0 * around), min(high, start + 2.0 * around)))
         ends[drive.source] = low, high
-    if drawing.apart(mechanism.linkage) > drawing.allowed:
-        raise ValueError('it has another pose than the robot, which is nearly stretched or folded')
     slack = drawing.lean + drawing.gap / drawing.size
     if slack > EXACT:
         reports.append(f'Warning: the file is not exact: axes lean by {drawing.lean:.2g} rad, and '
@@ -302,16 +273,15 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
 def _sweep(drive: check.Source, limits: Tuple[float, float], settings: scene.InputSettings
            ) -> Tuple[float, float]:
     """Return the limits of an input within its reach; raise ValueError if it has no such ends."""
-    low, high = (float(short(end, 1e-15)) if abs(end) < FARTHEST else math.copysign(math.inf, end)
-                 for end in (drive.ratio * end + drive.offset
-                             for end in limits[::1 if drive.ratio > 0.0 else -1]))
+    low, high = (float(short(drive.ratio * end + drive.offset, 1e-15))
+                 for end in limits[::1 if drive.ratio > 0.0 else -1])
     for start, end in () if settings.input.is_whole(settings.reach) else settings.reach:
         turns = math.tau * math.floor((drive.value - start) / math.tau) * settings.input.turns
         if start + turns <= drive.value <= end + turns:
             # An end that is a dead point is not quite reached.
             edge = ROUNDING * (end - start)
             low, high = max(low, start + turns + edge), min(high, end + turns - edge)
-    if not low + 1e-6 * settings.input.size < high < low + math.inf:
+    if not -FARTHEST < low < high - 1e-6 * settings.input.size < FARTHEST:
         raise ValueError('its loops do not reach them')
     return low, high
 
@@ -334,12 +304,10 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
         if not drawings[-1].left:
             break
     best = min(drawings, key=lambda drawing: len(drawing.left))
-    if not best.drives:
-        raise NotDriven(_why(best) if best.left else 'no motor moves it')
-    for i, line in enumerate(best.lines):
-        # At a change point the side in this pose may be the wrong one.
+    for i, line in enumerate(best.lines if best.drives else ()):
+        # With a change point, the side in this pose may be the wrong one.
         name, *_, side = line.split()
-        if side in _OTHER and not best.apart(best.linkage, name) < best.allowed:
+        if side in _OTHER and not best.is_in_pose(name):
             best.lines[i] = line[:-len(side)] + _OTHER[side]
     return best
 
@@ -349,12 +317,6 @@ def _why(drawing: Drawing) -> str:
     holders = [joint for joint in drawing.joints if {*joint.bodies} & {*drawing.left}]
     freedom = 3 * len(drawing.left) - 2 * len(holders) - sum(
         joint in drawing.driven for joint in holders)
-    between = [joint.name for joint in holders if joint in drawing.driven
-               and {*joint.bodies} <= {*drawing.left}]
-    if between and freedom <= 0:
-        return f'not of dyads, as {", ".join(between)} drives between two of them'
-    if all(_is_ring(drawing, body, holders) for body in drawing.left):
-        return 'idle, as it only turns about a pin of other bodies'
     if freedom < 0:
         return 'held more than once by ' + ', '.join(
             joint.name for joint in holders if joint.position is not None)
@@ -362,25 +324,17 @@ def _why(drawing: Drawing) -> str:
             'bars (an Assur group of class III or higher)')
 
 
-def _is_ring(drawing: Drawing, body: str, holders: Sequence[Joint]) -> bool:
-    """Return whether the joints of a body are hinges at one place, about which it turns."""
-    places = [joint.place(body) for joint in holders if body in joint.bodies]
-    return all(joint.kind == HINGE for joint in holders) and max(
-        abs(place - places[0]) for place in places) < drawing.near
-
-
-def _parameters(drawing: Drawing, name: str) -> Dict[str, Any]:
+def _joints(drawing: Drawing) -> List[Tuple[str, float, str, float]]:
+    """Return the link, the sign, the name and the position of each joint that links measure."""
     measured = []
     for joint in drawing.measured:
         with suppress(ValueError):
             if joint not in drawing.driven:
                 measured.append((joint, *drawing.measured_by(joint)))
-    links = {link.name: link for link in drawing.linkage.links}
+    links = {link.name: link for link in mechanisms.create('custom', joints=drawing.lines).links}
     joints = []
     for joint, link, sign, angle in measured:
         if links[link].kind != 'prismatic':
             angle = math.remainder(angle - float(np.asarray(links[link].zero)), math.tau)
         joints.append((link, sign, joint.name, joint.start - sign * angle))
-    return check.parameters(
-        name, 'custom', drawing.lines, drawing.drives, joints, frame_id=drawing.ground,
-        pose=[float(short(value)) for value in coordinates(drawing.frame)])
+    return joints

@@ -57,7 +57,7 @@ def description(path: str, robot: Robot) -> str:
 def drawn(robot: Robot) -> bodies.Model:
     """Return the tree of a robot as a model that is written, its joints at zero."""
     at_zero = dict.fromkeys(robot.positions.keys() & robot.tree_joints, 0.0)
-    return bodies.Model('robot', robot.root, [bodies.Part(posed(robot, at_zero))])
+    return bodies.Model('robot', robot.root, [posed(robot, at_zero)])
 
 
 @contextmanager

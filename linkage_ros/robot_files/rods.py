@@ -52,8 +52,7 @@ class Rods:
         self._ends: Dict[str, str] = {}
         self.rods: List[str] = []
         self.drives: List[check.Source] = []
-        # Hinges of universal joints, whose limits do not count, and third hinges, which stay.
-        self.universals: Set[str] = set()
+        # Third hinges of balls, which stay.
         self.still: List[str] = []
         self._names: Set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
         rods = {body: tuple(held) for body, held in _on_bodies(group.joints).items()
@@ -95,15 +94,15 @@ class Rods:
     def _add(self, joint: Joint) -> None:
         """Add a link, and its joint with a link that is there."""
         base, body = sorted(joint.bodies, key=self._bodies.__contains__, reverse=True)
-        if joint.kind not in (HINGE, SLIDE):
-            raise ValueError(f'{joint.name} is a joint of type {joint.kind} and no end of a rod')
+        is_driven = joint.name in self._driven
+        if joint.kind != HINGE and (is_driven or joint.kind != SLIDE):
+            raise ValueError(f'{joint.name} is a joint of type {joint.kind}, no end of a rod and '
+                             'no cylinder')
         name = self._bodies[body] = self._named(joint)
         self.links[name] = joint
         self._ends[name] = (f'{self._bodies[base]} at {self._text(joint.place(base))} axis '
                             f'{self._text(joint.motion(body), False)}')
-        if joint.name in self._driven:
-            if joint.kind != HINGE:
-                raise ValueError(f'{joint.name} drives, and is no hinge and no cylinder')
+        if is_driven:
             self.drives.append(check.Source(name, joint.name, 1.0, 0.0 - joint.start, 0.0))
 
     def _end(self, joint: Joint, body: str) -> str:
@@ -141,8 +140,8 @@ class Rods:
             link = self._bodies[base]
             for hinge, axis, mark in zip((first, second), axes, marks):
                 name = self._named(hinge)
-                self.links[name] = hinge
-                self.universals.add(name)
+                # The limits of a rod's hinges do not count.
+                self.links[name] = replace(hinge, limits=None)
                 self._ends[name] = f'{link} at {self._text(place)} axis {self._text(axis, False)}'
                 link = name
                 self.rods.append(
@@ -168,7 +167,7 @@ class Rods:
         lines, motors = [], {drive.name for drive in self.drives}
         for name, joint in self.links.items():
             within = ''
-            if name not in motors | self.universals:
+            if name not in motors:
                 # Relative to the pose of the robot.
                 low, high = limits.get(name) or (end - joint.start for end in joint.range)
                 widest = math.inf if joint.kind == SLIDE else _ANY
@@ -204,12 +203,6 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
         angles = ' (angles from the pose of the file)' * (' at ' in error.problem)
         reports.append(f'Limits: {error.problem}{angles}; these are the largest proved to have '
                        f'one pose at most: {ranges}.')
-    for link, joint in made.links.items():
-        low, high = joint.range
-        why = joint.no_limits or f'from {low:.4g} to {high:.4g}: it has no end there' * bool(
-            joint.limits and math.isinf(high - low))
-        if why and joint.name not in sources and link not in made.universals:
-            reports.append(f'Left out: the limits of {joint.name}, {why}.')
     name = check.name_beside(others, f'{made.drives[0].name}_rods')
     parameters = check.parameters(name, 'rods', lines, made.drives, [
         (link, 1.0, joint.name, joint.start) for link, joint in made.links.items()
@@ -218,9 +211,7 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
     ends = {}
     for drive, (low, high) in zip(mechanism.inputs.values(), _sweeps(mechanism, limits)):
         ends[drive.source] = low - drive.offset, high - drive.offset
-        key = f'{name}.{drive.input.name}'
-        parameters[f'{key}.sweep'] = [float(short(low)), float(short(high))]
-        parameters[f'{key}.start'] = min(max(drive.start, low), high)
+        parameters[f'{name}.{drive.input.name}.sweep'] = [float(short(low)), float(short(high))]
     return check.Imported(name, parameters, reports, [*ends], ends, still=made.still)
 
 

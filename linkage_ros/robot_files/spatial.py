@@ -87,6 +87,8 @@ class Component:
         A radian, or the size, for each screw.
     named : dict
         The screw of each joint of the tree that has a position.
+    start : array
+        The pose of the file.
 
     """
 
@@ -124,6 +126,7 @@ class Component:
                         for key in ('axis', 'place'))
         self._twists = screws(axes, places, self._slides)
         self.unit = np.where(self._slides, self.size, 1.0)
+        self.start = np.zeros((1, len(self._screws)))
         self._set_equations(last, above)
 
     def _motions(self, joint: Joint, body: str) -> List[Tuple[str, np.ndarray]]:
@@ -162,10 +165,6 @@ class Component:
     def cut_names(self) -> Set[str]:
         """Names of the hinges that close its loops, whose angles `read` returns."""
         return {cut.name for cut in self._cuts if cut.position is not None and cut.kind == HINGE}
-
-    def at_start(self) -> np.ndarray:
-        """Return the pose of the file."""
-        return np.zeros((1, len(self._screws)))
 
     def is_of(self, names: Sequence[str]) -> np.ndarray:
         """Return which screws are of the joints that are named."""

@@ -28,7 +28,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from . import shapes
-from .robot import Body, FIXED, HINGE, posed, Robot, SLIDE
+from .robot import HINGE, posed, Robot, SLIDE
 from .shapes import BALL, BOX, CYLINDER, Piece, Place, weight
 from .. import palette
 from ..linkage import Arc, extremes, GROUND, Leg, Link, Mechanism
@@ -55,22 +55,6 @@ DENSITY = 2700.0
 SLACK = 1e-6
 
 
-@dataclass(eq=False)
-class Part:
-    """The robot of one mechanism, whose root stands on a link of another; or that of a file."""
-
-    robot: Robot
-    base: str = ''
-    pose: Sequence[float] = ()
-    mechanism: Any = None
-
-    def bodies(self) -> Iterator[Body]:
-        """Yield its bodies, parents first, with the root if it stands on a link."""
-        if self.base:
-            yield Body(self.robot.root, self.base, self.pose)
-        yield from self.robot.bodies()
-
-
 @dataclass
 class Model:
     """
@@ -78,8 +62,8 @@ class Model:
 
     Attributes
     ----------
-    parts : list of Part
-        The robot of each mechanism.
+    parts : list of Robot
+        That of each mechanism, or that of a file.
     density : float
         Of all bodies [kg/m^3], for a simulation.
 
@@ -87,7 +71,7 @@ class Model:
 
     name: str
     root: str
-    parts: List[Part]
+    parts: List[Robot]
     density: float = 0.0
 
 
@@ -111,12 +95,8 @@ def robot(mechanisms: Iterable[SceneMechanism], frame_id: str,
         If the links would not form a tree, or the longest bar is out of range.
 
     """
-    models = []
-    for mechanism in mechanisms:
-        base = mechanism.frame_id or frame_id
-        part = Part(_Tree(mechanism, width).robot, base, mechanism.pose, mechanism)
-        models.append(Model(mechanism.name, base, [part]))
-    return merged(models)
+    return merged([Model(mechanism.name, base, [_Tree(mechanism, base, width).robot])
+                   for mechanism in mechanisms for base in [mechanism.frame_id or frame_id]])
 
 
 def merged(models: Sequence[Model]) -> Model:
@@ -126,7 +106,7 @@ def merged(models: Sequence[Model]) -> Model:
     They must have the same root link, or the root of one must be a link of another.
     """
     parts = [part for model in models for part in model.parts]
-    below = {link: part.base for part in parts for link in part.robot.frames}
+    below = {link: part.base for part in parts for link in part.frames}
     # From the base of each part the bases below it, up to the last.
     lines = {part.base: [part.base] for part in parts}
     for line in lines.values():
@@ -136,8 +116,8 @@ def merged(models: Sequence[Model]) -> Model:
     if more or root in below:
         raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
                          f'link of another one of them, not {listed(bases, 120)}')
-    roots = [part.robot.root for part in parts]
-    joints = [joint for part in parts for joint in part.robot.joints]
+    roots = [part.root for part in parts]
+    joints = [joint for part in parts for joint in part.joints]
     for tag, names in (('link', [root, *roots, *(joint.bodies[1] for joint in joints)]),
                        ('joint', [*map('{}_fixed'.format, roots),
                                   *(joint.name for joint in joints)])):
@@ -163,7 +143,7 @@ def size(mechanism: SceneMechanism) -> float:
 class _Tree:
     """The bodies of a mechanism: ground, the root, crank and legs, in `robot`."""
 
-    def __init__(self, mechanism: SceneMechanism, width: Optional[float]):
+    def __init__(self, mechanism: SceneMechanism, base: str, width: Optional[float]):
         mechanism.check_planar()
         length = size(mechanism)
         self._length = length if width is None else width / WIDTH
@@ -178,7 +158,8 @@ class _Tree:
         if len(legs) == 1:
             self._travels.update(_input_travels(mechanism))
         ground = self._body('', GROUND)
-        self.robot = Robot(ground, {ground: np.eye(4)}, pieces={ground: []})
+        self.robot = Robot(ground, {ground: np.eye(4)}, pieces={ground: []}, base=base,
+                           pose=mechanism.pose, mechanism=mechanism)
         self._shared = mechanism.linkage.links[0] if len(legs) > 1 else None
         if self._shared:
             self._hang('', 1.0, self._shared)
@@ -261,13 +242,11 @@ def _input_travels(mechanism: SceneMechanism) -> Dict[str, Arc]:
     """Return the outermost ends of each input's reach that is no full rotation."""
     ends: Dict[str, Arc] = {}
     for name, settings in mechanism.inputs.items():
-        arcs, sweep = settings.reach, settings.sweep
-        if not settings.input.is_whole(arcs):
-            low, high = min(low for low, _ in arcs), max(high for _, high in arcs)
+        if settings.sweep and not settings.input.is_whole(settings.reach):
+            low, high = np.min(settings.reach), np.max(settings.reach)
             # A crank's angle is in the turn of its sweep.
-            turns = math.tau * math.floor((sweep[1] - low) / math.tau) if (
-                sweep and settings.input.turns) else 0.0
-            ends[name] = low + turns, high + turns
+            turns = math.tau * ((settings.sweep[1] - low) // math.tau) * settings.input.turns
+            ends[name] = float(low + turns), float(high + turns)
     return ends
 
 
@@ -313,10 +292,10 @@ def assembled(model: Model, density: float = DENSITY) -> Model:
     raises SceneError if there is no pose.
     """
     return replace(model, density=density, parts=[
-        replace(part, robot=_started(part, density)) for part in model.parts])
+        _started(part, density) for part in model.parts])
 
 
-def _started(part: Part, density: float) -> Robot:
+def _started(part: Robot, density: float) -> Robot:
     """Return the robot of a mechanism at the start of its inputs, with motors and gears."""
     mechanism, joints = part.mechanism, part.mechanism.joints
     assembly, linkage, inputs = mechanism.assembly(), mechanism.linkage, mechanism.inputs
@@ -334,14 +313,11 @@ def _started(part: Part, density: float) -> Robot:
         raise SceneError(f'{keys} must be where {mechanism.name} can be assembled, not at '
                          f'{", ".join(f"{start:g}" for start in starts)}')
     positions = {joints[name].name: joints[name].of(value) for name, value in values.items()}
-    robot = replace(part.robot, pieces={**part.robot.pieces}, meets={**part.robot.meets},
+    robot = replace(part, pieces={**part.pieces}, meets={**part.meets},
                     driven=[], servos={}, follows={})
     robot = posed(robot, {name: positions[name] for name in robot.positions})
     _add_slots(mechanism, robot)
-    still = {robot.root, *(joint.bodies[1] for joint in robot.joints
-                           if joint.kind == FIXED and joint.bodies[0] == robot.root)}
-    mass = sum(weight(pieces, density)[0] for body, pieces in robot.pieces.items()
-               if pieces and body not in still)
+    mass = sum(weight(pieces, density)[0] for pieces in robot.pieces.values() if pieces)
     tips = {link.name: link.tip for link in linkage.links}
     for name in inputs:
         joint, arm = joints[name], mechanism.scale * math.hypot(*linkage.frames[name][tips[name]])

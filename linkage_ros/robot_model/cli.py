@@ -19,7 +19,23 @@ def main(args: Optional[Sequence[str]] = None) -> int:
 
 def show(args: Optional[Sequence[str]], given_scene: Optional[scene.Scene] = None) -> None:
     """Print the model that a command line requests, of its scene or of the one from ROS."""
-    options = parser().parse_args(args)
+    parser = cli.Parser(
+        NAME, description='Print the robot model of a scene.',
+        epilog='`ros2 run linkage_ros urdf` also accepts the scene as a node does: '
+               '--ros-args --params-file SCENE')
+    positive = cli.within(float, bodies.SMALLEST, bodies.LARGEST)
+    cli.add_scene(parser, nargs='?', help="the scene's parameter file (default: the "
+                                          "catalogue's linkages)")
+    parser.add_argument('--format', choices=('urdf', 'sdf', 'mjcf'), default='urdf',
+                        help='a tree for robot_state_publisher, or closed loops for Gazebo or '
+                             'MuJoCo (default: urdf)')
+    parser.add_argument('--width', type=positive, metavar='M',
+                        help='thickness of a bar, with all other shapes in proportion (default: a '
+                             '40th of the longest)')
+    parser.add_argument('--density', type=positive, metavar='KG/M3',
+                        help='density of all bodies of sdf and mjcf '
+                             f'(default: {DENSITY:g}, aluminium)')
+    options = parser.parse_args(args)
     if given_scene and options.scene:
         raise cli.RequestError('give the scene either as SCENE or with --ros-args, not both')
     shown = given_scene or (scene.load(options.scene) if options.scene else scene.read({}))
@@ -30,24 +46,3 @@ def show(args: Optional[Sequence[str]], given_scene: Optional[scene.Scene] = Non
     if options.format != 'urdf':
         model = assembled(model, options.density or DENSITY)
     print({'urdf': urdf, 'sdf': sdf, 'mjcf': mjcf}[options.format].write(model))
-
-
-def parser() -> cli.Parser:
-    """Return the parser of the command line."""
-    made = cli.Parser(
-        NAME, description='Print the robot model of a scene.',
-        epilog='`ros2 run linkage_ros urdf` also accepts the scene as a node does: '
-               '--ros-args --params-file SCENE')
-    positive = cli.within(float, bodies.SMALLEST, bodies.LARGEST)
-    cli.add_scene(made, nargs='?', help="the scene's parameter file (default: the "
-                                        "catalogue's linkages)")
-    made.add_argument('--format', choices=('urdf', 'sdf', 'mjcf'), default='urdf',
-                      help='a tree for robot_state_publisher, or closed loops for Gazebo or '
-                           'MuJoCo (default: urdf)')
-    made.add_argument('--width', type=positive, metavar='M',
-                      help='thickness of a bar, with all other shapes in proportion (default: a '
-                           '40th of the longest)')
-    made.add_argument('--density', type=positive, metavar='KG/M3',
-                      help='density of all bodies of sdf and mjcf '
-                           f'(default: {DENSITY:g}, aluminium)')
-    return made

@@ -15,10 +15,8 @@ from __future__ import annotations
 import math
 from xml.etree.ElementTree import Element, indent, tostring
 
-import numpy as np
-
 from .bodies import add, COLOURS, Model, numbers
-from .robot import Body, HINGE, Joint, MAX_NUMBER, Robot
+from .robot import Body, HINGE, Joint, Robot
 from .shapes import BALL, BOX, CYLINDER
 
 # Time step [s] for a linkage of a metre; smaller linkages oscillate faster.
@@ -31,9 +29,8 @@ GRAVITY = 9.81
 
 def write(model: Model) -> str:
     """Return a robot model, its loops closed, as MJCF."""
-    robots = [part.robot for part in model.parts]
     step = STEP * math.sqrt(min([1.0, *(
-        arm for robot in robots for _, arm in robot.servos.values())]))
+        arm for robot in model.parts for _, arm in robot.servos.values())]))
     root = Element('mujoco', model=model.name)
     add(root, 'compiler', angle='radian', eulerseq='XYZ')
     add(root, 'option', timestep=numbers(step), integrator='implicitfast')
@@ -41,13 +38,13 @@ def write(model: Model) -> str:
     add(usual, 'geom', contype='0', conaffinity='0', density=numbers(model.density))
     add(usual, 'equality', solref=numbers(2.0 * step, 1.0), solimp='0.9999 0.9999 1')
     elements = {model.root: add(root, 'worldbody')}
-    for part in model.parts:
-        for body in part.bodies():
-            elements[body.name] = _add_body(elements[body.parent], body, part.robot)
+    for robot in model.parts:
+        for body in robot.bodies():
+            elements[body.name] = _add_body(elements[body.parent], body, robot)
     equality, actuator = add(root, 'equality'), add(root, 'actuator')
     starts = []
-    for part in model.parts:
-        robot, bodies = part.robot, {body.name: body for body in part.bodies()}
+    for robot in model.parts:
+        bodies = {body.name: body for body in robot.bodies()}
         joints = {joint.name: joint for joint in robot.joints}
         for cut, met in robot.meets.items():
             add(equality, 'connect', name=cut, body1=bodies[met].parent, body2=bodies[cut].parent,
@@ -71,7 +68,7 @@ def _add_body(parent: Element, body: Body, robot: Robot) -> Element:
         moved = add(made, 'joint', name=joint.name, type=joint.kind, axis=numbers(*body.axis),
                     ref=numbers(joint.start))
         if joint.limits:
-            moved.set('range', numbers(*np.clip(joint.limits, -MAX_NUMBER, MAX_NUMBER)))
+            moved.set('range', numbers(*joint.limits))
     for piece in robot.pieces.get(body.name, ()):
         half, thickness = 0.5 * piece.length, piece.thickness
         sizes = {CYLINDER: (thickness, half), BOX: (half, 0.5 * thickness, 0.5 * thickness),
@@ -83,10 +80,7 @@ def _add_body(parent: Element, body: Body, robot: Robot) -> Element:
 
 
 def _add_motor(actuator: Element, joint: Joint, robot: Robot) -> None:
-    """Add a servo that is stiff against weight, but too weak to break a loop; else a motor."""
-    if joint.name not in robot.servos:
-        add(actuator, 'motor', name=joint.name, joint=joint.name)
-        return
+    """Add a servo that is stiff against weight, but too weak to break a loop."""
     mass, arm = robot.servos[joint.name]
     turns = joint.kind == HINGE
     force, path = mass * GRAVITY * (arm if turns else 1.0), YIELD * (1.0 if turns else arm)

@@ -17,8 +17,7 @@ from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Optional, Seque
 import numpy as np
 
 from .shapes import Piece
-from ..cli import RequestError
-from ..words import listed, meant
+from ..words import listed, meant, RequestError
 
 HINGE, SLIDE, BALL, FIXED, UNIVERSAL, FREE = (
     'hinge', 'slide', 'ball', 'fixed', 'universal', 'free')
@@ -190,7 +189,11 @@ class Robot:
     meets : dict
         For each body that was cut off a closed loop the other one, whose origin is in its own.
     servos : dict
-        The mass [kg] and the arm [m] that a driven joint moves, where they are known.
+        The mass [kg] and the arm [m] that a driven joint moves.
+    base : str
+        The link of another robot on which the root stands, in a `pose`; '' if it stands on none.
+    mechanism : SceneMechanism
+        What it is the robot of, if it is of a scene.
 
     """
 
@@ -203,6 +206,9 @@ class Robot:
     pieces: dict[str, list[Piece]] = field(default_factory=dict)
     meets: dict[str, str] = field(default_factory=dict)
     servos: dict[str, tuple[float, float]] = field(default_factory=dict)
+    base: str = ''
+    pose: Sequence[float] = ()
+    mechanism: Any = None
 
     def hang(self, name: str, parent: str, place: Sequence[float], kind: str = FIXED,
              axis: Sequence[float] = (0.0, 0.0, 1.0),
@@ -215,7 +221,9 @@ class Robot:
             (frame[:3, :3],) * 2))
 
     def bodies(self) -> Iterator[Body]:
-        """Yield the bodies on the root, parents first; a joint is at the origin of its body."""
+        """Yield the bodies, parents first, the root if it has a base; joints are at origins."""
+        if self.base:
+            yield Body(self.root, self.base, self.pose)
         span = np.abs([frame[:3, 3] for frame in self.frames.values()]).max()
         for name, (base, joint) in self.spanning_tree()[0].items():
             frame, seen = self.frames[name], self.frames[base]
@@ -232,21 +240,17 @@ class Robot:
 
     def spanning_tree(self) -> tuple[dict[str, tuple[str, Joint]], list[Joint]]:
         """Return the parent and the joint of each body, and the joints that close loops."""
-        home, cuts = {body: body for body in self.frames}, []
-
-        def joined(body: str) -> str:
-            while home[body] != body:
-                home[body] = body = home[home[body]]
-            return body
-
+        # Of each body all that are joined to it.
+        joined, cuts = {body: {body} for body in self.frames}, []
         near: dict[str, list[tuple[str, Joint]]] = {body: [] for body in self.frames}
         for joint in sorted(self.joints, key=lambda joint: (
                 joint.is_cut, joint.name not in self.driven, _TREE.get(joint.kind, 1))):
-            first, second = map(joined, joint.bodies)
-            if joint.is_cut or first == second:
+            first, second = (joined[body] for body in joint.bodies)
+            if joint.is_cut or first is second:
                 cuts.append(joint)
                 continue
-            home[second] = first
+            first |= second
+            joined.update(dict.fromkeys(second, first))
             for body, other in (joint.bodies, joint.bodies[::-1]):
                 near[body].append((other, joint))
         tree: dict[str, tuple[str, Joint]] = {}
@@ -433,7 +437,7 @@ def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
     """Return a robot with some joints moved; raise RequestError for an unknown joint."""
     robot.check_names(values)
     if cuts := sorted(values.keys() - robot.tree_joints):
-        raise RequestError(f'{cuts[0]} closes a loop, so that other joints say where it is')
+        raise RequestError(f'{cuts[0]} closes a loop: its position follows from other joints')
     moves = {}
     for body, (base, joint) in robot.spanning_tree()[0].items():
         if joint.name in values and joint.position is not None:

@@ -22,24 +22,24 @@ from .shapes import weight
 
 def write(model: Model) -> str:
     """Return a robot model, its loops closed, as SDF."""
-    robots = [part.robot for part in model.parts]
     # Gazebo Classic reads versions up to 1.7, which have no mimic.
-    root = Element('sdf', version='1.11' if any(robot.follows for robot in robots) else '1.7')
+    has_mimic = any(robot.follows for robot in model.parts)
+    root = Element('sdf', version='1.11' if has_mimic else '1.7')
     made = add(root, 'model', name=model.name)
-    for part in model.parts:
-        meets, parents = part.robot.meets, {}
-        for body in part.bodies():
+    for robot in model.parts:
+        parents = {}
+        for body in robot.bodies():
             parents[body.name] = body.parent
-            if body.name in meets:
+            if body.name in robot.meets:
                 hinge = Joint(f'{body.name}_hinge', HINGE, (body.parent, body.name), (), ())
                 body = body._replace(joint=hinge, axis=(0.0, 0.0, 1.0))
-            _add_body(made, model, part.robot, body)
-        for cut, met in meets.items():
+            _add_body(made, model, robot, body)
+        for cut, met in robot.meets.items():
             _add_joint(made, f'{cut}_closed', 'fixed', parents[met], cut)
             _add_plugin(made, 'detachable-joint', 'DetachableJoint', parent_link=parents[met],
                         child_model='__model__', child_link=cut)
     _add_plugin(made, 'joint-state-publisher', 'JointStatePublisher')
-    for robot in robots:
+    for robot in model.parts:
         for name in robot.driven:
             _add_plugin(made, 'joint-position-controller', 'JointPositionController',
                         joint_name=name, use_velocity_commands='true')

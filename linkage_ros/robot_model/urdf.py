@@ -37,9 +37,9 @@ def write(model: Model) -> str:
     for colour, rgba in COLOURS.items():
         add(add(root, 'material', name=colour), 'color', rgba=numbers(*rgba))
     add(root, 'link', name=model.root)
-    for part in model.parts:
-        for body in part.bodies():
-            _add_link(root, body, part.robot.pieces.get(body.name, ()))
+    for robot in model.parts:
+        for body in robot.bodies():
+            _add_link(root, body, robot.pieces.get(body.name, ()))
     indent(root)
     return tostring(root, encoding='unicode')
 

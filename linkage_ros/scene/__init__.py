@@ -109,8 +109,7 @@ def changed(before: Scene, values: Mapping[str, Any]) -> Scene:
     All other parameters keep their values, defaults, too. Mechanisms without a changed value are
     reused. Raises SceneError as `read` does.
     """
-    parts = {'': _values(before.general),
-             **{name: mechanism.values for name, mechanism in before.mechanisms.items()}}
+    parts = {'': _values(before.general)}
     for name, part in _by_mechanism(values).items():
         mechanism = before.mechanisms.get(name)
         present = _values(mechanism.parameters) if mechanism else parts.get(name, {})
@@ -123,8 +122,8 @@ def _read(parts: Mapping[str, Mapping[str, Any]], known: Mapping[str, SceneMecha
     values = Values(parts.get('', {}))
     names, frame_id, frame_prefix, rate = (
         values.take(name, field) for name, field in GENERAL.items())
-    mechanisms = {name: read_mechanism(name, parts.get(name, {}), known.get(name))
-                  for name in names}
+    mechanisms = {name: known[name] if name in known and name not in parts
+                  else read_mechanism(name, parts.get(name, {})) for name in names}
     joints = {name: mechanism.joints for name, mechanism in mechanisms.items()}
     if joints != {name: mechanism.joints for name, mechanism in known.items()}:
         check_distinct(joints)

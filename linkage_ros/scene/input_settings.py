@@ -60,8 +60,10 @@ class InputSettings:
         The input of the linkage.
     reach : tuple of (float, float)
         Intervals of the input in which the linkage can be assembled.
-    speed, default_speed : float
-        Speed of the motion [rad/s or m/s]; the default is 1 rad/s, or three seconds for a stroke.
+    speed : float
+        Speed of the motion [rad/s or m/s].
+    default_speed : float
+        Its default [rad/s or m/s]: 1 rad/s, or a stroke in three seconds.
     start : float
         Initial value of the motion; outside the sweep, this begins at its nearer end.
     sweep : (float, float), optional
@@ -71,9 +73,10 @@ class InputSettings:
         but the reach.
     source : str
         Name of the source joint.
-    ratio, offset : float
-        At a position p of the source joint, the input or the measured output is ratio * p + offset
-        [rad or m].
+    ratio : float
+        At a position p of the source joint, the input or measured output is ratio * p + offset.
+    offset : float
+        See `ratio` [rad or m].
     measures : str
         Output that the source joint, a sensor, measures; empty: it is the input itself.
 
@@ -93,7 +96,7 @@ class InputSettings:
 
     @property
     def arcs(self) -> tuple[Arc, ...]:
-        """Return the intervals in which it may be: the sweep that a user has set, or the reach."""
+        """Return the sweep that a user has set, or else the arcs of the reach."""
         return (self.ends,) if self.ends else self.reach
 
     @property

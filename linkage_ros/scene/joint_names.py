@@ -8,11 +8,12 @@ from __future__ import annotations
 import json
 import math
 import re
-from typing import Any, Iterable, Mapping, NamedTuple, Optional
+from typing import Any, Mapping, NamedTuple, Optional
 
 import numpy as np
 
 from .parameters import read_lines, SceneError
+from ..cache import cached
 
 # A sign and a digit after a name begin an offset; a hyphen before a letter belongs to the name.
 _PLAIN = r'[A-Za-z_][\w./:]*(?:-[A-Za-z_][\w./:]*)*'
@@ -51,8 +52,10 @@ class JointName(NamedTuple):
         return (low, high) if -math.pi < low and high <= math.pi else None
 
 
-def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable[str],
-                     only_named: bool) -> dict[str, JointName]:
+# Most changes of a mechanism leave its names as they are.
+@cached(16)
+def read_joint_names(mechanism: str, joints: tuple[tuple[str, bool], ...],
+                     lines: tuple[str, ...], only_named: bool) -> Mapping[str, JointName]:
     """
     Return the published names of all joints, by joint.
 
@@ -60,15 +63,16 @@ def read_joint_names(mechanism: str, joints: Mapping[str, bool], lines: Iterable
     are those of the parameter joint_names. `only_named` leaves the other joints unpublished.
     Raises SceneError if a line is malformed, or its joint is unknown or has another line.
     """
+    is_angle = dict(joints)
     names = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
-             for joint in joints}
+             for joint in is_angle}
     for joint, match in read_lines(
-            f'{mechanism}.joint_names', lines, _LINE, joints,
+            f'{mechanism}.joint_names', lines, _LINE, is_angle,
             "'BC=left_shin' or 'EF=-\"ankle-2\"+0.35'").items():
         _, sign, name, figure = match.groups()
         name, offset = json.loads(name) if name[0] == '"' else name, float(figure or 0.0)
         names[joint] = JointName(name, -1.0 if sign else 1.0, offset,
-                                 wraps=joints[joint] and offset != 0.0)
+                                 wraps=is_angle[joint] and offset != 0.0)
     return names
 
 

@@ -80,7 +80,7 @@ class SceneMechanism:
     factor of all lengths. `points` are the joints that markers display; `pose` is x, y, z [m],
     roll, pitch, yaw [rad] in `frame_id`, or in the scene's frame if that is empty. `inputs` are by
     their names; `joints` are the published names by joint; `loads` are forces by joint, moments by
-    link. `values` are the values that the mechanism was read from.
+    link.
     """
 
     name: str
@@ -96,7 +96,6 @@ class SceneMechanism:
     joints: Mapping[str, JointName]
     only_named: bool
     loads: Mapping[str, Load]
-    values: Mapping[str, Any] = some(compare=False, repr=False)
     parameters: tuple[Parameter, ...] = some(compare=False, repr=False)
 
     @property
@@ -164,7 +163,7 @@ class SceneMechanism:
 
     @cached_property
     def ends(self) -> list[Optional[Arc]]:
-        """Return the sweeps that a user has set, before scale; None: no limit but the reach."""
+        """Return the sweeps that a user has set, before scale, and None for other inputs."""
         return [settings.ends and (settings.ends[0] / scale, settings.ends[1] / scale)
                 for settings, scale in zip(self.inputs.values(), self.scales)]
 
@@ -209,7 +208,7 @@ class SceneMechanism:
 
     @property
     def tracer(self) -> str:
-        """Return the joint that draws the locus: the tracer if in `points`, else their last."""
+        """Return the joint that draws the locus, the tracer if in `points`, else their last."""
         return self.linkage.tracer if self.linkage.tracer in self.points else self.points[-1]
 
 
@@ -218,11 +217,8 @@ def divided(values: Sequence[Any], units: Sequence[float]) -> list[Any]:
     return [value / unit for value, unit in zip(values, units)]
 
 
-def read_mechanism(name: str, entries: Mapping[str, Any], old: Optional[SceneMechanism]
-                   ) -> SceneMechanism:
-    """Read a mechanism from its values, or return `old` if it was read from them."""
-    if old and old.values is entries:
-        return old
+def read_mechanism(name: str, entries: Mapping[str, Any]) -> SceneMechanism:
+    """Read a mechanism from its values by full parameter name."""
     values = Values(entries, f'{name}.')
     take = values.take
     linkage, reach = _linkage(name, take('type', TYPE, name), values)
@@ -235,16 +231,17 @@ def read_mechanism(name: str, entries: Mapping[str, Any], old: Optional[SceneMec
               for input_ in linkage.inputs}
     frame_id, only_named = take('frame_id', FRAME), take('only_named', ONLY_NAMED)
     assembly = Assembly(linkage, leg_pairs, mirrored, scale, reach)
-    joints = _joint_names(
-        name, (*inputs,), (*assembly.legs,),
-        tuple((joint, linkage.is_angle(joint)) for joint in assembly.joints),
+    turning = [(joint, linkage.is_angle(joint)) for joint in assembly.joints]
+    joints = read_joint_names(
+        name, (*((input_, False) for input_ in inputs),
+               *((leg + joint, turns) for leg in assembly.legs for joint, turns in turning)),
         take('joint_names', JOINT_NAMES), only_named)
     loads = read_loads(name, linkage, take('loads', LOADS))
     if loads and (leg_pairs > 1 or mirrored):
         raise SceneError(f'{name}.loads must be empty for more than one leg')
     values.refuse_unknown()
     return SceneMechanism(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs,
-                          frame_id, joints, only_named, loads, entries, tuple(values.parameters))
+                          frame_id, joints, only_named, loads, tuple(values.parameters))
 
 
 def _linkage(name: str, type_: str, values: Values) -> tuple[Mechanism, tuple[Arc, ...]]:
@@ -278,17 +275,6 @@ def _built(design: Design, dimensions: tuple, branches: tuple) -> Mechanism:
     lines: dict[str, Any] = {} if design.name in mechanisms.TYPES else {
         'joints': design.joints, 'tracer': design.tracer}
     return mechanisms.create(design.name, branches=dict(branches), **lines, **dict(dimensions))
-
-
-@cached(16)
-def _joint_names(name: str, inputs: tuple[str, ...], legs: tuple[str, ...],
-                 joints: tuple[tuple[str, bool], ...], lines: tuple[str, ...], only_named: bool
-                 ) -> Mapping[str, JointName]:
-    """Read the names of all joints; most changes of a mechanism leave them as they are."""
-    return read_joint_names(name, {
-        **dict.fromkeys(inputs, False),
-        **{leg + joint: is_angle for leg in legs for joint, is_angle in joints}},
-        lines, only_named)
 
 
 def _legs(name: str, linkage: Mechanism, values: Values) -> tuple[int, bool]:

@@ -88,7 +88,7 @@ Pose pose(const double (&q)[n])
 {
   Pose made{};
   double zero[n] = {}, x[n];
-  made.placed = model.at(q, 1, &made.point) != 0;
+  made.placed = model.at(q, &made.point) != 0;
   made.good = made.placed;
   for (int side = 0; side < 2; ++side) {
     made.good = made.good && lkr_input_change(&model, side, &made.point, 1e-2, zero, x) != 0;

@@ -37,7 +37,7 @@ int main()
       const double x = static_cast<double>(state) * std::sqrt(1.0 + (i + 1.0) * (i + 1.0));
       q[i] = ranges[i][0] + (ranges[i][1] - ranges[i][0]) * (x - std::floor(x));
     }
-    if (!Code::model.at(q, 1, &p) ||
+    if (!Code::model.at(q, &p) ||
       !lkr_input_change(&Code::model, LKR_JOINTS, &p, 1e-3, p.load, x))
     {
       continue;

@@ -38,19 +38,12 @@ using Passive = void(const double * q, double * position, double (*rate)[LKR_MAX
 class HeldLog
 {
 public:
+  explicit HeldLog(const std::string & name) : thread_(&HeldLog::run, this, name) {}
+
   ~HeldLog()
   {
     over_.set_value();
-    if (thread_.joinable()) {
-      thread_.join();
-    }
-  }
-
-  void start(const std::string & name)
-  {
-    if (!thread_.joinable()) {
-      thread_ = std::thread(&HeldLog::run, this, name);
-    }
+    thread_.join();
   }
 
   /// Note the status of a command, or of a measurement; neither allocates, locks nor waits.
@@ -86,6 +79,7 @@ private:
 
   std::atomic<int> seen_{0};
   std::promise<void> over_;
+  // The last: it uses the others.
   std::thread thread_;
 };
 
@@ -239,7 +233,10 @@ public:
   using Code = Code_;
   static constexpr std::size_t passive_count = Code::joints.size() - Code::size;
 
-  explicit TransmissionOf(const hardware_interface::TransmissionInfo & info) : info_(info) {}
+  explicit TransmissionOf(const hardware_interface::TransmissionInfo & info)
+  : info_(info), log_(info.name)
+  {
+  }
 
   /// Set parameters and find handles by role or name; throws an exception that says what is wrong.
   void configure(
@@ -265,7 +262,6 @@ public:
     if (!lkr_begin(&Code::model, &memory_)) {
       refuse("it cannot be assembled");
     }
-    log_.start(info_.name);
   }
 
   void actuator_to_joint() override

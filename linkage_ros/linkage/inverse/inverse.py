@@ -110,7 +110,7 @@ class Solution(NamedTuple):
 
     @property
     def mode(self) -> str:
-        """Return the signs as text: 'AP+ CP- det-'."""
+        """Return the signs of the working mode as text, such as 'AP+ CP- det-'."""
         return ' '.join(f'{name}{"0+-"[sign]}' for name, sign in self.signs.items())
 
 

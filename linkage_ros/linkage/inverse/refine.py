@@ -25,8 +25,9 @@ from ..tolerances import ONE, SINGULAR
 
 # A larger error [sizes], or a longer step [rad, sizes], leads to another solution.
 FAR = 0.1
-# Distances to a pose beside a candidate that has none [ulps]: rates down to 1e-4 of the units.
-OUTSIDE = 2.0, -2.0, 32.0, -32.0, 512.0, -512.0, 8192.0, -8192.0
+# Beside a candidate without a pose one is looked for so many times, each time 16 times as far as
+# before from two ulps on: where the margin is 1e-6, rounding of the outputs leads as far out.
+OUTSIDE = 6
 
 
 def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Bracket, Row]
@@ -38,8 +39,9 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
     best = at(*inputs, *values)
     if not best[0] < math.inf:
         # Rounding of the outputs may have led out of the reach.
-        around = ((*inputs[:by], inputs[by] + ulps * math.ulp(inputs[by]), *inputs[by + 1:])
-                  for ulps in OUTSIDE for by in range(n))
+        around = ((*inputs[:by], inputs[by] + side * 16.0 ** k * math.ulp(inputs[by]),
+                   *inputs[by + 1:])
+                  for k in range(OUTSIDE) for side in (2.0, -2.0) for by in range(n))
         inputs = next((x for x in around if at(*x, *values)[0] < math.inf), inputs)
         best = at(*inputs, *values)
     following = best[2 + n:2 + 2 * n]

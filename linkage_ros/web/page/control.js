@@ -130,11 +130,6 @@ export class Slider {
     this.requests.offer([value, this.gesture ?? {}]);
   }
 
-  /** The present value, or the requested one while a request is pending. */
-  get expected() {
-    return this.requests.busy ? this.offered : this.accepted;
-  }
-
   /** The factor from the value to the displayed number. */
   get factor() {
     return units.of(this.unit).factor * this.times();

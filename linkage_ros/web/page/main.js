@@ -31,7 +31,8 @@ const panel = new Panel(at('panel'), light, words => say(words, REFUSED));
 picture.view = new View(picture, stored.from, {
   changed() {
     whole.hidden = picture.view.whole;
-    store({ from: picture.view.from });
+    const { zoom, shift, yaw, pitch } = picture.view;
+    store({ from: { zoom, shift, yaw, pitch } });
     draw();
   },
   drag(mechanism, want) {

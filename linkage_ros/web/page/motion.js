@@ -38,8 +38,10 @@ class InputSlider extends Slider {
   }
 
   button(sign, title, way) {
-    const step = () => way * (this.unit === 'rad' ? STEP : (this.high - this.low) / STEPS_A_STROKE);
-    return button(sign, () => this.offer(this.beside(this.expected + step())), { title, ariaLabel: title });
+    return button(sign, () => {
+      const step = way * (this.unit === 'rad' ? STEP : (this.high - this.low) / STEPS_A_STROKE);
+      this.offer(this.beside((this.requests.busy ? this.offered : this.accepted) + step));
+    }, { title, ariaLabel: title });
   }
 
   /** An angle plus the whole turns that put it on the slider. */
@@ -117,11 +119,6 @@ export class Motion {
   stopOrPlay() {
     const values = Object.fromEntries(Object.entries(this.mechanism.inputs).map(([name, { speed }]) => [`${name}.speed`, this.moves ? 0 : speed]));
     this.mechanism.ask('set', { values }).then(answer => this.reason.say(answer.reason));
-  }
-
-  /** The present inputs. */
-  get present() {
-    return [...this.inputs.values()].map(({ accepted }) => accepted);
   }
 
   renderPlay() {

@@ -85,8 +85,7 @@ export class Panel {
     for (const { mechanism, motion, inSight, still } of this.sections.values()) {
       const silent = performance.now() - mechanism.lastMarkers;
       put(still, { hidden: !isOpen() || silent < STILL, textContent: `No markers for ${Math.round(silent / 1000)} s` });
-      if (mechanism.space) continue;
-      if (inSight || this.arrows || !motion.inputs.size) motion.poll(this.arrows);
+      if (!mechanism.space && (inSight || this.arrows || !motion.inputs.size)) motion.poll(this.arrows);
     }
   }
 

@@ -133,10 +133,7 @@ export class Picture {
     const { canvas, context } = this;
     const pixel = window.devicePixelRatio;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    if (canvas.width !== Math.round(width * pixel) || canvas.height !== Math.round(height * pixel)) {
-      canvas.width = Math.round(width * pixel);
-      canvas.height = Math.round(height * pixel);
-    }
+    put(canvas, { width: Math.round(width * pixel), height: Math.round(height * pixel) });
     context.setTransform(pixel, 0, 0, pixel, 0, 0);
     context.fillStyle = paint('--paper');
     context.fillRect(0, 0, width, height);

@@ -202,7 +202,7 @@ export class Plot {
   /** Mark the present input, and print the value there or at the pointer. */
   follow() {
     if (!this.element.open || !this.curve) return;
-    const [present, ...others] = this.motion.present;
+    const [present, ...others] = [...this.motion.inputs.values()].map(({ accepted }) => accepted);
     if (present === undefined) return;
     // The curve is that of the other inputs' values.
     const fixed = others.map(value => value.toPrecision(6)).join();

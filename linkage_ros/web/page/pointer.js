@@ -60,12 +60,6 @@ export class View {
     this.changed();
   }
 
-  /** From where it is seen. */
-  get from() {
-    const { zoom, shift, yaw, pitch } = this;
-    return { zoom, shift, yaw, pitch };
-  }
-
   get turned() {
     return this.yaw !== 0 || this.pitch !== 0;
   }
@@ -151,10 +145,7 @@ export class View {
     const now = [...this.pointers.values()];
     const [from, to] = [middle(before), middle(now)];
     const way = to.map((end, i) => end - from[i]);
-    if (shiftKey || buttons & 2) {
-      this.turn(...way);
-      return;
-    }
+    if (shiftKey || buttons & 2) return this.turn(...way);
     if (now.length === 2) {
       const [far, near] = [now, before].map(([a, b]) => Math.hypot(a[0] - b[0], a[1] - b[1]));
       if (near > 0) this.magnify(far / near, from);
