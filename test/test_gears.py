@@ -74,6 +74,7 @@ def test_a_pose_is_answered_in_the_turn_in_which_it_is(ratio):
         for theta in (0.4 + math.tau * turns for turns in TURNS):
             if crank.is_part and theta < crank.low:
                 assert math.isnan(found.follow(output, 0.0, theta)[0])
+                assert math.isnan(found.input_for(output, 8.0, theta))
                 continue
             value, rate = (float(ask(theta, (output,))[output])
                            for ask in (found.joint_angles, found.joint_rates))

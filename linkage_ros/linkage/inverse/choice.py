@@ -44,6 +44,10 @@ def ranked(problem: InverseProblem, inputs: Reals, rates: Reals, seed: Reals = (
     """
     order = [x / size for x, size in zip(inputs, problem.sizes)]
     places = [nearest(x, y, turn) for x, y, turn in zip(inputs, seed, problem.turns)] or inputs
+    if seed:
+        # Beyond the turns that are computed, nothing is near.
+        places = [valid_where(x, input_.high - abs(y), 0.0) if input_.is_part else x
+                  for x, y, input_ in zip(places, seed, problem.linkage.inputs)]
     if any(ends):
         places = [_inside(problem, by, place, rates, ends[by], not seed) if ends[by] else place
                   for by, place in enumerate(places)]
