@@ -105,6 +105,13 @@ def test_one_change_point_a_turn_doubles_the_period(lengths, period):
     assert (period == 1) == np.allclose(between, now, atol=1e-3 * max(lengths))
 
 
+@pytest.mark.parametrize('lengths, expected', [
+    ({'a': 2.0, 'b': 3.0, 'c': 2.0, 'd': 3.0}, [-math.pi, 0.0]),
+    ({'a': 2.0, 'b': 4.0, 'c': 3.0, 'd': 3.0}, [-math.tau, 0.0])])
+def test_a_dead_point_at_zero_is_zero(lengths, expected):
+    assert mechanisms.create('four_bar', **lengths).dead_points() == expected
+
+
 def test_a_reach_is_found_that_has_no_pose_in_its_middle():
     # At zero A, B and C are in line and E is at A, so that nothing can be mirrored in A-E.
     found = linkage('A ground 0 0', 'B ground 3 0', 'C crank A 0.3', 'E mirror A C B',
