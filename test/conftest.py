@@ -90,6 +90,17 @@ def kept():
 
 
 @pytest.fixture
+def copy(kept, tmp_path):
+    """Return a copy of what git keeps, in the sources of a workspace."""
+    folder = tmp_path / 'src' / 'linkage_ros'
+    for file in kept:
+        target = folder / file.relative_to(Path(__file__).parents[1])
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(file, target)
+    return folder
+
+
+@pytest.fixture
 def setup_arguments(monkeypatch):
     """Return a function that returns what setup.py hands to setup() in a command."""
     import setuptools

@@ -290,3 +290,14 @@ def test_an_output_that_stands_still_in_most_poses_is_answered_where_it_moves():
         moves = abs(float(linkage.velocity((crank, drive))['J'][1])) > 1e-9
         found = linkage.input_for('J.y', value, others=(drive,))
         assert moves == (crank == 1.45) == (np.nanmin(abs(found - crank), initial=9.0) < 1e-9)
+
+
+@pytest.mark.parametrize('unit', [1.0, 1e-26, 1e20])
+def test_what_is_searched_is_found_in_any_unit(unit):
+    linkage = mechanisms.create('custom', joints=(
+        'A ground 0 0', 'B ground 0 c', 'E crank B e', 'F cylinder A E f right'),
+        c=3.6 * unit, e=0.42 * unit, f=4.0 * unit)
+    pose, outputs = (0.04, 1.4 * unit), ('F.x', 'barrel')
+    values = [float(linkage.solve(pose)['F'][0]), float(linkage.joint_angles(pose)['barrel'])]
+    found = linkage.inverse(outputs).all(values)
+    assert any(solution.inputs == pytest.approx(pose, rel=1e-9) for solution in found)
