@@ -11,7 +11,7 @@ from mpmath import mp, mpc, mpf
 import numpy as np
 import pytest
 from robots import Pinocchio
-from truth.cases import CASES, CRANK, cross, FOOT, IDLER, TIP
+from truth.cases import CASES, CRANK, cross, FOOT, IDLER
 
 
 def made(name, size=1.0, branches=None):
@@ -47,18 +47,6 @@ def test_a_dead_point_is_where_a_transmission_angle_is_flat(name):
         assert linkage.distance_to_dead_point(value, *held) == 0.0
 
 
-@pytest.mark.parametrize('name', [*CASES, *mechanisms.TYPES])
-def test_a_pose_has_the_same_bits_beside_rates_that_are_infinite(name):
-    linkage = made(name) if name in CASES else mechanisms.create(name)
-    held = poses(name)[0][1:] if name in CASES else np.zeros(len(linkage.inputs) - 1)
-    alone = linkage.function(None, linkage.joints)
-    together = linkage.function(None, linkage.joints, linkage.joints)
-    for value in {*linkage.dead_points(*held), *np.ravel(linkage.reach(*held))}:
-        inputs = float(value), *held.tolist()
-        expected = alone(*inputs)
-        assert np.array_equal(together(*inputs)[:len(expected)], expected, equal_nan=True)
-
-
 # --- what is published about them --------------------------------------------------------------
 
 def turned(linkage, theta, first, second):
@@ -89,13 +77,6 @@ def test_an_excavator_turns_by_the_law_of_cosines(piston):
                          (angle('H', 'E', 'J'), corner(n['g'], across, n['i'])
                           + corner(across, n['m'], n['k']))):
         assert abs(found - min(exact, 2 * mp.pi - exact)) < 8e-15
-
-
-def test_a_finger_that_mimics_its_driver_is_off_by_two_degrees():
-    finger, theta = made('2F-85 finger'), np.linspace(0.0, 0.8, 81)
-    follower = np.degrees(turned(finger, theta, 'P', 'F'))
-    assert np.ptp(follower) == pytest.approx(1.85, abs=0.005)
-    np.testing.assert_allclose(finger.solve(0.0)['T'] @ (1, 1j), TIP, atol=1e-16)
 
 
 def test_the_side_of_a_nearly_folded_dyad_is_not_that_of_its_zero_pose():
@@ -148,33 +129,6 @@ def test_a_rack_steers_both_wheels_alike_and_the_inner_one_more():
 
 
 # --- gears, strokes and rails, asked where they are awkward --------------------------------------
-
-
-def test_a_cylinder_may_close_to_nothing():
-    boom = mechanisms.create('custom', joints=[
-        'O ground 0 0', 'P ground 0.5 0', 'B cylinder P O 0.5 left'])
-    assert boom.reach() == [(0.0, 1.0)] and boom.dead_points() == [0.0, 1.0]
-    length = np.array([0.0, 0.02, 0.3, 0.99, 1.0])
-    np.testing.assert_allclose(np.hypot(*(boom.solve(length)['B'] - (0.5, 0.0)).T), length,
-                               rtol=1e-14, atol=1e-16)
-    np.testing.assert_allclose(np.abs(boom.joint_angles(length)['OB']),
-                               2.0 * np.arcsin(length), rtol=1e-14)
-
-
-def test_a_rail_that_does_not_begin_at_its_joint_carries_a_motor():
-    rail = mechanisms.create('custom', joints=[
-        'O ground 0 0', 'X ground 0 2', 'R carriage O along X -0.7 -0.2', 'L block R -0.5 0.1',
-        'A crank R 0.3 zero L', 'S carriage R along L 0.1 0.2', 'B dyad S A 0.3 0.3 left'])
-    assert [input_.name for input_ in rail.inputs] == ['carriage', 'crank', 'carriage2']
-    assert rail.reach(0.4, 0.15) == [(-0.7, -0.2)] and rail.dead_points(0.4, 0.15) == []
-    place = {name: at @ (1, 1j) for name, at in rail.solve([-0.4, 0.4, 0.15]).items()}
-    along = -0.5j - 0.1
-    assert place['R'] == -0.4j and place['L'] == pytest.approx(-0.4j + along, rel=1e-15)
-    assert place['A'] - place['R'] == pytest.approx(
-        0.3 * np.exp(0.4j) * along / abs(along), rel=1e-15)
-    for by, rate in enumerate((1j, 0.0, 0.0)):
-        assert rail.velocity([-0.4, 0.4, 0.15], by=by)['L'] @ (1, 1j) == rate
-    np.testing.assert_allclose(rail.input_for('B.y', place['B'].imag, others=(0.4, 0.15)), [-0.4])
 
 
 def test_a_carriage_alone_is_a_linkage():

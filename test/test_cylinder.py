@@ -24,30 +24,11 @@ def boom(**changed):
     return mechanisms.create('custom', joints=BOOM, **{**LENGTHS, **changed})
 
 
-def strokes(linkage, count=25):
-    low, high = linkage.reach()[0]
-    return np.linspace(low + 1e-3 * (high - low), high - 1e-3 * (high - low), count)
-
-
 def test_the_input_is_a_length_with_a_stroke():
     input_, = boom().inputs
     base = math.hypot(LENGTHS['g'], LENGTHS['h'])
     assert (input_.name, input_.kind, input_.unit) == ('cylinder', LENGTH, 'm')
     assert (input_.low, input_.high) == pytest.approx((LENGTHS['r'] - base, LENGTHS['r'] + base))
-
-
-def test_the_reach_is_a_stroke_and_its_ends_are_dead_points():
-    linkage = mechanisms.create('custom', joints=BOOM[:3], **LENGTHS)
-    base, r = math.hypot(LENGTHS['g'], LENGTHS['h']), LENGTHS['r']
-    assert linkage.reach() == [pytest.approx((r - base, r + base), rel=1e-15)]
-    assert linkage.dead_points() == list(linkage.reach()[0])
-    assert linkage.distance_to_dead_point(r - base + 0.125) == pytest.approx(0.125)
-    for end in linkage.reach()[0]:
-        assert np.isfinite(linkage.solve(end)['B']).all()
-        beyond = end + math.copysign(1e-12, end - r)
-        assert np.isnan(linkage.solve(beyond)['B']).all()
-    angle = linkage.transmission_angles(strokes(linkage))['B']
-    assert angle.min() > 0.0 and angle.max() < math.pi
 
 
 @pytest.mark.parametrize('far, placed', [(1, True), (40, False)])
@@ -69,19 +50,6 @@ def test_a_stroke_is_searched_on_its_own_scale(ends):
     expected = [(middle - far, middle - near), (middle + near, middle + far)]
     np.testing.assert_allclose(linkage.reach(), expected, rtol=0, atol=1e-20)
     np.testing.assert_allclose(linkage.dead_points(), np.ravel(expected), rtol=0, atol=1e-20)
-
-
-def test_several_cylinders_are_several_inputs():
-    mechanism = scene.load('config/excavator.yaml').mechanisms['excavator']
-    assert list(mechanism.inputs) == ['boom', 'arm', 'bucket']
-    lengths = [0.9, 1.3, 1.1]
-    place = {name: complex(*at) for name, at in mechanism.linkage.solve(lengths).items()}
-    for (base, rod), length in zip(('PB', 'CD', 'FG'), lengths):
-        assert abs(place[base] - place[rod]) == pytest.approx(length, rel=1e-14)
-    for (first, second), length in mechanism.linkage.bar_lengths.items():
-        assert abs(place[first] - place[second]) == pytest.approx(length, rel=1e-13)
-    bucket = mechanism.linkage.velocity(lengths, by=2)
-    assert not bucket['A'].any() and bucket['T'].any()
 
 
 def test_a_scene_counts_lengths_in_metres_scaled():

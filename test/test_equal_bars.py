@@ -5,7 +5,6 @@
 
 from importlib.util import find_spec
 import itertools
-import math
 
 from linkage_ros import mechanisms
 import numpy as np
@@ -39,19 +38,6 @@ def made(design):
     """Return the mechanism of a design."""
     return mechanisms.create('custom', joints=design.joints, branches=design.branches,
                              **design.dimensions)
-
-
-def test_a_four_bar_of_equal_bars_has_its_pose_where_it_is_folded():
-    found = mechanisms.create('custom', joints=[
-        'O ground 0 0', 'Q ground 1 0', 'A crank O 1', 'C dyad A Q 1 1 left'])
-    for theta in (0.0, 1e-200, -1e-200, 5e-324, 1e-160, 1e-155, -1e-12):
-        assert found.solve(theta)['C'] == pytest.approx([2.0, theta], rel=1e-15, abs=1e-16)
-        assert found.solve(np.array([theta, 0.3]))['C'][0] == pytest.approx(
-            [2.0, theta], rel=1e-15, abs=1e-16)
-        assert found.velocity(theta)['C'] == pytest.approx([-theta, 1.0], abs=1e-15)
-        rates = found.joint_rates(theta)
-        assert (rates['AC'], rates['QC']) == pytest.approx((-1.0, 1.0), abs=1e-15)
-    assert found.reach() == [(-math.pi, math.pi)] and found.dead_points() == [-math.pi, 0.0]
 
 
 @pytest.mark.nightly(all_but=8)

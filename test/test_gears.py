@@ -60,18 +60,6 @@ def test_there_is_one_period(ratio, period):
         assert later == pytest.approx(found.solve(0.3)['A'], abs=1e-9)
 
 
-def test_a_motor_is_known_in_the_turns_of_its_gear():
-    found = motor('1/80')
-    angle = 80.0 * math.pi / 3.0
-    assert sorted(x for answer in found.inverse('A.x').all(0.5) for x in answer.inputs) == \
-        pytest.approx([-angle, angle])
-    assert found.input_for('A.x', 0.5, near=80.0) == pytest.approx(angle)
-    assert found.input_for('A.x', 0.5) == pytest.approx([-angle, angle])
-    assert found.input_for('A.x', 0.5, near=500.0) == pytest.approx(
-        160.0 * math.pi - angle)
-    assert found.follow('A.x', 0.49, angle)[0] == pytest.approx(80.0 * math.acos(0.49))
-
-
 @pytest.mark.parametrize('ratio', [
     ratio if ratio in QUICK else pytest.param(ratio, marks=pytest.mark.nightly)
     for ratio in ('1/3', *RATIOS)])

@@ -62,12 +62,6 @@ def test_an_input_that_there_is_not_is_refused(by):
             ask((1.0, 2.0), None, by)
 
 
-def test_one_input_may_be_asked_for_as_several_are():
-    leg = mechanisms.create('jansen')
-    assert [answer.inputs for answer in leg.inputs_for(('G.x',), (-31.0,))] == [
-        (theta,) for theta in leg.input_for('G.x', -31.0)]
-
-
 def test_an_output_that_only_rounding_moves_has_no_answers():
     # The corner is the pivot itself, and the mirror's line has no length.
     linkage = custom('A ground 0 0', 'B ground -0.803093 2.0884554493679546',
@@ -100,13 +94,6 @@ def test_a_value_alone_has_the_answers_that_it_has_in_an_array(kind):
                 alone = inverse.nearest([*map(float, one)], [float(x[k]) for x in near])
                 np.testing.assert_allclose([x[k] for x in (*chosen, *rates)], [
                     *alone[0], *alone[1]], rtol=1e-10, atol=1e-13)
-
-
-def test_the_order_of_the_outputs_does_not_matter():
-    arm = mechanisms.create('five_bar')
-    place = arm.solve((1.9, 1.24), ('P',))['P'].tolist()
-    assert [answer.inputs for answer in arm.inputs_for(('P.y', 'P.x'), place[::-1])] == [
-        answer.inputs for answer in arm.inputs_for(('P.x', 'P.y'), place)]
 
 
 @pytest.mark.nightly(all_but=4)

@@ -136,19 +136,6 @@ def test_the_end_of_a_long_period_has_a_pose_a_period_away_too(ratio):
                 -first.turn, first.turn)), (end, answer)
 
 
-def test_a_value_at_a_special_input_is_answered_by_that_input_once():
-    drop = mechanisms.create('water_drop')
-    assert [answer.inputs for answer in drop.inputs_for(('B.y',), [0.0])] == [(-math.pi,), (0.0,)]
-    cell = mechanisms.create('peaucellier')
-    for low, high in cell.reach():
-        for end in (low, high):
-            for output in ('B.y', 'DC', 'C.y'):
-                value = cell.joint_angles(end, (output,))[output] if output == 'DC' else \
-                    cell.solve(end)[output[0]][1]
-                found = cell.input_for(output, float(value))
-                assert np.nanmin(np.abs(found - end)) < 1e-12, (output, end)
-
-
 @pytest.mark.parametrize('away, answers', [(-1e-3, 2), (-1e-9, 2), (-1e-14, 1), (1e-10, 1),
                                            (1e-8, 0), (1e-3, 0)])
 def test_next_to_an_extreme_values_have_two_solutions_or_its_own_or_none(away, answers):

@@ -13,7 +13,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.linkage import joint_lines
 import numpy as np
 import pytest
-from truth.hostile_texts import LEGAL, mutations, NUMBERS, TEXTS
+from truth.hostile_texts import mutations, NUMBERS, TEXTS
 
 FOUR_BAR = ('O ground 0 0', 'Q ground g 0', 'A crank O m', 'B dyad A Q b c left')
 # More digits than Python writes.
@@ -87,63 +87,44 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P slider A b Q 45*2 out', 'in degrees it is written (45*2)deg'),
     ('P slider A b Q 90 deg out', 'an angle is in rad, or in degrees: 30deg'),
     ('P dyad A Q 1 1 left R ground 0 0', 'one line per joint'),
+    ('P ground __import__("os") 0', 'is not a number, dimension or arithmetic on them'),
+    ('P ground exit 0', 'dimension exit has no value'),
+    ('R ground 0 0; P crank R 1 zero O', 'R and O are at the same place'),
+    ('R ground 0 0; P carriage R along O 0 1', 'R and O are at the same place'),
+    ('R ground 0 0; P slider A 1 R along O out', 'R and O are at the same place'),
+    ('R ground 0 0; P dyad R O 1 1 left', 'R and O are at the same place'),
     ('P' * 65 + ' ground 0 0', 'a letter, then up to 63 letters, digits and underscores'),
 ])
 def test_a_wrong_line_is_refused_with_the_line_and_what_is_allowed(line, problem):
     if problem is None:
         assert made(line).reach()
         return
+    *more, line = line.split('; ')
     shown = line if len(line) <= 60 else line[:57] + '...'
     with pytest.raises(ValueError, match=re.escape(f'joint line "{shown}": ') + '.*'
                        + re.escape(problem)):
-        made(line)
+        made(*more, line)
 
 
-@pytest.mark.parametrize('line', [
-    'P crank R 1 zero O', 'P carriage R along O 0 1', 'P slider A 1 R along O out',
-    'P dyad R O 1 1 left', 'P cylinder R O 1 left'])
-def test_joints_at_the_same_place_have_no_direction(line):
-    with pytest.raises(ValueError, match=f'joint line "{line}": R and O are at the same place'):
-        made('R ground 0 0', line)
+CHAIN = ('O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'P dyad A Q 3 2.5 left',
+         'R dyad P Q 2 2 left', 'S dyad R P 3 3 left', 'T dyad S R 2 2.5 right')
+MANY = [f'P{i} ground {i} 0' for i in range(500)]
 
 
-def test_a_name_that_calls_python_is_only_a_name():
-    with pytest.raises(ValueError, match='is not a number, dimension or arithmetic on them'):
-        made('P ground __import__("os") 0')
-    with pytest.raises(ValueError, match='dimension exit has no value'):
-        made('P ground exit 0')
-
-
-def in_order(*numbers):
-    """Return a chain of dyads' lines: the ground, then those of these numbers."""
-    lines = ['O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'P dyad A Q 3 2.5 left',
-             'R dyad P Q 2 2 left', 'S dyad R P 3 3 left', 'T dyad S R 2 2.5 right']
-    return [lines[number - 1] for number in (1, 2, 3, *numbers)]
-
-
-def test_a_line_that_comes_too_early_says_which_one_to_move():
-    assert mechanisms.create('custom', joints=in_order(4, 5, 6, 7)).reach()
-    for numbers, problem in {
-            (5, 4, 6, 7): 'joint P is placed later, in line 5: move it up',
-            (4, 5, 7, 6): 'joint S is placed later, in line 7: move it up',
-            (7, 6, 5, 4): 'joint S is placed later, in line 5: move it up'}.items():
-        with pytest.raises(ValueError, match=problem):
-            mechanisms.create('custom', joints=in_order(*numbers))
-
-
-@pytest.mark.parametrize('lines, later', [
-    (('P dyad A R 2 2 left', 'R dyad Q P 2 2 left'), 'R is placed later, in line 5'),
-    (('P dyad A S 2 2 left', 'R dyad Q P 2 2 left', 'S rigid P R 1 1 left'), 'S .* in line 6')])
-def test_of_a_group_of_three_bars_the_reason_says_so(lines, later):
-    with pytest.raises(ValueError, match=f'joint {later}: move it up; if it depends on P, they '
-                       'cannot be solved: only dyads'):
-        mechanisms.create('custom', joints=in_order() + list(lines))
-
-
-def test_a_long_list_is_elided():
-    many = [f'P{i} ground {i} 0' for i in range(500)]
-    with pytest.raises(ValueError, match=r'there are: O, Q, A, P0, .*, \.\.\. \(503\)$'):
-        mechanisms.create('custom', joints=[*in_order(), *many, 'Z dyad X Q 1 1 left'])
+@pytest.mark.parametrize('lines, problem', [
+    ([CHAIN[i] for i in (0, 1, 2, 4, 3, 5, 6)], 'joint P is placed later, in line 5: move it up'),
+    ([CHAIN[i] for i in (0, 1, 2, 3, 4, 6, 5)], 'joint S is placed later, in line 7: move it up'),
+    ([CHAIN[i] for i in (0, 1, 2, 6, 5, 4, 3)], 'joint S is placed later, in line 5: move it up'),
+    ((*CHAIN[:3], 'P dyad A R 2 2 left', 'R dyad Q P 2 2 left'),
+     'joint R is placed later, in line 5: move it up; if it depends on P, they cannot be solved: '
+     'only dyads'),
+    ((*CHAIN[:3], 'P dyad A S 2 2 left', 'R dyad Q P 2 2 left', 'S rigid P R 1 1 left'),
+     'joint S is placed later, in line 6: move it up; if it depends on P, they cannot be solved'),
+    ((*CHAIN[:3], *MANY, 'Z dyad X Q 1 1 left'), r'there are: O, Q, A, P0, .*, \.\.\. \(503\)$')])
+def test_a_line_that_comes_too_early_says_which_one_to_move(lines, problem):
+    assert mechanisms.create('custom', joints=CHAIN).reach()
+    with pytest.raises(ValueError, match=problem):
+        mechanisms.create('custom', joints=lines)
 
 
 @pytest.mark.parametrize('joints', [
@@ -388,15 +369,9 @@ ROLES = {
     'sign': lambda text: made(branches={'B': text}),
     'type': mechanisms.create, 'design': mechanisms.design, 'defaults': mechanisms.defaults,
     'scene': lambda text: scene.read({'mechanisms': [text]}),
-    'parameter': lambda text: scene.read({text: 1.0}),
-    'parameter of one': lambda text: scene.read(four_bar_scene(**{f'f.{text}': 1.0})),
+    'parameter': lambda text: scene.read(four_bar_scene(**{f'f.{text}': 1.0})),
     'type in a scene': lambda text: scene.read({'mechanisms': ['f'], 'f.type': text}),
     'line in a scene': lambda text: scene.read(four_bar_scene(**{'f.joints': [*FOUR_BAR, text]})),
-    'tracer in a scene': lambda text: scene.read(four_bar_scene(**{'f.tracer': text})),
-    'dimension in a scene':
-        lambda text: scene.read(four_bar_scene(**{f'f.dimensions.{text}': 1.0})),
-    'value in a scene': lambda text: scene.read(four_bar_scene(**{'f.dimensions.b': text})),
-    'branch in a scene': lambda text: scene.read(four_bar_scene(**{f'f.branches.{text}': 1})),
     'points in a scene': lambda text: scene.read(four_bar_scene(**{'f.points': [text]})),
 }
 
@@ -451,11 +426,6 @@ def test_of_odd_numbers_hardly_one_is_a_number(role, legal):
     assert [text for text in NUMBERS if not refused(ROLES[role], text)] == legal
 
 
-@pytest.mark.parametrize('line', LEGAL)
-def test_the_lines_that_are_mutated_are_legal(line):
-    assert made(line).points[4] == 'P'
-
-
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('count, seed', [
     (400, 1), pytest.param(60000, 2, marks=pytest.mark.nightly),
@@ -463,16 +433,6 @@ def test_the_lines_that_are_mutated_are_legal(line):
 def test_a_line_with_slips_is_refused_or_makes_a_linkage(count, seed):
     outcomes = [refused(made, text) for text in mutations(count, seed)]
     assert 0.5 < sum(outcomes) / count < 0.98
-
-
-@pytest.mark.nightly
-def test_what_passes_is_only_what_is_documented():
-    number = re.compile(r'[0-9.eE]+|[+*/(),-]|max|sqrt|pi|deg|[gmbc]')
-    for text in mutations(300, 4):
-        if not refused(made, text):
-            for word in text.split():
-                name = re.fullmatch('[A-Za-z][A-Za-z0-9_]*', word)
-                assert name or not number.sub('', word), text
 
 
 @pytest.mark.parametrize('names', [5, 0.5, True, object(), len, [5], [['A']], ({},), {'a': 'A'},

@@ -96,17 +96,6 @@ def test_a_command_says_in_one_sentence_what_to_install(broken, capsys, package,
 
 
 @pytest.mark.parametrize('way', WAYS)
-def test_a_viewer_says_what_to_install_before_it_is_a_node(broken, way):
-    pytest.importorskip('rclpy')
-    from linkage_ros.web.viewer import Viewer
-
-    broken('aiohttp', way)
-    remedy = re.escape(optional.INSTALL['aiohttp'])
-    with pytest.raises(ImportError, match=f'aiohttp is .*{remedy}'):
-        Viewer()
-
-
-@pytest.mark.parametrize('way', WAYS)
 def test_the_library_computes_without_machine_code(broken, way):
     leg = mechanisms.create('jansen')
     broken('llvmlite', way)

@@ -57,27 +57,6 @@ def test_what_is_no_output_is_refused_by_its_name(name):
 
 # --- following a measured value ---
 
-@pytest.mark.nightly(all_but=3)
-@pytest.mark.parametrize('type_, output', [
-    ('four_bar', 'QB'), ('jansen', 'BC'), ('jansen', 'EF'), ('slotted_lever', 'lever'),
-    ('water_drop', 'distance(A,C)'), ('jansen', 'angle(A,G)'), ('slider_crank', 'block')])
-def test_the_input_follows_a_measured_output_between_its_extremes(type_, output):
-    linkage = mechanisms.create(type_)
-    (least, low), (greatest, high) = linkage.extremes(output)[0]
-    low, high = sorted((low, high))
-    theta = np.linspace(low, high, 400)[5:-5]
-    values = linkage.joint_angles(theta, [output])[output]
-    near, is_rising = theta[0], np.diff(np.unwrap(values)) * np.diff(values)[0] > 0.0
-    for true, value in zip(theta.tolist(), values.tolist()):
-        near, rate = linkage.follow(output, value, near)
-        again = linkage.joint_angles(near, [output])[output]
-        assert math.remainder(again - value, math.tau) == pytest.approx(
-            0.0, abs=1e-13 * max(1.0, linkage.longest))
-        if low < high and is_rising.all():
-            assert near == pytest.approx(true, abs=1e-6)
-            assert rate == pytest.approx(float(linkage.joint_rates(near, [output])[output]))
-
-
 def test_whole_turns_are_kept_and_what_cannot_be_is_not_a_number():
     linkage = mechanisms.create('four_bar')
     value = float(linkage.joint_angles(0.7)['QB'])
