@@ -9,7 +9,6 @@ import tracemalloc
 from effort import few_calls
 from linkage_ros import mechanisms
 from linkage_ros.linkage.inputs import CRANK
-from linkage_ros.linkage.motion.singularities import distinct
 import numpy as np
 import pytest
 
@@ -143,7 +142,7 @@ def test_the_inverse_has_the_answers_of_both_turns_about_a_change_point(output):
 
 @pytest.mark.parametrize('theta', [3.1415926535897927, math.pi, -math.pi, 1e9, -7.0, 0.0])
 def test_a_dead_point_is_between_minus_pi_and_pi(theta):
-    wrapped = distinct([theta], CRANK)
+    wrapped = CRANK.distinct([theta])
     assert -math.pi <= wrapped[0] < math.pi
     assert abs(math.remainder(wrapped[0] - theta, math.tau)) < 1e-6
     assert wrapped == [theta] or not -math.pi <= theta < math.pi

@@ -5,7 +5,6 @@
 
 import math
 from pathlib import Path
-import re
 import subprocess
 import sys
 from xml.etree import ElementTree
@@ -89,16 +88,6 @@ def test_whoever_comes_late_hears_the_description_once(graph):
     graph.until(lambda: len(heard) > 1 < len(whole))
     assert len(heard) == len(whole) == 2
     assert all('xyz="1.0 0.0 0.0"' in texts[1].data for texts in (heard, whole))
-
-
-def test_a_new_dimension_makes_a_new_description(graph):
-    node = graph.start(Kinematics, {'mechanisms': ['cell'], 'cell.type': 'peaucellier'})
-    heard = graph.listen(String, 'cell/robot_description', LATCHED)
-    graph.until(lambda: heard)
-    assert graph.set(node, cell__dimensions__r=3.1).successful
-    graph.until(lambda: len(heard) > 1)
-    ends = [float(re.search('upper="([^"]*)"', message.data)[1]) for message in heard]
-    assert ends == pytest.approx([2.0 * math.acos(5.0 / (2.0 * r)) for r in (3.0, 3.1)])
 
 
 def test_the_command_prints_those_that_are_named(capsys):

@@ -81,8 +81,10 @@ class LinkageFormulas:
         self._derivatives: Dict[int, Dict[Real, Real]] = {}
         self._outputs: Mapping[str, Callable] = {
             'points': self._points, 'velocities': self._velocities, 'angles': self._angles,
-            'rates': self._rates, 'parts': self.parts, 'margins': self._margins,
-            'transmissions': self._transmissions, 'closures': self._closures,
+            'rates': self._rates, 'parts': self.parts, 'closures': self._closures,
+            # At least 0 where the limit is satisfied.
+            'margins': lambda _: [x.margin + x.tolerance for x in self.built.limits],
+            'transmissions': lambda names: [self.built.transmissions[name] for name in names],
             'output': self._output, 'checked': self.checked,
             'point accelerations': self._point_accelerations,
             'joint accelerations': self._joint_accelerations}
@@ -231,13 +233,6 @@ class LinkageFormulas:
         directions = self.built.directions
         parents = {link.name: link.parent for link in self.built.links}
         return [rate(name) for name in names]
-
-    def _margins(self, _: Names) -> List[Real]:
-        """Return each limit's margin plus its tolerance: >= 0 where the limit is satisfied."""
-        return [limit.margin + limit.tolerance for limit in self.built.limits]
-
-    def _transmissions(self, names: Names) -> List[Real]:
-        return [self.built.transmissions[n] for n in names]
 
     @property
     def closures(self) -> List[Limit]:

@@ -10,11 +10,11 @@ This module alone handles the periodicity of angles.
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
+from typing import Any, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .tolerances import ONE, ROUNDING, SINGULAR
+from .tolerances import LEAST, ONE, ROUNDING
 
 Arc = Tuple[float, float]
 
@@ -25,9 +25,6 @@ ANGLE, LENGTH = 'angle', 'length'
 MAX_PERIOD = 100
 # Greatest denominator of a gear ratio with a period, and greatest ratio.
 MOST_TURNS, FASTEST = 10 ** 6, 1000
-# Poses that are compared with those a period later. One more is a prime: of a range of whole turns
-# each is at another angle.
-PERIODIC = 66
 
 
 class Input(NamedTuple):
@@ -157,14 +154,20 @@ class Input(NamedTuple):
             if start < end:
                 yield start, end
 
+    def distinct(self, values: Iterable[float]) -> List[float]:
+        """Return values in order, wrapped, one of those that differ by rounding."""
+        found: List[float] = []
+        for x in sorted(float(self.wrapped(0.0 if abs(x) < LEAST else x)) for x in values):
+            if not found or x - found[-1] > ONE:
+                found.append(x)
+        if self.wraps and len(found) > 1 and found[0] + self.turn - found[-1] <= ONE:
+            found.pop()
+        return found
+
     def between(self, ends: Iterable[float]) -> List[Arc]:
         """Return the arcs between values, in order; the last of a turn ends where it began."""
-        marks: List[float] = []
-        inside = (end - self.turns_of(end) for end in ends) if self.wraps else (
-            end for end in (self.low, *ends, self.high) if self.low <= end <= self.high)
-        for end in sorted(inside):
-            if not marks or end - marks[-1] > ONE:
-                marks.append(end)
+        marks = self.distinct(ends if self.wraps else (
+            end for end in (self.low, *ends, self.high) if self.low <= end <= self.high))
         if not marks:
             return [(self.low, self.high)]
         return list(zip(marks, marks[1:] + [marks[0] + self.turn] * self.wraps))
@@ -193,21 +196,3 @@ def wrapped(theta: Any, turn: float = math.tau) -> Any:
     turned = theta - turn * np.floor((theta + half) / turn)
     turned = np.where((turned < -half) | (turned >= half), -half, turned)
     return np.where((theta >= -half) & (theta < half), theta, turned)
-
-
-def is_periodic(places: Callable, input_: Input, turn: float,
-                arcs: Sequence[Arc] = ()) -> bool:
-    """
-    Return whether all poses over an input are the same a turn [rad] later.
-
-    `places` takes values of the input, shape (n,), and returns coordinates (any, n), NaN outside
-    some arcs. Between arcs it is asked, too: samples alone miss narrow gaps.
-    """
-    gaps = [0.5 * (end + start) for (_, end), (start, _) in zip(arcs, arcs[1:])]
-    theta = np.concatenate([
-        np.linspace(input_.low, input_.high, PERIODIC + 2)[1:-1], gaps])
-    now, later = places(theta), places(theta + turn)
-    with np.errstate(invalid='ignore'):
-        size = np.fmax.reduce(np.abs(now), axis=None, initial=0.0)
-        alike = np.abs(now - later) <= SINGULAR * size
-    return bool(np.all(alike | (np.isnan(now) & np.isnan(later))))

@@ -17,10 +17,11 @@ from numpy.typing import ArrayLike
 
 from .formulas import formulas_of, LinkPoint, Points
 from .geometry.spatial import IN_SINGLE
-from .inputs import FASTEST, Input, is_periodic, MAX_PERIOD, MOST_TURNS, spread
+from .inputs import FASTEST, Input, MAX_PERIOD, MOST_TURNS, spread
 from .text import joint_lines
 from .text.arguments import checked_dimensions, numbers
 from .text.design import Design
+from .tolerances import SINGULAR
 from ..cache import Cache
 from ..formula.expression import derivative, Real, real
 from ..formula.namespace import array_function
@@ -30,6 +31,9 @@ from ..words import listed, meant, plain_text, quoted
 
 # Quantities of joints; all others are of links.
 OF_POINTS = 'points', 'velocities', 'point accelerations'
+# Poses that are compared with those a period later. One more is a prime: of a range of whole turns
+# each is at another angle.
+COMPARED = 66
 
 Own = TypeVar('Own', bound='Kinematics')
 # One input, or a sequence of several; each a number or an array [rad or m].
@@ -98,8 +102,13 @@ class Kinematics:
     @property
     def longest(self) -> float:
         """Return the longest bar [m], or without bars the longest stroke of an input."""
-        return max(self.bar_lengths.values(),
-                   default=max(input_.high - input_.low for input_ in self.inputs))
+        return max(self.bar_lengths.values() or [
+            input_.high - input_.low for input_ in self.inputs])
+
+    @property
+    def coordinates(self) -> Tuple[str, ...]:
+        """Return the outputs that are coordinates of joints, such as 'A.x'."""
+        return tuple(f'{name}.{axis}' for name in self.points for axis in self.axes)
 
     def line_of(self, *joints: str) -> joint_lines.Line:
         """Return the last line that places one of some joints."""
@@ -222,10 +231,10 @@ class Kinematics:
                for fraction, ratio in zip(fractions, ratios)):
             return math.inf
         turns = math.lcm(*(fraction.denominator for fraction in fractions))
-        if turns > most or not self._passes_change_point(by):
+        if turns > most or not self._passes_change_point(by) or self.repeats(
+                by, turns, 'angles', self.coordinates, math.pi * turns):
             return turns
-        return turns if is_periodic(lambda theta: self._points_over(by, theta), Input(
-            '', low=-math.pi * turns, high=math.pi * turns), math.tau * turns) else 2 * turns
+        return 2 * turns
 
     def _passes_change_point(self, by: int) -> bool:
         """Return whether a dyad of a crank has a gap of nothing but rounding."""
@@ -235,11 +244,22 @@ class Kinematics:
         return any(np.ndim(tolerance + start + end) == 0 and min(abs(start), abs(end)) <= tolerance
                    for tolerance, start, end in values)
 
-    def _points_over(self, by: int, values: np.ndarray) -> np.ndarray:
-        """Return the coordinates of all joints over one input; the others are spread."""
-        inputs = spread([self._with_stroke(x) for x in self.structure.built.inputs], len(values))
-        inputs[by] = values
-        return self.compiled('points', self.points).searched(*inputs)
+    def repeats(self, by: int, turns: float, kind: str, outputs: Tuple[str, ...], high: float,
+                gaps: Sequence[float] = ()) -> bool:
+        """
+        Return whether outputs are the same so many turns of an input later, from -high to high.
+
+        They are asked in gaps of the reach, too: samples alone miss narrow ones.
+        """
+        now = np.append(high * np.linspace(-1.0, 1.0, COMPARED + 2)[1:-1], gaps)
+        later = now + math.tau * turns
+        inputs = spread([self._with_stroke(x) for x in self.structure.built.inputs], len(now))
+        pose, rows = self.compiled(kind, outputs), []
+        for inputs[by] in (now, later):
+            # As directions: angles are the same up to whole turns.
+            rows.append(np.exp([1j * row / (1.0 if self.is_angle(name) else self.longest)
+                                for name, row in zip(outputs, pose.searched(*inputs))]))
+        return np.allclose(rows[1], rows[0], 0.0, SINGULAR, equal_nan=True)
 
     def _with_limits(self, by: int, input_: Input) -> Input:
         """Return an input with the limits [rad or m] of all poses."""
@@ -398,8 +418,7 @@ class Kinematics:
     def check_there(self, output: str) -> None:
         """Raise ValueError if an output does not exist."""
         if not self.has_output(output):
-            named = (*self.joints, *(f'{name}.{axis}' for name in self.points
-                                     for axis in self.axes))
+            named = (*self.joints, *self.coordinates)
             own = listed([name for name in named if output == name[:-2]])
             raise ValueError(
                 f'{self.type} has no output {quoted(output)}; allowed: distance(A,B) and '

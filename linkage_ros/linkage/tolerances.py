@@ -7,6 +7,8 @@ The tolerances of the core: what counts as equal, from the rounding of one sum u
 All are without a unit: parts of a size, or angles [rad]; inputs and outputs count in their sizes.
 """
 
+# Angles below this [rad] are zero: the rounding of any other angle is coarser.
+LEAST = 1e-18
 # A margin or a sum counts as zero within rounding: eight half ulps of the scale.
 TOLERANCE = 8 * 2.0 ** -53
 # Inputs, or values of an output, no farther apart than this are one: the rounding of many sums.

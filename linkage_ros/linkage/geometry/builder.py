@@ -373,28 +373,26 @@ class Builder:
                  short: Real) -> None:
         """Add a Peaucellier cell: the joint right of pole -> pin, the corner, the left joint."""
         right, corner, left = names
-        found = planar.inversor(self.arm(pole, pin), long, short)
-        self.limits += found.right.limits
-        self._pair(right, pole, pin, found.right, long, short)
-        link = self._add_link(right, corner, found.left.second, short)
-        self._place(corner, right, found.left.second, link, short,
-                    self.points[pole].place + found.inverse)
-        self._pair(left, pole, pin, found.left, long, short)
-        link = self._add_link(left, corner, found.right.second, short)
-        self._bar(left, corner, found.right.second, short, link)
+        first, second, inverse = planar.inversor(self.arm(pole, pin), long, short)
+        self.limits += first.limits
+        self._pair(right, pole, pin, first, long, short)
+        link = self._add_link(right, corner, second.second, short)
+        self._place(corner, right, second.second, link, short, self.points[pole].place + inverse)
+        self._pair(left, pole, pin, second, long, short)
+        link = self._add_link(left, corner, first.second, short)
+        self._bar(left, corner, first.second, short, link)
 
     def slot(self, tip: str, pivot: str, pin: str, offset: Real, half: float,
              length: Real) -> None:
         """Turn a lever of this length [m] about a joint by a pin in its slot."""
-        found = planar.slot(self.arm(pivot, pin), offset, half)
-        self.limits.append(found.limit)
+        along, slide, limit = planar.slot(self.arm(pivot, pin), offset, half)
+        self.limits.append(limit)
         start = real(pi / 2) if self.points[pivot].link == GROUND else real(0.0)
-        lever = self._add_link(
-            pivot, tip, found.along, length, self._numbered('lever'), start=start)
-        self._place(tip, pivot, found.along * length, lever, length)
+        lever = self._add_link(pivot, tip, along, length, self._numbered('lever'), start=start)
+        self._place(tip, pivot, along * length, lever, length)
         self._axes[lever] = self._vectors[pivot, tip]
-        self.transmissions[tip] = arctangent(abs(found.slide), offset)
-        self._slide(self._numbered('slide'), lever, pivot, pin, found.slide, found.along)
+        self.transmissions[tip] = arctangent(abs(slide), offset)
+        self._slide(self._numbered('slide'), lever, pivot, pin, slide, along)
         self.frames[self.links[-1].name][pin] = Complex(0.0, offset)
 
     def slider(self, name: str, pin: str, rod: Real, origin: str, direction: Union[Real, str],
@@ -416,12 +414,12 @@ class Builder:
         rail = planar.CrankRail(end.crank, start.place, along) \
             if end.crank and not along.x.varies and start.link == GROUND \
             else planar.Rail(end.place, start.place, along, start.magnitude + end.magnitude)
-        found = planar.slider(rail, rod, side)
-        self.limits += found.limits
-        link = self._add_link(pin, name, found.rod, rod)
-        self._place(name, pin, found.rod, link, rod)
-        self.transmissions[name] = arctangent(abs(found.reach), rail.height)
-        self._slide(self._numbered('block'), parent, origin, name, found.place, along, angle)
+        bar, place, limits, reach = planar.slider(rail, rod, side)
+        self.limits += limits
+        link = self._add_link(pin, name, bar, rod)
+        self._place(name, pin, bar, link, rod)
+        self.transmissions[name] = arctangent(abs(reach), rail.height)
+        self._slide(self._numbered('block'), parent, origin, name, place, along, angle)
 
     def _on_ground(self, name: str, otherwise: str = '') -> None:
         if self.points[name].link != GROUND:

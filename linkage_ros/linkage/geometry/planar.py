@@ -457,43 +457,29 @@ def transmission(found: Dyad) -> Real:
     return 2.0 * arctangent(beyond.root(), within.root())
 
 
-class Inversor(NamedTuple):
-    """A Peaucellier cell on the arm pole - pin: its three joints as vectors, and its limits."""
-
-    right: Dyad
-    left: Dyad
-    inverse: Complex
-
-
-def inversor(arm: Arm, long: Real, short: Real) -> Inversor:
+def inversor(arm: Arm, long: Real, short: Real) -> Tuple[Dyad, Dyad, Complex]:
     """
     Return the Peaucellier-Lipkin cell with bars long [m] from the pole and a rhombus of short [m].
 
-    The traced corner is pole + (long^2 - short^2) / conjugate(w): it runs on a straight line
-    when the pole lies on the crank circle.
+    These are its right and left dyad on the arm from the pole to the pin, and the traced corner,
+    which is pole + (long^2 - short^2) / conjugate(w): it runs on a straight line when the pole
+    lies on the crank circle.
     """
     right = dyad(arm, long, short, -1.0, smooth=False)
     left = dyad(arm, long, short, 1.0, smooth=False)
     power = (long - short) * (long + short)
     straight = arm.inverse_of_isosceles() if isinstance(arm, CrankArm) else None
     inverse = (arm.vector * (power / arm.divisor) if straight is None else straight * power)
-    return Inversor(right, left, Complex(*(
-        valid_within(part, right.limits) for part in (inverse.x, inverse.y))))
+    return right, left, Complex(*(
+        valid_within(part, right.limits) for part in (inverse.x, inverse.y)))
 
 
-class Slot(NamedTuple):
-    """A lever that a pin moves by its slot: unit vector along the slot, the slide, the limit."""
-
-    along: Complex
-    slide: Real
-    limit: Limit
-
-
-def slot(arm: Arm, offset: Real, half: float) -> Slot:
+def slot(arm: Arm, offset: Real, half: float) -> Tuple[Complex, Real, Limit]:
     """
     Return the lever about the arm's foot whose slot, `offset` [m] to its left, takes the pin.
 
-    w = l (t + i e) with the unit vector l along the lever and t = half sqrt(|w|^2 - e^2) [m].
+    These are the unit vector l along the lever, the slide t = half sqrt(|w|^2 - e^2) [m], with
+    w = l (t + i e), and the limit.
     """
     limit = arm.beyond(offset, abs(offset))
     slide = limit.root() * half
@@ -501,9 +487,9 @@ def slot(arm: Arm, offset: Real, half: float) -> Slot:
     along = Complex(*(valid_where(where(central, way * half, part), arm.divisor, real(0.0))
                       for way, part in ((arm.vector.x, aside.x), (arm.vector.y, aside.y))))
     turning = spin(arm.vector)
-    return Slot(with_spin(along.direction(), Rate(
+    return with_spin(along.direction(), Rate(
         (slide, *turning.of), lambda rate, *rates: turning.formula(*rates) + where(
-            central, 0.0, offset * rate / arm.divisor))), slide, limit)
+            central, 0.0, offset * rate / arm.divisor))), slide, limit
 
 
 class Rail:
@@ -558,27 +544,16 @@ class CrankRail(Rail):
             start, end, arctangent(self._turn.y, self._turn.x), self._crank.angle))
 
 
-class Slider(NamedTuple):
-    """
-    A block on a fixed line: the rod to it, its place along the line [m], and the limits.
-
-    `reach` is the distance along the line from the pin to the block [m].
-    """
-
-    rod: Complex
-    place: Real
-    limits: Tuple[Limit, ...]
-    reach: Real
-
-
-def slider(rail: Rail, rod: Real, side: float) -> Slider:
+def slider(rail: Rail, rod: Real, side: float
+           ) -> Tuple[Complex, Real, Tuple[Limit, ...], Real]:
     """
     Return the RRP dyad: a rod [m] from a pin to a block on a line.
 
-    The block is ahead of the pin's foot on the line for side = +1; it continues smoothly past a
+    These are the vector of the rod, the block's place along the line [m], the limits, and how far
+    the block is ahead of the pin [m]. It is ahead for side = +1, and continues smoothly past a
     change point of a crank.
     """
     limits = rail.limits(rod)
     reach = reduce(lambda x, y: x * y, (limit.smooth or limit.root() for limit in limits)) * side
     height = _nan_with(reach, rail.along, rail.height)
-    return Slider(rail.along * Complex(reach, -height), rail.foot + reach, limits, reach)
+    return rail.along * Complex(reach, -height), rail.foot + reach, limits, reach

@@ -51,13 +51,6 @@ class Boxes(NamedTuple):
         return Boxes(self.middle[which], self.half[which])
 
 
-class TwoPoses(NamedTuple):
-    """Two poses [rad] for the same motors: the angles of cranks, or lengths [m]."""
-
-    motors: Sequence[float]
-    poses: Sequence[np.ndarray]
-
-
 class WindowRod(NamedTuple):
     """
     A rod in the frame of the first hinge; its length [m] is None if it is an input.
@@ -243,8 +236,12 @@ class Window:
             apart = np.minimum(away, math.pi - away) > right.half + left.half + SINGULAR
         return ~(apart | np.isnan(shared[0].half) | np.isnan(shared[1].half))
 
-    def second_pose(self) -> Optional[TwoPoses]:
-        """Return two poses for the same motors, far from each other, if some are found."""
+    def second_pose(self) -> Optional[Tuple[Tuple[float, float], Sequence[np.ndarray]]]:
+        """
+        Return motors and two poses [rad] that they have, far from each other, if some are found.
+
+        Motors are angles of cranks, or lengths [m].
+        """
         start, other = (ends.clip(self.low[:, None], self.high[:, None])
                         for ends in self.undecided())
         # Not more than Newton's method can try at once.
@@ -264,7 +261,7 @@ class Window:
         if not (apart > DISTINCT).any():
             return None
         i = int(np.nanargmax(apart))
-        return TwoPoses((motors[0][i], motors[1][i]), (start[:, i], found[:, i]))
+        return (motors[0][i], motors[1][i]), (start[:, i], found[:, i])
 
     def _is_found(self) -> bool:
         """Return whether Newton's method finds the poses of a grid, from the middle."""

@@ -28,9 +28,6 @@ from .refine import refine
 from .segments import Segments
 from ..motion.curves import HALVINGS
 
-# The longest step of an input [rad, sizes]: a fold and its other side are farther apart, mostly.
-MAX_STEP = 0.7
-
 
 def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
            source: object) -> Optional[Row]:
@@ -52,9 +49,8 @@ def _followed(problem: InverseProblem, values: Sequence[float], residuals: Seque
     """Return the end of a motion of the outputs from `residuals` above values; None if none."""
     if solution := refine(problem, values, tuple(seed)):
         inputs, rates = problem.nearest_equivalent(solution, seed), solution[problem.n:]
-        # A fold is not passed, nor is the motion left for another one.
-        if _side(rates) == side and all(abs(x - y) <= MAX_STEP * size for x, y, size in zip(
-                inputs, seed, problem.sizes)):
+        # A fold is not passed.
+        if _side(rates) == side:
             return *inputs, *rates
     if not halvings:
         return None

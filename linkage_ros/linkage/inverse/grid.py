@@ -18,7 +18,6 @@ from typing import Iterator, List, Sequence, Union
 
 import numpy as np
 
-from .follow import MAX_STEP
 from .problem import ACCEPTED, InverseProblem, Row
 from .segments import Bracket, segments_of
 from ..formulas import Names
@@ -30,6 +29,8 @@ from ...words import listed
 
 # Starts, more of them where fewer than this number can be assembled.
 COUNTS, ASSEMBLED = (4096, 65536), 500
+# The longest step [rad, sizes]: longer ones lead away from folds.
+MAX_STEP = 0.7
 
 
 def check_dependence(linkage: Kinematics, outputs: Names) -> None:
@@ -144,5 +145,6 @@ class Grid:
             q = np.where(better[:, None], trial, q)
             solved = np.where(better, new, solved)
         # Most of those that reach one solution differ by rounding.
-        places = CLOSE * np.unique(np.round(np.concatenate(reached) / CLOSE), axis=0)
+        units = CLOSE * self._steps
+        places = units * np.unique(np.round(np.concatenate(reached) / units), axis=0)
         return [*map(tuple, places.tolist())]

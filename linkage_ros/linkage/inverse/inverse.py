@@ -307,7 +307,7 @@ class Inverse:
     def _each(self, values: Any, name: str = 'values') -> Tuple[Any, ...]:
         """Return a float or an array for each output; raise ValueError if they are not that."""
         if not isinstance(values, (list, tuple)):
-            values = np.atleast_1d(numbers(name, values))
+            values = [values] if type(values) is float else np.atleast_1d(numbers(name, values))
         if len(values) != self._n:
             raise self._miscounted(values, name)
         parts: List[Any] = [x if type(x) is float else numbers(name, x) for x in values]

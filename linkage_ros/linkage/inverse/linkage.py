@@ -390,9 +390,8 @@ class _Sketch(Dyads):
 
     def _joint(self, body: str, joint: str) -> str:
         """Return the name of a joint in the lines; raise ValueError if no line places it."""
-        for name, at in self.on[body].items():
-            if abs(at - self._frames[body][joint]) < self.near:
-                return name
+        if name := self.joint_at(body, self._frames[body][joint]):
+            return name
         raise ValueError(f'{joint} is not placed')
 
 

@@ -10,7 +10,7 @@ them (`refine`), and what chooses one (`choice`) or continues one (`follow`).
 
 from __future__ import annotations
 
-from functools import cached_property, partial, reduce
+from functools import cached_property, reduce
 from itertools import combinations
 import math
 from typing import Dict, Sequence, Tuple
@@ -18,11 +18,10 @@ from typing import Dict, Sequence, Tuple
 import numpy as np
 
 from ..formulas import LinkageFormulas
-from ..inputs import Input, is_periodic, spread
+from ..inputs import Input
 from ..kinematics import Kinematics
-from ..motion.curves import LEAST
 from ..motion.reach import reach_of
-from ..tolerances import SINGULAR
+from ..tolerances import LEAST, SINGULAR
 from ...cache import cached
 from ...formula.expression import argument, dimension, greater, nearest_integer, Real, real, where
 from ...formula.program import CompiledFunction, Program
@@ -48,8 +47,6 @@ class InverseProblem:
     inputs : tuple of Input
         Those of the linkage. If one repeats only after very many turns, its period is that of the
         outputs, if they repeat earlier.
-    angular : list of bool
-        For each output, whether it is an angle.
     scales, sizes : list of float
         The unit of each output and of each input in which they are compared [rad or m].
     periods, turns : list of float
@@ -61,45 +58,37 @@ class InverseProblem:
         self.linkage, self.outputs, self.n = linkage, outputs, len(outputs)
         if any(map(np.ndim, linkage.dimensions.values())):
             raise ValueError('the inverse is for one set of dimensions, not for arrays')
-        self.angular = [linkage.is_angle(name) for name in outputs]
-        self.scales = [1.0 if angular else linkage.longest for angular in self.angular]
+        self.scales = [1.0 if linkage.is_angle(name) else linkage.longest for name in outputs]
         self.sizes = [input_.size for input_ in linkage.inputs]
         self.inputs = tuple(map(self._with_period, range(self.n), linkage.inputs))
         self.turns = [input_.turn if input_.wraps else math.inf for input_ in self.inputs]
         # An output that is an input has its period.
         own = {input_.name: turn for input_, turn in zip(self.inputs, self.turns)}
-        self.periods = [own.get(name, math.tau) if angular else math.inf
-                        for name, angular in zip(outputs, self.angular)]
+        self.periods = [own.get(name, math.tau) if linkage.is_angle(name) else math.inf
+                        for name in outputs]
 
     def _with_period(self, by: int, input_: Input) -> Input:
         """Return an input with the period of the outputs if its own has too many turns."""
         if not input_.is_part:
             return input_
-        rates = [self.linkage.gear(name, by)[0] for name in self.linkage.geared_to(by)]
+        linkage = self.linkage
+        rates = [linkage.gear(name, by)[0] for name in linkage.geared_to(by)]
         periods = (1.0, *(1.0 / abs(rate) for rate in rates if rate))
-        over, arcs = partial(self._outputs_over, by), reach_of(self.linkage) if self.n == 1 else ()
-        return next((each for each in (input_._replace(
-            period=period, low=-math.pi * period, high=math.pi * period) for period in periods)
-                     if each.wraps and is_periodic(over, input_, each.turn, arcs)), input_)
-
-    def _outputs_over(self, by: int, values: np.ndarray) -> np.ndarray:
-        """Return the outputs, angles as directions, over one input; the others are spread."""
-        inputs = spread(self.linkage.inputs, len(values))
-        inputs[by] = values
+        arcs = reach_of(linkage) if self.n == 1 else []
+        gaps = [0.5 * (end + start) for (_, end), (start, _) in zip(arcs, arcs[1:])]
         # A value repeats only where the linkage can be assembled again.
-        pose = self.linkage.compiled('checked', self.outputs)
-        rows = zip(pose.over(*inputs), self.angular, self.scales)
-        return np.concatenate([[np.cos(row), np.sin(row)] if angular else [row / scale]
-                               for row, angular, scale in rows])
+        return next((input_._replace(period=turns, low=-math.pi * turns, high=math.pi * turns)
+                     for turns in periods if linkage.repeats(
+                         by, turns, 'checked', self.outputs, input_.high, gaps)), input_)
 
     @cached_property
     def newton(self) -> CompiledFunction:
         """Return the code for a step of Newton's method; see `newton`."""
-        program = newton(self.linkage.structure, self.outputs, tuple(self.periods),
-                         tuple(self.turns))
-        return program.bind({**self.linkage.dimensions, LONGEST_BAR: self.linkage.longest, **{
+        linkage = self.linkage
+        program = newton(linkage.structure, self.outputs, tuple(self.periods), tuple(self.turns))
+        return program.bind({**linkage.dimensions, LONGEST_BAR: linkage.longest, **{
             f'[{input_.name}]': size for input_, size in zip(self.inputs, self.sizes)}}, {},
-            self.linkage.is_accelerated)
+            linkage.is_accelerated)
 
     def reduced(self, values: Row) -> Row:
         """Return values with large angles reduced to one period, exactly."""

@@ -65,7 +65,7 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Br
                    ) -> Optional[Row]:
     """Return the solution in a bracket, which Newton's method does not leave; None if none."""
     low, high, x, sign, place, others = bracket
-    n, at = problem.n, problem.newton.at
+    n, at, ulp = problem.n, problem.newton.at, math.ulp(values[place]) / problem.scales[place]
     x = x if low <= x <= high else 0.5 * (low + high)
     best, best_x = (math.inf, math.inf), x
     for _ in range(HALVINGS):
@@ -75,7 +75,7 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Br
         elif best[1] <= ACCEPTED:
             break
         error, following = trial[2 + place], trial[2 + n]
-        if following == x:
+        if following == x or trial[0] <= ulp:
             break
         low, high = (x, high) if error * sign < 0.0 else (low, x)
         x = following if low < following < high else 0.5 * (low + high)

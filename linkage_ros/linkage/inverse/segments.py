@@ -13,22 +13,22 @@ from __future__ import annotations
 
 from bisect import bisect_right
 import math
-from typing import Any, Callable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
 from ..inputs import Arc, Input
 from ..kinematics import Kinematics
-from ..motion.curves import ascending, CUTS, extremes, LEAST, refined, sampled, turning_points
+from ..motion.curves import ascending, CUTS, extremes, refined, sampled, turning_points
 from ..motion.reach import MAX_ENDS, reach_of
-from ..motion.singularities import Analysis, distinct, NEAR, NearZero
-from ..tolerances import CLOSE, ONE, ROUNDING, SINGULAR, TOLERANCE
+from ..motion.singularities import Analysis, NEAR
+from ..tolerances import CLOSE, LEAST, ONE, ROUNDING, SINGULAR, TOLERANCE
 
 # Rounding of a pose, which that of all joints may explain: so many ulps of an input, or multiples
 # of the rounding of one sum.
 ULPS = 64.0
-# The output's error between samples, and the least jump [parts of its range].
-EXPLAINED, JUMP = 1e-4, 0.05
+# The least jump of the output [parts of its range].
+JUMP = 0.05
 # More additional samples of an arc are those of a linkage that is singular nearly everywhere.
 MAX_SAMPLES = 10000
 
@@ -91,43 +91,30 @@ class Table(NamedTuple):
 
 class Segments:
     """
-    An output over the reach, in segments on which it is monotone.
+    An output over the first input's reach, in segments on which it is monotone.
 
-    Parameters
-    ----------
-    curve : callable
-        From values of the input, shape (n,), to the output and its rate, shape (2, n).
-    arcs : sequence of (float, float)
-        The reach; no arc extends to both sides of -pi or pi.
-    near_zeros : sequence of NearZero
-        Where a dyad is or nearly is at a dead point.
-    input_ : Input
-        The input; in all samples it is in its size.
-    period : float
-        After how much the output is the same, or inf.
-    size : float
-        The unit of the output.
-    offset : float
-        Whole turns [rad] that are added to solutions; see `Mechanism.turned`.
-
+    In all samples the input is in its step.
     """
 
-    def __init__(self, curve: Callable, arcs: Sequence[Arc], near_zeros: Sequence[NearZero],
-                 input_: Input, period: float, size: float, offset: float):
-        self._curve, self._period, self._size = curve, period, size
-        self._input, self._unit = input_, input_.step
-        self._rounding = TOLERANCE * size
-        normalized = input_.normalized()
-        special = distinct((near.value for near in near_zeros if near.gap <= near.rounding),
-                           normalized)
-        marks = distinct((near.value for near in near_zeros if near.gap <= NEAR * near.size),
-                         normalized)
+    def __init__(self, linkage: Kinematics, output: str, others: Sequence[float], first: Input):
+        analysis, self._input = Analysis(linkage, others, first), first
+        self._curve, arcs = analysis.curve('output', output), analysis.reach()
+        is_angle, own = linkage.is_angle(output), first.turn if first.wraps else math.inf
+        self._period = (own if output == first.name else math.tau) if is_angle else math.inf
+        self._size = 1.0 if is_angle else linkage.longest
+        self._rounding, self._unit = TOLERANCE * self._size, first.step
+        normalized = first.normalized()
+        # Where a dyad is at a dead point, and where it nearly is.
+        near_zeros = analysis.near_zeros()
+        special = normalized.distinct(x.value for x in near_zeros if x.gap <= x.rounding)
+        marks = normalized.distinct(x.value for x in near_zeros if x.gap <= NEAR * x.size)
         self.jumps: List[float] = []
         # Next to an end of the reach there is a pose also when turns are added, and behind gears.
-        farthest = math.pi if input_.is_part else normalized.high
-        ulps = 2.0 if input_.period == 1 else 4.0
+        farthest = math.pi if first.is_part else normalized.high
+        offset = math.tau * abs(dict(linkage.design.turned).get(first.name, 0.0)) / self._unit
+        ulps = 2.0 if first.period == 1 else 4.0
         self._inside = [tuple(end + side * ulps * (not normalized.is_cut(end)) * math.ulp(
-            max(abs(end) + offset / self._unit, farthest))
+            max(abs(end) + offset, farthest))
             for end, side in zip(arc, (1.0, -1.0))) for arc in arcs]
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
         if not 0 < len(runs) <= MAX_ENDS * max(1.0, sum(hi - lo for lo, hi in arcs) / math.tau) \
@@ -251,11 +238,9 @@ class Segments:
             gap / self._period)
 
     def _runs(self, lo: float, hi: float, marks: Sequence[float]) -> Iterator[Tuple]:
-        """Yield samples as inputs, values, rates and noise, cut where the output jumps."""
+        """Yield samples as inputs, values and rates, cut where the output jumps."""
         theta = np.concatenate([sampled(*arc) for arc in _cut([(lo, hi)], marks)])
         theta = ascending(theta)
-        if len(theta) < 2:
-            return
         most = MAX_SAMPLES + 4 * len(theta)
         theta, jumped = self._divided(theta, most)
         if len(theta) > most:
@@ -276,7 +261,7 @@ class Segments:
             if len(clear) > 1 and theta[run[-1]] - theta[run[0]] > ROUNDING:
                 run = run[clear[0]:clear[-1] + 1]
                 yield (theta[run], np.unwrap(value[0, run], period=self._period) if self._period
-                       < math.inf else value[0, run], rate[0, run], noise[run])
+                       < math.inf else value[0, run], rate[0, run])
 
     def _divided(self, theta: np.ndarray, most: int) -> Tuple[np.ndarray, np.ndarray]:
         """Return samples that explain the output, and after which of them it jumps."""
@@ -295,8 +280,7 @@ class Segments:
                 wide = (width > SINGULAR) & (missed > ULPS * self._rounding)
                 # Two extremes may hide where the change is less than half of what rates say.
                 hidden = (slopes[0] * slopes[1] > 0.0) & (missed > 0.5 * np.abs(mean))
-                place = np.flatnonzero((missed > JUMP * size) | wide & (
-                    hidden | (missed > EXPLAINED * size)))
+                place = np.flatnonzero((missed > JUMP * size) | wide & hidden)
             neighbours = np.nextafter(theta[place], theta[place + 1]) == theta[place + 1]
             jumped = place[neighbours & (np.abs(change[place]) > JUMP * size)]
             place = place[~neighbours]
@@ -310,17 +294,16 @@ class Segments:
 
     def _moves(self, runs: Sequence[Tuple]) -> bool:
         """Return whether the output changes by more than rounding."""
-        _, values, _, noise = (np.concatenate(part) for part in zip(*runs))
-        # Medians; np.median and np.unique would import masked arrays, which takes 10 ms.
-        typical, usual = (np.sort(numbers)[len(numbers) // 2] for numbers in (values, noise))
-        noise = ULPS * (noise + usual) + self._rounding
-        return bool(np.any(np.abs(self._difference(values - typical)) > noise))
+        values = np.concatenate([value for _, value, _ in runs])
+        # The median; np.median would import masked arrays, which takes 10 ms.
+        away = np.abs(self._difference(values - np.sort(values)[len(values) // 2]))
+        return bool((away > ULPS * self._rounding).any())
 
-    def _monotone(self, theta: np.ndarray, value: np.ndarray, rate: np.ndarray,
-                  noise: np.ndarray) -> Iterator[Segment]:
+    def _monotone(self, theta: np.ndarray, value: np.ndarray, rate: np.ndarray
+                  ) -> Iterator[Segment]:
         """Yield the segments of a run, cut at its extremes."""
         with np.errstate(invalid='ignore'):
-            places = turning_points(value, rate, 4.0 * (noise + self._rounding))
+            places = turning_points(value, rate, 8.0 * self._rounding)
             rising = rate[places] >= 0.0
             at, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
                 x.shape) == rising[:, None], theta[places], theta[places + 1])
@@ -364,16 +347,8 @@ def segments_of(linkage: Kinematics, output: str, others: Sequence[float] = (),
                 first: Optional[Input] = None) -> Segments:
     """Return the segments of an output over the first input; see `Analysis`."""
     first = first or linkage.inputs[0]
-
-    def make() -> Segments:
-        analysis = Analysis(linkage, others, first)
-        period = math.inf if not linkage.is_angle(output) else (
-            math.tau if output != first.name else first.turn if first.wraps else math.inf)
-        return Segments(analysis.curve('output', output), analysis.reach(), analysis.near_zeros(),
-                        first, period, 1.0 if linkage.is_angle(output) else linkage.longest,
-                        math.tau * abs(dict(linkage.design.turned).get(first.name, 0.0)))
-
-    return linkage.cache.get_or_make(('segments', output, first.period, *others), make)
+    return linkage.cache.get_or_make(('segments', output, first.period, *others),
+                                     lambda: Segments(linkage, output, others, first))
 
 
 def extremes_of(linkage: Kinematics, output: str, arcs: Optional[Sequence[Arc]],

@@ -15,14 +15,14 @@ from typing import Callable, Tuple
 
 import numpy as np
 
+from ..tolerances import LEAST
+
 # Even samples of a whole turn; halvings of a distance after which few of its digits are left.
 TURN_SAMPLES, HALVINGS = 360, 48
 # Peaks of a curve that are refined for its extremes.
 REFINED_PEAKS = 4
 # Fractions at which a bracket is divided; an odd number of them, so that one is its middle.
 CUTS = np.arange(1, 16) / 16
-# Angles below this [rad] are zero: the rounding of any other angle is coarser.
-LEAST = 1e-18
 
 
 def sampled(lo: float, hi: float, count: int = 0) -> np.ndarray:
@@ -86,17 +86,17 @@ def near_misses(values: np.ndarray) -> np.ndarray:
                 & (sign * inner <= 2.0 * bent))
 
 
-def turning_points(values: np.ndarray, rates: np.ndarray, least: np.ndarray) -> np.ndarray:
+def turning_points(values: np.ndarray, rates: np.ndarray, least: float) -> np.ndarray:
     """
     Return the samples after which a curve has an extreme.
 
     An extreme lies between samples with rates of opposite signs. Two successive ones that differ
-    by no more than the sum of `least` at both are rounding, and are omitted.
+    by no more than `least` are rounding, and are omitted.
     """
     rising = np.asarray(rates) >= 0.0
     found: list = []
     for i in np.flatnonzero(rising[1:] != rising[:-1]).tolist():
-        if found and abs(values[i] - values[found[-1]]) <= least[i] + least[found[-1]]:
+        if found and abs(values[i] - values[found[-1]]) <= least:
             found.pop()
         else:
             found.append(i)

@@ -18,7 +18,7 @@ import numpy as np
 
 from .curves import ascending, HALVINGS, lowest, near_misses, refined, sampled
 from ..geometry.planar import Limit
-from ..inputs import Arc, CRANK, Input, is_periodic
+from ..inputs import Arc, CRANK, Input
 from ..kinematics import Kinematics
 from ..tolerances import ONE
 
@@ -59,17 +59,13 @@ def _reach(linkage: Kinematics, others: Tuple[float, ...]) -> List[Arc]:
     turns = range(round(first * step / math.tau), round(last * step / math.tau))
     ends = [(end + math.tau * turn) / step for limit in closed
             for end in _crank_ends(limit, linkage.value) for turn in turns]
-    if input_.wraps:
-        # The linkage may be assembled differently a turn later: the arcs then end at -pi and pi.
-        ends.append(input_.low)
     if any(x.margin.varies and x not in closed for x in limits):
         # Beyond an end in closed form the limit holds for its tolerance, which moves no end.
         rows = [i for i, limit in enumerate(limits) if limit in closed]
         ends += [end for lo, hi in input_.between(ends)
                  if (margins(np.array([lo + INSIDE * (hi - lo)]))[rows] >= 0.0).all()
                  for end in _limits(margins, lo, hi)]
-    arcs = reachable_arcs(ends, assembled, input_, lambda: is_periodic(
-        over_first(linkage, 'points', linkage.points, others), input_, input_.turn))
+    arcs = reachable_arcs(ends, assembled, input_)
     if not input_.is_whole(arcs):
         arcs = [_trimmed(assembled, *arc) for arc in arcs]
     return [(lo * step, hi * step) for lo, hi in arcs if lo < hi]
@@ -145,12 +141,11 @@ def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:
 
 
 def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
-                   input_: Input = CRANK,
-                   joined: Callable[[], bool] = lambda: True) -> List[Arc]:
+                   input_: Input = CRANK) -> List[Arc]:
     """
     Return the reachable arcs between values at which reachability may change.
 
-    Arcs that touch are merged; those that touch across -pi and pi, if `joined` returns True.
+    Arcs that touch are merged, across -pi and pi, too.
     """
     parts = input_.between(ends)
     reached = [arc for arc in parts if bool(reachable(arc[0] + INSIDE * (arc[1] - arc[0])))]
@@ -162,8 +157,7 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
             found[-1] = found[-1][0], hi
         else:
             found.append((lo, hi))
-    if (input_.wraps and len(found) > 1 and found[0][0] + input_.turn - found[-1][1] <= ONE
-            and joined()):
+    if input_.wraps and len(found) > 1 and found[0][0] + input_.turn - found[-1][1] <= ONE:
         found[-1] = found[-1][0], found.pop(0)[1] + input_.turn
     return [(lo - input_.turn, hi - input_.turn) if input_.wraps and lo >= input_.high
             else (lo, hi) for lo, hi in found]

@@ -11,15 +11,15 @@ area of a kite or parallelogram.
 
 from __future__ import annotations
 
-from typing import Callable, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .curves import LEAST, refined, sampled
+from .curves import refined, sampled
 from .reach import over_first, reach_of
 from ..inputs import Arc, Input
 from ..kinematics import Kinematics
-from ..tolerances import CLOSE, ONE, TOLERANCE
+from ..tolerances import CLOSE, TOLERANCE
 
 # Outputs change quickly where a closure is below this fraction of its size.
 NEAR = 1e-2
@@ -58,17 +58,6 @@ def _approaches(theta: np.ndarray, values: np.ndarray, rates: np.ndarray,
         return np.nonzero((before < 0.0) & (after >= 0.0) & ~(bound > near))
 
 
-def distinct(values: Iterable[float], input_: Input) -> List[float]:
-    """Return values of an input in order, wrapped, one of those that differ by rounding."""
-    found: List[float] = []
-    for x in sorted(float(input_.wrapped(0.0 if abs(x) < LEAST else x)) for x in values):
-        if not found or x - found[-1] > ONE:
-            found.append(x)
-    if input_.wraps and len(found) > 1 and found[0] + input_.turn - found[-1] <= ONE:
-        found.pop()
-    return found
-
-
 class Analysis:
     """
     Motion of a linkage with its first input; the other inputs are fixed.
@@ -91,7 +80,7 @@ class Analysis:
         touched = [near.value for near in self.near_zeros()
                    if near.gap <= near.rounding
                    and all(first.apart(near.value, end) > CLOSE for end in ends)]
-        return distinct([*ends, *touched], first)
+        return first.distinct([*ends, *touched])
 
     def reach(self) -> List[Arc]:
         """Return the reach in arcs, none of them on both sides of an end of a turn."""
@@ -130,25 +119,19 @@ class Analysis:
         values, rates = np.reshape(curve(theta), (len(folds), 2, -1)).swapaxes(0, 1)
         size = np.fmax.reduce(np.abs(values), axis=1, initial=0.0)
         # A closure as small as its rounding counts as zero. One that is never larger, such as the
-        # area of a kite that is always flat, is ignored.
-        ignored = size <= FLAT * rounding
-        rounding = rounding + TOLERANCE ** 2 * size
+        # area of a kite that is always flat, never does.
+        rounding, size = np.where(
+            size > FLAT * rounding, (rounding + TOLERANCE ** 2 * size, size), -1.0)
 
         def near(row: np.ndarray, value: np.ndarray, gap: np.ndarray) -> Iterator[NearZero]:
-            return (NearZero(*numbers) for *numbers, flat in zip(
-                value.tolist(), gap.tolist(), rounding[row].tolist(), size[row].tolist(),
-                ignored[row].tolist()) if not flat)
+            return map(NearZero, *(x.tolist() for x in (value, gap, rounding[row], size[row])))
 
-        for end in (0, -1):
-            if self._first.normalized().is_cut(theta[end]):
-                yield from near(np.arange(len(folds)), np.full(len(folds), theta[end]),
-                                np.abs(values[:, end]))
         # A sample may be the zero itself, with a rate of either sign.
-        inner, before, after = (np.abs(values[:, 1:-1]), np.abs(values[:, :-2]),
-                                np.abs(values[:, 2:]))
+        gaps = np.pad(np.abs(values), ((0, 0), (1, 1)), constant_values=np.inf)
+        before, inner, after = gaps[:, :-2], gaps[:, 1:-1], gaps[:, 2:]
         row, place = np.nonzero(
             (inner <= rounding[:, None]) & (inner < before) & (inner <= after))
-        yield from near(row, theta[place + 1], inner[row, place])
+        yield from near(row, theta[place], inner[row, place])
         searched = ((_crossings(values, folds), values),
                     (_approaches(theta, values, rates, NEAR * size[:, None]), rates))
         for kind, ((row, place), samples) in enumerate(searched):

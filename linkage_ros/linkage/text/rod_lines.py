@@ -133,8 +133,9 @@ def _why_not(window: Window, inputs: Sequence[str], hinges: Sequence[str]) -> st
         return ', '.join(f'{name} at {value:.6g}' for name, value in zip(names, values))
 
     if two := window.second_pose():
-        return (f'there is a second pose in these limits: with {at(inputs, two.motors)}, '
-                + ' as well as '.join(at(hinges, pose) for pose in two.poses))
+        motors, poses = two
+        return (f'there is a second pose in these limits: with {at(inputs, motors)}, '
+                + ' as well as '.join(at(hinges, pose) for pose in poses))
     return ("there may be a second pose in these limits, or one that the steps of Newton's method "
             'do not reach')
 
