@@ -318,10 +318,7 @@ class Segments:
         for first, last in zip(cuts, cuts[1:]):
             part = slice(first, last + 1)
             sign = 1.0 if value[last] >= value[first] else -1.0
-            values = sign * value[part]
-            # An extreme in noise has a value of its own.
-            values[0] = values[:2].min()
-            yield Segment(theta[part], np.maximum.accumulate(values), sign)
+            yield Segment(theta[part], np.maximum.accumulate(sign * value[part]), sign)
 
     def _slack(self, number: int, end: int) -> float:
         """Return how far beyond an end of a segment, 0 or -1, values are those of the end."""
