@@ -22,7 +22,7 @@ from ..kinematics import Kinematics
 from ..motion.curves import ascending, CUTS, extremes, refined, sampled, turning_points
 from ..motion.reach import MAX_ENDS, reach_of
 from ..motion.singularities import Analysis, NEAR
-from ..tolerances import CLOSE, LEAST, ONE, ROUNDING, SINGULAR, TOLERANCE
+from ..tolerances import CLOSE, ONE, ROUNDING, SINGULAR, TOLERANCE
 
 # Rounding of a pose, which that of all joints may explain: so many ulps of an input, or multiples
 # of the rounding of one sum.
@@ -307,7 +307,6 @@ class Segments:
             rising = rate[places] >= 0.0
             at, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
                 x.shape) == rising[:, None], theta[places], theta[places + 1])
-        at = np.where(np.abs(at) < LEAST, 0.0, at)
         found = self._curve(at)[0] if len(at) else at
         # An extreme may be the one input at which an arm has no length and no direction.
         at = np.where(np.isfinite(found), at, theta[places])
