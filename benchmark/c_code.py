@@ -8,7 +8,7 @@ What a linkage in C takes: code, stack and time, on microcontrollers and on this
 
 Compilers that are not installed are left out (apt install gcc-avr avr-libc simavr
 gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm). With --document the tables go into
-docs/c-code.md.
+docs/design/c-code.md.
 """
 
 from pathlib import Path
@@ -164,7 +164,7 @@ def main():
             value for use in USES
             for value in times(HERE_, *prepared(name, outputs, number, use)))]
          for name, outputs in CASES for number in ('float', 'double')])
-    document.show(options, 'c-code.md', f'{text}\n\n{document.machine()}')
+    document.show(options, 'design/c-code.md', f'{text}\n\n{document.machine()}')
 
 
 def measured(target, text, values):

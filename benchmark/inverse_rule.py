@@ -13,17 +13,13 @@ points. With --document the table goes into docs/design/accuracy.md.
 
 from collections import Counter
 from itertools import chain
-from pathlib import Path
-import sys
 import time
 
 from linkage_ros import mechanisms
 import numpy as np
+from truth import inverse_judge, linkage_checks
 
 from . import document
-
-sys.path.append(str(Path(__file__).parents[1] / 'test'))
-from truth import inverse_judge, linkage_checks  # noqa: E402
 
 # Choices of several outputs, of which most do not determine the inputs.
 TRIES = 20

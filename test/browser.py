@@ -227,5 +227,5 @@ class Browser:
 
     def picture(self) -> np.ndarray:
         """Return what is seen: red, green and blue, shape (height, width, 3)."""
-        data = (self._do('Page.captureScreenshot', format='png'))['data']
+        data = self._do('Page.captureScreenshot', format='png', optimizeForSpeed=True)['data']
         return np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert('RGB'), int)

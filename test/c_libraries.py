@@ -13,12 +13,16 @@ import shutil
 import subprocess
 import sys
 
+from linkage_ros import scene
 from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import joints
+from linkage_ros.c_code.package import ranges
 from linkage_ros.scene.joint_names import JointName
 import numpy as np
 import pytest
 
+# What nothing writes.
+UNWRITTEN = 0.123456789
 STAND_IN = Path(__file__).parent / 'ros2_control'
 # What finds rcutils, whose log transmissions use; nothing if it is not installed.
 ROS = next(([f'-isystem{include}', f'-L{prefix}/lib', '-lrcutils', f'-Wl,-rpath,{prefix}/lib']
@@ -26,7 +30,6 @@ ROS = next(([f'-isystem{include}', f'-L{prefix}/lib', '-lrcutils', f'-Wl,-rpath,
             for include in (f'{prefix}/include/rcutils', f'{prefix}/include')
             if Path(include, 'rcutils', 'logging_macros.h').is_file()), [])
 COMPILER = shutil.which('cc') or shutil.which('gcc')
-SAMPLE = (STAND_IN / 'sample.h').read_text()
 SANITIZED = ('-g', '-O1', '-fsanitize=address,undefined', '-fno-sanitize-recover=all')
 STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror')
 # For what is written for ros2_control.
@@ -43,6 +46,16 @@ def shared(tmp_path_factory, name):
     with open(folder / f'{name}.lock', 'w') as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield folder / name
+
+
+def alone(linkage, name='m', **settings):
+    """Return the mechanism of a type or of joint lines, alone in its scene."""
+    if not isinstance(linkage, dict):
+        linkage = {'type': linkage} if isinstance(linkage, str) else {
+            'type': 'custom', 'joints': [*linkage]}
+    return scene.read({'mechanisms': [name], **{
+        f'{name}.{key}': value for key, value in {**linkage, **settings}.items()}}
+        ).mechanisms[name]
 
 
 def loaded(folder, code, *flags):
@@ -68,19 +81,31 @@ int poses_taken(void) {{ int before = taken; taken = 0; return before; }}
 """
 
 
-def inverter(folder, mechanism, output):
-    """Return the inverse of a mechanism's only input in C: value, near -> input and poses."""
-    text = header.written(mechanism, [output])
+def inverter(folder, mechanism, *outputs):
+    """
+    Return the inverse of a mechanism in C: values and near inputs -> inputs or None, and poses.
+
+    It checks that no more poses are computed than the header says.
+    """
+    text, n = header.written(mechanism, outputs), len(outputs)
     name, = re.findall(r'int (\w+_for_\w+)', text)
+    most = int(re.search(r'call takes at most (\d+) poses', text)[1])
+    given = 'value, near' if n > 1 else '*value, *near'
     library = loaded(folder, f"""{counted(text)}
-int inverted(double value, double near, double *input) {{ return {name}(value, near, input); }}
+int inverted(const double *value, const double *near, double *inputs)
+{{
+    return {name}({given}, inputs);
+}}
 """)
-    answer = ctypes.c_double()
 
     def invert(value, near):
-        is_there = library.inverted(ctypes.c_double(value), ctypes.c_double(near),
-                                    ctypes.byref(answer))
-        return answer.value if is_there else None, library.poses_taken()
+        made = (ctypes.c_double * n)(*[UNWRITTEN] * n)
+        is_there = library.inverted(*((ctypes.c_double * n)(*np.ravel(each))
+                                      for each in (value, near)), made)
+        assert is_there or {*made} == {UNWRITTEN}
+        taken = library.poses_taken()
+        assert taken <= most
+        return (made[:] if n > 1 else made[0]) if is_there else None, taken
 
     return invert
 
@@ -114,3 +139,19 @@ def expected(mechanism, inputs, chosen=()):
     return ((outputs(mechanism, inputs, measured) - offset) / ratio, rates / ratio[:, None],
             np.array([*map(JointName.of, named, outputs(mechanism, inputs, chosen))]),
             np.array([name.sign for name in named])[:, None] * turning)
+
+
+def prove(package, mechanism, compiler):
+    """Compile the proof for a mechanism of a package and run it, with sanitizers, too."""
+    name, program = mechanism.name, package / f'proof_{mechanism.name}'
+    code = (package / 'src' / f'{name}.hpp').read_text()
+    class_, space = re.search(r'struct (\w+)Code', code)[1], re.search(r'namespace (\w+)', code)[1]
+    for count, flags in ((100_000, ()), (5000, SANITIZED)):
+        subprocess.run([
+            compiler, *PLUGIN, '-O2', *flags, f'-DNAME={name}', f'-DCLASS={class_}',
+            f'-DNAMESPACE={space}', f'-DRANGES={ranges(mechanism)}', '-I', package / 'src',
+            '-I', package / 'include', STAND_IN / 'proof.cpp', '-o', program, *PLUGIN], check=True)
+        ended = subprocess.run([program, str(count)], capture_output=True, text=True)
+        assert ended.returncode == 0, ended.stdout + ended.stderr
+        tried, good = map(int, re.search(r'(\d+) states, (\d+)', ended.stdout).groups())
+        assert tried == count and good > 0.9 * count

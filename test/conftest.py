@@ -27,6 +27,8 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 # A failure prints how to repeat it; a run depends on no earlier one.
 settings.register_profile('repeatable', database=None, print_blob=True, deadline=None)
 settings.load_profile('repeatable')
+# Its failures show both sides, as those of tests do.
+pytest.register_assert_rewrite('oracle')
 # Of whatever a test starts that is not told another.
 _domain = Domain()
 atexit.register(_domain.release)
@@ -85,6 +87,17 @@ def kept():
     listed = subprocess.run(['git', 'ls-files', '-co', '--exclude-standard'], cwd=root, check=True,
                             text=True, capture_output=True).stdout.split()
     return {root / name for name in listed if (root / name).is_file()}
+
+
+@pytest.fixture
+def copy(kept, tmp_path):
+    """Return a copy of what git keeps, in the sources of a workspace."""
+    folder = tmp_path / 'src' / 'linkage_ros'
+    for file in kept:
+        target = folder / file.relative_to(Path(__file__).parents[1])
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(file, target)
+    return folder
 
 
 @pytest.fixture

@@ -28,7 +28,9 @@ def written(folder, file, *changes):
 
 
 def of_text(path, text):
-    """Return a file with a text."""
+    """Return a file with a text; the test is skipped where nothing reads it."""
+    if '<mujoco' in text:
+        pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
     path.write_text(text, encoding='utf-8')
     return path
 
@@ -36,7 +38,7 @@ def of_text(path, text):
 def printed(file, *args):
     """Return the exit code of the command, and what it prints as output and as errors."""
     if str(file).endswith('.xml'):
-        pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
+        pytest.importorskip('mujoco')
     pytest.importorskip('yaml')
     args = [str(ROBOTS / file), *map(str, args)]
     return _printed(*args, texts=tuple(
@@ -120,6 +122,27 @@ class Pinocchio:
         link = self._library.FrameType.BODY
         return {name: self._data.oMf[self._model.getFrameId(name, link)].translation.copy()
                 for name in names}
+
+
+class MuJoCo:
+    """A model of MuJoCo, which knows its loops."""
+
+    def __init__(self, text):
+        self.library = pytest.importorskip('mujoco', reason='pip install mujoco')
+        self.model = self.library.MjModel.from_xml_string(text)
+        self.data = self.library.MjData(self.model)
+        self.joints = [self.model.joint(i).name for i in range(self.model.njnt)]
+
+    def place(self, positions):
+        """Put joints at positions, and what they move."""
+        for name, value in positions.items():
+            self.data.joint(name).qpos = value
+        self.library.mj_forward(self.model, self.data)
+
+    def open(self):
+        """Return how far what is tied together is apart [m]."""
+        self.library.mj_forward(self.model, self.data)
+        return np.abs(self.data.efc_pos[:self.data.ne]).max(initial=0.0)
 
 
 def words(numbers):

@@ -191,7 +191,7 @@ class Crank:
     _stamps = itertools.count(1)
 
     def __init__(self, graph, names, topic):
-        self._graph, self._names = graph, names
+        self._graph, self.names = graph, names
         self._publisher = graph.node.create_publisher(JointState, topic, 10)
         # The lists in which an answer has come, by their number.
         self._answered = {}
@@ -219,7 +219,7 @@ class Crank:
         return message.header.stamp.sec
 
     def _message(self, angles, velocities):
-        message = JointState(name=self._names, position=angles, velocity=velocities)
+        message = JointState(name=self.names, position=angles, velocity=velocities)
         message.header.stamp.sec = next(self._stamps)
         return message
 

@@ -5,78 +5,33 @@
 What was just measured can be commanded, in C, over the catalogue and random linkages.
 
 Each question measures a pose, then commands the joints to be where they are, or where they are
-beside it: at inputs that differ by 1e-3 rad or sizes. Counted are questions, those that are
-refused, and answers with another pose: not the one asked for, and farther away.
+beside it: at inputs that differ by 1e-3 rad or sizes. Python says where they are.
 """
 
 from contextlib import suppress
-import ctypes
 import subprocess
 
-from c_libraries import COMPILER, loaded, SAMPLE, SANITIZED
+from c_libraries import alone, COMPILER, loaded, SANITIZED
+from c_memories import memories, Memory
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
-from linkage_ros.c_code.axes import joints
-from linkage_ros.c_code.package import ranges
+from linkage_ros.c_code.axes import actuators, joints
 import numpy as np
 import pytest
 from truth import random_linkages
 
 pytestmark = pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
 NUMBERS = pytest.mark.parametrize('number', ['double', 'float'])
-# Linkages for which a fault was found: a closed form was missing an assembly mode.
-FAULTS = [('DE', ['A ground 0 0', 'B ground 0 1.4', 'C cylinder B A 1.0157 right',
-                  'D E F inversor B C 1.2375 0.3369'])]
-QUESTIONS = """
-void {name}_counts(long poses, long *counts)
-{{
-    static const {number} slack = {slack};
-    static const double ranges[{n}][2] = {ranges};
-    static {name}_memory m;
-    long i;
-    int k, side;
-    if (!{name}_begin(&m))
-        return;
-    for (i = 1; i <= poses; i++) {{
-        {number} q[{n}], beside[{n}], gap[{n}], least;
-        lkr_point p, goal;
-        lkr_side measured = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }};
-        lkr_side asked = measured, found = measured;
-        sample({n}, ranges, i, q);
-        if (!{name}_at(q, &p))
-            continue;
-        for (k = 0; k < {n}; k++)
-            beside[k] = q[k] + (i & 1 << k ? 1 : -1) * ({number})1e-3;
-        for (side = 0; side < 2; side++) {{
-            goal = p;
-            if (side && !{name}_at(beside, &goal))
-                continue;
-            for (k = 0; k < {n}; k++)
-                measured.position[k] = p.position[0][k];
-            if ({name}_actuators_to_joints(&m, &measured, &asked) & 1)
-                continue;
-            counts[0]++;
-            for (k = 0; side && k < {n}; k++)
-                asked.position[k] = goal.position[1][k];
-            if ({name}_joints_to_actuators(&m, &asked, &found) & 1) {{
-                counts[1]++;
-                continue;
-            }}
-            least = lkr_gap(&{name}_model, 0, found.position, &goal, gap);
-            if (least > slack && lkr_gap(&{name}_model, 0, found.position, &p, gap)
-                > slack + 2 * lkr_gap(&{name}_model, 0, goal.position[0], &p, beside))
-                counts[2]++;
-        }}
-    }}
-}}
-"""
+# A linkage for which a closed form was missing an assembly mode.
+FAULT = ['A ground 0 0', 'B ground 0 1.4', 'C cylinder B A 1.0157 right',
+         'D E F inversor B C 1.2375 0.3369']
+# Poses of a linkage, and how far joints and actuators may be from those of Python [rad, sizes].
+POSES, NEAR, SLACK = 300, {'double': 1e-9, 'float': 1e-6}, {'double': 1e-6, 'float': 1e-2}
 
 
 def read(name, joint_lines, names=(), **given):
     """Return a mechanism of joint lines, with the names of its commanded joints."""
-    mechanism, = scene.read({
-        'mechanisms': [name], f'{name}.type': 'custom', f'{name}.joints': list(joint_lines),
-        **{f'{name}.{key}': value for key, value in given.items()}}).mechanisms.values()
+    mechanism = alone(joint_lines, name, **given)
     joints(mechanism, names)
     return header.Request(mechanism, (), tuple(names))
 
@@ -101,56 +56,80 @@ def drawn(seeds):
                         others, len(linkage.inputs), replace=False)] for k in (1, 2)]
 
 
-def code(cases, number='double'):
-    """Return the C of cases, with functions that put questions."""
-    return header.printed(cases, number == 'float') + SAMPLE + ''.join(
-        QUESTIONS.format(name=case.mechanism.name, number=number, n=len(case.mechanism.inputs),
-                         slack='1e-2f' if number == 'float' else '1e-6',
-                         ranges=ranges(case.mechanism)) for case in cases)
+def placed(mechanism, axes, inputs):
+    """Return the positions of axes at inputs (poses, n) of the linkage; NaN: not assembled."""
+    linkage = mechanism.linkage
+    names = [each.output for each in axes], [
+        f'{point}.{axis}' for point in linkage.points for axis in linkage.axes]
+    columns = [*inputs.T] if inputs.shape[1] > 1 else inputs[:, 0]
+    values, points = (np.transpose([linkage.joint_angles(columns, each)[name] for name in each])
+                      for each in names)
+    factor, offset = np.transpose([(each.factor, each.offset) for each in axes])
+    values[~np.isfinite(points).all(axis=1)] = np.nan
+    return values * factor + offset
+
+
+def away(axes, positions, others):
+    """Return how far positions are from others, in sizes, the shorter way round."""
+    size, turn = np.transpose([(each.size, each.turn) for each in axes])
+    gap = positions - others
+    gap -= turn * np.round(gap / np.where(turn, turn, np.inf))
+    return np.abs(gap / size).max(axis=-1)
+
+
+def asked(library, case, number):
+    """Return how many questions are put to a linkage, and what is wrong with the answers."""
+    mechanism, rng, slack = case.mechanism, np.random.default_rng(1), SLACK[number]
+    memory = Memory(library, mechanism, np.float32 if number == 'float' else float)
+    sides = actuators(mechanism), joints(mechanism, case.joints)
+    sizes = np.array([input_.size for input_ in mechanism.linkage.inputs])
+    low, high = np.transpose([
+        np.divide(max(settings.arcs, key=np.ptp), mechanism.scale_of(name))
+        for name, settings in mechanism.inputs.items()])
+    here = rng.uniform(low, high, (POSES, len(low)))
+    beside = here + 1e-3 * sizes * rng.choice([-1.0, 1.0], here.shape)
+    (actuator, joint), (goal, commanded) = ([placed(mechanism, axes, inputs) for axes in sides]
+                                            for inputs in (here, beside))
+    count, wrong = 0, []
+    for i in np.flatnonzero(np.isfinite(joint + actuator + commanded + goal).all(axis=1)):
+        status, (measured, *_) = memory.send(0, actuator[i])
+        off = away(sides[1], measured, joint[i])
+        if number == 'float' and (status & 1 or off > NEAR[number]):
+            # Next to a dead point or an end.
+            continue
+        answer, (found, *_) = memory.send(1, measured)
+        if (status | answer) & 1 or off > NEAR[number] or away(
+                sides[0], found, actuator[i]) > slack:
+            wrong.append(f'pose {i}')
+        memory.send(0, actuator[i])
+        status, (found, *_) = memory.send(1, commanded[i])
+        # Another pose that is as near is an answer, too.
+        if status & 1 or away(sides[0], found, goal[i]) > slack and away(
+                sides[0], found, actuator[i]) > slack + 2 * away(sides[0], goal[i], actuator[i]):
+            wrong.append(f'beside {i}')
+        count += 2
+    return count, wrong
 
 
 def questions(folder, cases, number):
-    """Return how many questions were put to each case, and raise if there were misses."""
+    """Return how many questions were put to each case, and raise if an answer was wrong."""
     folder.mkdir(parents=True, exist_ok=True)
-    library, counts = loaded(folder, code(cases, number), '-O1'), {}
-    for case in cases:
-        counts[case.mechanism.name] = (ctypes.c_long * 3)()
-        library[f'{case.mechanism.name}_counts'](ctypes.c_long(300), counts[case.mechanism.name])
-    assert {name: each[:] for name, each in counts.items() if any(each[1:])} == {}
-    return [each[0] for each in counts.values()]
+    library = loaded(folder, memories(cases, number == 'float'), '-O1')
+    answers = {case.mechanism.name: asked(library, case, number) for case in cases}
+    assert {name: wrong for name, (_, wrong) in answers.items() if wrong} == {}
+    return [count for count, _ in answers.values()]
 
 
-def test_sanitizers_find_nothing(tmp_path):
-    def ran(name, text):
-        (tmp_path / f'{name}.c').write_text(text)
-        for command_line in ([COMPILER, '-std=c99', *SANITIZED, tmp_path / f'{name}.c', '-o',
-                              tmp_path / name, '-lm'], [tmp_path / name]):
-            ended = subprocess.run(command_line, capture_output=True, text=True)
-            if ended.returncode:
-                return ended.stderr[:2000]
-        return ended.stdout
-
-    if ran('none', 'int main(void) { return 0; }\n'):
-        pytest.skip('no program with sanitizers is linked or runs here')
-    cases = [read('lever', FAULTS[0][1]), *map(header.Request, scene.read({
-        'mechanisms': ['leg'], 'leg.type': 'five_bar', 'leg.loads': ['P=3 -20']}
-        ).mechanisms.values())]
-    printed = ran('asked', '#include <stdio.h>\n' + code(cases) + 'int main(void)\n{\n' + ''.join(
-        f"""long {name}[3] = {{ 0, 0, 0 }};
-{name}_counts(2000, {name});
-printf("%d", {name}[0] > 1000 && !{name}[1] && !{name}[2]);
-""" for name in ('lever', 'leg')) + '}\n')
-    assert printed == '11'
+@NUMBERS
+def test_a_linkage_that_had_a_fault(tmp_path, number):
+    assert questions(tmp_path, [read('fault', FAULT, ['fault_DE'])], number) > [200]
 
 
 @pytest.mark.nightly
 @NUMBERS
-def test_the_catalogue_and_what_was_refused(tmp_path, number):
-    catalogue = scene.read({'mechanisms': [*mechanisms.TYPES], **{
-        f'{name}.type': name for name in mechanisms.TYPES}}).mechanisms.values()
-    faults = [read(f'fault{i}', joint_lines, [f'fault{i}_{output}'])
-              for i, (output, joint_lines) in enumerate(FAULTS)]
-    assert min(questions(tmp_path, [*map(header.Request, catalogue), *faults], number)) > 200
+def test_the_catalogue(tmp_path, number):
+    catalogue = [header.Request(alone(name, name)) for name in mechanisms.TYPES]
+    assert min(questions(tmp_path, catalogue, number)) > 200
 
 
 @pytest.mark.nightly
@@ -160,3 +139,40 @@ def test_random_linkages(tmp_path, number, seeds):
     cases = [*drawn(seeds)]
     assert sum(sum(questions(tmp_path / f'{i}', cases[i:i + 25], number))
                for i in range(0, len(cases), 25)) > 400 * len(seeds)
+
+
+def test_sanitizers_find_nothing(tmp_path):
+    def ran(text):
+        (tmp_path / 'code.c').write_text(text)
+        for command_line in ([COMPILER, '-std=c99', *SANITIZED, tmp_path / 'code.c', '-o',
+                              tmp_path / 'code', '-lm'], [tmp_path / 'code']):
+            ended = subprocess.run(command_line, capture_output=True, text=True)
+            if ended.returncode:
+                return ended.stderr[:2000]
+        return ended.stdout
+
+    if ran('int main(void) { return 0; }\n'):
+        pytest.skip('no program with sanitizers is linked or runs here')
+    cases = [header.Request(alone('slotted_lever', 'lever', **{'crank.sweep': [-1.0, 2.0]})),
+             header.Request(alone('five_bar', 'leg', loads=['P=1 2']))]
+    printed = ran(f"""{memories(cases)}
+#include <stdio.h>
+int main(void)
+{{
+    static const double values[] = {{ NAN, INFINITY, 1e300, 0, 1, 0.3, 2, -1, 0.5, -0.1, 1.5 }};
+    lkr_side given = {{ {{ 0 }}, {{ 0 }}, {{ 0 }} }}, found = given;
+    unsigned i, status = 0;
+    lever_started();
+    leg_started();
+    for (i = 0; i < 5000; i++) {{
+        given.position[i / 2 % 2] = values[i / 3 % 11];
+        given.velocity[i / 2 % 2] = values[i / 5 % 11];
+        given.effort[i / 2 % 2] = values[i / 7 % 11];
+        status |= 1u << lever_sent((int)(i % 2), &given, &found);
+        status |= 1u << leg_sent((int)(i % 2), &given, &found);
+    }}
+    printf("%u", status);
+}}
+""")
+    # It was all right, out of reach, and not known.
+    assert int(printed) & 0b10011 == 0b10011

@@ -72,8 +72,8 @@ def test_bytes_that_are_no_joint_states_are_passed_over_with_one_warning(graph, 
     for _ in range(5):
         hand.send(text=text)
     said = graph.until(lambda: hand.warnings('no JointState'))
-    assert said[0].startswith(f'crank_states: a message of {len(text)} bytes is ignored, since it '
-                              'is no JointState: ') and len(said[0]) < 400
+    assert len(said[0]) < 400 and said[0].startswith(
+        f'/crank_states: a message of {len(text)} bytes is ignored, since it is no JointState: ')
     assert hand.moved(['jansen_crank'], [0.5], [1.0]).velocity[0] == 1.0
     assert len(hand.warnings('no JointState')) == 1
 
@@ -88,16 +88,6 @@ def test_any_speed_is_handled_without_a_warning_of_numpy(graph, speed):
         for theta in (0.5, 0.6, 1e200):
             state = hand.moved(['m_crank'], [theta], [speed])
             assert np.isfinite(state.velocity).all() and np.isfinite(state.position).all()
-
-
-def test_ten_thousand_joints_hold_nobody_up(graph):
-    hand = Hand(graph)
-    names = [f'joint{i}' for i in range(9999)] + ['jansen_crank']
-    for theta in (0.1, 0.2, 0.3):
-        hand.send(names, [0.0] * 9999 + [theta])
-        graph.until(lambda theta=theta: hand.joints and hand.joints[-1].position[0] == theta)
-    said, = hand.warnings('no input is called')
-    assert 'joint0, joint1' in said and '... (9999)' in said and len(said) < 400
 
 
 def test_a_warning_is_repeated_when_its_time_is_over():

@@ -3,16 +3,13 @@
 
 """Linkages of the user's own: change points, two cranks, sweeps."""
 
-import doctest
 import math
-from pathlib import Path
 
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
 
 TURN = [(-math.pi, math.pi)]
-PAGE = Path(__file__).parents[1] / 'docs' / 'which-word.md'
 FOUR_BAR = ('O ground 0 0', 'Q ground g 0', 'A crank O m', 'B dyad A Q b c left')
 
 
@@ -144,11 +141,6 @@ def test_arrays_of_dimensions_are_checked_too():
         with pytest.raises(ValueError, match=f'line "{line}": {wrong}'):
             mechanisms.create('custom', joints=(*FOUR_BAR, line), m=1.0, g=4.0, c=2.5,
                               b=np.array([3.0, 2.5]))
-
-
-def test_the_page_of_words_says_what_is_refused():
-    failed, tried = doctest.testfile(str(PAGE), module_relative=False)
-    assert tried == 3 and not failed
 
 
 def test_a_joint_of_a_carriage_stands_still_while_that_is_held():

@@ -126,9 +126,6 @@ def test_a_picture_follows_the_stroke_there_and_back():
     lengths = [cycle.pose(turns).inputs[0] for turns in np.linspace(0.0, 1.0, 101)]
     assert low <= min(lengths) < low + 0.03 and high - 0.03 < max(lengths) <= high
     assert np.isfinite(cycle.course).all()
-    assert cycle.pose(cycle.turns_to(1.0)).inputs[0] == pytest.approx(1.0)
-    with pytest.raises(scene.SceneError, match='the cylinder length never reaches 9 m'):
-        cycle.turns_to(9.0)
 
 
 @pytest.mark.parametrize('length', [1e-1, 1e-4, 1e-8])

@@ -8,8 +8,9 @@ import json
 from pathlib import Path
 import re
 import sys
-import textwrap
 
+from benchmark import calls, document
+from benchmark.nodes import report
 from linkage_ros import mechanisms, scene
 from linkage_ros.linkage import joint_lines, Mechanism
 import pytest
@@ -25,10 +26,9 @@ FENCE = re.compile(r'^```(\w*)\n(.*?)^```', re.MULTILINE | re.DOTALL)
 
 
 @pytest.fixture
-def catalogue(monkeypatch):
+def catalogue():
     for module in ('matplotlib', 'yaml'):
         pytest.importorskip(module)
-    monkeypatch.syspath_prepend(ROOT / 'docs')
     import catalogue
     return catalogue
 
@@ -105,12 +105,8 @@ def test_every_word_has_its_drawing_with_the_very_lines_that_it_shows():
     assert set(joint_lines.FORMS) <= drawn & in_the_table
 
 
-@pytest.mark.parametrize('page, code', [
-    ('README.md', r'((?m:^)    from linkage_ros .*?\n\n)'),
-    ('docs/forces.md', r'```python\n(.*?)```')])
-def test_the_library_on_a_page_works_as_written(page, code):
-    parts = re.findall(code, (ROOT / page).read_text(), re.DOTALL)
-    exec(compile(''.join(map(textwrap.dedent, parts)), page, 'exec'), {})
+def test_the_library_on_the_page_of_forces_works_as_written():
+    exec(''.join(blocks(ROOT / 'docs' / 'forces.md', 'python')), {})
 
 
 API = [ROOT / 'docs' / 'api.rst', *sorted((ROOT / 'docs' / 'api').glob('*.rst'))]
@@ -169,19 +165,9 @@ def test_text_of_a_docstring_becomes_markdown(catalogue):
         'What it is.', '```text\nY line\n```', r'In a\*b\*c \<d\> \[e\] `f*g`: √(θ²) → \|h\|']
 
 
-@pytest.fixture
-def measured(monkeypatch):
-    pytest.importorskip('mpmath')
-    monkeypatch.syspath_prepend(ROOT)
-    import benchmark.document
-    import benchmark.nodes.report
-    return benchmark
-
-
-def test_what_a_scene_costs_is_what_was_measured(measured):
+def test_what_a_scene_costs_is_what_was_measured():
     results = json.loads((ROOT / 'benchmark' / 'results' / 'nodes.json').read_text())
-    made = measured.nodes.report.document(results).strip()
-    assert measured.document.written('design/performance.md') == made
+    assert document.written('design/performance.md') == report.document(results).strip()
 
 
 def test_what_is_measured_is_of_a_commit():
@@ -200,7 +186,6 @@ def test_the_files_of_a_journey_are_those_that_run(graph, heading):
     pytest.importorskip('rclpy')
     from linkage_ros.nodes import ownership
     from linkage_ros.nodes.kinematics import Kinematics
-    from rcl_interfaces.msg import ParameterEvent
     from sensor_msgs.msg import JointState
     from std_msgs.msg import String
 
@@ -210,10 +195,9 @@ def test_the_files_of_a_journey_are_those_that_run(graph, heading):
     named = {file for step in steps for file in re.findall(r'`((?:nodes|scene)/\w+\.py)`', step)}
     node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': 'jansen'})
     crank, received = graph.crank(['m_crank']), graph.listen(JointState, 'm/joint_states')
-    announced = graph.listen(ParameterEvent, ownership.TOPIC, ownership.LATCHED)
     # The last that the worker does at a start.
     described = graph.listen(String, 'robot_description', ownership.LATCHED)
-    graph.until(lambda: announced and described)
+    graph.until(lambda: described)
     for angle in (0.2, 0.3):
         crank([angle], received)
     ran, room = set(), str(ROOT / 'linkage_ros') + '/'
@@ -242,8 +226,7 @@ def test_every_file_that_the_architecture_names_is_there():
             'linkage_ros/mechanisms/roberts.py', 'config/roberts.yaml'}
 
 
-def test_every_call_that_the_pages_show_is_timed(measured, tmp_path, monkeypatch):
-    from benchmark import calls, document
+def test_every_call_that_the_pages_show_is_timed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shown = [[page, f'`{calls.short(call)}`'] for page, code in calls.code_of_pages().items()
              for call, _ in calls.calls(code)]

@@ -34,12 +34,6 @@ def test_what_runs_at_the_same_time_never_shares_a_domain(graph):
         process.stdin.close()
 
 
-def test_a_domain_that_was_given_back_can_be_had_again():
-    for _ in range(2 * domains.DOMAINS):
-        with domains.Domain() as domain:
-            assert 1 <= domain.id <= 100
-
-
 @pytest.mark.parametrize('kind, first, apart', [
     (socket.SOCK_STREAM, domains.FIRST_LOCK, 1),
     (socket.SOCK_DGRAM, domains.FIRST_PORT, domains.PORTS_PER_DOMAIN)])
@@ -50,12 +44,6 @@ def test_a_domain_that_others_use_is_left_alone(kind, first, apart):
         other.bind(('', first + apart * domain.id))
         with domains.Domain(iter([domain.id, free.id])) as another:
             assert another.id == free.id
-
-
-def test_where_all_are_in_use_that_is_said():
-    with domains.Domain() as domain:
-        with pytest.raises(RuntimeError, match='every ROS_DOMAIN_ID from 1 to 100 is in use'):
-            domains.Domain(iter([domain.id]))
 
 
 def test_the_locks_are_those_of_the_domain_coordinator():

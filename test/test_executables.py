@@ -8,9 +8,6 @@ import os
 from pathlib import Path
 import re
 import signal
-import subprocess
-import sys
-import textwrap
 import time
 
 import pytest
@@ -137,46 +134,3 @@ def test_arguments_that_there_are_not_end_in_one_sentence(capfd, name, arguments
     main = import_module(module(name)).main
     assert main([name, *arguments]) == 1
     assert one_sentence(capfd.readouterr().err, said)
-
-
-@pytest.mark.nightly
-def test_a_signal_while_a_message_is_published_is_no_failure():
-    # A process of its own: where the machine is busy, the signal may end it amid the callback.
-    done = subprocess.run([sys.executable, '-c', textwrap.dedent("""
-        import signal, sys
-        from linkage_ros.nodes.scene_node import run
-        import rclpy
-        from sensor_msgs.msg import JointState
-
-        class Ended(rclpy.node.Node):
-            def __init__(self):
-                super().__init__('ended')
-                self._publisher = self.create_publisher(JointState, 'topic', 1)
-                self.create_timer(0.001, self._end)
-
-            def _end(self):
-                signal.raise_signal(signal.SIGTERM)
-                rclpy.shutdown()
-                self._publisher.publish(JointState())
-
-        sys.exit(run([Ended], 'ended', args=[]))
-        """)], cwd=ROOT, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 0 and 'Traceback' not in done.stderr
-
-
-@pytest.mark.nightly
-def test_the_library_works_where_there_is_no_ros():
-    done = subprocess.run([sys.executable, '-c', textwrap.dedent("""
-        import sys
-        sys.modules['rclpy'] = None
-        from linkage_ros import scene
-        from linkage_ros.scene import motion
-        mechanism = scene.read({}).mechanisms['jansen']
-        assert mechanism.assembly().solution(('G',)).rows.shape == (1, 2)
-        assert motion.Motion(1.0).at(10 ** 9) == (1.0, 1.0)
-        try:
-            import linkage_ros.nodes.kinematics
-        except ImportError as error:
-            print(error.name.partition('.')[0])
-        """)], cwd=ROOT, capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stdout) == (0, 'rclpy\n'), done.stderr

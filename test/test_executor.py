@@ -13,7 +13,6 @@ import sys
 import textwrap
 from types import SimpleNamespace
 
-from linkage_interfaces.srv import ServoInverse
 from linkage_ros.nodes import scene_node
 import pytest
 from rclpy.executors import SingleThreadedExecutor
@@ -76,16 +75,6 @@ def test_a_new_rate_acts_at_once(tmp_path):
         graph.until(lambda: graph.node.count_publishers('crank_states'))
         assert graph.set(named('crank_driver'), rate=50.0).successful
         graph.until(lambda: len(heard) > 2)
-
-
-def test_a_service_and_a_parameter_are_answered(tmp_path):
-    with started(tmp_path, 'servo_inverse') as graph:
-        client = graph.node.create_client(ServoInverse, 'servo_inverse')
-        answer = graph.call(client, ServoInverse.Request(lever_angle=[0.0]))
-        # A pose has its value up to rounding.
-        assert answer.success and abs(answer.servo_angle[0]) < 2.0 ** -52
-        refused = graph.set(named('servo_inverse'), slotted_lever__dimensions__a=-1.0)
-        assert not refused.successful
 
 
 def test_where_there_is_no_such_executor_the_plain_one_is_used():

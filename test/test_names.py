@@ -95,28 +95,3 @@ def test_what_is_asked_by_names_of_any_class_is_the_same(made, what):
     found, expected = ASKED[what](made), ASKED[what](str)
     assert found == expected and len(found) > 0
     assert {*map(type, found)} == {*map(type, expected)}
-
-
-@pytest.mark.parametrize('made', [np.str_, member])
-def test_what_is_no_name_is_refused_as_ever(made):
-    linkage, _ = fresh()
-    for ask in (linkage.solve, linkage.joint_angles, linkage.velocity):
-        with pytest.raises(ValueError, match='custom has no (point|joint).*; allowed: '):
-            ask(0.5, (made('none'),))
-    for ask, why in (
-            (lambda: linkage.input_for(made('none'), 0.5), 'has no output .*; allowed: '),
-            (lambda: linkage.input_for(made('O.x'), 0.5),
-             '^O.x of custom does not move with the crank$'),
-            (lambda: FIVE_BAR.inputs_for([made('none'), 'C.x'], (0.0, 0.0)),
-             'five_bar has no output'),
-            (lambda: scene.changed(LEVER, {made('lever.colour'): 1.0}),
-             r'^lever\.colour is not a parameter of the scene')):
-        with pytest.raises(ValueError, match=why):
-            ask()
-
-
-def test_an_error_names_the_argument_that_is_wrong():
-    with pytest.raises(ValueError, match='rate must be a sequence of as many values'):
-        FIVE_BAR.acceleration((0.3, 0.4), 1.0, 0.0)
-    with pytest.raises(ValueError, match=r'no output .*; allowed: distance\(A,B\)'):
-        mechanisms.create('jansen').extremes('distance(O, G)')

@@ -9,9 +9,6 @@ import os
 from pathlib import Path
 import resource
 import signal
-import subprocess
-import sys
-import time
 
 from linkage_interfaces.srv import InputsFor, ServoInverse as Service
 from linkage_ros.nodes import shutdown
@@ -22,7 +19,7 @@ import pytest
 from rclpy.logging import LoggingSeverity
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from ros_harness import DEADLINE, Graph, Process
+from ros_harness import Graph, Process
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import MarkerArray
@@ -265,48 +262,3 @@ def test_a_signal_ends_the_start_of_a_thousand_mechanisms(
         ends_quietly(process, number)
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize('number', SIGNALS)
-@pytest.mark.parametrize('name', ['servo_inverse', 'scene'])
-def test_a_signal_ends_a_long_trajectory(tmp_path, name, number):
-    path = tmp_path / 'scene.yaml'
-    path.write_text('/**:\n  ros__parameters:\n    mechanisms: [m]\n    m.type: five_bar\n')
-    with Process(name, path) as process, Graph(process.domain) as graph:
-        graph.listen(JointTrajectory, 'servo_trajectory')
-        publisher = graph.publisher(JointTrajectory, 'wanted_trajectory')
-        graph.until(lambda: graph.node.count_publishers('servo_trajectory'))
-        before = cpu(process)
-        published = -math.inf
-
-        def works():
-            # The other process may know this publisher later than this one knows it.
-            nonlocal published
-            if time.monotonic() > published + 2.0:
-                publisher.publish(trajectory(10_000, **{'m_P.x': 0.059, 'm_P.y': 0.1}))
-                published = time.monotonic()
-            return cpu(process) > before + 0.2
-
-        graph.until(works)
-        ends_quietly(process, number)
-
-
-SCRIPT = """
-import rclpy
-from linkage_ros.nodes.kinematics import Kinematics
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.parameter import Parameter
-
-rclpy.init()
-node, executor = Kinematics(), SingleThreadedExecutor()
-executor.add_node(node)
-for _ in range(20):
-    executor.spin_once(timeout_sec=0.01)
-node.set_parameters([Parameter('jansen.scale', value=2.0)])
-"""
-
-
-@pytest.mark.nightly
-def test_a_script_ends_that_leaves_a_changed_scene_to_a_node_that_no_longer_spins():
-    with Graph() as graph:
-        subprocess.run([sys.executable, '-c', SCRIPT], timeout=DEADLINE, check=True, env={
-            **os.environ, 'ROS_DOMAIN_ID': str(graph.context.get_domain_id())})

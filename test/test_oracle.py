@@ -9,8 +9,7 @@ from pathlib import Path
 import subprocess
 import sys
 
-import numpy as np
-from oracle import Bench, everything, history, message, Mismatch, SCENES
+from oracle import Bench, everything, history, message, SCENES
 import pytest
 from ros_harness import Graph
 
@@ -28,7 +27,7 @@ def test_whatever_happens_the_node_publishes_what_the_library_says(name, seeds):
         for seed in seeds:
             try:
                 bench.run(history(SCENES[name], seed))
-            except Mismatch as error:
+            except AssertionError as error:
                 pytest.fail(f'history {seed}, after those from {seeds[0]} on: {error}')
 
 
@@ -79,22 +78,6 @@ def test_a_short_history_is_published_as_the_library_says(graph, parameters, ste
     Bench(graph, parameters).run(steps)
 
 
-PAIR = {'mechanisms': ['a', 'b'], 'a.type': 'jansen', 'b.type': 'peaucellier'}
-# Where the cell's reach ends.
-END = 2.0 * math.acos(5.0 / 6.0)
-
-
-@pytest.mark.nightly(all_but=2)
-@pytest.mark.parametrize('by', [
-    message({'a_crank': 0.3}, [math.nan]), message({'a_crank': 0.3}, [math.inf]),
-    message({'a_crank': 0.3}, [1e308]), message({'b_crank': END}, [1.0])],
-    ids=['nan', 'inf', 'overflow', 'an end of the reach'])
-def test_a_velocity_that_is_no_number_leaves_all_velocities_out(graph, by):
-    Bench(graph, PAIR).run([
-        *everything(PAIR), message({'a_crank': 0.2, 'b_crank': 0.1}, [1.0, 1.0]), ('compiled',),
-        *(step for i in range(5) for step in (
-            by, message({'a_crank': 0.2, 'b_crank': 0.1}, [1.0, 1.0]), by,
-            message({'a_crank': 0.2 + 0.01 * i} if i % 2 else {'b_crank': 0.01 * i}, [1.0])))])
 
 
 MEASURED = {'mechanisms': ['a', 'b'], 'a.type': 'four_bar', 'a.crank.measures': 'QB',
@@ -110,21 +93,6 @@ def test_what_a_sensor_cannot_say_is_no_pose(graph, bad):
     bench.run([*everything(MEASURED), odd[0], good, *odd, good, other, odd[0], other,
                ('compiled',), good, good, *odd, other, good, message({'a_QB': 0.44}, [0.5], 4)])
     assert bench.model.states['a'].values == [pytest.approx(0.54, abs=0.1)]
-
-
-@pytest.mark.nightly(all_but=1)
-@pytest.mark.parametrize('name', ['an excavator', 'a reach that ends',
-                                  'more legs than are solved one by one'])
-def test_numbers_are_the_same_at_the_ends_of_the_reach_and_in_many_legs(graph, name):
-    bench = Bench(graph, SCENES[name])
-    drives = [drive for mechanism in bench.model.scene.mechanisms.values()
-              for drive in mechanism.inputs.values()]
-    middle = {drive.source: 0.5 * sum(drive.reach[0]) for drive in drives}
-    speeds = [1.0] * len(drives)
-    bench.run([*everything(SCENES[name]), message(middle, speeds), ('compiled',), *(
-        message({**middle, drive.source: drive.reach[0][0] + part * (
-            drive.reach[0][1] - drive.reach[0][0])}, speeds)
-        for drive in drives for part in (0.0, 1.0, 1e-9, -1e-9, *np.linspace(0.1, 0.9, 9)))])
 
 
 WITHOUT = 'LINKAGE_ROS_WITHOUT_LLVMLITE'

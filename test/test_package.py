@@ -4,7 +4,6 @@
 """The package as colcon, pip and a reader of the changelog see it."""
 
 import configparser
-import hashlib
 from importlib.metadata import EntryPoint
 import json
 import os
@@ -43,16 +42,6 @@ def test_all_files_name_one_package_and_version():
     assert urls[0] == urls[1] and set(urls[0]) == {'website', 'repository', 'bugtracker'}
 
 
-def test_every_source_begins_with_its_licence(kept):
-    tags = 'FileCopyrightText: 2026 linkage_ros contributors', r'License-Identifier: Apache-2\.0'
-    notice = re.compile(r'(#!.*\n)?' + ''.join(rf'\W*SPDX-{tag}' for tag in tags))
-    sources = [file for file in kept if 'vendor' not in file.parts and file.suffix in (
-        '.py', '.c', '.cpp', '.hpp', '.h', '.cmake', '.js')]
-    assert len(sources) > 300
-    # Printed by a command.
-    assert [file.name for file in sources if not notice.match(file.read_text())] == ['lever.h']
-
-
 def without_comments(text):
     return re.sub(r'^ *#.*', '', text, flags=re.MULTILINE)
 
@@ -60,7 +49,7 @@ def without_comments(text):
 PROMISES = [(ROOT / name).read_text() for name in ('README.md', 'CONTRIBUTING.md')]
 SCRIPT, WORKFLOW = ((ROOT / name).read_text() for name in ('.ci/run', '.github/workflows/ci.yml'))
 PROGRAM = (r'(make [a-z]+|(?:ros2|colcon|python|source|pip|git|pre-commit|rosdep)(?= [a-z.-])'
-           r'|bloom-\w+|catkin_\w+_version|\.ci/run)')
+           r'|bloom-\w+|catkin_\w+|\.ci/run)')
 
 
 def test_what_is_promised_is_run_or_is_said_not_to_be():
@@ -97,7 +86,9 @@ def pins(file):
 def test_all_that_make_installs_is_locked_with_hashes():
     makefile, script = ((ROOT / name).read_text() for name in ('Makefile', 'wheels/install.sh'))
     assert not re.search(r'pip\b.* install', makefile)
-    assert len(re.findall(r'pip install', script)) == 1 and '--require-hashes' in script
+    # Given an extra, pip 23.2 looks for the newest release, whatever is pinned: hence --no-deps.
+    assert re.findall(r'pip install.*', script) == [
+        'pip install -q --no-deps --require-hashes --no-build-isolation "$@" \\']
     locked = {file: pins(file) for file in (ROOT / 'wheels' / 'lock').glob('*.txt')}
     assert all(found and all(hashed for *_, hashed in found) for found in locked.values())
     direct = [*(ROOT / 'wheels').glob('*.txt'), ROOT / 'docs' / 'requirements.txt',
@@ -131,19 +122,8 @@ def test_pip_puts_no_command_on_the_path(setup_arguments, command):
     assert setup_arguments(command)['entry_points'] == {'console_scripts': []}
 
 
-@pytest.fixture
-def copy(kept, tmp_path):
-    """Return a copy of what git keeps, in the sources of a workspace."""
-    folder = tmp_path / 'src' / 'linkage_ros'
-    for file in kept:
-        target = folder / file.relative_to(ROOT)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(file, target)
-    return folder
-
-
 @pytest.mark.nightly
-def test_a_wheel_has_the_library_and_the_page_and_no_commands(copy, tmp_path):
+def test_a_wheel_has_the_library_and_the_page(copy, tmp_path):
     subprocess.run([sys.executable, '-m', 'pip', 'wheel', '-q', '--no-build-isolation',
                     '--no-deps', '-w', tmp_path, copy], check=True, timeout=120)
     wheel, = tmp_path.glob('*.whl')
@@ -152,7 +132,6 @@ def test_a_wheel_has_the_library_and_the_page_and_no_commands(copy, tmp_path):
     assert {f'linkage_ros/{name}' for name in (
         'mechanisms/jansen.py', 'web/page/index.html', 'web/page/vendor/LICENSE', 'py.typed',
     )} <= set(names)
-    assert not any(name.endswith('entry_points.txt') or 'scripts/' in name for name in names)
 
 
 @pytest.mark.nightly
@@ -162,9 +141,6 @@ def test_a_wheel_has_the_library_and_the_page_and_no_commands(copy, tmp_path):
     '--base-paths src src/linkage_ros/linkage_interfaces'])
 def test_the_ordinary_colcon_build_of_a_workspace_is_enough(copy, tmp_path, layout):
     pytest.importorskip('rclpy')
-    is_named = 'linkage_interfaces' in layout
-    if is_named:
-        depend_on_the_interfaces(tmp_path / 'src' / 'asker')
     # What building against wheels needs besides.
     flags = [f'-DCMAKE_PREFIX_PATH={sys.prefix}', f'-DPython3_EXECUTABLE={sys.executable}',
              f'-DCMAKE_PROJECT_INCLUDE={ROOT}/wheels/prefix.cmake', '-DBUILD_TESTING=OFF']
@@ -182,7 +158,6 @@ print(servo_inverse.__file__, ServoInverse.__module__)' && echo $AMENT_PREFIX_PA
     ended = subprocess.run(['bash', '-c', script], cwd=tmp_path, env=clean, timeout=300,
                            text=True, capture_output=True)
     assert ended.returncode == 0, ended.stderr
-    assert (tmp_path / 'install' / 'asker').exists() == is_named
     module, prefixes = ended.stdout.splitlines()
     assert module.startswith(str(tmp_path))
     assert module.endswith('linkage_interfaces.srv._servo_inverse')
@@ -192,40 +167,7 @@ print(servo_inverse.__file__, ServoInverse.__module__)' && echo $AMENT_PREFIX_PA
                            'servo_inverse', 'transmission', 'urdf', 'viewer'}
 
 
-def depend_on_the_interfaces(asker):
-    """Write a package that depends on the nested one."""
-    asker.mkdir()
-    manifest = (ROOT / 'linkage_interfaces' / 'package.xml').read_text()
-    needs = '<name>asker</name><depend>linkage_interfaces</depend>'
-    (asker / 'package.xml').write_text(re.sub(
-        '<(member_of_group|build_depend|exec_depend|depend)>.*', '', manifest).replace(
-            '<name>linkage_interfaces</name>', needs))
-    (asker / 'CMakeLists.txt').write_text("""\
-        cmake_minimum_required(VERSION 3.10)
-        project(asker)
-        find_package(ament_cmake REQUIRED)
-        find_package(linkage_interfaces REQUIRED)
-        ament_package()""")
-
-
-def wrapped(folder, *lines):
-    """Return a Python that is like this one, but for what shell lines do to its arguments."""
-    python = folder / 'python'
-    python.write_text('\n'.join(['#!/bin/bash', *lines, f'exec {sys.executable} "$@"']))
-    python.chmod(0o755)
-    return str(python)
-
-
-def only_line(command, folder, environment):
-    """Return the one line that a command which fails prints, but for make's own."""
-    ended = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True,
-                           timeout=120)
-    assert ended.returncode
-    said, = (line for line in ended.stderr.splitlines() if not line.startswith('make'))
-    return said
-
-
-@pytest.mark.nightly(all_but=1)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
 @pytest.mark.parametrize('lines, settings, complaint', [
     ([], {'PYTHON': 'nowhere'}, 'PYTHON=nowhere is no command'),
@@ -236,57 +178,25 @@ def only_line(command, folder, environment):
     ([], {'CXX': 'nowhere'}, 'The compiler nowhere is missing: install gcc and g++'),
     (['case "$*" in *Python.h*) exit 1; esac'], {}, 'lacks its headers: install python3-dev'),
     pytest.param([], {'PIP_INDEX_URL': 'http://127.0.0.1:9'},
-                 'The Python package index cannot be reached', marks=pytest.mark.nightly)])
+                 'The Python package index cannot be reached', marks=pytest.mark.nightly),
+    ([], {'PYTHON': '', 'PATH': '../..'}, 'No Python from 3.10 to 3.14 was found')])
 def test_the_build_says_in_one_line_what_is_missing(copy, tmp_path, lines, settings, complaint):
-    usual = {'PYTHON': wrapped(tmp_path, *lines), 'PATH': os.environ['PATH'],
-             'PIP_CONFIG_FILE': os.devnull, 'PIP_RETRIES': '1'}
-    assert complaint in only_line(['make', 'build'], copy, {**usual, **settings})
-
-
-@pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
-def test_the_build_says_in_one_line_that_there_is_no_python(copy, tmp_path):
+    # A Python that is like this one, but for what shell lines do to its arguments.
+    python = tmp_path / 'python'
+    python.write_text('\n'.join(['#!/bin/bash', *lines, f'exec {sys.executable} "$@"']))
+    python.chmod(0o755)
+    # A path without any.
     for command in ('bash', 'env', 'find', 'make'):
         (tmp_path / command).symlink_to(shutil.which(command))
-    said = only_line(['make', 'build'], copy, {'PATH': str(tmp_path)})
-    assert 'No Python from 3.10 to 3.14 was found' in said
+    usual = {'PYTHON': str(python), 'PATH': os.environ['PATH'], 'PIP_CONFIG_FILE': os.devnull,
+             'PIP_RETRIES': '1'}
+    ended = subprocess.run(['make', 'build'], cwd=copy, env={**usual, **settings}, text=True,
+                           capture_output=True, timeout=120)
+    said, = (line for line in ended.stderr.splitlines() if not line.startswith('make'))
+    assert ended.returncode and complaint in said
 
 
-@pytest.mark.nightly
-def test_a_release_that_is_newer_than_the_lock_file_is_not_installed(tmp_path):
-    # Given an extra, pip 23.2 looks for the newest release, whatever is pinned.
-    for name, version, says in (('asks', '1', 'Requires-Dist: asked[more]'),
-                                ('asked', '1', 'Provides-Extra: more'),
-                                ('asked', '2', 'Provides-Extra: more')):
-        about = f'{name}-{version}.dist-info'
-        with zipfile.ZipFile(tmp_path / f'{name}-{version}-py3-none-any.whl', 'w') as wheel:
-            wheel.writestr(f'{about}/METADATA',
-                           f'Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n{says}\n')
-            wheel.writestr(f'{about}/WHEEL', 'Wheel-Version: 1.0\nTag: py3-none-any\n')
-            wheel.writestr(f'{about}/RECORD', '')
-    lock = tmp_path / 'lock.txt'
-    lock.write_text(''.join(
-        f'{name}==1 --hash=sha256:{hashlib.sha256(file.read_bytes()).hexdigest()}\n'
-        for name in ('asks', 'asked') for file in tmp_path.glob(f'{name}-1-*')))
-    (tmp_path / 'bin').mkdir()
-    wrapped(tmp_path / 'bin')
-    ended = subprocess.run(
-        [ROOT / 'wheels/install.sh', sys.executable, tmp_path, lock], text=True, timeout=60,
-        capture_output=True, env={**os.environ, 'PIP_TARGET': str(tmp_path / 'made'),
-                                  'PIP_NO_INDEX': '1', 'PIP_FIND_LINKS': str(tmp_path)})
-    assert ended.returncode == 0, ended.stderr
-    assert {file.name for file in (tmp_path / 'made').iterdir()} == {
-        'asks-1.dist-info', 'asked-1.dist-info'}
-
-
-@pytest.mark.nightly
-@pytest.mark.skipif(not shutil.which('make'), reason='make is not installed')
-def test_clean_leaves_what_git_keeps(copy):
-    before = sorted(copy.rglob('*'))
-    for name in ('.venv-lint/bin/x', 'build/x', 'install-jazzy/x', 'log/x', 'demo/out/x',
-                 'pictures/out/x', 'docs/_build/x', 'docs/mechanisms/x', 'benchmark/.cache/x',
-                 '.hypothesis/x', '.pytest_cache/x', '.ruff_cache/x', 'linkage_ros.egg-info/x',
-                 'linkage_ros/web/__pycache__/x', '__pycache__/x'):
-        (copy / name).parent.mkdir(parents=True, exist_ok=True)
-        (copy / name).touch()
-    subprocess.run(['make', 'clean'], cwd=copy, check=True, capture_output=True, timeout=60)
-    assert sorted(copy.rglob('*')) == before
+def test_clean_removes_nothing_that_git_keeps(kept):
+    rule = re.search(r'\trm -rf (.*?)\n\tfind', (ROOT / 'Makefile').read_text(), re.DOTALL)[1]
+    removed = {made for pattern in re.findall(r'[\w.*/-]+', rule) for made in ROOT.glob(pattern)}
+    assert removed and not [file for file in kept if removed & {file, *file.parents}]

@@ -13,7 +13,6 @@ import pytest
 from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
 from rclpy.node import Node
-import yaml
 
 ROOT = Path(__file__).parents[1]
 # `{b:1}` is left out: libyaml reads it one way or another, by its version.
@@ -64,25 +63,6 @@ def written(rng):
     if rng.random() < 0.15:
         del lines[rng.integers(len(lines))]
     return '\n'.join(lines) + '\n' * (rng.random() < 0.9)
-
-
-def ordinary(rng):
-    """Return a file as a person or a program writes it: each name once in a section."""
-    def value():
-        draw = (lambda: int(rng.integers(-2 ** 40, 2 ** 40)), lambda: float(rng.normal()),
-                lambda: float(10.0 ** rng.uniform(-300, 300)), lambda: bool(rng.integers(2)),
-                lambda: ''.join(rng.choice(list('ab_/=+-. 10:e'), rng.integers(12))))[
-                    rng.integers(5)]
-        return draw() if rng.random() < 0.7 else [draw() for _ in range(rng.integers(1, 5))]
-
-    def parameters(depth):
-        names = rng.choice(['a', 'b', 'rate', 'm', 'crank', 'frame_id', 'points'], 3, False)
-        return {str(name): parameters(depth + 1) if depth < 3 and rng.random() < 0.3 else value()
-                for name in names}
-
-    chosen = rng.choice(SECTIONS[:9], rng.integers(1, 4), False)
-    return yaml.safe_dump({str(section): {'ros__parameters': parameters(0)}
-                           for section in chosen}, sort_keys=False)
 
 
 def of_ros(path, name, expected):
@@ -161,13 +141,6 @@ def test_a_value_that_ros_refuses_or_reads_in_a_surprising_way_is_refused(tmp_pa
 def test_odd_files_are_the_same_to_the_library_and_to_a_node(ros, tmp_path, first):
     for seed in range(first, first + 100):
         check(tmp_path / 'file.yaml', written(np.random.default_rng(seed)))
-
-
-@pytest.mark.parametrize('first', [0, *(
-    pytest.param(first, marks=pytest.mark.nightly) for first in range(25, 200, 25))])
-def test_ordinary_files_are_accepted_and_the_same(ros, tmp_path, first):
-    for seed in range(first, first + 25):
-        assert check(tmp_path / 'file.yaml', ordinary(np.random.default_rng(seed)))
 
 
 def test_every_file_of_the_package_is_the_same_to_the_library_and_to_a_node(ros, tmp_path):

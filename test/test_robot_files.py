@@ -20,6 +20,7 @@ import pytest
 from robots import (
     imported,
     LIBRARIES,
+    MuJoCo,
     of_text,
     printed,
     published,
@@ -31,82 +32,73 @@ from robots import (
 from truth import random_linkages
 
 
-def error(file, positions):
-    """Return by how much MuJoCo sees equalities of a file open [m]."""
-    import mujoco
-    model = mujoco.MjModel.from_xml_path(str(ROBOTS / file))
-    data = mujoco.MjData(model)
-    for name, value in positions.items():
-        data.qpos[model.joint(name).qposadr] = value
-    mujoco.mj_forward(model, data)
-    return np.abs(data.efc_pos[data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)]).max()
-
-
-MODELS = {'four_bar.xml': np.linspace(-3.0, 3.0, 40), 'whitworth.xml': np.linspace(-0.9, 0.9, 40),
-          'gripper.xml': np.linspace(0.0, 0.8, 20)}
-
-
-@pytest.mark.parametrize('file', MODELS)
-def test_mujoco_sees_the_loops_of_a_model_closed(file):
-    mechanisms = imported(file)
-    for position in MODELS[file]:
-        joints = {}
-        for mechanism in mechanisms:
-            joints.update(published(mechanism, **{mechanism.first.source: position}))
-        assert error(file, joints) < 1e-14
-
-
 def test_a_rod_with_ball_ends_on_a_moving_tarsus_keeps_its_length():
-    mujoco = pytest.importorskip('mujoco')
     mechanism, = imported('toe_rod.xml')
     assert mechanism.frame_id == 'tarsus'
-    model = mujoco.MjModel.from_xml_path(str(ROBOTS / 'toe_rod.xml'))
-    data, eye = mujoco.MjData(model), model.eq_data[0]
+    robot = MuJoCo((ROBOTS / 'toe_rod.xml').read_text())
     for position in np.linspace(-1.75, -0.1, 20):
-        for name, value in published(mechanism, foot_crank_joint=position).items():
-            data.qpos[model.joint(name).qposadr] = value
-        mujoco.mj_kinematics(model, data)
-        foot = model.body('foot').id
-        end = data.xpos[foot] + data.xmat[foot].reshape(3, 3) @ eye[3:6]
-        rod = np.linalg.norm(end - data.xpos[model.body('plantar_rod').id])
-        assert rod == pytest.approx(0.35012, abs=1e-14)
+        joints = published(mechanism, foot_crank_joint=position)
+        robot.place(joints)
+        foot, rod = (robot.data.body(name) for name in ('foot', 'plantar_rod'))
+        end = foot.xpos + foot.xmat.reshape(3, 3) @ robot.model.eq_data[0, 3:6]
+        assert math.dist(end, rod.xpos) == pytest.approx(0.35012, abs=1e-14)
         # The side of the keyframe: the foot follows its crank, as in a parallelogram.
-        assert abs(data.joint('foot_joint').qpos[0] - position) < 0.35
+        assert abs(joints['foot_joint'] - position) < 0.35
 
 
 FEET = [('front_foot', 'back_foot')]
-URDF = {
+# The options of a file, how far its motors move, and frames that coincide.
+FILES = {
     'four_bar.urdf': ((), {'motor': (-3.0, 3.0)}, [('wrist_a', 'wrist_b')]),
     'boom.urdf': ((), {'boom_cylinder': (-0.3, 0.5)}, [('eye_a', 'eye_b')]),
-    'five_bar.urdf': (('--loops', ROBOTS / 'five_bar_loops.yaml'),
+    'five_bar.urdf': (('--loops', str(ROBOTS / 'five_bar_loops.yaml')),
                       {'mot_front': (-0.4, 0.4), 'mot_back': (0.5, -0.3)}, FEET),
-    'palletiser.urdf': (('--loops', ROBOTS / 'palletiser_loops.yaml'),
+    'palletiser.urdf': (('--loops', str(ROBOTS / 'palletiser_loops.yaml')),
                         {'joint_2': (-0.5, 0.9), 'joint_3': (0.6, -0.8)},
                         [('tail_a', 'tail_b'), ('level_a', 'level_b'), ('tool_a', 'tool_b')]),
     # The bell's angle is that of a link less that of the thigh, both on one pin of a third link.
     'wheel_leg.urdf': ((), {'hip': (-0.25, 0.3), 'crank_motor': (0.35, -0.35)},
-                       [('rod_eye', 'bell_eye'), ('tendon_eye', 'shin_eye')])}
+                       [('rod_eye', 'bell_eye'), ('tendon_eye', 'shin_eye')]),
+    # A second four-bar on the finger that the first one moves.
+    'rack.sdf': ((), {'rack_slide': (-0.02, 0.02), 'tip_motor': (-3.0, 3.0)}, ()),
+    # In an MJCF, equalities say what coincides.
+    'four_bar.xml': ((), {'motor': (-3.0, 3.0)}, ()),
+    'whitworth.xml': ((), {'crank_joint': (-0.9, 0.9)}, ()),
+    'gripper.xml': ((), {'right_driver_joint': (0.0, 0.8), 'left_driver_joint': (0.0, 0.8)}, ())}
 
 
 def check_closed(robot, joints, loops):
-    """Check that frames of a robot coincide at joint positions."""
-    places = robot.places(joints, [name for pair in loops for name in pair])
+    """Check that frames of a robot coincide at joint positions, or what its file says does."""
+    if isinstance(robot, MuJoCo):
+        robot.place(joints)
+        assert robot.open() < 1e-14
+        return
+    # A joint that closes a loop is in no tree.
+    places = robot.places({name: joints[name] for name in joints.keys() & {*robot.joints}},
+                          [name for pair in loops for name in pair])
     for first, second in loops:
         assert places[first] == pytest.approx(places[second], abs=2e-15)
 
 
-@pytest.mark.nightly(all_but=5)
-@pytest.mark.parametrize('library', LIBRARIES)
-@pytest.mark.parametrize('file', URDF)
-def test_the_joints_of_a_urdf_close_its_loops(file, library):
-    more, motors, loops = URDF[file]
-    robot = library((ROBOTS / file).read_text())
-    mechanism, = imported(file, *more)
+@pytest.mark.parametrize('file, library', [
+    (file, library) for file in FILES for library in (
+        [MuJoCo] if file.endswith('.xml') else LIBRARIES)])
+def test_published_joints_close_the_loops_of_a_file(file, library):
+    more, motors, loops = FILES[file]
+    found, path = imported(file, *more), str(ROBOTS / file)
+    read = readers.read(path, *more[1:])
+    robot = library((ROBOTS / file).read_text() if library is MuJoCo
+                    else readers.description(path, read))
     for part in np.linspace(0.0, 1.0, 15):
-        joints = published(mechanism, **{motor: low + part * (high - low)
-                                         for motor, (low, high) in motors.items()})
-        assert set(robot.joints) - joints.keys() <= {'swing'}
+        joints, at = {}, {motor: low + part * (high - low)
+                          for motor, (low, high) in motors.items()}
+        for mechanism in found:
+            joints.update(published(mechanism, **{
+                drive.source: at[drive.source] for drive in mechanism.inputs.values()}))
         check_closed(robot, joints, loops)
+    rest, lost = cli.others(read, {mechanism.name: mechanism for mechanism in found}, {})
+    rest = scene.read({**rest, 'mechanisms': ['others']}).mechanisms if rest else {}
+    assert not lost and {*robot.joints} <= joints.keys() | check.published(rest)
 
 
 LIMIT, MOTOR = 'lower="-1.2" upper="1.2"', '<joint name="motor" axis="0 1 0"/>'
@@ -202,11 +194,6 @@ def loops_of(folder, more, pair='front_foot, back_foot', kind='3d'):
         folder / 'loops.yaml', f'{{closed_loop: [[{pair}]], type: [{kind}], {more}}}')
 
 
-def test_a_check_begins_at_a_pose_outside_the_limits(tmp_path):
-    line = said(written(tmp_path, 'four_bar.urdf', (LIMIT, 'lower="0.2" upper="1.2"')))
-    assert 'in 240 poses of the robot, motor from 0 to 1.2,' in line
-
-
 @pytest.fixture
 def four_bar():
     """Return the closed robot of a four-bar, and the parameters of its scene."""
@@ -214,23 +201,30 @@ def four_bar():
     return robot, cli.described(robot)[0]
 
 
-def compared(robot, given, **ends):
-    """Return the report on a scene's mechanism, or how it differs from its robot."""
+def compared(robot, given, *motors):
+    """Return the report on mechanisms of a scene that motors drive, or how one differs."""
     mechanisms = scene.read(given).mechanisms
     reports, wrong = check.compared(robot, mechanisms, [
-        check.Imported(*mechanisms, {}, [], [*ends], ends)])
+        check.Imported(name, {}, [], motors) for name in mechanisms])
     return ' '.join([*reports, *wrong.values()])
 
 
 def test_a_source_of_several_mechanisms_is_checked_where_all_of_them_move(four_bar):
-    (report,), wrong = check.compared(four_bar[0], scene.read(four_bar[1]).mechanisms, [
-        check.Imported('motor', {}, [], ['motor'], {'motor': ends})
-        for ends in ((-1.0, 0.5), (-0.5, 1.0))])
-    assert not wrong and 'motor from -0.5 to 0.5, ' in report
+    robot, given = four_bar
+    zero = given['motor.crank.offset']
+    given.update({key.replace('motor.', 'twin.', 1): value for key, value in given.items()})
+    given.update({'mechanisms': ['motor', 'twin'], 'twin.joint_names': ['CD=a', 'BD=b'], **{
+        f'{name}.crank.sweep': [zero + low, zero + high]
+        for name, low, high in (('motor', -1.0, 0.5), ('twin', -0.5, 1.0))}})
+    assert 'motor, twin: in 240 poses of the robot, motor from -0.5 to 0.5, ' in compared(
+        robot, given, 'motor')
 
 
 def test_a_mechanism_that_cannot_move_is_not_checked(four_bar):
-    assert compared(*four_bar, motor=(0.0, 0.0)) == 'it could not be checked in more than 0 poses'
+    robot, given = four_bar
+    zero = given['motor.crank.start']
+    given['motor.crank.sweep'] = [zero, zero + 1e-10]
+    assert compared(robot, given, 'motor') == 'it could not be checked in more than 0 poses'
 
 
 def checked(text):
@@ -239,27 +233,27 @@ def checked(text):
         'Checked: .*: in (.*) poses of the robot, .* loops stand open by (.*) m at most', text)]
 
 
-@pytest.mark.parametrize('place', ['0 0 0.2', '0 0 0.20001', '0 0.01 0.2', '0 0 0.26'])
-def test_a_scene_is_held_against_its_robot_over_the_range_of_its_motor(tmp_path, place):
-    text = said(written(tmp_path, 'four_bar.urdf', (
-        '<link2 link="rocker" xyz="0 0 0.2"/>', f'<link2 link="rocker" xyz="{place}"/>')))
-    (count, worst), = checked(text)
-    assert count >= 200 and worst < 1e-12 and 'motor from -1.2 to 1.2' in text
+def pin_at(place):
+    """Return the change that moves the pin of a four-bar's rocker."""
+    return ('<link2 link="rocker" xyz="0 0 0.2"/>', f'<link2 link="rocker" xyz="{place}"/>')
 
 
-def test_of_a_wide_range_two_turns_are_checked(tmp_path):
-    code, out, err = printed(written(tmp_path, 'four_bar.urdf', (LIMIT, 'lower="-40" upper="40"')))
-    assert 'motor from -6.283 to 6.283,' in err and 'sweep: [-4' in out
-
-
-def test_a_range_is_checked_up_to_where_loops_end(tmp_path):
+@pytest.mark.parametrize('changes, ends, more', [
+    *(([pin_at(place)], (-1.2, 1.2), '') for place in (
+        '0 0 0.2', '0 0 0.20001', '0 0.01 0.2', '0 0 0.26')),
+    # From a pose outside the limits; of a wide range two turns.
+    ([(LIMIT, 'lower="0.2" upper="1.2"')], (0.0, 1.2), ''),
+    ([(LIMIT, 'lower="-40" upper="40"')], (-math.tau, math.tau), ''),
     # The crank reaches from 35.6 to 112.8 degrees, by the cosine rule, and stands at 90.
-    text = said(written(tmp_path, 'four_bar.urdf', (LIMIT, ''), (
-        '<link2 link="rocker" xyz="0 0 0.2"/>', '<link2 link="rocker" xyz="0 0 0.12"/>')))
+    ([(LIMIT, ''), pin_at('0 0 0.12')], (-0.4, 0.93), '; not beyond where its loops end')],
+    ids=range(7))
+def test_a_scene_is_held_against_its_robot_over_the_range_of_its_motor(
+        tmp_path, changes, ends, more):
+    text = said(written(tmp_path, 'four_bar.urdf', *changes))
     (count, worst), = checked(text)
-    low, high = map(float, re.search('motor from (.*) to (.*), its', text).groups())
-    assert count >= 200 and worst < 1e-12 and 'not beyond where its loops end' in text
-    assert -0.40 < low < -0.35 and 0.85 < high < 0.95
+    seen = map(float, re.search('motor from (.*) to (.*), its', text).groups())
+    assert count >= 200 and worst < 1e-12 and f'm at most{more}.' in text
+    assert [*seen] == pytest.approx(ends, abs=0.04 if more else 1e-3)
 
 
 @pytest.mark.parametrize('old, new, why', [
@@ -270,34 +264,23 @@ def test_a_range_is_checked_up_to_where_loops_end(tmp_path):
     ('=elbow-1.57079632', '=elbow-1.57079633', 'its loops stand open by 3e-09 m$')])
 def test_a_mechanism_that_differs_from_its_robot_is_refused(four_bar, old, new, why):
     robot, given = four_bar
-    assert compared(robot, given, motor=(-1.2, 1.2)).startswith('Checked: motor: in 240 poses')
+    assert compared(robot, given, 'motor').startswith('Checked: motor: in 240 poses')
     key = 'motor.joint_names' if '=' in old else 'motor.joints'
     changed = [line.replace(old, new) for line in given[key]]
     assert changed != given[key]
     given[key] = changed
-    assert re.match(f'with motor at .* {why}', compared(robot, given, motor=(-1.2, 1.2)))
-
-
-BALL = ('<link name="a"/><link name="b"/><joint name="elbow_y" type="continuous">'
-        '<parent link="crank"/><child link="a"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>'
-        '</joint><joint name="elbow_x" type="continuous"><parent link="a"/><child link="b"/>'
-        '<axis xyz="1 0 0"/></joint><joint name="elbow" type="continuous">'
-        '<parent link="b"/><child link="coupler"/><axis xyz="0 0 1"/>')
-PIN_OF_ROD = ('<joint name="elbow" type="continuous">\n    <parent link="crank"/><child link='
-         '"coupler"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>')
-ROD = [(PIN_OF_ROD, BALL), ('name="wrist" type="revolute"', 'name="wrist" type="spherical"')]
+    assert re.match(f'with motor at .* {why}', compared(robot, given, 'motor'))
 
 
 def test_hinges_that_cross_at_the_end_of_a_rod_are_a_ball(tmp_path):
-    file = written(tmp_path, 'four_bar.urdf', *ROD)
-    _, out, err = printed(file)
+    _, out, err = printed('rod.urdf')
     assert "hold:='elbow_x=0 elbow=0'" in out and 'Not published' not in err
-    mechanism, = imported(file)
+    mechanism, = imported('rod.urdf')
     # About the normal of the plane first, so that the rod's other hinges stay.
     for angle in (-1.1, 0.4, 1.2):
         assert published(mechanism, motor=angle) == pytest.approx(
             {'motor': angle, 'shoulder': -angle, 'elbow_y': -angle}, abs=1e-14)
-    loose = written(tmp_path, 'four_bar.urdf', *ROD, (
+    loose = written(tmp_path, 'rod.urdf', (
         'name="shoulder" type="continuous"', 'name="shoulder" type="spherical"'))
     assert re.search('not planar: (coupler|rocker) hangs on balls alone, and is no rod',
                      refused(loose))
@@ -305,7 +288,7 @@ def test_hinges_that_cross_at_the_end_of_a_rod_are_a_ball(tmp_path):
 
 def test_hinges_of_a_rod_that_its_other_end_needs_do_not_stay(tmp_path):
     # A universal joint does not let the rod turn in the plane alone: it spins, too.
-    file = written(tmp_path, 'four_bar.urdf', *ROD, (
+    file = written(tmp_path, 'rod.urdf', (
         '</robot>', '<link name="cross"/><joint name="wrist_1" type="continuous">'
         '<parent link="rocker"/><child link="cross"/><origin xyz="0 0 0.2"/><axis xyz="0 1 1"/>'
         '</joint></robot>'), (
@@ -433,9 +416,13 @@ def test_a_long_comment_costs_no_more_than_its_letters(tmp_path, long):
     assert {*robot.positions} == {'motor', 'elbow', 'shoulder'}
 
 
-@pytest.mark.parametrize('more', [['\x9b2J'] * 4, ['\x1b]0;title\x07'] * 4, [
-    1500 * each for each in ('x', '', 'x y ', 'x')]], ids=range(3))
-def test_a_name_of_the_file_is_never_more_than_text_in_the_terminal(tmp_path, more):
+@pytest.mark.parametrize('code, more', [
+    (0, ['\x9b2J'] * 4), (1, ['\x1b]0;title\x07'] * 4),
+    (1, [1500 * each for each in ('x', '', 'x y ', 'x')]),
+    (0, ['\n/crank_driver: {ros__parameters: {rate: 1.0}}\n#', '\u2028evil: 1\x85', '-1', '"\\'])],
+    ids=range(4))
+def test_a_name_of_a_file_is_only_a_name_in_a_scene_and_in_a_terminal(tmp_path, code, more):
+    yaml = pytest.importorskip('yaml')
     names = ('coupler', 'rocker', 'elbow', 'motor')
     called = {name: name + each for name, each in zip(names, more)}
     root = ElementTree.fromstring((ROBOTS / 'four_bar.urdf').read_text())
@@ -443,25 +430,25 @@ def test_a_name_of_the_file_is_never_more_than_text_in_the_terminal(tmp_path, mo
         for key in ('name', 'link', 'joint'):
             if part.get(key) in called:
                 part.set(key, called[part.get(key)])
-    file = of_text(tmp_path / 'named.urdf', ElementTree.tostring(root, 'unicode'))
+    file = of_text(tmp_path / 'robot\nevil: 2\n#.urdf', ElementTree.tostring(root, 'unicode'))
     for args in ['--driven', 'nobody'], []:
-        _, out, err = printed(file, *args)
+        found, out, err = printed(file, *args)
         for line in err.splitlines():
             assert line.isprintable() and len(line) < 5000
             assert max(map(len, line.split()), default=0) <= 300
         assert all(line.isprintable() for line in out.splitlines())
-
-
-def sprung(tmp_path):
-    """Return a gripper with a spring in a finger."""
-    pytest.importorskip('mujoco')
-    body = '<body name="right_coupler" pos="0 0.0315 -0.0041">'
-    return written(tmp_path, 'gripper.xml', (body, f'{body}<joint name="spring" axis="1 0 0"/>'))
+    assert found == code
+    if not code:
+        mechanism, = imported(file)
+        assert yaml.safe_load(out).keys() == {'/**'}
+        assert published(mechanism, **{called['motor']: 0.4}).keys() == {
+            called['elbow'], called['motor'], 'shoulder'}
 
 
 def test_a_passive_joint_of_a_loop_is_no_input(tmp_path):
-    # A spring beside the motor's loop leaves a second one undetermined.
-    spring = sprung(tmp_path)
+    # A spring in a finger, beside the motor's loop, leaves a second one undetermined.
+    body = '<body name="right_coupler" pos="0 0.0315 -0.0041">'
+    spring = written(tmp_path, 'gripper.xml', (body, f'{body}<joint name="spring" axis="1 0 0"/>'))
     mechanisms = {one.name: one for one in imported(spring)}
     robot, line = readers.read(str(spring)), said(spring)
     rest, lost = cli.others(robot, mechanisms, {})
@@ -512,18 +499,6 @@ def test_a_pose_at_the_end_of_its_loops_is_left_on_the_other_side(tmp_path):
     for more in re.findall('--pose (.*?) (?:or (?=--)|to the command)', line):
         assert f'motor, from -2 to -1: {BEYOND}' in said(
             file, '--driven', 'motor', '--pose', *more.split())
-
-
-def test_names_of_a_file_stay_names(tmp_path):
-    yaml = pytest.importorskip('yaml')
-    name = 'jy\n/crank_driver: {ros__parameters: {rate: 1.0}}\n#'
-    text = name.replace('\n', '&#10;')
-    file = written(tmp_path, 'four_bar.urdf', ('"shoulder"', f'"{text}"'), (
-        '"elbow"', '"finger-1"'), ('"wrist"', '"&#x2028;evil: 1&#x85;"'))
-    evil = file.rename(tmp_path / 'robot\nevil: 2\n#.urdf')
-    mechanism, = imported(evil)
-    assert published(mechanism, motor=0.4).keys() == {name, 'finger-1', 'motor'}
-    assert yaml.safe_load(printed(evil)[1]).keys() == {'/**'}
 
 
 def test_world_of_drake_is_no_second_root(tmp_path):
@@ -585,7 +560,6 @@ def test_a_universal_joint_of_an_sdf_is_a_pin(tmp_path, joints):
     (5e-6, 'from_robot: Warning: the file is not exact: axes lean by 5e-06 rad, and loops stay'),
     (0.0, ''), (2e-3, 'are 0.115 degrees from it, more than 0.057; ')])
 def test_a_misfit_is_printed_and_imported_if_it_is_small(tmp_path, lean, why):
-    pytest.importorskip('mujoco')
     code, out, err = printed(written(tmp_path, 'four_bar.xml', (
         'axis="0 -1 0"', f'axis="{lean} -1 0"')))
     assert code == (lean > 1e-3) and why in err and bool(why) == ('rad, and' in err or code > 0)
@@ -620,8 +594,7 @@ def test_a_joint_of_the_whole_robot_that_opens_a_loop_is_named(monkeypatch):
     still, _ = cli.others(robot, mechanisms, {'bell_joint': 0.0})
     wrong = scene.read({**given, **still, 'hip.joint_names': names,
                         'mechanisms': ['hip', 'others']}).mechanisms
-    ends = {'hip': (-0.2, 0.3), 'crank_motor': (-0.3, 0.3)}
-    made = [check.Imported('hip', {}, [], [*ends], ends)]
+    made = [check.Imported('hip', {}, [], ['hip', 'crank_motor'])]
     assert not check.compared(robot, mechanisms, made)[1]
     found = check.compared(robot, wrong, made)
     assert not found[0] and re.match('with hip at .*, crank_motor at .* its loops stand open by ',
@@ -629,19 +602,6 @@ def test_a_joint_of_the_whole_robot_that_opens_a_loop_is_named(monkeypatch):
     monkeypatch.setattr(check, 'compared', lambda *_: found)
     assert f'Left out: hip: compared with the robot: {found[1]["hip"]}.' in refused(
         'wheel_leg.urdf', '--pose', 'hip=0')
-
-
-@pytest.mark.parametrize('file', ['boom.urdf', 'gripper.xml', 'rack.sdf', 'palletiser.urdf'])
-def test_all_joints_of_a_whole_robot_are_published(file):
-    more = ['--loops', ROBOTS / 'palletiser_loops.yaml'] * ('pallet' in file)
-    mechanisms = {one.name: one for one in imported(file, *more)}
-    robot = readers.read(str(ROBOTS / file), *map(str, more[1:]))
-    rest, lost = cli.others(robot, mechanisms, {})
-    assert not lost
-    if rest:
-        mechanisms.update(scene.read({**rest, 'mechanisms': ['others']}).mechanisms)
-    text = readers.description(str(ROBOTS / file), robot)
-    assert {*LIBRARIES[1](text).joints} <= check.published(mechanisms)
 
 
 def test_a_comment_of_another_format_makes_no_urdf(tmp_path):
@@ -661,17 +621,6 @@ def test_a_loop_of_too_many_links_is_refused_at_once(tmp_path, order):
     assert f'{count} bodies are in loops that share joints: no more than 150' in refused(of_text(
         tmp_path / 'chain.urdf', f'<robot name="r">{links}{joints}<loop_joint name="w" '
         f'type="revolute"><link1 link="l0"/><link2 link="l{count}"/></loop_joint></robot>'))
-
-
-def test_a_joint_of_an_sdf_may_end_at_a_frame(tmp_path):
-    joint, = readers.read(str(of_text(
-        tmp_path / 'model.sdf', """<sdf version="1.9"><world name="w"><model name="m">
-      <link name="a"/><frame name="g" attached_to="n::c"><pose>0 0 0.5 0 0 0</pose></frame>
-      <model name="n"><pose relative_to="a">0 0 3 0 0 0</pose><link name="c"/></model>
-      <joint name="j" type="revolute"><parent>world</parent><child>g</child></joint>
-      </model></world></sdf>"""))).joints
-    assert joint.bodies == ('world', 'n::c')
-    assert joint.places[0] == pytest.approx([0.0, 0.0, 3.5])
 
 
 def robot_of(linkage, values):
@@ -761,9 +710,10 @@ def moves(linkage, values, robot, steps):
     return moved
 
 
-# Slots and cylinders on one pair of joints; gears of gears; crossed bars on a block.
+# Slots and cylinders on one pair of joints; gears of gears; crossed bars on a block; a motor that
+# goes on where bars lie in line, though not as its robot.
 @pytest.mark.parametrize('seeds', [
-    [3, 9, 18, 29], *(pytest.param(seeds, marks=pytest.mark.nightly) for seeds in (
+    [3, 9, 18, 29, 195], *(pytest.param(seeds, marks=pytest.mark.nightly) for seeds in (
         [79, 84, 129, 179, 191, 301, 361, 531, 616, 643, 681], range(120)))])
 def test_random_linkages_come_back_from_robots(seeds):
     moved = 0
@@ -772,4 +722,5 @@ def test_random_linkages_come_back_from_robots(seeds):
             moved += moves(*made)
         except RequestError as error:
             assert re.search('closes a loop|not of dyads|it cannot move', str(error))
+            assert cli.WRONG not in str(error)
     assert moved > len(seeds) // 2

@@ -5,7 +5,6 @@
 
 import copy
 import math
-import re
 from unittest.mock import ANY
 from xml.etree import ElementTree
 
@@ -15,12 +14,12 @@ from linkage_ros.robot_files import readers
 from linkage_ros.robot_model import bodies, mjcf, robot, rviz, sdf, urdf
 from linkage_ros.robot_model.bodies import assembled
 from linkage_ros.robot_model.cli import main
-from linkage_ros.robot_model.shapes import BARREL, BLOCK, ground_frame, GUIDE, ROD, shapes
+from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
 import numpy as np
 import pytest
 from robots import rotation
 from test_simulators import model, simulated, some_quick
-from test_urdf import in_space, MACHINES, OWN, posed
+from test_urdf import ARM, in_space, MACHINES, OWN, posed
 
 QUICK = ('jansen', 'slotted_lever', 'engine with zeros elsewhere', 'five_bar',
          'boom and arm', 'Scotch yoke', 'Cardan gears', 'scissor lift', 'five-bar with a gear')
@@ -93,18 +92,14 @@ def visuals(text, frames):
 
 
 def scene_seen(one, thetas, width):
-    """Return what is seen of the links of a scene, and the balls of the points on each."""
+    """Return what is seen of the links of a scene but balls."""
     _, places = posed(one, thetas)
-    found, points = {}, {}
-    shown = shapes(one)
+    found, shown = {}, shapes(one)
     ends = one.assembly().solution([end for shape in shown for end in (shape.start, shape.end)])
     ends.solve(thetas.tolist())
 
     def add(link, *visual):
         found.setdefault(f'm_{link}_link', []).append(row(*visual))
-
-    def ball(place):
-        return row('sphere', GREY, width, place, place)
 
     def colour(link):
         return ORANGE if link in one.inputs else BLUE
@@ -112,15 +107,11 @@ def scene_seen(one, thetas, width):
     for prefix, leg_ends in zip(one.assembly().legs, ends.rows):
         spots = {name[len(f'm_{prefix}'):]: in_space(one.pose, place)
                  for name, place in places.items() if name.startswith(f'm_{prefix}')}
-        joints = {link.name: link.joint for link in one.linkage.links}
-        for link, frame in {'ground': ground_frame(one.linkage), **one.linkage.frames}.items():
-            name = link if link == 'ground' else prefix + link
-            points.setdefault(f'm_{name}_link', {}).update(
-                (f'm_{prefix}{point}', [ball(spots[point])]) for point in frame
-                if point != joints.get(link))
-            for start, end in one.linkage.bars if link != 'ground' else ():
+        for link, frame in one.linkage.frames.items():
+            for start, end in one.linkage.bars:
                 if {start, end} <= set(frame):
-                    add(name, 'cylinder', colour(link), width / 2, spots[start], spots[end])
+                    add(prefix + link, 'cylinder', colour(link), width / 2, spots[start],
+                        spots[end])
         for shape, (start, end) in zip(shown, leg_ends.reshape(-1, 2, 2)):
             link, slide = shape.start.link, shape.slide.name
             look = {GUIDE: ('box', GREY, width / 2), BLOCK: ('box', colour(slide), 2.0 * width),
@@ -129,11 +120,7 @@ def scene_seen(one, thetas, width):
             drawn = (*look, in_space(one.pose, start), in_space(one.pose, end))
             if link != 'ground' or row(*drawn) not in found.get('m_ground_link', []):
                 add(link if link == 'ground' else prefix + link, *drawn)
-    return found, points
-
-
-def bare(name):
-    return name.partition('_cut')[0]
+    return found
 
 
 @pytest.mark.parametrize('name', some_quick([*MACHINES, *OWN], QUICK))
@@ -147,24 +134,19 @@ def test_three_formats_show_what_the_scene_has(name):
                        for drive in one.inputs.values()])
     places, moved = posed(one, starts)[1], built.parts[0]
     frames = {body: turned(*one.pose) @ frame for body, frame in moved.frames.items()}
-    homes = {joint.bodies[1]: joint.bodies[0] for joint in moved.joints}
     texts = urdf.write(robot), mjcf.write(built), sdf.write(built)
     # People read it: a line for each element.
     assert all(text.count('\n') >= text.count('/>') + text.count('</') - 1 for text in texts)
     tree, loops, gazebo = (visuals(text, frames) for text in texts)
-    wanted, points = scene_seen(one, starts, width)
-    for link, rows in tree.items():
-        if link.endswith('_link'):
-            # A moving link of which nothing else is seen is a ball at its own joint.
-            place = frames[link][:3, 3]
-            check_seen({link: rows}, {link: wanted.get(link) or [
-                row('sphere', GREY, width, place, place)] * (link != 'm_ground_link')})
-    for link, balls in points.items():
-        check_seen({bare(child): tree[child] for child in tree
-                    if homes.get(child) == link and not child.endswith('_link')}, balls)
-    assert {name: (other, ratio) for name, (other, ratio, _) in moved.follows.items()} == {
-        name: (other, pytest.approx(ratio, abs=1e-6))
-        for name, (other, ratio) in gears(one, starts).items()}
+    # A body of which nothing else is seen, such as a point, is a ball.
+    balls = {name: [row('sphere', GREY, width, frame[:3, 3], frame[:3, 3])]
+             for name, frame in frames.items() if name != 'm_ground_link'}
+    wanted = {**balls, **scene_seen(one, starts, width)}
+    for found in tree, loops, gazebo:
+        check_seen(found, {name: wanted.get(name, []) for name in found})
+    # Bodies in the slots of yokes are of simulators alone.
+    assert tree.keys() == robot.parts[0].frames.keys() and frames.keys() == loops.keys()
+    assert frames.keys() == gazebo.keys()
     limits = ElementTree.fromstring(texts[0]).iter('limit')
     assert {(each.get('effort'), each.get('velocity')) for each in limits} <= {('0', '0')}
     simulator, (root,) = map(ElementTree.fromstring, texts[1:])
@@ -172,17 +154,6 @@ def test_three_formats_show_what_the_scene_has(name):
               for link in root.iter('link') if link.find('inertial') is not None}
     assert masses.keys() == {name for name in gazebo if gazebo[name]}
     check_mjcf(one, simulator, starts, places, 9.81 * sum(masses.values()))
-    check_sdf(one, root, {cut: homes[met] for cut, met in moved.meets.items()})
-    # What runs in a yoke's slot, and its pin, is where the point in the slot is.
-    for name in loops.keys() - tree.keys():
-        link = re.fullmatch('m_(.*)_(slot_link|pin)', name)[1]
-        pin = next(pin for yoke, pin in one.linkage.yokes.items() if link.endswith(yoke))
-        place = in_space(one.pose, next(
-            place for point, place in places.items() if point.endswith(pin)))
-        for file in loops, gazebo:
-            check_seen({'': file.pop(name)}, {'': [row('sphere', GREY, width, place, place)]})
-    check_seen(loops, tree)
-    check_seen(gazebo, tree)
 
 
 def check_mjcf(one, root, starts, places, weight):
@@ -204,38 +175,25 @@ def check_mjcf(one, root, starts, places, weight):
             sorted(map(joint.of, drive.sweep or ())))
 
 
-def check_sdf(one, root, closed):
-    """Check all that an SDF says but its links."""
-    assert root.get('name') == 'm'
-    plugins = [('detachable-joint', 'DetachableJoint', {
-        'parent_link': met, 'child_model': '__model__', 'child_link': cut})
-        for cut, met in closed.items()]
-    plugins += [('joint-state-publisher', 'JointStatePublisher', {}), *(
-        ('joint-position-controller', 'JointPositionController',
-         {'joint_name': one.joints[name].name, 'use_velocity_commands': 'true'})
-        for name in one.inputs)]
-    assert sorted(((each.attrib, {part.tag: part.text for part in each})
-                   for each in root.findall('plugin')), key=repr) == sorted((
-        ({'filename': f'gz-sim-{file}-system', 'name': f'gz::sim::systems::{name}'}, values)
-        for file, name, values in plugins), key=repr)
-
-
-def gears(one, starts):
-    """Return, of joints with gears, the input and the ratio of their published changes."""
-    found = {}
-    for i, driving in enumerate(one.inputs):
-        for prefix in one.assembly().legs:
-            step = 1e-4 * (np.arange(len(starts)) == i)
-            before, after = (posed(one, starts + way * step)[0] for way in (-1.0, 1.0))
-            names = [one.joints[name].name for name in (driving, *(
-                prefix + joint for joint in one.linkage.geared))]
-            by, *moved = [math.remainder(after[name] - before[name], math.tau) for name in names]
-            found.update((name, (names[0], change / by)) for name, change in zip(names[1:], moved)
-                         if abs(change) > 1e-9)
-    return found
+def test_gazebo_has_a_plugin_for_each_cut_and_each_motor():
+    root, = ElementTree.fromstring(sdf.write(assembled(bodies.robot(
+        [simulated('five_bar')], 'world'))))
+    found = [(plugin.get('filename'), plugin.get('name').rpartition('::')[2],
+              {part.tag: part.text for part in plugin}) for plugin in root.findall('plugin')]
+    controller = ('gz-sim-joint-position-controller-system', 'JointPositionController')
+    assert root.get('name') == 'm' and found == [
+        ('gz-sim-detachable-joint-system', 'DetachableJoint', {
+            'parent_link': 'm_AP_link', 'child_model': '__model__', 'child_link': 'm_P_cut'}),
+        ('gz-sim-joint-state-publisher-system', 'JointStatePublisher', {}),
+        *((*controller, {'joint_name': f'm_{name}', 'use_velocity_commands': 'true'})
+          for name in ('crank', 'crank2'))]
 
 
 YOKE = ['O ground 0 0', 'X ground 1 0', 'A crank O 1', 'C yoke A O along X', 'D block C {} 0']
+LEGS = {'mechanisms': ['leg', 'leg_left0'], 'leg.type': 'jansen', 'leg_left0.type': 'jansen'}
+TWO = 'leg.joints, leg_left0.joints must have other names: the robot model would have two {}'
+BASES = ('frame_id must be the same for all mechanisms of one robot model, or a link of another '
+         'one of them, not {}')
 LONG = 'm.scale and m.dimensions must make the longest bar from 1e-30 to 1e+30 m long, not {}'
 
 
@@ -250,11 +208,14 @@ LONG = 'm.scale and m.dimensions must make the longest bar from 1e-30 to 1e+30 m
     ({'m.type': 'custom', 'm.joints': [
         'O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'crank_link dyad A Q 3 3 left']},
      'm.joints must have other names: the robot model would have two links m_crank_link'),
-    ({'frame_id': 'm_crank_link'},
-     'frame_id must be the same for all mechanisms of one robot model, or a link of another one '
-     'of them, not m_crank_link')])
+    ({**LEGS, 'leg.leg_pairs': 2, 'leg_left0.only_named': True}, TWO.format('links leg_left0_O')),
+    ({**LEGS, 'leg.joint_names': ['BC=leg_O_fixed']}, TWO.format('joints leg_O_fixed')),
+    ({'frame_id': 'm_crank_link'}, BASES.format('m_crank_link')),
+    *(({**ARM, 'hand.frame_id': hand, 'arm.frame_id': arm}, BASES.format(f'{hand}, {arm}'))
+      for hand, arm in (('thigh', 'shin'), ('thigh', 'world'), ('arm_AB_link', 'hand_AB_link')))])
 def test_what_makes_no_model_is_refused(given, complaint):
-    found = scene.read({'mechanisms': ['m'], 'm.type': 'four_bar', **given})
+    one = {'mechanisms': ['m'], 'm.type': 'four_bar'}
+    found = scene.read({**(one if 'mechanisms' not in given else {}), **given})
     try:
         urdf.describe(found.mechanisms.values(), found.frame_id)
         assert not complaint
@@ -329,7 +290,8 @@ def test_the_command_prints_what_its_options_ask_for(tmp_path, capsys):
     (['--format', 'sdf', '--density', 'lead'],
      "argument --density: invalid number value: 'lead'"),
     (['--density', '2e30'], 'argument --density: must be from 1e-30 to 1e+30, not 2e30'),
-    (['--mechanism', 'leg'], "there is no mechanism 'leg'; allowed: water_drop, jansen, "),
+    (['--mechanism', 'jansn'], "there is no mechanism 'jansn'; allowed: water_drop, jansen, "
+     'peaucellier, slotted_lever; did you mean jansen?'),
     (['--format', 'dae'], "argument --format: invalid choice: 'dae' (choose from "),
     (['nowhere.yaml'], 'nowhere.yaml: No such file or directory')])
 def test_the_command_says_what_is_wrong(capsys, arguments, complaint):

@@ -28,11 +28,6 @@ ROS = ('rclpy', 'builtin_interfaces', 'geometry_msgs', 'rcl_interfaces', 'sensor
        'trajectory_msgs', 'visualization_msgs', 'linkage_interfaces')
 MODULES = sorted(PACKAGE.rglob('*.py'))
 PAGE = PACKAGE / 'web' / 'page'
-# Who uses what everybody may.
-GUESTS = [path for folder in ('test', 'benchmark', 'linkage_ros/nodes', 'linkage_ros/web')
-          for path in sorted((ROOT / folder).rglob('*.py'))]
-# Public for all their underscores.
-PUBLIC = ('_replace', '_asdict', '_fields', '_make', '_exit')
 
 
 @cache
@@ -134,14 +129,6 @@ def test_every_foreign_package_is_declared():
         tops = {name.partition('.')[0] for name in imports(module)}
         foreign = tops - {'linkage_ros', '__future__'} - sys.stdlib_module_names
         assert foreign <= declared | {*optional.INSTALL}, module
-
-
-def test_nothing_private_of_others_is_used():
-    for module in GUESTS:
-        for node in ast.walk(parsed(module)):
-            if isinstance(node, ast.Attribute) and re.match('_(?!.*__$)', node.attr):
-                assert node.attr in PUBLIC or ast.unparse(node.value) in ('self', 'cls'), (
-                    f'{module}:{node.lineno}')
 
 
 def test_a_module_begins_with_what_it_is_for():

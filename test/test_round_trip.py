@@ -10,10 +10,9 @@ from linkage_ros import scene
 from linkage_ros.robot_files import readers
 from linkage_ros.robot_model import bodies, mjcf, sdf, urdf
 from linkage_ros.robot_model.bodies import assembled
-from linkage_ros.robot_model.shapes import BALL, Piece
 import numpy as np
 import pytest
-from robots import ROBOTS
+from robots import of_text, ROBOTS
 from test_robot_files import random_linkage
 from test_robot_model import turned
 from test_urdf import ARM
@@ -24,8 +23,7 @@ FORMATS = {'urdf': urdf.write, 'sdf': sdf.write, 'mjcf': mjcf.write}
 
 def check_read(model, form, folder):
     """Write a model and compare all that is read of it: the same bodies, joints, motors, gears."""
-    file = folder / 'robot.xml'
-    file.write_text(FORMATS[form](model), encoding='utf-8')
+    file = of_text(folder / 'robot.xml', FORMATS[form](model))
     read, root = readers.read(str(file)), {'urdf': model.root}.get(form, 'world')
     frames, stands = {model.root: np.eye(4)}, []
     for part in model.parts:
@@ -107,8 +105,6 @@ def prepared(mechanisms, form, frame_id='world'):
 @pytest.mark.parametrize('form', FORMATS)
 @pytest.mark.parametrize('config', CONFIGS, ids=lambda config: config.stem)
 def test_robots_of_the_shipped_scenes_come_back(tmp_path, config, form):
-    if form == 'mjcf':
-        pytest.importorskip('mujoco')
     given = scene.load(str(config))
     for mechanism in given.mechanisms.values():
         if not mechanism.in_space:
@@ -118,8 +114,6 @@ def test_robots_of_the_shipped_scenes_come_back(tmp_path, config, form):
 @pytest.mark.parametrize('form', FORMATS)
 @pytest.mark.parametrize('link', ['AB_link', 'B', 'B_cut'])
 def test_a_hand_on_an_arm_comes_back(tmp_path, link, form):
-    if form == 'mjcf':
-        pytest.importorskip('mujoco')
     mechanisms = scene.read({**ARM, 'hand.frame_id': f'arm_{link}'}).mechanisms.values()
     check_read(prepared(mechanisms, form), form, tmp_path)
 
@@ -147,44 +141,10 @@ def random_mechanism(seed):
 @pytest.mark.parametrize('seeds', [
     range(2, 9), pytest.param(range(9, 40), marks=pytest.mark.nightly)])
 def test_random_robots_come_back(tmp_path, seeds, form):
-    if form == 'mjcf':
-        pytest.importorskip('mujoco')
     mechanisms = [*filter(None, map(random_mechanism, seeds))]
     assert len(mechanisms) > len(seeds) // 2
     for mechanism in mechanisms:
         check_read(prepared([mechanism], form), form, tmp_path)
-
-
-def random_urdf(rng):
-    """Return a random tree of links."""
-    text, names = '<link name="base"/>', ['base']
-    for i in range(rng.integers(2, 8)):
-        rows = rng.normal(size=(3, 3))
-        # Not all readers make axes as long as one.
-        rows[2] /= np.linalg.norm(rows[2])
-        numbers = [' '.join(map(repr, map(float, row))) for row in rows]
-        kind = rng.choice(['revolute', 'continuous', 'prismatic', 'fixed'])
-        text += (f'<link name="l {i}"/><joint name="j-{i}" type="{kind}"><parent link="'
-                 f'{rng.choice(names)}"/><child link="l {i}"/><origin xyz="{numbers[0]}" '
-                 f'rpy="{numbers[1]}"/><axis xyz="{numbers[2]}"/><limit lower="-9" upper="9" '
-                 'effort="1" velocity="1"/></joint>')
-        names.append(f'l {i}')
-    return f'<robot name="r">{text}</robot>', names
-
-
-@pytest.mark.parametrize('form', FORMATS)
-@pytest.mark.parametrize('seed', range(8))
-def test_random_trees_of_a_file_come_back_in_each_format(tmp_path, seed, form):
-    if form == 'mjcf':
-        pytest.importorskip('mujoco')
-    file = tmp_path / 'tree.urdf'
-    file.write_text(random_urdf(np.random.default_rng(seed))[0])
-    drawn = readers.drawn(readers.read(str(file)))
-    # What moves in MuJoCo weighs something.
-    drawn.parts[0].pieces.update((body, [Piece(BALL, 'joint', 0.1, (0.0, 0.0), (0.1, 0.0))])
-                                       for body in drawn.parts[0].frames)
-    drawn.density = 1000.0
-    check_read(drawn, form, tmp_path)
 
 
 @pytest.mark.parametrize('file', ['four_bar.urdf', 'boom.urdf', 'palletiser.urdf',

@@ -68,6 +68,7 @@ class Writer:
         self.numbers = count()
         self.links, self.axes, self.places, self.bodies, self.follows = {}, {}, {}, {}, {}
         text = self.model('', 'robot', frame(rng), version, 2, np.eye(4))
+        text = f'<world name="w">{text}</world>' if rng.random() < 0.5 else text
         self.text = f'<?xml version="1.0"?><sdf version="{version}">{text}</sdf>'
 
     def pose(self, at, base, version, known=(), relative=True):
@@ -93,35 +94,40 @@ class Writer:
         def whole(one):
             return f'{inner}::{one}'.lstrip(':')
 
-        here = {'__model__': at}
+        here, bodies = {'__model__': at}, {}
         parts = [self.pose(at, base, number, known)]
         for _ in range(rng.integers(2, 5)):
             link = f'link {next(self.numbers)}'
             there = frame(rng)
             parts.append(f'<link name="{link}">{self.pose(there, at, number, here)}</link>')
             here[link] = self.links[whole(link)] = there
-        links = [link for link in here if link != '__model__']
+            bodies[link] = whole(link)
+        bodies['__model__'] = next(iter(bodies.values()))
         for _ in range(rng.integers(3) if number >= (1, 7) else 0):
             own, there = f'frame-{next(self.numbers)}', frame(rng)
             on = [*here][rng.integers(len(here))] if rng.random() < 0.5 else ''
             said = f' attached_to="{on}"' if on else ''
             parts.append(f'<frame name="{own}"{said}>'
                          f'{self.pose(there, here[on] if on else at, number, here)}</frame>')
-            here[own] = there
+            here[own], bodies[own] = there, bodies[on or '__model__']
         if depth and number >= (1, 7):
             child = f'inner {next(self.numbers)}'
             there = frame(rng)
             parts.append(self.model(inner, child, there, version, depth - 1, at, here))
-            links += [link[len(whole('')):] for link in self.links
+            inside = [link[len(whole('')):] for link in self.links
                       if link.startswith(whole(child))]
-            here.update({link: self.links[whole(link)] for link in links})
-        rng.shuffle(links)
-        for parent, child in zip(['world', *links] if depth == 2 else links,
-                                 links if depth == 2 else links[1:]):
-            parts.append(self.joint(whole, parent, child, at, here, number))
+            here.update({link: self.links[whole(link)] for link in inside})
+            bodies.update({link: whole(link) for link in inside})
+            # A model stands for its first link.
+            here[child], bodies[child] = there, whole(inside[0])
+        ends = [*bodies]
+        rng.shuffle(ends)
+        for parent, child in zip(['world', *ends] if depth == 2 else ends,
+                                 ends if depth == 2 else ends[1:]):
+            parts.append(self.joint(whole, parent, child, at, here, number, bodies))
         return f'<model name="{name}">{"".join(parts)}</model>'
 
-    def joint(self, whole, parent, child, at, here, number):
+    def joint(self, whole, parent, child, at, here, number, bodies):
         """Return a joint of any pose, axis and way to say it."""
         rng, name, there = self.rng, f'joint {next(self.numbers)}', frame(self.rng)
         axis = rng.normal(size=3)
@@ -148,8 +154,7 @@ class Writer:
                      '</reference></mimic>')
             self.follows[whole(name)] = leader, *numbers
         self.axes[whole(name)], self.places[whole(name)] = axis, there[:3, 3]
-        self.bodies[whole(name)] = tuple(
-            one if one == 'world' else whole(one) for one in (parent, child))
+        self.bodies[whole(name)] = bodies.get(parent, 'world'), bodies[child]
         kind = 'prismatic' if rng.random() < 0.3 else 'revolute'
         return (f'<joint name="{name}" type="{kind}"><parent>{parent}</parent>'
                 f'<child>{child}</child>{self.pose(there, here[child], number, here)}'

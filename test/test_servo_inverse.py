@@ -17,7 +17,6 @@ from truth.working_modes import five_bar, lever_of
 TWO = {'mechanisms': ['left', 'right', 'drop'], 'left.type': 'slotted_lever',
        'right.type': 'slotted_lever', 'right.dimensions.a': 200.0, 'drop.type': 'water_drop'}
 SWEPT = {'mechanisms': ['slotted_lever'], 'slotted_lever.crank.sweep': [-1.3, 0.8]}
-KINDS = [kind for kind in mechanisms.TYPES if len(mechanisms.create(kind).inputs) == 1]
 
 
 def test_each_servo_angle_puts_the_lever_where_it_is_wanted(graph):
@@ -83,13 +82,13 @@ def test_a_request_that_cannot_be_answered_gets_the_reason_alone(graph, paramete
 
 @pytest.mark.parametrize('fields, message', [
     ({'lever_angle': [0.1, 0.6, 0.1, math.nan, -math.inf]},
-     'lever angles 0.6, nan, -inf cannot be reached; the lever reaches [-0.562536, 0.562536] rad'),
-    ({'lever_angle': [0.1] + [1.0] * 9}, 'lever angles 1, 1, 1, 1, 1 and 4 more cannot be reached'
-     '; the lever reaches [-0.562536, 0.562536] rad'),
+     'lever cannot be 0.6, nan, -inf; lever reaches [-0.562536, 0.562536] rad'),
+    ({'lever_angle': [0.1] + [1.0] * 9}, 'lever cannot be 1, 1, 1, 1, 1 and 4 more'
+     '; lever reaches [-0.562536, 0.562536] rad'),
     ({'lever_angle': [1e308], 'output': 'G.x', 'mechanism': 'jansen'},
-     'values of G.x 1e+308 cannot be reached; G.x reaches [-0.357608, -0.0180657] m'),
+     'G.x cannot be 1e+308; G.x reaches [-0.357608, -0.0180657] m'),
     ({'lever_angle': [-math.inf], 'output': 'BC', 'mechanism': 'jansen'},
-     'values of BC -inf cannot be reached; a value must be finite')])
+     'BC cannot be -inf; a value must be finite')])
 def test_a_value_that_cannot_be_had_is_nan_with_the_reason(graph, fields, message):
     node = graph.start(ServoInverse)
     response = node.answer(Service.Request(**fields), Service.Response())
@@ -123,23 +122,6 @@ def test_all_working_modes_of_a_foot_are_told_and_the_nearest_comes_first(graph)
         near = (answer + [2 * math.pi, -8 * math.pi]).tolist()
         again = node.answer_inputs_for(InputsFor.Request(near=near, **FOOT), InputsFor.Response())
         assert again.positions[:2].tolist() == pytest.approx(near) and again.modes[0] == mode
-
-
-@pytest.mark.parametrize('turn', [-2, 0, 1])
-def test_of_several_inputs_one_in_a_sweep_of_another_turn_is_answered_there(graph, turn):
-    sweep = [turn * math.tau + end for end in (1.0, 3.0)]
-    node = graph.start(ServoInverse, {
-        'mechanisms': ['leg'], 'leg.type': 'five_bar', 'leg.crank.sweep': sweep,
-        'leg.crank.start': sweep[0] + 0.9, 'leg.crank2.start': 1.24})
-    response = node.answer_inputs_for(
-        InputsFor.Request(outputs=['P.x', 'P.y'], values=[0.06, 0.15], near=[1.9, 1.24]),
-        InputsFor.Response())
-    expected = [inputs for inputs, _ in five_bar(mechanisms.create('five_bar').dimensions,
-                                                 0.06 + 0.15j) if 1.0 <= inputs[0] <= 3.0]
-    answers = np.reshape(response.positions, (-1, 2))
-    assert len(expected) == len(answers) == 2
-    assert sorted(answers[:, 0] - turn * math.tau) == pytest.approx(
-        sorted(inputs[0] for inputs in expected), abs=1e-12)
 
 
 INPUTS_REFUSED = [
@@ -177,14 +159,16 @@ def ask(node, wanted, near=(), output='', mechanism=''):
     return node.answer(request, Service.Response())
 
 
-def test_many_angles_at_once_are_answered_like_each_alone(graph):
-    node = graph.start(ServoInverse, SWEPT)
+@pytest.mark.parametrize('given, near', [
+    (SWEPT, ()), ({}, [math.tau * (i % 3) for i in range(600)])])
+def test_many_angles_at_once_are_answered_like_each_alone(graph, given, near):
+    node = graph.start(ServoInverse, given)
     wanted = np.linspace(-0.5, 0.5, 600).tolist()
-    alone = [ask(node, [each]) for each in wanted]
+    alone = [ask(node, [each], near[i:i + 1]) for i, each in enumerate(wanted)]
 
     def check():
-        many = ask(node, wanted)
-        assert not many.success and many.message
+        many = ask(node, wanted, near)
+        assert many.success != bool(many.message) and many.success == (given == {})
         assert many.reachable == [one.success for one in alone]
         for field in ('servo_angle', 'reduction'):
             np.testing.assert_allclose(
@@ -202,88 +186,6 @@ def test_many_angles_at_once_are_answered_like_each_alone(graph):
 def test_what_would_cost_an_answer_its_digits_is_refused(graph, bad):
     with pytest.raises(scene.SceneError):
         graph.start(ServoInverse, {**SWEPT, **bad})
-
-
-def random_scene(rng):
-    """Return a random scene of one mechanism with one crank, often with a sweep; None if none."""
-    kind = str(rng.choice(KINDS))
-    given = {'mechanisms': ['m'], 'm.type': kind, 'm.scale': float(rng.choice([1.0, 0.01])),
-             **{f'm.dimensions.{name}': length * math.exp(rng.uniform(-0.1, 0.1))
-                for name, length in mechanisms.defaults(kind).items() if length}}
-    try:
-        reach = scene.read(given).mechanisms['m'].reach
-    except scene.SceneError:
-        return None
-    if rng.random() < 0.7:
-        low, high = np.sort(rng.uniform(*reach[0], 2))
-        if reach[0] == (-math.pi, math.pi):
-            high += rng.choice([0.0, 5.0, 15.0])
-        turns = 2 * math.pi * int(rng.integers(-2, 3))
-        given['m.crank.sweep'] = [float(low + turns), float(max(high, low + 1e-3) + turns)]
-    try:
-        scene.read(given)
-    except scene.SceneError:
-        return None
-    return given
-
-
-def check_random_scene(graph, rng):
-    """Ask for values of a random output; compare with what a fine search finds."""
-    given = random_scene(rng)
-    if given is None:
-        return 0
-    node = graph.start(ServoInverse, given)
-    mechanism = node.scene.mechanisms['m']
-    linkage, sweep = mechanism.linkage, given.get('m.crank.sweep')
-    output = str(rng.choice([*linkage.joints, *(f'{joint}.{axis}' for joint in linkage.points
-                                                for axis in 'xy')]))
-    joint, _, axis = output.rpartition('.')
-    slides = [link.name for link in linkage.links if link.kind == 'prismatic']
-    turns = not joint and output not in slides
-
-    def value(theta):
-        found = (linkage.solve(theta, (joint,))[joint][..., 'xy'.index(axis)] if joint
-                 else linkage.joint_angles(theta, (output,))[output])
-        return found if turns else found * mechanism.scale
-
-    arcs = [sweep] if sweep else mechanism.reach
-    theta = np.concatenate([[*np.linspace(*arc, 40001), math.nan] for arc in arcs])
-    curve = value(theta)
-    if np.nanmax(curve) - np.nanmin(curve) <= 1e-12 * mechanism.scale * linkage.longest:
-        return 0  # it never moves, but for rounding
-    wanted = value(np.concatenate([rng.uniform(*arcs[0], 2), rng.uniform(*mechanism.reach[0], 2)]))
-    near = rng.uniform(-12.0, 12.0, 4) if rng.random() < 0.7 else np.zeros(0)
-    response = ask(node, wanted.tolist(), near.tolist(), output, 'm')
-    assert all(response.reachable[:2]), (given, output, wanted, response)
-    for i, servo in enumerate(response.servo_angle):
-        gap = curve - wanted[i]
-        gap = gap - 2 * math.pi * np.round(gap / (2 * math.pi)) if turns else gap
-        crossed = (gap[:-1] * gap[1:] <= 0.0) & (np.abs(np.diff(gap)) < 1.0 + 9.0 * (not turns))
-        roots = theta[:-1][crossed]
-        case = given, output, wanted[i], near, servo, roots, response.message
-        assert math.isfinite(servo) or not roots.size, case
-        if math.isfinite(servo):
-            miss = float(value(servo)) - wanted[i]
-            miss -= 2 * math.pi * round(miss / (2 * math.pi)) if turns else 0.0
-            size = math.pi if turns else np.nanmax(np.abs(curve))
-            assert abs(miss) < 1e-12 * size + 4e-15 * abs(response.reduction[i]), case
-            assert not sweep or sweep[0] <= servo <= sweep[1], case
-            if near.size and roots.size:
-                roots = roots if sweep else roots + 2 * math.pi * np.round(
-                    (near[i] - roots) / (2 * math.pi))
-                assert abs(servo - near[i]) < np.abs(roots - near[i]).min() + 1e-3, case
-    return 1
-
-
-def test_random_outputs_in_random_sweeps_are_had_or_cannot_be(graph, scenes=12, seed=1):
-    rng = np.random.default_rng(seed)
-    assert sum(check_random_scene(graph, rng) for _ in range(scenes)) > scenes // 4
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('seed', range(2, 8))
-def test_many_random_outputs_in_random_sweeps_are_had_or_cannot_be(graph, seed):
-    test_random_outputs_in_random_sweeps_are_had_or_cannot_be(graph, 80, seed)
 
 
 def test_dimensions_change_while_the_node_runs(graph):

@@ -264,10 +264,10 @@ def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
     swept = {'mechanisms': ['leg'], 'leg.type': 'five_bar', 'leg.crank.sweep': [6.0, 9.0]}
     wanted = InverseRequest(scene.read(swept).mechanisms['leg'], ('P.x', 'P.y'))
     answers = wanted.answers((0.05, 0.15), (0.0, 0.0))
-    assert answers and all(6.0 <= answer.inputs[0] <= 9.0 for answer in answers)
-    assert answers[0].inputs[0] == pytest.approx(min(answer.inputs[0] for answer in answers))
+    assert answers and all(6.0 <= inputs[0] <= 9.0 for inputs, _ in answers)
+    assert answers[0][0][0] == pytest.approx(min(inputs[0] for inputs, _ in answers))
     found, _, _ = wanted.command((0.05, 0.15), None, (0.0, 0.0), jumps=True)
-    assert found == pytest.approx(answers[0].inputs)
+    assert found == pytest.approx(answers[0][0])
     swept['leg.crank.sweep'] = [3.0, 3.5]
     wanted = InverseRequest(scene.read(swept).mechanisms['leg'], ('P.x', 'P.y'))
     assert wanted.answers((0.05, 0.15), (3.2, 0.0)) == []
@@ -290,3 +290,14 @@ def test_an_output_that_stands_still_in_most_poses_is_answered_where_it_moves():
         moves = abs(float(linkage.velocity((crank, drive))['J'][1])) > 1e-9
         found = linkage.input_for('J.y', value, others=(drive,))
         assert moves == (crank == 1.45) == (np.nanmin(abs(found - crank), initial=9.0) < 1e-9)
+
+
+@pytest.mark.parametrize('unit', [1.0, 1e-26, 1e20])
+def test_what_is_searched_is_found_in_any_unit(unit):
+    linkage = mechanisms.create('custom', joints=(
+        'A ground 0 0', 'B ground 0 c', 'E crank B e', 'F cylinder A E f right'),
+        c=3.6 * unit, e=0.42 * unit, f=4.0 * unit)
+    pose, outputs = (0.04, 1.4 * unit), ('F.x', 'barrel')
+    values = [float(linkage.solve(pose)['F'][0]), float(linkage.joint_angles(pose)['barrel'])]
+    found = linkage.inverse(outputs).all(values)
+    assert any(solution.inputs == pytest.approx(pose, rel=1e-9) for solution in found)

@@ -17,43 +17,36 @@ import shutil
 import subprocess
 import weakref
 
-from c_libraries import expected, PLUGIN, ROS, shared, STAND_IN
+from c_libraries import expected, PLUGIN, ROS, shared, STAND_IN, UNWRITTEN
 from linkage_ros import scene
 from linkage_ros.c_code.package import package
 import numpy as np
 import pytest
+import test_transmission
 
 pytestmark = [
     pytest.mark.skipif(not shutil.which('g++'), reason='g++ is not installed'),
     pytest.mark.skipif(not ROS, reason='rcutils is not installed')]
 
-# A motor with a gear, one in a sweep, a five-bar, and one that measures what it moves.
+# A motor with a gear, one that turns on, and of others: one in a sweep, a five-bar, and one that
+# measures what it moves.
 SCENE = {
     'mechanisms': ['knee', 'lever', 'leg', 'lift', 'drag'],
     'knee.type': 'custom', 'knee.crank.source': 'knee_motor', 'knee.crank.ratio': -0.1,
     'knee.crank.sweep': [-0.45, 0.7],
     'knee.joints': ['O ground 0 0', 'Q ground 0 -0.25', 'A crank O 0.045',
                     'B dyad A Q 0.25 0.036 left'],
-    'lever.type': 'slotted_lever', 'lever.crank.source': 'servo', 'lever.crank.ratio': -0.5,
-    'lever.crank.offset': 0.3, 'lever.crank.sweep': [-0.4, 0.4],
-    'lever.joint_names': ['lever=-flap+0.1'],
-    'leg.type': 'five_bar', 'leg.crank.start': 1.9, 'leg.crank2.start': 1.24,
-    'leg.loads': ['P=3 -20'],
-    'lift.type': 'custom', 'lift.joints': [
-        'O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left'],
-    'lift.crank.measures': 'QB', 'lift.crank.start': 0.5, 'lift.crank.sweep': [0.2, 2.2],
     'drag.type': 'custom', 'drag.joints': [
-        'O ground 0 0', 'Q ground 0.3 0', 'A crank O 1', 'B dyad A Q 0.9 1.1 left']}
+        'O ground 0 0', 'Q ground 0.3 0', 'A crank O 1', 'B dyad A Q 0.9 1.1 left'],
+    **{key: value for key, value in test_transmission.SCENE.items()
+       if key.partition('.')[0] in ('lever', 'leg', 'lift') and key != 'lever.loads'}}
 OTHER = {'mechanisms': ['rocker'], 'rocker.type': 'four_bar', 'rocker.crank.start': 1.0}
-ACTUATORS = {'knee': {'knee_motor': 'crank'}, 'lever': {'servo': 'crank'},
-             'leg': {'leg_crank': 'crank', 'leg_crank2': 'crank2'},
-             'lift': {'lift_crank': 'crank'},
-             'rocker': {'rocker_crank': 'crank'}, 'drag': {'drag_crank': 'crank'}}
-JOINTS = {'knee': {'knee_QB': 'QB'}, 'lever': {'flap': 'lever'},
-          'leg': {'leg_crank': 'crank', 'leg_AP': 'AP'}, 'lift': {'lift_crank': 'crank'},
-          'rocker': {'rocker_QB': 'QB'}, 'drag': {'drag_QB': 'QB'}}
+AXES = {**test_transmission.AXES, 'knee': ({'knee_motor': 'crank'}, {'knee_QB': 'QB'}),
+        **{name: ({f'{name}_crank': 'crank'}, {f'{name}_{joint}': joint})
+           for name, joint in (('lift', 'crank'), ('rocker', 'QB'), ('drag', 'QB'))}}
+ACTUATORS, JOINTS = ({name: axes[side] for name, axes in AXES.items()} for side in (0, 1))
 KINDS = 'position', 'velocity', 'effort'
-NAN, UNWRITTEN = math.nan, 0.123456789
+NAN = math.nan
 OK, OUT_OF_REACH, SINGULAR, NOT_KNOWN = 0, 1, 2, 4
 COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
     not shutil.which(name), reason=f'{name} is not installed')) for name in ('g++', 'clang++')]
@@ -171,25 +164,6 @@ UNREACHABLE = {'knee': 9.0, 'lever': 1.5, 'leg': [1.9, -0.2], 'lift': 0.5 + math
                'rocker': 9.0}
 
 
-@pytest.mark.parametrize('name', INPUTS)
-def test_what_is_not_commanded_is_not_written(plugins, name):
-    component, (inputs, others) = plugins.component(name), INPUTS[name]
-    actuator, joint = poses(plugins.mechanisms[name], *inputs)
-    further = poses(plugins.mechanisms[name], *others)[0]
-    # Before anything is known, after a measurement, a command, and another measurement.
-    for before in (lambda: None, lambda: component.read(actuator),
-                   lambda: component.write(joint, 1.0, 2.0), lambda: component.read(further)):
-        before()
-        status, written = component.write(NAN)
-        assert status == NOT_KNOWN and (written == UNWRITTEN).all()
-        for kind in range(3):
-            given = [NAN] * 3
-            given[kind] = joint if kind == 0 else np.ones(len(joint))
-            status, written = component.write(*given)
-            others_ = [other for other in range(3) if other != kind]
-            assert status & NOT_KNOWN and (written[others_] == UNWRITTEN).all()
-
-
 def test_an_effort_is_not_held_over_a_pause(plugins):
     mechanism, component = plugins.mechanisms['lift'], plugins.component('lift')
     (_, dead), *_ = mechanism.linkage.extremes('QB')[0]
@@ -253,7 +227,7 @@ def test_any_history_of_values_moves_a_motor_to_what_was_commanded(plugins, name
         inputs = low + rng.uniform(0.0, 1.0, len(low)) * (high - low)
         actuator, joint = poses(mechanism, *inputs)
         is_missing = np.arange(len(low)) == rng.integers(len(low))
-        kind = rng.integers(5)
+        kind = rng.integers(6)
         if kind == 0:
             status, (position, *_) = component.read(actuator)
             assert status == OK and position == pytest.approx(joint, abs=1e-12)
@@ -272,6 +246,14 @@ def test_any_history_of_values_moves_a_motor_to_what_was_commanded(plugins, name
             partial = np.where(is_missing, rng.choice([NAN, math.inf]), joint)
             status, written = component.write(partial, effort=partial)
             assert status & NOT_KNOWN and (written == UNWRITTEN).all()
+        elif kind == 4:
+            # Of one quantity alone.
+            values = np.full((3, len(low)), NAN)
+            row = rng.integers(3)
+            values[row] = joint
+            status, written = component.write(*values)
+            assert status & NOT_KNOWN and (np.delete(written, row, 0) == UNWRITTEN).all()
+            held = held if row else written[0]
         else:
             status, (position, velocity, _) = component.write(UNREACHABLE[name], 1.0)
             assert status & OUT_OF_REACH and not velocity[np.isfinite(held)].any()
@@ -309,15 +291,13 @@ JOINT, MOTOR = 'joint_handle\tknee_QB', 'actuator_handle\tknee_motor'
     ('knee', ['actuator_handle\telbow\tposition\t0'], {}, ''),
     # Each interface: one handle, on all axes or on none.
     ('knee', [f'{JOINT}\tposition\t5'], {},
-     "joint 'knee_QB' has two handles for one interface: 'position' and 'position'"),
-    ('knee', [f'{JOINT}\ttorque\t5'], {}, "'torque' and 'effort'"),
-    ('leg', ['actuator_handle\tleg_crank2\tforce\t5'], {}, "'leg_crank2' has two handles"),
+     "joint 'knee_QB' has several handles for position"),
+    ('knee', [f'{JOINT}\ttorque\t5'], {}, "joint 'knee_QB' has several handles for effort"),
+    ('leg', ['actuator_handle\tleg_crank2\tforce\t5'], {}, "'leg_crank2' has several handles"),
     ('knee', [f'{JOINT}\ttemperature\t5'], {}, ''),
     ('knee', [f'{JOINT}\tvelocity\t0'], {}, 'need a handle for velocity'),
-    ('knee', [f'{MOTOR}\tvelocity\t0'], {}, 'need a handle for velocity'),
     ('knee', [f'{MOTOR}\teffort\t0'], {'kinds': ['position']}, 'need a handle for effort'),
-    ('knee', [f'{JOINT}\tposition\t0'], {'kinds': ['effort']}, 'need a handle for position'),
-    ('leg', ['actuator_handle\tleg_crank\tvelocity\t0'], {}, 'need a handle for velocity'),
+    ('knee', [], {'kinds': ['effort']}, 'need a handle for position'),
     ('leg', [f'joint_handle\t{each}\tvelocity\t0' for each in JOINTS['leg']], {},
      'need a handle for velocity'),
     # A handle without a value is none.
@@ -335,33 +315,28 @@ def test_axes_and_handles_are_checked(plugins, name, lines, given, said):
 
 def test_a_robot_has_its_own_gears_and_encoder_zeros(plugins):
     """Of the built-in transmissions: joint = actuator / reduction + offset, both ways."""
-    inputs, rng = (1.9, 1.24), np.random.default_rng(8)
-    plain = plugins.component('leg')
-    numbers = {name: (rng.uniform(-3.0, 3.0), rng.uniform(-1.0, 1.0)) for name in (
-        'a', 'b', 'c', 'd')}
-    lines = [f'{kind}\t{name}\t{role}\t{numbers[name][0]!r}\t{numbers[name][1]!r}'
-             for kind, name, role in (('actuator', 'a', 'crank'), ('actuator', 'b', 'crank2'),
-                                      ('joint', 'c', 'crank'), ('joint', 'd', 'AP'))]
-    geared = plugins.component('leg', *lines, actuators={'a': None, 'b': None},
-                               joints={'c': None, 'd': None})
-    (reduction, offset), (joint_reduction, joint_offset) = (
-        np.array([numbers[name] for name in names]).T for names in ('ab', 'cd'))
-    actuator, joint = poses(plugins.mechanisms['leg'], *inputs)
-    _, seen = plain.read(actuator, [0.3, -0.2], [2.0, 5.0])
-    status, found = geared.read(actuator * reduction + offset, np.array([0.3, -0.2]) * reduction,
-                                np.array([2.0, 5.0]) / reduction)
-    assert status == OK
-    np.testing.assert_allclose(found, [
-        seen[0] / joint_reduction + joint_offset, seen[1] / joint_reduction,
-        seen[2] * joint_reduction], rtol=1e-9, atol=1e-9)
-    _, seen = plain.write(joint, [0.4, 0.1], [1.0, -2.0])
-    status, found = geared.write(
-        joint / joint_reduction + joint_offset, np.array([0.4, 0.1]) / joint_reduction,
-        np.array([1.0, -2.0]) * joint_reduction)
-    assert status == OK
-    np.testing.assert_allclose(found, [
-        seen[0] * reduction + offset, seen[1] * reduction, seen[2] / reduction],
-        rtol=1e-9, atol=1e-9)
+    plain, rng = plugins.component('leg'), np.random.default_rng(8)
+    reductions, offsets = rng.uniform(-3.0, 3.0, (2, 2)), rng.uniform(-1.0, 1.0, (2, 2))
+    names = {'actuator': {'a': 'crank', 'b': 'crank2'}, 'joint': {'c': 'crank', 'd': 'AP'}}
+    geared = plugins.component('leg', *(
+        f'{kind}\t{name}\t{role}\t{reduction!r}\t{offset!r}'
+        for (kind, axes), *numbers in zip(names.items(), reductions.tolist(), offsets.tolist())
+        for (name, role), reduction, offset in zip(axes.items(), *numbers)),
+        actuators=dict.fromkeys('ab'), joints=dict.fromkeys('cd'))
+
+    def of_robot(values, side):
+        """Return what the robot has for values of the scene."""
+        factor = reductions[side] if side == 0 else 1.0 / reductions[side]
+        position, velocity, effort = values
+        return np.array([position * factor + offsets[side], velocity * factor, effort / factor])
+
+    for side, (call, position) in enumerate(zip(('read', 'write'), poses(
+            plugins.mechanisms['leg'], 1.9, 1.24))):
+        values = np.array([position, [0.3, -0.2], [2.0, 5.0]])
+        _, seen = getattr(plain, call)(*values)
+        status, found = getattr(geared, call)(*of_robot(values, side))
+        assert status == OK
+        np.testing.assert_allclose(found, of_robot(seen, 1 - side), rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize('name', ['knee', 'leg', 'lever'])
@@ -389,10 +364,11 @@ def test_passive_joints_have_states_where_there_are_handles(plugins, name, renam
     before = component.extra.copy()
     component.write(poses(mechanism, *INPUTS[name][0])[1], 1.0)
     assert np.array_equal(component.extra, before)
-    component.read(actuator, by @ speeds)
     status, _ = component.read(NAN, NAN)
     assert status & NOT_KNOWN and np.array_equal(component.extra[0], before[0])
     assert not component.extra[1].any()
+    component.read(actuator, by @ speeds)
+    assert np.array_equal(component.extra, before)
 
 
 def test_why_values_are_held_is_logged_once_per_reason(plugins, capfd):

@@ -6,7 +6,6 @@
 import gc
 import json
 import math
-import re
 
 from browser import until
 from linkage_ros import mechanisms, scene
@@ -29,7 +28,6 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from truth.working_modes import lever_of
 from viewer_harness import (
-    example,
     LEG,
     LEVER,
     markers_of,
@@ -103,19 +101,6 @@ def test_a_slider_sets_the_node_that_owns_the_parameter_and_others_changes_are_s
         (1, 1), (3, 3), (6, 3)]
 
 
-@pytest.mark.parametrize('values, reason', [
-    ({'dimensions__b': -150.0}, r'lever\.dimensions\.b .*-150'),
-    ({'dimensions__b': 'long'}, 'lever.dimensions.b must be a finite number'),
-    ({'dimensions__b': True}, 'lever.dimensions.b must be a finite number'),
-    ({'type': 'jansen'}, 'read-only parameter: lever.type'),
-    ({'dimensions__a': 10.0, 'dimensions__e': 700.0}, 'be assembled'),
-    ({'branches__L': 5}, r'lever\.branches\.L'),
-])
-def test_a_refusal_says_why_and_changes_nothing(lever, page, values, reason):
-    assert re.search(reason, page.set('/lever', **values))
-    assert (lever.value('lever.dimensions.a'), lever.value('lever.dimensions.b')) == (80.0, 150.0)
-
-
 def test_announcements_that_make_no_sense_change_nothing(graph, show):
     page = show(LEVER).page()
     publisher = graph.node.create_publisher(
@@ -135,26 +120,6 @@ def test_announcements_that_make_no_sense_change_nothing(graph, show):
     json.dumps(page.messages, allow_nan=False)
     answer = page.pose('/lever')
     assert answer['reason'] == '' and 'crank' in answer['inputs']
-
-
-def test_a_dragged_lever_is_where_it_was_dragged_to_and_stays_there(show):
-    running = show(LEVER)
-    page = running.page()
-    answer = page.pose('/lever', output='lever', value=0.4)
-    assert answer['reason'] == ''
-
-    def is_there():
-        joints = page.drawn('/lever', 'joints')
-        return len(joints) and abs(math.atan2(
-            joints[1, 0] - joints[3, 0], joints[3, 1] - joints[1, 1]) - 0.4) < 1e-6
-
-    until(is_there)
-    servo, lever = answer['inputs']['crank'], answer['outputs']['lever']
-    assert lever_of(servo) == pytest.approx(0.4, abs=1e-12)
-    slope = (lever_of(servo + 1e-6) - lever_of(servo - 1e-6)) / 2e-6
-    assert lever['rates'] == [pytest.approx(slope, abs=1e-8)]
-    assert running.value('lever.crank.speed') == 0.0
-    assert running.value('lever.crank.start') == servo
 
 
 TWO_ARCS = {**RATE, 'mechanisms': ['bar'], 'bar.type': 'four_bar', 'bar.crank.start': 1.0,
@@ -180,16 +145,6 @@ def test_an_input_goes_again_to_where_it_started_though_that_is_a_middle_or_an_e
         until(lambda value=value: away(value) > 0.01)
     for value in (end for arc in arcs for end in arc for _ in range(2)):
         assert page.pose(f'/{name}', output='crank', value=value)['reason'] == ''
-
-
-@pytest.mark.parametrize('key, want, reason', [
-    ('/gone', {}, "no mechanism '/gone'"),
-    ('/drop', {'output': 'lever', 'value': 0.1}, "no output 'lever'"),
-    ('/drop', {'joint': 'X', 'place': [0.0, 0.0]}, "water_drop has no point 'X'; allowed: O, C, "),
-])
-def test_what_cannot_be_brought_about_says_why(lever, page, key, want, reason):
-    assert re.search(reason, page.pose(key, **want)['reason'])
-    assert lever.value('lever.crank.speed') == 1.0
 
 
 def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(page):
@@ -271,21 +226,6 @@ def test_where_an_input_is_that_nobody_has_named_is_not_guessed(graph, show):
         return page.pose('/leg').get('inputs')
 
     assert until(inputs)['crank'] == pytest.approx(2.0)
-
-
-def test_what_a_sensor_cannot_be_at_is_nowhere_on_the_page(show):
-    running = show({**example('scissor_lift'), 'rate': 0.0})
-    lift = scene.read(example('scissor_lift')).mechanisms['lift']
-    crank_states = running.graph.node.create_publisher(JointState, 'crank_states', 10)
-    page = running.page()
-
-    def is_at(sent, value):
-        crank_states.publish(JointState(name=['lift_cylinder'], position=[sent]))
-        return abs(page.pose('/lift')['inputs']['carriage'] - value) < 1e-9
-
-    sent, _ = lift.to_source(lift.first, 1.0, 0.0)
-    until(lambda: is_at(sent, 1.0))
-    until(lambda: is_at(99.0, 1.2))
 
 
 def test_an_input_is_where_the_last_message_says(graph, show):

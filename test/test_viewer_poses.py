@@ -111,8 +111,7 @@ def test_a_table_has_every_quantity_of_every_output_in_its_unit(name):
 @pytest.mark.parametrize('kind', ['velocity', 'acceleration'])
 @pytest.mark.parametrize('name', ['excavator', 'jansen', 'scissor_lift'])
 def test_arrows_are_how_the_joints_move_in_the_picture(name, kind):
-    mechanism, = scene.read(example(name)).mechanisms.values()
-    starts = [drive.start for drive in mechanism.inputs.values()]
+    mechanism, starts = mechanism_of(name)
     speeds = {name: 0.1 * (2 + i) for i, name in enumerate(mechanism.inputs)}
 
     def places(time):
@@ -335,8 +334,7 @@ def test_arrows_of_force_are_the_loads_and_what_holds_them():
     found = poses.arrows(mechanism, [0.5], 'force', {'crank': 1.0})
     effort, = mechanism.efforts([0.5])
     assert found == {'unit': 'N', 'at': {'L': (3.0, -4.0)}, 'efforts': {'crank': [effort, 'N·m']}}
-    digger, = scene.read(example('excavator')).mechanisms.values()
-    present = [drive.start for drive in digger.inputs.values()]
+    digger, present = mechanism_of('excavator')
     assert poses.arrows(digger, present, 'force', {}) == {'unit': 'N', 'at': {}, 'efforts': {}}
     loaded = dataclasses.replace(digger, loads={'T': (0.0, -9.0)})
     assert poses.arrows(loaded, present, 'force', {}) == {
@@ -347,8 +345,7 @@ def test_arrows_of_force_are_the_loads_and_what_holds_them():
 @pytest.mark.parametrize('name, output', [
     ('excavator', 'T.y'), ('jansen', 'G.x'), ('peaucellier', 'PB'), ('peaucellier', 'C.y')])
 def test_a_position_is_drawn_as_it_bends_even_next_to_a_dead_point(name, output):
-    mechanism, = scene.read(example(name)).mechanisms.values()
-    present = [drive.start for drive in mechanism.inputs.values()]
+    mechanism, present = mechanism_of(name)
     curve = curves.curve(mechanism, present, 'position', output)
     x, y = np.array(curve['x']), np.array(curve['y'], float)
     middle = 0.5 * (x[:-1] + x[1:])

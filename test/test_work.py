@@ -6,15 +6,11 @@
 from collections import Counter
 import dis
 
-from builtin_interfaces.msg import Time
 from linkage_ros import mechanisms
-from linkage_ros.nodes import message_layout, messages
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.publishers import LATCHED
 from linkage_ros.scene.legs import Assembly
-import numpy as np
 import pytest
-from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -106,34 +102,3 @@ def test_all_legs_of_a_walker_are_solved_in_one_call(graph, work):
     turn([0.3], markers)
     # Even if a message came twice: one by one there would be six.
     assert 0 < sum(work.values()) < 6
-
-
-def check_patched(build, kind, values, stamp):
-    """See that a patched message reads like one that is built."""
-    (_, patched), = message_layout.PatchedMessages([(None, build)], len(values)).patched(
-        message_layout.pack(stamp), values)
-    assert deserialize_message(patched, kind) == deserialize_message(
-        serialize_message(build(stamp, values)), kind)
-
-
-# Whatever stands in the gaps between fields, which a middleware does not clear.
-@pytest.mark.parametrize('rounds', [20, pytest.param(3000, marks=pytest.mark.nightly)])
-def test_a_patched_message_reads_like_one_that_is_built(rounds):
-    random = np.random.default_rng(rounds)
-    for _ in range(rounds):
-        count, legs, name = *map(int, random.integers((2, 1), (12, 40))), 'w' * random.integers(9)
-        markers = messages.Markers(name, 'world', random.normal(size=6).tolist(), 1.0, {
-            0: [(0, 1), (1, 0)], 1: range(count), 7: [(0, 1, 0)]})
-        names = [f'{name}{i}' for i in range(count)]
-
-        def drawn(stamp, values, markers=markers, legs=legs):
-            return markers.message(stamp, values.reshape(legs, -1, 2))
-
-        def joined(stamp, values, names=names):
-            return messages.joint_states(stamp, names, values[:len(names)], values[len(names):])
-
-        stamp = Time(sec=int(random.integers(2 ** 31)), nanosec=int(random.integers(10 ** 9)))
-        for build, kind, size in ((drawn, MarkerArray, 2 * count * legs),
-                                  (joined, JointState, count), (joined, JointState, 2 * count)):
-            for values in (random.normal(size=size), np.zeros(size), -np.arange(size) * 1e300):
-                check_patched(build, kind, values, stamp)

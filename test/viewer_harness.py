@@ -321,7 +321,6 @@ class Seen(browser.Browser):
 
     def upright_lever(self):
         """Return where the tip and the pivot of a lever that stands upright are on the page."""
-        until(self.is_still)
         self.value('names.checked && names.click()')
         until(self.is_still)
         # The numbers of the grid are left out: they are grey too.

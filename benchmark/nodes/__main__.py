@@ -4,15 +4,15 @@
 """
 What `kinematics` costs beside a floor and a relay, and how long changes hold it up.
 
-    python -m benchmark.nodes --missing     what is not measured of these sources yet, in minutes
+    python -m benchmark.nodes --missing     what is not measured of these sources yet
     python -m benchmark.nodes --quick       a look at all, in a few minutes
     python -m benchmark.nodes changes       this piece alone, in full or --quick
     python -m benchmark.nodes --tables      the tables of the last results
 
 Pieces are the scenes and `changes`; --plain measures them where llvmlite cannot be imported.
-`--missing` stops before ten minutes are over and ends with 3 while something is left: call it
-again. Results go to benchmark/results/nodes.json, those of a look to benchmark/.cache/; the tables
-are printed, and written into docs/design/performance.md by --document.
+Results are kept piece by piece in benchmark/results/nodes.json, those of a look in
+benchmark/.cache/; the tables are printed, and written into docs/design/performance.md by
+--document.
 """
 
 import json
@@ -29,26 +29,22 @@ from . import report
 from .. import document
 
 HERE = Path(__file__).parents[1]
-# About how long a piece takes [minutes], and what is measured without llvmlite, too.
-PIECES = {'one leg': 2.0, '12 legs': 3.0, 'four mechanisms': 1.5, 'sixty mechanisms': 2.0,
-          'changes': 3.0}
+# What is measured, and what of it without llvmlite, too.
+PIECES = 'one leg', '12 legs', 'four mechanisms', 'sixty mechanisms', 'changes'
 PLAIN = '12 legs', 'changes'
-# One call of `--missing` takes no longer than this [minutes], if no piece does.
-LONGEST, LEFT = 9.8, 3
-ROUNDS, QUICK_ROUNDS = 7, 2
 # What a Python imports at its start, so that it finds no llvmlite.
 WITHOUT = "import sys\nsys.modules['llvmlite'] = None\n"
 
 
 def main():
-    """Run, write and print; return the exit code."""
+    """Run, write and print."""
     options = arguments()
-    result = json.loads(options.output.read_text()) if options.output.exists() else {}
-    options.output.parent.mkdir(parents=True, exist_ok=True)
-    is_left = False if options.tables else run(options, result)
-    tables = report.document(result)
-    document.show(options, 'design/performance.md', tables)
-    return LEFT if is_left else 0
+    output = HERE / ('.cache' if options.quick else 'results') / 'nodes.json'
+    result = json.loads(output.read_text()) if output.exists() else {}
+    if not options.tables:
+        output.parent.mkdir(exist_ok=True)
+        run(options, result, output)
+    document.show(options, 'design/performance.md', report.document(result))
 
 
 def arguments():
@@ -60,20 +56,16 @@ def arguments():
     mode.add_argument('--quick', action='store_true', help='one rate and fewer rounds')
     mode.add_argument('--tables', action='store_true', help='run nothing, show the last results')
     parser.add_argument('--plain', action='store_true', help='without llvmlite')
-    parser.add_argument('--rounds', type=int, help='bursts of each subject')
-    parser.add_argument('--output', type=Path, metavar='JSON')
     options = parser.parse_args()
     if unknown := set(options.pieces) - set(PIECES):
         parser.error(f'no piece {unknown}: {", ".join(PIECES)}')
     if not (options.pieces or options.missing or options.quick or options.tables):
         parser.error('name some pieces, or --missing, --quick or --tables')
-    options.output = options.output or (
-        HERE / ('.cache' if options.quick else 'results') / 'nodes.json')
     return options
 
 
-def run(options, result):
-    """Measure what was asked for, and write each piece at once; return whether some is left."""
+def run(options, result, output):
+    """Measure what was asked for; add each piece to the result, and write it at once."""
     # The processes find each other here and nobody else.
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     domain = Domain()
@@ -83,14 +75,11 @@ def run(options, result):
     if options.missing:
         chosen = [(name, plain) for plain in (False, True) for name in (PLAIN if plain else PIECES)
                   if result.get(report.titled(name, plain), {}).get('sources') != sources]
-    for i, (name, plain) in enumerate(chosen):
-        if i and options.missing and (time.time() - started) / 60 + PIECES[name] > LONGEST:
-            return True
+    for name, plain in chosen:
         result[report.titled(name, plain)] = {**_measured(name, plain, options),
                                               'sources': sources}
-        options.output.write_text(json.dumps(result, indent=1) + '\n')
+        output.write_text(json.dumps(result, indent=1) + '\n')
         print(f'{report.titled(name, plain)}: {time.time() - started:.0f} s', file=sys.stderr)
-    return False
 
 
 def _measured(name, plain, options):
@@ -100,9 +89,8 @@ def _measured(name, plain, options):
         if plain:
             (Path(folder) / 'sitecustomize.py').write_text(WITHOUT)
             env['PYTHONPATH'] = os.pathsep.join([folder, env.get('PYTHONPATH', '')])
-        rounds = options.rounds or (QUICK_ROUNDS if options.quick else ROUNDS)
         subprocess.run([sys.executable, '-m', 'benchmark.nodes.piece', name, str(path),
-                        str(rounds), *['--quick'] * options.quick], env=env, check=True)
+                        *['--quick'] * options.quick], env=env, check=True)
         return json.loads(path.read_text())
 
 
@@ -113,4 +101,4 @@ def _sources():
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    main()

@@ -23,8 +23,8 @@ NODE = ('-m', 'linkage_ros.nodes.kinematics')
 # How long a burst takes [s], by rate [Hz].
 SECONDS = {50.0: 1.2, 200.0: 1.0, 500.0: 0.8, 1000.0: 0.6}
 WARM_UP = 60
-# What else is compared in a scene, in a loop and in processes.
-BESIDE = {'one leg': ('relay',)}
+# The scene whose leg is closed numerically, too.
+RELAYED = 'one leg'
 # In a loop, in a round: topics to publish on, and ticks at least. After so long, all is known and
 # made [s].
 PUBLISHED, TICKS, COMPILING = 600, 20, 1.0
@@ -74,8 +74,8 @@ class Bench:
         heard = scenes.topics(scene)
         floor = (*SUBJECT, 'floor', '--ready', str(self.ready(scene)))
         wanted = {'kinematics': (NODE, heard), 'floor': (floor, heard)}
-        for kind in BESIDE.get(scene, ()):
-            wanted[kind] = (*SUBJECT, kind), heard[:1] if kind == 'relay' else heard
+        if scene == RELAYED:
+            wanted['relay'] = (*SUBJECT, 'relay'), heard[:1]
         if scene == '12 legs':
             wanted['joints'] = NODE, heard[:1]
             wanted['unheard'], wanted['deaf'] = (NODE, ()), ((*SUBJECT, 'deaf'), ())
@@ -96,8 +96,8 @@ class Bench:
         """Return what a tick takes [us], one after the other without a pause, in this process."""
         ready = self.ready(scene)
         subject.Floor.ready = subject.ready(pickle.loads(ready.read_bytes()))
-        kinds = ['kinematics', 'floor', *BESIDE.get(scene, ())]
-        given = [Parameter(name, value=value) for name, value in scenes.given(scene).items()]
+        kinds = ['kinematics', 'floor', *['relay'] * (scene == RELAYED)]
+        given = [Parameter(name, value=value) for name, value in scenes.SCENES[scene].items()]
         nodes = {kind: subject.KINDS[kind](
             namespace=f'/{kind}', parameter_overrides=given) for kind in kinds}
         ears = [Process(kind, *SUBJECT, 'ear', '--ready', str(ready)) for kind in kinds]

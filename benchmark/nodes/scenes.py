@@ -31,11 +31,6 @@ SCENES = {
 STEP = 10_000_019
 
 
-def given(name: str) -> dict:
-    """Return the parameters of a scene."""
-    return SCENES[name]
-
-
 class Topic(NamedTuple):
     """A topic that `kinematics` answers on."""
 
@@ -46,14 +41,14 @@ class Topic(NamedTuple):
 def topics(name: str) -> Tuple[Topic, ...]:
     """Return the topics of a scene."""
     return tuple(Topic(f'{mechanism}/{what}', what == 'joint_states')
-                 for mechanism in given(name)['mechanisms']
+                 for mechanism in SCENES[name]['mechanisms']
                  for what in ('joint_states', 'markers'))
 
 
 def write(name: str, folder: Path) -> Path:
     """Write the parameter file of a scene."""
     path = folder / f'{name.replace(" ", "_")}.yaml'
-    path.write_text(yaml.safe_dump({'/**': {'ros__parameters': given(name)}}))
+    path.write_text(yaml.safe_dump({'/**': {'ros__parameters': SCENES[name]}}))
     return path
 
 
@@ -61,7 +56,7 @@ class Cranks:
     """One crank message after the other."""
 
     def __init__(self, name: str):
-        mechanisms = scene.read(given(name)).mechanisms
+        mechanisms = scene.read(SCENES[name]).mechanisms
         self._motions = [Motion.of(mechanism.first) for mechanism in mechanisms.values()]
         self._message = JointState(name=[f'{mechanism}_crank' for mechanism in mechanisms])
         self._count = 0

@@ -10,7 +10,6 @@ KIND is one of KINDS below.
 """
 
 import argparse
-from functools import wraps
 from pathlib import Path
 import pickle
 import sys
@@ -19,25 +18,12 @@ from linkage_ros import scene
 from linkage_ros.nodes import scene_node
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.message_layout import ANY
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
 from .relay import Loops
-
-
-def until_the_end(callback):
-    """Let a callback of a node fail in silence where it fails because its context has ended."""
-    @wraps(callback)
-    def guarded(self, *args):
-        try:
-            callback(self, *args)
-        except rclpy_implementation.RCLError:
-            if self.context.ok():
-                raise
-    return guarded
 
 
 class Floor(Node):
@@ -51,7 +37,6 @@ class Floor(Node):
                      for topic, (type_, depth, text) in self.ready.items()]
         self.create_subscription(JointState, 'crank_states', self._turn, ANY)
 
-    @until_the_end
     def _turn(self, _):
         for publisher, text in self._out:
             publisher.publish(text)
@@ -79,7 +64,6 @@ class Relay(Node):
         self._publisher = self.create_publisher(JointState, 'leg/joint_states', 10)
         self.create_subscription(JointState, 'crank_states', self._turn, ANY)
 
-    @until_the_end
     def _turn(self, cranks):
         angles = self._loops.joint_angles(cranks.position[0])
         message = JointState(name=self._names, position=angles.tolist())

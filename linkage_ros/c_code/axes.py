@@ -17,8 +17,6 @@ from ..words import listed
 # Relative size of a Jacobian below which outputs do not determine the inputs, and the poses in
 # which it is looked at.
 DEPENDENT, SPREAD = 1e-9, 200
-# States that are tried for a first pose.
-SAMPLES = 4096
 
 
 class Axis(NamedTuple):
@@ -154,13 +152,9 @@ def loads(mechanism: SceneMechanism) -> Iterator[Tuple[str, float]]:
 
 
 def start(mechanism: SceneMechanism) -> List[float]:
-    """Return the starts of the inputs, in the linkage's own units; elsewhere if it has no pose."""
-    linkage = mechanism.linkage
-    first = [Motion.of(settings).at(0)[0] / mechanism.scale_of(name)
-             for name, settings in mechanism.inputs.items()]
-    samples = np.vstack([first, np.transpose(spread(linkage.inputs, SAMPLES))])
-    values = linkage.posed(linkage.points, ()).over(*samples.T)
-    return samples[np.isfinite(values).all(axis=0).argmax()].tolist()
+    """Return the starts of the inputs, in the linkage's own units."""
+    return [Motion.of(settings).at(0)[0] / mechanism.scale_of(name)
+            for name, settings in mechanism.inputs.items()]
 
 
 def _key(mechanism: SceneMechanism, link: str) -> str:
@@ -202,6 +196,5 @@ def _tell(mechanism: SceneMechanism, outputs: Sequence[str]) -> bool:
     sizes = np.array([1.0 if linkage.is_angle(each) else linkage.longest for each in outputs])
     units = np.array([each.size for each in linkage.inputs])
     scaled = np.moveaxis(np.nan_to_num(rates * units[:, None, None] / sizes[:, None]), -1, 0)
-    values = np.linalg.svd(scaled, compute_uv=False)
-    return values.shape[1] == len(outputs) and bool(
-        (values[:, -1] > DEPENDENT * np.maximum(1.0, values[:, 0])).any())
+    least = DEPENDENT * np.maximum(1.0, np.abs(scaled).max(axis=(1, 2)))
+    return len(outputs) in np.linalg.matrix_rank(scaled, least)

@@ -3,7 +3,6 @@
 
 """Command that prints the mechanisms of a scene as C; it needs no ROS."""
 
-import sys
 from typing import List, Optional, Sequence, Tuple
 
 from . import header
@@ -60,7 +59,3 @@ def arguments() -> cli.Parser:
                       help='an inverse for each of these: a link, A.x, distance(A,B), angle(A,B)')
     made.add_argument('--float', action='store_true', help='float instead of double')
     return made
-
-
-if __name__ == '__main__':
-    sys.exit(main())

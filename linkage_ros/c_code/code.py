@@ -64,7 +64,7 @@ class Code:
         if math.isnan(value):
             return 'LKR_NAN'
         if abs(value) > (3.4e38 if self.single else sys.float_info.max):
-            return f'({"-" * (value < 0.0)}INFINITY)'
+            return '-INFINITY' if value < 0.0 else 'INFINITY'
         if not self.single:
             return repr(float(value))
         # The shortest text of a float32, as Python writes it: versions of numpy differ.

@@ -10,8 +10,7 @@ library's sine, cosine and arctangent. What all mechanisms have in common is `li
 
 from __future__ import annotations
 
-from itertools import chain, repeat
-from typing import Any, Dict, Iterable, Iterator, List, NamedTuple, Sequence
+from typing import Any, Dict, Iterator, List, NamedTuple, Sequence
 
 from .axes import actuators, Axis, axis, invertible, joints, loads
 from .code import Code, indented
@@ -66,16 +65,17 @@ def written(mechanism: SceneMechanism, outputs: Sequence[str] = (), single: bool
 
 def printed(requests: Sequence[Request], single: bool = False) -> str:
     """Return the headers of mechanisms, one after another, and what they have in common."""
-    return '\n'.join(headers(requests, single, [template('linkage.h').rstrip()]))
+    later = [''] * (len(requests) - 1)
+    return '\n'.join(headers(requests, single, [template('linkage.h').rstrip(), *later]))
 
 
-def headers(requests: Sequence[Request], single: bool, common: Iterable[str]) -> List[str]:
-    """Return the headers of mechanisms in one program, the first with the texts of `common`."""
+def headers(requests: Sequence[Request], single: bool, common: Sequence[str]) -> List[str]:
+    """Return the headers of mechanisms in one program, each with a text of `common`."""
     values = [_values(request, single) for request in requests]
     sizes = {size: max(each[f'own_{size}'] for each in values) for size in (
         'inputs', 'solutions')}
     return [filled(template('mechanism.h.in'), {**each, **sizes, 'common': text})
-            for each, text in zip(values, chain(common, repeat('')))]
+            for each, text in zip(values, common)]
 
 
 def _values(request: Request, single: bool) -> Dict[str, Any]:
@@ -108,7 +108,7 @@ def _values(request: Request, single: bool) -> Dict[str, Any]:
             ('ACTUATOR', 'JOINT'), sides)),
         'axes': comment('; '.join(f'{side}: {_with_units(linkage, axes)}' for side, axes in zip(
             ('Actuators', 'joints'), sides))),
-        'model': '\n'.join(filter(None, parts))}
+        'model': '\n'.join(filter(None, [*tables.functions.values(), *parts]))}
 
 
 def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> Dict[str, List[Axis]]:

@@ -4,7 +4,7 @@
 """Limits of the commanded joints that follow from the sweeps and the reach."""
 
 import math
-from typing import Iterator, Sequence, Tuple
+from typing import Iterator, Sequence
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -16,19 +16,8 @@ from ..scene import SceneMechanism
 SAMPLES = 200_000
 
 
-def text(mechanism: SceneMechanism, names: Sequence[str] = ()) -> str:
-    """Return the limits of the commanded joints as elements of a URDF; see `axes.joints`."""
-    lines = []
-    for name, low, high in joint_limits(mechanism, names):
-        limit = f'<limit lower="{low:.9g}" upper="{high:.9g}"/>' if math.isfinite(
-            high - low) else '<!-- it turns without an end: continuous -->'
-        lines.append(f'<joint name={quoteattr(name)}>{limit}</joint>')
-    return '\n'.join(lines)
-
-
-def joint_limits(mechanism: SceneMechanism, names: Sequence[str] = ()
-                 ) -> Iterator[Tuple[str, float, float]]:
-    """Yield the name of each commanded joint, and its limits [rad or m]; infinite: it turns."""
+def lines(mechanism: SceneMechanism, names: Sequence[str] = ()) -> Iterator[str]:
+    """Yield each commanded joint with its limits as an element of a URDF; see `axes.joints`."""
     linkage, inputs = mechanism.linkage, mechanism.inputs
     # The arcs of each input, in the linkage's own units.
     arcs = [np.divide(settings.arcs, mechanism.scale_of(name))
@@ -42,15 +31,18 @@ def joint_limits(mechanism: SceneMechanism, names: Sequence[str] = ()
         turns = axis.turn or linkage.is_angle(axis.output) and not any(
             settings.ends for settings in inputs.values())
         is_turning = turns and high - low >= math.tau * abs(axis.factor) * (1.0 - 1e-9)
-        yield (axis.name, -math.inf, math.inf) if is_turning else (axis.name, low, high)
+        limit = '<!-- it turns without an end: continuous -->' if is_turning else \
+            f'<limit lower="{low:.9g}" upper="{high:.9g}"/>'
+        yield f'<joint name={quoteattr(axis.name)}>{limit}</joint>'
 
 
 def _values(mechanism: SceneMechanism, axis: Axis, arcs: Sequence[np.ndarray]) -> np.ndarray:
-    """Return an output at many poses, the corners of the sweeps among them."""
+    """Return an output at the start and at many poses, the corners of the sweeps among them."""
     linkage, rng = mechanism.linkage, np.random.default_rng(1)
     parts = rng.uniform(-0.1, 1.1, (len(arcs), SAMPLES)).clip(0.0, 1.0)
-    inputs = [own.min() + part * np.ptp(own) for part, own in zip(parts, arcs)]
+    inputs = [np.append(first, own.min() + part * np.ptp(own))
+              for first, part, own in zip(start(mechanism), parts, arcs)]
     values = linkage.joint_angles(inputs, [axis.output])[axis.output]
-    first = float(linkage.joint_angles(start(mechanism), [axis.output])[axis.output])
+    first = values[np.isfinite(values).argmax()]
     return first + np.remainder(values - first + math.pi, math.tau) - math.pi if axis.turn \
         else values

@@ -3,7 +3,6 @@
 
 """A ROS 2 package with mechanisms of a scene as transmissions of ros2_control."""
 
-from itertools import repeat
 from pathlib import Path
 import re
 from typing import Dict, Mapping, Sequence, Tuple
@@ -67,7 +66,7 @@ def package(name: str, scene: str, mechanisms: Sequence[Tuple[SceneMechanism, Se
             '#include "pluginlib/class_list_macros.hpp"\n',
             *(filled(template('export.cpp.in'), part) for part in parts)]),
         'src/linkage.h': template('linkage.h')}
-    texts = header.headers(requests, False, repeat('#include "linkage.h"'))
+    texts = header.headers(requests, False, ['#include "linkage.h"'] * len(parts))
     for part, text in zip(parts, texts):
         own = part['name']
         files[f'src/{own}_linkage.h'] = text

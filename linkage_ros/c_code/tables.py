@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from itertools import product
 import math
-from typing import Iterator, List, Sequence, Set, Tuple
+from typing import Dict, Iterator, List, Sequence, Tuple
 
 import numpy as np
 
@@ -44,6 +44,8 @@ class Tables:
 
     Attributes
     ----------
+    functions : dict
+        The functions for the solutions of inverses, by their names.
     solutions : int
         The most solutions of an inverse.
 
@@ -56,25 +58,23 @@ class Tables:
         # The sizes of the inputs in the scene's units.
         self._units = [size * mechanism.scale_of(name)
                        for name, size in zip(mechanism.inputs, self._sizes)]
-        self._written: Set[str] = set()
+        self.functions: Dict[str, str] = {}
         self.solutions = 1
 
     def text(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], tag: str = '') -> str:
         """
-        Return the functions for solutions and for a pose, and the table.
+        Return the function for a pose, and the table.
 
         `sides` are the actuators and the joints; an inverse alone has no actuators, and a `tag`
         at the end of its names.
         """
-        names, functions = zip(*map(self._solutions, sides))
-        row, inputs = self._code.row, [*zip(self.mechanism.inputs.values(), self._units)]
-        sweeps = ['{ -LKR_FAR, LKR_FAR }' if tag or not settings.ends else
-                  row(np.divide(settings.ends, unit)) for settings, unit in inputs]
+        row, everywhere = self._code.row, (-math.inf, math.inf)
+        sweeps = [row(np.divide(not tag and settings.ends or everywhere, unit))
+                  for settings, unit in zip(self.mechanism.inputs.values(), self._units)]
         return filled(template('model.h.in'), {
             'name': self.mechanism.name, 'tag': tag, 'number': self._code.number,
             'about': 'the inverse' if tag else 'the actuators and joints',
-            'n': len(self._sizes), 'names': ', '.join(names),
-            'solutions': '\n'.join(filter(None, functions)),
+            'n': len(self._sizes), 'names': ', '.join(map(self._solutions, sides)),
             'at': '\n'.join(indented(self._at(sides))),
             'actuators': self._rows(sides[0]), 'joints': self._rows(sides[1]),
             'turns': ', '.join(row(self._turns(axes)) for axes in sides),
@@ -129,14 +129,12 @@ class Tables:
         """Return the rows of a side's axes."""
         rows, counted = [], gears(self.linkage, axes)
         for k, each in enumerate(axes):
-            i, factor, offset = -1, each.factor, each.offset
-            if k in counted:
-                i, ratio, shift = counted[k]
-                factor, offset = factor * ratio * self._sizes[i], factor * shift + offset
-            scale, turn, *line = map(self._code.literal, (
-                1.0 / each.size, each.turn, factor, offset))
-            rows.append(f'{{ {scale}, {turn}, {i}, {", ".join(line)} }}')
-        return ', '.join(rows) or '{ 0, 0, -1, 0, 0 }'
+            i, ratio, shift = counted.get(k, (-1, 0.0, 0.0))
+            numbers = map(self._code.literal, (
+                ratio * self._sizes[i], shift, each.factor, each.offset, 1.0 / each.size,
+                each.turn))
+            rows.append(f'{{ {i}, {", ".join(numbers)} }}')
+        return ', '.join(rows) or '{ -1, 0, 0, 0, 0, 0, 0 }'
 
     def _turns(self, axes: Sequence[Axis]) -> List[float]:
         """Return after how much of each input the positions of axes are the same, or 0."""
@@ -146,21 +144,18 @@ class Tables:
 
     # --- inverses ---
 
-    def _solutions(self, axes: Sequence[Axis]) -> Tuple[str, str]:
-        """Return the name of the function for all inputs of outputs, and it, if it is new."""
+    def _solutions(self, axes: Sequence[Axis]) -> str:
+        """Return the name of the function for all inputs of outputs, and note it; 0: none."""
         outputs = tuple(each.output for each in axes)
         if len(gears(self.linkage, axes)) == len(axes):
-            return '0', ''
+            return '0'
         name = '_'.join([f'{self.mechanism.name}_solutions', *(
             self._formulas.fields[output] for output in outputs)])
-        if name in self._written:
-            return name, ''
-        self._written.add(name)
         closed = self.linkage.inverse(outputs).closed
-        count, function = self._closed(name, closed, outputs) if closed else self._series(
-            name, *outputs)
+        count, self.functions[name] = self._closed(
+            name, closed, outputs) if closed else self._series(name, *outputs)
         self.solutions = max(self.solutions, count)
-        return name, function
+        return name
 
     def _series(self, name: str, output: str) -> Tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""

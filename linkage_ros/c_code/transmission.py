@@ -28,7 +28,7 @@ def write(args: Optional[List[str]]) -> None:
     try:
         mechanisms = with_joints(chosen, options.joints)
         if options.limits:
-            print('\n'.join(limits.text(*each) for each in mechanisms))
+            print('\n'.join(line for each in mechanisms for line in limits.lines(*each)))
         else:
             write_package(options.out, Path(options.scene).name, mechanisms)
     except ValueError as error:

@@ -77,7 +77,7 @@ class CommandStream:
     Requests arrive on `wanted_states` and `wanted_trajectory`. Each solution continues the last
     one; if an output is out of reach, its actuator holds the last valid command. The node's worker
     solves a trajectory, which a newer one replaces. `present(mechanism)` returns the present
-    inputs of a SceneMechanism [rad or m], inf where they are unknown.
+    inputs of a SceneMechanism [rad or m], or their starts.
     """
 
     def __init__(self, node: Any, mechanisms: Iterable[str],
@@ -91,8 +91,8 @@ class CommandStream:
         self._mechanisms: Mapping[str, SceneMechanism] = {}
         self._last: dict[str, ActuatorCommand] = {}
         self._worker, self._newest = node.worker, JointTrajectory()
-        self._reader = subscribe(
-            node, 'wanted_states', self._interpret, self._receive)
+        self._topic = node.resolve_topic_name('wanted_states')
+        self._reader = subscribe(node, 'wanted_states', self._interpret, self._receive)
         node.create_subscription(JointTrajectory, 'wanted_trajectory', node.guarded(
             'wanted_trajectory', self._receive_trajectory), 10)
 
@@ -152,7 +152,7 @@ class CommandStream:
         """Return a sender's targets, its count of positions, and whether it has velocities."""
         targets, reasons = self._targets(message.name[:len(message.position)])
         for reason in self._reasons.new(reasons):
-            self._logger.warning(f'wanted_states: {reason}{self._reasons.ending}')
+            self._logger.warning(f'{self._topic}: {reason}{self._reasons.ending}')
         return targets, len(message.position), len(message.velocity) == len(message.name)
 
     def _receive(self, routes: tuple[list[Target], int, bool], stamp: bytes,
@@ -170,9 +170,7 @@ class CommandStream:
         """Return the inputs to continue from: of the last command, else present, else starts."""
         if last := self._last.get(target.mechanism.name):
             return last.inputs
-        return [position if math.isfinite(position) else settings.start
-                for position, settings in zip(self._present(target.mechanism),
-                                              target.mechanism.inputs.values())]
+        return self._present(target.mechanism)
 
     def _command(self, target: Target, positions: Sequence[float],
                  speeds: Optional[Sequence[float]]) -> Optional[ActuatorCommand]:
@@ -185,7 +183,7 @@ class CommandStream:
             self._last[name] = command
             return command
         self._throttle.warn(
-            target.named, lambda: f'wanted_states: {target.reason(positions, is_quick)}')
+            target.named, lambda: f'{self._topic}: {target.reason(positions, is_quick)}')
         return last and last._replace(speeds=[0.0] * len(last.inputs))
 
     def _send(self, stamp: bytes, commands: Sequence[tuple[Target, ActuatorCommand]]) -> None:

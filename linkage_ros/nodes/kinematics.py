@@ -59,7 +59,6 @@ class Kinematics(scene_node.SceneNode):
         self._scene_joint_states = SceneJointStates(self, self._inputs)
         self._mechanisms.update((name, MechanismTopics(self, mechanism))
                                 for name, mechanism in self.scene.mechanisms.items())
-        self._states_topic = self.resolve_topic_name('crank_states')
         # That of the last message that set an input.
         self._stamp = NEVER
         self._joint_names: frozenset = frozenset()
@@ -189,8 +188,9 @@ class Kinematics(scene_node.SceneNode):
                                     and name not in self._joint_names)
         if unknown:
             self.get_logger().warning(
-                f'{self._states_topic}: no input is called {listed(unknown, 150)}; the inputs are '
-                f'{listed(self._inputs, 150)}{self._unknown.ending}')
+                f'{self.resolve_topic_name("crank_states")}: no input is called '
+                f'{listed(unknown, 150)}; the inputs are {listed(self._inputs, 150)}'
+                f'{self._unknown.ending}')
 
     def _warn_of_missing(self) -> None:
         """Warn of source joints that have not been received."""
@@ -199,8 +199,9 @@ class Kinematics(scene_node.SceneNode):
                    for mechanism, i in inputs if self._mechanisms[mechanism].inputs[i] is None}
         if waiting:
             self.get_logger().warning(
-                f'{self._states_topic}: no position of {listed(waiting, 150)} was received, '
-                f'without which {listed(dict.fromkeys(waiting.values()), 150)} cannot move')
+                f'{self.resolve_topic_name("crank_states")}: no position of '
+                f'{listed(waiting, 150)} was received, without which '
+                f'{listed(dict.fromkeys(waiting.values()), 150)} cannot move')
 
 
 def main(args: Any = None) -> int:

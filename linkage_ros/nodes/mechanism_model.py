@@ -11,6 +11,7 @@ import math
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
@@ -81,6 +82,7 @@ class MechanismModel:
         drawn = mechanism.name, prefix + frame_id, mechanism.pose
         self._points, shown = _shown(mechanism)
         self._drawn = *drawn, bodies.size(mechanism), shown
+        self.marker_ids = frozenset(id_ for id_, pieces in shown.items() if pieces)
         self._conversions = Cache(self._conversion)
         self.regular = Cache(self._regular)
         self.patched_messages = Cache(self._patched_messages, MAX_MESSAGES)
@@ -90,12 +92,12 @@ class MechanismModel:
         """Return the builder of its marker messages."""
         return messages.Markers(*self._drawn)
 
-    def latched(self) -> Tuple[str, Optional[Any]]:
-        """Return the URDF, '' for a spatial linkage, and the locus's marker, None without one."""
+    def latched(self) -> Tuple[str, Optional[bytes]]:
+        """Return the URDF, '' for a spatial linkage; the serialised locus, None without one."""
         drawn, size = self._drawn[:3], self._drawn[3]
         curve = self.assembly.locus(self.mechanism.tracer)
         return (urdf.write(self.robot) if self.robot else '',
-                messages.locus(*drawn, curve, size, self.mechanism.mirrored)
+                serialize_message(messages.locus(*drawn, curve, size, self.mechanism.mirrored))
                 if len(curve) > 1 else None)
 
     def _regular(self, wanted: Tuple[bool, bool, bool]) -> AssemblyState:

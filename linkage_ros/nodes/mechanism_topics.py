@@ -111,7 +111,7 @@ class MechanismTopics:
         if not state.any_assembled:
             self._delete(self._displayed)
         elif self._markers.subscribed:
-            self._displayed = self.model.marker_array.ids
+            self._displayed = self.model.marker_ids
         return state
 
     def prepared(self, mechanism: scene.SceneMechanism, frame_id: str, prefix: str,
@@ -134,9 +134,9 @@ class MechanismTopics:
     def adopt(self, model: MechanismModel) -> None:
         """Replace the model, and delete those markers that the new model does not have."""
         self.model, self.state = model, None
-        self._delete(self._displayed - model.marker_array.ids)
+        self._delete(self._displayed - model.marker_ids)
 
-    def publish_latched(self, description: str, locus: Optional[Marker]) -> None:
+    def publish_latched(self, description: str, locus: Optional[bytes]) -> None:
         """Publish the robot model if it has changed; publish the locus, or delete it if None."""
         if description != self._described:
             self._described = description

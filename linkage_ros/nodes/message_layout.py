@@ -91,6 +91,7 @@ def subscribe(node: Any, topic: str, interpret: Callable[[JointState], Any],
     other exception is reported.
     """
     reader, clock, throttle = Reader(interpret), node.get_clock(), Throttle(node.get_logger())
+    name = node.resolve_topic_name(topic)
 
     def receive_or_ignore(data: bytes) -> None:
         try:
@@ -100,10 +101,10 @@ def subscribe(node: Any, topic: str, interpret: Callable[[JointState], Any],
                     numbers)
         except Unreadable as error:
             reason = str(error)
-            throttle.warn(topic, lambda: (f'{topic}: a message of {len(data)} bytes is ignored, '
-                                          f'since it is no JointState: {reason}'))
+            throttle.warn(name, lambda: (f'{name}: a message of {len(data)} bytes is ignored, '
+                                         f'since it is no JointState: {reason}'))
         except Exception as error:
-            node.report(topic, error)
+            node.report(name, error)
 
     node.create_subscription(JointState, topic, receive_or_ignore, ANY, raw=True)
     return reader

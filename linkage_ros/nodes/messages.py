@@ -71,7 +71,6 @@ class Markers:
                  shown: Mapping[int, Sequence]):
         self._shown = [(_marker(name, id_, frame_id, pose, size), np.array(points, int).ravel())
                        for id_, points in shown.items() if points]
-        self.ids = frozenset(marker.id for marker, _ in self._shown)
 
     def message(self, stamp: Any, places: np.ndarray, grounded: Sequence[int] = (0,)
                 ) -> MarkerArray:

@@ -155,10 +155,10 @@ def solve_inputs_for(mechanism: scene.SceneMechanism, request: Any, response: An
         raise ValueError(f'near must be finite and within {scene.FARTHEST:g} of zero')
     answers = inverse.answers(values, inverse.inputs_of(near) if near else None)
     response.names = [settings.source for settings in mechanism.inputs.values()]
-    response.positions = [position for answer in answers
-                          for position in inverse.positions_of(answer.inputs)]
-    response.modes = [answer.mode for answer in answers]
-    response.singular = [answer.is_singular for answer in answers]
+    response.positions = [position for inputs, _ in answers
+                          for position in inverse.positions_of(inputs)]
+    response.modes = [solution.mode for _, solution in answers]
+    response.singular = [solution.is_singular for _, solution in answers]
     response.success = bool(answers)
     response.message = '' if answers else elided(inverse.reason(*values), MESSAGE)
 
@@ -181,7 +181,7 @@ def _unreachable(inverse: InverseRequest, values: Sequence[float]) -> str:
     named = ', '.join(f'{value:.6g}' for value in values[:MAX_NAMED_VALUES])
     more = f' and {len(values) - MAX_NAMED_VALUES} more' if len(values) > MAX_NAMED_VALUES else ''
     first = next(filter(math.isfinite, values), math.nan)
-    return f'{inverse.quantity} {named}{more} cannot be reached; {inverse.reason(first)}'
+    return f'{listed(inverse.outputs)} cannot be {named}{more}; {inverse.reason(first)}'
 
 
 def main(args: Any = None) -> int:

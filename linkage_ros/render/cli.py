@@ -4,9 +4,9 @@
 """The command `render`: command line and drawing."""
 
 import argparse
+from dataclasses import replace
 import math
 from pathlib import Path
-import re
 import shutil
 
 from . import parts
@@ -64,6 +64,8 @@ def draw(args):
     """Write the files that a command line requests."""
     arguments = parsed(args)
     mechanisms = chosen(scene.load(arguments.scene).mechanisms, arguments.mechanism)
+    if arguments.angle is not None:
+        mechanisms[0] = started(mechanisms[0], math.radians(arguments.angle))
     with needs('matplotlib'):
         from matplotlib import style
 
@@ -91,19 +93,26 @@ def draw(args):
             files.data(picture, times, arguments.data)
 
 
+def started(mechanism, angle):
+    """Return a mechanism whose crank starts at an angle [rad]; raise RequestError if it cannot."""
+    first, input_ = mechanism.first, mechanism.first.input
+    if not input_.turns:
+        raise RequestError(f'--angle is for a crank: {mechanism.name} is driven by a length; it '
+                           'is drawn at its start')
+    if first.sweep and not input_.holds(first.sweep, angle, angle):
+        raise RequestError(f'the {input_.quantity} never reaches {angle:.6g} rad: it stays inside '
+                           f'{scene.in_words([first.sweep])} rad')
+    return replace(mechanism, inputs={
+        **mechanism.inputs, input_.name: replace(first, start=angle)})
+
+
 def moments(arguments, picture):
     """Return the times to draw [turns of the first input]."""
-    first = picture.panels[0]
-    input_ = first.mechanism.first.input
     if not arguments.moving:
-        if arguments.angle is None:
-            return [0.0]
-        if not input_.turns:
-            raise RequestError(f'--angle is for a crank: {first.mechanism.name} is driven by a '
-                               'length; it is drawn at its start')
-        return [first.cycle.turns_to(math.radians(arguments.angle))]
+        return [0.0]
     if not math.isfinite(picture.period):
-        raise RequestError(f'{first.mechanism.name}.{input_.name}.speed is 0: nothing moves')
+        first = picture.panels[0].mechanism
+        raise RequestError(f'{first.name}.{first.first.input.name}.speed is 0: nothing moves')
     turns = arguments.turns or 1.0
     frames = arguments.frames or max(round(turns * picture.period * (arguments.fps or FPS)), 1)
     if frames > MAX_FRAMES:
@@ -170,19 +179,15 @@ def parts_of_a_picture(text):
 
 
 def size(text):
-    """Return width and height."""
-    match = re.fullmatch('([0-9]+)[xX]([0-9]+)', text)
-    sides = tuple(map(int, match.groups())) if match else (0,)
-    if not all(MIN_SIDE <= side <= MAX_SIDE for side in sides):
-        raise argparse.ArgumentTypeError(f'must be like 720x720, each side from {MIN_SIDE} to '
-                                         f'{MAX_SIDE}, not {text}')
-    return sides
+    """Return width and height, from text such as 720x720."""
+    width, height = map(within(int, MIN_SIDE, MAX_SIDE), text.lower().split('x'))
+    return width, height
 
 
 # Options that are for some endings only: these, a name of the value, its type, and what it is.
 OPTIONS = {
     'angle': (IMAGES, 'DEG', degrees, "the first mechanism's crank angle, in degrees or as in "
-              'pi/2 or 90deg (default: where it starts)'),
+              'pi/2 or 90deg (default: where it starts, as all others)'),
     'turns': (VIDEOS, 'N', within(float, 0.001, 1000.0), "turns of the first mechanism's crank, "
               'or periods of its oscillation (default: 1)'),
     'fps': (VIDEOS, 'N', within(float, 0.001, MAX_FPS), f'frames per second (default: {FPS:g})'),

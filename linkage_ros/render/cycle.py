@@ -13,7 +13,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 
 from ..robot_model.shapes import drawn
-from ..scene import in_words, SceneError, SceneMechanism
+from ..scene import SceneMechanism
 from ..scene.motion import Motion
 
 SAMPLES = 720  # of a turn
@@ -55,12 +55,12 @@ class Cycle:
                        for k, shape in enumerate(sliding)]
         self._solution = assembly.solution((*joints, *(
             end for shape in sliding for end in (shape.start, shape.end))))
-        self._first = mechanism.first
         motions = [Motion.of(settings) for settings in mechanism.inputs.values()]
         self.period = motions[0].turn
         # Each input, and its turns in one of the first.
+        is_moving = math.isfinite(self.period)
         self._inputs = [*zip(motions, [1.0, *(
-            turn_ratio(self.period, motion.turn) for motion in motions[1:])])]
+            self.period / motion.turn if is_moving else 0.0 for motion in motions[1:])])]
         self.turns = next((n for n in range(1, MAX_TURNS) if all(
             motion.is_repeated(n * ratio) for motion, ratio in self._inputs)), MAX_TURNS)
         self.prefixes = tuple(assembly.legs)
@@ -74,15 +74,6 @@ class Cycle:
         self._solution.solve(inputs)
         rows = self._solution.rows.copy()
         return Configuration(turns, inputs, rows.reshape(len(rows), -1, 2))
-
-    def turns_to(self, value: float) -> float:
-        """Return the turns to a value [rad or m] of the first input; SceneError if never."""
-        turns, input_ = self._inputs[0][0].turns_to(value), self._first.input
-        if math.isnan(turns):
-            sweep = in_words(filter(None, [self._first.sweep]))
-            raise SceneError(f'the {input_.quantity} never reaches {value:.6g} {input_.unit}: it '
-                             f'stays inside {sweep} {input_.unit}')
-        return turns
 
     def curve(self, joint: int, start: float, end: float) -> np.ndarray:
         """Return the curve of a joint between two times [turns], shape (n, legs, 2) [m]."""
@@ -100,10 +91,3 @@ class Cycle:
         if len(curve) or self.turns == MAX_TURNS:
             return curve
         return self.course[:, 0, mechanism.linkage.points.index(mechanism.tracer)]
-
-
-def turn_ratio(period: float, other: float) -> float:
-    """Return the turns of another input in one turn of the first, from their times [s]."""
-    if not math.isfinite(other):
-        return 0.0
-    return period / other if math.isfinite(period) else 1.0

@@ -16,7 +16,6 @@ from PIL import Image
 PALETTE_FRAMES = 8
 # Pillow looks colours up in a palette by their upper six bits: white would become another grey.
 SIX_BITS = 0b11111100
-GIF_TICKS = 100  # the unit of time in a GIF is a hundredth of a second
 
 # Fonts as outlines, and names from a fixed salt: an SVG that is the same everywhere.
 SVG = {'svg.hashsalt': 'linkage_ros', 'svg.fonttype': 'path'}
@@ -68,11 +67,12 @@ def gif(picture, times, fps, loop, colours, file: Path):
         frame = reduced(picture.at(turns)).quantize(palette=palette, dither=Image.Dither.NONE)
         frame.putpalette(shown)
         frames.append(frame)
-    ends = [round(GIF_TICKS * k / fps) for k in range(len(frames) + 1)]
+    # A GIF counts hundredths of a second, Pillow milliseconds.
+    ends = [10 * round(100.0 * k / fps) for k in range(len(frames) + 1)]
     repeats = {} if loop == 1 else {'loop': max(loop - 1, 0)}
     with replacing(file) as new:
         frames[0].save(new, 'GIF', save_all=True, append_images=frames[1:],
-                       duration=[1000 // GIF_TICKS * int(d) for d in np.diff(ends)], **repeats)
+                       duration=np.diff(ends).tolist(), **repeats)
 
 
 def mp4(picture, times, fps, file: Path):

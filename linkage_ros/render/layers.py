@@ -7,7 +7,6 @@ The layers of a picture, drawn with Matplotlib: traces, guides, legs, floor, hea
 Each adds artists to axes and moves them.
 """
 
-import cmath
 import math
 import re
 import textwrap
@@ -118,26 +117,19 @@ def straight(curve):
     return (middle, middle + directions[0]) if sizes[1] <= MAX_BEND * sizes[0] > 0.0 else None
 
 
-def around(frame):
-    """Return a link's joints in their order around their centre."""
-    places = {name: complex(*place) for name, place in frame.items()}
-    middle = sum(places.values()) / len(places)
-    return sorted(places, key=lambda name: cmath.phase(places[name] - middle))
-
-
 class Legs:
     """The links and joints; each pair of legs is paler than the one before."""
 
     def __init__(self, axes, mechanism, cycle, parts, unit):
-        linkage, shown = mechanism.linkage, set(mechanism.points)
+        linkage = mechanism.linkage
         joints = np.array(indices(linkage, mechanism.points))
-        plates = [around(frame) for frame in linkage.frames.values() if len(frame) > 2]
         # The indices of all that is drawn of a leg, by part.
         self._indices = {
             **lines_of(mechanism, cycle), 'joints': joints,
             'pivots': joints[fixed(cycle.course)[joints]],
             'tracer': indices(linkage, [mechanism.tracer]),
-            'plates': [indices(linkage, plate) for plate in plates if shown.issuperset(plate)]}
+            'plates': [indices(linkage, plate)
+                       for plate in shapes.plates(linkage, mechanism.points)]}
         sides = 1 + mechanism.mirrored
         thin = unit * (1.0 if len(cycle.prefixes) == 1 else 0.7)
         self.legs = [(leg, artists(
@@ -240,7 +232,7 @@ class Headline:
 
     def __init__(self, axes, mechanism, parts, unit, single):
         self._linkage, self._has_readings = mechanism.linkage, 'title' in parts
-        self._is_short = not single or unit < 0.6
+        self._columns = 4 if single and unit >= 0.6 else 2
         self._fixed_lines = [] if single else [mechanism.name.replace('_', ' ')]
         if 'dimensions' in parts:
             sizes = self._linkage.dimensions.items()
@@ -250,15 +242,14 @@ class Headline:
 
     def show(self, pose):
         """Update the text."""
-        texts = readings(self._linkage, pose.inputs, self._is_short) if self._has_readings else []
-        columns = 2 if self._is_short else 4
+        texts = readings(self._linkage, pose.inputs) if self._has_readings else []
         # Spaces as wide as a digit: a reading hardly moves those after it.
-        rows = ['  '.join(text.ljust(11, '\u2007') for text in texts[k:k + columns])
-                for k in range(0, len(texts), columns)]
+        rows = ['  '.join(text.ljust(11, '\u2007') for text in texts[k:k + self._columns])
+                for k in range(0, len(texts), self._columns)]
         self.text.set_text('\n'.join([*self._fixed_lines, *rows]))
 
 
-def readings(linkage, inputs, short=False):
+def readings(linkage, inputs):
     """Return texts of the inputs and, for a slotted lever, of its angle and the ratios."""
     if not hasattr(linkage, 'reduction'):
         return [reading(re.sub(r'^crank(?=\d*$)', 'θ', input_.name), value) if input_.turns
@@ -266,11 +257,9 @@ def readings(linkage, inputs, short=False):
                 for input_, value in zip(linkage.inputs, inputs)]
     theta = math.remainder(inputs[0], math.tau)
     lever = float(linkage.joint_angles(theta)['lever'])
-    angles = [reading('θ', theta), reading('φ', lever)]
-    if short:
-        return angles
-    return angles + [f'φ/θ = {rounded(lever / theta, 3) if theta else "–"}',
-                     f'dφ/dθ = {rounded(float(linkage.reduction(theta)), 3)}']
+    return [reading('θ', theta), reading('φ', lever),
+            f'φ/θ = {rounded(lever / theta, 3) if theta else "–"}',
+            f'dφ/dθ = {rounded(float(linkage.reduction(theta)), 3)}']
 
 
 def reading(name, angle):
@@ -295,10 +284,8 @@ class Names:
         lines = *linkage.bars, *((link.joint, link.tip) for link in linkage.links)
         self._bars = np.array([indices(linkage, line) for line in lines])
         self._fixed, self._pivot = np.flatnonzero(fixed(cycle.course)), 1j * PIVOT_SIZE * unit
-        in_slots = {link.tip for link in linkage.links if link.kind == 'prismatic'}
         # Distance from the joint [points], and half of what the name is wider than one letter.
-        self._distances = [(5 + 8 * unit) * (1.4 if name in in_slots else 1.0)
-                           for name in mechanism.points]
+        self._distance = 5 + 8 * unit
         self._wider = [0.25 * (8 + 6 * unit) * (len(name) - 1) for name in mechanism.points]
         self.artists = [axes.annotate(
             name, (0.0, 0.0), (0.0, 0.0), textcoords='offset points', fontsize=8 + 6 * unit,
@@ -315,16 +302,15 @@ class Names:
         drawn = np.hstack([joints, joints[:, self._fixed] - self._pivot, *(
             start + part * (end - start) for part in np.linspace(0.0, 1.0, 25)), *(
             np.broadcast_to(curve, (len(joints), len(curve))) for curve in curves)])
-        for text, index, distance, wider in zip(
-                self.artists, self._index, self._distances, self._wider):
-            offsets = distance * self.DIRECTIONS + wider * self.DIRECTIONS.real
+        for text, index, wider in zip(self.artists, self._index, self._wider):
+            offsets = self._distance * self.DIRECTIONS + wider * self.DIRECTIONS.real
             tried = joints[:, [index]] + offsets
             room = np.min([np.fmin.reduce(abs(tried[..., None] + end - drawn[:, None]), axis=2)
                            for end in {-wider, 0.0, wider}], axis=0)
-            room = np.nan_to_num(np.minimum(room, distance))
+            room = np.nan_to_num(np.minimum(room, self._distance))
             best = offsets[room.mean(axis=0).argmax()]
             text.set_position((best.real, best.imag))
-            half = (0.5 * distance + wider) * np.linspace(-1.0, 1.0, 5)
+            half = (0.5 * self._distance + wider) * np.linspace(-1.0, 1.0, 5)
             drawn = np.hstack([drawn, joints[:, [index]] + best + half])
 
     def _points(self, places):

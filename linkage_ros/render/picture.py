@@ -107,7 +107,7 @@ class Picture:
 
     def _turns(self, panel, turns):
         """Return the turns of one mechanism in the time of some turns of the first."""
-        if panel is self.panels[0] or panel.cycle.period == self.period:
+        if panel.cycle.period == self.period:
             return turns
         return self.seconds(turns) / panel.cycle.period
 
@@ -120,20 +120,18 @@ class Panel:
         self._axes = axes
         self._margin = 14 + 30 * unit  # pixels, for pivots, slots and names
         self._joints = layers.indices(mechanism.linkage, mechanism.points)
-        moving: list = [layers.Trace(axes, mechanism, self.cycle, trace, unit)]
+        self.moving: list = [layers.Trace(axes, mechanism, self.cycle, trace, unit)]
         if 'floor' in parts:
-            moving.append(layers.Floor(axes, mechanism, self.cycle, unit))
+            self.moving.append(layers.Floor(axes, mechanism, self.cycle, unit))
         if 'guides' in parts:
             layers.guides(axes, mechanism, self.cycle, unit)
-        moving.append(layers.Legs(axes, mechanism, self.cycle, parts, unit))
+        self.moving.append(layers.Legs(axes, mechanism, self.cycle, parts, unit))
         self._names = None
         if 'labels' in parts and len(self.cycle.prefixes) == 1:
             self._names = layers.Names(axes, mechanism, self.cycle, unit)
-            moving.append(self._names)
+            self.moving.append(self._names)
         if parts & {'title', 'dimensions'}:
-            moving.append(layers.Headline(axes, mechanism, parts, unit, single))
-        self.moving = moving
-        self._extent = self._drawn()
+            self.moving.append(layers.Headline(axes, mechanism, parts, unit, single))
         self._dress('axes' in parts, unit)
 
     def _drawn(self):
@@ -160,7 +158,7 @@ class Panel:
 
     def fill(self):
         """Set limits around all that is drawn, at one scale; PictureError if too small."""
-        low, high = self._extent
+        low, high = self._drawn()
         pixels = np.array(self._axes.get_window_extent().size)
         if pixels.min() < 3.0 * self._margin:
             raise PictureError(CROWDED)

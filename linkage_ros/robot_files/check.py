@@ -29,12 +29,8 @@ PATHS, POSES, MIN_POSES = 12, 240, 200
 MISFIT = 10.0
 # A mechanism whose joints are farther off in the file's pose [rad, or of the size] is another.
 OTHER = 1e-3
-# A loop that closes with a larger step of a joint [rad, or of the size] than this is another pose.
-LEAP = 0.35
 # Stiffness next to a change point, as a part of the largest.
 CHANGE = 0.25
-
-Ranges = Dict[str, Tuple[float, float]]
 
 
 class Difference(ValueError):
@@ -45,16 +41,14 @@ class Imported(NamedTuple):
     """
     A mechanism's name, its parameters and its report.
 
-    Also the joints that move it, its sources or what follows them, between which positions each
-    source moves [rad or m], the misfit of the file, of the size, and hinges of balls that may stay
-    where they are.
+    Also the joints that move it, its sources or what follows them, the misfit of the file, of the
+    size, and hinges of balls that may stay where they are.
     """
 
     name: str
     parameters: Dict[str, Any]
     reports: List[str]
     driven: Sequence[str]
-    ends: Ranges
     slack: float = 0.0
     still: Sequence[str] = ()
 
@@ -144,10 +138,14 @@ class _Loops:
         # Where each source starts, and between which positions it moves.
         self._start = {drive.source: robot.positions[drive.source]
                        for mechanism in self._mechanisms for drive in mechanism.inputs.values()}
-        self._ends: Ranges = {}
-        for source, ends in (item for made in parts for item in made.ends.items()):
-            low, high = self._ends.get(source, ends)
-            self._ends[source] = max(low, ends[0]), min(high, ends[1])
+        self._ends: Dict[str, Tuple[float, float]] = {}
+        for drive in (drive for made in parts for drive in mechanisms[made.name].inputs.values()):
+            around = math.pi if drive.input.turns else 0.5 * component.size
+            low, high = drive.ends or (drive.start - around, drive.start + around)
+            ends = sorted((end - drive.offset) / drive.ratio for end in (
+                max(low, drive.start - 2.0 * around), min(high, drive.start + 2.0 * around)))
+            low, high = self._ends.get(drive.source, ends)
+            self._ends[drive.source] = max(low, ends[0]), min(high, ends[1])
         self._slack = MISFIT * max(made.slack for made in parts)
         self._allowed = (EXACT + self._slack) * component.size
         self._pose = component.start
@@ -265,7 +263,6 @@ class _Loops:
             new = component.closed(component.moved_to(poses[-1], motors), fixed, 40)
             stiffness = component.stiffness(np.concatenate([*poses, new]), fixed)
             if not (np.max(np.abs(component.errors(new)[0] - self._misfit)) < self._allowed
-                    and np.max(np.abs(component.away(new - poses[-1]))) < LEAP
                     and np.min(stiffness) > CHANGE * np.max(stiffness)):
                 return
         raise Difference(self._at({name: values[path, step] for name, values in

@@ -245,33 +245,25 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
     limits, reports = robot.limits(drawing.driven)
     if drawing.left:
         reports.append(f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.')
-    ends = {}
     for drive in drawing.drives:
-        around = math.pi if drive.name[:5] == 'crank' else 0.5 * drawing.size
-        low, high = drive.value - around, drive.value + around
         if drive.source in limits:
+            low, high = limits[drive.source]
             try:
-                low, high = sweep = _sweep(
-                    drive, limits[drive.source], mechanism.inputs[drive.name])
-                parameters[f'{name}.{drive.name}.sweep'] = [*sweep]
+                parameters[f'{name}.{drive.name}.sweep'] = _sweep(
+                    drive, (low, high), mechanism.inputs[drive.name])
             except ValueError as error:
-                low_limit, high_limit = limits[drive.source]
-                reports.append(f'Left out: the limits of {drive.source}, from {low_limit:.4g} to '
-                               f'{high_limit:.4g}: {error}.')
-        start = min(max(drive.value, low), high)
-        low, high = sorted((end - drive.offset) / drive.ratio for end in (
-            max(low, start - 2.0 * around), min(high, start + 2.0 * around)))
-        ends[drive.source] = low, high
+                reports.append(f'Left out: the limits of {drive.source}, from {low:.4g} to '
+                               f'{high:.4g}: {error}.')
     slack = drawing.lean + drawing.gap / drawing.size
     if slack > EXACT:
         reports.append(f'Warning: the file is not exact: axes lean by {drawing.lean:.2g} rad, and '
                        f'loops stay open by {drawing.gap:.2g} m; so is what is published.')
     driven = [joint.name for joint in drawing.driven]
-    return check.Imported(name, parameters, reports, driven, ends, slack, drawing.still)
+    return check.Imported(name, parameters, reports, driven, slack, drawing.still)
 
 
 def _sweep(drive: check.Source, limits: Tuple[float, float], settings: scene.InputSettings
-           ) -> Tuple[float, float]:
+           ) -> List[float]:
     """Return the limits of an input within its reach; raise ValueError if it has no such ends."""
     low, high = (float(short(drive.ratio * end + drive.offset, 1e-15))
                  for end in limits[::1 if drive.ratio > 0.0 else -1])
@@ -283,7 +275,7 @@ def _sweep(drive: check.Source, limits: Tuple[float, float], settings: scene.Inp
             low, high = max(low, start + turns + edge), min(high, end + turns - edge)
     if not -FARTHEST < low < high - 1e-6 * settings.input.size < FARTHEST:
         raise ValueError('its loops do not reach them')
-    return low, high
+    return [low, high]
 
 
 def _drawn(robot: Robot, group: loops.Group) -> Drawing:

@@ -208,11 +208,9 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
         (link, 1.0, joint.name, joint.start) for link, joint in made.links.items()
         if joint.name not in sources and joint.position is not None], frame_id=group.ground)
     mechanism = scene.read({'mechanisms': [name], **parameters}).mechanisms[name]
-    ends = {}
     for drive, (low, high) in zip(mechanism.inputs.values(), _sweeps(mechanism, limits)):
-        ends[drive.source] = low - drive.offset, high - drive.offset
         parameters[f'{name}.{drive.input.name}.sweep'] = [float(short(low)), float(short(high))]
-    return check.Imported(name, parameters, reports, [*ends], ends, still=made.still)
+    return check.Imported(name, parameters, reports, sources, still=made.still)
 
 
 def _sweeps(mechanism: scene.SceneMechanism, limits: Mapping[str, Tuple[float, float]]

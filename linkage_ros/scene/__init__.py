@@ -64,13 +64,12 @@ class Scene:
 
     def changed_from(self, old: 'Scene') -> list[Parameter]:
         """Return the parameters whose values differ from an older scene of the same mechanisms."""
+        # No change adds or removes a parameter.
         parts = [(self.general, old.general), *(
             (mechanism.parameters, old.mechanisms[name].parameters)
-            for name, mechanism in self.mechanisms.items()
-            if mechanism is not old.mechanisms[name])]
-        before = {parameter.name: parameter.value for _, part in parts for parameter in part}
-        return [parameter for part, _ in parts for parameter in part
-                if parameter.value != before.get(parameter.name)]
+            for name, mechanism in self.mechanisms.items())]
+        return [parameter for part, before in parts if part is not before
+                for parameter, other in zip(part, before) if parameter.value != other.value]
 
 
 def load(path: str) -> Scene:
@@ -99,7 +98,7 @@ def read(values: Mapping[str, Any]) -> Scene:
     if 'mechanisms' not in parts.get('', {}):
         for name, scale in mechanisms.CATALOGUE.items():
             parts[name] = {f'{name}.scale': scale, **parts.get(name, {})}
-    return _read(parts, {})
+    return _read(parts, {}, ())
 
 
 def changed(before: Scene, values: Mapping[str, Any]) -> Scene:
@@ -109,21 +108,21 @@ def changed(before: Scene, values: Mapping[str, Any]) -> Scene:
     All other parameters keep their values, defaults, too. Mechanisms without a changed value are
     reused. Raises SceneError as `read` does.
     """
-    parts = {'': _values(before.general)}
-    for name, part in _by_mechanism(values).items():
-        mechanism = before.mechanisms.get(name)
-        present = _values(mechanism.parameters) if mechanism else parts.get(name, {})
-        if not part.items() <= present.items():
-            parts[name] = {**present, **part}
-    return _read(parts, before.mechanisms)
+    parts = {name: part for name, part in _by_mechanism(values).items()
+             if name not in before.mechanisms or not part.items() <= {
+                 parameter.name: parameter.value
+                 for parameter in before.mechanisms[name].parameters}.items()}
+    return _read(parts, before.mechanisms, before.general)
 
 
-def _read(parts: Mapping[str, Mapping[str, Any]], known: Mapping[str, SceneMechanism]) -> Scene:
-    values = Values(parts.get('', {}))
+def _read(parts: Mapping[str, Mapping[str, Any]], known: Mapping[str, SceneMechanism],
+          general: Iterable[Parameter]) -> Scene:
+    values = Values(parts.get('', {}), known=general)
     names, frame_id, frame_prefix, rate = (
         values.take(name, field) for name, field in GENERAL.items())
     mechanisms = {name: known[name] if name in known and name not in parts
-                  else read_mechanism(name, parts.get(name, {})) for name in names}
+                  else read_mechanism(name, parts.get(name, {}), known.get(name))
+                  for name in names}
     joints = {name: mechanism.joints for name, mechanism in mechanisms.items()}
     if joints != {name: mechanism.joints for name, mechanism in known.items()}:
         check_distinct(joints)
@@ -131,10 +130,6 @@ def _read(parts: Mapping[str, Mapping[str, Any]], known: Mapping[str, SceneMecha
     for rest in (values, *(Values(parts[name]) for name in parts if name not in ('', *names))):
         rest.refuse_unknown(allowed)
     return Scene(mechanisms, frame_id, frame_prefix, rate, tuple(values.parameters))
-
-
-def _values(parameters: Iterable[Parameter]) -> dict[str, Any]:
-    return {parameter.name: parameter.value for parameter in parameters}
 
 
 def _by_mechanism(values: Any) -> dict[str, dict[str, Any]]:

@@ -11,11 +11,12 @@ from typing import Any, Iterable, Optional
 
 from .parameters import DRIVER, Field, SceneError, Values
 from ..linkage import Arc, Input, Mechanism
+from ..words import elided
 
 # Distance of a default sweep from each end of the reach, as a fraction of the reach.
 SWEEP_MARGIN = 0.01
-# Intervals in a message, at most: gears may have hundreds.
-MAX_ARCS = 8
+# Letters of the intervals in a message, at most: gears may have hundreds.
+MAX_ARCS = 200
 # Largest angle [rad] whose rounding error is negligible for a crank.
 FARTHEST = 1e6
 MAX_SPEED = 100.0
@@ -106,31 +107,25 @@ class InputSettings:
 
 
 def in_words(arcs: Iterable[Arc]) -> str:
-    """Return intervals as text, such as '[0, 1] or [2, 3]'."""
-    texts = [f'[{low:.6g}, {high:.6g}]' for low, high in arcs]
-    more = [f'{len(texts) - MAX_ARCS} more'] * (len(texts) > MAX_ARCS)
-    return ' or '.join([*texts[:MAX_ARCS], *more])
+    """Return intervals as text, such as '[0, 1] or [2, 3]'; of many, the first ones."""
+    return elided(' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs), MAX_ARCS)
 
 
 def read_settings(name: str, linkage: Mechanism, input_: Input, reach: tuple[Arc, ...],
                   scale: float, values: Values) -> InputSettings:
     """Read the settings of an input; its lengths are those of the linkage times `scale`."""
-    key = input_.name
-    if len(linkage.inputs) > 1:
-        # The reach of one of several inputs depends on the others.
-        reach = ((input_.low, input_.high),)
+    key, default_speed = input_.name, 1.0
     if not input_.turns:
         input_ = input_._replace(low=scale * input_.low, high=scale * input_.high)
         reach = tuple((scale * low, scale * high) for low, high in reach)
+        stroke = max(high - low for low, high in reach)
+        default_speed = float(f'{min(stroke / 3.0, MAX_SPEED):.2g}')
 
     def take(setting: str, field: Field, default: Any = None, **about: Any) -> Any:
         return values.take(f'{key}.{setting}', field.about(key, input_.unit, **about), default)
 
-    is_whole, default_speed = input_.is_whole(reach), 1.0
+    is_whole = input_.is_whole(reach)
     farthest = max(FARTHEST_START, input_.high) if input_.turns else None
-    if not input_.turns:
-        stroke = max(high - low for low, high in reach)
-        default_speed = float(f'{min(stroke / 3.0, MAX_SPEED):.2g}')
     speed = take('speed', SPEED, default_speed)
     start = take('start', START, low=farthest and -farthest, high=farthest)
     sweep = ends = take('sweep', SWEEP) or None

@@ -44,20 +44,12 @@ class ActuatorCommand(NamedTuple):
         return all(map(math.isfinite, self.inputs))
 
 
-class SceneAnswer(NamedTuple):
-    """Inputs [rad or m] that give outputs their values, and the working mode; see `Solution`."""
-
-    inputs: tuple[float, ...]
-    mode: str
-    is_singular: bool
-
-
 def present_inputs(mechanism: SceneMechanism, positions: Mapping[str, float]) -> list[float]:
-    """Return the inputs [rad or m] at the last position of each source; inf if unknown."""
-    known = [mechanism.from_source(
-        settings, positions.get(settings.source, math.nan), None, None)[0]
+    """Return the inputs [rad or m] at the last position of each source; starts if unknown."""
+    known = [(settings.start, mechanism.from_source(
+        settings, positions.get(settings.source, math.nan), None, None)[0])
         for settings in mechanism.inputs.values()]
-    return [value if math.isfinite(value) else math.inf for value in known]
+    return [value if math.isfinite(value) else start for start, value in known]
 
 
 class InverseRequest:
@@ -88,8 +80,6 @@ class InverseRequest:
         self._mechanism, self._settings = mechanism, list(mechanism.inputs.values())
         self.outputs = [output or LEVER for output in outputs]
         self._inverse = mechanism.linkage.inverse(tuple(self.outputs))
-        self.quantity = 'lever angles' if self.outputs == [LEVER] else \
-            f'values of {listed(self.outputs)}'
         self.units = [settings.input.unit for settings in self._settings]
         self._units, self._scales = [*map(mechanism.scale_of, self.outputs)], mechanism.scales
         self._actuators = [settings.actuator for settings in self._settings]
@@ -173,9 +163,9 @@ class InverseRequest:
             return n * [math.inf if any(speeds) else 0.0]
 
     def answers(self, values: Sequence[float], seed: Optional[Sequence[float]] = None
-                ) -> list[SceneAnswer]:
+                ) -> list[tuple[list[float], Solution]]:
         """
-        Return all answers to one value of each output, as inputs [rad or m] of the scene.
+        Return all answers to one value of each output: inputs [rad or m], and the linkage's own.
 
         They are sorted by their distance from the inputs `seed` [rad or m], by default the start.
         """
@@ -184,17 +174,13 @@ class InverseRequest:
             divided(values, self._units), divided(seed, self._scales)))
         sizes = [settings.input.size for settings in self._settings]
         return sorted(answers, key=lambda answer: math.dist(
-            np.divide(answer.inputs, sizes), np.divide(seed, sizes)))
+            np.divide(answer[0], sizes), np.divide(seed, sizes)))
 
-    def _inside(self, answers: Sequence[Solution]) -> list[SceneAnswer]:
-        """Return those of the linkage's answers that lie inside the sweeps."""
-        inside = []
-        for answer in answers:
-            inputs = [_between_ends(settings, value * scale) for settings, value, scale in zip(
-                self._settings, answer.inputs, self._scales)]
-            if not any(map(math.isnan, inputs)):
-                inside.append(SceneAnswer(tuple(inputs), answer.mode, answer.is_singular))
-        return inside
+    def _inside(self, solutions: Sequence[Solution]) -> list[tuple[list[float], Solution]]:
+        """Return those of the linkage's solutions that lie inside the sweeps, with its inputs."""
+        answers = [([_between_ends(settings, value * scale) for settings, value, scale in zip(
+            self._settings, solution.inputs, self._scales)], solution) for solution in solutions]
+        return [answer for answer in answers if not any(map(math.isnan, answer[0]))]
 
     def reason(self, *values: float) -> str:
         """Return in words why values are unreachable."""
@@ -220,9 +206,8 @@ class InverseRequest:
             return f'{what} is outside the reach'
         output, = self.outputs
         reached = in_words((low, high) for (low, _), (high, _) in self._mechanism.extremes(output))
-        return (f'{"the lever" if output == LEVER else output} reaches {reached} '
-                f'{"rad" if self._mechanism.linkage.is_angle(output) else "m"}'
-                + f' in {sweeps}' * bool(limited))
+        unit = 'rad' if self._mechanism.linkage.is_angle(output) else 'm'
+        return f'{output} reaches {reached} {unit}' + f' in {sweeps}' * bool(limited)
 
 
 def _between_ends(settings: InputSettings, value: float) -> float:

@@ -12,8 +12,10 @@ from typing import Any, Mapping, NamedTuple, Optional
 
 import numpy as np
 
+from .legs import Assembly
 from .parameters import read_lines, SceneError
 from ..cache import cached
+from ..linkage import Mechanism
 
 # A sign and a digit after a name begin an offset; a hyphen before a letter belongs to the name.
 _PLAIN = r'[A-Za-z_][\w./:]*(?:-[A-Za-z_][\w./:]*)*'
@@ -45,25 +47,26 @@ class JointName(NamedTuple):
     def travel(self, ends: tuple[float, float]) -> Optional[tuple[float, float]]:
         """Return limits of the published value from those of the position; None if it wraps."""
         low, high = sorted(self._replace(wraps=False).of(end) for end in ends)
-        if not self.wraps:
-            return low, high
-        turns = math.tau * round(0.5 * (low + high) / math.tau)
+        turns = math.tau * round(0.5 * (low + high) / math.tau) if self.wraps else 0.0
         low, high = low - turns, high - turns
-        return (low, high) if -math.pi < low and high <= math.pi else None
+        return None if self.wraps and not -math.pi < low <= high <= math.pi else (low, high)
 
 
-# Most changes of a mechanism leave its names as they are.
+# Many changes of a mechanism leave its names as they are.
 @cached(16)
-def read_joint_names(mechanism: str, joints: tuple[tuple[str, bool], ...],
+def read_joint_names(mechanism: str, linkage: Mechanism, leg_pairs: int, mirrored: bool,
                      lines: tuple[str, ...], only_named: bool) -> Mapping[str, JointName]:
     """
-    Return the published names of all joints, by joint.
+    Return the published names of all joints, by joint: the inputs, then the joints of each leg.
 
-    `joints` tells for each joint whether it is an angle, which wraps if it has an offset. `lines`
-    are those of the parameter joint_names. `only_named` leaves the other joints unpublished.
-    Raises SceneError if a line is malformed, or its joint is unknown or has another line.
+    `lines` are those of the parameter joint_names. `only_named` leaves the other joints
+    unpublished. An angle wraps if it has an offset, unless it is an input. Raises SceneError if a
+    line is malformed, or its joint is unknown or has another line.
     """
-    is_angle = dict(joints)
+    assembly = Assembly(linkage, leg_pairs, mirrored, reach=())
+    is_angle = {input_.name: False for input_ in linkage.inputs}
+    is_angle |= {leg + joint: linkage.is_angle(joint)
+                 for leg in assembly.legs for joint in assembly.joints}
     names = {joint: JointName(f'{mechanism}_{joint}', published=not only_named)
              for joint in is_angle}
     for joint, match in read_lines(
@@ -78,8 +81,7 @@ def read_joint_names(mechanism: str, joints: tuple[tuple[str, bool], ...],
 
 def quoted_name(name: str) -> str:
     """Return a published name as it is written in joint_names: quoted if it must be."""
-    plain = re.fullmatch(_PLAIN, name, re.ASCII)
-    return name if plain else json.dumps(name, ensure_ascii=False)
+    return name if re.fullmatch(_PLAIN, name, re.ASCII) else json.dumps(name, ensure_ascii=False)
 
 
 def check_distinct(names: Mapping[str, Mapping[str, JointName]]) -> None:

@@ -93,12 +93,9 @@ class Assembly:
 
     def __init__(self, linkage: Mechanism, leg_pairs: int = 1, mirrored: bool = False,
                  scale: float = 1.0, reach: Optional[Sequence] = None):
-        lags = [math.tau * j / leg_pairs for j in range(leg_pairs)]
-        sides = {'left': (0.0, 1.0), 'right': (math.pi, -1.0)}
-        if not mirrored:
-            del sides['right']
-        self.legs = {f'{side}{j}_': Leg(lag, start, sign, scale) for j, lag in enumerate(lags)
-                     for side, (start, sign) in sides.items()}
+        sides = [('left', 0.0, 1.0), ('right', math.pi, -1.0)][:1 + mirrored]
+        self.legs = {f'{side}{j}_': Leg(math.tau * j / leg_pairs, start, sign, scale)
+                     for j in range(leg_pairs) for side, start, sign in sides}
         if len(self.legs) == 1:
             self.legs = {'': Leg(0.0, 0.0, 1.0, scale)}
         self.linkage = linkage
@@ -125,8 +122,7 @@ class Assembly:
     def within_reach(self, value: float) -> List[bool]:
         """Return which legs can be assembled at a value [rad or m] of the input, by its reach."""
         first = self.linkage.inputs[0]
-        if not first.turns:
-            return [first.on(self.reach, value / self._scale)]
+        value = value if first.turns else value / self._scale
         return [first.on(self.reach, leg.start + leg.side * (value - leg.lag))
                 for leg in self.legs.values()]
 

@@ -83,15 +83,6 @@ class Motion:
         periods = turns * self._turn / self._period
         return math.isclose(periods, round(periods))
 
-    def turns_to(self, value: float) -> float:
-        """Return the turns from the start to a value [rad or m]; NaN if it is never reached."""
-        place = self._near(_steps(value))
-        if self._sweep is not None and not 0 <= place <= self._width:
-            return math.nan
-        places = (place,) if self._sweep is None else (place, -place)
-        return min(self._forward * (place - self._phase) % self._period
-                   for place in places) / self._turn
-
     def _value(self, phase: int) -> tuple[float, float]:
         travelled, ahead = self._fold(phase % self._period)
         # Multiplication by a power of two is exact.

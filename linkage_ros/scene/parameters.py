@@ -175,22 +175,29 @@ class Values:
     """
     Values by full parameter name; `take` validates one and adds it to `parameters`.
 
-    A parameter's full name is `prefix` and its key.
+    A parameter's full name is `prefix` and its key. A parameter without a value keeps that of the
+    `known` one.
     """
 
-    def __init__(self, values: Mapping[str, Any], prefix: str = ''):
+    def __init__(self, values: Mapping[str, Any], prefix: str = '',
+                 known: Iterable[Parameter] = ()):
         self._unused, self._prefix = dict(values), prefix
+        self._known = {parameter.name: parameter for parameter in known}
         self.parameters: list[Parameter] = []
 
-    def keys(self, prefix: str = '') -> list[str]:
-        """Return what follows a prefix in the sorted keys that have not been taken."""
+    def keys(self, prefix: str) -> list[str]:
+        """Return what follows a prefix in the sorted keys of values and known parameters."""
         start = self._prefix + prefix
-        return sorted(name[len(start):] for name in self._unused if name.startswith(start))
+        return sorted(name[len(start):] for name in {*self._unused, *self._known}
+                      if name.startswith(start))
 
     def take(self, key: str, field: Field, default: Any = None) -> Any:
         """Return a valid value, `default` if there is none; raise SceneError if it is invalid."""
         name, default = self._prefix + key, field.default if default is None else default
-        value = field.checked(name, self._unused.pop(name, default))
+        known = self._known.get(name)
+        value = self._unused.pop(name, known.value if known else default)
+        if not known or known.value is not value or known.field is not field:
+            value = field.checked(name, value)
         self.parameters.append(Parameter(name, field, value, default))
         return value
 

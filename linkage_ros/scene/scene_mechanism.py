@@ -217,34 +217,32 @@ def divided(values: Sequence[Any], units: Sequence[float]) -> list[Any]:
     return [value / unit for value, unit in zip(values, units)]
 
 
-def read_mechanism(name: str, entries: Mapping[str, Any]) -> SceneMechanism:
-    """Read a mechanism from its values by full parameter name."""
-    values = Values(entries, f'{name}.')
+def read_mechanism(name: str, entries: Mapping[str, Any],
+                   before: Optional[SceneMechanism] = None) -> SceneMechanism:
+    """Read a mechanism from its values by full parameter name, other values as `before`."""
+    values = Values(entries, f'{name}.', before.parameters if before else ())
     take = values.take
-    linkage, reach = _linkage(name, take('type', TYPE, name), values)
+    linkage, reaches = _linkage(name, take('type', TYPE, name), values)
     scale, (leg_pairs, mirrored) = take('scale', SCALE), _legs(name, linkage, values)
     points = take('points', POINTS.about(
         rule=f'some of {listed(linkage.points)}, each once', choices=linkage.points),
         linkage.points)
     pose = take('pose', POSE)
     inputs = {input_.name: read_settings(name, linkage, input_, reach, scale, values)
-              for input_ in linkage.inputs}
+              for input_, reach in zip(linkage.inputs, reaches)}
     frame_id, only_named = take('frame_id', FRAME), take('only_named', ONLY_NAMED)
-    assembly = Assembly(linkage, leg_pairs, mirrored, scale, reach)
-    turning = [(joint, linkage.is_angle(joint)) for joint in assembly.joints]
     joints = read_joint_names(
-        name, (*((input_, False) for input_ in inputs),
-               *((leg + joint, turns) for leg in assembly.legs for joint, turns in turning)),
-        take('joint_names', JOINT_NAMES), only_named)
+        name, linkage, leg_pairs, mirrored, take('joint_names', JOINT_NAMES), only_named)
     loads = read_loads(name, linkage, take('loads', LOADS))
     if loads and (leg_pairs > 1 or mirrored):
         raise SceneError(f'{name}.loads must be empty for more than one leg')
     values.refuse_unknown()
-    return SceneMechanism(name, linkage, reach, scale, leg_pairs, mirrored, points, pose, inputs,
-                          frame_id, joints, only_named, loads, tuple(values.parameters))
+    return SceneMechanism(name, linkage, reaches[0], scale, leg_pairs, mirrored, points, pose,
+                          inputs, frame_id, joints, only_named, loads, tuple(values.parameters))
 
 
-def _linkage(name: str, type_: str, values: Values) -> tuple[Mechanism, tuple[Arc, ...]]:
+def _linkage(name: str, type_: str, values: Values) -> tuple[Mechanism, list]:
+    """Read a linkage; return it and the reach of each input."""
     try:
         design = mechanisms.design(type_) if type_ in mechanisms.TYPES else mechanisms.design(
             type_, values.take('joints', JOINTS), values.take('tracer', TRACER) or None,
@@ -259,14 +257,15 @@ def _linkage(name: str, type_: str, values: Values) -> tuple[Mechanism, tuple[Ar
     try:
         linkage = _built(design, tuple(dimensions.items()), tuple(branches.items()))
         # The reach of one of several inputs depends on the others.
-        first, *others = linkage.inputs
-        reach = ((first.low, first.high),) if others else tuple(linkage.reach())
+        reaches = [((input_.low, input_.high),) for input_ in linkage.inputs]
+        if len(reaches) == 1:
+            reaches = [tuple(linkage.reach())]
     except ValueError as error:
         raise SceneError(f'{name}.dimensions: {error}') from None
-    if not reach:
+    if not reaches[0]:
         raise SceneError(f'{name}.{"dimensions" if dimensions else "joints"} must let the {type_} '
                          f'be assembled at some {linkage.inputs[0].kind}')
-    return linkage, reach
+    return linkage, reaches
 
 
 @cached(16, shared=True)

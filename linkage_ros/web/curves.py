@@ -13,8 +13,6 @@ from ..linkage import ascending, sampled, theta_of
 from ..scene import SceneError, SceneMechanism
 
 SAMPLES = 361
-# Tolerance of an end of the reach that is a dead point, as a fraction of a turn or a stroke.
-CLOSE = 1e-6
 # The quantities, and whether they are of outputs or of joints.
 KINDS = {'position': 'output', 'velocity': 'output', 'acceleration': 'output',
          'transmission angle': 'joint', 'force ratio': 'output'}
@@ -51,10 +49,8 @@ class Sweep:
         self._inputs, self._speeds, self._still = map(theta_of, (
             [values, *others], [1.0 / self._size, *still], [0.0, *still]))
         self.values, self.dead = values * self._size, np.multiply(dead, self._size)
-        # A full rotation has no ends, and an end that is a dead point is named as that.
-        self.ends = self._size * np.array([
-            end for end in np.ravel([] if is_whole else reach)
-            if not any(self.input.apart(end, point) < CLOSE * self.input.size for point in dead)])
+        # A full rotation has no ends.
+        self.ends = self._size * np.ravel([] if is_whole else reach)
 
     def names(self, kind: str) -> list[str]:
         """Return the joints with a transmission angle, or the outputs."""
@@ -96,14 +92,12 @@ def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSIT
     """
     Return one of KINDS over the first input: x and y in `units`, y None where it has none.
 
-    `dead` are the dead points, `ends` the other ends of the reach; y grows with the `power` of the
+    `dead` are the dead points, `ends` those of the reach; y grows with the `power` of the
     input's speed.
     """
     sweep = Sweep(mechanism, present, dense_ends=True)
     names = sweep.names(kind)
     output = names[0] if names and output is None else output or ''
-    if kind != TRANSMISSION:
-        sweep.linkage.check_there(output)
     x, y, unit = sweep.values, sweep.of(kind, (output,))[output], sweep.unit(kind, output)
     # No line is drawn through a pole.
     after = np.searchsorted(x, sweep.dead[(x[0] < sweep.dead) & (sweep.dead < x[-1])])

@@ -44,8 +44,7 @@ class Feed:
     def __init__(self, key: str, topic: str, type_: type,
                  warn: Callable[[str, str], None]) -> None:
         self.newest: Optional[bytes] = None
-        self._key, self._topic, self._type = key, topic, type_
-        self._warn = warn
+        self._key, self._topic, self._type, self._warn = key, topic, type_, warn
         self._converted: Optional[bytes] = None
         self._frame = b''
 

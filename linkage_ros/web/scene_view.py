@@ -18,7 +18,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.client import Client
 from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.parameter import parameter_value_to_python
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -29,6 +29,7 @@ from ..c_code import header
 from ..nodes import ownership
 from ..nodes.log import Throttle
 from ..nodes.parameters import typed
+from ..nodes.publishers import LATCHED
 from ..robot_model import urdf
 from ..scene import SceneError, SceneMechanism, writing
 from ..scene.inverse_request import present_inputs
@@ -47,7 +48,6 @@ FORMS = 'yaml', 'png', 'h', 'csv', 'urdf'
 Answer = dict[str, Any]
 
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class ShownMechanism(NamedTuple):
@@ -241,9 +241,7 @@ class SceneView:
                     f'{shown.name}.{name}.start' not in shown.nodes):
                 raise SceneError(
                     f'the {name} is not known yet: no message names {settings.source}')
-        return mechanism, [
-            value if math.isfinite(value) else settings.start for value, settings in zip(
-                present_inputs(mechanism, positions), mechanism.inputs.values())]
+        return mechanism, present_inputs(mechanism, positions)
 
     def _mechanism(self, shown: ShownMechanism) -> SceneMechanism:
         return self._scenes[shown.owner].mechanisms[shown.name]

@@ -20,11 +20,9 @@ from typing import Any, Callable
 from aiohttp import web, WSCloseCode
 
 from .feed import Feed
-from .scene_view import SceneView
+from .scene_view import Answer, SceneView
 from .. import palette
 from ..words import elided, MESSAGE, quoted
-
-Message = dict[str, Any]
 
 PAGE = Path(__file__).parent / 'page'
 # Files with placeholders for the palette's colours, which are their names in lower case.
@@ -174,13 +172,13 @@ class Client:
 
     def __init__(self, view: SceneView, socket_: web.WebSocketResponse) -> None:
         self._view, self._socket = view, socket_
-        self._texts: dict[Any, Message] = {}
+        self._texts: dict[Any, Answer] = {}
         self._offered: set[Feed] = set()
         self._ready = True
         self._news = asyncio.Event()
         self._requests: asyncio.Queue[str] = asyncio.Queue(MAX_WAITING)
 
-    def tell(self, key: Any, message: Message) -> None:
+    def tell(self, key: Any, message: Answer) -> None:
         """Send a message; it replaces a waiting one with the same key."""
         self._texts.pop(key, None)
         self._texts[key] = message
@@ -260,7 +258,7 @@ class Client:
                     self._ready = False
                     await asyncio.wait_for(self._socket.send_bytes(picture), MAX_READ_S)
 
-    async def _send_message(self, message: Message) -> None:
+    async def _send_message(self, message: Answer) -> None:
         await asyncio.wait_for(self._socket.send_json(message), MAX_READ_S)
 
 

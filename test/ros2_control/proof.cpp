@@ -16,7 +16,6 @@
 #define TEXT_(text) #text
 #define TEXT(text) TEXT_(text)
 #include TEXT(NAME.hpp)
-#include "sample.h"
 
 namespace
 {
@@ -119,6 +118,15 @@ void at(Robot & robot, const Pose & where)
     robot.actuator[2][i] = 1.0 + i;
   }
   robot.transmission.actuator_to_joint();
+}
+
+/// Sample i of the inputs: multiples of irrational numbers, without their whole parts.
+void sample(long i, double (&q)[n])
+{
+  for (int k = 0; k < n; ++k) {
+    const double x = static_cast<double>(i) * std::sqrt(1.0 + (k + 1.0) * (k + 1.0));
+    q[k] = ranges[k][0] + (ranges[k][1] - ranges[k][0]) * (x - std::floor(x));
+  }
 }
 
 /// Returns whether the state is far enough from singular poses and ends to be tried.
@@ -235,7 +243,7 @@ int main(int argc, char ** argv)
   may_allocate = false;
   long tried = 0;
   for (long i = 1; i <= states; ++i) {
-    sample(n, ranges, i, q);
+    sample(i, q);
     tried += there_and_back(robot, q, i);
   }
   check(2 * tried > states, "most states are singular", tried);

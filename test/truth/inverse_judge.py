@@ -143,10 +143,10 @@ class Output:
 def judge(linkage, name, rng, count=6, others=()):
     """Return counts by (kind, what), and the worst error of an answer in units of the rule."""
     output, found, worst = Output(linkage, name, others), Counter(), 0.0
-    values = output.values[np.isfinite(output.values)]
-    # An output that stands still, except where an arm nearly vanishes, tells no input.
-    middle = np.quantile(values, 0.5, method='nearest') if len(values) else 0.0
-    if len(values) < 20 or np.quantile(output.away(values, middle), 0.9) < 1e-6 * output.size:
+    steps = output.away(output.values[1:], output.values[:-1])
+    steps = steps[np.isfinite(steps)]
+    # An output that stands still at most places tells no input.
+    if len(steps) < 20 or np.median(steps) < 1e-9 * output.size:
         return found, worst
     names = (name, *(input_.name for input_ in linkage.inputs[1:]))
     inverse = linkage.inverse(names)
@@ -188,7 +188,10 @@ def judge(linkage, name, rng, count=6, others=()):
                 found[kind, 'invented at', linkage, name, at, others] += 1
             elif kind == 'ordinary':
                 worst = max(worst, error)
-            if any(first.apart(x, y) <= 1e-9 * first.size for y in answers[:k]):
+            # Two that are near are one if the output has its value between them, too.
+            if any(first.apart(x, y) <= 1e-9 * first.size and output.away(
+                    output.at(x + 0.5 * math.remainder(y - x, first.turn)), value)
+                    <= MOST * 2.0 ** -53 * output.size for y in answers[:k]):
                 found[kind, 'duplicates'] += 1
                 found[kind, 'duplicates at', linkage, name, at, others] += 1
     return found, worst
@@ -202,11 +205,11 @@ def _error(output, first, x, value):
         # The turns that were added to an end rounded it.
         reached = max(beside, key=np.isfinite)
     # What an ulp of the input changes, on the side where there is a pose; and what 64 do.
-    change = np.nanmax([0.0, *output.away(beside, reached)]) / 4.0
     far = 64.0 * np.spacing(max(abs(x), first.size))
-    far = output.at(np.array([x + far, x - far]))
+    far = np.nanmax([0.0, *output.away(output.at(np.array([x + far, x - far])), reached)])
+    change = max(np.nanmax([0.0, *output.away(beside, reached)]) / 4.0, far / 128.0)
     return float(output.away(reached, value)) / (2.0 ** -53 * output.size + change), reached, min(
-        1e-6 * output.size, 2.0 * np.nanmax([0.0, *output.away(far, reached)]))
+        1e-6 * output.size, 2.0 * far)
 
 
 def judge_several(linkage, names, rng, count=6):

@@ -146,13 +146,14 @@ typedef struct {
     lkr_real load[LKR_MAX_INPUTS];
 } lkr_point;
 
-/* An actuator or a joint: its position is factor * value + offset. */
+/* An actuator or a joint: its position is factor * value + offset, with the value of an output. */
 typedef struct {
+    /* The input of which the value is ratio * input + shift, whole turns included; -1: of none. */
+    int input;
+    lkr_real ratio, shift;
+    lkr_real factor, offset;
     /* One over the size of its position, and what it may change by without effect, or 0. */
     lkr_real scale, turn;
-    /* The input whose value it has, whole turns included; -1 if it has that of an output. */
-    int input;
-    lkr_real factor, offset;
 } lkr_axis;
 
 /* A linkage. Inputs q are in rad or in sizes. */
@@ -401,10 +402,10 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
         count = model->solutions[side](value, x);
     }
     for (i = 0; i < model->inputs; i++) {
-        const int input = model->axis[side][i].input;
-        for (k = 0; k < count && input >= 0; k++) {
-            near[input] = value[i];
-            x[k][input] = value[i];
+        const lkr_axis *axis = &model->axis[side][i];
+        for (k = 0; k < count && axis->input >= 0; k++) {
+            near[axis->input] = (value[i] - axis->shift) / axis->ratio;
+            x[k][axis->input] = near[axis->input];
         }
     }
     for (k = 0; k < count; k++) {
@@ -431,7 +432,7 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
                 for (i = 0; i < model->inputs; i++) {
                     const lkr_axis *axis = &model->axis[s][i];
                     if (axis->input >= 0) {
-                        p->position[s][i] += axis->factor
+                        p->position[s][i] += axis->factor * axis->ratio
                             * (q[axis->input] - x[nearest][axis->input]);
                     }
                 }
@@ -462,8 +463,8 @@ static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *value, 
 
 /* --- actuators and joints --- */
 
-/* Initialize the memory; returns 0 if the linkage cannot be assembled where it starts. */
-static inline int lkr_begin(const lkr_model *model, lkr_memory *m)
+/* Initialize the memory. */
+static inline void lkr_begin(const lkr_model *model, lkr_memory *m)
 {
     int i;
     memset(m, 0, sizeof *m);
@@ -473,7 +474,6 @@ static inline int lkr_begin(const lkr_model *model, lkr_memory *m)
         m->held[LKR_ACTUATORS].position[i] = LKR_NAN;
         m->held[LKR_JOINTS].position[i] = LKR_NAN;
     }
-    return model->at(m->q, &m->point);
 }
 
 /* Copy the values that are finite. */
@@ -591,9 +591,9 @@ static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, 
         /* What was commanded before a pause is not held after it. */
         memset(held->effort, 0, sizeof held->effort);
     }
-    lkr_copy(position & missing ? 0 : n, held->position, to->position);
-    lkr_copy(velocity & missing ? 0 : n, held->velocity, to->velocity);
-    lkr_copy(effort & missing ? 0 : n, held->effort, to->effort);
+    lkr_copy((position & missing) ? 0 : n, held->position, to->position);
+    lkr_copy((velocity & missing) ? 0 : n, held->velocity, to->velocity);
+    lkr_copy((effort & missing) ? 0 : n, held->effort, to->effort);
     return position | velocity | effort;
 }
 

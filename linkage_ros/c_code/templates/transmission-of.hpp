@@ -13,7 +13,7 @@
 #include <future>
 #include <memory>
 #include <numeric>
-#include <optional>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <type_traits>
@@ -22,6 +22,7 @@
 #include "hardware_interface/hardware_info.hpp"
 #include "linkage_ros/linkage_transmission.hpp"
 #include "rcutils/logging_macros.h"
+#include "transmission_interface/accessor.hpp"
 #include "transmission_interface/exception.hpp"
 #include "transmission_interface/handle.hpp"
 #include "transmission_interface/transmission_loader.hpp"
@@ -30,6 +31,10 @@ namespace @namespace@
 {
 /// The name of an actuator or a joint in the scene, and its role in the linkage.
 struct Axis { const char * name, * role; };
+
+/// The names that the interface of each quantity may have, the usual one first.
+inline const std::array<std::vector<std::string>, 3> interfaces{
+  {{"position"}, {"velocity"}, {"effort", "torque", "force"}}};
 
 /// Positions of joints that are not commanded, and their rates by each input, at inputs.
 using Passive = void(const double * q, double * position, double (*rate)[LKR_MAX_INPUTS]);
@@ -129,23 +134,18 @@ public:
       if (names[i].empty()) {
         names[i] = axes[i].name;
       }
-    }
-    static const std::array<std::string, 5> kinds{"position", "velocity", "effort", "torque", "force"};
-    for (const auto & handle : given) {
-      const auto i = static_cast<std::size_t>(
-        std::find(names.begin(), names.end(), handle.get_prefix_name()) - names.begin());
-      const auto kind = static_cast<std::size_t>(
-        std::find(kinds.begin(), kinds.end(), handle.get_interface_name()) - kinds.begin());
-      // Those of others are ignored, as by the built-in transmissions.
-      if (!handle || i == size || kind == kinds.size()) {
-        continue;
+      for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
+        auto & own = handles_[kind][i];
+        for (const auto & interface : interfaces[kind]) {
+          const auto found =
+            transmission_interface::get_ordered_handles(given, {names[i]}, interface);
+          own.insert(own.end(), found.begin(), found.end());
+        }
+        if (own.size() > 1) {
+          throw Exception(what + " '" + names[i] + "' has several handles for " +
+            interfaces[kind][0]);
+        }
       }
-      auto & own = handles_[std::min<std::size_t>(kind, 2)][i];
-      if (own) {
-        throw Exception(what + " '" + names[i] + "' has two handles for one interface: '" +
-          own->get_interface_name() + "' and '" + handle.get_interface_name() + "'");
-      }
-      own.emplace(handle);
     }
   }
 
@@ -154,10 +154,10 @@ public:
   {
     const auto & own = handles_[kind];
     return static_cast<std::size_t>(std::count_if(
-      own.begin(), own.begin() + needed, [](const auto & handle) { return handle.has_value(); }));
+      own.begin(), own.begin() + needed, [](const auto & handles) { return !handles.empty(); }));
   }
 
-  bool have(std::size_t kind) const { return handles_[kind][0].has_value(); }
+  bool have(std::size_t kind) const { return !handles_[kind][0].empty(); }
 
   /// Read values as the scene has them; those without a handle are 0.
   lkr_side read() const
@@ -192,13 +192,13 @@ private:
 
   double value(std::size_t kind, std::size_t i) const
   {
-    return have(kind) ? handles_[kind][i]->get_value() : 0.0;
+    return have(kind) ? handles_[kind][i].front().get_value() : 0.0;
   }
 
   void set(std::size_t kind, std::size_t i, double value)
   {
-    if (handles_[kind][i] && std::isfinite(value)) {
-      (void)handles_[kind][i]->set_value(value);
+    if (!handles_[kind][i].empty() && std::isfinite(value)) {
+      (void)handles_[kind][i].front().set_value(value);
     }
   }
 
@@ -221,16 +221,16 @@ private:
     return size == 1 && is_actuator && info.name == "actuator1" && info.role == "actuator1";
   }
 
-  std::array<std::array<std::optional<Handle>, size>, 3> handles_;
+  // Of each quantity and axis one handle, or none.
+  std::array<std::array<std::vector<Handle>, size>, 3> handles_;
   std::array<double, size> offset_{}, factor_{};
 };
 
-/// A linkage between actuators and joints; Code_ wraps its generated C, which is included before.
-template <class Code_>
+/// A linkage between actuators and joints; Code wraps its generated C, which is included before.
+template <class Code>
 class TransmissionOf : public linkage_ros::LinkageTransmission
 {
 public:
-  using Code = Code_;
   static constexpr std::size_t passive_count = Code::joints.size() - Code::size;
 
   explicit TransmissionOf(const hardware_interface::TransmissionInfo & info)
@@ -251,26 +251,21 @@ public:
     joints_ = {};
     actuators_.find("actuator", Code::actuators, info_.actuators, actuator_handles);
     joints_.find("joint", Code::joints, info_.joints, joint_handles);
-    static const std::array<const char *, 3> kinds{"position", "velocity", "effort"};
-    for (std::size_t kind = 0; kind < 3; ++kind) {
+    for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
       const auto count = actuators_.count(kind) + joints_.count(kind);
       if (count != 2 * Code::size && (count != 0 || kind == 0)) {
-        refuse(std::string("all its actuators and joints need a handle for ") + kinds[kind] +
+        refuse("all its actuators and joints need a handle for " + interfaces[kind][0] +
           (kind ? ", or none of them" : ": velocities and efforts depend on the pose"));
       }
     }
-    if (!lkr_begin(&Code::model, &memory_)) {
-      refuse("it cannot be assembled");
-    }
+    lkr_begin(&Code::model, &memory_);
   }
 
   void actuator_to_joint() override
   {
     transmit(LKR_ACTUATORS, actuators_, joints_);
     if constexpr (passive_count > 0) {
-      if (memory_.newest == LKR_ACTUATORS) {
-        write_passive();
-      }
+      write_passive();
     }
   }
 
@@ -306,7 +301,7 @@ private:
     to.write(result);
   }
 
-  /// Write states of the joints that are not commanded, at the inputs of the newest measurement.
+  /// Write states of the joints that are not commanded: where the newest measurement is, or standing.
   void write_passive()
   {
     double position[passive_count], rate[passive_count][LKR_MAX_INPUTS];
@@ -314,7 +309,9 @@ private:
     for (std::size_t i = 0; i < passive_count; ++i) {
       const double velocity = std::inner_product(
         rate[i], rate[i] + Code::size, memory_.speed, 0.0);
-      joints_.write(Code::size + i, position[i], std::isfinite(velocity) ? velocity : 0.0);
+      joints_.write(
+        Code::size + i, memory_.newest == LKR_ACTUATORS ? position[i] : LKR_NAN,
+        std::isfinite(velocity) ? velocity : 0.0);
     }
   }
 

@@ -145,5 +145,6 @@ class Grid:
             q = np.where(better[:, None], trial, q)
             solved = np.where(better, new, solved)
         # Most of those that reach one solution differ by rounding.
-        places = CLOSE * np.unique(np.round(np.concatenate(reached) / CLOSE), axis=0)
+        units = CLOSE * self._steps
+        places = units * np.unique(np.round(np.concatenate(reached) / units), axis=0)
         return [*map(tuple, places.tolist())]

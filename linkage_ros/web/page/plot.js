@@ -163,7 +163,7 @@ export class Plot {
     };
   }
 
-  /** Mark the dead points and the other ends of the reach. */
+  /** Mark the dead points and the ends of the reach. */
   mark(plot) {
     const { ctx, bbox: { top, height } } = plot;
     const pixel = window.devicePixelRatio;

@@ -1,0 +1,50 @@
+# SPDX-FileCopyrightText: 2026 linkage_ros contributors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Mechanisms in C with their memories, whose actuators and joints are sent values."""
+
+import ctypes
+
+from c_libraries import loaded, UNWRITTEN
+from linkage_ros.c_code import header
+import numpy as np
+
+# All that is given and written is an lkr_side: positions, velocities, efforts.
+CALLER = """
+static {name}_memory {name}_m;
+void {name}_started(void) {{ {name}_begin(&{name}_m); }}
+int {name}_sent(int side, const lkr_side *from, lkr_side *to)
+{{
+    return side ? {name}_joints_to_actuators(&{name}_m, from, to)
+        : {name}_actuators_to_joints(&{name}_m, from, to);
+}}
+"""
+
+
+def memories(requests, single=False):
+    """Return the C of mechanisms, with the functions that `Memory` calls."""
+    return header.printed(requests, single) + ''.join(CALLER.format(
+        name=request.mechanism.name) for request in requests)
+
+
+def compiled(folder, mechanisms, *names, single=False):
+    """Return a library with the actuators and joints of mechanisms."""
+    return loaded(folder, memories([
+        header.Request(mechanism, (), names) for mechanism in mechanisms], single))
+
+
+class Memory:
+    """The memory of one mechanism in C."""
+
+    def __init__(self, library, mechanism, kind=float):
+        self._send, self._n, self._kind = (
+            library[f'{mechanism.name}_sent'], len(mechanism.inputs), kind)
+        library[f'{mechanism.name}_started']()
+
+    def send(self, side, position, velocity=0.0, effort=0.0):
+        """Return the status and the other side's positions, velocities, efforts: or UNWRITTEN."""
+        given, found = np.zeros((3, 3), self._kind), np.full((3, 3), UNWRITTEN, self._kind)
+        for row, values in zip(given, (position, velocity, effort)):
+            row[:self._n] = values
+        status = self._send(side, *(ctypes.c_void_p(x.ctypes.data) for x in (given, found)))
+        return status, found[:, :self._n]
