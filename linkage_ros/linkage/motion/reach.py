@@ -51,7 +51,8 @@ def _reach(linkage: Kinematics, others: Tuple[float, ...]) -> List[Arc]:
     def assembled(theta: Any) -> Any:
         return _failing(margins, theta) == len(limits)
 
-    closed = [limit for limit in limits if limit.ends]
+    # The angle of a geared crank, or of another input, is no leaf of this one.
+    closed = [limit for limit in limits if limit.ends and limit.ends.theta.args[0] == 0]
     # Without a whole period, the turns on both sides of zero.
     first, last = (0.0, input_.turn) if input_.wraps else (input_.low - math.tau / step,
                                                            input_.high + math.tau / step)
