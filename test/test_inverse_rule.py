@@ -101,7 +101,8 @@ def test_of_the_catalogue_nothing_is_lost_or_invented(kind):
 
 
 @pytest.mark.nightly(all_but=1)
-@pytest.mark.parametrize('outputs', [('P.x', 'P.y'), ('P.x', 'crank'), ('crank2', 'P.y')])
+@pytest.mark.parametrize('outputs', [
+    ('P.x', 'P.y'), ('P.x', 'crank'), ('crank2', 'P.y'), ('angle(P,Q)', 'crank')])
 def test_of_two_inputs_no_ordinary_solution_is_lost_or_invented(outputs):
     found, _ = inverse_judge.judge_several(
         mechanisms.create('five_bar'), outputs, np.random.default_rng(1), 60)
