@@ -125,13 +125,16 @@ class Pinocchio:
 
 
 class MuJoCo:
-    """A model of MuJoCo, which knows its loops."""
+    """A model of MuJoCo in its keyframe, if it has one; it knows its loops."""
 
     def __init__(self, text):
         self.library = pytest.importorskip('mujoco', reason='pip install mujoco')
         self.model = self.library.MjModel.from_xml_string(text)
         self.data = self.library.MjData(self.model)
         self.joints = [self.model.joint(i).name for i in range(self.model.njnt)]
+        if self.model.nkey:
+            self.library.mj_resetDataKeyframe(self.model, self.data, 0)
+        self.place({})
 
     def place(self, positions):
         """Put joints at positions, and what they move."""

@@ -415,9 +415,11 @@ def test_the_twelve_legs_of_a_strandbeest_come_back_from_its_sdf(tmp_path, capsy
         of_text(tmp_path / 'legs.sdf', capsys.readouterr().out))
 
 
-@pytest.mark.parametrize('ends, limits', [('-0.4 0.5', ' within -0.4 0.5'), ('-4 4', '')])
-def test_a_cylinder_in_space_turns_a_foot(tmp_path, ends, limits):
-    file = written(tmp_path, 'cylinder.xml', ('-0.4 0.5', ends))
+@pytest.mark.parametrize('ends, ref, limits', [
+    ('-0.4 0.5', 0.0, ' within -0.4 0.5'), ('-0.2 0.7', 0.2, ' within -0.4 0.5'),
+    ('-4 4', 0.0, '')])
+def test_a_cylinder_in_space_turns_a_foot(tmp_path, ends, ref, limits):
+    file = written(tmp_path, 'cylinder.xml', ('range="-0.4 0.5"', f'ref="{ref}" range="{ends}"'))
     code, out, err = printed(file)
     assert code == 0 and 'in 240 poses of the robot, ram from ' in err and 'Left out' not in err
     assert f'- pitch hinge ground at 0 0 0.1 axis 0 1 0{limits} - ram' in ' '.join(out.split())
@@ -431,7 +433,7 @@ def test_a_cylinder_in_space_turns_a_foot(tmp_path, ends, limits):
         length = np.linalg.norm(pivot + rotation((0.0, angle, 0.0)) @ eye - base)
         ram = 0.3 + length - start
         assert published(mechanism, ram=ram) == pytest.approx(
-            {'pitch': angle, 'ram': ram}, abs=1e-9)
+            {'pitch': angle + ref, 'ram': ram}, abs=1e-9)
 
 
 @pytest.mark.parametrize('old, new, why', [

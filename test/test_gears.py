@@ -121,6 +121,18 @@ def test_the_reach_is_where_it_can_be_assembled(ratio):
     assert first.is_part == all(first.on(reach, 1e6 + k) for k in range(99))
 
 
+@pytest.mark.parametrize('ratio', ['2', '-3', '0.5'])
+def test_the_reach_ends_where_a_geared_crank_is_too_far_from_a_ground_joint(ratio):
+    found = mechanisms.create('custom', joints=[
+        'O ground 0 0', 'A crank O 1', f'D crank O 0.7 geared crank {ratio} 0.3',
+        'Q ground 2 0', 'B dyad D Q 0.9 1.2 left'])
+    first, = found.inputs
+    theta = np.random.default_rng(0).uniform(first.low, first.high, 1001)
+    whole = np.isfinite(found.solve(theta)['B']).all(axis=1)
+    assert whole.any() and not whole.all()
+    assert [first.on(found.reach(), x) for x in theta.tolist()] == whole.tolist()
+
+
 def test_a_crank_that_has_turned_for_long_is_answered_where_it_is():
     # A gear typed as 0.333 repeats after 1000 turns, which a machine passes in minutes.
     bars = 'O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'B dyad A Q 2.5 2 left'

@@ -101,7 +101,8 @@ def test_of_the_catalogue_nothing_is_lost_or_invented(kind):
 
 
 @pytest.mark.nightly(all_but=1)
-@pytest.mark.parametrize('outputs', [('P.x', 'P.y'), ('P.x', 'crank'), ('crank2', 'P.y')])
+@pytest.mark.parametrize('outputs', [
+    ('P.x', 'P.y'), ('P.x', 'crank'), ('crank2', 'P.y'), ('angle(P,Q)', 'crank')])
 def test_of_two_inputs_no_ordinary_solution_is_lost_or_invented(outputs):
     found, _ = inverse_judge.judge_several(
         mechanisms.create('five_bar'), outputs, np.random.default_rng(1), 60)
@@ -115,6 +116,20 @@ def test_an_output_that_jumps_has_extremes_on_both_sides(output, most):
     with_rail = mechanisms.create('custom', joints=[*lines, 'Z carriage O along Q 100 200'])
     assert with_rail.extremes(output, others=[150.0]) == extremes
     assert all(high - low < most + 1e-9 for (low, _), (high, _) in extremes)
+
+
+def test_rates_where_a_pose_has_none_are_those_of_the_nearest_float_that_has_them():
+    found = mechanisms.create('custom', joints=[
+        'A ground 0 0', 'B ground 2.1 -0.0714483557885009', 'C crank A 1.100977588441',
+        'D slider C 2.3782075834 A along B out', 'E dyad D A 1.5 0.5971384475097938 right',
+        'G slider D 0.4768848 C along A in'])
+    start, _ = found.reach()[0]
+    (theta,), (rate,) = found.inverse('DG').nearest(
+        (float(found.joint_angles(start, ['DG'])['DG']),), (start,))
+    inside = theta + math.ulp(theta) * np.arange(9)
+    rates = found.joint_rates(inside, ['DG'])['DG']
+    assert not math.isfinite(rates[0]) and theta == pytest.approx(start, abs=1e-14)
+    assert rate == pytest.approx(rates[np.isfinite(rates)][0])
 
 
 def test_an_extreme_as_the_library_says_it_has_an_answer():

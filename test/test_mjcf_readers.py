@@ -5,9 +5,9 @@
 
 import numpy as np
 import pytest
-from robots import of_text, Pinocchio, words
+from robots import MuJoCo, of_text, Pinocchio, words
 
-mujoco = pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
+pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
 
 from linkage_ros.robot_files import readers  # noqa: E402
 from linkage_ros.robot_model.urdf import write  # noqa: E402
@@ -57,33 +57,24 @@ class Tree:
                 f'{"".join(self._body(depth + 1) for _ in range(rng.integers(3 - depth)))}</body>')
 
 
-def posed(file, positions=None):
-    """Return MuJoCo's model of a file at joint positions, or in its keyframe."""
-    model = mujoco.MjModel.from_xml_path(str(file))
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    for name, value in (positions or {}).items():
-        data.joint(name).qpos = value
-    mujoco.mj_forward(model, data)
-    return model, data
-
-
 @pytest.mark.parametrize('seed', range(12))
 def test_a_tree_of_mujoco_is_the_same_tree_as_urdf(tmp_path, seed):
     rng = np.random.default_rng(seed)
     tree = Tree(rng)
     file = of_text(tmp_path / 'tree.xml', tree.text)
     robot = readers.read(str(file))
-    model, data = posed(file)
+    there = MuJoCo(tree.text)
+    data = there.data
     for i, body in enumerate(tree.bodies):
         assert robot.frames[body][:3, 3] == pytest.approx(data.xpos[i + 1], abs=1e-13)
         assert robot.frames[body][:3, :3].ravel() == pytest.approx(data.xmat[i + 1], abs=1e-13)
-    names = [model.joint(i).name for i in range(model.njnt)]
+    names = there.joints
     assert robot.positions == {name: data.joint(name).qpos[0] for name in names}
     assert robot.driven == [*names[::2], names[1]]
     positions = dict(zip(names, rng.normal(size=len(names)).tolist()))
     found = Pinocchio(write(readers.drawn(robot))).places(positions, tree.bodies)
-    for i, place in enumerate(posed(file, positions)[1].xpos[1:]):
+    there.place(positions)
+    for i, place in enumerate(data.xpos[1:]):
         assert found[tree.bodies[i]] == pytest.approx(place, abs=1e-13)
 
 
@@ -104,7 +95,7 @@ def test_a_tie_is_open_as_far_as_mujoco_has_it(tmp_path, tie, seed):
     file = of_text(tmp_path / 'tree.xml', Tree(rng, more + (
         '<weld body1="b0" body2="world" active="false"/>')).text)
     cut, = (joint for joint in readers.read(str(file)).joints if joint.is_cut)
-    _, data = posed(file)
+    data = MuJoCo(file.read_text()).data
     assert (cut.kind, cut.bodies) == ('fixed' if 'weld' in tie else 'ball', ('b0', 'b1'))
     apart, *turned = np.split(data.efc_pos, [3])
     assert np.linalg.norm(np.subtract(*cut.places)) == pytest.approx(np.linalg.norm(apart))
@@ -137,9 +128,6 @@ def test_joints_with_zeros_of_their_own_are_where_mujoco_ties_them(tmp_path, see
         assert leader == 'b' and not robot.held
     else:
         positions = {'b': b, **robot.held}
-    model = mujoco.MjModel.from_xml_path(str(file))
-    data = mujoco.MjData(model)
-    for name, value in positions.items():
-        data.joint(name).qpos = value
-    mujoco.mj_forward(model, data)
-    assert data.ne == 1 and abs(data.efc_pos[0]) < 1e-15
+    there = MuJoCo(file.read_text())
+    there.place(positions)
+    assert there.data.ne == 1 and there.open() < 1e-15

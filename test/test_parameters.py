@@ -6,6 +6,7 @@
 from importlib.metadata import version
 import json
 import math
+import re
 import threading
 
 from effort import few_calls
@@ -63,9 +64,7 @@ class Client:
 
     def ask(self, type_, **request):
         """Call a service; return the future."""
-        name = {SetParameters: 'set_parameters', DescribeParameters: 'describe_parameters',
-                SetParametersAtomically: 'set_parameters_atomically',
-                GetParameterTypes: 'get_parameter_types'}[type_]
+        name = re.sub('(?<=[a-z])(?=[A-Z])', '_', type_.__name__).lower()
         if type_ not in self._clients:
             self._clients[type_] = self._graph.node.create_client(
                 type_, f'{self.node.get_fully_qualified_name()}/{name}')
@@ -99,11 +98,12 @@ def values_of(node):
     return {name: scene.plain(node.get_parameter(name).value) for name in node.fields}
 
 
-def refuse_all(graph, kind, names):
-    """Throw everything at some parameters of a node; what is taken is put back."""
+@pytest.mark.nightly
+@pytest.mark.parametrize('kind, least', [(CrankDriver, 80), (Kinematics, 1000)])
+def test_no_value_of_any_kind_spoils_any_parameter(graph, kind, least):
     node = graph.start(kind, EVERYTHING)
     client = Client(graph, node)
-    names = names(node.fields)
+    names = list(node.fields)
     before, about = values_of(node), client.about(names)
     hostile = [parameter.to_parameter_msg() for parameter in HOSTILE]
     for name in names:
@@ -117,13 +117,7 @@ def refuse_all(graph, kind, names):
         # A value that follows from others stays what it was set to.
         assert values_of(node) == before, name
     assert client.about(names) == about
-    return len(names) * len(hostile)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('kind, least', [(CrankDriver, 80), (Kinematics, 1000)])
-def test_no_value_of_any_kind_spoils_any_parameter(graph, kind, least):
-    assert refuse_all(graph, kind, list) > least
+    assert len(names) * len(hostile) > least
 
 
 @pytest.mark.parametrize('kind', KINDS)
@@ -242,11 +236,6 @@ class Slow(nodes.SceneNode):
         self.adopted.append((threading.current_thread(), new.mechanisms['leg'].scale))
 
 
-def settled(graph, node):
-    """Wait until what was accepted is adopted."""
-    graph.until(lambda: node.is_settled)
-
-
 def held_up(graph, client):
     """Let the worker of a node be busy with a scene."""
     client.about(['leg.scale'])
@@ -267,7 +256,7 @@ def test_a_change_is_answered_and_messages_are_handled_while_a_worker_prepares_i
     assert node.get_parameter('leg.scale').value == 1.5
     assert not node.is_settled and node.adopted[-1][1] == 1.0
     node.free.set()
-    settled(graph, node)
+    graph.until(lambda: node.is_settled)
     assert node.prepared[-1][0] is not threading.main_thread()
     assert node.adopted[-1] == (threading.main_thread(), 1.5)
 
@@ -284,7 +273,7 @@ def test_of_a_hundred_changes_each_is_answered_and_the_newest_prepared_and_annou
     results = client.set(*[('leg.scale', 52.0 + number) for number in range(50)])
     assert [result.successful for result in results] == [True] * 50
     node.free.set()
-    settled(graph, node)
+    graph.until(lambda: node.is_settled)
     assert node.adopted[-1][1] == 101.0 and len(node.begun) == begun + 1
     # First all parameters, then the scale that held up the worker, and the last one.
     graph.until(lambda: len(announced) > 2)
@@ -387,7 +376,7 @@ def test_a_mistake_while_a_scene_is_prepared_leaves_the_one_before(graph):
     assert node.adopted[-1][1] == 1.0
     assert client.set(('leg.crank.offset', 0.0))[0].successful
     assert client.set(('leg.scale', 4.0))[0].successful
-    settled(graph, node)
+    graph.until(lambda: node.is_settled)
     assert node.adopted[-1][1] == 4.0
 
 

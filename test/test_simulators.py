@@ -48,12 +48,7 @@ def model(mechanisms, frame_id='world', **given):
 
 
 class Simulation(MuJoCo):
-    """A model in MuJoCo, at its start."""
-
-    def __init__(self, text):
-        super().__init__(text)
-        self.library.mj_resetDataKeyframe(self.model, self.data, 0)
-        self.library.mj_kinematics(self.model, self.data)
+    """A model in MuJoCo that moves."""
 
     def places(self, names):
         return {name: self.data.body(name).xpos.copy() for name in names}

@@ -3,6 +3,7 @@
 
 """Frames: the markers that the page draws, from the bytes of any publisher."""
 
+import itertools
 import json
 import math
 
@@ -75,7 +76,8 @@ def test_lines_and_triangles_are_told_apart_by_their_ids(type_, id_, kind):
 
 @pytest.mark.parametrize('text', [
     b'', b'\0\1\0\0', b'\xff' * 64, walker(1)[:99], walker(1)[:4] + b'\xff' * 500, *(
-        spoilt(part, number) for part in range(4) for number in (math.nan, -1e300))])
+        spoilt(part, number) for part in range(4) for number in (math.nan, -1e300))],
+    ids=itertools.count())  # padding between fields is whatever was in memory
 def test_of_what_cannot_be_drawn_nothing_stays(text):
     topic = feed_of_a_leg()
     for topic.newest in (walker(0), text, walker(2)):

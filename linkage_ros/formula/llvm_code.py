@@ -76,7 +76,7 @@ class Builder(ir.IRBuilder):
         return self.call(function, operands)
 
     @contextmanager
-    def each(self, last: ir.Value, first: ir.Value, step: int = 1) -> Iterator[ir.Value]:
+    def each(self, last: ir.Value, first: ir.Value, step: int) -> Iterator[ir.Value]:
         """Write a loop over the integers from `first` to `last`, exclusive; yield the integer."""
         before = self.block
         head, body, end = (self.function.append_basic_block() for _ in range(3))

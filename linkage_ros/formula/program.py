@@ -42,21 +42,6 @@ ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
     **{name: row.numpy for name, row in OPERATIONS.items()}, 'nan': np.nan, 'inf': np.inf})
 
 
-def _of_one(name: str) -> Callable:
-    """Return a function of `FLOATS` on one number of numpy, NaN where it raises."""
-    def function(*operands: float) -> np.float64:
-        try:
-            return np.float64(FLOATS.names[name](*operands))
-        except ValueError:
-            return np.float64(math.nan)
-
-    return function
-
-
-# As `FLOATS`, bit for bit, but with the operators of numpy's numbers, which do not raise.
-ONE_POSE = Dialect(ARRAYS.templates, {
-    **ARRAYS.names, **{name: _of_one(name) for name in ('sin', 'cos', 'atan2')}})
-
 
 def evaluate(node: Real, dimensions: Mapping, known: dict) -> Any:
     """Evaluate an expression of dimensions alone; `known` is shared between calls."""
@@ -133,10 +118,6 @@ class _Variant:
     @cached_property
     def float(self) -> Callable:
         return _python(self.listing, FLOATS, self.arguments)
-
-    @cached_property
-    def one_pose(self) -> Callable:
-        return _python(self.listing, ONE_POSE, self.arguments)
 
     @cached_property
     def array(self) -> Callable:
@@ -221,9 +202,7 @@ class CompiledFunction:
 
     def _quietly(self, *arguments: float) -> tuple:
         """Return the outputs at one pose with inf or nan where Python's floats raise."""
-        with np.errstate(all='ignore'):
-            return tuple(map(float, self.variant.one_pose(*self.constants)(
-                *map(np.float64, arguments))))
+        return tuple(self._blocks([np.array([float(x)]) for x in arguments], 1)[:, 0].tolist())
 
     def on(self, dialect: Dialect) -> Callable:
         """Return the function of arrays in a dialect of `ARRAYS`, which returns a tuple."""

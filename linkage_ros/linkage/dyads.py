@@ -31,6 +31,7 @@ from typing import (
     Union,
 )
 
+from .geometry.builder import bar_name
 from .tolerances import ROUNDING
 
 Pin = Tuple[str, complex]
@@ -87,11 +88,6 @@ def short(value: float, near: float = 2e-16) -> str:
         return '0'
     return next((text for text in (f'{value:.{digits}g}' for digits in range(1, 13))
                  if abs(float(text) - value) <= near), repr(float(value)))
-
-
-def bar_name(joint: str, tip: str) -> str:
-    """Return the name of a bar's link."""
-    return ('' if len(joint + tip) == 2 else '_').join((joint, tip))
 
 
 class Dyads:

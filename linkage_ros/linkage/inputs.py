@@ -82,7 +82,7 @@ class Input(NamedTuple):
 
     def whole_turns(self, near: float) -> float:
         """Return the turns around which values are computed, if not those around zero."""
-        if not self.is_part:
+        if not (self.is_part and math.isfinite(near)):
             return 0.0
         # Half of what is computed lies on both sides of a value by at least a quarter of it.
         half = math.floor((self.high - self.low) / (2.0 * math.tau))

@@ -117,10 +117,10 @@ class Mechanism(Kinematics):
         inverse = self.inverse((output, *(input_.name for input_ in self.inputs[1:])))
         if near is not None:
             return inverse.nearest((value, *fixed), (near, *fixed))[0][0]
-        value = numbers('value', value)
-        if value.ndim:
+        if type(value) is not float and numbers('value', value).ndim:
             return inverse.over(value, *fixed)[0][0]
-        found = inverse.all((float(value), *fixed))
+        wanted: Any = (value, *fixed)
+        found = inverse.all(wanted)
         return np.array([answer.inputs[0] for answer in found] or [math.nan])
 
     def _fixed(self, others: Any) -> Tuple[float, ...]:

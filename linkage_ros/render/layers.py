@@ -199,8 +199,8 @@ class Floor:
     MARKS = 9  # per turn
 
     def __init__(self, axes, mechanism, cycle, unit):
-        tracer = mechanism.linkage.points.index(mechanism.tracer)
-        feet = cycle.course[:, :, tracer]
+        self._tracer = mechanism.linkage.points.index(mechanism.tracer)
+        feet = cycle.course[:, :, self._tracer]
         lowest = np.nan_to_num(feet[:-1, :, 1], nan=np.inf).argmin(axis=1)
         steps = np.diff(feet[:, :, 0], axis=0)[np.arange(len(lowest)), lowest]
         self._way = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
@@ -208,7 +208,6 @@ class Floor:
         turn = abs(self._way[-1])
         stride = max(np.ptp(self._way), MIN_STRIDE * mechanism.scale * mechanism.linkage.longest)
         self.spacing = turn / self.MARKS if turn > 0.1 * stride else 0.5 * stride
-        self._tracer = tracer
         self._axes = axes
         style = {'color': FLOOR, 'zorder': 1, 'capstyle': 'round'}
         self._line, self.marks = (axes.add_collection(
@@ -242,14 +241,15 @@ class Headline:
 
     def show(self, pose):
         """Update the text."""
-        texts = readings(self._linkage, pose.inputs) if self._has_readings else []
+        short = self._columns == 2
+        texts = readings(self._linkage, pose.inputs, short) if self._has_readings else []
         # Spaces as wide as a digit: a reading hardly moves those after it.
         rows = ['  '.join(text.ljust(11, '\u2007') for text in texts[k:k + self._columns])
                 for k in range(0, len(texts), self._columns)]
         self.text.set_text('\n'.join([*self._fixed_lines, *rows]))
 
 
-def readings(linkage, inputs):
+def readings(linkage, inputs, short=False):
     """Return texts of the inputs and, for a slotted lever, of its angle and the ratios."""
     if not hasattr(linkage, 'reduction'):
         return [reading(re.sub(r'^crank(?=\d*$)', 'θ', input_.name), value) if input_.turns
@@ -257,9 +257,11 @@ def readings(linkage, inputs):
                 for input_, value in zip(linkage.inputs, inputs)]
     theta = math.remainder(inputs[0], math.tau)
     lever = float(linkage.joint_angles(theta)['lever'])
-    return [reading('θ', theta), reading('φ', lever),
-            f'φ/θ = {rounded(lever / theta, 3) if theta else "–"}',
-            f'dφ/dθ = {rounded(float(linkage.reduction(theta)), 3)}']
+    angles = [reading('θ', theta), reading('φ', lever)]
+    if short:
+        return angles
+    return angles + [f'φ/θ = {rounded(lever / theta, 3) if theta else "–"}',
+                     f'dφ/dθ = {rounded(float(linkage.reduction(theta)), 3)}']
 
 
 def reading(name, angle):

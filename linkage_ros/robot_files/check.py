@@ -152,21 +152,19 @@ class _Loops:
         self._misfit = component.errors(self._pose)[0]
 
     def report(self) -> str:
-        """Return the report; raise Difference if loops are open, or in fewer than MIN_POSES."""
+        """Return the report; raise Difference as `_walk_to` does, or for another start."""
         self._check_start()
         low, high = corners = np.array([
             self._ends.get(source, (value,) * 2) for source, value in self._start.items()]).T
         walk, beyond = self._walk_to(corners if len(self._ends) == 1 else np.random.default_rng(
             1).uniform(low, high, (PATHS, len(low))))
-        if (count := walk.good.sum()) < MIN_POSES:
-            raise Difference(f'it could not be checked in more than {count} poses')
         moved = ', '.join(f'{source} from {min(values.min(), first):.4g} to '
                           f'{max(values.max(), first):.4g}' for source in self._ends
                           for first, values in [(self._start[source],
                                                  walk.joints[source][walk.good])])
-        return (f'Checked: {", ".join(made.name for made in self._parts)}: in {count} poses of '
-                f'the robot, {moved}, its loops stand open by {walk.gaps[walk.good].max():.0e} m '
-                f'at most{beyond}.')
+        names, gaps = ', '.join(made.name for made in self._parts), walk.gaps[walk.good]
+        return (f'Checked: {names}: in {gaps.size} poses of the robot, {moved}, its loops stand '
+                f'open by {gaps.max():.0e} m at most{beyond}.')
 
     def _check_start(self) -> None:
         """Raise Difference if a joint is not where the file has it."""
@@ -186,10 +184,9 @@ class _Loops:
         Return a walk of the sources to targets, a row each, and why it ends before, if it does.
 
         The way is shorter where too few of its poses are closed. Raises Difference if the loops
-        stand open, or have no pose where the robot has one.
+        stand open, have no pose where the robot has one, or are closed in fewer than MIN_POSES.
         """
-        start, beyond = np.array([*self._start.values()]), ''
-        walk = self._walk(start[None], 0)
+        start, beyond, count = np.array([*self._start.values()]), '', 0
         for _ in range(3):
             targets = targets[np.max(np.abs(targets - start), axis=1) > 1e-9]
             if not len(targets):
@@ -199,10 +196,10 @@ class _Loops:
                 if not walk.good[path].all():
                     self._check_end(walk, path, step)
                     beyond = '; not beyond where its loops end'
-            if walk.good.sum() >= MIN_POSES:
-                break
+            if (count := walk.good.sum()) >= MIN_POSES:
+                return walk, beyond
             targets = start + (targets - start) * walk.good.mean(axis=1)[:, None]
-        return walk, beyond
+        raise Difference(f'it could not be checked in more than {count} poses')
 
     def _walk(self, targets: np.ndarray, steps: int) -> Walk:
         """
@@ -212,7 +209,7 @@ class _Loops:
         opens it by its error in angle times the loops' size.
         """
         component, start = self._component, np.array([*self._start.values()])
-        parts = np.arange(1, steps + 1) / max(steps, 1)
+        parts = np.arange(1, steps + 1) / steps
         sources = dict(zip(self._start, np.moveaxis(
             start + (targets - start)[:, None] * parts[:, None], -1, 0)))
         joints = self._positions(sources)

@@ -199,8 +199,7 @@ class SceneMechanism:
         # The scale lengthens the lever arms of forces; moments do not depend on it.
         loads = {name: load if isinstance(load, float) else tuple(
             self.scale * part for part in load) for name, load in self.loads.items()}
-        efforts = self.linkage.effort(self.theta(values), loads)
-        return tuple(divided(efforts.tolist(), self.scales))
+        return tuple(divided(self.linkage.effort(self.theta(values), loads).tolist(), self.scales))
 
     def assembly(self) -> Assembly:
         """Return the solver of all legs."""

@@ -45,8 +45,7 @@ def ends(mechanism: SceneMechanism, parameter: Parameter) -> Optional[Arc]:
     if key == 'start':
         tried = [value, *(end for arc in mechanism.inputs[what].reach for end in arc)]
     elif key == 'offset':
-        half = math.pi * mechanism.inputs[what].input.size
-        tried = [value - half, value + half]
+        tried = [value + side * math.pi * mechanism.inputs[what].input.size for side in (-1, 1)]
     else:
         tried = [0.1 * value, 10.1 * value]
     return max(min(tried), -MAX_END), min(max(tried), MAX_END)

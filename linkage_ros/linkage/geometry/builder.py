@@ -57,6 +57,11 @@ class Link(NamedTuple):
     tip: str
 
 
+def bar_name(joint: str, tip: str) -> str:
+    """Return the name of a bar's link."""
+    return ('' if len(joint + tip) == 2 else '_').join((joint, tip))
+
+
 class Gear(NamedTuple):
     """A geared input: another input times a ratio, plus an offset [rad or m]."""
 
@@ -518,7 +523,7 @@ class Builder:
         Its tip is on it if that has a length [m]. Its angle is counted from `start` [rad], seen
         from its parent: the link that the joint belongs to, unless another is given.
         """
-        name = name or ('' if len(joint + tip) == 2 else '_').join((joint, tip))
+        name = name or bar_name(joint, tip)
         self._check_new(name)
         parent, start = parent or self.points[joint].link, start or real(0.0)
         zero = Complex(0.0, 1.0) if start.value else Complex(1.0, 0.0)

@@ -234,9 +234,7 @@ class Inverse:
 
     def _all(self, values: Row, seed: Row = ()) -> List[Row]:
         """Return all solutions in order, those in the turns around `seed` if these are many."""
-        if seed and self._is_part:
-            return self._in_turns(values, seed, Inverse._solved)
-        return self._solved(values)
+        return self._in_turns(values, seed, Inverse._solved)
 
     def _in_turns(self, values: Row, seed: Row, solve: Callable) -> List[Row]:
         """
@@ -244,8 +242,6 @@ class Inverse:
 
         Of an input with very many turns, an inverse has the solutions of those around zero.
         """
-        if not all(map(math.isfinite, (*values, *seed))):
-            return []
         turns = [input_.whole_turns(x) for input_, x in zip(self.inputs, seed)]
         if not any(turns):
             return solve(self, values, seed)

@@ -295,12 +295,12 @@ class _Sketch(Dyads):
                 places = self._named[joint][level[joint]], frame[joint]
                 return Hinge((level[joint], body), places, 1.0,
                              -cmath.phase(frame[second] - frame[first]), output)
-        for start, end, turn in ((first, second, along), (second, first, -along)):
+        for start, end in ((first, second), (second, first)):
             if start in level:
-                body = self._pin(start, output, turn)
-                slides.append(self._guided(end, f'{output} pin', body, 1.0 + 0.0j, turn))
+                body = self._pin(start, output, along)
+                slides.append(self._guided(end, f'{output} pin', body, 1.0 + 0.0j, along))
                 return Hinge((level[start], body), (self._named[start][level[start]], 0.0j), 1.0,
-                             0.0 if start == first else math.pi, output)
+                             0.0, output)
         raise ValueError(f'neither joint of {output} is on a body that never turns')
 
     def place_in_pose(self, body: str, place: complex) -> complex:

@@ -22,7 +22,7 @@ from ..kinematics import Kinematics
 from ..motion.curves import ascending, CUTS, extremes, refined, sampled, turning_points
 from ..motion.reach import MAX_ENDS, reach_of
 from ..motion.singularities import Analysis, NEAR
-from ..tolerances import CLOSE, LEAST, ONE, ROUNDING, SINGULAR, TOLERANCE
+from ..tolerances import CLOSE, ONE, ROUNDING, SINGULAR, TOLERANCE
 
 # Rounding of a pose, which that of all joints may explain: so many ulps of an input, or multiples
 # of the rounding of one sum.
@@ -307,7 +307,6 @@ class Segments:
             rising = rate[places] >= 0.0
             at, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
                 x.shape) == rising[:, None], theta[places], theta[places + 1])
-        at = np.where(np.abs(at) < LEAST, 0.0, at)
         found = self._curve(at)[0] if len(at) else at
         # An extreme may be the one input at which an arm has no length and no direction.
         at = np.where(np.isfinite(found), at, theta[places])
@@ -318,10 +317,7 @@ class Segments:
         for first, last in zip(cuts, cuts[1:]):
             part = slice(first, last + 1)
             sign = 1.0 if value[last] >= value[first] else -1.0
-            values = sign * value[part]
-            # An extreme in noise has a value of its own.
-            values[0] = values[:2].min()
-            yield Segment(theta[part], np.maximum.accumulate(values), sign)
+            yield Segment(theta[part], np.maximum.accumulate(sign * value[part]), sign)
 
     def _slack(self, number: int, end: int) -> float:
         """Return how far beyond an end of a segment, 0 or -1, values are those of the end."""

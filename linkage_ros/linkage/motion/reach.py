@@ -20,7 +20,6 @@ from .curves import ascending, HALVINGS, lowest, near_misses, refined, sampled
 from ..geometry.planar import Limit
 from ..inputs import Arc, CRANK, Input
 from ..kinematics import Kinematics
-from ..tolerances import ONE
 
 # Fraction at which an arc is tested: in the exact middle, an arm of a symmetric linkage may have
 # no length.
@@ -52,6 +51,7 @@ def _reach(linkage: Kinematics, others: Tuple[float, ...]) -> List[Arc]:
     def assembled(theta: Any) -> Any:
         return _failing(margins, theta) == len(limits)
 
+    # The angle of a geared crank, or of another input, is no leaf of this one.
     closed = [limit for limit in limits if limit.ends and limit.ends.theta.args[0] == 0]
     # Without a whole period, the turns on both sides of zero.
     first, last = (0.0, input_.turn) if input_.wraps else (input_.low - math.tau / step,
@@ -153,11 +153,11 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
         return [(input_.low, input_.high)]
     found: List[Arc] = []
     for lo, hi in reached:
-        if found and lo - found[-1][1] <= ONE:
+        if found and lo == found[-1][1]:
             found[-1] = found[-1][0], hi
         else:
             found.append((lo, hi))
-    if input_.wraps and len(found) > 1 and found[0][0] + input_.turn - found[-1][1] <= ONE:
+    if input_.wraps and len(found) > 1 and found[0][0] + input_.turn == found[-1][1]:
         found[-1] = found[-1][0], found.pop(0)[1] + input_.turn
     return [(lo - input_.turn, hi - input_.turn) if input_.wraps and lo >= input_.high
             else (lo, hi) for lo, hi in found]
