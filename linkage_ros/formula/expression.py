@@ -86,6 +86,8 @@ class Real:
                 return one
             if one.value == 1.0:
                 return rest
+            if one.value is not None and one.value < 0.0 and rest.value is None:
+                return -(real(-one.value) * rest)
         for one, rest in ((self, other), (other, self)):
             if one.op == 'negative':
                 return -(one.args[0] * rest)

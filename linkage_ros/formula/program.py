@@ -42,7 +42,6 @@ ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
     **{name: row.numpy for name, row in OPERATIONS.items()}, 'nan': np.nan, 'inf': np.inf})
 
 
-
 def evaluate(node: Real, dimensions: Mapping, known: dict) -> Any:
     """Evaluate an expression of dimensions alone; `known` is shared between calls."""
     evaluate_in_order(unknown([node], _OPERANDS, known), dimensions, known)

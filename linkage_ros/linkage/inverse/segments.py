@@ -22,7 +22,7 @@ from ..kinematics import Kinematics
 from ..motion.curves import ascending, CUTS, extremes, refined, sampled, turning_points
 from ..motion.reach import MAX_ENDS, reach_of
 from ..motion.singularities import Analysis, NEAR
-from ..tolerances import CLOSE, ONE, ROUNDING, SINGULAR, TOLERANCE
+from ..tolerances import CLOSE, LEAST, ONE, ROUNDING, SINGULAR, TOLERANCE
 
 # Rounding of a pose, which that of all joints may explain: so many ulps of an input, or multiples
 # of the rounding of one sum.
@@ -117,7 +117,8 @@ class Segments:
             max(abs(end) + offset, farthest))
             for end, side in zip(arc, (1.0, -1.0))) for arc in arcs]
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
-        if not 0 < len(runs) <= MAX_ENDS * max(1.0, sum(hi - lo for lo, hi in arcs) / math.tau) \
+        length = sum(hi - lo for lo, hi in arcs)
+        if not runs or len(self.jumps) > MAX_ENDS * max(1.0, length / math.tau) \
                 or not self._moves(runs):
             runs, self.jumps = [], []
         self.all = [segment for run in runs for segment in self._monotone(*run)]
@@ -293,11 +294,13 @@ class Segments:
                 (theta, new), (value, found[0]), (rate, found[1])))
 
     def _moves(self, runs: Sequence[Tuple]) -> bool:
-        """Return whether the output changes by more than rounding."""
+        """Return whether the output differs from its median, over a tenth of the reach."""
         values = np.concatenate([value for _, value, _ in runs])
-        # The median; np.median would import masked arrays, which takes 10 ms.
-        away = np.abs(self._difference(values - np.sort(values)[len(values) // 2]))
-        return bool((away > ULPS * self._rounding).any())
+        widths = np.concatenate([np.gradient(theta) for theta, _, _ in runs])
+        order, length = np.argsort(values), widths.sum()
+        median = values[order[np.searchsorted(widths[order].cumsum(), 0.5 * length)]]
+        away = np.abs(self._difference(values - median)) > ULPS * self._rounding
+        return bool(widths[away].sum() > 0.1 * length)
 
     def _monotone(self, theta: np.ndarray, value: np.ndarray, rate: np.ndarray
                   ) -> Iterator[Segment]:
@@ -310,6 +313,7 @@ class Segments:
         found = self._curve(at)[0] if len(at) else at
         # An extreme may be the one input at which an arm has no length and no direction.
         at = np.where(np.isfinite(found), at, theta[places])
+        at[abs(at) < LEAST] = 0.0
         found = value[places] + self._difference(
             np.where(np.isfinite(found), found, value[places]) - value[places])
         theta, value = np.insert(theta, places + 1, at), np.insert(value, places + 1, found)
