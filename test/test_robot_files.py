@@ -711,7 +711,7 @@ def moves(linkage, values, robot, steps):
 
 
 @pytest.mark.parametrize('seeds', [
-    range(4), pytest.param(range(4, 120), marks=pytest.mark.nightly)])
+    range(5), pytest.param(range(5, 120), marks=pytest.mark.nightly)])
 def test_random_linkages_come_back_from_robots(seeds):
     moved = 0
     for made in filter(None, map(random_robot, seeds)):
