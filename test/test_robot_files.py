@@ -538,6 +538,15 @@ def test_urdf_plus_names_the_joints_that_are_not_driven(tmp_path):
     assert readers.read(str(written(tmp_path, 'four_bar.urdf', *free, motor))).driven == ['motor']
 
 
+@pytest.mark.parametrize('pose', ['A=0.4', 'D=-0.5', 'A=0.4 B=-0.4 C=0.4', 'A=0.4 B=-0.4 D=0.4'])
+def test_positions_count_from_the_file_s_zero_whatever_its_pose(pose):
+    # Also that of the joint which closes the loop.
+    mechanism, = imported('four_bar.sdf', '--pose', *(f'joint_{each}' for each in pose.split()))
+    for angle in (-1.0, 0.7):
+        assert published(mechanism, joint_A=angle) == pytest.approx(
+            {'joint_A': angle, 'joint_B': -angle, 'joint_C': angle, 'joint_D': angle}, abs=1e-14)
+
+
 @pytest.mark.parametrize('joints', ['', 'B', 'D', 'BD', 'BC', 'BCD'])
 def test_a_universal_joint_of_an_sdf_is_a_pin(tmp_path, joints):
     text = (ROBOTS / 'four_bar.sdf').read_text()
@@ -652,7 +661,7 @@ def robot_of(linkage, values):
             if slides or name != link.joint:
                 home.setdefault(name, link.name)
     robot.driven = [each.name for each in linkage.inputs]
-    return robot
+    return robot.cut_loops()
 
 
 def random_linkage(seed, without=()):
