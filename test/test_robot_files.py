@@ -577,6 +577,22 @@ def test_a_misfit_is_printed_and_imported_if_it_is_small(tmp_path, lean, why):
     assert all(worst <= max(2.0 * lean, 1e-15) for _, worst in checked(err))
 
 
+def test_of_loops_in_space_the_planar_part_is_imported_alone(tmp_path):
+    # Its crank also moves a flap about another axis, by a rod on balls.
+    mechanism, = imported(file := written(tmp_path, 'four_bar.urdf', ('0 -1 0', '1e-5 -1 0'), (
+        '</robot>', """<link name="rod"/><link name="flap"/>
+          <joint name="hinge" type="continuous"><parent link="base_link"/><child link="flap"/>
+            <origin xyz="0 0.2 0"/><axis xyz="1 0 0"/></joint>
+          <joint name="ball" type="spherical"><parent link="crank"/><child link="rod"/>
+            <origin xyz="0 0 0.2"/></joint>
+          <loop_joint name="eye" type="spherical"><link1 link="rod" xyz="0 0.2 0"/>
+            <link2 link="flap" xyz="0 0 0.2"/></loop_joint></robot>""")))
+    assert re.search('Left out: .*: not planar: the axes of motor and hinge are 90 degrees from '
+                     'it.*axes lean by 1e-05 rad, .*Not published: hinge: ', said(file), re.DOTALL)
+    assert published(mechanism, motor=0.4) == pytest.approx(
+        {'motor': 0.4, 'elbow': -0.4, 'shoulder': -0.4})
+
+
 @pytest.mark.parametrize('low', [-0.5, 0.2])
 def test_a_motor_between_two_moving_links_drives_in_the_frame_of_one(tmp_path, low):
     # As in a parallelogram: the elbow turns back as far as the shoulder turns.
@@ -611,11 +627,6 @@ def test_a_joint_of_the_whole_robot_that_opens_a_loop_is_named(monkeypatch):
     monkeypatch.setattr(check, 'compared', lambda *_: found)
     assert f'Left out: hip: compared with the robot: {found[1]["hip"]}.' in refused(
         'wheel_leg.urdf', '--pose', 'hip=0')
-
-
-def test_a_comment_of_another_format_makes_no_urdf(tmp_path):
-    file = written(tmp_path, 'four_bar.sdf', ('</sdf>', '</sdf><!-- from <robot> -->'))
-    assert readers.description(str(file), readers.read(str(file))).startswith('<robot')
 
 
 @pytest.mark.nightly
