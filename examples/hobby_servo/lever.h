@@ -741,7 +741,7 @@ static inline int lever_solutions_angle_lever(const float *value,
     const float v18 = sqrtf((v9 * v9) + (v15 * v15));
     const float v19 = v9 / v18;
     const float v22 = v19 * 0.045f;
-    const float v27 = lkr_root((0.02f + v22) * (0.02f - v22), 1.154632e-18f);
+    const float v27 = lkr_root((0.02f + v22) * (0.02f - v22), 6.198883e-10f);
     const float v28 = v19 * v27;
     const float v30 = v15 / v18;
     const float v31 = v30 * v22;
