@@ -93,9 +93,8 @@ def _values(package_name: str, class_: str, mechanism: SceneMechanism, commanded
     named = [escape(comment(', '.join(axis.name for axis in axes))) for axes in sides]
     return {
         'package': package_name, 'namespace': f'{package_name}_plugins', 'class': class_,
-        'name': mechanism.name, 'n': str(len(commanded)), 'ranges': ranges(mechanism),
+        'name': mechanism.name, 'ranges': ranges(mechanism),
         'actuators': rows(sides[0]), 'joints': rows([*commanded, *others]),
-        'joint_count': str(len(commanded) + len(others)),
         'passive_function': f'{mechanism.name}_passive' if others else 'nullptr',
         'axes': ' and '.join(named),
         'lines': '\n'.join(f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(axis.role)}/>'

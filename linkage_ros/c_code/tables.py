@@ -87,7 +87,9 @@ class Tables:
         lines = [f'{self.mechanism.name}_pose s, {", ".join(self._formulas.by)};',
                  f'(void){self._formulas.call()};']
         for i, each in enumerate(axes):
-            lines += self._assigned(each, f'position[{i}]', f'rate[{i}]')
+            speeds = [f'{rate} * speed[{j}]' for j, rate in enumerate(self._rates(each))]
+            lines += [*self._positions(each, f'position[{i}]'),
+                      f'velocity[{i}] = {" + ".join(speeds)};']
         return filled(template('passive.h.in'), {
             'name': self.mechanism.name, 'number': self._code.number,
             'body': '\n'.join(indented(lines))})
@@ -102,7 +104,9 @@ class Tables:
         yield f'{self.mechanism.name}_pose s, {", ".join(formulas.by)};'
         yield from (f'if (!{formulas.call()}) {{', '    return 0;', '}')
         for place, each in places.items():
-            yield from self._assigned(each, f'p->position{place}', f'p->rate{place}')
+            yield from self._positions(each, f'p->position{place}')
+            yield from (f'p->rate{place}[{j}] = {rate};'
+                        for j, rate in enumerate(self._rates(each)))
         # An inverse alone needs no efforts.
         powers = [*loads(self.mechanism)] if sides[0] else []
         for j, (by, unit) in enumerate(zip(formulas.by, self._units)):
@@ -112,16 +116,19 @@ class Tables:
             yield f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
         yield f'return isfinite({" + ".join(f"p->position{place}" for place in places)});'
 
-    def _assigned(self, axis: Axis, position: str, rate: str) -> List[str]:
-        """Return the statements for the position of an axis, and its rates by each input."""
-        code, field = self._code, self._formulas.fields[axis.output]
-        factor = axis.factor / self.mechanism.scale_of(axis.output)
+    def _positions(self, axis: Axis, place: str) -> List[str]:
+        """Return the statements for the position of an axis."""
+        code, factor = self._code, axis.factor / self.mechanism.scale_of(axis.output)
         offset = f' + {code.literal(axis.offset)}' if axis.offset else ''
-        return [
-            f'{position} = {code.times(f"s.{field}", factor)}{offset};',
-            *[f'{position} -= lkr_turns({position}, {code.literal(math.tau)});'] * axis.wraps,
-            *(f'{rate}[{j}] = {code.times(f"{by}.{field}", factor * unit)};'
-              for j, (by, unit) in enumerate(zip(self._formulas.by, self._units)))]
+        field = self._formulas.fields[axis.output]
+        return [f'{place} = {code.times(f"s.{field}", factor)}{offset};',
+                *[f'{place} -= lkr_turns({place}, {code.literal(math.tau)});'] * axis.wraps]
+
+    def _rates(self, axis: Axis) -> List[str]:
+        """Return the code of the rates of an axis by each input."""
+        factor = axis.factor / self.mechanism.scale_of(axis.output)
+        return [self._code.times(f'{by}.{self._formulas.fields[axis.output]}', factor * unit)
+                for by, unit in zip(self._formulas.by, self._units)]
 
     # --- tables ---
 
