@@ -35,6 +35,7 @@ from ...formula.expression import (
     dot,
     Real,
     square_root,
+    substituted,
 )
 
 # Assembly modes at most, in all turns.
@@ -90,6 +91,12 @@ class InverseLinkage(NamedTuple):
     modes: Tuple[Mode, ...]
     turns: Tuple[Tuple[float, ...], ...]
     arguments: Dict[Real, Real]
+
+    def solutions(self) -> List[List[Real]]:
+        """Return the inputs in each mode and its turns, as expressions of the outputs."""
+        return [substituted([value + turn for value, turn in zip(mode.inputs, turns)],
+                            self.arguments)
+                for mode in self.modes for turns in product(*self.turns)]
 
     def __str__(self) -> str:
         comments = {}
