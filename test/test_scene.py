@@ -323,6 +323,12 @@ def test_the_slider_of_a_length_that_nothing_limits_changes_it_by_nine_times_its
     assert ends(SIGNED, 'own.dimensions.v') == pytest.approx((-3.0, 2.4), abs=0.06)
 
 
+def test_a_slider_ends_where_a_length_is_no_number():
+    rooted = [line.replace('line O A v', 'line O A sqrt(1-v)') for line in SIGNED['own.joints']]
+    low, high = ends({**SIGNED, 'own.joints': rooted, 'own.dimensions.v': 0.5}, 'own.dimensions.v')
+    assert low == pytest.approx(-4.0) and 0.9 < high < 1.0
+
+
 ACTUATED = {**OWN, 'own.dimensions.h': 0.0, 'own.dimensions.c': 2.0, 'own.joints': [
     'O ground 0 0', 'P ground 1 h', 'B cylinder P O 1.5 left', 'C crank O c called tilt']}
 
