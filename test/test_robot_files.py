@@ -358,9 +358,9 @@ def test_angles_that_are_rounded_in_the_file_are_in_one_plane(tmp_path):
 @pytest.mark.parametrize('sign', [1, -1])
 def test_a_jaw_slides_as_its_crank_and_rod_say(tmp_path, sign):
     # Seen from either end of its slide.
-    ends = '<parent>palm</parent><child>finger</child>', '<parent>finger</parent><child>palm</child>'
-    mechanism, = imported(written(
-        tmp_path, 'slider_crank.sdf', (ends[0], ends[sign < 0])))
+    ends = '<parent>{}</parent><child>{}</child>'
+    mechanism, = imported(written(tmp_path, 'slider_crank.sdf', (
+        ends.format('palm', 'finger'), ends.format(*['palm', 'finger'][::sign]))))
     rod = abs(complex(0.0548, 0.013) - cmath.rect(0.0175, 0.4))
     for angle in np.linspace(-2.0, 2.0, 25):
         pin = cmath.rect(0.0175, 0.4 + angle)

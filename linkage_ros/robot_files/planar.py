@@ -175,7 +175,7 @@ class Drawing(Dyads):
         return link, joint.motion(body), phase(along / self.parts[base].along)
 
     def _measuring(self, pin: str, base: str, body: str) -> Tuple[str, complex]:
-        """Add a bar on a body, always parallel to one of another; return its link and direction."""
+        """Add a bar that is always parallel to one of a body; return its link and direction."""
         (other, end), start = self.other(body, pin), self.on[body][pin]
         along = end - start
         foot = next((name for name in self.on[base]
