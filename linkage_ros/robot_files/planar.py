@@ -189,8 +189,6 @@ class Drawing(Dyads):
                 or self.fixed(base, self.on[base][pin] + corner)[0]
             line = f'parallelogram {pin} {foot} {other}'
         name = self.name(self.on[base][foot] + along, body, line)
-        # It is on a link of its own: nothing of the body is to be placed from it.
-        del self.on[body][name]
         return bar_name(foot, name), along
 
     def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> Tuple[str, str]:
