@@ -103,12 +103,6 @@ def test_the_cusp_of_the_drop_has_all_digits_across_its_axis():
             2.0 / 9.0 * theta ** 3, rel=1e-9, abs=0.0)
 
 
-def test_peaucellier_s_line_is_exactly_straight():
-    cell = mechanisms.create('peaucellier')
-    (low, high), = cell.reach()
-    assert np.ptp(cell.solve(np.linspace(low, high, 99), (cell.tracer,))[cell.tracer][:, 0]) == 0.0
-
-
 def straight_part(linkage, degrees, samples=4001):
     """Return P and its speed while the crank is within so many degrees about pi."""
     theta = math.pi + np.linspace(-0.5, 0.5, samples) * math.radians(degrees)
