@@ -145,12 +145,13 @@ def prove(package, mechanism, compiler):
     """Compile the proof for a mechanism of a package and run it, with sanitizers, too."""
     name, program = mechanism.name, package / f'proof_{mechanism.name}'
     code = (package / 'src' / f'{name}.hpp').read_text()
-    class_, space = re.search(r'struct (\w+)Code', code)[1], re.search(r'namespace (\w+)', code)[1]
+    space = re.search(r'namespace (\w+)', code)[1]
     for count, flags in ((100_000, ()), (5000, SANITIZED)):
         subprocess.run([
-            compiler, *PLUGIN, '-O2', *flags, f'-DNAME={name}', f'-DCLASS={class_}',
-            f'-DNAMESPACE={space}', f'-DRANGES={ranges(mechanism)}', '-I', package / 'src',
-            '-I', package / 'include', STAND_IN / 'proof.cpp', '-o', program, *PLUGIN], check=True)
+            compiler, *PLUGIN, '-O2', *flags, f'-DNAME={name}', f'-DNAMESPACE={space}',
+            f'-DINPUTS={len(mechanism.inputs)}', f'-DRANGES={ranges(mechanism)}', '-I',
+            package / 'src', '-I', package / 'include', STAND_IN / 'proof.cpp', '-o', program,
+            *PLUGIN], check=True)
         ended = subprocess.run([program, str(count)], capture_output=True, text=True)
         assert ended.returncode == 0, ended.stdout + ended.stderr
         tried, good = map(int, re.search(r'(\d+) states, (\d+)', ended.stdout).groups())

@@ -148,6 +148,10 @@ INVERSES = [
     (['O ground 0 0', 'Q ground 0.5 0.25', 'A crank O 0.8',
       'D crank Q 0.288 geared crank 0.5 0.96', 'B dyad A D 2.05 2.54 left'], 'angle(A,B)',
      {'inputs': [6.151306541], 'nears': [6.52, 6.2, 6.15, 5.0]}),
+    # A series of a length, in a scene of another scale.
+    ({'type': 'custom', 'scale': 2.0, 'joints': [
+        'O ground 0 0', 'Q ground 0 1.4', 'C cylinder Q O 1.0157 right', 'R ground 2 0.3',
+        'D dyad C R 1.5 1.1 left', 'E rigid C D 0.7 0.8 left']}, 'E.y', {'close': 1e-13}),
     # It has modes that no single pose shows.
     (['A ground 0 0', 'B ground 0 1.4', 'C cylinder B A 1.0157 right',
       'D E F inversor B C 1.2375 0.3369'], 'DE', {'parts': np.linspace(0.02, 0.98, 41)}),

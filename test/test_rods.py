@@ -11,6 +11,7 @@ import gmpy2
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
 from linkage_ros.linkage import FORMS, WindowError
+from linkage_ros.linkage.geometry import window as proof
 import numpy as np
 import pytest
 from truth import rods
@@ -252,6 +253,40 @@ def test_the_two_poses_of_refused_limits_are_two_poses(seed):
                 assert max(abs(np.subtract(poses[:2], poses[2:]))) > 1e-2
                 found += 1
     assert found
+
+
+def test_in_boxes_of_poses_motors_and_gradients_are_inside_the_bounds_of_the_proof():
+    rng = np.random.default_rng(5)
+
+    def holds(boxes, values, turn=math.tau):
+        gaps = values - boxes.middle
+        return np.all(abs(gaps - turn * np.round(gaps / turn)) <= boxes.half + 1e-9)
+
+    for _ in range(20):
+        (a, u, v), (k, e, f) = paths = [
+            [3.0 * x, *rng.uniform(0.2, 2.0) * np.linalg.qr(rng.normal(size=(3, 2)))[0].T]
+            for x in rng.normal(size=(2, 3))]
+        pivot, end = (proof.Circle(*(proof.Vector(*x) for x in path)) for path in paths)
+        half, middle = 10.0 ** rng.uniform(-2.0, -0.3, (3, 400)), rng.uniform(-3, 3, (3, 400))
+        # Many of them at corners.
+        theta, p, r = (middle + half * (1.5 * rng.uniform(-1, 1, half.shape)).clip(-1, 1))
+        q, ahead = (np.outer(x, np.cos(r)) + np.outer(y, np.sin(r)) for x, y in ((e, f), (f, -e)))
+        turn = np.array([[np.cos(p), -np.sin(p), 0 * p], [np.sin(p), np.cos(p), 0 * p],
+                         [0 * p, 0 * p, 1 + 0 * p]])
+        b, by_r = (np.einsum('ijn,jn->in', turn, x) for x in (q + k[:, None], ahead))
+        off = a[:, None] + np.outer(u, np.cos(theta)) + np.outer(v, np.sin(theta)) - b
+        moved = np.outer(v, np.cos(theta)) - np.outer(u, np.sin(theta))
+        rod = proof.WindowRod(pivot, end, np.linalg.norm(off, axis=0),
+                               np.sign((off * moved).sum(axis=0)))
+        poses = proof.Boxes(middle[1:], half[1:])
+        assert holds(rod.ranges(poses), theta)
+        wide = rng.uniform(0.0, math.pi, theta.shape)
+        others = proof.Boxes(theta + wide * rng.uniform(-1, 1, theta.shape), wide)
+        assert holds(rod.shared(rod.ranges(poses), others), theta)
+        gradient = off[0] * b[1] - off[1] * b[0] - 1j * (off * by_r).sum(axis=0)
+        assert holds(rod.directions(proof.Boxes(middle[0], half[0]), poses), np.angle(gradient))
+        rod = proof.WindowRod(pivot._replace(u=3 * (0.0,), v=3 * (0.0,)), end, None, 0.0)
+        assert holds(rod.ranges(poses), np.linalg.norm(a[:, None] - b, axis=0), 1e9)
 
 
 @pytest.fixture(scope='module')

@@ -175,7 +175,7 @@ typedef struct {
     lkr_real scale, turn;
 } lkr_axis;
 
-/* A linkage. Inputs q are in rad or in sizes. */
+/* A linkage. Inputs q are in the scene's units. */
 typedef struct {
     int inputs;
     /* The pose at inputs; returns 0 if it cannot be assembled. */
@@ -186,8 +186,8 @@ typedef struct {
     lkr_axis axis[2][LKR_MAX_INPUTS];
     /* After how much of each input the actuators or the joints repeat, or 0. */
     lkr_real turn[2][LKR_MAX_INPUTS];
-    /* The unit of each input, in those of the scene; where it starts, and its sweep. */
-    lkr_real unit[LKR_MAX_INPUTS];
+    /* The size of each input, where it starts, and its sweep. */
+    lkr_real size[LKR_MAX_INPUTS];
     lkr_real start[LKR_MAX_INPUTS];
     lkr_real sweep[LKR_MAX_INPUTS][2];
 } lkr_model;
@@ -276,15 +276,19 @@ static inline int lkr_input_change(const lkr_model *model, int side, const lkr_p
     lkr_real least, const lkr_real *change, lkr_real *x)
 {
     lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS];
-    int i, j;
+    int i, j, is_regular;
     for (i = 0; i < model->inputs; i++) {
         const lkr_real scale = model->axis[side][i].scale;
         for (j = 0; j < model->inputs; j++) {
-            a[i][j] = p->rate[side][i][j] * scale;
+            a[i][j] = p->rate[side][i][j] * scale * model->size[j];
         }
         x[i] = change[i] * scale;
     }
-    return lkr_solve(model->inputs, least, a, x);
+    is_regular = lkr_solve(model->inputs, least, a, x);
+    for (j = 0; j < model->inputs; j++) {
+        x[j] *= model->size[j];
+    }
+    return is_regular;
 }
 
 /* --- the inverse --- */
@@ -360,7 +364,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
     for (i = 0; i < model->inputs; i++) {
         for (j = 0; j < model->inputs; j++) {
             const lkr_real rate = LKR_MATH(fabs)(p->rate[side][i][j]) * model->axis[side][i].scale;
-            steepest = lkr_max(steepest, rate * lkr_max(1, LKR_MATH(fabs)(q[j])));
+            steepest = lkr_max(steepest, rate * lkr_max(model->size[j], LKR_MATH(fabs)(q[j])));
         }
     }
     return left <= LKR_CLOSE * lkr_min(steepest, LKR_STEEPEST);
@@ -372,28 +376,24 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
 static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_real *near,
     const lkr_real *x, lkr_real *q)
 {
+    const int is_command = side == LKR_JOINTS;
     lkr_real away = 0;
     int i;
     for (i = 0; i < model->inputs; i++) {
         const lkr_real low = model->sweep[i][0];
         const lkr_real high = model->sweep[i][1];
         const lkr_real turn = model->turn[side][i];
-        if (side == LKR_JOINTS) {
-            const lkr_real inside = lkr_min(lkr_max(near[i], low), high);
-            q[i] = x[i] + lkr_turns(inside - x[i], turn);
-            if (q[i] < low) {
-                q[i] += turn;
-            } else if (q[i] > high) {
-                q[i] -= turn;
-            }
-            if (q[i] < low || q[i] > high) {
-                return -1;
-            }
-        } else {
-            q[i] = x[i] + lkr_turns(near[i] - x[i], turn);
-            away += 10 * lkr_max(0, lkr_max(low - q[i], q[i] - high));
+        const lkr_real inside = lkr_min(lkr_max(near[i], low), high);
+        lkr_real beyond;
+        q[i] = x[i] + lkr_turns((is_command ? inside : near[i]) - x[i], turn);
+        if (is_command && (q[i] < low || q[i] > high)) {
+            q[i] += q[i] < low ? turn : -turn;
         }
-        away += LKR_MATH(fabs)(q[i] - near[i]);
+        beyond = lkr_max(0, lkr_max(low - q[i], q[i] - high));
+        if (is_command && beyond > 0) {
+            return -1;
+        }
+        away += (LKR_MATH(fabs)(q[i] - near[i]) + 10 * beyond) / model->size[i];
     }
     return isfinite(away) ? away : -1;
 }
@@ -465,18 +465,14 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
 static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *value, const lkr_real *near,
     lkr_real *inputs)
 {
+    const size_t size = (size_t)model->inputs * sizeof *inputs;
     lkr_real q[LKR_MAX_INPUTS] = { 0 };
     lkr_point p;
-    int i;
-    for (i = 0; i < model->inputs; i++) {
-        q[i] = near[i] / model->unit[i];
-    }
+    memcpy(q, near, size);
     if (!lkr_inverse(model, LKR_JOINTS, value, q, &p)) {
         return 0;
     }
-    for (i = 0; i < model->inputs; i++) {
-        inputs[i] = q[i] * model->unit[i];
-    }
+    memcpy(inputs, q, size);
     return 1;
 }
 
@@ -563,8 +559,9 @@ static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int si
         other[i] = side == LKR_JOINTS ? p->load[i] : -p->load[i];
         for (j = 0; j < model->inputs; j++) {
             other[i] += p->rate[side][j][i] * effort[j];
-            a[i][j] = p->rate[1 - side][j][i] * model->axis[1 - side][j].scale;
+            a[i][j] = p->rate[1 - side][j][i] * model->axis[1 - side][j].scale * model->size[i];
         }
+        other[i] *= model->size[i];
     }
     is_regular = lkr_solve(model->inputs, LKR_SINGULAR, a, other);
     for (i = 0; i < model->inputs; i++) {
@@ -741,7 +738,7 @@ static inline int lever_solutions_angle_lever(const float *value,
     const float v18 = sqrtf((v9 * v9) + (v15 * v15));
     const float v19 = v9 / v18;
     const float v22 = v19 * 0.045f;
-    const float v27 = lkr_root((0.02f + v22) * (0.02f - v22), 1.154632e-18f);
+    const float v27 = lkr_root((0.02f + v22) * (0.02f - v22), 6.198883e-10f);
     const float v28 = v19 * v27;
     const float v30 = v15 / v18;
     const float v31 = v30 * v22;
@@ -753,7 +750,7 @@ static inline int lever_solutions_angle_lever(const float *value,
     return 2;
 }
 
-/* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be assembled. */
+/* Positions and rates at inputs; 0 if it cannot be assembled. */
 static inline int lever_at(const float *q, lkr_point *p)
 {
     lever_pose s, by_crank;
@@ -775,11 +772,11 @@ static const lkr_model lever_model = {
     { { { 0, 1.0f, 0.0f, 1.0f, 0.0f, 1.0f, 0.0f } },
       { { -1, 0.0f, 0.0f, 1.0f, 0.0f, 1.0f, 6.2831855f } } },
     { { 0.0f }, { 6.2831855f } },
-    /* Of the inputs: units, start, sweeps. */
+    /* Of the inputs: sizes, start, sweeps. */
     { 1.0f }, { 0.0f }, { { -INFINITY, INFINITY } }
 };
 
-/* Positions and rates at inputs, each in rad or in its size; 0 if it cannot be assembled. */
+/* Positions and rates at inputs; 0 if it cannot be assembled. */
 static inline int lever_at_angle_lever(const float *q, lkr_point *p)
 {
     lever_pose s, by_crank;
@@ -799,7 +796,7 @@ static const lkr_model lever_model_angle_lever = {
     { { { -1, 0, 0, 0, 0, 0, 0 } },
       { { -1, 0.0f, 0.0f, 1.0f, 0.0f, 1.0f, 6.2831855f } } },
     { { 6.2831855f }, { 6.2831855f } },
-    /* Of the inputs: units, start, sweeps. */
+    /* Of the inputs: sizes, start, sweeps. */
     { 1.0f }, { 0.0f }, { { -INFINITY, INFINITY } }
 };
 

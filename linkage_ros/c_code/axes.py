@@ -80,9 +80,6 @@ def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
     if len({*outputs}) != len(mechanism.inputs):
         raise ValueError(f'{mechanism.name} has {len(mechanism.inputs)} inputs: as many of its '
                          f'joints are needed, not {listed(names)}')
-    if names and not _tell(mechanism, outputs):
-        raise ValueError(f'{listed(names)} of {mechanism.name} moves with none of the inputs, or '
-                         'only together with another joint')
     return invertible(mechanism, [_joint(mechanism, output) for output in outputs])
 
 
@@ -120,7 +117,7 @@ def invertible(mechanism: SceneMechanism, axes: List[Axis]) -> List[Axis]:
     """Return axes; raise ValueError if positions of them do not give the inputs for certain."""
     linkage, names = mechanism.linkage, [each.output for each in axes]
     what = f'{listed(names)} of {mechanism.name}'
-    if len(gears(linkage, axes)) == len(axes):
+    if len({i for i, _, _ in gears(linkage, axes).values()}) == len(axes):
         return axes
     if any(input_.is_part for input_ in linkage.inputs):
         raise ValueError(f'{what} has no inverse, since it repeats after too many turns')
@@ -152,9 +149,8 @@ def loads(mechanism: SceneMechanism) -> Iterator[Tuple[str, float]]:
 
 
 def start(mechanism: SceneMechanism) -> List[float]:
-    """Return the starts of the inputs, in the linkage's own units."""
-    return [Motion.of(settings).at(0)[0] / mechanism.scale_of(name)
-            for name, settings in mechanism.inputs.items()]
+    """Return the starts of the inputs."""
+    return [Motion.of(settings).at(0)[0] for settings in mechanism.inputs.values()]
 
 
 def _key(mechanism: SceneMechanism, link: str) -> str:

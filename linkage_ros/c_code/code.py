@@ -16,7 +16,7 @@ import numpy as np
 from .names import comment
 from ..formula.expression import Real, substituted
 from ..formula.operations import OPERATIONS
-from ..formula.program import Dialect, Program
+from ..formula.program import Dialect, Program, tolerant
 from ..linkage import IN_SINGLE, Mechanism
 
 # Names of constants, arguments and values.
@@ -87,7 +87,8 @@ class Code:
         Each of its `blocks` is a comment and the values that it assigns, by their places. `last`
         is its last statement. Values take the place of `replaced` expressions.
         """
-        results = substituted([x for _, assigned in blocks for x in assigned.values()], replaced)
+        results = tolerant(substituted(
+            [x for _, assigned in blocks for x in assigned.values()], replaced), self._rounding)
         program = Program(results, len(arguments))
         exact: Dict[Real, Any] = {}
         program.bind(self.linkage.dimensions, exact)

@@ -110,8 +110,7 @@ class Formulas:
                     product(zip(['p', *self.by], units), outputs), values)}
 
     def call(self) -> str:
-        """Return a call of the function for inputs q in their sizes, to s and the rates."""
-        values = [self._code.times(f'q[{i}]', input_.size * self._mechanism.scale_of(input_.name))
-                  for i, input_ in enumerate(self._linkage.inputs)]
+        """Return a call of the function for inputs q, to s and the rates."""
+        values = [f'q[{i}]' for i in range(len(self.inputs))]
         results = ['&s', *(f'&{by}' for by in self.by)]
         return f'{self._mechanism.name}_formulas({", ".join(values + results)})'

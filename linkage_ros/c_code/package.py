@@ -76,11 +76,9 @@ def package(name: str, scene: str, mechanisms: Sequence[Tuple[SceneMechanism, Se
 
 
 def ranges(mechanism: SceneMechanism) -> str:
-    """Return the sweeps or reaches of the inputs, in rad or in sizes, as an initializer of C++."""
-    arcs = [np.divide(max(settings.arcs, key=np.ptp),
-                      input_.size * mechanism.scale_of(input_.name))
-            for input_, settings in zip(mechanism.linkage.inputs, mechanism.inputs.values())]
-    return '{%s}' % ', '.join('{%r, %r}' % (*arc.tolist(),) for arc in arcs)
+    """Return the sweeps or reaches of the inputs as an initializer of C++."""
+    arcs = [max(settings.arcs, key=np.ptp) for settings in mechanism.inputs.values()]
+    return '{%s}' % ', '.join('{%r, %r}' % (*map(float, arc),) for arc in arcs)
 
 
 def _values(package_name: str, class_: str, mechanism: SceneMechanism, commanded: Sequence[Axis],
@@ -93,9 +91,8 @@ def _values(package_name: str, class_: str, mechanism: SceneMechanism, commanded
     named = [escape(comment(', '.join(axis.name for axis in axes))) for axes in sides]
     return {
         'package': package_name, 'namespace': f'{package_name}_plugins', 'class': class_,
-        'name': mechanism.name, 'n': str(len(commanded)), 'ranges': ranges(mechanism),
+        'name': mechanism.name, 'ranges': ranges(mechanism),
         'actuators': rows(sides[0]), 'joints': rows([*commanded, *others]),
-        'joint_count': str(len(commanded) + len(others)),
         'passive_function': f'{mechanism.name}_passive' if others else 'nullptr',
         'axes': ' and '.join(named),
         'lines': '\n'.join(f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(axis.role)}/>'

@@ -21,13 +21,13 @@ CORRECTED, SHORT, SHORTEST = 1e-9, 1.0 / 32.0, 1e-5
 HALVINGS = 60
 
 
-def series(linkage: Mechanism, output: str, parts: Sequence[Sequence[float]], single: bool
-           ) -> np.ndarray:
+def series(linkage: Mechanism, output: str, parts: Sequence[Sequence[float]], single: bool,
+           scale: float = 1.0) -> np.ndarray:
     """
     Return the pieces of parts in which an output only rises or only falls: inputs and outputs.
 
-    Each row is an `lkr_piece` of `linkage.h`, with inputs in their sizes. The root in it makes
-    the input smooth where the output has an extreme.
+    Each row is an `lkr_piece` of `linkage.h`, with `scale` times the inputs of the linkage. The
+    root in it makes the input smooth where the output has an extreme.
     """
     unit, pose = linkage.inputs[0].size, linkage.posed((), (output,))
     is_angle, terms = linkage.is_angle(output), TERMS[single]
@@ -76,11 +76,11 @@ def series(linkage: Mechanism, output: str, parts: Sequence[Sequence[float]], si
                    | (np.abs(cut - start) < ROUNDING))[:, 0]
         squares = roots ** 2
         middle = change * squares.mean(axis=1, keepdims=True)
-        scale = 1.0 / (change * half * half)
+        steepness = 1.0 / (change * half * half)
         pieces = np.hstack([
             end + middle, 0.5 * np.abs(change) * np.diff(squares),
-            np.sort(halved(squares, start, cut, end, change)), scale, middle * scale,
-            center / half, fitted.T.round(17)])
+            unit * scale * np.sort(halved(squares, start, cut, end, change)), steepness,
+            middle * steepness, center / half, unit * scale * fitted.T.round(17)])
         rows = np.vstack([rows, pieces[is_done]])
         ends = np.insert(roots[~is_done], [1], center[~is_done], axis=1)
         roots = np.vstack([ends[:, :2], ends[:, 1:]])

@@ -54,10 +54,6 @@ class Tables:
     def __init__(self, mechanism: SceneMechanism, code: Code, formulas: Formulas):
         self.mechanism, self.linkage, self._code, self._formulas = (
             mechanism, mechanism.linkage, code, formulas)
-        self._sizes = [input_.size for input_ in mechanism.linkage.inputs]
-        # The sizes of the inputs in the scene's units.
-        self._units = [size * mechanism.scale_of(name)
-                       for name, size in zip(mechanism.inputs, self._sizes)]
         self.functions: Dict[str, str] = {}
         self.solutions = 1
 
@@ -69,17 +65,18 @@ class Tables:
         at the end of its names.
         """
         row, everywhere = self._code.row, (-math.inf, math.inf)
-        sweeps = [row(np.divide(not tag and settings.ends or everywhere, unit))
-                  for settings, unit in zip(self.mechanism.inputs.values(), self._units)]
+        sweeps = [row(not tag and settings.ends or everywhere)
+                  for settings in self.mechanism.inputs.values()]
         return filled(template('model.h.in'), {
             'name': self.mechanism.name, 'tag': tag, 'number': self._code.number,
             'about': 'the inverse' if tag else 'the actuators and joints',
-            'n': len(self._sizes), 'names': ', '.join(map(self._solutions, sides)),
+            'n': len(self.mechanism.scales), 'names': ', '.join(map(self._solutions, sides)),
             'at': '\n'.join(indented(self._at(sides))),
             'actuators': self._rows(sides[0]), 'joints': self._rows(sides[1]),
             'turns': ', '.join(row(self._turns(axes)) for axes in sides),
-            'units': row(self._units), 'start': row(np.divide(
-                start(self.mechanism), self._sizes)),
+            'sizes': row(scale * input_.size for scale, input_ in zip(
+                self.mechanism.scales, self.linkage.inputs)),
+            'start': row(start(self.mechanism)),
             'sweeps': ', '.join(sweeps)})
 
     def passive(self, axes: Sequence[Axis]) -> str:
@@ -87,7 +84,9 @@ class Tables:
         lines = [f'{self.mechanism.name}_pose s, {", ".join(self._formulas.by)};',
                  f'(void){self._formulas.call()};']
         for i, each in enumerate(axes):
-            lines += self._assigned(each, f'position[{i}]', f'rate[{i}]')
+            speeds = [f'{rate} * speed[{j}]' for j, rate in enumerate(self._rates(each))]
+            lines += [*self._positions(each, f'position[{i}]'),
+                      f'velocity[{i}] = {" + ".join(speeds)};']
         return filled(template('passive.h.in'), {
             'name': self.mechanism.name, 'number': self._code.number,
             'body': '\n'.join(indented(lines))})
@@ -102,26 +101,31 @@ class Tables:
         yield f'{self.mechanism.name}_pose s, {", ".join(formulas.by)};'
         yield from (f'if (!{formulas.call()}) {{', '    return 0;', '}')
         for place, each in places.items():
-            yield from self._assigned(each, f'p->position{place}', f'p->rate{place}')
+            yield from self._positions(each, f'p->position{place}')
+            yield from (f'p->rate{place}[{j}] = {rate};'
+                        for j, rate in enumerate(self._rates(each)))
         # An inverse alone needs no efforts.
         powers = [*loads(self.mechanism)] if sides[0] else []
-        for j, (by, unit) in enumerate(zip(formulas.by, self._units)):
+        for j, by in enumerate(formulas.by):
             terms = [code.times(f'{by}.{formulas.fields[output]}',
-                                -load * unit / self.mechanism.scale_of(output))
+                                -load / self.mechanism.scale_of(output))
                      for output, load in powers]
             yield f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
         yield f'return isfinite({" + ".join(f"p->position{place}" for place in places)});'
 
-    def _assigned(self, axis: Axis, position: str, rate: str) -> List[str]:
-        """Return the statements for the position of an axis, and its rates by each input."""
-        code, field = self._code, self._formulas.fields[axis.output]
-        factor = axis.factor / self.mechanism.scale_of(axis.output)
+    def _positions(self, axis: Axis, place: str) -> List[str]:
+        """Return the statements for the position of an axis."""
+        code, factor = self._code, axis.factor / self.mechanism.scale_of(axis.output)
         offset = f' + {code.literal(axis.offset)}' if axis.offset else ''
-        return [
-            f'{position} = {code.times(f"s.{field}", factor)}{offset};',
-            *[f'{position} -= lkr_turns({position}, {code.literal(math.tau)});'] * axis.wraps,
-            *(f'{rate}[{j}] = {code.times(f"{by}.{field}", factor * unit)};'
-              for j, (by, unit) in enumerate(zip(self._formulas.by, self._units)))]
+        field = self._formulas.fields[axis.output]
+        return [f'{place} = {code.times(f"s.{field}", factor)}{offset};',
+                *[f'{place} -= lkr_turns({place}, {code.literal(math.tau)});'] * axis.wraps]
+
+    def _rates(self, axis: Axis) -> List[str]:
+        """Return the code of the rates of an axis by each input."""
+        factor = axis.factor / self.mechanism.scale_of(axis.output)
+        return [self._code.times(f'{by}.{self._formulas.fields[axis.output]}', factor)
+                for by in self._formulas.by]
 
     # --- tables ---
 
@@ -131,7 +135,7 @@ class Tables:
         for k, each in enumerate(axes):
             i, ratio, shift = counted.get(k, (-1, 0.0, 0.0))
             numbers = map(self._code.literal, (
-                ratio * self._sizes[i], shift, each.factor, each.offset, 1.0 / each.size,
+                ratio / self.mechanism.scales[i], shift, each.factor, each.offset, 1.0 / each.size,
                 each.turn))
             rows.append(f'{{ {i}, {", ".join(numbers)} }}')
         return ', '.join(rows) or '{ -1, 0, 0, 0, 0, 0, 0 }'
@@ -160,8 +164,9 @@ class Tables:
     def _series(self, name: str, output: str) -> Tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""
         code, monotone = self._code, pieces(self.linkage, output)
+        found = series(self.linkage, output, monotone, code.single, *self.mechanism.scales)
         rows = [f'    {{ {", ".join(map(code.literal, row[:7]))}, {code.row(row[7:])} }},'
-                for row in series(self.linkage, output, monotone, code.single).tolist()]
+                for row in found.tolist()]
         is_angle = self.linkage.is_angle(output)
         sizes = map(code.literal, (1.0 if is_angle else self.linkage.longest,
                                    math.tau if is_angle else 0.0))
@@ -184,9 +189,10 @@ class Tables:
         blocks = [(', '.join(
             f'{joint} {"left" if mode.linkage.branches[joint] > 0 else "right"}'
             for joint in closed.branches), {
-                f'q[{k * len(turns) + j}][{i}]': (value + turn) * (1.0 / size)
+                f'q[{k * len(turns) + j}][{i}]': (value + turn) * scale
                 for j, turned in enumerate(turns)
-                for i, (value, turn, size) in enumerate(zip(mode.inputs, turned, self._sizes))})
+                for i, (value, turn, scale) in enumerate(zip(
+                    mode.inputs, turned, self.mechanism.scales))})
             for k, mode in enumerate(modes)]
         count = len(modes) * len(turns)
         lines = '\n'.join(f'     {comment(line)}' for line in closed.lines)

@@ -11,13 +11,12 @@ has. Loops that share joints are checked together, with all that the scene publi
 
 from __future__ import annotations
 
-from dataclasses import replace
 import math
 from typing import Any, Dict, List, Mapping, NamedTuple, Sequence, Set, Tuple
 
 import numpy as np
 
-from .spatial import Component, components, EXACT, wrapped
+from .spatial import Component, components, EXACT
 from .. import scene
 from ..linkage import short, theta_of
 from ..robot_model.robot import Robot, SLIDE
@@ -107,8 +106,7 @@ def compared(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
     """
     reports: List[str] = []
     wrong: Dict[str, str] = {}
-    for component in components(replace(robot, driven=[*robot.driven, *(
-            name for made in imported for name in made.driven)])):
+    for component in components(robot):
         parts = [made for made in imported if {*made.driven} & component.positions.keys()]
         if parts:
             try:
@@ -205,8 +203,7 @@ class _Loops:
         """
         Put what is published on straight paths of the sources into the loops.
 
-        By how much the file's own misfit opens them does not count. A joint that closes a loop
-        opens it by its error in angle times the loops' size.
+        By how much the file's own misfit opens them does not count.
         """
         component, start = self._component, np.array([*self._start.values()])
         parts = np.arange(1, steps + 1) / steps
@@ -222,10 +219,6 @@ class _Loops:
             pose = component.moved_to(pose, here)
             pose = pose if fixed.all() else component.closed(pose, fixed)
             gaps[:, k] = np.max(np.abs(component.errors(pose)[0] - self._misfit), axis=1)
-            read = component.read(pose)
-            for name in here.keys() & component.cut_names:
-                off = component.size * np.abs(wrapped(here[name] - read[name]))
-                gaps[:, k] = np.maximum(gaps[:, k], off)
             poses.append(pose)
         gaps[isnan] = math.nan
         return Walk({**sources, **joints}, gaps, poses,
@@ -241,8 +234,8 @@ class _Loops:
             angles = mechanism.linkage.joint_angles(theta_of(values))
             positions.update((called.name, called.of(angles[link]))
                              for link, called in mechanism.joints.items() if called.published)
-        return {name: values for name, values in positions.items()
-                if name in self._component.named.keys() | self._component.cut_names}
+        named = self._component.named
+        return {name: values for name, values in positions.items() if name in named}
 
     def _check_end(self, walk: Walk, path: int, step: int) -> None:
         """

@@ -118,10 +118,9 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
     for made in imported:
         parameters.update(made.parameters)
     mechanisms = scene.read(parameters).mechanisms
-    tree = robot.tree_joints
     stay = {name for made in imported for name in made.still}
     still = {name: value for name, value in robot.positions.items()
-             if name in tree.keys() & stay - check.published(mechanisms)}
+             if name in stay - check.published(mechanisms)}
     rest, lost = others(robot, mechanisms, still)
     mechanisms = scene.read({**parameters, **rest}).mechanisms
     checks, wrong = check.compared(robot, mechanisms, imported)
@@ -131,8 +130,8 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
     reports = [*reports, *(report for made in imported for report in made.reports), *checks]
     if lost:
         reports.append(not_published(lost))
-    if free := [name for name, joint in tree.items()
-                if name and joint.kind not in (HINGE, SLIDE, FIXED)]:
+    if free := [joint.name for joint in robot.joints
+                if not joint.is_cut and joint.kind not in (HINGE, SLIDE, FIXED)]:
         reports.append(f'Not published: {", ".join(free)}: a ball or a free joint has no one '
                        'position. The model of the robot has them fixed where the file has them.')
     return parameters, reports, still

@@ -73,7 +73,7 @@ def closed(robot: Robot, seed: int = 0) -> Closed:
     if not made.faults:
         return made
     inside = {}
-    for joint in robot.tree_joints.values():
+    for joint in robot.joints:
         low, high = joint.range
         if joint.position is not None and not low <= joint.position <= high:
             margin = INSIDE * min(high - low, 1.0)
@@ -89,8 +89,7 @@ def closed(robot: Robot, seed: int = 0) -> Closed:
 def _closed(robot: Robot, seed: int) -> Closed:
     # Dependent joints are where the others say.
     robot = posed(robot, {name: ratio * robot.positions[source] + offset
-                          for name, joint in robot.tree_joints.items()
-                          if name in robot.follows and joint.position is not None
+                          for name in robot.positions.keys() & robot.follows
                           for source, ratio, offset in [robot.source(name)]})
     made = Closed(robot, [], {})
     moves: Dict[str, np.ndarray] = {}
@@ -121,7 +120,8 @@ def _check_driven(component: Component, pose: np.ndarray, motors: List[str], fol
                   ) -> None:
     """Raise ValueError if loops cannot move; NotDriven if their motors do not determine a pose."""
     if not component.loose(pose, [])[0]:
-        fixed = [joint.name for joint in component.joints if joint.kind == FIXED and joint.is_cut]
+        fixed = [joint.name for joint in component.joints
+                 if joint.kind == FIXED and joint.is_cut and joint.name]
         raise ValueError('it cannot move, as its joints hold each other' + (
             f': {listed(fixed)} makes one body of two, where a pin has the type 3d'
             if fixed else ''))

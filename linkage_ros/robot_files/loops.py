@@ -31,8 +31,9 @@ class Group(NamedTuple):
 
 def groups(robot: Robot) -> List[Group]:
     """Return the loops of a robot, with their planar parts; bodies fixed to others are one."""
-    # Those that close a loop fix bodies, too.
-    fixed = [replace(joint, is_cut=False) for joint in robot.joints if joint.kind == FIXED]
+    # Whatever closes a loop joins bodies as all others do.
+    robot = replace(robot, joints=[replace(joint, is_cut=False) for joint in robot.joints])
+    fixed = [joint for joint in robot.joints if joint.kind == FIXED]
     home = {robot.root: robot.root}
     for body, (base, joint) in replace(robot, joints=fixed).spanning_tree()[0].items():
         home[body] = home[base] if joint.kind == FIXED else body

@@ -46,7 +46,7 @@ def read(path: str, loops: Optional[str] = None) -> Robot:
     with _blaming(path):
         for name in robot.follows:
             robot.source(name)
-    return robot
+    return robot.cut_loops()
 
 
 def description(path: str, robot: Robot) -> str:
@@ -56,8 +56,7 @@ def description(path: str, robot: Robot) -> str:
 
 def drawn(robot: Robot) -> bodies.Model:
     """Return the tree of a robot as a model that is written, its joints at zero."""
-    at_zero = dict.fromkeys(robot.positions.keys() & robot.tree_joints, 0.0)
-    return bodies.Model('robot', robot.root, [posed(robot, at_zero)])
+    return bodies.Model('robot', robot.root, [posed(robot, dict.fromkeys(robot.positions, 0.0))])
 
 
 @contextmanager

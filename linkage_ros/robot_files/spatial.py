@@ -140,9 +140,9 @@ class Component:
 
     def _set_equations(self, last: Mapping[str, int], above: np.ndarray) -> None:
         """Set the points that coincide on both ends of each cut."""
-        self._cut_ends = [[last[body] for body in cut.bodies] for cut in self._cuts]
         ends, points = [], []
-        for end, cut in zip(self._cut_ends, self._cuts):
+        for cut in self._cuts:
+            end = [last[body] for body in cut.bodies]
             offsets = [np.zeros((2, 3))]
             if cut.kind == HINGE:
                 first, second = cut.axes
@@ -160,11 +160,6 @@ class Component:
         """Positions in the file of named joints with one degree of freedom."""
         return {joint.name: joint.position for joint in self.joints
                 if joint.position is not None}
-
-    @property
-    def cut_names(self) -> Set[str]:
-        """Names of the hinges that close its loops, whose angles `read` returns."""
-        return {cut.name for cut in self._cuts if cut.position is not None and cut.kind == HINGE}
 
     def is_of(self, names: Sequence[str]) -> np.ndarray:
         """Return which screws are of the joints that are named."""
@@ -314,16 +309,7 @@ class Component:
     def read(self, poses: np.ndarray) -> Dict[str, np.ndarray]:
         """Return the positions of named joints [rad or m], within half a turn of the file's."""
         positions = self._starts + np.where(self._slides, poses, wrapped(poses))
-        by_name = {name: positions[:, i] for name, i in self.named.items()}
-        frames = self._frames(poses)
-        for cut, (first, second) in zip(self._cuts, self._cut_ends):
-            if cut.name in self.cut_names:
-                turned = frames[:, first, :3, :3].swapaxes(1, 2) @ frames[:, second, :3, :3]
-                across = np.cross(cut.axis, np.eye(3)[np.argmin(np.abs(cut.axis))])
-                ahead = turned @ across
-                by_name[cut.name] = cut.start + np.arctan2(
-                    np.cross(across, ahead) @ cut.axis, ahead @ across)
-        return by_name
+        return {name: positions[:, i] for name, i in self.named.items()}
 
 
 def wrapped(angles: np.ndarray) -> np.ndarray:

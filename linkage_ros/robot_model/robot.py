@@ -26,8 +26,6 @@ KINDS = {'revolute': HINGE, 'continuous': HINGE, 'prismatic': SLIDE, 'spherical'
          '6d': FIXED, 'revolute2': UNIVERSAL, 'floating': FREE}
 # No robot has parts farther off [m], or limits [m or rad].
 MAX_NUMBER = 1e9
-# Joints that a tree prefers, if they are not driven.
-_TREE = {FIXED: 0, SLIDE: 1, FREE: 2, BALL: 3, HINGE: 4}
 
 
 def at(place: Any, turned: Any = ((1, 0, 0), (0, 1, 0), (0, 0, 1))) -> np.ndarray:
@@ -238,20 +236,36 @@ class Robot:
                 base, seen = f'{name}/joint', home
             yield Body(name, base, _seen(seen, frame, span))
 
+    def cut_loops(self) -> Robot:
+        """
+        Make a tree of the joints, and return it: the last joint of each loop is cut.
+
+        Where it has a position, it moves a body of its own in the tree, welded to the other one.
+        """
+        joined = {body: body for body in self.frames}
+
+        def first(body: str) -> str:
+            while joined[body] != body:
+                joined[body] = body = joined[joined[body]]
+            return body
+
+        for joint in sorted((joint for joint in self.joints if not joint.is_cut),
+                            key=lambda joint: joint.position is None):
+            base, body = joint.bodies
+            if first(base) != first(body):
+                joined[first(body)] = first(base)
+            elif joint.position is None:
+                joint.is_cut = True
+            else:
+                welded, frame = f'{body}/{joint.name}', at(joint.places[1], joint.turns[1])
+                joint.bodies, self.frames[welded] = (base, welded), self.frames[body]
+                self.join('', FIXED, (body, welded), frame, other=frame)
+        return self
+
     def spanning_tree(self) -> tuple[dict[str, tuple[str, Joint]], list[Joint]]:
         """Return the parent and the joint of each body, and the joints that close loops."""
-        # Of each body all that are joined to it; the fewer are added to the more.
-        joined, cuts = {body: {body} for body in self.frames}, []
         near: dict[str, list[tuple[str, Joint]]] = {body: [] for body in self.frames}
-        for joint in sorted(self.joints, key=lambda joint: (
-                joint.is_cut, joint.name not in self.driven, _TREE.get(joint.kind, 1))):
-            first, second = (joined[body] for body in joint.bodies)
-            if joint.is_cut or first is second:
-                cuts.append(joint)
-                continue
-            first, second = sorted((first, second), key=len, reverse=True)
-            first |= second
-            joined.update(dict.fromkeys(second, first))
+        for joint in sorted(self.joints, key=lambda joint: joint.name not in self.driven):
             for body, other in (joint.bodies, joint.bodies[::-1]):
                 near[body].append((other, joint))
         tree: dict[str, tuple[str, Joint]] = {}
@@ -262,16 +276,12 @@ class Robot:
                 tree[start] = self.root, Joint('', FREE, (self.root, start), places, places)
             row = [start]
             for body in row:
-                others = {other: (body, joint) for other, joint in near[body]
-                          if other != self.root and other not in tree}
+                others = {other: (body, joint) for other, joint in near[body] if not joint.is_cut
+                          and other != self.root and other not in tree}
                 tree.update(others)
                 row += others
-        return tree, cuts
-
-    @property
-    def tree_joints(self) -> dict[str, Joint]:
-        """Return the joints of the spanning tree by their names."""
-        return {joint.name: joint for _, joint in self.spanning_tree()[0].values()}
+        inside = {joint for _, joint in tree.values()}
+        return tree, [joint for joint in self.joints if joint not in inside]
 
     def join(self, name: str, kind: str, bodies: tuple[str, str], frame: np.ndarray,
              axis: Any = (0.0, 0.0, 1.0), other: Optional[np.ndarray] = None,
@@ -437,8 +447,6 @@ def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[
 def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
     """Return a robot with some joints moved; raise RequestError for an unknown joint."""
     robot.check_names(values)
-    if cuts := sorted(values.keys() - robot.tree_joints):
-        raise RequestError(f'{cuts[0]} closes a loop: its position follows from other joints')
     moves = {}
     for body, (base, joint) in robot.spanning_tree()[0].items():
         if joint.name in values and joint.position is not None:

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 linkage_ros contributors
 // SPDX-License-Identifier: Apache-2.0
 
-// A generated transmission, its names in NAME, CLASS and NAMESPACE and the ranges of its inputs in
-// RANGES, is proved at so many states: positions both ways, velocities against differences, power,
+// A generated transmission, its names in NAME and NAMESPACE and the number and the ranges of its
+// inputs in INPUTS and RANGES, is proved at so many states: positions both ways, velocities against differences, power,
 // nothing allocated, and nothing written that is not finite.
 #include <cmath>
 #include <cstdio>
@@ -19,9 +19,9 @@
 
 namespace
 {
-using Code = NAMESPACE::JOINED(CLASS, Code);
-constexpr int n = static_cast<int>(Code::size);
-constexpr const lkr_model & model = Code::model;
+const NAMESPACE::Linkage & linkage = NAMESPACE::JOINED(NAME, _linkage);
+const lkr_model & model = linkage.model;
+constexpr int n = INPUTS;
 constexpr double ranges[n][2] = RANGES;
 constexpr double nan_ = std::numeric_limits<double>::quiet_NaN();
 constexpr double unwritten = 0.123456789;
@@ -41,7 +41,7 @@ void check(bool holds, const char * what, long state)
 struct Robot
 {
   double actuator[3][n], joint[3][n];
-  NAMESPACE::JOINED(CLASS, Transmission) transmission;
+  NAMESPACE::Transmission transmission;
 
   static hardware_interface::TransmissionInfo info()
   {
@@ -50,16 +50,16 @@ struct Robot
     for (int i = n - 1; i >= 0; --i) {
       const std::size_t k = static_cast<std::size_t>(i);
       made.actuators.emplace_back();
-      made.actuators.back().name = Code::actuators[k].name;
-      made.actuators.back().role = Code::actuators[k].role;
+      made.actuators.back().name = linkage.actuators[k].name;
+      made.actuators.back().role = linkage.actuators[k].role;
       made.joints.emplace_back();
-      made.joints.back().name = Code::joints[k].name;
-      made.joints.back().role = Code::joints[k].role;
+      made.joints.back().name = linkage.joints[k].name;
+      made.joints.back().role = linkage.joints[k].role;
     }
     return made;
   }
 
-  Robot() : transmission(info())
+  Robot() : transmission(linkage, info())
   {
     const char * const kinds[3] = {"position", "velocity", "effort"};
     std::vector<transmission_interface::JointHandle> joints;
@@ -68,8 +68,8 @@ struct Robot
       for (int i = 0; i < n; ++i) {
         const std::size_t k = static_cast<std::size_t>(i);
         actuator[kind][i] = joint[kind][i] = 0.0;
-        actuators.emplace_back(Code::actuators[k].name, kinds[kind], &actuator[kind][i]);
-        joints.emplace_back(Code::joints[k].name, kinds[kind], &joint[kind][i]);
+        actuators.emplace_back(linkage.actuators[k].name, kinds[kind], &actuator[kind][i]);
+        joints.emplace_back(linkage.joints[k].name, kinds[kind], &joint[kind][i]);
       }
     }
     transmission.configure(joints, actuators);

@@ -12,8 +12,6 @@
 #include <cstddef>
 #include <future>
 #include <memory>
-#include <numeric>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <type_traits>
@@ -32,12 +30,18 @@ namespace @namespace@
 /// The name of an actuator or a joint in the scene, and its role in the linkage.
 struct Axis { const char * name, * role; };
 
+/// A linkage in C, with its axes: the commanded joints come before the passive ones.
+struct Linkage
+{
+  const lkr_model & model;
+  std::vector<Axis> actuators, joints;
+  /// Positions and velocities of the passive joints, at inputs and their speeds.
+  void (* at_passive)(const double * q, const double * speed, double * position, double * velocity);
+};
+
 /// The names that the interface of each quantity may have, the usual one first.
 inline const std::array<std::vector<std::string>, 3> interfaces{
   {{"position"}, {"velocity"}, {"effort", "torque", "force"}}};
-
-/// Positions of joints that are not commanded, and their rates by each input, at inputs.
-using Passive = void(const double * q, double * position, double (*rate)[LKR_MAX_INPUTS]);
 
 /// Logs why values are held, from a thread of its own: a control loop only sets bits.
 class HeldLog
@@ -90,151 +94,146 @@ private:
 
 /// The handles of all actuators, or of all joints, by interface: position, velocity, effort. The
 /// first `needed` of them have to be there.
-template <class Handle, std::size_t needed, std::size_t size = needed>
+template <class Handle>
 class Handles
 {
 public:
   template <class Infos>
   void find(
-    const std::string & what, const std::array<Axis, size> & axes, const Infos & infos,
-    const std::vector<Handle> & given)
+    const std::string & what, const std::vector<Axis> & axes, std::size_t needed,
+    const Infos & infos, const std::vector<Handle> & given)
   {
     using transmission_interface::Exception;
+    needed_ = needed;
+    rows_.assign(axes.size(), {});
     std::string allowed;
     for (std::size_t i = 0; i < needed; ++i) {
       allowed += std::string(" '") + axes[i].name + "' (role '" + axes[i].role + "')";
     }
-    std::array<std::string, size> names;
-    factor_.fill(1.0);
     for (const auto & info : infos) {
       std::size_t i = place(axes, info.name, info.role);
-      if (i == size && is_added(info)) {
+      if (i == axes.size() && is_added(info)) {
         // It is the only actuator, or one beside that of the description.
-        if (!names[0].empty()) {
+        if (!rows_[0].name.empty()) {
           continue;
         }
         i = 0;
       }
-      if (i == size || !names[i].empty()) {
+      if (i == axes.size() || !rows_[i].name.empty()) {
         throw Exception(what + " '" + info.name + "', role '" + info.role + "', is none of" + allowed);
       }
       if (!std::isfinite(info.offset) || !std::isnormal(info.mechanical_reduction)) {
         throw Exception(what + " '" + info.name + "' needs a finite offset, and a finite "
           "mechanical_reduction other than 0");
       }
-      names[i] = info.name;
       // A reduction is that of the built-in transmissions: from the joint to the actuator.
-      offset_[i] = info.offset;
-      factor_[i] = is_actuator ? info.mechanical_reduction : 1.0 / info.mechanical_reduction;
+      rows_[i] = {
+        info.name, info.offset,
+        is_actuator ? info.mechanical_reduction : 1.0 / info.mechanical_reduction, {}};
     }
-    for (std::size_t i = 0; i < size; ++i) {
-      if (names[i].empty() && i < needed) {
-        throw Exception(what + " '" + axes[i].name + "' is missing; needed are" + allowed);
-      }
-      if (names[i].empty()) {
-        names[i] = axes[i].name;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      if (rows_[i].name.empty()) {
+        if (i < needed) {
+          throw Exception(what + " '" + axes[i].name + "' is missing; needed are" + allowed);
+        }
+        rows_[i].name = axes[i].name;
       }
       for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
-        auto & own = handles_[kind][i];
+        auto & own = rows_[i].handles[kind];
         for (const auto & interface : interfaces[kind]) {
           const auto found =
-            transmission_interface::get_ordered_handles(given, {names[i]}, interface);
+            transmission_interface::get_ordered_handles(given, {rows_[i].name}, interface);
           own.insert(own.end(), found.begin(), found.end());
         }
         if (own.size() > 1) {
-          throw Exception(what + " '" + names[i] + "' has several handles for " +
+          throw Exception(what + " '" + rows_[i].name + "' has several handles for " +
             interfaces[kind][0]);
         }
       }
     }
   }
 
-  /// The number of handles for an interface.
+  /// The number of needed handles for an interface.
   std::size_t count(std::size_t kind) const
   {
-    const auto & own = handles_[kind];
-    return static_cast<std::size_t>(std::count_if(
-      own.begin(), own.begin() + needed, [](const auto & handles) { return !handles.empty(); }));
+    std::size_t sum = 0;
+    for (std::size_t i = 0; i < needed_; ++i) {
+      sum += rows_[i].handles[kind].size();
+    }
+    return sum;
   }
-
-  bool have(std::size_t kind) const { return !handles_[kind][0].empty(); }
 
   /// Read values as the scene has them; those without a handle are 0.
   lkr_side read() const
   {
     lkr_side values{};
-    for (std::size_t i = 0; i < needed; ++i) {
-      values.position[i] = (value(0, i) - offset_[i]) / factor_[i];
-      values.velocity[i] = value(1, i) / factor_[i];
-      values.effort[i] = value(2, i) * factor_[i];
+    for (std::size_t i = 0; i < needed_; ++i) {
+      const auto & row = rows_[i];
+      values.position[i] = (value(i, 0) - row.offset) / row.factor;
+      values.velocity[i] = value(i, 1) / row.factor;
+      values.effort[i] = value(i, 2) * row.factor;
     }
     return values;
   }
 
-  /// Write what is finite.
-  void write(const lkr_side & values)
+  /// Write values of an axis, those that are finite.
+  void write(std::size_t i, double position, double velocity, double effort)
   {
-    for (std::size_t i = 0; i < needed; ++i) {
-      write(i, values.position[i], values.velocity[i]);
-      set(2, i, values.effort[i] / factor_[i]);
+    const auto & row = rows_[i];
+    const std::array<double, 3> values{
+      position * row.factor + row.offset, velocity * row.factor, effort / row.factor};
+    for (std::size_t kind = 0; kind < values.size(); ++kind) {
+      if (!row.handles[kind].empty() && std::isfinite(values[kind])) {
+        (void)rows_[i].handles[kind].front().set_value(values[kind]);
+      }
     }
-  }
-
-  void write(std::size_t i, double position, double velocity)
-  {
-    set(0, i, position * factor_[i] + offset_[i]);
-    set(1, i, velocity * factor_[i]);
   }
 
 private:
+  /// An axis, with one handle for each quantity, or none.
+  struct Row
+  {
+    std::string name;
+    double offset = 0.0, factor = 1.0;
+    std::array<std::vector<Handle>, 3> handles;
+  };
+
   static constexpr bool is_actuator =
     std::is_same_v<Handle, transmission_interface::ActuatorHandle>;
 
-  double value(std::size_t kind, std::size_t i) const
+  double value(std::size_t i, std::size_t kind) const
   {
-    return have(kind) ? handles_[kind][i].front().get_value() : 0.0;
-  }
-
-  void set(std::size_t kind, std::size_t i, double value)
-  {
-    if (!handles_[kind][i].empty() && std::isfinite(value)) {
-      (void)handles_[kind][i].front().set_value(value);
-    }
+    const auto & handles = rows_[i].handles[kind];
+    return handles.empty() ? 0.0 : handles.front().get_value();
   }
 
   /// The place of a role; of a name, if there is no role.
   static std::size_t place(
-    const std::array<Axis, size> & axes, const std::string & name, const std::string & role)
+    const std::vector<Axis> & axes, const std::string & name, const std::string & role)
   {
-    for (std::size_t i = 0; i < size; ++i) {
-      if (role.empty() ? name == axes[i].name : role == axes[i].role) {
-        return i;
-      }
-    }
-    return size;
+    return static_cast<std::size_t>(std::find_if(axes.begin(), axes.end(), [&](const Axis & axis) {
+      return role.empty() ? name == axis.name : role == axis.role;
+    }) - axes.begin());
   }
 
   /// Whether ros2_control has added an actuator, which it does to hardware of type "actuator".
   template <class Info>
-  static bool is_added(const Info & info)
+  bool is_added(const Info & info) const
   {
-    return size == 1 && is_actuator && info.name == "actuator1" && info.role == "actuator1";
+    return rows_.size() == 1 && is_actuator && info.name == "actuator1" && info.role == "actuator1";
   }
 
-  // Of each quantity and axis one handle, or none.
-  std::array<std::array<std::vector<Handle>, size>, 3> handles_;
-  std::array<double, size> offset_{}, factor_{};
+  std::size_t needed_ = 0;
+  std::vector<Row> rows_;
 };
 
-/// A linkage between actuators and joints; Code wraps its generated C, which is included before.
-template <class Code>
-class TransmissionOf : public linkage_ros::LinkageTransmission
+/// A linkage between actuators and joints.
+class Transmission : public linkage_ros::LinkageTransmission
 {
 public:
-  static constexpr std::size_t passive_count = Code::joints.size() - Code::size;
-
-  explicit TransmissionOf(const hardware_interface::TransmissionInfo & info)
-  : info_(info), log_(info.name)
+  Transmission(const Linkage & linkage, const hardware_interface::TransmissionInfo & info)
+  : linkage_(linkage), info_(info), size_(linkage.actuators.size()),
+    position_(linkage.joints.size() - size_), velocity_(position_), log_(info.name)
   {
   }
 
@@ -247,33 +246,31 @@ public:
       refuse("there is no parameter '" + info_.parameters.begin()->first +
         "': write the package again for other lengths");
     }
-    actuators_ = {};
-    joints_ = {};
-    actuators_.find("actuator", Code::actuators, info_.actuators, actuator_handles);
-    joints_.find("joint", Code::joints, info_.joints, joint_handles);
+    actuators_.find("actuator", linkage_.actuators, size_, info_.actuators, actuator_handles);
+    joints_.find("joint", linkage_.joints, size_, info_.joints, joint_handles);
     for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
       const auto count = actuators_.count(kind) + joints_.count(kind);
-      if (count != 2 * Code::size && (count != 0 || kind == 0)) {
+      if (count != 2 * size_ && (count != 0 || kind == 0)) {
         refuse("all its actuators and joints need a handle for " + interfaces[kind][0] +
           (kind ? ", or none of them" : ": velocities and efforts depend on the pose"));
       }
     }
-    lkr_begin(&Code::model, &memory_);
+    lkr_begin(&linkage_.model, &memory_);
   }
 
   void actuator_to_joint() override
   {
     transmit(LKR_ACTUATORS, actuators_, joints_);
-    if constexpr (passive_count > 0) {
+    if (linkage_.at_passive) {
       write_passive();
     }
   }
 
   void joint_to_actuator() override { transmit(LKR_JOINTS, joints_, actuators_); }
 
-  std::size_t num_actuators() const override { return Code::size; }
+  std::size_t num_actuators() const override { return size_; }
 
-  std::size_t num_joints() const override { return Code::size; }
+  std::size_t num_joints() const override { return size_; }
 
   int status() const noexcept override { return status_; }
 
@@ -293,44 +290,47 @@ private:
       // What is not set is not written.
       std::fill_n(kind, LKR_MAX_INPUTS, LKR_NAN);
     }
-    status_ = lkr_transmit(&Code::model, &memory_, side, &values, &result);
-    if (!joints_.have(1) && !joints_.have(2)) {
+    status_ = lkr_transmit(&linkage_.model, &memory_, side, &values, &result);
+    if (joints_.count(1) + joints_.count(2) == 0) {
       status_ &= ~SINGULAR;
     }
     log_.note(status_, side == LKR_JOINTS);
-    to.write(result);
+    for (std::size_t i = 0; i < size_; ++i) {
+      to.write(i, result.position[i], result.velocity[i], result.effort[i]);
+    }
   }
 
   /// Write states of the joints that are not commanded: where the newest measurement is, or standing.
   void write_passive()
   {
-    double position[passive_count], rate[passive_count][LKR_MAX_INPUTS];
-    Code::at_passive(memory_.q, position, rate);
-    for (std::size_t i = 0; i < passive_count; ++i) {
-      const double velocity = std::inner_product(
-        rate[i], rate[i] + Code::size, memory_.speed, 0.0);
+    linkage_.at_passive(memory_.q, memory_.speed, position_.data(), velocity_.data());
+    for (std::size_t i = 0; i < position_.size(); ++i) {
       joints_.write(
-        Code::size + i, memory_.newest == LKR_ACTUATORS ? position[i] : LKR_NAN,
-        std::isfinite(velocity) ? velocity : 0.0);
+        size_ + i, memory_.newest == LKR_ACTUATORS ? position_[i] : LKR_NAN,
+        std::isfinite(velocity_[i]) ? velocity_[i] : 0.0, LKR_NAN);
     }
   }
 
+  const Linkage & linkage_;
   hardware_interface::TransmissionInfo info_;
+  std::size_t size_;
   lkr_memory memory_{};
-  Handles<transmission_interface::ActuatorHandle, Code::size> actuators_;
-  Handles<transmission_interface::JointHandle, Code::size, Code::joints.size()> joints_;
+  Handles<transmission_interface::ActuatorHandle> actuators_;
+  Handles<transmission_interface::JointHandle> joints_;
+  // Of the passive joints.
+  std::vector<double> position_, velocity_;
   int status_ = OK;
   HeldLog log_;
 };
 
-template <class Code>
+template <const Linkage & linkage>
 class LoaderOf : public transmission_interface::TransmissionLoader
 {
 public:
   std::shared_ptr<transmission_interface::Transmission> load(
     const hardware_interface::TransmissionInfo & info) override
   {
-    return std::make_shared<TransmissionOf<Code>>(info);
+    return std::make_shared<Transmission>(linkage, info);
   }
 };
 }  // namespace @namespace@

@@ -53,7 +53,7 @@ class Link(NamedTuple):
     parent: str
     joint: str
     kind: str
-    zero: Real
+    zero: Any
     tip: str
 
 

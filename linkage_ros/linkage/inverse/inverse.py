@@ -21,11 +21,10 @@ from numpy.typing import ArrayLike
 
 from . import rods
 from .choice import Choice
-from .expressions import chosen_of, modes_of, SINGLE
 from .follow import follow
 from .grid import check_dependence, Grid
 from .linkage import decompose, InverseLinkage
-from .modes import Modes
+from .modes import chosen_of, Modes, modes_of, SINGLE
 from .problem import InverseProblem, Row
 from .refine import distinct, distinct_arrays, refine, refine_arrays
 from .segments import Segments, segments_of

@@ -35,6 +35,7 @@ from ...formula.expression import (
     dot,
     Real,
     square_root,
+    substituted,
 )
 
 # Assembly modes at most, in all turns.
@@ -91,6 +92,12 @@ class InverseLinkage(NamedTuple):
     turns: Tuple[Tuple[float, ...], ...]
     arguments: Dict[Real, Real]
 
+    def solutions(self) -> List[List[Real]]:
+        """Return the inputs in each mode and its turns, as expressions of the outputs."""
+        return [substituted([value + turn for value, turn in zip(mode.inputs, turns)],
+                            self.arguments)
+                for mode in self.modes for turns in product(*self.turns)]
+
     def __str__(self) -> str:
         comments = {}
         for place, (name, ratio, offset) in self.drives.items():
@@ -142,7 +149,6 @@ class _Read(NamedTuple):
 
 def decompose(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
     """Return the inverse linkage for outputs, None where no closed form is known."""
-    # Lengths in joint lines are in metres.
     if len(set(outputs)) < len(outputs):
         return None
     pose = _pose(linkage)
@@ -198,7 +204,7 @@ class _Sketch(Dyads):
             for joint, place in frame.items():
                 self._named.setdefault(joint, {})[body] = place
         for link in linkage.links:
-            angle = self._zero(link) + (pose[link.name] if link.kind == 'revolute' else 0.0)
+            angle = link.zero + (pose[link.name] if link.kind == 'revolute' else 0.0)
             turn = self._at[link.parent][1] * cmath.rect(1.0, angle)
             joint, origin = next(iter(self._frames[link.name].items()))
             self._at[link.name] = self._place(joint) - turn * origin, turn
@@ -213,8 +219,8 @@ class _Sketch(Dyads):
         for output in sorted(outputs, key=lambda name: name.startswith('angle(')):
             if output not in done:
                 done += self._add(output, slides, motors)
-        size = max(abs(place) for frame in self._frames.values() for place in frame.values())
-        size = max(size, linkage.longest)
+        size = max(linkage.longest, *(
+            abs(place) for frame in self._frames.values() for place in frame.values()))
         bodies = [*self._frames, *(body for pin in self._named.values() for body in pin),
                   *(body for each in (*slides, *motors) for body in each.bodies)]
         # A joint on a single body is needed only if an input is read from it.
@@ -229,17 +235,13 @@ class _Sketch(Dyads):
         self.take_apart()
         self.reads = [self._read(by, input_) for by, input_ in enumerate(linkage.inputs)]
 
-    @staticmethod
-    def _zero(link: Link) -> float:
-        return float(np.asarray(link.zero))
-
     def _motion(self, link: Link) -> Motor:
         """Return the motion of a link relative to its parent."""
         bodies, hangs = (link.parent, link.name), self._frames[link.parent][link.joint]
         if link.kind == 'revolute':
-            return Hinge(bodies, (hangs, self._frames[link.name][link.joint]), 1.0,
-                         self._zero(link), link.name)
-        along, name = cmath.rect(1.0, self._zero(link)), link.name
+            return Hinge(bodies, (hangs, self._frames[link.name][link.joint]), 1.0, link.zero,
+                         link.name)
+        along, name = cmath.rect(1.0, link.zero), link.name
         for axis, part in ('x', along.real), ('y', along.imag):
             # The slide of a block on a fixed line determines the coordinates of the block.
             if link.parent == GROUND and f'{link.tip}.{axis}' in self._outputs and \
@@ -356,7 +358,7 @@ class _Sketch(Dyads):
 
     def _value(self, link: Link) -> Tuple[Tuple[str, ...], Callable]:
         """Return the joints that tell the position of a link on its parent, and its formula."""
-        zero = cmath.rect(1.0, self._zero(link))
+        zero = cmath.rect(1.0, link.zero)
         if link.kind == 'revolute':
             ends, ahead = self._direction(link.name, 1.0 + 0.0j)
             others, back = self._direction(link.parent, zero)

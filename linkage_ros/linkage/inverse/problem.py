@@ -45,8 +45,8 @@ class InverseProblem:
     n : int
         The number of outputs, and of inputs.
     inputs : tuple of Input
-        Those of the linkage. If one repeats only after very many turns, its period is that of the
-        outputs, if they repeat earlier.
+        Those of the linkage. The period of one that repeats only after very many turns is one
+        turn if the outputs repeat after that.
     scales, sizes : list of float
         The unit of each output and of each input in which they are compared [rad or m].
     periods, turns : list of float
@@ -68,18 +68,14 @@ class InverseProblem:
                         for name in outputs]
 
     def _with_period(self, by: int, input_: Input) -> Input:
-        """Return an input with the period of the outputs if its own has too many turns."""
+        """Return an input, with one turn as its period if the outputs repeat after that."""
         if not input_.is_part:
             return input_
-        linkage = self.linkage
-        rates = [linkage.gear(name, by)[0] for name in linkage.geared_to(by)]
-        periods = (1.0, *(1.0 / abs(rate) for rate in rates if rate))
-        arcs = reach_of(linkage) if self.n == 1 else []
+        arcs = reach_of(self.linkage) if self.n == 1 else []
         gaps = [0.5 * (end + start) for (_, end), (start, _) in zip(arcs, arcs[1:])]
         # A value repeats only where the linkage can be assembled again.
-        return next((input_._replace(period=turns, low=-math.pi * turns, high=math.pi * turns)
-                     for turns in periods if linkage.repeats(
-                         by, turns, 'checked', self.outputs, input_.high, gaps)), input_)
+        repeats = self.linkage.repeats(by, 1, 'checked', self.outputs, input_.high, gaps)
+        return Input(input_.name, speed=input_.speed) if repeats else input_
 
     @cached_property
     def newton(self) -> CompiledFunction:
