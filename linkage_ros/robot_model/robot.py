@@ -244,8 +244,7 @@ class Robot:
         """
         # Of each body all that are joined to it; the fewer are added to the more.
         joined = {body: {body} for body in self.frames}
-        for joint in sorted((joint for joint in self.joints if not joint.is_cut),
-                            key=lambda joint: joint.position is None):
+        for joint in [joint for joint in self.joints if not joint.is_cut]:
             base, body = joint.bodies
             fewer, more = sorted((joined[base], joined[body]), key=len)
             if fewer is not more:
