@@ -69,7 +69,8 @@ def modes_of(problem: InverseProblem, closed: Optional[InverseLinkage]
     for inputs in closed.solutions():
         results = substituted(forward, dict(enumerate(inputs)))
         for by, (turn, scale) in enumerate(zip(problem.periods, problem.scales)):
-            room = OFF * scale - abs(nearest(results[by] - argument(by), real(0.0), turn))
+            # Not a product of OFF, which would be a number that single precision does not know.
+            room = OFF - abs(nearest(results[by] - argument(by), real(0.0), turn)) / scale
             inputs = [valid_where(x, room, 0.0) for x in inputs]
         modes.append(([nearest(x, real(0.0), turn) for x, turn in zip(inputs, problem.turns)],
                       results[problem.n:]))
