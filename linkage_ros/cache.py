@@ -67,12 +67,6 @@ class Cache(Dict[Any, Any]):
         value = self.get(key, _MISSING)
         return self._put(key, make) if value is _MISSING else value
 
-    def clear(self) -> None:
-        """Drop all entries."""
-        with self._lock:
-            super().clear()
-            self._in_use.clear()
-
     def _put(self, key: Hashable, make: Callable[[], Any]) -> Any:
         with self._lock:
             value = self._in_use.get(key, _MISSING)

@@ -3,6 +3,7 @@
 
 """A linkage that a length drives does all that one driven by an angle does."""
 
+from itertools import product
 import math
 
 from linkage_ros import mechanisms, scene
@@ -106,3 +107,13 @@ def test_the_barrel_of_an_isosceles_cylinder_keeps_its_digits_as_it_gets_short(l
         -1.0 / (2.5 * sine), rel=4e-16)
     assert linkage.joint_accelerations(length, 1.0, 0.0, ('barrel',))['barrel'] == pytest.approx(
         -length / (2.5 * sine) ** 3, rel=1e-6, abs=1e-8)
+
+
+def test_a_cylinder_on_a_crank_turns_at_the_rates_of_its_angles():
+    linkage = mechanisms.create('custom', joints=(
+        'O ground 0 0', 'P ground 3 0.5', 'A crank O 1', 'B cylinder A P 1.5 left called drive'))
+    for by, pose in product((0, 1), ((0.3, 1.9), (2.0, 3.1))):
+        ahead, behind = (linkage.joint_angles(pose + step * np.eye(2)[by])
+                         for step in (1e-6, -1e-6))
+        for name, rate in linkage.joint_rates(pose, by=by).items():
+            assert rate == pytest.approx((ahead[name] - behind[name]) / 2e-6, abs=1e-8), name

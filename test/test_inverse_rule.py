@@ -115,6 +115,9 @@ def test_an_output_that_jumps_has_extremes_on_both_sides(output, most):
     extremes = mechanisms.create('custom', joints=lines).extremes(output)
     with_rail = mechanisms.create('custom', joints=[*lines, 'Z carriage O along Q 100 200'])
     assert with_rail.extremes(output, others=[150.0]) == extremes
+    # A fast gear has another unit of the crank's angle.
+    geared = mechanisms.create('custom', joints=[*lines, 'Z crank O 1 geared crank 20 0'])
+    assert np.ravel(geared.extremes(output)) == pytest.approx(np.ravel(extremes), abs=1e-3)
     assert all(high - low < most + 1e-9 for (low, _), (high, _) in extremes)
 
 

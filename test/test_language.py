@@ -83,7 +83,7 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P ground g*g*1e70 0', "'g*g*1e70' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0 30deg', "'30deg' is in degrees, but Y is not an angle"),
     ('P slider A b Q 90 out', '90 is more than a turn; in degrees it is written 90deg'),
-    ('P slider A b Q -90 out', '-90 is more than a turn; in degrees it is written -90deg'),
+    ('P slider A b Q -6.3 out', '-6.3 is more than a turn; in degrees it is written -6.3deg'),
     ('P slider A b Q 45*2 out', 'in degrees it is written (45*2)deg'),
     ('P slider A b Q 90 deg out', 'an angle is in rad, or in degrees: 30deg'),
     ('P dyad A Q 1 1 left R ground 0 0', 'one line per joint'),

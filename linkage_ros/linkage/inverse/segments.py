@@ -274,8 +274,6 @@ class Segments:
                 size = 0.5 * self._period if self._period < math.inf else max(
                     float(np.nanmax(value) - np.nanmin(value)), CLOSE * self._size)
                 slopes = np.stack([rate[1:], rate[:-1]])
-                # At an end a rate may be infinite.
-                slopes = np.where(np.isfinite(slopes), slopes, slopes[::-1])
                 mean = 0.5 * width * slopes.sum(axis=0)
                 missed = np.abs(change - np.where(np.isfinite(mean), mean, 0.0))
                 wide = (width > SINGULAR) & (missed > ULPS * self._rounding)
@@ -311,9 +309,8 @@ class Segments:
             at, _ = refined(lambda x: (self._curve(x.ravel())[1] >= 0.0).reshape(
                 x.shape) == rising[:, None], theta[places], theta[places + 1])
         found = self._curve(at)[0] if len(at) else at
-        # An extreme may be the one input at which an arm has no length and no direction.
-        at = np.where(np.isfinite(found), at, theta[places])
         at[abs(at) < LEAST] = 0.0
+        # An extreme may be the one input at which an arm has no length and no direction.
         found = value[places] + self._difference(
             np.where(np.isfinite(found), found, value[places]) - value[places])
         theta, value = np.insert(theta, places + 1, at), np.insert(value, places + 1, found)
