@@ -454,6 +454,16 @@ def test_joint_limits_are_those_of_all_poses(capsys, path):
             assert high - slack <= np.nanmax(values) <= high + 1e-9
 
 
+def test_joint_limits_can_be_commanded(capsys, tmp_path):
+    for path in ('examples/leg.yaml', 'config/slotted_lever.yaml'):
+        limits = limits_of(capsys, ROOT / path)
+        for name, mechanism in scene.load(ROOT / path).mechanisms.items():
+            (tmp_path / name).mkdir()
+            library, (joint,) = compiled(tmp_path / name, [mechanism]), joints(mechanism)
+            assert [Memory(library, mechanism).send(1, [end])[0] & 1
+                    for end in limits[joint.name]] == [0, 0]
+
+
 @pytest.mark.parametrize('name, more, limits', [
     ('QB', '', False), ('crank', '', False), ('crank2', '', False),
     ('crank2', 'crank.sweep: [-1.0, 20.0], ', (-40.0, 2.0)), ('crank', 'crank.sweep: [0.0, 9.0], ',
