@@ -150,7 +150,8 @@ def prove(package, mechanism, compiler):
         subprocess.run([
             compiler, *PLUGIN, '-O2', *flags, f'-DNAME={name}', f'-DNAMESPACE={space}',
             f'-DINPUTS={len(mechanism.inputs)}', f'-DRANGES={ranges(mechanism)}', '-I',
-            package / 'src', '-I', package / 'include', STAND_IN / 'proof.cpp', '-o', program, *PLUGIN], check=True)
+            package / 'src', '-I', package / 'include', STAND_IN / 'proof.cpp', '-o', program,
+            *PLUGIN], check=True)
         ended = subprocess.run([program, str(count)], capture_output=True, text=True)
         assert ended.returncode == 0, ended.stdout + ended.stderr
         tried, good = map(int, re.search(r'(\d+) states, (\d+)', ended.stdout).groups())

@@ -230,6 +230,16 @@ def test_the_inverse_in_single_precision_chooses_alike(kind):
     assert np.nanquantile(off, 0.9) < 1e-4
 
 
+def test_in_single_precision_solutions_next_to_a_dead_point_are_there():
+    large = mechanisms.create('custom', joints=(
+        'A ground 0 -4.7e5', 'C ground 1.8e6 0', 'D crank C 1.2e6', 'E antiparallelogram C D A'))
+    inverse = large.inverse('E.y')
+    cranks = next(place for place in large.dead_points() if place > 0.0) + np.linspace(-0.01, 0.01)
+    found, = inverse.function(np, follows=True)(*(x.astype('f4') for x in (
+        large.joint_angles(cranks, ['E.y'])['E.y'], cranks)))
+    np.testing.assert_allclose(found, cranks, atol=1e-3)
+
+
 @pytest.mark.parametrize('kind', INVERSES)
 def test_all_modes_are_all_solutions(kind, strict):
     values, _ = questions(kind, 40)

@@ -14,17 +14,15 @@ from typing import Any, Dict, Iterable, List, Mapping, Sequence, Tuple
 import numpy as np
 
 from .names import comment
-from ..formula.expression import Real, real, substituted
+from ..formula.expression import Real, substituted
 from ..formula.operations import OPERATIONS
-from ..formula.program import Dialect, in_order, Program
+from ..formula.program import Dialect, Program, tolerant
 from ..linkage import IN_SINGLE, Mechanism
 
 # Names of constants, arguments and values.
 _NAMED = re.compile(r'\b[kx]\d+\b')
 # Expressions that are true or false.
 _CONDITIONS = ('less', 'less_equal')
-# Operations whose last argument is a tolerance, and how much coarser a float is than a double.
-_LIMITS, COARSER = ('root', 'valid_where'), 2.0 ** 29
 # Longest line of code, and longest formula of a constant in its comment.
 LINE, MAX_FORMULA = 100, 50
 
@@ -89,8 +87,8 @@ class Code:
         Each of its `blocks` is a comment and the values that it assigns, by their places. `last`
         is its last statement. Values take the place of `replaced` expressions.
         """
-        results = self._tolerant(substituted(
-            [x for _, assigned in blocks for x in assigned.values()], replaced))
+        results = tolerant(substituted(
+            [x for _, assigned in blocks for x in assigned.values()], replaced), self._rounding)
         program = Program(results, len(arguments))
         exact: Dict[Real, Any] = {}
         program.bind(self.linkage.dimensions, exact)
@@ -133,14 +131,6 @@ class Code:
         lines += [f'const {self.number} x{i} = {code};' if f'x{i}' in used else f'(void){code};'
                   for i, code in enumerate(arguments) if f'x{i}' in used or code.isidentifier()]
         return '\n'.join([head, '{', *indented(lines + text.split('\n')), '}', ''])
-
-    def _tolerant(self, results: Sequence[Real]) -> Sequence[Real]:
-        """Return results with tolerances of the type, where they are numbers already, too."""
-        if not self.single:
-            return results
-        numbers = {x.args[-1] for x in in_order(results) if x.op in _LIMITS}
-        return substituted(results, {x: real(x.value * COARSER) for x in numbers
-                                     if x.value and x.value not in self._rounding})
 
 
 def bare(code: str) -> str:

@@ -23,7 +23,7 @@ from typing import Any, Callable, Dict, List, Sequence, Tuple
 
 from .expression import argument, operation, Real, substituted, unknown, where
 from .listing import Dialect
-from .program import ARRAYS, in_order, Program
+from .program import ARRAYS, in_order, Program, tolerant
 from ..words import listed
 
 
@@ -34,13 +34,13 @@ def array_function(outputs: Sequence[Real], arguments: int, xp: Any, dimensions:
 
     `single` are the numbers that take the place of others in single precision.
     """
-    program = Program(Finite().outputs(substituted(outputs, {})), arguments)
-
     def code(dtype: Any, numbers: Dict[float, float]) -> Callable:
         names = {name: _of_floats_too(name, xp, dtype) for name in (
             'sin', 'cos', 'sqrt', 'absolute', 'rint', 'where', 'atan2')}
         dialect = Dialect(ARRAYS.templates, {**ARRAYS.names, **names}, lambda value: repr(
             numbers.get(value, value)))
+        program = Program(Finite().outputs(
+            substituted(tolerant(outputs, numbers), {})), arguments)
         known = {x: numbers[x.value] for x in in_order(outputs) if x.value in numbers}
         return program.bind(dimensions, known).on(dialect)
 

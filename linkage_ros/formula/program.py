@@ -24,7 +24,7 @@ import warnings
 
 import numpy as np
 
-from .expression import Real, substituted, unknown
+from .expression import Real, real, substituted, unknown
 from .listing import Dialect, Listing
 from .operations import OPERATIONS
 from ..cache import Cache
@@ -32,6 +32,8 @@ from ..optional import needs
 
 # A block of this many poses stays in the second-level cache; measured in benchmark/.
 BLOCK_OF_POSES = 4096
+# How much coarser single precision is.
+COARSER = 2.0 ** 29
 # Below this many poses the float code in a loop beats numpy's cost per call.
 FEW_POSES = 32
 _NAMED, _OPERANDS = re.compile(r'\bv\d+'), attrgetter('operands')
@@ -68,6 +70,18 @@ def in_order(nodes: Iterable[Real], needed: Callable = _OPERANDS) -> List[Real]:
     for x in unknown(nodes, needed, known):
         known[x] = None
     return list(known)
+
+
+def tolerant(outputs: Sequence[Real], single: Mapping[float, float]) -> Sequence[Real]:
+    """
+    Return outputs for single precision, with its tolerances in the place of plain numbers.
+
+    `single` are the numbers that take the place of others; without any, precision is double. A
+    tolerance that follows from dimensions is computed with them.
+    """
+    tolerances = {x.args[-1] for x in in_order(outputs) if x.op in ('root', 'valid_where')}
+    return substituted(outputs, {x: real(COARSER * x.value) for x in tolerances
+                                 if x.value and x.value not in single}) if single else outputs
 
 
 def _with_releases(lines: Sequence[Tuple[str, str]], outputs: Sequence[str]) -> List[str]:

@@ -265,7 +265,7 @@ class Robot:
     def spanning_tree(self) -> tuple[dict[str, tuple[str, Joint]], list[Joint]]:
         """Return the parent and the joint of each body, and the joints that close loops."""
         near: dict[str, list[tuple[str, Joint]]] = {body: [] for body in self.frames}
-        for joint in self.joints:
+        for joint in sorted(self.joints, key=lambda joint: joint.name not in self.driven):
             for body, other in (joint.bodies, joint.bodies[::-1]):
                 near[body].append((other, joint))
         tree: dict[str, tuple[str, Joint]] = {}
