@@ -20,7 +20,6 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.parameter import Parameter
 from ros_harness import hastened
 
-SOON = 2.0
 LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
 A = 'lever.dimensions.a'
 

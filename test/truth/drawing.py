@@ -55,7 +55,6 @@ class Digits:
     """Arithmetic in many digits."""
 
     point = staticmethod(mpc)
-    number = staticmethod(mpfr)
     floor = staticmethod(gmpy2.floor)
     least = staticmethod(min)
 
@@ -88,7 +87,6 @@ class Digits:
 class Floats:
     """Arithmetic on arrays of float64."""
 
-    number = staticmethod(float)
     floor = staticmethod(np.floor)
     least = staticmethod(np.minimum)
     direction = staticmethod(np.angle)
@@ -150,6 +148,7 @@ class Line(NamedTuple):
         return self.word == 'crank'
 
 
+@functools.cache
 def read(text):
     """Return a `Line` of the language."""
     parts = text.split()
@@ -210,18 +209,24 @@ class Arithmetic:
     def __init__(self, dimensions, moved=None):
         self._moved = moved or {}
         self._known = {'max': max, 'sqrt': _square_root, 'literal': self._literal,
-                       **{name: Value(number, mpfr(0)) for name, number in dimensions.items()}}
+                       **{name: Value(number, mpfr(0)) for name, number in dimensions.items()},
+                       'pi': _rounded(gmpy2.const_pi(), mpfr(0))}
 
     def value(self, text):
         """Return the `Value` of a text."""
-        return eval(_TOKEN.sub(lambda token: (
-            f'literal("{token["number"]}", {bool(token["deg"])})' if token['number'] else
-            token[0]), text), {**self._known, 'pi': _rounded(gmpy2.const_pi(), mpfr(0))})
+        return eval(_code(text), self._known)
 
     def _literal(self, text, is_in_degrees):
         number = mpfr(float(text)) + self._moved.get(text, 0)
         return _rounded(number * gmpy2.const_pi() / 180, mpfr(0)) if is_in_degrees else Value(
             number, mpfr(0))
+
+
+@functools.cache
+def _code(text):
+    return compile(_TOKEN.sub(lambda token: (
+        f'literal("{token["number"]}", {bool(token["deg"])})' if token['number'] else token[0]),
+        text), text, 'eval')
 
 
 def _square_root(value):

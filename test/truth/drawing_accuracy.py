@@ -195,7 +195,6 @@ class Measure:
         self.linkage, self.poses, self._way, self.strict = linkage, poses, way or {}, strict
         self._nominal = self._given(linkage.numbers)
         self._moved = {}
-        self._pinned = linkage.fixed | set(linkage.cranks)
         self._lines = {name: line for line in linkage.lines for name in line.names}
         # An angle is about as large as one; lengths are as large as the longest of them.
         self._units = [1 if line.turns else linkage.longest for line in linkage.inputs]

@@ -491,24 +491,26 @@ def followed(subject):
 
 @checked
 def efforts(subject):
-    """Compare the efforts that balance a load with the rates of what it moves."""
+    """Compare the efforts that balance loads with the rates of what they move."""
     mechanism, given = subject.mechanism, _given(asked(subject, 1), ())
-    links = {link.name: link for link in mechanism.links}
+    links, loads, moved = {link.name: link for link in mechanism.links}, {}, []
     # At a dead point they may be anything.
     sure = [by for by in range(len(mechanism.inputs)) if np.isfinite(
         [*mechanism.joint_rates(given, by=by).values()]).all()]
     for name in (*mechanism.points, *mechanism.joints):
-        link, moved = links.get(name), [f'{name}.x', f'{name}.y']
+        link, of = links.get(name), [f'{name}.x', f'{name}.y']
         if link:
             while link and link.kind == 'prismatic':
                 link = links.get(link.parent)
-            moved = [f'angle({link.joint},{link.tip})'] if link else []
+            of = [f'angle({link.joint},{link.tip})'] if link else []
         load = subject.rng.uniform(-9.0, 9.0, 1 if name in links else 2)
-        found = mechanism.effort(given, {name: load[0] if name in links else load})[sure]
-        wanted = [-np.dot([*mechanism.joint_rates(given, moved, by).values()], load[:len(moved)])
-                  for by in sure]
-        if not np.allclose(found, wanted, 1e-6, 1e-8 * max(1.0, mechanism.longest)):
-            yield 'effort', f'{found}, not {wanted}, for {load} at {name}, {given}'
+        loads[name] = load[0] if name in links else load
+        moved += zip(of, load)
+    found = mechanism.effort(given, loads)[sure]
+    wanted = [-sum(rates[output] * load for output, load in moved) for rates in (
+        mechanism.joint_rates(given, {*dict(moved)}, by) for by in sure)]
+    if not np.allclose(found, wanted, 1e-6, 1e-8 * max(1.0, mechanism.longest)):
+        yield 'effort', f'{found}, not {wanted}, for {loads}, {given}'
 
 
 @checked

@@ -11,6 +11,7 @@ lengths, offsets of zero, and all that but for a rounding or a little more.
 """
 
 from contextlib import suppress
+from functools import cache
 import math
 import re
 from typing import NamedTuple
@@ -29,8 +30,8 @@ NEAR = (0.0, 0.0, 0.0, 1e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9)
 # negative.
 LINES = {
     'dyad {0} {1} {l} {m} {side}': 18, 'rigid {a} {b} {l} {m} {side}': 8, 'line {a} {b} {s}': 4,
-    'mirror {a} {b} {c}': 4, 'parallelogram {a} {b} {c}': 2, 'antiparallelogram {a} {b} {c}': 2,
-    'inversor {0} {1} {l} {m}': 3, 'slot {0} {1} {s} {half} {m}': 4,
+    'mirror {a} {b} {c}': 4, 'parallelogram {a} {b} {c}': 3, 'antiparallelogram {a} {b} {c}': 2,
+    'inversor {0} {1} {l} {m}': 4, 'slot {0} {1} {s} {half} {m}': 4,
     'slider {0} {l} {f} {angle} {half}': 5, 'slider {0} {l} {a} along {b} {half}': 3,
     'yoke {0} {a} along {b}': 3, 'block {x} {s} {t}': 3, 'image {f} {g} {h}': 3,
     'crank {f} {l} geared {drive} {ratio} {turn}': 1,
@@ -184,9 +185,8 @@ class _Writer:
                 self._take([self._name()], text)
 
     def _fold(self):
-        ground, crank = self._number(), self._number()
-        if self._rng.random() < 0.4:
-            crank = self._nudged(ground)
+        ground = self._number()
+        crank = self._nudged(ground) if self._rng.random() < 0.4 else self._number()
         names = dict(zip('OQAB', (self._name() for _ in 'OQAB')))
         place = self._rng.choice(('{} 0', '-{} 0', '0 {}', '0 -{}'))
         self._take([names['O']], 'ground 0 0')
@@ -194,22 +194,22 @@ class _Writer:
         self._take([names['A']], f'crank {names["O"]} {crank}' + self._rng.choice(('', ' up')))
         self.inputs = 1
         known = {**names, 'g': lambda: self._nudged(ground), 'k': lambda: self._nudged(crank),
-                 'l': self._number()}
-        self._try([names['B']], self._rng.choice(FOLDS), known)
+                 'l': cache(self._number)}
+        self._try([names['B']], self._rng.choice(FOLDS), Linkage(
+            self.lines, self.dimensions), known)
 
     def add(self, forms):
         """Add one of some lines, if one of many tries is a linkage that has a pose."""
-        name = self._name()
+        name, linkage = self._name(), Linkage(self.lines, self.dimensions)
         for _ in range(TRIES):
             form = chosen(self._rng, forms)
             names = [name, f'{name}b', f'{name}c'] if form.startswith('inversor') else [name]
-            if self._try(names, form, {}):
+            if self._try(names, form, linkage, {}):
                 self.inputs += form in INPUTS
                 return
 
-    def _try(self, names, form, known):
+    def _try(self, names, form, linkage, known):
         before = dict(self.dimensions), list(self._lengths)
-        linkage = Linkage(self.lines, self.dimensions)
         known = {**self._picked(linkage), **known}
         text = re.sub(r'\{(\w+)\}', lambda match: self._filled(match[1], known), form)
         if form.startswith(DRIVEN) and len(linkage.driven_names) == 1:
