@@ -96,19 +96,15 @@ def values(mechanism, count):
     return np.column_stack(rows)
 
 
-@pytest.mark.parametrize('name', SCENE['mechanisms'])
-def test_poses_and_rates_are_those_of_python(library, mechanisms, name, count=50):
+@pytest.mark.parametrize('name, count', [*((name, 50) for name in SCENE['mechanisms']), *(
+    pytest.param(name, 100_000, marks=pytest.mark.nightly)
+    for name in ('jansen', 'slotted_lever'))])
+def test_poses_and_rates_are_those_of_python(library, mechanisms, name, count):
     mechanism = mechanisms[name]
     inputs = values(mechanism, count)
     (found, whole), poses = solved(library, mechanism, inputs), expected(mechanism, inputs)
     assert whole == np.isfinite(poses[:, :len(fields(mechanism))]).all(axis=1).tolist()
     np.testing.assert_allclose(found, poses, rtol=1e-15, atol=0.0)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('name', ['jansen', 'slotted_lever'])
-def test_so_they_are_at_a_hundred_thousand_poses(library, mechanisms, name):
-    test_poses_and_rates_are_those_of_python(library, mechanisms, name, 100_000)
 
 
 @pytest.mark.parametrize('name, single, lines', [

@@ -9,6 +9,7 @@ beside it: at inputs that differ by 1e-3 rad or sizes. Python says where they ar
 """
 
 from contextlib import suppress
+from pathlib import Path
 import subprocess
 
 from c_libraries import alone, COMPILER, loaded, SANITIZED
@@ -21,6 +22,7 @@ import pytest
 from truth import random_linkages
 
 pytestmark = pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
+ROOT = Path(__file__).parents[1]
 NUMBERS = pytest.mark.parametrize('number', ['double', 'float'])
 # Linkages for which a closed form was missing an assembly mode; in float, one beside a limit.
 FAULTS = [(['A ground 0 0', 'B ground 0 1.4', 'C cylinder B A 1.0157 right',
@@ -89,7 +91,8 @@ def asked(library, case, number):
         np.divide(max(settings.arcs, key=np.ptp), mechanism.scale_of(name))
         for name, settings in mechanism.inputs.items()])
     here = rng.uniform(low, high, (POSES, len(low)))
-    beside = here + 1e-3 * sizes * rng.choice([-1.0, 1.0], here.shape)
+    beside = (here + 1e-3 * sizes * rng.choice([-1.0, 1.0], here.shape)).clip(*np.transpose([
+        ends or (-np.inf, np.inf) for ends in mechanism.ends]))
     (actuator, joint), (goal, commanded) = ([placed(mechanism, axes, inputs) for axes in sides]
                                             for inputs in (here, beside))
     count, wrong = 0, []
@@ -136,9 +139,10 @@ def test_linkages_that_had_a_fault(tmp_path, number, fault, output, count):
 
 @pytest.mark.nightly
 @NUMBERS
-def test_the_catalogue(tmp_path, number):
-    catalogue = [header.Request(alone(name, name)) for name in mechanisms.TYPES]
-    assert min(questions(tmp_path, catalogue, number)) > 200
+def test_the_catalogue_and_an_ankle(tmp_path, number):
+    ankle = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).mechanisms.values()
+    requests = [*map(header.Request, (*map(alone, mechanisms.TYPES, mechanisms.TYPES), *ankle))]
+    assert min(questions(tmp_path, requests, number)) > 200
 
 
 @pytest.mark.nightly

@@ -104,6 +104,7 @@ REFUSED = [
      "four_bar.xml: it uses the plugin 'mujoco.none', which this MuJoCo does not have: remove"),
     ('four_bar.urdf', [], 'motor, shoulder drive it, and hold each other, as 1 of them tell where '
      'all is: add --driven motor to the command', '--driven', 'motor', 'shoulder'),
+    ('four_bar.sdf', [], f'{HELD}.\n', '--hold', 'joint_A=0'),
     # What follows a joint that is held is held.
     ('four_bar.urdf', [('<limit', '<mimic joint="elbow"/><limit')], HELD, '--hold', 'elbow=0'),
     # A fold, without motors.

@@ -160,6 +160,8 @@ CHOICES = [
     # It cannot be commanded there, but at its ends.
     (SLOT, {'crank.start': 0.5, 'crank.sweep': [0.2, 0.8]}, ['A.y'], 1,
      [(0.02 * math.cos(0.9), None), (0.02 * math.cos(0.8), 0.8), (0.02 * math.cos(0.2), 0.2)]),
+    *((SLOT, {'crank.start': 0.5, 'crank.sweep': [0.2, end]}, ['A.y'], 1,
+       [(0.02 * math.cos(end), end)]) for end in (0.6, 0.7, 0.9, 1.0, 1.1)),
     # What is beyond it by more weighs ten times.
     (SLOT, {'crank.measures': 'A.y', 'crank.start': 0.2, 'crank.sweep': [-1.0, 0.2]},
      ['crank'], 0, [(0.02 * math.cos(0.3), -0.3)])]
@@ -222,18 +224,6 @@ def test_small_steps_up_to_an_extreme_are_not_lost(tmp_path, single, step, beyon
                     memory = Memory(library, mechanism, kind)
                     assert command(memory, before)[0] == 0
                     assert command(memory, extreme + part * out)[0] == is_out
-
-
-@pytest.mark.nightly
-def test_an_ankle_in_single_precision_is_that_of_python(tmp_path):
-    mechanism, = scene.load(str(ROOT / 'examples' / 'ankle.yaml')).mechanisms.values()
-    memory = Memory(compiled(tmp_path, [mechanism], single=True), mechanism, np.float32)
-    for inputs in np.random.default_rng(4).uniform(-0.2, 0.2, (300, 2)):
-        actuator, _, joint, _ = expected(mechanism, inputs)
-        status, (found, *_) = memory.send(0, actuator)
-        assert status == 0 and found == pytest.approx(joint, abs=1e-5)
-        status, (found, *_) = memory.send(1, joint)
-        assert status & 1 == 0 and found == pytest.approx(actuator, abs=1e-4)
 
 
 def test_joints_that_move_with_no_input_are_refused():
@@ -462,6 +452,16 @@ def test_joint_limits_are_those_of_all_poses(capsys, path):
             slack = 0.05 * (high - low)
             assert low - 1e-9 <= np.nanmin(values) <= low + slack
             assert high - slack <= np.nanmax(values) <= high + 1e-9
+
+
+def test_joint_limits_can_be_commanded(capsys, tmp_path):
+    for path in ('examples/leg.yaml', 'config/slotted_lever.yaml'):
+        limits = limits_of(capsys, ROOT / path)
+        for name, mechanism in scene.load(ROOT / path).mechanisms.items():
+            (tmp_path / name).mkdir()
+            library, (joint,) = compiled(tmp_path / name, [mechanism]), joints(mechanism)
+            assert [Memory(library, mechanism).send(1, [end])[0] & 1
+                    for end in limits[joint.name]] == [0, 0]
 
 
 @pytest.mark.parametrize('name, more, limits', [

@@ -371,8 +371,8 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
 }
 
 /* Add the turns to x that bring it nearest to inputs; returns how far it is from there, -1 if not
-   allowed. A command has to be in the sweeps. What is measured may be outside, which counts ten times
-   more. */
+   allowed. A command has to be in the sweeps, up to rounding. What is measured may be outside, which
+   counts ten times more. */
 static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_real *near,
     const lkr_real *x, lkr_real *q)
 {
@@ -384,14 +384,18 @@ static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_rea
         const lkr_real high = model->sweep[i][1];
         const lkr_real turn = model->turn[side][i];
         const lkr_real inside = lkr_min(lkr_max(near[i], low), high);
+        const lkr_real slack = LKR_CLOSE * lkr_max(model->size[i], LKR_MATH(fabs)(near[i]));
         lkr_real beyond;
         q[i] = x[i] + lkr_turns((is_command ? inside : near[i]) - x[i], turn);
-        if (is_command && (q[i] < low || q[i] > high)) {
+        if (is_command && (q[i] < low - slack || q[i] > high + slack)) {
             q[i] += q[i] < low ? turn : -turn;
         }
         beyond = lkr_max(0, lkr_max(low - q[i], q[i] - high));
-        if (is_command && beyond > 0) {
-            return -1;
+        if (is_command) {
+            if (beyond > slack) {
+                return -1;
+            }
+            q[i] = lkr_min(lkr_max(q[i], low), high);
         }
         away += (LKR_MATH(fabs)(q[i] - near[i]) + 10 * beyond) / model->size[i];
     }

@@ -175,13 +175,20 @@ class Drawing(Dyads):
         return link, joint.motion(body), phase(along / self.parts[base].along)
 
     def _measuring(self, pin: str, base: str, body: str) -> Tuple[str, complex]:
-        """Add a bar that is always parallel to one of a body; return its link and direction."""
+        """Add a bar that turns on one body as another does; return its link and direction."""
         (other, end), start = self.other(body, pin), self.on[body][pin]
         along = end - start
-        foot = next((name for name in self.on[base]
-                     if self.placed_on[name] == base and name != pin), '') \
-            or self.fixed(base, self.on[base][pin] + along * complex(0.5, 0.75 ** 0.5))[0]
-        name = self.name(self.on[base][foot] + along, body, f'parallelogram {pin} {foot} {other}')
+        corner = along * complex(0.5, 0.75 ** 0.5)
+        if self.placed_on[pin] == base:
+            # A triangle that is a dyad, so that it hangs on the pin.
+            side, foot, along = self.length_text(abs(along)), pin, corner
+            line = f'dyad {pin} {other} {side} {side} left'
+        else:
+            # Of three bodies on a pin, a bar parallel to that of one, on another one.
+            foot = next((name for name in self.on[base] if self.placed_on[name] == base), '') \
+                or self.fixed(base, self.on[base][pin] + corner)[0]
+            line = f'parallelogram {pin} {foot} {other}'
+        name = self.name(self.on[base][foot] + along, body, line)
         return bar_name(foot, name), along
 
     def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> Tuple[str, str]:

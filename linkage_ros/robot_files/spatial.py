@@ -85,8 +85,8 @@ class Component:
         The greatest distance of two joints in the file's pose [m].
     unit : array
         A radian, or the size, for each screw.
-    named : dict
-        The screw of each joint of the tree that has a position.
+    positions, named : dict
+        The position in the file, and the screw, of each joint that has one.
     start : array
         The pose of the file.
 
@@ -94,8 +94,10 @@ class Component:
 
     def __init__(self, robot: Robot, tree: Dict[str, Tuple[str, Joint]], bodies: Set[str],
                  cuts: Sequence[Joint]):
-        self._cuts, edges = cuts, {tree[body][1] for body in bodies} | {*cuts}
+        edges = {tree[body][1] for body in bodies} | {*cuts}
         self.joints = [joint for joint in robot.joints if joint in edges]
+        self.positions = {joint.name: joint.position for joint in self.joints
+                          if joint.position is not None}
         places = np.array([place for joint in self.joints for place in joint.places])
         self.size = float(np.max(np.linalg.norm(places - places[0], axis=1))) or 1.0
         self._screws: List[Screw] = []
@@ -127,7 +129,7 @@ class Component:
         self._twists = screws(axes, places, self._slides)
         self.unit = np.where(self._slides, self.size, 1.0)
         self.start = np.zeros((1, len(self._screws)))
-        self._set_equations(last, above)
+        self._set_equations(cuts, last, above)
 
     def _motions(self, joint: Joint, body: str) -> List[Tuple[str, np.ndarray]]:
         """Return kind and axis of the screws of a joint; far from a ball's singular poses."""
@@ -138,10 +140,11 @@ class Component:
         return {BALL: turns, FREE: [*((SLIDE, way) for way in np.eye(3)), *turns]}.get(
             joint.kind, [])
 
-    def _set_equations(self, last: Mapping[str, int], above: np.ndarray) -> None:
+    def _set_equations(self, cuts: Sequence[Joint], last: Mapping[str, int], above: np.ndarray
+                       ) -> None:
         """Set the points that coincide on both ends of each cut."""
         ends, points = [], []
-        for cut in self._cuts:
+        for cut in cuts:
             end = [last[body] for body in cut.bodies]
             offsets = [np.zeros((2, 3))]
             if cut.kind == HINGE:
@@ -154,12 +157,6 @@ class Component:
         self._ends = np.array(ends, int).reshape(-1, 2)
         self._points = np.concatenate([points, np.ones((len(ends), 2, 1))], axis=2)
         self._signs = above[self._ends] * np.array([[1.0], [-1.0]])
-
-    @property
-    def positions(self) -> Dict[str, float]:
-        """Positions in the file of named joints with one degree of freedom."""
-        return {joint.name: joint.position for joint in self.joints
-                if joint.position is not None}
 
     def is_of(self, names: Sequence[str]) -> np.ndarray:
         """Return which screws are of the joints that are named."""

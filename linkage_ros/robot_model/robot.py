@@ -242,18 +242,14 @@ class Robot:
 
         Where it has a position, it moves a body of its own in the tree, welded to the other one.
         """
-        joined = {body: body for body in self.frames}
-
-        def first(body: str) -> str:
-            while joined[body] != body:
-                joined[body] = body = joined[joined[body]]
-            return body
-
-        for joint in sorted((joint for joint in self.joints if not joint.is_cut),
-                            key=lambda joint: joint.position is None):
+        # Of each body all that are joined to it; the fewer are added to the more.
+        joined = {body: {body} for body in self.frames}
+        for joint in [joint for joint in self.joints if not joint.is_cut]:
             base, body = joint.bodies
-            if first(base) != first(body):
-                joined[first(body)] = first(base)
+            fewer, more = sorted((joined[base], joined[body]), key=len)
+            if fewer is not more:
+                more |= fewer
+                joined.update(dict.fromkeys(fewer, more))
             elif joint.position is None:
                 joint.is_cut = True
             else:

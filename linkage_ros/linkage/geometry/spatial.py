@@ -336,10 +336,8 @@ def two_rods(rods: Sequence[Rod], home: Sequence[Real]) -> Tuple[Turn, Turn, Lim
     """
     bars = [(rod.pivot.place, rod.end, rod.length) for rod in rods]
     pose: HingeAngles = cosine(home[0]), sine(home[0]), cosine(home[1]), sine(home[1])
-    for _ in range(STEPS - 1):
-        pose, _step = newton_step(bars, pose)
-    # The steps before have changed the length of both unit vectors by rounding.
-    pose, step = newton_step(bars, (*_on_circle(*pose[:2]), *_on_circle(*pose[2:])))
+    for _ in range(STEPS):
+        pose, step = newton_step(bars, pose)
     final: List[Row] = []
 
     def rates(*given: Real) -> Tuple[Real, Real]:
@@ -371,12 +369,6 @@ def _stepped(c: Scalar, s: Scalar, step: Scalar) -> Tuple[Scalar, Scalar]:
     by = 1.0 / (1.0 + square_)
     cos, sin = (1.0 - square_) * by, step * by
     return c * cos - s * sin, s * cos + c * sin
-
-
-def _on_circle(c: Real, s: Real) -> Tuple[Real, Real]:
-    """Return a cosine and a sine corrected for the rounding of the sum of their squares."""
-    by = 1.5 - 0.5 * (square(c) + square(s))
-    return c * by, s * by
 
 
 def drawn_side(hinge: Hinge, pivot: Vector, end: Vector) -> Tuple[Real, Real]:
