@@ -96,6 +96,9 @@ def test_whole_turns_are_kept_and_a_singular_pose_is_not_passed():
     rim = math.sqrt(4.0 - 0.36)
     answer, = linkage.inputs_for(outputs, (0.6, rim))
     assert answer.is_singular and set(answer.signs.values()) == {0}
+    # Where rounding of the foot is all that is between them, they are one.
+    assert [len(linkage.inputs_for(outputs, (0.6, rim - below))) for below in (3e-15, 1e-9)] == [
+        1, 4]
     inputs, rates = linkage.inverse(outputs).follow((0.6, rim - 1e-9), near)
     assert np.isfinite(inputs).all()
     for beyond in (rim + 1e-9, 5.0, math.inf, math.nan):
