@@ -158,6 +158,10 @@ class Arm:
         """Return the margin square - radius^2; the radius is made from lengths up to size."""
         return self._limit(radius, size, self.square - square(radius))
 
+    def difference(self, first: Real, second: Real) -> Real:
+        """Return by how much a bar of a dyad is longer than the other [m]."""
+        return first - second
+
     def stroke(self, first: Real, second: Real, size: Real) -> Tuple[Limit, Limit]:
         """Return `within` of their sum and `beyond` of their difference; first varies."""
         length = self.length
@@ -233,6 +237,13 @@ class CrankArm(Arm):
         return self._half_angle_limit(radius, size, -1.0,
                                       exact_sum(g, m, -radius) * exact_sum(g, m, radius),
                                       exact_sum(g, -m, -radius) * exact_sum(g, -m, radius))
+
+    def difference(self, first: Real, second: Real) -> Real:
+        """Return by how much a bar is longer; by nothing if by rounding where the arm vanishes."""
+        apart = first - second
+        rounding = TOLERANCE * (first + second + self._g + self._m)
+        return where(self._is_isosceles, where(abs(apart) <= rounding, 0.0, apart), apart) \
+            if self._is_smooth else apart
 
     def to_opposite(self, first: Real, second: Real) -> Complex:
         """
@@ -314,10 +325,10 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) 
     v = side sqrt((r1 + r2)^2 - |w|^2) sqrt(|w|^2 - (r1 - r2)^2) / 2|w|^2; left of the arm for
     side = +1. At a change point of a crank arm the branch continues smoothly if `smooth`.
     """
-    radius = first + second
-    limits = arm.within(radius, radius), arm.beyond(first - second, radius)
+    radius, apart = first + second, arm.difference(first, second)
+    limits = arm.within(radius, radius), arm.beyond(apart, radius)
     v = _height(arm, limits, side, smooth)
-    skew = _nan_with(v, arm.vector, (first - second) * radius / (2.0 * arm.divisor))
+    skew = _nan_with(v, arm.vector, apart * radius / (2.0 * arm.divisor))
     u, turning = 0.5 + skew, spin(arm.vector)
 
     def bar(along: Real, length: Real) -> Complex:
