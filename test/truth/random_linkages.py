@@ -179,12 +179,10 @@ class _Writer:
         """Add the ground, and what folds flat on a first crank if it is to be degenerate."""
         if self._degenerate and self._rng.random() < 0.5:
             self._fold()
-        missing = int(self._rng.integers(2, 4)) + inputs - 1 - len(self._joints) // 2
-        while missing > 0:
+        for _ in range(int(self._rng.integers(2, 4)) + inputs - 1 - len(self._joints) // 2):
             text = f'ground {self._coordinate()} {self._coordinate()}'
             if not any(line.endswith(text) for line in self.lines):
                 self._take([self._name()], text)
-                missing -= 1
 
     def _fold(self):
         ground = self._number()
