@@ -715,16 +715,13 @@ def moves(linkage, values, robot, steps):
 
 
 @pytest.mark.parametrize('seeds', [
-    range(5), pytest.param([*range(5, 65), *range(66, 120)], marks=pytest.mark.nightly),
-    # Mirror images of a kite: a crossed parallelogram on them is on another side than in the file.
-    pytest.param([65], marks=[pytest.mark.nightly, pytest.mark.xfail(strict=True)])])
+    range(5), pytest.param(range(5, 120), marks=pytest.mark.nightly)])
 def test_random_linkages_come_back_from_robots(seeds):
     moved = 0
     for made in filter(None, map(random_robot, seeds)):
         try:
             moved += moves(*made)
         except RequestError as error:
-            assert re.search('closes a loop|not of dyads|it cannot move|lie in line|loops end',
-                             str(error))
+            assert re.search('closes a loop|not of dyads|it cannot move', str(error))
             assert cli.WRONG not in str(error)
     assert moved > len(seeds) // 2
