@@ -494,9 +494,6 @@ def efforts(subject):
     """Compare the efforts that balance loads with the rates of what they move."""
     mechanism, given = subject.mechanism, _given(asked(subject, 1), ())
     links, loads, moved = {link.name: link for link in mechanism.links}, {}, []
-    # The rule says nothing where four ulps of an input change an output by more than 1e-6.
-    sure = [by for by in range(len(mechanism.inputs)) if (np.abs(
-        [*mechanism.joint_rates(given, by=by).values()]) < 1e9).all()]
     for name in (*mechanism.points, *mechanism.joints):
         link, of = links.get(name), [f'{name}.x', f'{name}.y']
         if link:
@@ -506,9 +503,12 @@ def efforts(subject):
         load = subject.rng.uniform(-9.0, 9.0, 1 if name in links else 2)
         loads[name] = load[0] if name in links else load
         moved += zip(of, load)
+    rates = [mechanism.joint_rates(given, {*dict(moved)}, by)
+             for by in range(len(mechanism.inputs))]
+    # The rule says nothing where four ulps of an input change an output by more than 1e-6.
+    sure = [by for by, row in enumerate(rates) if (np.abs([*row.values()]) < 1e9).all()]
     found = mechanism.effort(given, loads)[sure]
-    wanted = [-sum(rates[output] * load for output, load in moved) for rates in (
-        mechanism.joint_rates(given, {*dict(moved)}, by) for by in sure)]
+    wanted = [-sum(rates[by][output] * load for output, load in moved) for by in sure]
     if not np.allclose(found, wanted, 1e-6, 1e-8 * max(1.0, mechanism.longest)):
         yield 'effort', f'{found}, not {wanted}, for {loads}, {given}'
 
