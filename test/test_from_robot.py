@@ -369,7 +369,7 @@ def undecided(seed):
 
 
 @pytest.mark.parametrize('seeds', [
-    range(6), pytest.param(range(6, 120), marks=pytest.mark.nightly)], ids=['', 'more'])
+    range(12), pytest.param(range(12, 120), marks=pytest.mark.nightly)], ids=['', 'more'])
 def test_a_line_that_is_pasted_leads_on(seeds):
     pasted = 0
     for robot in filter(None, map(undecided, seeds)):
