@@ -367,3 +367,9 @@ def test_no_line_goes_through_a_pole():
     assert (np.diff(x) >= 0.0).all()
     # Wherever two neighbours are joined, the ratio is of one sign.
     assert (y[:-1] * y[1:] < 0.0).sum() == 0
+
+
+@pytest.mark.parametrize('kind, power', [
+    ('position', 0), ('velocity', 1), ('acceleration', 2), ('transmission angle', 0)])
+def test_a_curve_says_how_it_grows_with_the_speed(kind, power):
+    assert curves.curve(*mechanism_of('jansen'), kind, None)['power'] == power
