@@ -149,10 +149,11 @@ def test_dead_points_of_an_arm_of_rounding_leave_the_other_outputs_their_answers
     assert found.input_for('Dc.y', value) == pytest.approx(5.4, abs=1e-12)
 
 
-@pytest.mark.parametrize('ulps', [-2, -1, 1, 2])
-def test_bars_of_a_kite_that_differ_by_rounding_meet_beside_an_arm_of_no_length(ulps):
-    kite = linkage('O ground 0 0', 'Q ground 1 0', 'A crank O 1', 'B dyad Q A 1 c left',
-                   c=1.0 + ulps * 2.0 ** -52)
-    theta = np.array([-1e-3, -1e-12, 0.0, 1e-12, 1e-3])
+@pytest.mark.parametrize('crank', [-8, -1, 0, 1, 2])
+@pytest.mark.parametrize('ulps', [-8, -2, -1, 1, 2, 8])
+def test_bars_that_differ_by_rounding_keep_their_lengths_beside_an_arm_of_hardly_any(crank, ulps):
+    kite = linkage('O ground 0 0', 'Q ground 1 0', 'A crank O m', 'B dyad Q A 1 c left',
+                   m=1.0 + crank * 2.0 ** -52, c=1.0 + ulps * 2.0 ** -52)
+    theta = np.array([-1e-3, -1e-12, -1e-15, 0.0, 1e-16, 1e-14, 1e-3])
     for places in (kite.solve(theta)['B'], np.array([kite.solve(x)['B'] for x in theta])):
         np.testing.assert_allclose(np.hypot(*(places - (1.0, 0.0)).T), 1.0, rtol=1e-9)

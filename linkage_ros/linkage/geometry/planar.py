@@ -158,8 +158,8 @@ class Arm:
         """Return the margin square - radius^2; the radius is made from lengths up to size."""
         return self._limit(radius, size, self.square - square(radius))
 
-    def difference(self, first: Real, second: Real) -> Real:
-        """Return by how much a bar of a dyad is longer than the other [m]."""
+    def difference(self, first: Real, second: Real, shorter: Limit) -> Real:
+        """Return by how much a bar of a dyad is longer than the other [m]; see `CrankArm`."""
         return first - second
 
     def stroke(self, first: Real, second: Real, size: Real) -> Tuple[Limit, Limit]:
@@ -238,12 +238,11 @@ class CrankArm(Arm):
                                       exact_sum(g, m, -radius) * exact_sum(g, m, radius),
                                       exact_sum(g, -m, -radius) * exact_sum(g, -m, radius))
 
-    def difference(self, first: Real, second: Real) -> Real:
-        """Return by how much a bar is longer; by nothing if by rounding where the arm vanishes."""
-        apart = first - second
-        rounding = TOLERANCE * (first + second + self._g + self._m)
-        return where(self._is_isosceles, where(abs(apart) <= rounding, 0.0, apart), apart) \
-            if self._is_smooth else apart
+    def difference(self, first: Real, second: Real, shorter: Limit) -> Real:
+        """Return `first - second`, or its like in the arm where the limit takes both as equal."""
+        apart, own = first - second, abs(self._g - self._m)
+        return where(abs(shorter.ends.end) <= shorter.tolerance,
+                     where(apart < 0.0, -own, own), apart) if shorter.ends else apart
 
     def to_opposite(self, first: Real, second: Real) -> Complex:
         """
@@ -325,8 +324,9 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) 
     v = side sqrt((r1 + r2)^2 - |w|^2) sqrt(|w|^2 - (r1 - r2)^2) / 2|w|^2; left of the arm for
     side = +1. At a change point of a crank arm the branch continues smoothly if `smooth`.
     """
-    radius, apart = first + second, arm.difference(first, second)
-    limits = arm.within(radius, radius), arm.beyond(apart, radius)
+    radius = first + second
+    limits = arm.within(radius, radius), arm.beyond(first - second, radius)
+    apart = arm.difference(first, second, limits[1])
     v = _height(arm, limits, side, smooth)
     skew = _nan_with(v, arm.vector, apart * radius / (2.0 * arm.divisor))
     u, turning = 0.5 + skew, spin(arm.vector)
