@@ -15,7 +15,7 @@
 #define JOINED(a, b) JOINED_(a, b)
 #define TEXT_(text) #text
 #define TEXT(text) TEXT_(text)
-#include TEXT(NAME.hpp)
+#include "plugins.cpp"
 
 namespace
 {
