@@ -48,6 +48,7 @@ def package(name: str, scene: str, mechanisms: Sequence[Tuple[SceneMechanism, Se
         parts.append(_parts(name, type_, mechanism, commanded, others))
     values = {
         'package': name, 'namespace': f'{name}_plugins', 'scene': escape(comment(scene)),
+        'passive': max(len(request.passive) for request in requests),
         **{key: '\n'.join(part[key] for part in parts) for key in parts[0]}}
     headers = header.headers(requests, False, ['#include "linkage.h"'] * len(requests))
     return {
@@ -72,7 +73,6 @@ def _parts(package_name: str, type_: str, mechanism: SceneMechanism, commanded: 
         'package': package_name, 'namespace': f'{package_name}_plugins', 'type': type_,
         'name': mechanism.name, 'axes': ' and '.join(named),
         'actuators': rows(sides[0]), 'joints': rows([*commanded, *others]),
-        'passive_function': f'{mechanism.name}_passive' if others else 'nullptr',
         'lines': '\n'.join(f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(axis.role)}/>'
                            for kind, axes in zip(('actuator', 'joint'), sides) for axis in axes)}
     return {

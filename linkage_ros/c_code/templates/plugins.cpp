@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 // Written by linkage_ros.
+#define LKR_MAX_PASSIVE @passive@
 @includes@
 #include "pluginlib/class_list_macros.hpp"
 #include "transmission.hpp"
