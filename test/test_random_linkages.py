@@ -112,7 +112,7 @@ def test_linkages_of_each_word_hold(word):
     assert not found, report(found)
 
 
-@pytest.mark.nightly(all_but=10)
+@pytest.mark.nightly(all_but=8)
 @pytest.mark.parametrize('name', LISTED)
 def test_a_listed_linkage_holds_what_any_must(name):
     found, _ = checks.problems(LISTED[name], np.random.default_rng(0))
@@ -121,7 +121,7 @@ def test_a_listed_linkage_holds_what_any_must(name):
 
 @pytest.mark.parametrize('kind', hard_cases.CATALOGUE)
 @pytest.mark.parametrize('seed, count', [
-    (1, 2), *(pytest.param(seed, 15, marks=pytest.mark.nightly) for seed in (2, 3, 4))])
+    (1, 1), *(pytest.param(seed, 15, marks=pytest.mark.nightly) for seed in (2, 3, 4))])
 def test_the_catalogue_with_hard_dimensions_holds(kind, seed, count):
     for mechanism, rng in hard_cases.linkages(kind, seed, count):
         told = checks.problems(random_linkages.Design(

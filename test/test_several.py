@@ -108,7 +108,7 @@ def test_whole_turns_are_kept_and_a_singular_pose_is_not_passed():
     np.testing.assert_allclose(back, near, atol=1e-9)
 
 
-@pytest.mark.nightly(all_but=2)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('seed', range(12))
 def test_what_is_followed_passes_no_fold_and_ends_where_small_steps_do(seed):
     rng, reached = np.random.default_rng(seed), 0
