@@ -332,7 +332,7 @@ class Builder:
         pin = self.points[first].crank
         ends = [self._side(end, point).vector for end in (second, first)]
         place, arm = self.points[point].place, self.arm(second, first, smooth=True)
-        self._reflect(name, first, second, arm, place, cross(arm.vector, ends[0]), ends,
+        self._reflect(name, first, second, arm, place, arm.offset(place, ends[0]), ends,
                       self._side(first, point).length, self._side(second, point).length)
         if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
             self._kites[first, name] = arm
@@ -354,7 +354,7 @@ class Builder:
         arm = self.arm(second, first, smooth=True)
         opposite = self.points[first].place + to_second.vector
         start = self.points[corner].place
-        offset = cross(arm.vector, to_second.vector)
+        offset = -arm.offset(start, -to_second.vector)
         place = start + arm.to_opposite(to_first.length, to_second.length) \
             if isinstance(arm, planar.CrankArm) else None
         self._reflect(name, first, second, arm, opposite, offset,
