@@ -211,8 +211,7 @@ class CrankArm(Arm):
         vector = along * Complex((g - m) + 2.0 * m * square(h), 2.0 * m * s * h)
         self.foot = crank.centre + crank.bar() if reverse else ground
         self.square = square(g - m) + 4.0 * g * m * square(h)
-        self._crank, self._along, self._turn = crank, -along if reverse else along, turn
-        self._line, self._is_reversed = along, reverse
+        self._crank, self._turn, self._is_reversed = crank, turn, reverse
         self._g, self._m, self._s, self._h, self._is_smooth = g, m, s, h, smooth
         # The arm between two equal lengths bisects them, also where it has no length itself.
         turning = where(self._is_isosceles, 0.5,
@@ -279,33 +278,11 @@ class CrankArm(Arm):
         return Limit(margin, tolerance, smooth if self._is_smooth else None, CrankEnds(
             start, end, arctangent(self._turn.y, self._turn.x), self._crank.angle))
 
-    def beyond_kite(self, k: Real) -> Complex:
-        """
-        Return pin + k (pin - image), where image mirrors the crank centre in the arm's line.
-
-        The component across the ground line is one product, which keeps every digit next to a
-        cusp, where the leading terms of a sum cancel.
-        """
-        g, m, s, sin = self._g, self._m, self._s, 2.0 * self._s * self._h
-        lead = (g + m) * ((g + m) + k * (m - g))
-        lead = where(self._is_isosceles, self.square, lead - 4.0 * g * m * square(s))
-        across = m * sin * lead / self.square
-        along = (1.0 + k) * m * (1.0 - 2.0 * square(s)) + \
-            2.0 * k * g * square(m * sin) / self.square
-        return self._crank.centre + self._line * Complex(along, across)
-
     def _first_sign(self, sign: float) -> Real:
         """Return the sign that makes s (sign +1) or h positive at the first quarter turn."""
         ahead, behind = (-sign, 1.0) if self._crank.backwards else (1.0, sign)
         beyond = where(0.0 <= self._turn.y, behind, -behind)
         return where(-TOLERANCE <= self._turn.x, ahead, beyond)
-
-    def inverse_of_isosceles(self) -> Optional[Complex]:
-        """Return 1 / conjugate(arm) if foot and pin are equally far from the centre, or None."""
-        if self._g is not self._m:
-            return None
-        return self._along * Complex(1.0, self._s / self._h) / (2.0 * self._m)
-
 
 def _half_angle(theta: Real, turn: Complex) -> Tuple[Real, Real]:
     """Return sine and cosine of (theta + arg turn) / 2 for a unit vector turn."""
@@ -491,8 +468,7 @@ def inversor(arm: Arm, long: Real, short: Real) -> Tuple[Dyad, Dyad, Complex]:
     right = dyad(arm, long, short, -1.0)
     left = dyad(arm, long, short, 1.0)
     power = (long - short) * (long + short)
-    straight = arm.inverse_of_isosceles() if isinstance(arm, CrankArm) else None
-    inverse = (arm.vector * (power / arm.divisor) if straight is None else straight * power)
+    inverse = arm.vector * (power / arm.divisor)
     return right, left, Complex(*(
         valid_within(part, right.limits) for part in (inverse.x, inverse.y)))
 
