@@ -144,6 +144,15 @@ MENDED = {
     'crossed bars next to the flat pose': ((
         'A ground 0 0', 'C ground 0 -0.4', 'D crank A 1.9', 'H antiparallelogram A D C'),
         [0.5 * math.pi + away for away in AWAY]),
+    'crossed bars of which one is short beside the crank': ((
+        'A ground 0 0', 'B ground 0 0.158', 'C crank A 0.776', 'D antiparallelogram A B C'),
+        [0.5 * math.pi + away for away in AWAY]),
+    'a kite on a ground line that is short beside the crank': ((
+        'O ground 0 0', 'Q ground -0.072 0', 'A crank O 1.871 up', 'B mirror O Q A'),
+        np.linspace(0.5, 0.7, 10)),
+    'a cell of bars that differ by rounding': ((
+        'O ground 0 0', 'P ground -1.2 0', 'A crank O 1.2', 'B C D inversor P A 0.5 0.5-1.7e-15'),
+        [math.pi + away for away in AWAY]),
     'crossed bars on a cylinder': ((
         'A ground 0 0', 'C ground 0 -0.4', 'B cylinder C A 1.9 left', 'H antiparallelogram A B C'),
         [2.3 + away for away in AWAY]),
