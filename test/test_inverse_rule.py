@@ -114,6 +114,17 @@ def test_of_two_inputs_no_ordinary_solution_is_lost_or_invented(outputs):
     assert found['ordinary', 'questions'] > 15 and not counts(found, 'ordinary')
 
 
+def test_another_assembly_mode_leads_to_no_solution():
+    linkage = mechanisms.create('custom', joints=[
+        'A ground 0 0', 'B ground -2.19 0', 'C crank A 2.189999999999781',
+        'D dyad C B 2.19 2.189999999999781 right', 'E cylinder A D 2.19 right'])
+    for theta in np.linspace(2.8, 3.1, 20).tolist():
+        value = float(linkage.joint_angles((theta, 3.0), ['D.x'])['D.x'])
+        found = [solution.inputs[0] for solution in linkage.inverse(
+            ('D.x', 'cylinder')).all((value, 3.0))]
+        assert found == pytest.approx([-theta, theta], abs=1e-12)
+
+
 @pytest.mark.parametrize('output, most', [('angle(A,L)', math.pi), ('angle(S,B)', 0.12)])
 def test_an_output_that_jumps_has_extremes_on_both_sides(output, most):
     lines, = (case[0] for case in SPECIAL.values() if output in case[2])
