@@ -565,6 +565,11 @@ def test_a_misfit_is_printed_and_imported_if_it_is_small(
     assert all(worst <= max(2.0 * lean, 1e-15) for _, worst in checked(err))
 
 
+def test_a_gap_along_axes_that_lean_moves_nothing(tmp_path):
+    assert 'Checked: motor: in 240 poses' in said(written(
+        tmp_path, 'four_bar.urdf', pin_at('0 0.01 0.26'), ('0 -1 0', '1e-5 -1 0')))
+
+
 def test_of_loops_in_space_the_planar_part_is_imported_alone(tmp_path):
     # Its crank also moves a flap about another axis, by a rod on balls.
     mechanism, = imported(file := written(tmp_path, 'four_bar.urdf', ('0 -1 0', '1e-5 -1 0'), (

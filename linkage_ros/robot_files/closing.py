@@ -12,8 +12,7 @@ from typing import Dict, Iterable, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .loops import ASKEW
-from .spatial import CLOSED, Component, components, DEAD_POINT, is_free
+from .spatial import ASKEW, CLOSED, Component, components, DEAD_POINT, is_free
 from ..robot_model.robot import displaced, FIXED, NotDriven, posed, Robot
 from ..words import listed
 
