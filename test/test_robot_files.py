@@ -723,17 +723,17 @@ def moves(linkage, values, robot, steps):
     return moved
 
 
-# Slots and cylinders on one pair of joints; gears of gears; crossed bars on a block; a motor that
-# goes on where bars lie in line, though not as its robot.
 @pytest.mark.parametrize('seeds', [
-    [3, 9, 18, 29, 195], *(pytest.param(seeds, marks=pytest.mark.nightly) for seeds in (
-        [79, 84, 129, 179, 191, 301, 361, 531, 616, 643, 681], range(120)))])
+    range(5), pytest.param([*range(5, 65), *range(66, 120)], marks=pytest.mark.nightly),
+    # Mirror images of a kite: a crossed parallelogram on them is on another side than in the file.
+    pytest.param([65], marks=[pytest.mark.nightly, pytest.mark.xfail(strict=True)])])
 def test_random_linkages_come_back_from_robots(seeds):
     moved = 0
     for made in filter(None, map(random_robot, seeds)):
         try:
             moved += moves(*made)
         except RequestError as error:
-            assert re.search('closes a loop|not of dyads|it cannot move', str(error))
+            assert re.search('closes a loop|not of dyads|it cannot move|lie in line|loops end',
+                             str(error))
             assert cli.WRONG not in str(error)
     assert moved > len(seeds) // 2
