@@ -174,7 +174,7 @@ def test_bars_that_mirror_others_have_a_word_of_their_own(word, base):
     assert [line[:9] for line in reports] == ['Checked: '] and not still
 
 
-@pytest.mark.parametrize('more, word', [(1e-11, 'parallelogram'), (1e-8, 'dyad')])
+@pytest.mark.parametrize('more, word', [(1e-13, 'parallelogram'), (1e-10, 'dyad')])
 def test_bars_that_differ_by_more_than_rounding_are_no_parallelogram(more, word):
     linkage = mechanisms.create('custom', joints=[
         'A ground 0 0', 'B ground 0.6 0', 'C crank A 0.2', f'D dyad B C {0.2 + more!r} 0.6 right'])

@@ -702,10 +702,11 @@ def random_robot(seed):
     return linkage, theta_of(values), robot, 0.03 * rng.normal(size=(8, len(linkage.inputs)))
 
 
-def moves(linkage, values, robot, steps):
+def moves(linkage, values, robot, steps, lean=0.0):
     """Return whether the scene of a robot moves as its linkage does, by steps of the inputs."""
     given, said, _ = cli.described(robot)
-    assert all(count >= 200 and worst < 1e-6 for count, worst in checked('\n'.join(said)))
+    assert all(count >= 200 and worst < 1e-6 + 10.0 * lean * max(1.0, linkage.longest)
+               for count, worst in checked('\n'.join(said)))
     mechanisms = scene.read(given).mechanisms.values()
     before, moved = linkage.joint_angles(values), False
     for step in steps:
@@ -719,7 +720,7 @@ def moves(linkage, values, robot, steps):
                 off = found[link.name] - (after[link.name] - before[link.name])
                 slides, moved = link.kind == 'prismatic', True
                 off = off / linkage.longest if slides else math.remainder(off, math.tau)
-                assert not abs(off) > 1e-9, (link.name, step)
+                assert not abs(off) > 1e-9 + 100.0 * lean, (link.name, step)
     return moved
 
 
@@ -736,4 +737,18 @@ def test_random_linkages_come_back_from_robots(seeds):
             assert re.search('closes a loop|not of dyads|it cannot move|lie in line|loops end',
                              str(error))
             assert cli.WRONG not in str(error)
+    assert moved > len(seeds) // 2
+
+
+@pytest.mark.parametrize('seeds', [
+    [17, 35], pytest.param(range(36, 80), marks=pytest.mark.nightly)], ids=['', 'more'])
+def test_axes_that_lean_by_rounding_change_no_mechanism(seeds):
+    moved = 0
+    for seed in seeds:
+        if made := random_robot(seed):
+            rng = np.random.default_rng(seed)
+            for joint in made[2].joints:
+                axis = joint.axes[0] + 1e-5 * rng.uniform(-1.0, 1.0, 3) * (joint.kind == 'hinge')
+                joint.axes = (axis / np.linalg.norm(axis),) * 2
+            moved += moves(*made, lean=1e-5)
     assert moved > len(seeds) // 2

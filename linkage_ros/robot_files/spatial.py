@@ -100,6 +100,8 @@ class Component:
         The position in the file, and the screw, of each joint that has one.
     start : array
         The pose of the file.
+    near : float
+        Loops open by less, of the size, are closed: by rounding, or by axes that lean.
 
     """
 
@@ -156,8 +158,10 @@ class Component:
         """Set the points that coincide on both ends of each cut."""
         ends, points = [], []
         up = next((joint.axis for joint in self.joints if joint.kind == HINGE), np.zeros(3))
-        is_flat = all(lean(joint, up) < ASKEW and (joint in cuts or joint.kind in (HINGE, SLIDE))
-                      for joint in self.joints)
+        leans = max(lean(joint, up) for joint in self.joints)
+        is_flat = leans < ASKEW and all(joint in cuts or joint.kind in (HINGE, SLIDE)
+                                        for joint in self.joints)
+        self.near = CLOSED + 2.0 * leans * is_flat
         for cut in cuts:
             end = [last[body] for body in cut.bodies]
             places = np.array(cut.places)
