@@ -10,7 +10,6 @@ from xml.etree import ElementTree
 
 from hypothesis import given, settings, strategies as st
 from linkage_ros import scene
-from linkage_ros.robot_files import readers
 from linkage_ros.robot_model import bodies, mjcf, robot, rviz, sdf, urdf
 from linkage_ros.robot_model.bodies import assembled
 from linkage_ros.robot_model.cli import main
@@ -250,18 +249,6 @@ def test_coordinates_of_a_pose_give_the_pose(place, angles):
     assert turned(*found) == pytest.approx(pose, abs=1e-8)
     assert robot.pose(*place, *angles) == pytest.approx(pose, abs=1e-12)
     assert all(map(math.isfinite, found)) and abs(found[4]) <= 0.5 * math.pi + 1e-12
-
-
-def test_names_with_signs_of_xml_come_back(tmp_path):
-    frame, joint = """x<y> & "it's" é""", "a<b>& c'd"
-    found = scene.read({'mechanisms': ['m'], 'm.type': 'four_bar', 'm.frame_id': frame,
-                        'm.joint_names': [f'AB="{joint}"']})
-    file = tmp_path / 'robot.urdf'
-    file.write_text(urdf.describe(found.mechanisms.values(), 'world'), encoding='utf-8')
-    read = readers.read(str(file))
-    assert read.root == frame
-    assert (joint, ('m_crank_link', 'm_AB_link')) in [
-        (each.name, each.bodies) for each in read.joints]
 
 
 def test_the_command_prints_what_its_options_ask_for(tmp_path, capsys):

@@ -114,7 +114,9 @@ def test_robots_of_the_shipped_scenes_come_back(tmp_path, config, form):
 @pytest.mark.parametrize('form', FORMATS)
 @pytest.mark.parametrize('link', ['AB_link', 'B', 'B_cut'])
 def test_a_hand_on_an_arm_comes_back(tmp_path, link, form):
-    mechanisms = scene.read({**ARM, 'hand.frame_id': f'arm_{link}'}).mechanisms.values()
+    mechanisms = scene.read({
+        **ARM, 'hand.frame_id': f'arm_{link}', 'arm.frame_id': """x<y> & "it's" é""",
+        'hand.joint_names': ['AB="a<b>& c\'d"']}).mechanisms.values()
     check_read(prepared(mechanisms, form), form, tmp_path)
 
 

@@ -12,8 +12,7 @@ from typing import Dict, Iterable, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .loops import ASKEW
-from .spatial import CLOSED, Component, components, DEAD_POINT, is_free
+from .spatial import ASKEW, Component, components, DEAD_POINT, is_free
 from ..robot_model.robot import displaced, FIXED, NotDriven, posed, Robot
 from ..words import listed
 
@@ -106,7 +105,7 @@ def _closed(robot: Robot, seed: int) -> Closed:
             moves.update(component.moves(pose))
             positions.update((name, float(value[0]))
                              for name, value in component.read(pose[None]).items())
-            if component.gap(pose[None])[0] < CLOSED:
+            if component.gap(pose[None])[0] < component.near:
                 _check_driven(component, pose, motors, followers)
         except ValueError as error:
             made.faults.update((joint.name, error) for joint in component.joints)
@@ -193,7 +192,8 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], l
         for way in motions if len(motions) > component.nullity(still) else ():
             aside = 3.0 * ASIDE * component.unit * np.array([way, -way])
             pairs = [component.closed(step + aside, fixed, 40) for step in steps]
-            pairs = [poses for poses in pairs if np.max(component.gap(poses, rows)) < CLOSED]
+            pairs = [poses for poses in pairs
+                     if np.max(component.gap(poses, rows)) < component.near]
             if not pairs:
                 raise ValueError(f'its loops end where the file has {listed(motors)}: choose '
                                  'another pose by --pose, or mend lengths or places in the file')
@@ -221,8 +221,8 @@ def nearest(component: Component, motors: List[str], followers: List[str], seed:
     gap = float(component.gap(start)[0])
     # Slightly inclined axes must not move undriven joints far.
     poses = component.closed(start, fixed, soft=1e-7)
-    if gap < NEAR and component.gap(poses)[0] <= max(CLOSED, gap) \
-            and np.linalg.norm(component.away(poses)) < 1e3 * max(gap, CLOSED):
+    if gap < NEAR and component.gap(poses)[0] <= max(component.near, gap) \
+            and np.linalg.norm(component.away(poses)) < 1e3 * max(gap, component.near):
         _check_unfolded(component, poses[0], motors,
                         max(DEAD_POINT, 3.0 * math.sqrt(min(gap, 1e-4))))
         return poses[0], ''
@@ -234,7 +234,7 @@ def nearest(component: Component, motors: List[str], followers: List[str], seed:
                        for _, rows in component.independent(component.is_of(names)))
         if smallest < 0.9 * open_by:
             candidates, still, open_by = others, names, smallest
-        if open_by < CLOSED:
+        if open_by < component.near:
             break
     report = '' if still or not motors else \
         f'{", ".join(motors)} moved: their loops cannot be closed where the file has them.'
@@ -242,7 +242,7 @@ def nearest(component: Component, motors: List[str], followers: List[str], seed:
     for which, rows in component.independent(fixed):
         # Those with the smallest gap, inside limits if there are any; the nearest first.
         gaps = component.gap(candidates, rows)
-        some = candidates[gaps <= 1.001 * gaps.min() + CLOSED]
+        some = candidates[gaps <= 1.001 * gaps.min() + component.near]
         inside = component.within(some, which)
         some = some[inside] if inside.any() else some
         determined = which & ~is_free(component.free_ways(some[0], fixed | ~which)) \

@@ -10,14 +10,11 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from .spatial import CROSSING, loops_of
+from .spatial import ASKEW, CROSSING, lean, loops_of
 from ..robot_model.robot import BALL, FIXED, HINGE, Joint, Robot, SLIDE
 
 # Kinds of joints in planar loops.
 FLAT = (HINGE, SLIDE, BALL)
-# Axes that differ by less [rad] are parallel: files have rounded numbers, and mirrored legs that
-# somebody aligned by hand.
-ASKEW = 1e-3
 
 
 class Group(NamedTuple):
@@ -119,14 +116,6 @@ def check_planar(ground: str, joints: Sequence[Joint], drives: Sequence[str] = (
                              f'than {np.degrees(ASKEW):.2g}')
     _check_rods(ground, joints, hinges[0].axis)
     return hinges, largest
-
-
-def lean(joint: Joint, normal: np.ndarray) -> float:
-    """Return the inclination of a joint's axes against those of a plane [rad]."""
-    if joint.kind == SLIDE:
-        return float(abs(joint.axis @ normal))
-    return float(max(np.linalg.norm(np.cross(axis, normal)) for axis in joint.axes)) \
-        if joint.kind == HINGE else 0.0
 
 
 def pins(joint: Joint, normal: np.ndarray) -> List[Joint]:

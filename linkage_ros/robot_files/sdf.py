@@ -87,7 +87,7 @@ class _Model:
             return name
         part = self._parts[name]
         if part.tag == 'model':
-            first = next((inner for inner in part if inner.tag in ('link', 'model')), part)
+            first = next((inner for tag in ('link', 'model') for inner in part.findall(tag)), part)
             return self.body(self.named(
                 name, part.get('canonical_link', first.get('name', '')), True))
         return self.body(self.named(name, part.get('attached_to') or text(

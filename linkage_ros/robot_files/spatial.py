@@ -25,6 +25,9 @@ MAX_STEP = 0.5
 # The last step [rad, or of the size]: steps square, so that the next would be rounding.
 LAST_STEP = 1e-8
 MAX_BODIES = 150
+# Axes that differ by less [rad] are parallel: files have rounded numbers, and mirrored legs that
+# somebody aligned by hand.
+ASKEW = 1e-3
 # Hinges nearer to each other [m] cross in a point.
 CROSSING = 1e-6
 # Loops open by less, of their size, are closed.
@@ -33,6 +36,14 @@ CLOSED = 1e-10
 EXACT = 1e-9
 # Loops that are less stiff, of their size, are at a dead point.
 DEAD_POINT = 3e-4
+
+
+def lean(joint: Joint, normal: np.ndarray) -> float:
+    """Return the inclination of a joint's axes against those of a plane [rad]."""
+    if joint.kind == SLIDE:
+        return float(abs(joint.axis @ normal))
+    return float(max(np.linalg.norm(np.cross(axis, normal)) for axis in joint.axes)) \
+        if joint.kind == HINGE else 0.0
 
 
 class Screw(NamedTuple):
@@ -89,6 +100,8 @@ class Component:
         The position in the file, and the screw, of each joint that has one.
     start : array
         The pose of the file.
+    near : float
+        Loops open by less, of the size, are closed: by rounding, or by axes that lean.
 
     """
 
@@ -144,15 +157,23 @@ class Component:
                        ) -> None:
         """Set the points that coincide on both ends of each cut."""
         ends, points = [], []
+        up = next((joint.axis for joint in self.joints if joint.kind == HINGE), np.zeros(3))
+        leans = max(lean(joint, up) for joint in self.joints)
+        is_flat = leans < ASKEW and all(joint in cuts or joint.kind in (HINGE, SLIDE)
+                                        for joint in self.joints)
+        self.near = CLOSED + 2.0 * leans * is_flat
         for cut in cuts:
             end = [last[body] for body in cut.bodies]
+            places = np.array(cut.places)
+            # Nothing moves along the axes of a planar loop, and a gap there changes no angle.
+            places[1] += up * (up @ (places[0] - places[1])) * is_flat
             offsets = [np.zeros((2, 3))]
             if cut.kind == HINGE:
                 first, second = cut.axes
                 offsets.append(np.array([first, second if first @ second > 0.0 else -second]))
             if cut.kind == FIXED:
                 offsets += [np.array([turn[:, k] for turn in cut.turns]) for k in range(3)]
-            points += [np.array(cut.places) + self.size * offset for offset in offsets]
+            points += [places + self.size * offset for offset in offsets]
             ends += [end] * len(offsets)
         self._ends = np.array(ends, int).reshape(-1, 2)
         self._points = np.concatenate([points, np.ones((len(ends), 2, 1))], axis=2)
