@@ -403,11 +403,27 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *v
     return left <= LKR_CLOSE * lkr_min(steepest, LKR_STEEPEST);
 }
 
+/* How far rounding of values moves an input, in sizes: next to an extreme, half of all digits, and
+   at most so far where the pose is not known yet. */
+static inline lkr_real lkr_slack(const lkr_model *model, int side, const lkr_point *p, int input)
+{
+    lkr_real slack = LKR_SINGULAR;
+    int i;
+    for (i = 0; p && i < model->inputs; i++) {
+        const lkr_real rate = LKR_MATH(fabs)(p->rate[side][i][input]) * model->axis[side][i].scale
+            * model->size[input];
+        if (rate * slack > LKR_CLOSE) {
+            slack = LKR_CLOSE / rate;
+        }
+    }
+    return slack;
+}
+
 /* Add the turns to x that bring it nearest to inputs; returns how far it is from there, -1 if not
    allowed. A command has to be in the sweeps, up to rounding. What is measured may be outside, which
-   counts ten times more. */
+   counts ten times more. The pose at x is p, or null. */
 static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_real *near,
-    const lkr_real *x, lkr_real *q)
+    const lkr_real *x, const lkr_point *p, lkr_real *q)
 {
     const int is_command = side == LKR_JOINTS;
     lkr_real away = 0;
@@ -417,7 +433,8 @@ static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_rea
         const lkr_real high = model->sweep[i][1];
         const lkr_real turn = model->turn[side][i];
         const lkr_real inside = lkr_min(lkr_max(near[i], low), high);
-        const lkr_real slack = LKR_CLOSE * lkr_max(model->size[i], LKR_MATH(fabs)(near[i]));
+        const lkr_real slack = LKR_CLOSE * lkr_max(model->size[i], LKR_MATH(fabs)(near[i]))
+            + lkr_slack(model, side, p, i) * model->size[i];
         lkr_real beyond;
         q[i] = x[i] + lkr_turns((is_command ? inside : near[i]) - x[i], turn);
         if (is_command && (q[i] < low - slack || q[i] > high + slack)) {
@@ -461,7 +478,7 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
         }
     }
     for (k = 0; k < count; k++) {
-        away[k] = lkr_bring(model, side, near, x[k], q);
+        away[k] = lkr_bring(model, side, near, x[k], NULL, q);
     }
     /* Rounding may hide a solution next to the near inputs. */
     memcpy(x[count], near, sizeof near);
@@ -478,7 +495,7 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
         }
         away[nearest] = -1;
         if (lkr_refine(model, side, value, x[nearest], p)
-            && lkr_bring(model, side, near, x[nearest], q) >= 0) {
+            && lkr_bring(model, side, near, x[nearest], p, q) >= 0) {
             /* Values that count inputs have their turns. */
             for (s = LKR_ACTUATORS; s <= LKR_JOINTS; s++) {
                 for (i = 0; i < model->count[s]; i++) {
@@ -553,7 +570,7 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
     /* Where it is already it stays, whatever rounding says; but a command has to be in the sweeps. */
     is_there = m->newest != LKR_NEITHER
         && lkr_gap(model, side, value, &p, gap) <= LKR_ENOUGH
-        && lkr_bring(model, side, m->q, m->q, q) == 0;
+        && lkr_bring(model, side, m->q, m->q, &p, q) == 0;
     memcpy(q, m->q, sizeof q);
     if (!is_there && !lkr_inverse(model, side, value, q, &p)) {
         return LKR_OUT_OF_REACH;
