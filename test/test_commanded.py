@@ -139,6 +139,16 @@ def questions(folder, cases, number):
     return [count for count, _ in answers.values()]
 
 
+def cranks(memory, case, output, value):
+    """Return the crank within its sweep for a command, from its middle: C's and Python's."""
+    (low, high), = case.mechanism.ends
+    memory.send(0, [(low + high) / 2])
+    status, ((crank,), *_) = memory.send(1, [value])
+    python, = case.mechanism.linkage.inverse(output).nearest(
+        (value,), ((low + high) / 2,), [(low, high)])[0]
+    return [math.nan if status & 1 else float(crank), python]
+
+
 @NUMBERS
 def test_the_ends_of_sweeps_can_be_commanded(tmp_path, number):
     """Next to an extreme of an output, its rounding moves the input far."""
@@ -154,24 +164,16 @@ def test_the_ends_of_sweeps_can_be_commanded(tmp_path, number):
     library, kind = loaded(tmp_path, memories(cases, number == 'float')), (
         np.float32 if number == 'float' else float)
     for (output, end, inwards, distance), case in zip(ends, cases):
-        linkage, (low, high) = case.mechanism.linkage, case.mechanism.first.ends
-
-        def out(crank):
-            return linkage.joint_angles(crank, [output])[output]
-
-        def found(value):
-            memory, middle = Memory(library, case.mechanism, kind), (low + high) / 2
-            memory.send(0, [middle])
-            status, ((crank,), *_) = memory.send(1, [value])
-            python, = linkage.inverse(output).nearest((value,), (middle,), [(low, high)])[0]
-            assert (status & 1 == 1) == math.isnan(python)
-            return math.nan if status & 1 else float(crank), python
-
-        for crank, close in zip(found(out(end)), (CLOSE[number], CLOSE['double'])):
-            assert kind(low) <= crank <= kind(high)
-            assert abs(out(crank) - out(end)) < close
+        memory = Memory(library, case.mechanism, kind)
+        places = np.array([end, end - 1e-3 * inwards])
+        at_end, beyond = case.mechanism.linkage.joint_angles(places, [output])[output]
+        found = np.array(cranks(memory, case, output, at_end))
+        (low, high), = np.array(case.mechanism.ends, kind)
+        assert ((low <= found.astype(kind)) & (found.astype(kind) <= high)).all()
+        off = case.mechanism.linkage.joint_angles(found, [output])[output] - at_end
+        assert (np.abs(off) < (CLOSE[number], CLOSE['double'])).all()
         if distance == 0.1:
-            assert np.isnan(found(out(end - 1e-3 * inwards))).all()
+            assert np.isnan(cranks(memory, case, output, beyond)).all()
 
 
 @NUMBERS
