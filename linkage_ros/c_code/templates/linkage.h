@@ -51,7 +51,6 @@ typedef double lkr_real;
 /* Steps of Newton's method from a solution that rounding has moved. */
 #define LKR_MAX_STEPS 3
 #define LKR_NAN ((lkr_real)NAN)
-#define LKR_FAR ((lkr_real)1e30)
 /* A solution that misses by more than this belongs to another assembly [rad, sizes]. */
 #define LKR_OTHER ((lkr_real)0.01)
 
@@ -129,8 +128,8 @@ static inline int lkr_are_finite(int n, const lkr_real *x)
 
 /* --- types --- */
 
-/* The two sides of a linkage; LKR_NEITHER of them is known at first. */
-enum { LKR_ACTUATORS = 0, LKR_JOINTS = 1, LKR_NEITHER = 2 };
+/* The two sides of a linkage. */
+enum { LKR_ACTUATORS = 0, LKR_JOINTS = 1 };
 
 /* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep. SINGULAR: a
    velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or infinite, which of a command
@@ -191,13 +190,13 @@ typedef struct {
     lkr_real term[LKR_TERMS];
 } lkr_piece;
 
-/* The state between calls: the last pose and its inputs, the side that it follows from, and what is
+/* The state between calls: the last pose and its inputs, whether there is one yet, and what is
    held: the positions of the actuators where they were last commanded or measured, whichever is newer,
    of the joints where they were last measured, NaN before; the last efforts. */
 typedef struct {
     lkr_point point;
     lkr_real q[LKR_MAX_INPUTS];
-    int newest;
+    int is_known;
     lkr_side held[2];
 } lkr_memory;
 
@@ -350,7 +349,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *v
     memcpy(x, q, sizeof x);
     for (step = 0; step <= LKR_MAX_STEPS; step++) {
         lkr_point next;
-        lkr_real now = LKR_FAR;
+        lkr_real now = INFINITY;
         if (model->at(x, &next)) {
             now = lkr_gap(model, side, value, &next, gap);
         }
@@ -463,7 +462,7 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
     }
     /* Rounding may hide a solution next to the near inputs. */
     memcpy(x[count], near, sizeof near);
-    away[count] = LKR_FAR;
+    away[count] = INFINITY;
     for (;;) {
         int nearest = -1;
         for (k = 0; k <= count; k++) {
@@ -515,12 +514,9 @@ static inline void lkr_begin(const lkr_model *model, lkr_memory *m)
 {
     int i;
     memset(m, 0, sizeof *m);
-    m->newest = LKR_NEITHER;
-    for (i = 0; i < model->inputs; i++) {
-        m->q[i] = model->start[i];
+    memcpy(m->q, model->start, sizeof m->q);
+    for (i = 0; i < LKR_MAX_JOINTS; i++) {
         m->held[LKR_ACTUATORS].position[i] = LKR_NAN;
-    }
-    for (i = 0; i < model->count[LKR_JOINTS]; i++) {
         m->held[LKR_JOINTS].position[i] = LKR_NAN;
     }
 }
@@ -549,7 +545,7 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
     }
     lkr_to_values(model, side, position, value);
     /* Where it is already it stays, whatever rounding says; but a command has to be in the sweeps. */
-    is_there = m->newest != LKR_NEITHER
+    is_there = m->is_known
         && lkr_gap(model, side, value, &p, gap) <= LKR_ENOUGH
         && lkr_bring(model, side, m->q, m->q, &p, q) == 0;
     memcpy(q, m->q, sizeof q);
@@ -560,7 +556,7 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
     if (!lkr_are_finite(n, found)) {
         return LKR_OUT_OF_REACH;
     }
-    m->newest = side;
+    m->is_known = 1;
     m->point = p;
     memcpy(m->q, q, sizeof q);
     lkr_copy(model->count[other], found, m->held[other].position);
@@ -637,7 +633,7 @@ static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, 
     const int count = model->count[1 - side];
     const int missing = side == LKR_JOINTS ? LKR_NOT_KNOWN : 0;
     /* Commanded efforts act where the actuators are, not where they are commanded to be. */
-    const int is_here = side == LKR_JOINTS && m->newest != LKR_NEITHER;
+    const int is_here = side == LKR_JOINTS && m->is_known;
     const lkr_point here = m->point;
     lkr_side *held = &m->held[1 - side];
     int position, velocity, effort;
@@ -648,7 +644,7 @@ static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, 
     position = lkr_move(model, m, side, from->position);
     velocity = lkr_velocities(model, &m->point, side, from->velocity, held->velocity);
     effort = lkr_efforts(model, is_here ? &here : &m->point, side, from->effort, held->effort);
-    if (m->newest == LKR_NEITHER) {
+    if (!m->is_known) {
         velocity = LKR_NOT_KNOWN;
         effort = LKR_NOT_KNOWN;
     }
