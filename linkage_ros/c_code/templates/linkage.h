@@ -242,18 +242,24 @@ static inline lkr_real lkr_gap(const lkr_model *model, int side, const lkr_real 
     return most;
 }
 
-/* Solve a x = b in place, b in x; returns 0 where a is singular. */
-static inline int lkr_solve(int size, lkr_real least,
-    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS], lkr_real *x)
+/* Solve J x = b in place, b in x, with the rates J of a side's values by the inputs, or with their
+   transpose. Returns 0 where J is singular, all in sizes. */
+static inline int lkr_solve(const lkr_model *model, int side, const lkr_point *p, int is_transposed,
+    lkr_real least, lkr_real *x)
 {
     /* A compiler knows this bound. */
-    const int n = size < LKR_MAX_INPUTS ? size : LKR_MAX_INPUTS;
+    const int n = model->inputs < LKR_MAX_INPUTS ? model->inputs : LKR_MAX_INPUTS;
+    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS];
     lkr_real most = 1;
     int i, j, k;
     for (i = 0; i < n; i++) {
+        const lkr_real scale = model->axis[side][i].scale;
         for (j = 0; j < n; j++) {
-            most = lkr_max(most, LKR_MATH(fabs)(a[i][j]));
+            const lkr_real rate = p->rate[side][i][j] * scale * model->size[j];
+            a[is_transposed ? j : i][is_transposed ? i : j] = rate;
+            most = lkr_max(most, LKR_MATH(fabs)(rate));
         }
+        x[i] *= is_transposed ? model->size[i] : scale;
     }
     for (k = 0; k < n; k++) {
         lkr_real pivot, value;
@@ -281,27 +287,10 @@ static inline int lkr_solve(int size, lkr_real least,
             x[i] -= factor * x[k];
         }
     }
+    for (i = 0; i < n; i++) {
+        x[i] *= is_transposed ? model->axis[side][i].scale : model->size[i];
+    }
     return lkr_are_finite(n, x);
-}
-
-/* The change of the inputs for a change of values; returns as lkr_solve. */
-static inline int lkr_input_change(const lkr_model *model, int side, const lkr_point *p,
-    lkr_real least, const lkr_real *change, lkr_real *x)
-{
-    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS];
-    int i, j, is_regular;
-    for (i = 0; i < model->inputs; i++) {
-        const lkr_real scale = model->axis[side][i].scale;
-        for (j = 0; j < model->inputs; j++) {
-            a[i][j] = p->rate[side][i][j] * scale * model->size[j];
-        }
-        x[i] = change[i] * scale;
-    }
-    is_regular = lkr_solve(model->inputs, least, a, x);
-    for (j = 0; j < model->inputs; j++) {
-        x[j] *= model->size[j];
-    }
-    return is_regular;
 }
 
 /* --- the inverse --- */
@@ -362,7 +351,8 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *v
         if (left <= LKR_ENOUGH) {
             return 1;
         }
-        if (!lkr_input_change(model, side, p, LKR_LEAST, gap, x)) {
+        memcpy(x, gap, sizeof x);
+        if (!lkr_solve(model, side, p, 0, LKR_LEAST, x)) {
             break;
         }
         for (i = 0; i < model->inputs; i++) {
@@ -568,16 +558,15 @@ static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int
     const lkr_real *velocity, lkr_real *other)
 {
     const int n = model->inputs;
-    lkr_real rate[LKR_MAX_INPUTS];
     lkr_real speed[LKR_MAX_INPUTS] = { 0 };
     int i, j, is_regular;
     if (!lkr_are_finite(n, velocity)) {
         return LKR_NOT_KNOWN;
     }
     for (i = 0; i < n; i++) {
-        rate[i] = velocity[i] / model->axis[side][i].factor;
+        speed[i] = velocity[i] / model->axis[side][i].factor;
     }
-    is_regular = lkr_input_change(model, side, p, LKR_SINGULAR, rate, speed);
+    is_regular = lkr_solve(model, side, p, 0, LKR_SINGULAR, speed);
     for (i = 0; i < model->count[1 - side]; i++) {
         other[i] = 0;
         for (j = 0; j < n; j++) {
@@ -597,11 +586,8 @@ static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int
 static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int side,
     const lkr_real *effort, lkr_real *other)
 {
-    const lkr_axis *from = model->axis[side];
-    const lkr_axis *to = model->axis[1 - side];
     const int n = model->inputs;
-    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS];
-    lkr_real x[LKR_MAX_INPUTS];
+    lkr_real x[LKR_MAX_INPUTS] = { 0 };
     int i, j, is_regular;
     if (!lkr_are_finite(n, effort)) {
         return LKR_NOT_KNOWN;
@@ -609,19 +595,17 @@ static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int si
     for (i = 0; i < n; i++) {
         x[i] = side == LKR_JOINTS ? p->load[i] : -p->load[i];
         for (j = 0; j < n; j++) {
-            x[i] += p->rate[side][j][i] * from[j].factor * effort[j];
-            a[i][j] = p->rate[1 - side][j][i] * to[j].scale * model->size[i];
+            x[i] += p->rate[side][j][i] * model->axis[side][j].factor * effort[j];
         }
-        x[i] *= model->size[i];
     }
-    is_regular = lkr_solve(n, LKR_SINGULAR, a, x);
+    is_regular = lkr_solve(model, 1 - side, p, 1, LKR_SINGULAR, x);
     for (i = 0; i < n; i++) {
-        x[i] *= to[i].scale / to[i].factor;
+        x[i] /= model->axis[1 - side][i].factor;
     }
     if (!is_regular || !lkr_are_finite(n, x)) {
         return LKR_SINGULAR_POSE;
     }
-    memcpy(other, x, (size_t)n * sizeof *x);
+    lkr_copy(n, x, other);
     return LKR_OK;
 }
 
