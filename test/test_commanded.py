@@ -41,10 +41,10 @@ POSES, NEAR, SLACK = 300, {'double': 1e-9, 'float': 1e-6}, {'double': 1e-6, 'flo
 
 
 def read(name, joint_lines, names=(), **given):
-    """Return a mechanism of joint lines, with the names of its commanded joints."""
-    mechanism = alone(joint_lines, name, **given)
-    joints(mechanism, names)
-    return header.Request(mechanism, (), tuple(names))
+    """Return a mechanism of joint lines, with the names of its commanded joints, if there is C."""
+    request = header.Request(alone(joint_lines, name, **given), (), tuple(names))
+    assert header.printed([request])
+    return request
 
 
 def drawn(seeds):
