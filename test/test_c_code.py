@@ -235,6 +235,13 @@ def test_several_inputs_are_found_for_as_many_outputs(mechanisms, tmp_path):
         header.written(mechanisms['bent'], ('C.x', 'angle(O,C)'))
 
 
+@pytest.mark.nightly
+def test_a_series_of_too_many_pieces_is_refused():
+    # It goes up and down a thousand times.
+    with pytest.raises(ValueError, match='no inverse: .* a series of more than 10000 pieces'):
+        header.written(alone([*MOTOR, 'A crank O 1 geared crank 1000 0']), ['A.x'], single=True)
+
+
 @pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('name', ['slotted_lever', 'boom', *(
     name for name in mechanisms.TYPES if name not in ('slotted_lever', 'five_bar'))])

@@ -9,6 +9,8 @@ beside it: at inputs that differ by 1e-3 rad or sizes. Python says where they ar
 """
 
 from contextlib import suppress
+from itertools import product
+import math
 from pathlib import Path
 import subprocess
 
@@ -29,15 +31,20 @@ FAULTS = [(['A ground 0 0', 'B ground 0 1.4', 'C cylinder B A 1.0157 right',
             'D E F inversor B C 1.2375 0.3369'], 'DE', 200),
           (['A ground 0 -466877.40017928416', 'C ground 1817220.0129748432 0',
             'D crank C 1186290.2285410194', 'E antiparallelogram C D A'], 'E.y', 500)]
+# Linkages with extremes of an output, and how far that may be from a command at its rounding.
+NEXT_TO_EXTREMES = [
+    (['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 out 0.08'], 'lever'),
+    (['O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left'], 'B.y')]
+CLOSE = {'double': 1e-12, 'float': 1e-6}
 # Poses of a linkage, and how far joints and actuators may be from those of Python [rad, sizes].
 POSES, NEAR, SLACK = 300, {'double': 1e-9, 'float': 1e-6}, {'double': 1e-6, 'float': 1e-2}
 
 
 def read(name, joint_lines, names=(), **given):
-    """Return a mechanism of joint lines, with the names of its commanded joints."""
-    mechanism = alone(joint_lines, name, **given)
-    joints(mechanism, names)
-    return header.Request(mechanism, (), tuple(names))
+    """Return a mechanism of joint lines, with the names of its commanded joints, if there is C."""
+    request = header.Request(alone(joint_lines, name, **given), (), tuple(names))
+    assert header.printed([request])
+    return request
 
 
 def drawn(seeds):
@@ -130,6 +137,43 @@ def questions(folder, cases, number):
     answers = {case.mechanism.name: asked(library, case, number) for case in cases}
     assert {name: wrong for name, (_, wrong) in answers.items() if wrong} == {}
     return [count for count, _ in answers.values()]
+
+
+def cranks(memory, case, output, value):
+    """Return the crank within its sweep for a command, from its middle: C's and Python's."""
+    (low, high), = case.mechanism.ends
+    memory.send(0, [(low + high) / 2])
+    status, ((crank,), *_) = memory.send(1, [value])
+    python, = case.mechanism.linkage.inverse(output).nearest(
+        (value,), ((low + high) / 2,), [(low, high)])[0]
+    return [math.nan if status & 1 else float(crank), python]
+
+
+@NUMBERS
+def test_the_ends_of_sweeps_can_be_commanded(tmp_path, number):
+    """Next to an extreme of an output, its rounding moves the input far."""
+    ends, cases = [], []
+    for joint_lines, output in NEXT_TO_EXTREMES:
+        (_, extreme), *_ = alone(joint_lines).linkage.extremes(output)[0]
+        for distance, inwards in product((0.0, 1e-6, 1e-4, 1e-2, 0.1), (-1.0, 1.0)):
+            name, end = f'm{len(ends)}', extreme + inwards * distance
+            sweep = sorted((end, end + 0.3 * inwards))
+            ends.append((output, end, inwards, distance))
+            cases.append(read(name, joint_lines, [f'{name}_{output}'], **{
+                'crank.sweep': sweep, 'crank.start': sum(sweep) / 2}))
+    library, kind = loaded(tmp_path, memories(cases, number == 'float')), (
+        np.float32 if number == 'float' else float)
+    for (output, end, inwards, distance), case in zip(ends, cases):
+        memory = Memory(library, case.mechanism, kind)
+        places = np.array([end, end - 1e-3 * inwards])
+        at_end, beyond = case.mechanism.linkage.joint_angles(places, [output])[output]
+        found = np.array(cranks(memory, case, output, at_end))
+        (low, high), = np.array(case.mechanism.ends, kind)
+        assert ((low <= found.astype(kind)) & (found.astype(kind) <= high)).all()
+        off = case.mechanism.linkage.joint_angles(found, [output])[output] - at_end
+        assert (np.abs(off) < (CLOSE[number], CLOSE['double'])).all()
+        if distance == 0.1:
+            assert np.isnan(cranks(memory, case, output, beyond)).all()
 
 
 @NUMBERS

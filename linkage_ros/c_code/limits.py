@@ -14,8 +14,6 @@ from ..scene import SceneMechanism
 
 # Poses of several inputs at which the joints are looked at.
 SAMPLES = 200_000
-# Half of the last of nine digits at most, as a part of a number; farther out by less is rounding.
-HALF_DIGIT, ROUNDING = 5e-9, 1e-14
 
 
 def lines(mechanism: SceneMechanism, names: Sequence[str] = ()) -> Iterator[str]:
@@ -34,15 +32,8 @@ def lines(mechanism: SceneMechanism, names: Sequence[str] = ()) -> Iterator[str]
             settings.ends for settings in inputs.values())
         is_turning = turns and high - low >= math.tau * abs(axis.factor) * (1.0 - 1e-9)
         limit = '<!-- it turns without an end: continuous -->' if is_turning else \
-            f'<limit lower="{_inside(low, 1.0)}" upper="{_inside(high, -1.0)}"/>'
+            f'<limit lower="{low!r}" upper="{high!r}"/>'
         yield f'<joint name={quoteattr(axis.name)}>{limit}</joint>'
-
-
-def _inside(end: float, inwards: float) -> str:
-    """Return an end in nine digits that is no farther out, so that it can be commanded."""
-    text = f'{end:.9g}'
-    is_inside = (float(text) - end) * inwards >= -ROUNDING
-    return text if is_inside else f'{end + inwards * HALF_DIGIT * abs(end):.9g}'
 
 
 def _values(mechanism: SceneMechanism, axis: Axis, arcs: Sequence[np.ndarray]) -> np.ndarray:

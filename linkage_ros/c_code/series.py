@@ -19,6 +19,8 @@ TERMS, CLOSE = (20, 8), (4e-15, 1e-7)
 CORRECTED, SHORT, SHORTEST = 1e-9, 1.0 / 32.0, 1e-5
 # Halvings of a piece that bring an input to its rounding.
 HALVINGS = 60
+# Pieces at most: a curve that needs more is rounding.
+MAX_PIECES = 10_000
 
 
 def series(linkage: Mechanism, output: str, parts: Sequence[Sequence[float]], single: bool,
@@ -28,6 +30,12 @@ def series(linkage: Mechanism, output: str, parts: Sequence[Sequence[float]], si
 
     Each row is an `lkr_piece` of `linkage.h`, with `scale` times the inputs of the linkage. The
     root in it makes the input smooth where the output has an extreme.
+
+    Raises
+    ------
+    ValueError
+        If there are too many.
+
     """
     unit, pose = linkage.inputs[0].size, linkage.posed((), (output,))
     is_angle, terms = linkage.is_angle(output), TERMS[single]
@@ -62,6 +70,9 @@ def series(linkage: Mechanism, output: str, parts: Sequence[Sequence[float]], si
     # Between roots of the parts of a half's change: those that are too long are cut in two.
     own, roots = np.arange(len(halves)), np.tile([0.0, 1.0], (len(halves), 1))
     while len(own):
+        if len(rows) + len(own) > MAX_PIECES:
+            raise ValueError(f'{output} of {linkage.type} has no inverse: it has no closed form, '
+                             f'and a series of more than {MAX_PIECES} pieces')
         start, cut, end, change = halves[own].T[..., None]
         center, half = roots.mean(axis=1, keepdims=True), 0.5 * np.diff(roots)
         fitted = chebyshev.chebfit(nodes, halved(

@@ -68,14 +68,14 @@ class Tables:
         row, everywhere = self._code.row, (-math.inf, math.inf)
         sweeps = [row(not tag and settings.ends or everywhere)
                   for settings in self.mechanism.inputs.values()]
-        all_axes = sides[0], [*sides[1], *passive]
+        rows = sides[0], [*sides[1], *passive]
         return filled(template('model.h.in'), {
             'name': self.mechanism.name, 'tag': tag, 'number': self._code.number,
             'about': 'the inverse' if tag else 'the actuators and joints',
-            'n': len(self.mechanism.scales), 'counts': ', '.join(f'{len(axes)}' for axes in all_axes),
+            'n': len(self.mechanism.scales), 'counts': ', '.join(str(len(axes)) for axes in rows),
             'names': ', '.join(map(self._solutions, sides)),
-            'at': '\n'.join(indented(self._at(all_axes, len(sides[1])))),
-            'actuators': self._rows(all_axes[0]), 'joints': self._rows(all_axes[1]),
+            'at': '\n'.join(indented(self._at(rows, len(sides[1])))),
+            'actuators': self._rows(rows[0]), 'joints': self._rows(rows[1]),
             'turns': ', '.join(row(self._turns(axes)) for axes in sides),
             'sizes': row(scale * input_.size for scale, input_ in zip(
                 self.mechanism.scales, self.linkage.inputs)),

@@ -87,11 +87,11 @@ struct Pose
 Pose pose(const double (&q)[n])
 {
   Pose made{};
-  double zero[n] = {}, x[n];
+  double zero[n] = {};
   made.placed = model.at(q, &made.point) != 0;
   made.good = made.placed;
   for (int side = 0; side < 2; ++side) {
-    made.good = made.good && lkr_input_change(&model, side, &made.point, 1e-2, zero, x) != 0;
+    made.good = made.good && lkr_solve(&model, side, &made.point, 0, 1e-2, zero) != 0;
     lkr_to_positions(&model, side, &made.point, made.position[side]);
   }
   return made;

@@ -51,7 +51,6 @@ typedef double lkr_real;
 /* Steps of Newton's method from a solution that rounding has moved. */
 #define LKR_MAX_STEPS 3
 #define LKR_NAN ((lkr_real)NAN)
-#define LKR_FAR ((lkr_real)1e30)
 /* A solution that misses by more than this belongs to another assembly [rad, sizes]. */
 #define LKR_OTHER ((lkr_real)0.01)
 
@@ -129,8 +128,8 @@ static inline int lkr_are_finite(int n, const lkr_real *x)
 
 /* --- types --- */
 
-/* The two sides of a linkage; LKR_NEITHER of them is known at first. */
-enum { LKR_ACTUATORS = 0, LKR_JOINTS = 1, LKR_NEITHER = 2 };
+/* The two sides of a linkage. */
+enum { LKR_ACTUATORS = 0, LKR_JOINTS = 1 };
 
 /* Status of a call: 0, or a sum of these. OUT_OF_REACH: outside the reach or the sweep. SINGULAR: a
    velocity or an effort would be infinite. NOT_KNOWN: a value is NaN or infinite, which of a command
@@ -191,13 +190,13 @@ typedef struct {
     lkr_real term[LKR_TERMS];
 } lkr_piece;
 
-/* The state between calls: the last pose and its inputs, the side that it follows from, and what is
+/* The state between calls: the last pose and its inputs, whether there is one yet, and what is
    held: the positions of the actuators where they were last commanded or measured, whichever is newer,
    of the joints where they were last measured, NaN before; the last efforts. */
 typedef struct {
     lkr_point point;
     lkr_real q[LKR_MAX_INPUTS];
-    int newest;
+    int is_known;
     lkr_side held[2];
 } lkr_memory;
 
@@ -243,18 +242,24 @@ static inline lkr_real lkr_gap(const lkr_model *model, int side, const lkr_real 
     return most;
 }
 
-/* Solve a x = b in place, b in x; returns 0 where a is singular. */
-static inline int lkr_solve(int size, lkr_real least,
-    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS], lkr_real *x)
+/* Solve J x = b in place, b in x, with the rates J of a side's values by the inputs, or with their
+   transpose. Returns 0 where J is singular, all in sizes. */
+static inline int lkr_solve(const lkr_model *model, int side, const lkr_point *p, int is_transposed,
+    lkr_real least, lkr_real *x)
 {
     /* A compiler knows this bound. */
-    const int n = size < LKR_MAX_INPUTS ? size : LKR_MAX_INPUTS;
+    const int n = model->inputs < LKR_MAX_INPUTS ? model->inputs : LKR_MAX_INPUTS;
+    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS];
     lkr_real most = 1;
     int i, j, k;
     for (i = 0; i < n; i++) {
+        const lkr_real scale = model->axis[side][i].scale;
         for (j = 0; j < n; j++) {
-            most = lkr_max(most, LKR_MATH(fabs)(a[i][j]));
+            const lkr_real rate = p->rate[side][i][j] * scale * model->size[j];
+            a[is_transposed ? j : i][is_transposed ? i : j] = rate;
+            most = lkr_max(most, LKR_MATH(fabs)(rate));
         }
+        x[i] *= is_transposed ? model->size[i] : scale;
     }
     for (k = 0; k < n; k++) {
         lkr_real pivot, value;
@@ -282,27 +287,10 @@ static inline int lkr_solve(int size, lkr_real least,
             x[i] -= factor * x[k];
         }
     }
+    for (i = 0; i < n; i++) {
+        x[i] *= is_transposed ? model->axis[side][i].scale : model->size[i];
+    }
     return lkr_are_finite(n, x);
-}
-
-/* The change of the inputs for a change of values; returns as lkr_solve. */
-static inline int lkr_input_change(const lkr_model *model, int side, const lkr_point *p,
-    lkr_real least, const lkr_real *change, lkr_real *x)
-{
-    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS];
-    int i, j, is_regular;
-    for (i = 0; i < model->inputs; i++) {
-        const lkr_real scale = model->axis[side][i].scale;
-        for (j = 0; j < model->inputs; j++) {
-            a[i][j] = p->rate[side][i][j] * scale * model->size[j];
-        }
-        x[i] = change[i] * scale;
-    }
-    is_regular = lkr_solve(model->inputs, least, a, x);
-    for (j = 0; j < model->inputs; j++) {
-        x[j] *= model->size[j];
-    }
-    return is_regular;
 }
 
 /* --- the inverse --- */
@@ -350,7 +338,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *v
     memcpy(x, q, sizeof x);
     for (step = 0; step <= LKR_MAX_STEPS; step++) {
         lkr_point next;
-        lkr_real now = LKR_FAR;
+        lkr_real now = INFINITY;
         if (model->at(x, &next)) {
             now = lkr_gap(model, side, value, &next, gap);
         }
@@ -363,7 +351,8 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *v
         if (left <= LKR_ENOUGH) {
             return 1;
         }
-        if (!lkr_input_change(model, side, p, LKR_LEAST, gap, x)) {
+        memcpy(x, gap, sizeof x);
+        if (!lkr_solve(model, side, p, 0, LKR_LEAST, x)) {
             break;
         }
         for (i = 0; i < model->inputs; i++) {
@@ -384,11 +373,27 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *v
     return left <= LKR_CLOSE * lkr_min(steepest, LKR_STEEPEST);
 }
 
+/* How far rounding of values moves an input, in sizes: next to an extreme, half of all digits, and
+   at most so far where the pose is not known yet. */
+static inline lkr_real lkr_slack(const lkr_model *model, int side, const lkr_point *p, int input)
+{
+    lkr_real slack = LKR_SINGULAR;
+    int i;
+    for (i = 0; p && i < model->inputs; i++) {
+        const lkr_real rate = LKR_MATH(fabs)(p->rate[side][i][input]) * model->axis[side][i].scale
+            * model->size[input];
+        if (rate * slack > LKR_CLOSE) {
+            slack = LKR_CLOSE / rate;
+        }
+    }
+    return slack;
+}
+
 /* Add the turns to x that bring it nearest to inputs; returns how far it is from there, -1 if not
    allowed. A command has to be in the sweeps, up to rounding. What is measured may be outside, which
-   counts ten times more. */
+   counts ten times more. The pose at x is p, or null. */
 static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_real *near,
-    const lkr_real *x, lkr_real *q)
+    const lkr_real *x, const lkr_point *p, lkr_real *q)
 {
     const int is_command = side == LKR_JOINTS;
     lkr_real away = 0;
@@ -398,7 +403,8 @@ static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_rea
         const lkr_real high = model->sweep[i][1];
         const lkr_real turn = model->turn[side][i];
         const lkr_real inside = lkr_min(lkr_max(near[i], low), high);
-        const lkr_real slack = LKR_CLOSE * lkr_max(model->size[i], LKR_MATH(fabs)(near[i]));
+        const lkr_real slack = LKR_CLOSE * lkr_max(model->size[i], LKR_MATH(fabs)(near[i]))
+            + lkr_slack(model, side, p, i) * model->size[i];
         lkr_real beyond;
         q[i] = x[i] + lkr_turns((is_command ? inside : near[i]) - x[i], turn);
         if (is_command && (q[i] < low - slack || q[i] > high + slack)) {
@@ -442,11 +448,11 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
         }
     }
     for (k = 0; k < count; k++) {
-        away[k] = lkr_bring(model, side, near, x[k], q);
+        away[k] = lkr_bring(model, side, near, x[k], NULL, q);
     }
     /* Rounding may hide a solution next to the near inputs. */
     memcpy(x[count], near, sizeof near);
-    away[count] = LKR_FAR;
+    away[count] = INFINITY;
     for (;;) {
         int nearest = -1;
         for (k = 0; k <= count; k++) {
@@ -459,7 +465,7 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
         }
         away[nearest] = -1;
         if (lkr_refine(model, side, value, x[nearest], p)
-            && lkr_bring(model, side, near, x[nearest], q) >= 0) {
+            && lkr_bring(model, side, near, x[nearest], p, q) >= 0) {
             /* Values that count inputs have their turns. */
             for (s = LKR_ACTUATORS; s <= LKR_JOINTS; s++) {
                 for (i = 0; i < model->count[s]; i++) {
@@ -498,12 +504,9 @@ static inline void lkr_begin(const lkr_model *model, lkr_memory *m)
 {
     int i;
     memset(m, 0, sizeof *m);
-    m->newest = LKR_NEITHER;
-    for (i = 0; i < model->inputs; i++) {
-        m->q[i] = model->start[i];
+    memcpy(m->q, model->start, sizeof m->q);
+    for (i = 0; i < LKR_MAX_JOINTS; i++) {
         m->held[LKR_ACTUATORS].position[i] = LKR_NAN;
-    }
-    for (i = 0; i < model->count[LKR_JOINTS]; i++) {
         m->held[LKR_JOINTS].position[i] = LKR_NAN;
     }
 }
@@ -532,9 +535,9 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
     }
     lkr_to_values(model, side, position, value);
     /* Where it is already it stays, whatever rounding says; but a command has to be in the sweeps. */
-    is_there = m->newest != LKR_NEITHER
+    is_there = m->is_known
         && lkr_gap(model, side, value, &p, gap) <= LKR_ENOUGH
-        && lkr_bring(model, side, m->q, m->q, q) == 0;
+        && lkr_bring(model, side, m->q, m->q, &p, q) == 0;
     memcpy(q, m->q, sizeof q);
     if (!is_there && !lkr_inverse(model, side, value, q, &p)) {
         return LKR_OUT_OF_REACH;
@@ -543,7 +546,7 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
     if (!lkr_are_finite(n, found)) {
         return LKR_OUT_OF_REACH;
     }
-    m->newest = side;
+    m->is_known = 1;
     m->point = p;
     memcpy(m->q, q, sizeof q);
     lkr_copy(model->count[other], found, m->held[other].position);
@@ -555,16 +558,15 @@ static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int
     const lkr_real *velocity, lkr_real *other)
 {
     const int n = model->inputs;
-    lkr_real rate[LKR_MAX_INPUTS];
     lkr_real speed[LKR_MAX_INPUTS] = { 0 };
     int i, j, is_regular;
     if (!lkr_are_finite(n, velocity)) {
         return LKR_NOT_KNOWN;
     }
     for (i = 0; i < n; i++) {
-        rate[i] = velocity[i] / model->axis[side][i].factor;
+        speed[i] = velocity[i] / model->axis[side][i].factor;
     }
-    is_regular = lkr_input_change(model, side, p, LKR_SINGULAR, rate, speed);
+    is_regular = lkr_solve(model, side, p, 0, LKR_SINGULAR, speed);
     for (i = 0; i < model->count[1 - side]; i++) {
         other[i] = 0;
         for (j = 0; j < n; j++) {
@@ -584,11 +586,8 @@ static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int
 static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int side,
     const lkr_real *effort, lkr_real *other)
 {
-    const lkr_axis *from = model->axis[side];
-    const lkr_axis *to = model->axis[1 - side];
     const int n = model->inputs;
-    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS];
-    lkr_real x[LKR_MAX_INPUTS];
+    lkr_real x[LKR_MAX_INPUTS] = { 0 };
     int i, j, is_regular;
     if (!lkr_are_finite(n, effort)) {
         return LKR_NOT_KNOWN;
@@ -596,19 +595,17 @@ static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int si
     for (i = 0; i < n; i++) {
         x[i] = side == LKR_JOINTS ? p->load[i] : -p->load[i];
         for (j = 0; j < n; j++) {
-            x[i] += p->rate[side][j][i] * from[j].factor * effort[j];
-            a[i][j] = p->rate[1 - side][j][i] * to[j].scale * model->size[i];
+            x[i] += p->rate[side][j][i] * model->axis[side][j].factor * effort[j];
         }
-        x[i] *= model->size[i];
     }
-    is_regular = lkr_solve(n, LKR_SINGULAR, a, x);
+    is_regular = lkr_solve(model, 1 - side, p, 1, LKR_SINGULAR, x);
     for (i = 0; i < n; i++) {
-        x[i] *= to[i].scale / to[i].factor;
+        x[i] /= model->axis[1 - side][i].factor;
     }
     if (!is_regular || !lkr_are_finite(n, x)) {
         return LKR_SINGULAR_POSE;
     }
-    memcpy(other, x, (size_t)n * sizeof *x);
+    lkr_copy(n, x, other);
     return LKR_OK;
 }
 
@@ -620,7 +617,7 @@ static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, 
     const int count = model->count[1 - side];
     const int missing = side == LKR_JOINTS ? LKR_NOT_KNOWN : 0;
     /* Commanded efforts act where the actuators are, not where they are commanded to be. */
-    const int is_here = side == LKR_JOINTS && m->newest != LKR_NEITHER;
+    const int is_here = side == LKR_JOINTS && m->is_known;
     const lkr_point here = m->point;
     lkr_side *held = &m->held[1 - side];
     int position, velocity, effort;
@@ -631,7 +628,7 @@ static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, 
     position = lkr_move(model, m, side, from->position);
     velocity = lkr_velocities(model, &m->point, side, from->velocity, held->velocity);
     effort = lkr_efforts(model, is_here ? &here : &m->point, side, from->effort, held->effort);
-    if (m->newest == LKR_NEITHER) {
+    if (!m->is_known) {
         velocity = LKR_NOT_KNOWN;
         effort = LKR_NOT_KNOWN;
     }

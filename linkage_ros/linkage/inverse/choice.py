@@ -71,8 +71,9 @@ def _inside(problem: InverseProblem, by: int, place: Real, rates: Reals, ends: R
             first: bool) -> Real:
     """Return an input between two ends, after whole turns if needed; NaN if there is none."""
     (lower, upper), n, turn, size = ends, problem.n, problem.turns[by], problem.sizes[by]
-    # How far rounding of the outputs moves an input: next to an extreme, half of all digits.
-    slack = real(SINGULAR * size)
+    # How far rounding of the outputs moves an input: to an extreme, half of all digits, and one
+    # more where it is flat.
+    slack = real(10.0 * SINGULAR * size)
     for rate, scale in zip(rates[n * by:n * by + n], problem.scales):
         moved = TOLERANCE * math.pi * scale / (abs(rate) + 1e-300)
         slack = where(moved < slack, moved, slack)
