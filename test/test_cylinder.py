@@ -1,36 +1,15 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A linkage that a length drives does all that one driven by an angle does."""
+"""Lengths that drive: a stroke ends and is searched to the last digits, however short it is."""
 
 import math
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.linkage.inputs import LENGTH
-from linkage_ros.render.cycle import Cycle
 from linkage_ros.robot_model import urdf
-from linkage_ros.scene import slider
 import numpy as np
 import pytest
 from robots import Pinocchio
-
-# A boom O-B on a cylinder P-B; a bar Q-D keeps the bucket C-D nearly level.
-BOOM = ('O ground 0 0', 'P ground g -h', 'B cylinder P O r right', 'C line O B 1.5*r',
-        'Q ground 0 0.3*g', 'D dyad C Q 0.3*g 1.5*r right')
-LENGTHS = {'g': 0.5, 'h': 0.25, 'r': 1.0486}
-SCENE = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.joints': list(BOOM),
-         **{f'boom.dimensions.{name}': value for name, value in LENGTHS.items()}}
-
-
-def boom(**changed):
-    return mechanisms.create('custom', joints=BOOM, **{**LENGTHS, **changed})
-
-
-def test_the_input_is_a_length_with_a_stroke():
-    input_, = boom().inputs
-    base = math.hypot(LENGTHS['g'], LENGTHS['h'])
-    assert (input_.name, input_.kind, input_.unit) == ('cylinder', LENGTH, 'm')
-    assert (input_.low, input_.high) == pytest.approx((LENGTHS['r'] - base, LENGTHS['r'] + base))
 
 
 @pytest.mark.parametrize('far, placed', [(1, True), (40, False)])
@@ -52,50 +31,6 @@ def test_a_stroke_is_searched_on_its_own_scale(ends):
     expected = [(middle - far, middle - near), (middle + near, middle + far)]
     np.testing.assert_allclose(linkage.reach(), expected, rtol=0, atol=1e-20)
     np.testing.assert_allclose(linkage.dead_points(), np.ravel(expected), rtol=0, atol=1e-20)
-
-
-def test_a_scene_counts_lengths_in_metres_scaled():
-    mechanism = scene.read({**SCENE, 'boom.scale': 10.0, 'boom.cylinder.speed': 0.5,
-                            'boom.cylinder.start': 9.0}).mechanisms['boom']
-    drive = mechanism.first
-    assert drive.reach[0] == pytest.approx(np.multiply(10.0, boom().reach()[0]))
-    assert drive.start == 9.0 and drive.sweep[0] > drive.reach[0][0]
-    solution = mechanism.assembly().solution(('B', 'P'), ('OB',), ('OB',))
-    solution.solve([9.0], [0.5])
-    *places, angle, speed = solution.rows[0]
-    assert math.dist(places[:2], places[2:]) == pytest.approx(9.0)
-    assert angle == boom().joint_angles(0.9)['OB']
-    assert speed == pytest.approx(0.05 * boom().joint_rates(0.9)['OB'])
-
-
-@pytest.mark.parametrize('name, value, text', [
-    ('cylinder.sweep', [0.1, 1.0], r'boom.cylinder.sweep must be inside the reach \[.*\] m'),
-    ('cylinder.sweep', [1.0, 1.0], 'boom.cylinder.sweep must be .* lower end'),
-    ('cylinder.speed', 1e3, 'boom.cylinder.speed must be .* from -100 to 100'),
-    ('crank.speed', 1.0, 'boom.crank.speed is not a parameter')])
-def test_a_bad_value_of_a_cylinder_is_refused(name, value, text):
-    with pytest.raises(scene.SceneError, match=text):
-        scene.read({**SCENE, f'boom.{name}': value})
-
-
-def test_its_parameters_say_metres_and_have_sliders():
-    read = scene.read(SCENE)
-    about = {parameter.name: parameter for parameter in read.parameters}
-    assert about['boom.cylinder.speed'].field.meaning == 'Speed of the cylinder [m/s].'
-    boom = read.mechanisms['boom']
-    low, high = slider.ends(boom, about['boom.cylinder.start'])
-    (least, greatest), = boom.first.reach
-    assert low <= least and high == pytest.approx(greatest, abs=0.03)
-
-
-def test_a_picture_follows_the_stroke_there_and_back():
-    mechanism = scene.read({**SCENE, 'boom.cylinder.start': 0.9}).mechanisms['boom']
-    cycle = Cycle(mechanism)
-    assert cycle.pose(0.0).inputs == (0.9,)
-    low, high = mechanism.first.sweep
-    lengths = [cycle.pose(turns).inputs[0] for turns in np.linspace(0.0, 1.0, 101)]
-    assert low <= min(lengths) < low + 0.03 and high - 0.03 < max(lengths) <= high
-    assert np.isfinite(cycle.course).all()
 
 
 @pytest.mark.parametrize('length', [1e-1, 1e-4, 1e-8])

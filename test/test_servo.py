@@ -44,33 +44,3 @@ def test_an_answer_is_taken_between_the_ends_whole_turns_included(near, ends, an
     assert turns == pytest.approx(round(turns), abs=1e-15) and rate == rates[0, answer]
     low, high = ends or (-math.pi, math.pi)
     assert low <= theta <= high
-
-
-@pytest.mark.parametrize('kind, output', [
-    ('slotted_lever', 'lever'), ('four_bar', 'QB'), ('slider_crank', 'block'),
-    pytest.param('jansen', 'G.x', marks=pytest.mark.nightly)])
-def test_the_value_at_an_end_is_had_at_that_end(kind, output):
-    linkage, rng = mechanisms.create(kind), np.random.default_rng(5)
-
-    def value(theta):
-        return linkage.joint_angles(theta, (output,))[output]
-
-    extremes = linkage.input_for(output, np.max(value(np.linspace(-3.1, 3.1, 20001))))
-    for low in (*rng.uniform(-9.0, 9.0, 20), *extremes[np.isfinite(extremes)]):
-        ends = float(low), float(low) + 0.1
-        for end in ends:
-            theta, _ = linkage.servo_for(output, float(value(end)), None, ends)
-            assert ends[0] <= theta <= ends[1]
-
-
-@pytest.mark.nightly(all_but=2)
-@pytest.mark.parametrize('near', [None, 2.5])
-@pytest.mark.parametrize('ends', [None, (0.0, 6.0)])
-def test_machine_code_takes_the_answers_that_plain_python_takes(near, ends):
-    pytest.importorskip('llvmlite')
-    lever = mechanisms.create('slotted_lever', e=20.0)
-    wanted = np.linspace(-1.0, 1.0, 150)
-    found = lever.accelerated().servo_for('lever', wanted, near, ends)
-    alone = np.transpose([lever.servo_for('lever', each, near, ends) for each in wanted.tolist()])
-    assert 50 < np.isfinite(alone[0]).sum() < 150
-    np.testing.assert_allclose(found, alone, rtol=1e-12, atol=1e-15)
