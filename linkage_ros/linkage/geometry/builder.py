@@ -126,7 +126,6 @@ class Builder:
         self._vectors: Dict[Tuple[str, str], _Vector] = {}
         self._axes: Dict[str, _Vector] = {}
         self.driven: Dict[str, Tuple[Input, Real]] = {}
-        self._kites: Dict[Tuple[str, str], planar.CrankArm] = {}
 
     def require(self, amount: Real, problem: str, line: Any = None) -> None:
         """Refuse a line, the one drawn, for dimensions with which an amount is not above zero."""
@@ -310,12 +309,11 @@ class Builder:
 
     def line(self, name: str, first: str, second: str, distance: Real) -> None:
         """Add a point on the line of a bar, a distance [m] from first, towards second."""
-        part, kite = distance / self._side(first, second).length, self._kites.get((first, second))
-        self._add_to_link(name, first, second, Complex(part, 0.0), abs(distance),
-                          kite.beyond_kite(-part) if kite else None)
+        part = distance / self._side(first, second).length
+        self._add_to_link(name, first, second, Complex(part, 0.0), abs(distance))
 
-    def _add_to_link(self, name: str, first: str, second: str, corner: Complex, length: Real,
-                     place: Optional[Complex] = None) -> None:
+    def _add_to_link(self, name: str, first: str, second: str, corner: Complex,
+                     length: Real) -> None:
         """Add a joint to the link of two others, first + corner (second - first)."""
         vector, _, link = self._side(first, second)
         if link == GROUND:
@@ -323,19 +321,16 @@ class Builder:
             self.points[name] = Point(
                 start.place + vector * corner, GROUND, start.magnitude + length)
             return
-        self._place(name, first, vector * corner, link, length, place)
+        self._place(name, first, vector * corner, link, length)
         frame = self.frames[link]
         frame[name] = frame[first] + (frame[second] - frame[first]) * corner
 
     def mirror(self, name: str, point: str, first: str, second: str) -> None:
         """Mirror a joint in the line of two others: the far corner of a kite."""
-        pin = self.points[first].crank
         ends = [self._side(end, point).vector for end in (second, first)]
         place, arm = self.points[point].place, self.arm(second, first, smooth=True)
-        self._reflect(name, first, second, arm, place, cross(arm.vector, ends[0]), ends,
+        self._reflect(name, first, second, arm, place, arm.offset(place, ends[0]), ends,
                       self._side(first, point).length, self._side(second, point).length)
-        if isinstance(arm, planar.CrankArm) and pin and pin.centre is self.points[point].place:
-            self._kites[first, name] = arm
 
     def parallelogram(self, name: str, corner: str, first: str, second: str) -> None:
         """Join bars to two joints that are parallel to the bars from a corner to them."""
@@ -354,7 +349,7 @@ class Builder:
         arm = self.arm(second, first, smooth=True)
         opposite = self.points[first].place + to_second.vector
         start = self.points[corner].place
-        offset = cross(arm.vector, to_second.vector)
+        offset = -arm.offset(start, -to_second.vector)
         place = start + arm.to_opposite(to_first.length, to_second.length) \
             if isinstance(arm, planar.CrankArm) else None
         self._reflect(name, first, second, arm, opposite, offset,

@@ -176,6 +176,10 @@ class Arm:
         return (self._limit(first + second, size, longer),
                 self._limit(first - second, size, shorter))
 
+    def offset(self, point: Complex, to_point: Complex) -> Real:
+        """Return the cross product of the arm and the vector from its foot to a point."""
+        return cross(self.vector, to_point)
+
     def across(self, offset: Real) -> Complex:
         """Return the vector from a point of this offset to its mirror image in the arm's line."""
         return self.vector.turned() * (-2.0 * offset / self.divisor)
@@ -193,7 +197,7 @@ class CrankArm(Arm):
 
     An arm between two equal lengths, g = m, vanishes once in a turn, and then its direction
     e^(i theta'/2) only changes its sign. A `smooth` arm is for what does not depend on that sign:
-    its h is never zero.
+    its h is never zero, and its limits have smooth roots.
     """
 
     def __init__(self, ground: Complex, crank: Crank, reverse: bool = False,
@@ -207,8 +211,7 @@ class CrankArm(Arm):
         vector = along * Complex((g - m) + 2.0 * m * square(h), 2.0 * m * s * h)
         self.foot = crank.centre + crank.bar() if reverse else ground
         self.square = square(g - m) + 4.0 * g * m * square(h)
-        self._crank, self._along, self._turn = crank, -along if reverse else along, turn
-        self._line = along
+        self._crank, self._turn, self._is_reversed = crank, turn, reverse
         self._g, self._m, self._s, self._h, self._is_smooth = g, m, s, h, smooth
         # The arm between two equal lengths bisects them, also where it has no length itself.
         turning = where(self._is_isosceles, 0.5,
@@ -242,7 +245,15 @@ class CrankArm(Arm):
         """Return `first - second`, or its like in the arm where the limit takes both as equal."""
         apart, own = first - second, abs(self._g - self._m)
         return where(abs(shorter.ends.end) <= shorter.tolerance,
-                     where(apart < 0.0, -own, own), apart) if shorter.ends else apart
+                     where(apart < 0.0, -own, own), apart) if shorter.smooth else apart
+
+    def offset(self, point: Complex, to_point: Complex) -> Real:
+        """Return the cross product of the arm and the vector from its foot to a point."""
+        if point is not self._crank.centre:
+            return super().offset(point, to_point)
+        # Twice the triangle of foot, centre and pin, with every digit where it is flat.
+        area = 2.0 * self._g * self._m * self._s * self._h
+        return area if self._is_reversed else -area
 
     def to_opposite(self, first: Real, second: Real) -> Complex:
         """
@@ -264,36 +275,14 @@ class CrankArm(Arm):
         gap, half = (start, s) if sign > 0.0 else (end, h)
         grown = square_root(gm) * self._first_sign(sign)
         smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
-        return Limit(margin, tolerance, smooth, CrankEnds(
+        return Limit(margin, tolerance, smooth if self._is_smooth else None, CrankEnds(
             start, end, arctangent(self._turn.y, self._turn.x), self._crank.angle))
-
-    def beyond_kite(self, k: Real) -> Complex:
-        """
-        Return pin + k (pin - image), where image mirrors the crank centre in the arm's line.
-
-        The component across the ground line is one product, which keeps every digit next to a
-        cusp, where the leading terms of a sum cancel.
-        """
-        g, m, s, sin = self._g, self._m, self._s, 2.0 * self._s * self._h
-        lead = (g + m) * ((g + m) + k * (m - g))
-        lead = where(self._is_isosceles, self.square, lead - 4.0 * g * m * square(s))
-        across = m * sin * lead / self.square
-        along = (1.0 + k) * m * (1.0 - 2.0 * square(s)) + \
-            2.0 * k * g * square(m * sin) / self.square
-        return self._crank.centre + self._line * Complex(along, across)
 
     def _first_sign(self, sign: float) -> Real:
         """Return the sign that makes s (sign +1) or h positive at the first quarter turn."""
         ahead, behind = (-sign, 1.0) if self._crank.backwards else (1.0, sign)
         beyond = where(0.0 <= self._turn.y, behind, -behind)
         return where(-TOLERANCE <= self._turn.x, ahead, beyond)
-
-    def inverse_of_isosceles(self) -> Optional[Complex]:
-        """Return 1 / conjugate(arm) if foot and pin are equally far from the centre, or None."""
-        if self._g is not self._m:
-            return None
-        return self._along * Complex(1.0, self._s / self._h) / (2.0 * self._m)
-
 
 def _half_angle(theta: Real, turn: Complex) -> Tuple[Real, Real]:
     """Return sine and cosine of (theta + arg turn) / 2 for a unit vector turn."""
@@ -316,18 +305,18 @@ class Dyad(NamedTuple):
     limits: Tuple[Limit, ...]
 
 
-def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) -> Dyad:
+def dyad(arm: Arm, first: Real, second: Real, side: float) -> Dyad:
     """
     Return the RRR dyad on an arm: circles of radius first [m] and second [m] about its ends.
 
     The joint is foot + w (u + i v) with u = 1/2 + (r1 - r2)(r1 + r2) / 2|w|^2 and
     v = side sqrt((r1 + r2)^2 - |w|^2) sqrt(|w|^2 - (r1 - r2)^2) / 2|w|^2; left of the arm for
-    side = +1. At a change point of a crank arm the branch continues smoothly if `smooth`.
+    side = +1. At a change point of a smooth crank arm the branch continues smoothly.
     """
     radius = first + second
     limits = arm.within(radius, radius), arm.beyond(first - second, radius)
     apart = arm.difference(first, second, limits[1])
-    v = _height(arm, limits, side, smooth)
+    v = _height(arm, limits, side)
     skew = _nan_with(v, arm.vector, apart * radius / (2.0 * arm.divisor))
     u, turning = 0.5 + skew, spin(arm.vector)
 
@@ -340,9 +329,9 @@ def dyad(arm: Arm, first: Real, second: Real, side: float, smooth: bool = True) 
     return Dyad(bar(u, first), bar(skew - 0.5, second), limits)
 
 
-def _height(arm: Arm, limits: Sequence[Limit], side: float, smooth: bool) -> Real:
+def _height(arm: Arm, limits: Sequence[Limit], side: float) -> Real:
     """Return the distance of a dyad's joint to the left of its arm, in lengths of the arm."""
-    within, beyond = (x.smooth if smooth and x.smooth else x.root() for x in limits)
+    within, beyond = (limit.smooth or limit.root() for limit in limits)
     return within * beyond / (2.0 * arm.divisor) * side
 
 
@@ -359,7 +348,7 @@ def extended(arm: Arm, first: Real, second: Real, side: float, longest: Real) ->
     length = arm.length
     power = arm.square - square(second) if length is None else \
         (length - second) * (length + second)
-    v = _height(arm, limits, side, False)
+    v = _height(arm, limits, side)
     twice = where(square(first) <= arm.square, power + square(first),
                   (first - second) * (first + second) + arm.square)
     u = _nan_with(v, arm.vector, twice / (2.0 * arm.divisor))
@@ -476,11 +465,10 @@ def inversor(arm: Arm, long: Real, short: Real) -> Tuple[Dyad, Dyad, Complex]:
     which is pole + (long^2 - short^2) / conjugate(w): it runs on a straight line when the pole
     lies on the crank circle.
     """
-    right = dyad(arm, long, short, -1.0, smooth=False)
-    left = dyad(arm, long, short, 1.0, smooth=False)
+    right = dyad(arm, long, short, -1.0)
+    left = dyad(arm, long, short, 1.0)
     power = (long - short) * (long + short)
-    straight = arm.inverse_of_isosceles() if isinstance(arm, CrankArm) else None
-    inverse = (arm.vector * (power / arm.divisor) if straight is None else straight * power)
+    inverse = arm.vector * (power / arm.divisor)
     return right, left, Complex(*(
         valid_within(part, right.limits) for part in (inverse.x, inverse.y)))
 
