@@ -9,6 +9,7 @@ from linkage_ros import mechanisms, scene
 import mpmath
 import numpy as np
 import pytest
+
 ROCKER = {'mechanisms': ['bars'], 'bars.type': 'four_bar', 'bars.scale': 0.01}
 ASKED = [('jansen', 'distance(A,G)'), ('jansen', 'angle(C,G)'), ('four_bar', 'distance(O,B)'),
          ('four_bar', 'angle(B,A)'), ('slotted_lever', 'distance(Q,A)'), ('klann', 'angle(O,E)')]

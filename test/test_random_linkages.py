@@ -53,6 +53,9 @@ OTHERS = {
     'a limit on one side of a change point': (
         'O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 2 3 left', 'R ground 4 -4',
         'C dyad B R 3 2.5 left'),
+    'a short stroke far from its zero': (
+        'G ground 0 0', 'H ground 1 0', 'S carriage G along H 150e-9 153e-9',
+        'F ground 151.5e-9 1e-9', 'D dyad F S 1.5e-9 0.2e-9 left'),
     'no pose in the middle of the reach': (
         'A ground 0 0', 'B ground 3 0', 'C crank A 0.3', 'E mirror A C B', 'H mirror B A E',
         'K slider H 7 B 90deg in'),

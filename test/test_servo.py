@@ -44,3 +44,20 @@ def test_an_answer_is_taken_between_the_ends_whole_turns_included(near, ends, an
     assert turns == pytest.approx(round(turns), abs=1e-15) and rate == rates[0, answer]
     low, high = ends or (-math.pi, math.pi)
     assert low <= theta <= high
+
+
+@pytest.mark.parametrize('kind, output', [
+    ('slotted_lever', 'lever'), ('four_bar', 'QB'), ('slider_crank', 'block'),
+    pytest.param('jansen', 'G.x', marks=pytest.mark.nightly)])
+def test_the_value_at_an_end_is_had_at_that_end(kind, output):
+    linkage, rng = mechanisms.create(kind), np.random.default_rng(5)
+
+    def value(theta):
+        return linkage.joint_angles(theta, (output,))[output]
+
+    extremes = linkage.input_for(output, np.max(value(np.linspace(-3.1, 3.1, 20001))))
+    for low in (*rng.uniform(-9.0, 9.0, 20), *extremes[np.isfinite(extremes)]):
+        ends = float(low), float(low) + 0.1
+        for end in ends:
+            theta, _ = linkage.servo_for(output, float(value(end)), None, ends)
+            assert ends[0] <= theta <= ends[1]
