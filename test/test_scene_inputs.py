@@ -130,18 +130,6 @@ def test_the_positions_for_outputs_are_those_that_give_them_and_rates_are_slopes
     near(case.at(request.inputs_of(found)), values)
 
 
-def test_a_command_continues_from_the_last_inputs_at_the_speed_of_the_outputs(posed):
-    case, inputs, values, request = posed
-    speeds = [0.3, -0.7][:len(values)]
-    for jumps in (False, True):
-        command = request.command(values, speeds, [value + 1e-3 for value in inputs], jumps)
-        near(command.inputs, inputs)
-        near(command.positions, case.positions(inputs))
-        moved = case.jacobian(inputs) @ np.multiply(command.speeds, case.ratios)
-        np.testing.assert_allclose(moved, speeds, 1e-6, 1e-6)
-        assert request.command(values, None, inputs, jumps).speeds == ()
-
-
 def test_efforts_do_the_work_of_the_loads(posed):
     case, inputs, _, _ = posed
     work = np.zeros(len(inputs))
