@@ -6,6 +6,7 @@
 from itertools import product
 import math
 
+from effort import few_calls
 from linkage_ros import mechanisms, scene
 from linkage_ros.linkage import Solution
 from linkage_ros.scene.inverse_request import InverseRequest
@@ -96,7 +97,9 @@ def test_a_mode_is_followed_where_that_beyond_the_fold_is_nearer():
     values = 2.040979962430155, -0.5094493998914134
     nearer, kept = inverse.all(values, near)[:2]
     assert (nearer.mode, kept.mode) == ('AP+ CP- det-', 'AP+ CP+ det+')
-    assert inverse.follow(values, near)[0] == pytest.approx(kept.inputs, abs=1e-9)
+    with few_calls(3000):
+        found, _ = inverse.follow(values, near)
+    assert found == pytest.approx(kept.inputs, abs=1e-9)
 
 
 def test_next_to_a_fold_both_searched_solutions_are_found_and_at_it_one():
