@@ -143,23 +143,6 @@ def test_a_path_starts_next_to_an_input_of_zero(bars):
             inverse.path([np.array([value])], near)
 
 
-# --- outputs of linkages with several inputs ---
-
-def test_extremes_over_the_first_input_have_the_others_fixed(arm):
-    (low, at_low), (high, at_high) = arm.extremes('P.x', others=[2.0])[0]
-    (lo, hi), *_ = arm.reach(2.0)
-    sampled = arm.solve([np.linspace(lo, hi, 20001), 2.0])['P'][:, 0]
-    assert low == pytest.approx(np.nanmin(sampled), abs=1e-7)
-    assert high == pytest.approx(np.nanmax(sampled), abs=1e-7)
-    assert arm.solve([at_low, 2.0])['P'][0] == low and arm.solve([at_high, 2.0])['P'][0] == high
-    with pytest.raises(ValueError, match='the values of all except the first are needed'):
-        arm.extremes('P.x')
-    pieces, _ = arm.monotone('P.x', math.inf, others=[2.0])
-    for first, last, start, end in pieces:
-        for value, wanted in ((first, start), (last, end)):
-            assert arm.solve([value, 2.0])['P'][0] == pytest.approx(wanted, abs=1e-9)
-
-
 # --- what is printed ---
 
 def test_an_answer_prints_its_inputs_its_mode_and_its_margin(arm):

@@ -93,20 +93,6 @@ def test_the_crank_moves_as_the_parameters_say(graph, parameters, steps):
             assert driver.at(round(step[0] * SECOND)) == step[1]
 
 
-def test_all_cranks_of_the_catalogue_turn_on_system_time(graph):
-    graph.start(CrankDriver, {'rate': 500.0})
-    heard = graph.listen(JointState, 'crank_states')
-    graph.until(lambda: len(heard) > 10)
-    for message in heard:
-        assert list(message.name) == [
-            'water_drop_crank', 'jansen_crank', 'peaucellier_crank', 'slotted_lever_crank']
-        assert all(abs(v) == 1.0 for v in message.velocity)
-    first, last = heard[0], heard[-1]
-    elapsed = (last.header.stamp.sec - first.header.stamp.sec
-               + 1e-9 * (last.header.stamp.nanosec - first.header.stamp.nanosec))
-    assert last.position[0] - first.position[0] == pytest.approx(elapsed, abs=1e-12)
-
-
 def test_a_new_sweep_takes_the_crank_where_it_is(graph):
     driver = Driver(graph, DROP)
     driver.at(SECOND)

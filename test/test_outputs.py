@@ -10,8 +10,6 @@ import mpmath
 import numpy as np
 import pytest
 
-LIFT = {'mechanisms': ['lift'], 'lift.type': 'custom', 'lift.scale': 2.0, 'lift.joints': [
-    'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C line O B 1.6']}
 ROCKER = {'mechanisms': ['bars'], 'bars.type': 'four_bar', 'bars.scale': 0.01}
 ASKED = [('jansen', 'distance(A,G)'), ('jansen', 'angle(C,G)'), ('four_bar', 'distance(O,B)'),
          ('four_bar', 'angle(B,A)'), ('slotted_lever', 'distance(Q,A)'), ('klann', 'angle(O,E)')]
@@ -89,33 +87,9 @@ def test_whole_turns_of_a_wanted_angle_cost_no_digits(value):
     assert found == pytest.approx(wanted, abs=1e-14)
 
 
-def test_a_scene_measures_lengths_scaled_and_beyond_a_branch_the_nearest_answer():
-    mechanism = scene.read({**LIFT, 'lift.cylinder.measures': 'OB'}).mechanisms['lift']
-    for length in (1.3, 2.0, 3.1):
-        angle = mechanism.linkage.joint_angles(length / 2.0)['OB']
-        (found,), (rate,) = mechanism.follow(['OB'], [float(angle)], [2.0])
-        assert found == pytest.approx(length)
-        assert rate == pytest.approx(0.5 * mechanism.linkage.joint_rates(length / 2.0)['OB'])
-    drawn = mechanism.linkage.solve(1.0)['C']
-    assert mechanism.follow(['C.x'], [2.0 * drawn[0]], [2.0])[0][0] == pytest.approx(2.0)
-    crank = scene.read({**ROCKER, 'bars.crank.measures': 'QB'}).mechanisms['bars']
-    across = float(crank.linkage.joint_angles(math.pi - 0.01)['QB'])
-    assert crank.follow(['QB'], [across], [math.pi + 0.01])[0][0] == pytest.approx(math.pi - 0.01)
-
-
 def test_a_measured_value_stays_inside_the_sweep_that_is_set():
     swept = scene.read({**ROCKER, 'bars.crank.measures': 'QB', 'bars.crank.sweep': [0.5, 1.0]})
     mechanism = swept.mechanisms['bars']
     inside, outside = (float(mechanism.linkage.joint_angles(theta)['QB']) for theta in (0.8, 1.6))
     assert mechanism.follow(['QB'], [inside], [0.6])[0][0] == pytest.approx(0.8)
     assert math.isnan(mechanism.follow(['QB'], [outside], [0.6])[0][0])
-
-
-@pytest.mark.parametrize('name, source, text', [
-    ('five_bar', 'P.y', 'five_bar.crank.measures: only a linkage with one input'),
-    ('four_bar', 'QX', "four_bar.crank.measures: four_bar has no output 'QX'; allowed: dis"),
-    ('four_bar', 'distance(O,Q)', 'four_bar.crank.measures: distance(O,Q) of four_bar does not')])
-def test_a_source_that_cannot_be_is_refused(name, source, text):
-    with pytest.raises(scene.SceneError) as refused:
-        scene.read({'mechanisms': [name], f'{name}.crank.measures': source})
-    assert text in str(refused.value)

@@ -43,6 +43,22 @@ OTHERS = {
                             'C mirror B P A'),
     'a rhombus of a kite': ('O ground 0 0', 'C ground -0.3 0', 'A crank O 0.3', 'B mirror O C A',
                             'D rigid B A 0.3 0.3 left'),
+    'arms that are bars, far from the origin': (
+        'O ground 1e6 1e6', 'Q ground 1000004 1e6', 'A crank O 1', 'B dyad A Q 3.5 3 left',
+        'C rigid A B 2 2 left', 'L slot O A 0.6 out 3', 'D dyad A B 3 2 left',
+        'E dyad C B 2.5 2 right'),
+    'a limit that is only touched at half a turn': (
+        'O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 4 1 left', 'R ground -2 0',
+        'C dyad A R 1.5 0.6 left'),
+    'a limit on one side of a change point': (
+        'O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 2 3 left', 'R ground 4 -4',
+        'C dyad B R 3 2.5 left'),
+    'a short stroke far from its zero': (
+        'G ground 0 0', 'H ground 1 0', 'S carriage G along H 150e-9 153e-9',
+        'F ground 151.5e-9 1e-9', 'D dyad F S 1.5e-9 0.2e-9 left'),
+    'no pose in the middle of the reach': (
+        'A ground 0 0', 'B ground 3 0', 'C crank A 0.3', 'E mirror A C B', 'H mirror B A E',
+        'K slider H 7 B 90deg in'),
     'gears on what moves': (
         'O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'C crank Q 1 geared crank -0.5 0.3',
         'B dyad A C 2 2 left', 'D crank B 0.4 zero A geared crank 2 0.1', 'R ground 1 5',

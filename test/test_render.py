@@ -253,36 +253,6 @@ def test_any_motion_is_drawn_in_place_of_the_solved_one():
     assert values != Cycle(leg).pose(0.3).places.ravel().tolist()
 
 
-def test_the_floor_moves_as_the_foot_that_stands_on_it():
-    walker = mechanism('jansen', leg_pairs=3)
-    picture = picture_of(walker, parts=DEFAULT | {'floor'})
-    floor = next(la for la in picture.panels[0].moving if isinstance(la, layers.Floor))
-    foot = walker.linkage.points.index('G')
-
-    def state(turns):
-        picture.show(turns)
-        feet = picture.panels[0].pose.places[:, foot]
-        lowest = int(feet[:, 1].argmin())
-        marks = np.array([path.vertices[0] for path in floor.marks.get_paths()])
-        assert marks[:, 1] == pytest.approx(feet[lowest, 1])
-        low, high = floor.marks.axes.get_xlim()
-        assert marks[0, 0] <= low and marks[-1, 0] >= high - floor.spacing
-        return lowest, feet[lowest, 0], marks[3, 0]
-
-    # Below a foot that hardly moves there are few marks, too.
-    cell = mechanism('peaucellier')
-    layer = layers.Floor(picture.figure.axes[0], cell, Cycle(cell), 1.0)
-    assert layer.spacing > 0.009 * cell.linkage.longest
-    moved = 0
-    for k in range(60):
-        (leg, x, mark), (same, further, mark_further) = state(k / 60), state((k + 0.1) / 60)
-        if leg == same:
-            step = (mark_further - mark - (further - x)) / floor.spacing
-            assert abs(step - round(step)) < 0.02
-            moved += 1
-    assert moved > 30
-
-
 def test_a_line_is_drawn_where_the_curve_is_one():
     curves = {t: Cycle(mechanism(t)).locus(mechanism(t)) for t in (
         'peaucellier', 'slider_crank', 'whitworth', 'jansen', 'hoeken', 'watt', 'pantograph')}
@@ -335,21 +305,6 @@ def test_the_crank_is_where_it_was_asked_to_be(tmp_path, given, angle):
     row, = rows_of(data)
     assert math.remainder(row['bar_crank'] - angle, math.tau) == pytest.approx(0.0, abs=1e-12)
     assert row['time'] == row['lever_crank'] == 0.0
-
-
-@pytest.mark.parametrize('speeds, count, ratios', [
-    ((1.0, -1.5), 2, (1.0, -1.5)), ((-2.0, 0.0), 1, (-1.0, 0.0)), ((0.0, 3.0), 1, (1.0, 0.0)),
-    ((1.0, math.pi), 24, (1.0, math.pi))])
-def test_several_cranks_turn_as_fast_as_they_were_told_to(speeds, count, ratios):
-    five_bar = mechanism('five_bar', crank__speed=speeds[0], crank2__speed=speeds[1],
-                         crank2__start=2.0)
-    cycle = Cycle(five_bar)
-    assert cycle.turns == count and cycle.course.shape[:2] == (720 * count + 1, 1)
-    for turns in (0.0, 0.3, 1.9):
-        wanted = math.tau * turns * ratios[0], 2.0 + ratios[1] * math.tau * turns
-        thetas = cycle.pose(turns).inputs
-        assert [math.remainder(t - w, math.tau) for t, w in zip(thetas, wanted)] == pytest.approx(
-            [0.0, 0.0], abs=1e-12)
 
 
 def test_mechanisms_side_by_side_have_one_time():
@@ -541,5 +496,3 @@ def test_no_name_is_on_a_joint_or_on_another(name):
     joints = [text.axes.transData.transform(text.xy) for text in names]
     assert not any(box.contains(*joint) for box in boxes for joint in joints)
     assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
-
-

@@ -318,26 +318,6 @@ def test_machine_code_finds_the_same_poses(g1):
     np.testing.assert_allclose(pose(g1.accelerated(), motors), pose(g1, motors), atol=2e-15)
 
 
-def test_motors_give_the_power_that_the_joints_take(g1):
-    rng, names = np.random.default_rng(5), (('right', 'left'), ('pitch', 'roll'))
-    poses = rng.uniform((-50 * DEGREE, -15 * DEGREE), (30 * DEGREE, 15 * DEGREE), (4000, 2)).T
-    inverse = g1.driven_by('pitch', 'roll')
-    motors = np.array(list(inverse.joint_angles(poses, names[0]).values()))
-    there = ~np.isnan(motors).any(axis=0)
-    loads, speeds = rng.uniform(-30.0, 30.0, (2, 4000)), rng.uniform(-3.0, 3.0, (2, 4000))
-    # The inverse's rates are those of the forward, the other way round.
-    rates, back = (np.array([[linkage.joint_rates(inputs, [name], by)[name] for by in (0, 1)]
-                             for name in outputs]) for linkage, inputs, outputs in (
-        (g1, motors, names[1]), (inverse, poses, names[0])))
-    product = np.einsum('ijn,jkn->ikn', rates, back)[..., there]
-    worst = np.abs(back[..., there]).max(axis=(0, 1))
-    assert (np.abs(product - np.eye(2)[..., None]).max(axis=(0, 1)) <= 1e-13 * (1 + worst)).all()
-    given = g1.effort(motors, dict(zip(names[1], loads))).T * speeds
-    taken = loads * np.einsum('ijn,jn->in', rates, speeds)
-    assert (np.abs((given + taken).sum(axis=0))
-            <= 1e-12 * np.abs([given, taken]).sum(axis=(0, 1)))[there].all()
-
-
 def test_the_motors_of_a_pose_are_those_on_the_drawn_sides(g1):
     folded, wanted = made(G1, branches={'R': -1}), (-0.1, 0.05)
     for linkage, other in ((g1, folded), (folded, g1)):

@@ -130,41 +130,6 @@ def test_the_positions_for_outputs_are_those_that_give_them_and_rates_are_slopes
     near(case.at(request.inputs_of(found)), values)
 
 
-def test_a_command_continues_from_the_last_inputs_at_the_speed_of_the_outputs(posed):
-    case, inputs, values, request = posed
-    speeds = [0.3, -0.7][:len(values)]
-    for jumps in (False, True):
-        command = request.command(values, speeds, [value + 1e-3 for value in inputs], jumps)
-        near(command.inputs, inputs)
-        near(command.positions, case.positions(inputs))
-        moved = case.jacobian(inputs) @ np.multiply(command.speeds, case.ratios)
-        np.testing.assert_allclose(moved, speeds, 1e-6, 1e-6)
-        assert request.command(values, None, inputs, jumps).speeds == ()
-
-
-def test_all_answers_are_in_their_sweeps_the_nearest_first(posed):
-    case, inputs, values, request = posed
-    answers = request.answers(values, inputs)
-    near(answers[0][0], inputs)
-    sizes = [drive.input.size for drive in case.drives]
-    for start in (None, inputs, [value + 7.0 * size for value, size in zip(inputs, sizes)]):
-        own = start or [drive.start for drive in case.drives]
-        found = request.answers(values, start)
-        away = [math.hypot(*((a - b) / size for a, b, size in zip(each, own, sizes)))
-                for each, _ in found]
-        assert away == sorted(away) and len(found) == len(answers)
-        for each, solution in found:
-            near(case.at(each), values)
-            assert solution.mode and not solution.is_singular
-            for drive, value in zip(case.drives, each):
-                low, high = drive.ends or (drive.input.low, drive.input.high)
-                assert low <= value <= high or drive.ends is None and drive.input.turns
-    if len(inputs) == 1:
-        low, high = case.drives[0].ends or case.drives[0].reach[0]
-        gap = case.at([np.linspace(low, high, 2000)])[0] - values[0]
-        assert len(answers) == np.count_nonzero((gap[1:] > 0.0) != (gap[:-1] > 0.0))
-
-
 def test_efforts_do_the_work_of_the_loads(posed):
     case, inputs, _, _ = posed
     work = np.zeros(len(inputs))
@@ -214,22 +179,6 @@ def test_where_the_way_leads_out_of_the_sweep_one_input_jumps_into_it():
             near(InverseRequest(mechanism, ['block']).command(
                 [0.5 * block], None, [near_], jumps).inputs, [expected])
         near(mechanism.follow(['block'], [0.5 * block], [near_])[0][0], expected)
-
-
-@pytest.mark.parametrize('turn', [-1, 0])
-def test_a_sensor_s_input_continues_where_another_answer_is_nearer(turn):
-    """A slotted lever returns quickly: the slow answer is the farther one from its extreme."""
-    extreme, pin = math.acos(-80.0 / 150.0), 2.0
-    sweep = [turn * math.tau + end for end in (-1.9, 4.0)]
-    mechanism = scene.read({'mechanisms': ['m'], 'm.type': 'slotted_lever',
-                            'm.crank.sweep': sweep, 'm.crank.start': sweep[0]}).mechanisms['m']
-    lever = math.atan2(80.0 * math.sin(pin - 0.7), 150.0 + 80.0 * math.cos(pin - 0.7))
-    last = turn * math.tau + extreme - 0.02
-    fast = mechanism.linkage.input_for('lever', lever).max() + turn * math.tau
-    assert abs(fast - last) < last - (turn * math.tau + pin - 0.7)
-    near(mechanism.follow(['lever'], [lever], [last])[0][0], turn * math.tau + pin - 0.7)
-    near(InverseRequest(mechanism, ['lever']).command([lever], None, [last]).inputs,
-         [turn * math.tau + pin - 0.7])
 
 
 @pytest.mark.parametrize('scale', [0.5, 4.0])

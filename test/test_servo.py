@@ -61,16 +61,3 @@ def test_the_value_at_an_end_is_had_at_that_end(kind, output):
         for end in ends:
             theta, _ = linkage.servo_for(output, float(value(end)), None, ends)
             assert ends[0] <= theta <= ends[1]
-
-
-@pytest.mark.nightly(all_but=2)
-@pytest.mark.parametrize('near', [None, 2.5])
-@pytest.mark.parametrize('ends', [None, (0.0, 6.0)])
-def test_machine_code_takes_the_answers_that_plain_python_takes(near, ends):
-    pytest.importorskip('llvmlite')
-    lever = mechanisms.create('slotted_lever', e=20.0)
-    wanted = np.linspace(-1.0, 1.0, 150)
-    found = lever.accelerated().servo_for('lever', wanted, near, ends)
-    alone = np.transpose([lever.servo_for('lever', each, near, ends) for each in wanted.tolist()])
-    assert 50 < np.isfinite(alone[0]).sum() < 150
-    np.testing.assert_allclose(found, alone, rtol=1e-12, atol=1e-15)

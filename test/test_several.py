@@ -6,6 +6,7 @@
 from itertools import product
 import math
 
+from effort import few_calls
 from linkage_ros import mechanisms, scene
 from linkage_ros.linkage import Solution
 from linkage_ros.scene.inverse_request import InverseRequest
@@ -63,25 +64,6 @@ def test_an_arm_has_both_elbows(name, outputs, truth):
             agree(linkage, outputs, values, truth(numbers, complex(*values[:2]), *values[2:]))
 
 
-def test_an_answer_is_followed_without_a_jump_in_and_back_out():
-    linkage, numbers = made('excavator')
-    start = np.array([108.0, 132.0, 119.0])
-    here = np.array(list(map(float, linkage.joint_angles(start, BUCKET).values())))
-    there = here + (-60.0, 25.0, -0.7)
-    way = [*np.linspace(0.0, 1.0, 41), *np.linspace(1.0, 0.0, 7)]
-    inputs = start
-    for part in way:
-        values = here + part * (there - here)
-        inputs, rates = linkage.inverse(BUCKET).follow(values, inputs)
-        truth = [row for row, _ in excavator(numbers, complex(*values[:2]), values[2])]
-        assert min(np.abs(np.subtract(row, inputs)).max() for row in truth) < 1e-10
-        slopes = [[(ahead - behind) / 2e-4 for ahead, behind in zip(*(
-            np.array(list(linkage.joint_angles(inputs + step * np.eye(3)[i], BUCKET).values()))
-            for step in (1e-4, -1e-4)))] for i in range(3)]
-        np.testing.assert_allclose(rates, np.ravel(slopes), rtol=1e-6, atol=1e-7)
-    np.testing.assert_allclose(inputs, start, atol=1e-11)
-
-
 def test_whole_turns_are_kept_and_a_singular_pose_is_not_passed():
     linkage = mechanisms.create('five_bar', a=1.0, b=1.0, c=1.0, d=1.0, f=1.2)
     outputs, near = ('P.x', 'P.y'), np.array([1.7 + 4.0 * math.pi, 1.4 - 2.0 * math.pi])
@@ -115,7 +97,9 @@ def test_a_mode_is_followed_where_that_beyond_the_fold_is_nearer():
     values = 2.040979962430155, -0.5094493998914134
     nearer, kept = inverse.all(values, near)[:2]
     assert (nearer.mode, kept.mode) == ('AP+ CP- det-', 'AP+ CP+ det+')
-    assert inverse.follow(values, near)[0] == pytest.approx(kept.inputs, abs=1e-9)
+    with few_calls(3000):
+        found, _ = inverse.follow(values, near)
+    assert found == pytest.approx(kept.inputs, abs=1e-9)
 
 
 def test_next_to_a_fold_both_searched_solutions_are_found_and_at_it_one():

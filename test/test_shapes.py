@@ -3,9 +3,7 @@
 
 """Barrels, rods, guides and blocks are where the joints say, in every pose and in every leg."""
 
-import cmath
 from itertools import combinations
-import math
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.linkage import LinkPoint
@@ -114,20 +112,6 @@ def test_a_barrel_is_as_long_as_the_stroke_from_half_to_nine_tenths(sweep, barre
     assert (rod.start.x, rod.start.y, rod.end) == (
         pytest.approx(barrel - sweep[1]), 0.0, LinkPoint('cylinder', 0.0, 0.0))
     assert not outer.is_fixed and not rod.is_fixed
-
-
-@pytest.mark.parametrize('sweep', [(0.0, math.tau), (0.3, 1.1)])
-def test_a_guide_is_longer_than_its_block_s_way_by_the_block(sweep):
-    # The pin of the crank, along and across the guide.
-    pin = (40.0 * np.exp(1j * np.linspace(*sweep, 100_000)) + 20.0j) / cmath.rect(1.0, 0.5)
-    way = pin.real + np.sqrt(120.0 ** 2 - pin.imag ** 2)
-    one = mechanism(joints=ENGINE, **({'crank__sweep': sweep} if sweep[0] else {}))
-    guide, block = shapes.shapes(one)
-    half = one.linkage.longest / 20.0
-    ends = [complex(end.x, end.y + 20.0) / cmath.rect(1.0, 0.5) for end in guide[2:]]
-    assert ends == pytest.approx([way.min() - half, way.max() + half], abs=0.02)
-    assert (guide.start.link, guide.is_fixed, block.is_fixed) == ('ground', True, False)
-    assert block[2:] == (LinkPoint('block', -half, 0.0), LinkPoint('block', half, 0.0))
 
 
 @pytest.mark.parametrize('name', ['jansen', 'gripper', 'Cassie', 'flat'])

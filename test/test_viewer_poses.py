@@ -150,22 +150,6 @@ def test_an_input_goes_where_it_is_wanted_or_as_near_as_it_gets(
                                  'unit': mechanism.inputs[input_].input.unit})
 
 
-GEARED = {'mechanisms': ['gear'], 'gear.type': 'custom', 'gear.joints': [
-    'O ground 0 0', 'M crank O 0.01', 'A crank O 1 geared crank 1/5 0']}
-
-
-@pytest.mark.parametrize('value', [4.0, -15.7, 12.6])
-def test_a_geared_input_goes_where_it_is_wanted_in_all_of_its_period(value):
-    gear = scene.read(GEARED).mechanisms['gear']
-    inputs, missed = poses.reached(gear, [0.0], {'output': 'crank', 'value': value})
-    assert (inputs, missed) == ([value], None)
-    # It can be set to start there.
-    started = scene.read({**GEARED, 'gear.crank.start': value}).mechanisms['gear']
-    assert started.first.start == value
-    again, _ = poses.reached(gear, [0.0], {'output': 'crank', 'value': value + 10.0 * math.pi})
-    assert again == pytest.approx([value], abs=1e-12)
-
-
 def test_an_input_goes_to_the_nearest_of_two_arcs_and_not_where_nothing_can_be_assembled():
     bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'four_bar', 'bar.crank.start': 1.0, **{
         f'bar.dimensions.{name}': length for name, length in zip('abcd', (3.0, 2.0, 2.5, 3.0))}})

@@ -28,6 +28,9 @@ from .refine import refine
 from .segments import Segments
 from ..motion.curves import HALVINGS
 
+# The largest motion of the outputs [sizes] in a step.
+FAR = 0.1
+
 
 def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
            source: object) -> Optional[Row]:
@@ -47,7 +50,7 @@ def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[floa
 def _followed(problem: InverseProblem, values: Sequence[float], residuals: Sequence[float],
               seed: Sequence[float], side: float, halvings: int) -> Optional[Row]:
     """Return the end of a motion of the outputs from `residuals` above values; None if none."""
-    if solution := refine(problem, values, tuple(seed)):
+    if solution := refine(problem, values, tuple(seed), FAR):
         inputs, rates = problem.nearest_equivalent(solution, seed), solution[problem.n:]
         # A fold is not passed.
         if _side(rates) == side:

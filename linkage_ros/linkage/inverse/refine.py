@@ -28,9 +28,13 @@ from ..tolerances import ONE, SINGULAR
 OUTSIDE = 6
 
 
-def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Bracket, Row]
-           ) -> Optional[Row]:
-    """Return the solution at a candidate, its inputs and rates; None if there is none."""
+def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Bracket, Row],
+           far: float = SINGULAR) -> Optional[Row]:
+    """
+    Return the solution at a candidate, its inputs and rates; None if there is none.
+
+    A larger error than `far` [sizes] is that of another assembly mode.
+    """
     if isinstance(candidate, Bracket):
         return _refine_inside(problem, values, candidate)
     n, inputs, at = problem.n, candidate, problem.newton.at
@@ -44,7 +48,7 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
         best = at(*inputs, *values)
     following = best[2 + n:2 + 2 * n]
     for _ in range(HALVINGS):
-        if following == inputs or not best[0] <= SINGULAR:
+        if following == inputs or not best[0] <= far:
             break
         trial = at(*following, *values)
         if trial[0] < best[0]:
