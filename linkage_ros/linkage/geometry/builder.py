@@ -329,7 +329,8 @@ class Builder:
         """Mirror a joint in the line of two others: the far corner of a kite."""
         ends = [self._side(end, point).vector for end in (second, first)]
         place, arm = self.points[point].place, self.arm(second, first, smooth=True)
-        self._reflect(name, first, second, arm, place, arm.offset(place, ends[0]), ends,
+        offset = arm.offset(place, ends[0])
+        self._reflect(name, first, second, arm, place + arm.across(offset), offset, ends,
                       self._side(first, point).length, self._side(second, point).length)
 
     def parallelogram(self, name: str, corner: str, first: str, second: str) -> None:
@@ -346,26 +347,17 @@ class Builder:
     def antiparallelogram(self, name: str, corner: str, first: str, second: str) -> None:
         """Join two bars as long as those from a corner, but crossed."""
         to_first, to_second = (self._side(corner, end) for end in (first, second))
-        arm = self.arm(second, first, smooth=True)
-        opposite = self.points[first].place + to_second.vector
-        start = self.points[corner].place
-        offset = -arm.offset(start, -to_second.vector)
-        place = start + arm.to_opposite(to_first.length, to_second.length) \
-            if isinstance(arm, planar.CrankArm) else None
-        self._reflect(name, first, second, arm, opposite, offset,
-                      (to_first.vector, to_second.vector), to_second.length, to_first.length,
-                      place)
+        arm, start = self.arm(second, first, smooth=True), self.points[corner].place
+        self._reflect(name, first, second, arm,
+                      start + arm.to_opposite(to_first.length, to_second.length),
+                      -arm.offset(start, -to_second.vector), (to_first.vector, to_second.vector),
+                      to_second.length, to_first.length)
 
-    def _reflect(self, name: str, first: str, second: str, arm: planar.Arm, point: Complex,
-                 offset: Real, ends: Sequence[Complex], to_first: Real, to_second: Real,
-                 place: Optional[Complex] = None) -> None:
-        """
-        Join two bars at a point's mirror image, given its bars from second and first.
-
-        A place that is known in a better way is given.
-        """
+    def _reflect(self, name: str, first: str, second: str, arm: planar.Arm, image: Complex,
+                 offset: Real, ends: Sequence[Complex], to_first: Real, to_second: Real) -> None:
+        """Join two bars at the image of a point, given its offset and bars to it; see `mirror`."""
         self.folds.append(planar.Limit(offset, TOLERANCE * to_first * to_second))
-        place, from_second, from_first = planar.mirror(arm, point, offset, ends, place)
+        place, from_second, from_first = planar.mirror(arm, image, offset, ends)
         self._pair(name, first, second, planar.Dyad(from_first, from_second, ()), to_first,
                    to_second, place)
 

@@ -184,6 +184,16 @@ class Arm:
         """Return the vector from a point of this offset to its mirror image in the arm's line."""
         return self.vector.turned() * (-2.0 * offset / self.divisor)
 
+    def to_opposite(self, first: Real, second: Real) -> Complex:
+        """
+        Return the vector from a corner of an antiparallelogram to the opposite one.
+
+        The bars first and second [m] go from that corner to the arm's end and to its foot. Vector
+        and arm are the parallel sides of a trapezoid; their product is |first^2 - second^2|.
+        """
+        power = valid_where((first - second) * (first + second), self.square, real(0.0))
+        return self.vector * (power / self.divisor)
+
     def _limit(self, radius: Real, size: Real, margin: Real) -> Limit:
         # At the limit the length is the radius: an error of a length changes the square by the
         # radius times that error. A tolerance is constant: size bounds a radius that varies.
@@ -254,16 +264,6 @@ class CrankArm(Arm):
         # Twice the triangle of foot, centre and pin, with every digit where it is flat.
         area = 2.0 * self._g * self._m * self._s * self._h
         return area if self._is_reversed else -area
-
-    def to_opposite(self, first: Real, second: Real) -> Complex:
-        """
-        Return the vector from a corner of an antiparallelogram to the opposite one.
-
-        The bars first and second [m] go from that corner to the arm's end and to its foot. Vector
-        and arm are the parallel sides of a trapezoid; their product is |first^2 - second^2|.
-        """
-        power = valid_where((first - second) * (first + second), self.square, real(0.0))
-        return self.vector * (power / self.divisor)
 
     def _half_angle_limit(self, radius: Real, size: Real, sign: float, start: Real,
                           end: Real) -> Limit:
@@ -404,17 +404,15 @@ def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
     return Complex(0.5 + (first - second) * (first + second) / twice, height / twice * side)
 
 
-def mirror(arm: Arm, point: Complex, offset: Real, ends: Sequence[Complex],
-           image: Optional[Complex] = None) -> Tuple[Complex, ...]:
+def mirror(arm: Arm, image: Complex, offset: Real, ends: Sequence[Complex]
+           ) -> Tuple[Complex, ...]:
     """
     Return the mirror image of a point in the line of an arm, and the bars from both ends to it.
 
     `offset` is the point's offset from the arm. `ends` are the bars to the point from the arm's
-    foot and from its end. `image` is a more accurate form of the image, if there is one. The spin
-    of a bar's image is twice the arm's minus the bar's own.
+    foot and from its end. The spin of a bar's image is twice the arm's minus the bar's own.
     """
     across, turning, bars = arm.across(offset), spin(arm.vector), []
-    image = image or point + across
     for bar in ends:
         own = spin(bar)
         bars.append(with_spin(bar + across, Rate(
