@@ -255,7 +255,8 @@ class CrankArm(Arm):
         """Return `first - second`, or its like in the arm where the limit takes both as equal."""
         apart, own = first - second, abs(self._g - self._m)
         return where(abs(shorter.ends.end) <= shorter.tolerance,
-                     where(apart < 0.0, -own, own), apart) if shorter.smooth else apart
+                     where(apart < 0.0, -own, own), apart
+                     ) if shorter.smooth and shorter.ends else apart
 
     def offset(self, point: Complex, to_point: Complex) -> Real:
         """Return the cross product of the arm and the vector from its foot to a point."""
