@@ -16,7 +16,6 @@ import sys
 from linkage_ros import scene
 from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import joints
-from linkage_ros.c_code.package import ranges
 from linkage_ros.scene.joint_names import JointName
 import numpy as np
 import pytest
@@ -141,17 +140,17 @@ def expected(mechanism, inputs, chosen=()):
             np.array([name.sign for name in named])[:, None] * turning)
 
 
-def prove(package, mechanism, compiler):
+def prove(package, mechanism, compiler, flags=PLUGIN):
     """Compile the proof for a mechanism of a package and run it, with sanitizers, too."""
     name, program = mechanism.name, package / f'proof_{mechanism.name}'
-    code = (package / 'src' / f'{name}.hpp').read_text()
-    space = re.search(r'namespace (\w+)', code)[1]
-    for count, flags in ((100_000, ()), (5000, SANITIZED)):
+    space = re.search(r'namespace (\w+)', (package / 'src' / 'plugins.cpp').read_text())[1]
+    arcs = [max(settings.arcs, key=np.ptp) for settings in mechanism.inputs.values()]
+    ranges = ', '.join('{%r, %r}' % (*map(float, arc),) for arc in arcs)
+    for count, more in ((100_000, ()), (5000, SANITIZED)):
         subprocess.run([
-            compiler, *PLUGIN, '-O2', *flags, f'-DNAME={name}', f'-DNAMESPACE={space}',
-            f'-DINPUTS={len(mechanism.inputs)}', f'-DRANGES={ranges(mechanism)}', '-I',
-            package / 'src', '-I', package / 'include', STAND_IN / 'proof.cpp', '-o', program,
-            *PLUGIN], check=True)
+            compiler, *flags, '-O2', *more, f'-DNAME={name}', f'-DNAMESPACE={space}',
+            f'-DINPUTS={len(arcs)}', f'-DRANGES={{{ranges}}}', '-I', package / 'src', '-I',
+            package / 'include', STAND_IN / 'proof.cpp', '-o', program, *flags], check=True)
         ended = subprocess.run([program, str(count)], capture_output=True, text=True)
         assert ended.returncode == 0, ended.stdout + ended.stderr
         tried, good = map(int, re.search(r'(\d+) states, (\d+)', ended.stdout).groups())

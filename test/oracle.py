@@ -860,7 +860,7 @@ def message(positions, velocities=(), sec=1):
     return 'send', serialize_message(sent)
 
 
-def history(parameters, seed, length=60):
+def history(parameters, seed, length):
     """Return a random history of a scene: steps as `Bench.run` takes them."""
     return Generator(parameters, np.random.default_rng(seed)).history(length)
 

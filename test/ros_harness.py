@@ -239,8 +239,7 @@ def hastened(node, seconds):
 
 def module(name):
     """Return the module of an executable."""
-    rooms = {'render': 'render', 'urdf': 'nodes.urdf_cli', 'viewer': 'web.viewer',
-             'scene': 'nodes.scene_process'}
+    rooms = {'viewer': 'web.viewer', 'scene': 'nodes.scene_process'}
     return f'linkage_ros.{rooms.get(name, f"nodes.{name}")}'
 
 
@@ -250,7 +249,7 @@ class Process:
     def __init__(self, name, parameter_file, *arguments, domain=None, env=None, as_module=False):
         self._domain = None if domain else Domain()
         self.domain = domain or self._domain.id
-        start = ('-m', module(name)) if as_module or name == 'urdf' else (
+        start = ('-m', module(name)) if as_module else (
             '-c', f'from linkage_ros import executables; executables.{name}()')
         # A pipe that nobody reads would hold up who writes more than it holds.
         with tempfile.NamedTemporaryFile() as file:

@@ -3,15 +3,16 @@
 
 """A linkage that a length drives does all that one driven by an angle does."""
 
-from itertools import product
 import math
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.linkage.inputs import LENGTH
 from linkage_ros.render.cycle import Cycle
+from linkage_ros.robot_model import urdf
 from linkage_ros.scene import slider
 import numpy as np
 import pytest
+from robots import Pinocchio
 
 # A boom O-B on a cylinder P-B; a bar Q-D keeps the bucket C-D nearly level.
 BOOM = ('O ground 0 0', 'P ground g -h', 'B cylinder P O r right', 'C line O B 1.5*r',
@@ -109,11 +110,11 @@ def test_the_barrel_of_an_isosceles_cylinder_keeps_its_digits_as_it_gets_short(l
         -length / (2.5 * sine) ** 3, rel=1e-6, abs=1e-8)
 
 
-def test_a_cylinder_on_a_crank_turns_at_the_rates_of_its_angles():
-    linkage = mechanisms.create('custom', joints=(
-        'O ground 0 0', 'P ground 3 0.5', 'A crank O 1', 'B cylinder A P 1.5 left called drive'))
-    for by, pose in product((0, 1), ((0.3, 1.9), (2.0, 3.1))):
-        ahead, behind = (linkage.joint_angles(pose + step * np.eye(2)[by])
-                         for step in (1e-6, -1e-6))
-        for name, rate in linkage.joint_rates(pose, by=by).items():
-            assert rate == pytest.approx((ahead[name] - behind[name]) / 2e-6, abs=1e-8), name
+
+
+def test_a_carriage_alone_is_a_linkage():
+    rail = ['O ground 0 0', 'X ground 1 0', 'R carriage O along X -0.2 0.7']
+    assert mechanisms.create('custom', joints=rail).extremes('R.x') == [((-0.2, -0.2), (0.7, 0.7))]
+    mechanism = scene.read({
+        'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': rail}).mechanisms['m']
+    assert Pinocchio(urdf.describe([mechanism], 'world')).joints == ['m_carriage']

@@ -21,7 +21,7 @@ RATIOS = {'1/64': 64, '1/80': 80, '1/100': 100, '0.31': 100, '22/7': 7, '3/7': 7
 TURNS = 0.0, 13.3, -1e5
 
 # Fractions and a speed-up whose first question is quick.
-QUICK = '1/3', '0.31', '180'
+QUICK = '1/3', '180'
 
 
 def motor(ratio, *more):
@@ -82,7 +82,7 @@ def test_a_pose_is_answered_in_the_turn_in_which_it_is(ratio):
                 0.0, abs=1e-12 + 8.0 * size * math.ulp(theta))
 
 
-@pytest.mark.parametrize('ratio', [8, 60, 180, 1000, -999])
+@pytest.mark.parametrize('ratio', [8, 180, -999])
 def test_a_fast_gear_loses_no_answer(ratio):
     found = motor(ratio).input_for('A.x', 0.3)
     angle = math.acos(0.3)
@@ -103,7 +103,7 @@ def test_as_many_answers_as_brute_force_finds(ratio):
     assert np.sum(inside & (gap[1:] * gap[:-1] <= 0.0)) == len(found.input_for('E.x', 8.0321))
 
 
-@pytest.mark.nightly(all_but=4)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('ratio', [
     '1/3', '0.31', '1/80', pytest.param('1000', marks=pytest.mark.nightly), 'sqrt(2)', '0.12345'])
 def test_the_reach_is_where_it_can_be_assembled(ratio):
@@ -131,37 +131,6 @@ def test_the_reach_ends_where_a_geared_crank_is_too_far_from_a_ground_joint(rati
     whole = np.isfinite(found.solve(theta)['B']).all(axis=1)
     assert whole.any() and not whole.all()
     assert [first.on(found.reach(), x) for x in theta.tolist()] == whole.tolist()
-
-
-def test_a_crank_that_has_turned_for_long_is_answered_where_it_is():
-    # A gear typed as 0.333 repeats after 1000 turns, which a machine passes in minutes.
-    bars = 'O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'B dyad A Q 2.5 2 left'
-    plain = mechanisms.create('custom', joints=bars)
-    found = mechanisms.create('custom', joints=(*bars, 'D crank Q 1 geared crank 0.333 0.3'))
-    for theta in (2.0, 4000.25, -1e5):
-        value = float(plain.solve(theta)['B'][0])
-        # What the gear does not move repeats as without it.
-        assert len(found.inverse('B.x').all(value)) == len(plain.inverse('B.x').all(value)) == 2
-        for output in ('B.x', 'D.x'):
-            point, axis = output.split('.')
-            value = float(found.solve(theta)[point]['xy'.index(axis)])
-            assert found.input_for(output, value, theta) == pytest.approx(theta, abs=1e-9)
-
-
-@pytest.mark.parametrize('seed', [3.0, -5000.5])
-def test_a_gear_that_repeats_is_not_answered_where_a_rare_gap_of_the_reach_is(seed):
-    # Both cranks pull the dyad apart for a few degrees in a hundred turns.
-    found = mechanisms.create('custom', joints=(
-        'A ground 0 0', 'B ground 4 0', 'C crank A 1',
-        'D crank B 1 geared crank sqrt(2) 0 called drive', 'E dyad C D 2.99 2.99 left'))
-    value = 0.02
-    angles = (value + math.tau * np.arange(-5000, 5000)) / math.sqrt(2.0)
-    angles = angles[abs(angles - seed) < 100.0]
-    assembled = np.isfinite(found.solve(angles)['E'][:, 0])
-    answers = [solution.inputs[0] for solution in found.inverse('drive').all(value, seed)]
-    nearest = [min(abs(theta - answer) for answer in answers) for theta in angles.tolist()]
-    assert (np.array(nearest) < 1e-8).tolist() == assembled.tolist()
-    assert 0 < np.count_nonzero(assembled) < len(angles)
 
 
 def test_a_linkage_is_the_same_whole_turns_on():

@@ -44,7 +44,7 @@ def test_a_linkage_that_nobody_holds_is_gone_after_some_others():
 
 
 def test_other_outputs_leave_nothing_behind_in_a_linkage():
-    linkage = mechanisms.create('watt')
+    linkage = mechanisms.create('four_bar')
     outputs = [f'distance({a},{b})' for a, b in permutations(linkage.points[:5], 2)][:17]
 
     def expressions():

@@ -28,12 +28,6 @@ def custom(*joints, **numbers):
     return mechanisms.create('custom', joints=joints, **numbers)
 
 
-def outputs_of(linkage):
-    """Return all joint angles, slides and coordinates that move."""
-    names = (*linkage.joints, *(f'{point}.{axis}' for point in linkage.points for axis in 'xy'))
-    return [name for name in names if linkage.moves(name)]
-
-
 def test_the_joint_lines_of_an_inverse_are_printed():
     assert str(mechanisms.create('five_bar').inverse(('P.x', 'P.y'))) == FIVE_BAR
     assert str(mechanisms.create('jansen').inverse('G.x')) == (
@@ -70,35 +64,6 @@ def test_an_output_that_only_rounding_moves_has_no_answers():
     assert np.isnan(linkage.input_for('E.x', 0.0)).tolist() == [True]
     (low, high), = linkage.extremes('E.x')
     assert low <= high
-
-
-def apart(inputs, others, rates):
-    """Return how far outputs are apart, and a little of what the inputs are, which may be flat."""
-    gaps = np.subtract(inputs, others)
-    return abs(gaps @ np.reshape(rates, 2 * gaps.shape)).max() + 1e-6 * abs(gaps).max()
-
-
-@pytest.mark.nightly(all_but=3)
-@pytest.mark.parametrize('kind', sorted(mechanisms.TYPES, key=lambda kind: kind != 'five_bar'))
-def test_a_value_alone_has_the_answers_that_it_has_in_an_array(kind):
-    linkage, rng = mechanisms.create(kind), np.random.default_rng(8)
-    several = len(linkage.inputs) > 1
-    for outputs in [('P.x', 'P.y')] if several else [(name,) for name in outputs_of(linkage)]:
-        inverse = linkage.inverse(outputs)
-        # So many values are solved as arrays.
-        inputs = [rng.uniform(each.low, each.high, 40) for each in linkage.inputs]
-        rows = [*linkage.posed((), outputs).over(*inputs)]
-        near = [values + rng.uniform(-0.1, 0.1, 40) for values in inputs]
-        (found, slopes), (chosen, rates) = inverse.over(*rows), inverse.nearest(rows, near)
-        for k, values in enumerate(np.transpose(rows).tolist()):
-            assert not (np.diff(found[0, k]) < 0.0).any()
-            alone = [each.inputs for each in inverse.all(values)]
-            assert np.isfinite(found[:, k]).all(axis=0).sum() == len(alone)
-            for *row, slope in zip(*found[:, k], slopes[:, k].T):
-                assert row[0] != row[0] or min(apart(row, other, slope) for other in alone) < 1e-10
-            there, slope = inverse.nearest(values, [float(x[k]) for x in near])
-            np.testing.assert_allclose([x[k] for x in rates], slope, 1e-9, 1e-11)
-            assert there[0] != there[0] or apart([x[k] for x in chosen], there, slope) < 1e-10
 
 
 def test_half_a_turn_is_the_one_below_zero():
@@ -212,33 +177,6 @@ def test_a_jump_at_the_end_of_a_turn_is_not_passed(near):
         assert found == pytest.approx(near + 2.0 * away, abs=1e-12)
     (found,), _ = inverse.follow((math.copysign(0.5 * math.pi + 0.05, half),), (near,))
     assert math.isnan(found)
-
-
-@pytest.mark.nightly(all_but=6)
-@pytest.mark.parametrize('kind', [kind for kind in mechanisms.TYPES if kind != 'five_bar'])
-def test_next_to_the_seam_of_a_turn_a_solution_is_as_exact_as_elsewhere(kind):
-    linkage = mechanisms.create(kind)
-    first, = linkage.inputs
-    if not first.is_whole(linkage.reach()):
-        pytest.skip('it does not turn round')
-    seam = np.array([side * (math.pi - away) for side in (1, -1)
-                     for away in (0.0, 1e-15, 3e-15, 1e-14, 3e-14, 1e-13, 3e-13, 1e-12)])
-    checked = 0
-    for output in outputs_of(linkage):
-        scale = 1.0 if linkage.is_angle(output) else linkage.longest
-        values, rates = (linkage.joint_angles(seam, [output])[output],
-                         np.abs(linkage.joint_rates(seam, [output])[output]))
-        if (rates < 1e-2 * scale).any():
-            continue
-        # The rounding of the output and of the input.
-        room = 64 * 2.0 ** -53 * (scale / rates + math.pi)
-        arrays, _ = linkage.inverse(output).over(np.repeat(values, 40))
-        for i, (theta, value) in enumerate(zip(seam.tolist(), values.tolist())):
-            for found in linkage.input_for(output, value), arrays[0, 40 * i]:
-                away = np.abs(np.remainder(found - theta + math.pi, math.tau) - math.pi)
-                assert np.nanmin(away) <= room[i], (output, theta)
-        checked += 1
-    assert checked
 
 
 @pytest.mark.parametrize('limited', [False, True])

@@ -48,6 +48,11 @@ SPECIAL = {
     'a period of two turns': (
         ['O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'D crank Q 2 geared crank 1/2 0',
          'B dyad A D 2.2 2 left'], {}, ['B.x', 'crank2', 'AB'], np.linspace(4.31, 8.26, 40)),
+    'the last floats of a reach': (
+        ['A ground 0.829145187382171 -2.2156474128625305',
+         'B ground -2.2125892959295577 0.6633161499057368', 'C crank A 0.436499480176793',
+         'D mirror A C B', 'E Eb Ec inversor D A 0.7495014557578443 0.7495014557578443*1.8'], {},
+        ['Ec.x'], np.array([-1.5866750307266744])),
     'a gear without a place where the input is zero': (
         ['A ground 0 0', 'B ground 0.4 0', 'C cylinder A B 0.3 left',
          'D carriage B along A -0.7 -0.2 geared cylinder -1.5 0.2 called drive',
@@ -107,6 +112,17 @@ def test_of_two_inputs_no_ordinary_solution_is_lost_or_invented(outputs):
     found, _ = inverse_judge.judge_several(
         mechanisms.create('five_bar'), outputs, np.random.default_rng(1), 60)
     assert found['ordinary', 'questions'] > 15 and not counts(found, 'ordinary')
+
+
+def test_another_assembly_mode_leads_to_no_solution():
+    linkage = mechanisms.create('custom', joints=[
+        'A ground 0 0', 'B ground -2.19 0', 'C crank A 2.189999999999781',
+        'D dyad C B 2.19 2.189999999999781 right', 'E cylinder A D 2.19 right'])
+    for theta in np.linspace(2.8, 3.1, 20).tolist():
+        value = float(linkage.joint_angles((theta, 3.0), ['D.x'])['D.x'])
+        found = [solution.inputs[0] for solution in linkage.inverse(
+            ('D.x', 'cylinder')).all((value, 3.0))]
+        assert found == pytest.approx([-theta, theta], abs=1e-12)
 
 
 @pytest.mark.parametrize('output, most', [('angle(A,L)', math.pi), ('angle(S,B)', 0.12)])

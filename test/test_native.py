@@ -93,30 +93,6 @@ def test_every_bit_is_that_of_an_array(kind, count):
     assert np.array_equal(by_batch(linkage, thetas), np.hstack([*array]), equal_nan=True)
 
 
-@pytest.mark.nightly(all_but=1)
-@pytest.mark.parametrize('kind', ['jansen', 'klann'])
-def test_the_legs_of_a_walker_are_those_of_plain_python(kind, monkeypatch, code):
-    design = mechanisms.design(kind)
-    # A design of its own, whose code is made here.
-    linkage = mechanisms.create('custom', joints=(*design.joints, 'Z ground 0 0'),
-                                **mechanisms.defaults(kind))
-    assembly = Assembly(linkage, 6, True, scale=0.01)
-    quick, = solutions = [assembly.solution(linkage.points, assembly.joints, assembly.joints)]
-    wait_for_compilers()
-
-    def refuse(*_):
-        raise ImportError
-
-    with monkeypatch.context() as without:
-        without.setattr(program.CompiledFunction, 'batch', refuse)
-        solutions.append(assembly.solution(linkage.points, assembly.joints, assembly.joints))
-    for theta in angles(linkage)[:60].tolist():
-        finite = {solution.solve([theta], [-2.5]) for solution in solutions}
-        assert finite == {bool(np.isfinite(quick.values).all())}
-        np.testing.assert_allclose(*(solution.values for solution in solutions), 1e-9, 1e-9)
-    assert code.ran == 60
-
-
 def test_nobody_waits_for_the_compiler(code):
     linkage = fresh('Waited')
     code.allowed.clear()

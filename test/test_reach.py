@@ -6,43 +6,15 @@
 import math
 
 from linkage_ros import mechanisms
-import numpy as np
 import pytest
-from truth import drawing_accuracy, hard_cases, linkage_checks
-from truth.random_linkages import Design
+from truth import drawing_accuracy, hard_cases
 
-KINDS = list(hard_cases.CATALOGUE)
 TURN = [(-math.pi, math.pi)]
 
 
 def told(mechanism, *more):
     """Return what reproduces a failure."""
     return f'{mechanism.type} {mechanism.dimensions} {mechanism.branches} {more}'
-
-
-@pytest.mark.parametrize('kind, count', [
-    ('water_drop', 5), ('jansen', 10), ('peaucellier', 60), ('slotted_lever', 60),
-    *(pytest.param(kind, 300, marks=pytest.mark.nightly)
-      for kind in ('peaucellier', 'slotted_lever'))])
-def test_the_reach_is_what_brute_force_finds_and_has_all_poses(kind, count):
-    for mechanism, _ in hard_cases.linkages(kind, 1, count):
-        arcs = mechanism.reach()
-        ends = np.array([end for arc in arcs for end in arc])
-        try:
-            subject = linkage_checks.Subject(Design(
-                mechanism.design.joints, mechanism.dimensions, mechanism.branches),
-                np.random.default_rng(2), 1440)
-        except ValueError as error:
-            assert arcs == [] and 'no triangle has these sides' in str(error), told(mechanism)
-            continue
-        subject.values = np.sort([*subject.values, *(ends - 1e-6), *(ends + 1e-6)])
-        found = [*linkage_checks.reach(subject)]
-        assert not found and arcs == subject.mechanism.reach(), told(mechanism, found)
-        placed = np.isfinite(mechanism.solve(subject.values)[mechanism.tracer]).all(-1)
-        held = linkage_checks.inside(arcs, subject.values, math.tau)
-        wrong = subject.values[placed != held]
-        assert all(subject.away(theta, ends) < 1e-8 for theta in wrong), told(mechanism, wrong)
-        assert all(before[1] < after[0] for before, after in zip(arcs, arcs[1:]))
 
 
 @pytest.mark.nightly
@@ -67,20 +39,6 @@ def test_a_joint_that_never_ends_the_reach_moves_no_end_of_it(kind):
             *map(str, mechanism.design.joints), f'ZZ slider {mechanism.tracer} {rod!r} {ground} 0'
             ' out'), **mechanism.dimensions)
         assert larger.reach() == mechanism.reach(), told(mechanism)
-
-
-@pytest.mark.nightly(all_but=1)
-@pytest.mark.parametrize('count', [25, pytest.param(300, marks=pytest.mark.nightly)])
-@pytest.mark.parametrize('half', [1, -1])
-def test_the_lever_reach_is_what_brute_force_finds(half, count):
-    lever = np.linspace(-math.pi, math.pi, 1441)
-    for mechanism, _ in hard_cases.linkages('slotted_lever', 7, count):
-        mechanism = mechanisms.create('slotted_lever', branches={'L': half},
-                                      **mechanism.dimensions)
-        gap = hard_cases.lever_gap(mechanism.dimensions, lever, half)
-        held = linkage_checks.inside(mechanism.lever_reach(), lever, math.tau)
-        wrong = (np.abs(gap) > 1e-9) & (held != (gap > 0.0))
-        assert not wrong.any(), told(mechanism, lever[wrong])
 
 
 @pytest.mark.parametrize('a, e', [(80.0, 0.0), (math.nextafter(80.0, 90.0), 0.0), (80.0, 1e-9)])

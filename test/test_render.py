@@ -124,7 +124,7 @@ def test_a_turn_is_drawn_in_the_time_it_takes(tmp_path):
     assert np.allclose(np.remainder(2.0 * np.array(times), math.tau), cranks, atol=1e-12)
 
 
-@pytest.mark.nightly(all_but=3)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('type_', list(mechanisms.TYPES))
 def test_both_directions_have_one_scale_and_nothing_is_cut_off(type_):
     one = mechanism(type_)
@@ -530,7 +530,7 @@ def test_the_readings_of_one_picture_are_not_written_over_those_of_another():
     assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
 
 
-@pytest.mark.nightly(all_but=7)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('name', scene.load(str(ROOT / 'pictures' / 'words.yaml')).mechanisms)
 def test_no_name_is_on_a_joint_or_on_another(name):
     shown = scene.load(str(ROOT / 'pictures' / 'words.yaml')).mechanisms[name]

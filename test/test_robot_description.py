@@ -109,8 +109,10 @@ def files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def test_arguments_may_follow_those_for_ros(capsys):
-    assert main(['--ros-args', '-p', 'jansen.scale:=0.5', '--', '--mechanism', 'jansen']) == 0
+def test_arguments_of_the_process_may_follow_those_for_ros(capsys, monkeypatch):
+    monkeypatch.setattr('sys.argv', [
+        'urdf', '--ros-args', '-p', 'jansen.scale:=0.5', '--', '--mechanism', 'jansen'])
+    assert main() == 0
     assert '<robot name="jansen">' in capsys.readouterr().out
 
 

@@ -548,16 +548,20 @@ def test_a_parallelogram_stays_one_on_universal_joints_and_in_any_pose(tmp_path,
             assert math.remainder(found[name] - value, math.tau) == pytest.approx(0.0, abs=1e-14)
 
 
+# Of a hinge in the tree, and of one that closes a loop.
+@pytest.mark.parametrize('file, axis, start', [
+    ('four_bar.xml', 'axis="0 -1 0"', '-0.870796'),
+    ('four_bar.urdf', 'axis xyz="0 1 0"/>\n  </loop_joint>', '-1.570796')])
 @pytest.mark.parametrize('lean, why', [
     (9e-4, 'from_robot: Warning: the file is not exact: axes lean by 0.0009 rad, and loops stay'),
     (5e-6, 'from_robot: Warning: the file is not exact: axes lean by 5e-06 rad, and loops stay'),
     (0.0, ''), (2e-3, 'are 0.115 degrees from it, more than 0.057; ')])
-def test_a_misfit_is_printed_and_imported_if_it_is_small(tmp_path, lean, why):
-    code, out, err = printed(written(tmp_path, 'four_bar.xml', (
-        'axis="0 -1 0"', f'axis="{lean} -1 0"')))
+def test_a_misfit_is_printed_and_imported_if_it_is_small(
+        tmp_path, lean, why, file, axis, start):
+    code, out, err = printed(written(tmp_path, file, (axis, axis.replace('"0 ', f'"{lean} '))))
     assert code == (lean > 1e-3) and why in err and bool(why) == ('rad, and' in err or code > 0)
     # Where the file has it, by as much as the axis leans.
-    assert code or 'motor.crank.start: -0.870796' in out
+    assert code or f'motor.crank.start: {start}' in out
     assert all(worst <= max(2.0 * lean, 1e-15) for _, worst in checked(err))
 
 
@@ -714,17 +718,17 @@ def moves(linkage, values, robot, steps):
     return moved
 
 
-# Slots and cylinders on one pair of joints; gears of gears; crossed bars on a block; a motor that
-# goes on where bars lie in line, though not as its robot.
 @pytest.mark.parametrize('seeds', [
-    [3, 9, 18, 29, 195], *(pytest.param(seeds, marks=pytest.mark.nightly) for seeds in (
-        [79, 84, 129, 179, 191, 301, 361, 531, 616, 643, 681], range(120)))])
+    range(5), pytest.param([*range(5, 65), *range(66, 120)], marks=pytest.mark.nightly),
+    # Mirror images of a kite: a crossed parallelogram on them is on another side than in the file.
+    pytest.param([65], marks=[pytest.mark.nightly, pytest.mark.xfail(strict=True)])])
 def test_random_linkages_come_back_from_robots(seeds):
     moved = 0
     for made in filter(None, map(random_robot, seeds)):
         try:
             moved += moves(*made)
         except RequestError as error:
-            assert re.search('closes a loop|not of dyads|it cannot move', str(error))
+            assert re.search('closes a loop|not of dyads|it cannot move|lie in line|loops end',
+                             str(error))
             assert cli.WRONG not in str(error)
     assert moved > len(seeds) // 2

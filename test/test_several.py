@@ -108,28 +108,6 @@ def test_whole_turns_are_kept_and_a_singular_pose_is_not_passed():
     np.testing.assert_allclose(back, near, atol=1e-9)
 
 
-@pytest.mark.nightly(all_but=2)
-@pytest.mark.parametrize('seed', range(12))
-def test_what_is_followed_passes_no_fold_and_ends_where_small_steps_do(seed):
-    rng, reached = np.random.default_rng(seed), 0
-    linkage = mechanisms.create('five_bar', **dict(zip('abcdf', rng.uniform(0.4, 2.0, 5))))
-    inverse = linkage.inverse(('P.x', 'P.y'))
-    for near in rng.uniform(-3.0, 3.0, (40, 2)).tolist():
-        start = linkage.solve(near, ('P',))['P']
-        foot = start + rng.normal(0.0, 0.5, 2)
-        there, rates = inverse.follow(foot, near)
-        if math.isfinite(sum(there)):
-            before = Solution(tuple(near), inverse).jacobian
-            assert np.linalg.det(np.reshape(rates, (2, 2))) * np.linalg.det(before) > 0.0
-            np.testing.assert_allclose(linkage.solve(there, ('P',))['P'], foot, atol=1e-12)
-            step = near
-            for part in np.linspace(0.0, 1.0, 81)[1:]:
-                step = inverse.all(start + part * (foot - start), step)[0].inputs
-            assert there == pytest.approx(step, abs=1e-6)
-            reached += 1
-    assert reached
-
-
 def test_a_mode_is_followed_where_that_beyond_the_fold_is_nearer():
     linkage = mechanisms.create('five_bar', a=0.7705062351115836, b=1.5616011513598087,
                                 c=0.7534721238980263, d=1.4852815970909945, f=1.514771842943107)

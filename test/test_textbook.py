@@ -6,7 +6,8 @@ Textbook examples come out to the digits that are printed.
 
 Norton: R. L. Norton, "Design of Machinery" (examples of ch. 4, answers to the tables of problems
 P4-1 to P4-3, table 3-1). Mabie and Reinholtz: "Mechanisms and Dynamics of Machinery", the table of
-Geneva wheels.
+Geneva wheels. H. Shigeyoshi: jansen-linkage and water-drop-linkage (MIT licence), the tables that
+come with the programs.
 """
 
 import math
@@ -107,6 +108,33 @@ def test_a_geneva_wheel_turns_as_in_the_table(slots, speed, where, acceleration)
     accelerations = np.diff(linkage.joint_rates(theta)['lever']) / step
     assert printed(accelerations.max(), acceleration)
     assert math.degrees(theta[accelerations.argmax()]) == pytest.approx(float(where), abs=0.1)
+
+
+# deg, A, C, D, E, F, G
+JANSEN = """
+45.0 10.607 10.607 -33.849 33.492 -77.553 -1.2 -20.427 -42.952 -56.076 -34.232 -24.399 -91.791
+90.0 0.0 15.0 -46.736 32.77 -77.668 -13.672 -20.995 -43.231 -57.448 -47.487 -7.689 -90.389
+180.0 -15.0 0.0 -54.934 30.088 -75.597 -21.745 -65.315 -36.056 -96.76 -54.979 -33.73 -73.517
+225.0 -10.607 -10.607 -34.122 33.518 -77.596 -1.462 -68.451 -32.644 -105.035 -29.737 -64.562 -81.49
+315.0 10.607 -10.607 -19.472 29.334 -72.64 12.4 -39.41 -47.075 -70.078 -26.916 -59.513 -91.761
+"""
+# deg, A, B, P
+WATER_DROP = """
+1.0 -0.017 1.0 -0.023 0.0 0.0 4.0
+60.0 -0.866 0.5 -1.237 -0.429 0.247 3.286
+120.0 -0.866 -0.5 -1.732 -1.0 1.732 1.0
+170.0 -0.174 -0.985 -0.665 -0.114 1.3 -3.598
+185.0 0.087 -0.996 0.345 -0.03 -0.685 -3.895
+"""
+
+
+@pytest.mark.parametrize('kind, lengths, joints, table', [
+    ('jansen', {}, 'ACDEFG', JANSEN), ('water_drop', {'a': 1.0}, 'ABP', WATER_DROP)])
+def test_places_are_those_of_the_table_of_the_original_program(kind, lengths, joints, table):
+    linkage = mechanisms.create(kind, **lengths)
+    for theta, *places in (map(float, line.split()) for line in table.strip().splitlines()):
+        found = linkage.solve(math.radians(theta), [*joints])
+        np.testing.assert_allclose(np.ravel([*found.values()]), places, rtol=0.0, atol=5e-4)
 
 
 SQUEEZER = (

@@ -347,25 +347,21 @@ def test_mechanisms_of_any_names_are_classes_of_their_own():
 
 @pytest.mark.nightly
 @pytest.mark.skipif(not shutil.which('cmake'), reason='cmake is not installed')
-def test_a_package_is_built_and_tests_itself(tmp_path):
+def test_a_package_is_built_and_installed(tmp_path):
     if not (Path(sys.prefix) / 'share' / 'ament_cmake').is_dir():
         pytest.skip('ament_cmake is not installed')
     package = written(tmp_path, ROOT / 'examples' / 'leg.yaml', '--mechanism', 'knee', 'hip')
     installed, component = tmp_path / 'install', tmp_path / 'component'
 
-    def ran(*command):
-        ended = subprocess.run(command, capture_output=True, text=True)
-        assert ended.returncode == 0, ended.stdout + ended.stderr
-        return ended.stdout
-
     def built(source, folder, *more):
-        ran('cmake', '-S', source, '-B', folder, f'-DPython3_EXECUTABLE={sys.executable}',
-            f'-DCMAKE_INSTALL_PREFIX={installed}',
-            f'-DCMAKE_PREFIX_PATH={installed};{STAND_IN / "cmake"};{sys.prefix}')
-        ran('cmake', '--build', folder, *more)
+        for command in (['-S', source, '-B', folder, f'-DPython3_EXECUTABLE={sys.executable}',
+                         f'-DCMAKE_INSTALL_PREFIX={installed}',
+                         f'-DCMAKE_PREFIX_PATH={installed};{STAND_IN / "cmake"};{sys.prefix}'],
+                        ['--build', folder, *more]):
+            ended = subprocess.run(['cmake', *command], capture_output=True, text=True)
+            assert ended.returncode == 0, ended.stdout + ended.stderr
 
     built(package, tmp_path / 'build', '--target', 'install')
-    assert 'out of 2' in ran('ctest', '--test-dir', tmp_path / 'build')
     assert (installed / 'lib' / 'libleg_transmissions.so').is_file()
     # A hardware component finds the header of the status.
     component.mkdir()

@@ -34,6 +34,12 @@
 #include <math.h>
 #include <string.h>
 
+/* Joints that are not commanded, at most. */
+#ifndef LKR_MAX_PASSIVE
+#define LKR_MAX_PASSIVE 0
+#endif
+#define LKR_MAX_JOINTS (LKR_MAX_INPUTS + LKR_MAX_PASSIVE)
+
 #if LKR_FLOAT
 typedef float lkr_real;
 #define LKR_MATH(name) name##f
@@ -152,38 +158,42 @@ enum { LKR_OK = 0, LKR_OUT_OF_REACH = 1, LKR_SINGULAR_POSE = 2, LKR_NOT_KNOWN = 
 
 /* Positions, velocities and efforts of the actuators, or of the joints. */
 typedef struct {
-    lkr_real position[LKR_MAX_INPUTS];
-    lkr_real velocity[LKR_MAX_INPUTS];
-    lkr_real effort[LKR_MAX_INPUTS];
+    lkr_real position[LKR_MAX_JOINTS];
+    lkr_real velocity[LKR_MAX_JOINTS];
+    lkr_real effort[LKR_MAX_JOINTS];
 } lkr_side;
 
-/* A pose: positions of the actuators [0] and joints [1], their rates by each input, and the inputs'
-   efforts against the loads. */
+/* A pose: values of the actuators' outputs [0] and the joints' [1], their rates by each input, and the
+   inputs' efforts against the loads. */
 typedef struct {
-    lkr_real position[2][LKR_MAX_INPUTS];
-    lkr_real rate[2][LKR_MAX_INPUTS][LKR_MAX_INPUTS];
+    lkr_real value[2][LKR_MAX_JOINTS];
+    lkr_real rate[2][LKR_MAX_JOINTS][LKR_MAX_INPUTS];
     lkr_real load[LKR_MAX_INPUTS];
 } lkr_point;
 
-/* An actuator or a joint: its position is factor * value + offset, with the value of an output. */
+/* An actuator or a joint, and the output whose value it is. */
 typedef struct {
     /* The input of which the value is ratio * input + shift, whole turns included; -1: of none. */
     int input;
     lkr_real ratio, shift;
-    lkr_real factor, offset;
-    /* One over the size of its position, and what it may change by without effect, or 0. */
+    /* One over the size of the value, and what it may change by without effect, or 0. */
     lkr_real scale, turn;
+    /* The position is factor * value + offset; if it wraps, within half of its turn of 0. */
+    lkr_real factor, offset;
+    int wraps;
 } lkr_axis;
 
 /* A linkage. Inputs q are in the scene's units. */
 typedef struct {
     int inputs;
+    /* The number of actuators, as many as inputs, and of joints: first as many that are commanded. */
+    int count[2];
     /* The pose at inputs; returns 0 if it cannot be assembled. */
     int (*at)(const lkr_real *q, lkr_point *p);
     /* All inputs that a side's outputs may have, NaN where there is none; returns their number. 0 where
        the axes count all inputs. */
     int (*solutions[2])(const lkr_real *value, lkr_real (*q)[LKR_MAX_INPUTS]);
-    lkr_axis axis[2][LKR_MAX_INPUTS];
+    lkr_axis axis[2][LKR_MAX_JOINTS];
     /* After how much of each input the actuators or the joints repeat, or 0. */
     lkr_real turn[2][LKR_MAX_INPUTS];
     /* The size of each input, where it starts, and its sweep. */
@@ -202,27 +212,50 @@ typedef struct {
 
 /* The state between calls: the last pose and its inputs, the side that it follows from, and what is
    held: the positions of the actuators where they were last commanded or measured, whichever is newer,
-   of the joints where they were last measured, NaN before; the last efforts. The inputs' speeds are
-   those of the last call. */
+   of the joints where they were last measured, NaN before; the last efforts. */
 typedef struct {
     lkr_point point;
     lkr_real q[LKR_MAX_INPUTS];
-    lkr_real speed[LKR_MAX_INPUTS];
     int newest;
     lkr_side held[2];
 } lkr_memory;
 
-/* --- a pose and positions --- */
+/* --- a pose and values --- */
 
-/* Gaps from a pose to positions, the shorter way round; returns the largest, in sizes. */
-static inline lkr_real lkr_gap(const lkr_model *model, int side, const lkr_real *position,
+/* From positions to values of outputs. */
+static inline void lkr_to_values(const lkr_model *model, int side, const lkr_real *position,
+    lkr_real *value)
+{
+    int i;
+    for (i = 0; i < model->inputs; i++) {
+        const lkr_axis *axis = &model->axis[side][i];
+        value[i] = (position[i] - axis->offset) / axis->factor;
+    }
+}
+
+/* From the values of a pose to positions. */
+static inline void lkr_to_positions(const lkr_model *model, int side, const lkr_point *p,
+    lkr_real *position)
+{
+    int i;
+    for (i = 0; i < model->count[side]; i++) {
+        const lkr_axis *axis = &model->axis[side][i];
+        position[i] = axis->factor * p->value[side][i] + axis->offset;
+        if (axis->wraps) {
+            position[i] -= lkr_turns(position[i], LKR_MATH(fabs)(axis->factor) * axis->turn);
+        }
+    }
+}
+
+/* Gaps from a pose to values, the shorter way round; returns the largest, in sizes. */
+static inline lkr_real lkr_gap(const lkr_model *model, int side, const lkr_real *value,
     const lkr_point *p, lkr_real *gap)
 {
     lkr_real most = 0;
     int i;
     for (i = 0; i < model->inputs; i++) {
         const lkr_axis *axis = &model->axis[side][i];
-        gap[i] = position[i] - p->position[side][i];
+        gap[i] = value[i] - p->value[side][i];
         gap[i] -= lkr_turns(gap[i], axis->turn);
         most = lkr_max(most, LKR_MATH(fabs)(gap[i]) * axis->scale);
     }
@@ -271,7 +304,7 @@ static inline int lkr_solve(int size, lkr_real least,
     return lkr_are_finite(n, x);
 }
 
-/* The change of the inputs for a change of positions; returns as lkr_solve. */
+/* The change of the inputs for a change of values; returns as lkr_solve. */
 static inline int lkr_input_change(const lkr_model *model, int side, const lkr_point *p,
     lkr_real least, const lkr_real *change, lkr_real *x)
 {
@@ -324,8 +357,8 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
     return solutions;
 }
 
-/* From inputs q to those of positions next to them, and their pose; returns 0 if there are none. */
-static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position, lkr_real *q,
+/* From inputs q to those of values next to them, and their pose; returns 0 if there are none. */
+static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *value, lkr_real *q,
     lkr_point *p)
 {
     lkr_real gap[LKR_MAX_INPUTS] = { 0 };
@@ -338,7 +371,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
         lkr_point next;
         lkr_real now = LKR_FAR;
         if (model->at(x, &next)) {
-            now = lkr_gap(model, side, position, &next, gap);
+            now = lkr_gap(model, side, value, &next, gap);
         }
         if (!(now < left)) {
             break;
@@ -359,7 +392,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
     if (!(left < LKR_OTHER)) {
         return 0;
     }
-    /* What is left may be rounding: of the inputs, where a position changes fast; at an end of the
+    /* What is left may be rounding: of the inputs, where a value changes fast; at an end of the
        reach the rate is infinite, yet rounding is not. */
     for (i = 0; i < model->inputs; i++) {
         for (j = 0; j < model->inputs; j++) {
@@ -402,21 +435,17 @@ static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_rea
     return isfinite(away) ? away : -1;
 }
 
-/* From positions to the inputs nearest to q, and their pose; returns 0 if there are none. */
-static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *position, lkr_real *q,
+/* From values to the inputs nearest to q, and their pose; returns 0 if there are none. */
+static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *value, lkr_real *q,
     lkr_point *p)
 {
     lkr_real x[LKR_MAX_SOLUTIONS + 1][LKR_MAX_INPUTS];
     lkr_real away[LKR_MAX_SOLUTIONS + 1];
-    lkr_real near[LKR_MAX_INPUTS], value[LKR_MAX_INPUTS];
+    lkr_real near[LKR_MAX_INPUTS];
     int i, k, s;
     int count = 1;
-    if (!lkr_are_finite(model->inputs, position)) {
+    if (!lkr_are_finite(model->inputs, value)) {
         return 0;
-    }
-    for (i = 0; i < model->inputs; i++) {
-        const lkr_axis *axis = &model->axis[side][i];
-        value[i] = (position[i] - axis->offset) / axis->factor;
     }
     memcpy(near, q, sizeof near);
     /* Without a function for solutions, there is one, of counted inputs. */
@@ -448,15 +477,14 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
             return 0;
         }
         away[nearest] = -1;
-        if (lkr_refine(model, side, position, x[nearest], p)
+        if (lkr_refine(model, side, value, x[nearest], p)
             && lkr_bring(model, side, near, x[nearest], q) >= 0) {
-            /* Positions that count inputs have their turns. */
+            /* Values that count inputs have their turns. */
             for (s = LKR_ACTUATORS; s <= LKR_JOINTS; s++) {
-                for (i = 0; i < model->inputs; i++) {
+                for (i = 0; i < model->count[s]; i++) {
                     const lkr_axis *axis = &model->axis[s][i];
                     if (axis->input >= 0) {
-                        p->position[s][i] += axis->factor * axis->ratio
-                            * (q[axis->input] - x[nearest][axis->input]);
+                        p->value[s][i] += axis->ratio * (q[axis->input] - x[nearest][axis->input]);
                     }
                 }
             }
@@ -465,14 +493,16 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
     }
 }
 
-/* The inputs for values of outputs, nearest to near ones, all in the scene's units. */
-static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *value, const lkr_real *near,
+/* The inputs for outputs, nearest to near ones, all in the scene's units. */
+static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *output, const lkr_real *near,
     lkr_real *inputs)
 {
     const size_t size = (size_t)model->inputs * sizeof *inputs;
     lkr_real q[LKR_MAX_INPUTS] = { 0 };
+    lkr_real value[LKR_MAX_INPUTS];
     lkr_point p;
     memcpy(q, near, size);
+    lkr_to_values(model, LKR_JOINTS, output, value);
     if (!lkr_inverse(model, LKR_JOINTS, value, q, &p)) {
         return 0;
     }
@@ -491,6 +521,8 @@ static inline void lkr_begin(const lkr_model *model, lkr_memory *m)
     for (i = 0; i < model->inputs; i++) {
         m->q[i] = model->start[i];
         m->held[LKR_ACTUATORS].position[i] = LKR_NAN;
+    }
+    for (i = 0; i < model->count[LKR_JOINTS]; i++) {
         m->held[LKR_JOINTS].position[i] = LKR_NAN;
     }
 }
@@ -510,68 +542,93 @@ static inline void lkr_copy(int n, const lkr_real *from, lkr_real *to)
 static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, const lkr_real *position)
 {
     const int n = model->inputs;
+    const int other = 1 - side;
     lkr_point p = m->point;
-    lkr_real q[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS];
+    lkr_real q[LKR_MAX_INPUTS], value[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS], found[LKR_MAX_JOINTS];
     int is_there;
     if (!lkr_are_finite(n, position)) {
         return LKR_NOT_KNOWN;
     }
+    lkr_to_values(model, side, position, value);
     /* Where it is already it stays, whatever rounding says; but a command has to be in the sweeps. */
     is_there = m->newest != LKR_NEITHER
-        && lkr_gap(model, side, position, &p, gap) <= LKR_ENOUGH
+        && lkr_gap(model, side, value, &p, gap) <= LKR_ENOUGH
         && lkr_bring(model, side, m->q, m->q, q) == 0;
     memcpy(q, m->q, sizeof q);
-    if ((!is_there && !lkr_inverse(model, side, position, q, &p))
-        || !lkr_are_finite(n, p.position[1 - side])) {
+    if (!is_there && !lkr_inverse(model, side, value, q, &p)) {
+        return LKR_OUT_OF_REACH;
+    }
+    lkr_to_positions(model, other, &p, found);
+    if (!lkr_are_finite(n, found)) {
         return LKR_OUT_OF_REACH;
     }
     m->newest = side;
     m->point = p;
     memcpy(m->q, q, sizeof q);
-    lkr_copy(n, p.position[1 - side], m->held[1 - side].position);
+    lkr_copy(model->count[other], found, m->held[other].position);
     return LKR_OK;
 }
 
-/* The speeds of the inputs at a pose, and the velocities of the other side; returns a status. */
+/* From velocities at a pose to those of the other side; returns a status. */
 static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int side,
-    const lkr_real *velocity, lkr_real *speed, lkr_real *other)
+    const lkr_real *velocity, lkr_real *other)
 {
+    const int n = model->inputs;
+    lkr_real rate[LKR_MAX_INPUTS];
+    lkr_real speed[LKR_MAX_INPUTS] = { 0 };
     int i, j, is_regular;
-    if (!lkr_are_finite(model->inputs, velocity)) {
+    if (!lkr_are_finite(n, velocity)) {
         return LKR_NOT_KNOWN;
     }
-    is_regular = lkr_input_change(model, side, p, LKR_SINGULAR, velocity, speed);
-    for (i = 0; i < model->inputs; i++) {
+    for (i = 0; i < n; i++) {
+        rate[i] = velocity[i] / model->axis[side][i].factor;
+    }
+    is_regular = lkr_input_change(model, side, p, LKR_SINGULAR, rate, speed);
+    for (i = 0; i < model->count[1 - side]; i++) {
         other[i] = 0;
-        for (j = 0; j < model->inputs; j++) {
+        for (j = 0; j < n; j++) {
             other[i] += p->rate[1 - side][i][j] * speed[j];
         }
+        other[i] *= model->axis[1 - side][i].factor;
+        if (i >= n && !isfinite(other[i])) {
+            /* A joint that is not commanded does not stop the others. */
+            other[i] = 0;
+        }
     }
-    return is_regular && lkr_are_finite(model->inputs, other) ? LKR_OK : LKR_SINGULAR_POSE;
+    return is_regular && lkr_are_finite(n, other) ? LKR_OK : LKR_SINGULAR_POSE;
 }
 
-/* The same for efforts. The power of the actuators is that of the joints less that of the loads. */
+/* The same for efforts, in the place of those before if it can be. The power of the actuators is that
+   of the joints less that of the loads. */
 static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int side,
     const lkr_real *effort, lkr_real *other)
 {
+    const lkr_axis *from = model->axis[side];
+    const lkr_axis *to = model->axis[1 - side];
+    const int n = model->inputs;
     lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS];
+    lkr_real x[LKR_MAX_INPUTS];
     int i, j, is_regular;
-    if (!lkr_are_finite(model->inputs, effort)) {
+    if (!lkr_are_finite(n, effort)) {
         return LKR_NOT_KNOWN;
     }
-    for (i = 0; i < model->inputs; i++) {
-        other[i] = side == LKR_JOINTS ? p->load[i] : -p->load[i];
-        for (j = 0; j < model->inputs; j++) {
-            other[i] += p->rate[side][j][i] * effort[j];
-            a[i][j] = p->rate[1 - side][j][i] * model->axis[1 - side][j].scale * model->size[i];
+    for (i = 0; i < n; i++) {
+        x[i] = side == LKR_JOINTS ? p->load[i] : -p->load[i];
+        for (j = 0; j < n; j++) {
+            x[i] += p->rate[side][j][i] * from[j].factor * effort[j];
+            a[i][j] = p->rate[1 - side][j][i] * to[j].scale * model->size[i];
         }
-        other[i] *= model->size[i];
+        x[i] *= model->size[i];
     }
-    is_regular = lkr_solve(model->inputs, LKR_SINGULAR, a, other);
-    for (i = 0; i < model->inputs; i++) {
-        other[i] *= model->axis[1 - side][i].scale;
+    is_regular = lkr_solve(n, LKR_SINGULAR, a, x);
+    for (i = 0; i < n; i++) {
+        x[i] *= to[i].scale / to[i].factor;
     }
-    return is_regular && lkr_are_finite(model->inputs, other) ? LKR_OK : LKR_SINGULAR_POSE;
+    if (!is_regular || !lkr_are_finite(n, x)) {
+        return LKR_SINGULAR_POSE;
+    }
+    memcpy(other, x, (size_t)n * sizeof *x);
+    return LKR_OK;
 }
 
 /* From one side's positions, velocities and efforts to the other's; returns a status. What cannot be
@@ -579,41 +636,37 @@ static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int si
 static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, const lkr_side *from,
     lkr_side *to)
 {
-    const int n = model->inputs;
+    const int count = model->count[1 - side];
     const int missing = side == LKR_JOINTS ? LKR_NOT_KNOWN : 0;
     /* Commanded efforts act where the actuators are, not where they are commanded to be. */
     const int is_here = side == LKR_JOINTS && m->newest != LKR_NEITHER;
     const lkr_point here = m->point;
     lkr_side *held = &m->held[1 - side];
-    lkr_side made;
     int position, velocity, effort;
     if (side == LKR_ACTUATORS) {
         /* Where an actuator is measured is newer than its command, within the reach or not. */
-        lkr_copy(n, from->position, m->held[LKR_ACTUATORS].position);
+        lkr_copy(model->inputs, from->position, m->held[LKR_ACTUATORS].position);
     }
     position = lkr_move(model, m, side, from->position);
-    effort = lkr_efforts(model, is_here ? &here : &m->point, side, from->effort, made.effort);
-    velocity = lkr_velocities(model, &m->point, side, from->velocity, m->speed, held->velocity);
+    velocity = lkr_velocities(model, &m->point, side, from->velocity, held->velocity);
+    effort = lkr_efforts(model, is_here ? &here : &m->point, side, from->effort, held->effort);
     if (m->newest == LKR_NEITHER) {
         velocity = LKR_NOT_KNOWN;
         effort = LKR_NOT_KNOWN;
     }
     if (velocity != LKR_OK || position == LKR_OUT_OF_REACH) {
-        memset(m->speed, 0, sizeof m->speed);
         memset(held->velocity, 0, sizeof held->velocity);
     }
     if (position == LKR_OUT_OF_REACH) {
         velocity &= LKR_NOT_KNOWN;
     }
-    if (effort == LKR_OK) {
-        memcpy(held->effort, made.effort, sizeof made.effort);
-    } else if (effort & missing) {
+    if (effort & missing) {
         /* What was commanded before a pause is not held after it. */
         memset(held->effort, 0, sizeof held->effort);
     }
-    lkr_copy((position & missing) ? 0 : n, held->position, to->position);
-    lkr_copy((velocity & missing) ? 0 : n, held->velocity, to->velocity);
-    lkr_copy((effort & missing) ? 0 : n, held->effort, to->effort);
+    lkr_copy((position & missing) ? 0 : count, held->position, to->position);
+    lkr_copy((velocity & missing) ? 0 : count, held->velocity, to->velocity);
+    lkr_copy((effort & missing) ? 0 : model->inputs, held->effort, to->effort);
     return position | velocity | effort;
 }
 
@@ -754,51 +807,51 @@ static inline int lever_solutions_angle_lever(const float *value,
     return 2;
 }
 
-/* Positions and rates at inputs; 0 if it cannot be assembled. */
+/* Values and rates at inputs; 0 if it cannot be assembled. */
 static inline int lever_at(const float *q, lkr_point *p)
 {
     lever_pose s, by_crank;
     if (!lever_formulas(q[0], &s, &by_crank)) {
         return 0;
     }
-    p->position[0][0] = s.angle_crank;
+    p->value[0][0] = s.angle_crank;
     p->rate[0][0][0] = by_crank.angle_crank;
-    p->position[1][0] = s.angle_lever;
+    p->value[1][0] = s.angle_lever;
     p->rate[1][0][0] = by_crank.angle_lever;
     p->load[0] = 0.0f;
-    return isfinite(p->position[0][0] + p->position[1][0]);
+    return isfinite(p->value[0][0] + p->value[1][0]);
 }
 
 /* Tables of the actuators and joints, see lkr_model. */
 static const lkr_model lever_model = {
-    1, lever_at, { 0, lever_solutions_angle_lever },
+    1, { 1, 1 }, lever_at, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, and after how much of each input they repeat. */
-    { { { 0, 1.0f, 0.0f, 1.0f, 0.0f, 1.0f, 0.0f } },
-      { { -1, 0.0f, 0.0f, 1.0f, 0.0f, 1.0f, 6.2831855f } } },
+    { { { 0, 1.0f, 0.0f, 1.0f, 0.0f, 1.0f, 0.0f, 0 } },
+      { { -1, 0.0f, 0.0f, 1.0f, 6.2831855f, 1.0f, 0.0f, 0 } } },
     { { 0.0f }, { 6.2831855f } },
     /* Of the inputs: sizes, start, sweeps. */
     { 1.0f }, { 0.0f }, { { -INFINITY, INFINITY } }
 };
 
-/* Positions and rates at inputs; 0 if it cannot be assembled. */
+/* Values and rates at inputs; 0 if it cannot be assembled. */
 static inline int lever_at_angle_lever(const float *q, lkr_point *p)
 {
     lever_pose s, by_crank;
     if (!lever_formulas(q[0], &s, &by_crank)) {
         return 0;
     }
-    p->position[1][0] = s.angle_lever;
+    p->value[1][0] = s.angle_lever;
     p->rate[1][0][0] = by_crank.angle_lever;
     p->load[0] = 0.0f;
-    return isfinite(p->position[1][0]);
+    return isfinite(p->value[1][0]);
 }
 
 /* Tables of the inverse, see lkr_model. */
 static const lkr_model lever_model_angle_lever = {
-    1, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
+    1, { 0, 1 }, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, and after how much of each input they repeat. */
-    { { { -1, 0, 0, 0, 0, 0, 0 } },
-      { { -1, 0.0f, 0.0f, 1.0f, 0.0f, 1.0f, 6.2831855f } } },
+    { { { -1, 0, 0, 0, 0, 0, 0, 0 } },
+      { { -1, 0.0f, 0.0f, 1.0f, 6.2831855f, 1.0f, 0.0f, 0 } } },
     { { 6.2831855f }, { 6.2831855f } },
     /* Of the inputs: sizes, start, sweeps. */
     { 1.0f }, { 0.0f }, { { -INFINITY, INFINITY } }

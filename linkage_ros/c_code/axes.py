@@ -23,9 +23,9 @@ class Axis(NamedTuple):
     """
     An actuator or a joint, whose position [rad or m] is factor * output + offset.
 
-    `output` is one of the linkage, in its own units. `size` is the scale of its position; the
-    position has the period `turn`, if that is not 0: those of inputs and geared links count turns.
-    If it `wraps`, it is published within half a turn of zero. `role` is its name in the linkage.
+    `output` is one of the linkage, in its own units, as are its `size` and its period `turn`; that
+    is 0 for inputs and geared links, which count turns. If it `wraps`, its position is published
+    within half a turn of zero. `role` is its name in the linkage.
     """
 
     name: str
@@ -42,11 +42,10 @@ def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float =
          offset: float = 0.0, wraps: bool = False) -> Axis:
     """Return the axis of an output, with a factor and an offset from its value in the scene."""
     linkage = mechanism.linkage
-    factor *= mechanism.scale_of(output)
     is_angle = linkage.is_angle(output)
     turns = is_angle and output not in (*mechanism.inputs, *linkage.geared)
-    return Axis(name, output, factor, offset, abs(factor) * (1.0 if is_angle else linkage.longest),
-                math.tau * abs(factor) * turns, wraps and turns, output)
+    return Axis(name, output, factor * mechanism.scale_of(output), offset,
+                1.0 if is_angle else linkage.longest, math.tau * turns, wraps and turns, output)
 
 
 def actuators(mechanism: SceneMechanism) -> List[Axis]:

@@ -39,7 +39,7 @@ class Request(NamedTuple):
     joints : sequence of str
         Commanded joints, see `axes.joints`.
     passive : sequence of Axis
-        Joints that are not commanded, in a function of their own.
+        Joints that are not commanded, of which a transmission has the states.
 
     """
 
@@ -88,7 +88,7 @@ def _values(request: Request, single: bool) -> Dict[str, Any]:
         *(each.output for axes in (*sides, *inverses.values()) for each in axes),
         *(output for output, _ in loads(mechanism))])
     tables = Tables(mechanism, code, formulas)
-    parts = [tables.text(sides), tables.passive(request.passive) if request.passive else '']
+    parts = [tables.text(sides, '', request.passive)]
     for tag, axes in inverses.items():
         parts += [tables.text(([], axes), tag), _inverse(mechanism, axes, tag, code.number)]
     about = [*_about(mechanism), f'A call takes at most {POSES * (tables.solutions + 1)} poses.']
@@ -108,7 +108,7 @@ def _values(request: Request, single: bool) -> Dict[str, Any]:
             ('ACTUATOR', 'JOINT'), sides)),
         'axes': comment('; '.join(f'{side}: {_with_units(linkage, axes)}' for side, axes in zip(
             ('Actuators', 'joints'), sides))),
-        'model': '\n'.join(filter(None, [*tables.functions.values(), *parts]))}
+        'model': '\n'.join([*tables.functions.values(), *parts])}
 
 
 def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> Dict[str, List[Axis]]:

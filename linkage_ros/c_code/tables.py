@@ -57,75 +57,51 @@ class Tables:
         self.functions: Dict[str, str] = {}
         self.solutions = 1
 
-    def text(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], tag: str = '') -> str:
+    def text(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], tag: str = '',
+             passive: Sequence[Axis] = ()) -> str:
         """
         Return the function for a pose, and the table.
 
-        `sides` are the actuators and the joints; an inverse alone has no actuators, and a `tag`
-        at the end of its names.
+        `sides` are the actuators and the commanded joints; an inverse alone has no actuators, and
+        a `tag` at the end of its names. `passive` are joints that are not commanded.
         """
         row, everywhere = self._code.row, (-math.inf, math.inf)
         sweeps = [row(not tag and settings.ends or everywhere)
                   for settings in self.mechanism.inputs.values()]
+        all_axes = sides[0], [*sides[1], *passive]
         return filled(template('model.h.in'), {
             'name': self.mechanism.name, 'tag': tag, 'number': self._code.number,
             'about': 'the inverse' if tag else 'the actuators and joints',
-            'n': len(self.mechanism.scales), 'names': ', '.join(map(self._solutions, sides)),
-            'at': '\n'.join(indented(self._at(sides))),
-            'actuators': self._rows(sides[0]), 'joints': self._rows(sides[1]),
+            'n': len(self.mechanism.scales), 'counts': ', '.join(f'{len(axes)}' for axes in all_axes),
+            'names': ', '.join(map(self._solutions, sides)),
+            'at': '\n'.join(indented(self._at(all_axes, len(sides[1])))),
+            'actuators': self._rows(all_axes[0]), 'joints': self._rows(all_axes[1]),
             'turns': ', '.join(row(self._turns(axes)) for axes in sides),
             'sizes': row(scale * input_.size for scale, input_ in zip(
                 self.mechanism.scales, self.linkage.inputs)),
             'start': row(start(self.mechanism)),
             'sweeps': ', '.join(sweeps)})
 
-    def passive(self, axes: Sequence[Axis]) -> str:
-        """Return the function for joints that are not commanded."""
-        lines = [f'{self.mechanism.name}_pose s, {", ".join(self._formulas.by)};',
-                 f'(void){self._formulas.call()};']
-        for i, each in enumerate(axes):
-            speeds = [f'{rate} * speed[{j}]' for j, rate in enumerate(self._rates(each))]
-            lines += [*self._positions(each, f'position[{i}]'),
-                      f'velocity[{i}] = {" + ".join(speeds)};']
-        return filled(template('passive.h.in'), {
-            'name': self.mechanism.name, 'number': self._code.number,
-            'body': '\n'.join(indented(lines))})
-
-    # --- a pose ---
-
-    def _at(self, sides: Tuple[Sequence[Axis], Sequence[Axis]]) -> Iterator[str]:
-        """Yield the statements for positions, rates by each input, and loads."""
-        code, formulas = self._code, self._formulas
-        places = {f'[{side}][{i}]': each for side, axes in enumerate(sides)
-                  for i, each in enumerate(axes)}
+    def _at(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], commanded: int) -> Iterator[str]:
+        """Yield the statements for values, rates by each input, and loads."""
+        code, formulas, scale_of = self._code, self._formulas, self.mechanism.scale_of
         yield f'{self.mechanism.name}_pose s, {", ".join(formulas.by)};'
         yield from (f'if (!{formulas.call()}) {{', '    return 0;', '}')
-        for place, each in places.items():
-            yield from self._positions(each, f'p->position{place}')
-            yield from (f'p->rate{place}[{j}] = {rate};'
-                        for j, rate in enumerate(self._rates(each)))
+        for side, axes in enumerate(sides):
+            for i, each in enumerate(axes):
+                field, unit = formulas.fields[each.output], 1.0 / scale_of(each.output)
+                yield f'p->value[{side}][{i}] = {code.times(f"s.{field}", unit)};'
+                for j, by in enumerate(formulas.by):
+                    yield f'p->rate[{side}][{i}][{j}] = {code.times(f"{by}.{field}", unit)};'
         # An inverse alone needs no efforts.
         powers = [*loads(self.mechanism)] if sides[0] else []
         for j, by in enumerate(formulas.by):
-            terms = [code.times(f'{by}.{formulas.fields[output]}',
-                                -load / self.mechanism.scale_of(output))
+            terms = [code.times(f'{by}.{formulas.fields[output]}', -load / scale_of(output))
                      for output, load in powers]
             yield f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
-        yield f'return isfinite({" + ".join(f"p->position{place}" for place in places)});'
-
-    def _positions(self, axis: Axis, place: str) -> List[str]:
-        """Return the statements for the position of an axis."""
-        code, factor = self._code, axis.factor / self.mechanism.scale_of(axis.output)
-        offset = f' + {code.literal(axis.offset)}' if axis.offset else ''
-        field = self._formulas.fields[axis.output]
-        return [f'{place} = {code.times(f"s.{field}", factor)}{offset};',
-                *[f'{place} -= lkr_turns({place}, {code.literal(math.tau)});'] * axis.wraps]
-
-    def _rates(self, axis: Axis) -> List[str]:
-        """Return the code of the rates of an axis by each input."""
-        factor = axis.factor / self.mechanism.scale_of(axis.output)
-        return [self._code.times(f'{by}.{self._formulas.fields[axis.output]}', factor)
-                for by in self._formulas.by]
+        needed = [f'p->value[{side}][{i}]' for side, axes in enumerate(sides)
+                  for i in range(min(len(axes), commanded))]
+        yield f'return isfinite({" + ".join(needed)});'
 
     # --- tables ---
 
@@ -134,11 +110,10 @@ class Tables:
         rows, counted = [], gears(self.linkage, axes)
         for k, each in enumerate(axes):
             i, ratio, shift = counted.get(k, (-1, 0.0, 0.0))
-            numbers = map(self._code.literal, (
-                ratio / self.mechanism.scales[i], shift, each.factor, each.offset, 1.0 / each.size,
-                each.turn))
-            rows.append(f'{{ {i}, {", ".join(numbers)} }}')
-        return ', '.join(rows) or '{ -1, 0, 0, 0, 0, 0, 0 }'
+            numbers = self._code.row((ratio / self.mechanism.scales[i], shift, 1.0 / each.size,
+                                      each.turn, each.factor, each.offset))
+            rows.append(f'{{ {i}, {numbers[2:-2]}, {int(each.wraps)} }}')
+        return ', '.join(rows) or '{ -1, 0, 0, 0, 0, 0, 0, 0 }'
 
     def _turns(self, axes: Sequence[Axis]) -> List[float]:
         """Return after how much of each input the positions of axes are the same, or 0."""
@@ -157,19 +132,17 @@ class Tables:
             self._formulas.fields[output] for output in outputs)])
         closed = self.linkage.inverse(outputs).closed
         count, self.functions[name] = self._closed(
-            name, closed, outputs) if closed else self._series(name, *outputs)
+            name, closed, outputs) if closed else self._series(name, *axes)
         self.solutions = max(self.solutions, count)
         return name
 
-    def _series(self, name: str, output: str) -> Tuple[int, str]:
+    def _series(self, name: str, axis: Axis) -> Tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""
-        code, monotone = self._code, pieces(self.linkage, output)
-        found = series(self.linkage, output, monotone, code.single, *self.mechanism.scales)
+        code, monotone = self._code, pieces(self.linkage, axis.output)
+        found = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
         rows = [f'    {{ {", ".join(map(code.literal, row[:7]))}, {code.row(row[7:])} }},'
                 for row in found.tolist()]
-        is_angle = self.linkage.is_angle(output)
-        sizes = map(code.literal, (1.0 if is_angle else self.linkage.longest,
-                                   math.tau if is_angle else 0.0))
+        sizes = map(code.literal, (axis.size, axis.turn))
         # Where two pieces of a monotone part meet, both have the input.
         return min(len(rows), 2 * len(monotone)), '\n'.join([
             f'/* The inputs of an output, in each of {len(rows)} pieces of the reach. */',

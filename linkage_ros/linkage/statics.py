@@ -11,6 +11,7 @@ in every motion of the linkage.
 from __future__ import annotations
 
 from collections import abc
+from itertools import chain
 from typing import Any, Iterator, Mapping
 
 import numpy as np
@@ -35,20 +36,20 @@ def effort(linkage: Kinematics, theta: Inputs, loads: Mapping[str, ArrayLike]) -
 def _powers(linkage: Kinematics, theta: Inputs, loads: Mapping[str, ArrayLike],
             by: int) -> Iterator[np.ndarray]:
     """Yield each load's work per unit of an input."""
+    loads = {plain_text(name): load for name, load in loads.items()}
+    chains = {name: [*loaded_links(linkage, name)] for name in loads if name in linkage.joints}
+    velocities = linkage.velocity(theta, [name for name in loads if name in linkage.points], by)
+    rates = linkage.joint_rates(theta, sorted({*chain.from_iterable(chains.values())}), by)
     for name, load in loads.items():
-        name = plain_text(name)
         force = numbers(f'the load on {name}', load)
-        if name in linkage.points:
+        if name in velocities:
             if force.shape[-1:] != (len(linkage.axes),):
                 raise ValueError(f'the load on the joint {name} must be a force '
                                  f'{", ".join(linkage.axes)} [N], not {quoted(load)}')
-            velocity = linkage.velocity(theta, (name,), by)[name]
             # A zero load does no work, even at an infinite velocity.
-            yield np.where(force == 0.0, 0.0, force * velocity).sum(axis=-1)
-        elif name in linkage.joints:
-            chain = list(loaded_links(linkage, name))
-            rates = linkage.joint_rates(theta, chain, by)
-            turning = sum((rates[link] for link in chain), np.zeros(()))
+            yield np.where(force == 0.0, 0.0, force * velocities[name]).sum(axis=-1)
+        elif name in chains:
+            turning = sum((rates[link] for link in chains[name]), np.zeros(()))
             yield np.where(force == 0.0, 0.0, force * turning)
         else:
             raise ValueError(f'{linkage.type} has no joint or link {quoted(name)} to load; '

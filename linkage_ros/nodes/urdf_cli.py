@@ -43,7 +43,3 @@ def _scene(args: List[str]) -> scene.Scene:
         raise cli.RequestError("the parameter file must have '/**:' and below it "
                                "'ros__parameters:' with a scene")
     return node.scene
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -12,6 +12,7 @@ from typing import Dict, Iterable, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
+from .loops import ASKEW
 from .spatial import CLOSED, Component, components, DEAD_POINT, is_free
 from ..robot_model.robot import displaced, FIXED, NotDriven, posed, Robot
 from ..words import listed
@@ -30,6 +31,8 @@ NEARLY = 1e-6
 RESTING = 1e-6
 # A step of motors away from a dead point [rad, or of the size].
 ASIDE = 0.1
+# Loops stop a motion that they resist less, of their size, only because their axes lean.
+LEANING = 3.0 * ASKEW
 # How far inside its limits a joint starts, as a part of its range.
 INSIDE = 0.1
 
@@ -119,13 +122,13 @@ def _added(*options: Tuple[str, Iterable[str]]) -> str:
 def _check_driven(component: Component, pose: np.ndarray, motors: List[str], followers: List[str]
                   ) -> None:
     """Raise ValueError if loops cannot move; NotDriven if their motors do not determine a pose."""
-    if not component.loose(pose, [])[0]:
+    if not component.loose(pose, [], LEANING)[0]:
         fixed = [joint.name for joint in component.joints
                  if joint.kind == FIXED and joint.is_cut and joint.name]
         raise ValueError('it cannot move, as its joints hold each other' + (
             f': {listed(fixed)} makes one body of two, where a pin has the type 3d'
             if fixed else ''))
-    motions = component.free_ways(pose, component.is_of([]))
+    motions = component.free_ways(pose, component.is_of([]), LEANING)
     count = len(chosen := component.chosen(motions, motors))
     if count < len(motors):
         raise NotDriven(

@@ -54,7 +54,7 @@ def _parts(robot: Robot, group: Group) -> List[Group]:
     """Return the planar parts of loops that are not planar as a whole."""
     parts: List[Group] = []
     left = group.joints
-    for joint in sorted(group.joints, key=lambda joint: joint.name not in robot.driven):
+    for joint in group.joints:
         if joint.kind == HINGE and joint in left:
             parts += [part for part in _groups(robot, [
                 other for other in left if other.kind in FLAT and lean(other, joint.axis) < ASKEW

@@ -23,6 +23,7 @@ from .spatial import CROSSING, EXACT
 from .. import mechanisms, scene
 from ..linkage import (
     bar_name,
+    CLOSE,
     Dyads,
     Hinge,
     Motor,
@@ -83,7 +84,7 @@ class Drawing(Dyads):
         if self.gap > OPEN * size:
             raise ValueError(f'its loops cannot be closed: they stay open by {self.gap:.3g} m, '
                              f'more than {OPEN:g} of their size')
-        near = size * min(max(ROUNDING, 10.0 * self.gap / size), 1e-6)
+        near = CLOSE * size
         pins: List[Dict[str, complex]] = []
         for joint in self.joints:
             pin = dict(zip(joint.bodies, joint.places))
@@ -147,7 +148,7 @@ class Drawing(Dyads):
         """Return whether a joint of the lines is where the file has it."""
         linkage = mechanisms.create('custom', joints=self.lines)
         place = linkage.solve(theta_of([drive.value for drive in self.drives]), name)[name]
-        near = self.size * max(ROUNDING, 30.0 * self.gap / self.size + self.lean)
+        near = max(ROUNDING * self.size, 30.0 * self.gap)
         return all(abs(complex(*place) - on[name]) < near for on in self.on.values() if name in on)
 
     def measured_by(self, joint: Joint) -> Tuple[str, float, float]:

@@ -297,10 +297,11 @@ class Component:
         count = np.sum(~fixed) - self.nullity(fixed)
         return np.prod(np.linalg.svd(slope, compute_uv=False)[:, :count], axis=1)
 
-    def loose(self, pose: np.ndarray, motors: Sequence[str]) -> Tuple[List[str], np.ndarray]:
+    def loose(self, pose: np.ndarray, motors: Sequence[str], least: float = DEAD_POINT
+              ) -> Tuple[List[str], np.ndarray]:
         """Return the joints that move while motors do not, and the ways in which they do."""
         # The spin of a rod on balls does not count.
-        motions = self.free_ways(pose, self.is_of(motors)) * ~self._in_balls
+        motions = self.free_ways(pose, self.is_of(motors), least) * ~self._in_balls
         return [name for name, i in self.named.items() if is_free(motions)[i]], motions
 
     def read(self, poses: np.ndarray) -> Dict[str, np.ndarray]:

@@ -8,11 +8,11 @@ What the library is held to, worked out without it: for the tests and for the be
 drawing                any linkage, drawn from its joint lines in 96 digits or for many angles
 drawing_accuracy       how far an answer of any linkage may be from its drawing
 hard_cases             angles and dimensions that are hard on the catalogue
-random_linkages        random joint lines of every word, a third of them nearly degenerate
+random_linkages        random joint lines of every word, nearly degenerate ones, equal bars
 cases                  linkages that people have
 linkage_checks         everything that is asked of any linkage
 inverse_judge          an output's solutions, by sampled and bisected poses
-equal_bars             random linkages of equal bars, and the limits of their poses
+equal_bars             the limits of poses of equal bars, from both sides
 rods                   linkages of rods in space, in 90 digits and by a polynomial
 hostile_texts          texts that no joint line or number should be
 working_modes          all inputs of linkages with several, by circles

@@ -11,19 +11,7 @@ import cmath
 import math
 from typing import NamedTuple
 
-from mpmath import mp, mpf
-
 from .random_linkages import Design
-
-
-def cis(angle):
-    """Return the unit vector at an angle."""
-    return mp.expj(angle) if isinstance(angle, mpf) else cmath.exp(1j * angle)
-
-
-def cross(one, other):
-    """Return what vanishes where two vectors are parallel."""
-    return (one.conjugate() * other).imag
 
 
 class Case(NamedTuple):
@@ -69,7 +57,7 @@ CASES = {
         J dyad G H k m right""",
         {'p': 49.709, 'b': 104.858, 'l': 140.0, 'q': 80.0, 'o': 75.0, 'c': 112.156, 'd': 41.031,
          'r': 95.0, 'g': 25.639, 'i': 36.0, 'k': 30.98, 'm': 26.344, 'e': 104.039,
-         'f': abs(25.639 - 104.039 * cis(IDLER + math.acos(
+         'f': abs(25.639 - cmath.rect(104.039, IDLER + math.acos(
              (104.039 ** 2 + 36 ** 2 - 120.459 ** 2) / (2 * 104.039 * 36))))},
         ((98.0, 118.0, 110.0), (118.0, 146.0, 128.0))),
     # Minitaur's leg: both motors on one shaft.

@@ -110,9 +110,3 @@ def angles(rng, count, limits=()):
             theta += 2 * math.pi * round(log_uniform(rng, 1.0, 1e9))
         found.append(theta)
     return np.array(found)
-
-
-def approach(spot):
-    """Return angles on both sides of a spot, at every decade of distance, and the spot itself."""
-    steps = 10.0 ** -np.arange(1.0, 16.0)
-    return np.concatenate((spot - steps, [spot], spot + steps[::-1]))

@@ -30,10 +30,13 @@ SAMPLES, STEPS = 721, 60
 SPECIALS = 30
 # Random poses of several inputs, of which the first that can be assembled are questions.
 TRIES = 50
+SIDES = np.array([-1.0, 1.0])
 KINDS = 'ordinary', 'next to ends', 'ends', 'extremes', 'dead points'
 # The rule says nothing where the next floats change the output by more than this, and of several
 # inputs nothing where the margin is less.
 SINGULAR = 1e-6
+# An output that changes by less than ALLOWED over so much of its input stands still [sizes].
+STILL = 1e-3
 
 
 class Output:
@@ -72,8 +75,13 @@ class Output:
 
     def ulp_changes(self, at):
         """Return by how much four ulps of an input change the output."""
-        beside = self.at(at + 4.0 * np.spacing(abs(at)) * np.array([-1.0, 1.0]))
+        beside = self.at(at + 4.0 * np.spacing(abs(at)) * SIDES)
         return np.nanmax([0.0, *self.away(beside, self.at(at))])
+
+    def stands_still(self, at):
+        """Tell whether the output hardly changes: its value does not tell the input."""
+        beside = self.away(self.at(at + STILL * self.first.size * SIDES), self.at(at))
+        return bool(np.nanmax([0.0, *beside]) < ALLOWED * self.size)
 
     def ends(self):
         """Return the last inputs at which there is a pose, with the direction inside."""
@@ -161,7 +169,7 @@ def judge(linkage, name, rng, count=6, others=()):
         if others and any(solution.margin < SINGULAR for solution in (
                 Solution((at, *others), inverse), *solutions)):
             kind = 'singular'
-        elif output.ulp_changes(at) > SINGULAR * output.size:
+        elif output.stands_still(at) or output.ulp_changes(at) > SINGULAR * output.size:
             kind = 'no direction'
         found[kind, 'questions'] += 1
         expected = [at]
@@ -204,12 +212,14 @@ def _error(output, first, x, value):
     if reached != reached and first.wraps and not first.low <= x <= first.high:
         # The turns that were added to an end rounded it.
         reached = max(beside, key=np.isfinite)
-    # What an ulp of the input changes, on the side where there is a pose; and what 64 do.
-    far = 64.0 * np.spacing(max(abs(x), first.size))
-    far = np.nanmax([0.0, *output.away(output.at(np.array([x + far, x - far])), reached)])
-    change = max(np.nanmax([0.0, *output.away(beside, reached)]) / 4.0, far / 128.0)
+    # What an ulp of the input changes, on the side where there is a pose; and what 64 do. An end
+    # is the same in all turns.
+    sizes = np.array([abs(x), first.size]), np.array([abs(x), first.size, abs(first.high)])
+    far = [np.nanmax([0.0, *output.away(
+        output.at(x + 64.0 * np.spacing(each.max()) * SIDES), reached)]) for each in sizes]
+    change = max(np.nanmax([0.0, *output.away(beside, reached)]) / 4.0, far[0] / 128.0)
     return float(output.away(reached, value)) / (2.0 ** -53 * output.size + change), reached, min(
-        1e-6 * output.size, 2.0 * far)
+        1e-6 * output.size, 2.0 * far[1])
 
 
 def judge_several(linkage, names, rng, count=6):

@@ -24,6 +24,8 @@ from .drawing import draw, FLOATS, Linkage
 NARROWEST = 1e-12
 # An arm that is shorter than this part of the longest length has no direction to speak of.
 SHORTEST = 1e-7
+# One on which accelerations lose a digit or more.
+SHORT = 0.1
 
 
 class Problem(NamedTuple):
@@ -126,10 +128,14 @@ class Subject:
         """Return the states of all closures at a value of the first input, in many digits."""
         return set(self.measure().at([value, *self.held]).states.values())
 
+    def shortest_arm(self, given):
+        """Return the shortest arm at values of the inputs (n, inputs), in longest lengths."""
+        arms = self._drawn(list(np.asarray(given).T), self.ways[0])[0].arms.values()
+        return np.nan_to_num(np.min([1.0, *(np.min(arm) for arm in arms)]))
+
     def without_direction(self, value):
         """Tell whether something hangs on an arm of no length, at a value of the first input."""
-        arms = self.drawn([value])[0].arms.values()
-        return any(not np.all(arm >= SHORTEST) for arm in arms)
+        return self.shortest_arm([[value, *self.held]]) < SHORTEST
 
     def away(self, value, others):
         """Return how far a value of the first input is from the nearest of others, or turns on."""
@@ -206,11 +212,18 @@ def rates(subject, count=1):
 
 @checked
 def accelerations(subject):
-    """Compare accelerations at random speeds of the inputs with the drawing."""
+    """
+    Compare accelerations at random speeds of the inputs with the drawing.
+
+    On a short arm they lose as many digits as it is shorter than its bars.
+    """
+    given = asked(subject, 1)
+    if subject.shortest_arm(given) < SHORT:
+        return
     sizes = [1.0 if input_.turns else input_.high - input_.low for input_ in subject.inputs]
     motion = drawing_accuracy.Motion(*(tuple(row) for row in subject.rng.uniform(
         -2.0, 2.0, (2, len(sizes))) * sizes))
-    yield from _broken(subject, asked(subject, 1), False, motion=motion)
+    yield from _broken(subject, given, False, motion=motion)
 
 
 def _broken(subject, given, with_rates, mechanism=None, motion=None):

@@ -7,7 +7,6 @@ import cmath
 import math
 
 from . import drawing
-from .cases import cis, cross
 
 LEFT, RIGHT = 1, -1
 
@@ -25,7 +24,7 @@ def meet(one, radius, other, radius_, side):
 
 def side(start, joint, end):
     """Return to which side the way through a joint bends."""
-    return 1 if cross(joint - start, end - joint) > 0.0 else -1
+    return LEFT if ((end - joint) / (joint - start)).imag > 0.0 else RIGHT
 
 
 def five_bar(n, foot):
@@ -35,7 +34,7 @@ def five_bar(n, foot):
         for other in (LEFT, RIGHT):
             a = meet(0.0, n['a'], foot, n['b'], one)
             c = meet(ground, n['d'], foot, n['c'], other)
-            if a and c and cross(c - a, foot - a) > 0.0:
+            if a and c and side(a, c, foot) == LEFT:
                 yield (cmath.phase(a), cmath.phase(c - ground)), {
                     'AP': side(0.0, a, foot), 'CP': side(ground, c, foot)}
 
@@ -49,7 +48,7 @@ def arm(n, wrist):
 
 def excavator(n, h, angle):
     """Yield three cylinders' lengths for a bucket's pivot and its angle."""
-    p, j = -1j * n['p'], h + n['m'] * cis(angle)
+    p, j = -1j * n['p'], h + cmath.rect(n['m'], angle)
     for elbow in (LEFT, RIGHT):
         if not (a := meet(0.0, n['l'], h, n['q'], elbow)):
             continue

@@ -23,8 +23,6 @@ from .segments import Bracket
 from ..motion.curves import HALVINGS
 from ..tolerances import ONE, SINGULAR
 
-# A larger error [sizes] leads to another solution.
-FAR = 0.1
 # Beside a candidate without a pose one is looked for so many times, each time 16 times as far as
 # before from two ulps on: where the margin is 1e-6, rounding of the outputs leads as far out.
 OUTSIDE = 6
@@ -46,7 +44,7 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
         best = at(*inputs, *values)
     following = best[2 + n:2 + 2 * n]
     for _ in range(HALVINGS):
-        if following == inputs or not best[0] <= FAR:
+        if following == inputs or not best[0] <= SINGULAR:
             break
         trial = at(*following, *values)
         if trial[0] < best[0]:

@@ -113,7 +113,7 @@ class Segments:
         farthest = math.pi if first.is_part else normalized.high
         offset = math.tau * abs(dict(linkage.design.turned).get(first.name, 0.0)) / self._unit
         ulps = 2.0 if first.period == 1 else 4.0
-        self._inside = [tuple(end + side * ulps * (not normalized.is_cut(end)) * math.ulp(
+        arcs = [tuple(end + side * ulps * (not normalized.is_cut(end)) * math.ulp(
             max(abs(end) + offset, farthest))
             for end, side in zip(arc, (1.0, -1.0))) for arc in arcs]
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
@@ -134,8 +134,7 @@ class Segments:
         least, greatest = float(value[0] - slack[0]), float(value[-1] + slack[1])
         # Values so near to an end of the segment are the end's.
         near = np.minimum(slack, ONE * self._size)
-        low, high = min(self._inside, key=lambda arc: max(arc[0] - theta[0], theta[-1] - arc[1]))
-        theta = np.pad(theta.clip(low, high), 1, 'edge') * self._unit
+        theta = np.pad(theta, 1, 'edge') * self._unit
         value = np.pad(value.clip(value[0] + near[0], value[-1] - near[1]), 1, 'edge')
         return Table(least, greatest, sign, theta.tolist(), value.tolist())
 

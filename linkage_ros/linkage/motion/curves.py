@@ -83,7 +83,7 @@ def near_misses(values: np.ndarray) -> np.ndarray:
         sign = np.sign(inner)
         bent = sign * (before - 2.0 * inner + after)
         return ((sign * before >= sign * inner) & (sign * after >= sign * inner)
-                & (sign * inner <= 2.0 * bent))
+                & (sign * inner <= bent))
 
 
 def turning_points(values: np.ndarray, rates: np.ndarray, least: float) -> np.ndarray:

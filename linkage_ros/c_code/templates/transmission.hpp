@@ -35,8 +35,6 @@ struct Linkage
 {
   const lkr_model & model;
   std::vector<Axis> actuators, joints;
-  /// Positions and velocities of the passive joints, at inputs and their speeds.
-  void (* at_passive)(const double * q, const double * speed, double * position, double * velocity);
 };
 
 /// The names that the interface of each quantity may have, the usual one first.
@@ -93,7 +91,8 @@ private:
 };
 
 /// The handles of all actuators, or of all joints, by interface: position, velocity, effort. The
-/// first `needed` of them have to be there.
+/// first `needed` of them have to be there. Offsets and reductions of `infos` go into the
+/// linkage's `table`.
 template <class Handle>
 class Handles
 {
@@ -101,7 +100,7 @@ public:
   template <class Infos>
   void find(
     const std::string & what, const std::vector<Axis> & axes, std::size_t needed,
-    const Infos & infos, const std::vector<Handle> & given)
+    const Infos & infos, const std::vector<Handle> & given, lkr_axis * table)
   {
     using transmission_interface::Exception;
     needed_ = needed;
@@ -127,9 +126,10 @@ public:
           "mechanical_reduction other than 0");
       }
       // A reduction is that of the built-in transmissions: from the joint to the actuator.
-      rows_[i] = {
-        info.name, info.offset,
-        is_actuator ? info.mechanical_reduction : 1.0 / info.mechanical_reduction, {}};
+      const double factor = is_actuator ? info.mechanical_reduction : 1.0 / info.mechanical_reduction;
+      table[i].factor *= factor;
+      table[i].offset = table[i].offset * factor + info.offset;
+      rows_[i].name = info.name;
     }
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       if (rows_[i].name.empty()) {
@@ -163,28 +163,28 @@ public:
     return sum;
   }
 
-  /// Read values as the scene has them; those without a handle are 0.
+  /// Read values; those without a handle are 0.
   lkr_side read() const
   {
     lkr_side values{};
     for (std::size_t i = 0; i < needed_; ++i) {
-      const auto & row = rows_[i];
-      values.position[i] = (value(i, 0) - row.offset) / row.factor;
-      values.velocity[i] = value(i, 1) / row.factor;
-      values.effort[i] = value(i, 2) * row.factor;
+      values.position[i] = value(i, 0);
+      values.velocity[i] = value(i, 1);
+      values.effort[i] = value(i, 2);
     }
     return values;
   }
 
-  /// Write values of an axis, those that are finite.
-  void write(std::size_t i, double position, double velocity, double effort)
+  /// Write values, those that are finite.
+  void write(const lkr_side & values)
   {
-    const auto & row = rows_[i];
-    const std::array<double, 3> values{
-      position * row.factor + row.offset, velocity * row.factor, effort / row.factor};
-    for (std::size_t kind = 0; kind < values.size(); ++kind) {
-      if (!row.handles[kind].empty() && std::isfinite(values[kind])) {
-        (void)rows_[i].handles[kind].front().set_value(values[kind]);
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      const std::array<double, 3> own{values.position[i], values.velocity[i], values.effort[i]};
+      for (std::size_t kind = 0; kind < own.size(); ++kind) {
+        auto & handles = rows_[i].handles[kind];
+        if (!handles.empty() && std::isfinite(own[kind])) {
+          (void)handles.front().set_value(own[kind]);
+        }
       }
     }
   }
@@ -194,7 +194,6 @@ private:
   struct Row
   {
     std::string name;
-    double offset = 0.0, factor = 1.0;
     std::array<std::vector<Handle>, 3> handles;
   };
 
@@ -232,8 +231,7 @@ class Transmission : public linkage_ros::LinkageTransmission
 {
 public:
   Transmission(const Linkage & linkage, const hardware_interface::TransmissionInfo & info)
-  : linkage_(linkage), info_(info), size_(linkage.actuators.size()),
-    position_(linkage.joints.size() - size_), velocity_(position_), log_(info.name)
+  : linkage_(linkage), info_(info), size_(linkage.actuators.size()), log_(info.name)
   {
   }
 
@@ -246,8 +244,10 @@ public:
       refuse("there is no parameter '" + info_.parameters.begin()->first +
         "': write the package again for other lengths");
     }
-    actuators_.find("actuator", linkage_.actuators, size_, info_.actuators, actuator_handles);
-    joints_.find("joint", linkage_.joints, size_, info_.joints, joint_handles);
+    model_ = linkage_.model;
+    actuators_.find(
+      "actuator", linkage_.actuators, size_, info_.actuators, actuator_handles, model_.axis[0]);
+    joints_.find("joint", linkage_.joints, size_, info_.joints, joint_handles, model_.axis[1]);
     for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
       const auto count = actuators_.count(kind) + joints_.count(kind);
       if (count != 2 * size_ && (count != 0 || kind == 0)) {
@@ -255,16 +255,10 @@ public:
           (kind ? ", or none of them" : ": velocities and efforts depend on the pose"));
       }
     }
-    lkr_begin(&linkage_.model, &memory_);
+    lkr_begin(&model_, &memory_);
   }
 
-  void actuator_to_joint() override
-  {
-    transmit(LKR_ACTUATORS, actuators_, joints_);
-    if (linkage_.at_passive) {
-      write_passive();
-    }
-  }
+  void actuator_to_joint() override { transmit(LKR_ACTUATORS, actuators_, joints_); }
 
   void joint_to_actuator() override { transmit(LKR_JOINTS, joints_, actuators_); }
 
@@ -288,37 +282,24 @@ private:
     lkr_side result;
     for (auto kind : {result.position, result.velocity, result.effort}) {
       // What is not set is not written.
-      std::fill_n(kind, LKR_MAX_INPUTS, LKR_NAN);
+      std::fill_n(kind, LKR_MAX_JOINTS, LKR_NAN);
     }
-    status_ = lkr_transmit(&linkage_.model, &memory_, side, &values, &result);
+    status_ = lkr_transmit(&model_, &memory_, side, &values, &result);
     if (joints_.count(1) + joints_.count(2) == 0) {
       status_ &= ~SINGULAR;
     }
     log_.note(status_, side == LKR_JOINTS);
-    for (std::size_t i = 0; i < size_; ++i) {
-      to.write(i, result.position[i], result.velocity[i], result.effort[i]);
-    }
-  }
-
-  /// Write states of the joints that are not commanded: where the newest measurement is, or standing.
-  void write_passive()
-  {
-    linkage_.at_passive(memory_.q, memory_.speed, position_.data(), velocity_.data());
-    for (std::size_t i = 0; i < position_.size(); ++i) {
-      joints_.write(
-        size_ + i, memory_.newest == LKR_ACTUATORS ? position_[i] : LKR_NAN,
-        std::isfinite(velocity_[i]) ? velocity_[i] : 0.0, LKR_NAN);
-    }
+    to.write(result);
   }
 
   const Linkage & linkage_;
   hardware_interface::TransmissionInfo info_;
   std::size_t size_;
+  /// With the offsets and reductions of this robot.
+  lkr_model model_{};
   lkr_memory memory_{};
   Handles<transmission_interface::ActuatorHandle> actuators_;
   Handles<transmission_interface::JointHandle> joints_;
-  // Of the passive joints.
-  std::vector<double> position_, velocity_;
   int status_ = OK;
   HeldLog log_;
 };
