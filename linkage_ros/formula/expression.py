@@ -315,10 +315,6 @@ class Complex:
 
     def length(self) -> Real:
         """Return the length."""
-        if self.y.value == 0.0:
-            return abs(self.x)
-        if self.x.value == 0.0:
-            return abs(self.y)
         return square_root(self.squared())
 
     def direction(self) -> Complex:
