@@ -18,7 +18,6 @@ from itertools import chain
 import math
 from operator import attrgetter
 import re
-from struct import Struct
 from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 import warnings
 
@@ -125,8 +124,6 @@ class _Variant:
         self.arguments, self.outputs = arguments, len(outputs)
         self.constants = [self.listing.entries[n][0] for n in self.listing.constants]
         self.steps = in_order(self.constants)
-        # Packing floats as bytes takes a quarter of the time of numpy's conversion.
-        self.pack: Any = Struct(f'{self.outputs}d').pack_into
 
     @cached_property
     def float(self) -> Callable:
@@ -220,12 +217,6 @@ class CompiledFunction:
         listing = self.variant.listing
         constants = dict(zip((f'k{n}' for n in listing.constants), self.constants))
         return constants, *listing.statements(dialect)
-
-    def rows(self, count: int, argument: float) -> np.ndarray:
-        """Return the outputs at one argument, a float, in rows of so many numbers."""
-        rows = np.empty((self.variant.outputs // count, count))
-        self.variant.pack(rows, 0, *self.at(argument))
-        return rows
 
     def over(self, *arguments: Any) -> np.ndarray:
         """Return the outputs over broadcast arrays, shape (outputs, *shape)."""

@@ -30,7 +30,6 @@ from ...formula.expression import (
     Real,
     real,
     sine,
-    valid_where,
 )
 
 GROUND = 'ground'
@@ -188,12 +187,10 @@ class Builder:
         place = self.drive(Input(word, LENGTH, low, high), geared)
         # A carriage has no place beyond its ends, as a cylinder beyond its stroke.
         way = abs(low) + abs(high)
-        for margin in (place - low, high - place):
-            limit = planar.Limit(margin, TOLERANCE * way)
-            self.limits.append(limit)
-            self.ways.append(limit)
-            place = valid_where(place, limit.margin, limit.tolerance)
-        self._add_block(word, name, origin, towards, place, abs(low) + abs(high))
+        ends = [planar.Limit(margin, TOLERANCE * way) for margin in (place - low, high - place)]
+        self.limits += ends
+        self.ways += ends
+        self._add_block(word, name, origin, towards, planar.valid_within(place, ends), way)
 
     def yoke(self, name: str, pin: str, origin: str, towards: str) -> None:
         """Slide a block along a line between two joints; a pin runs in a slot across it."""

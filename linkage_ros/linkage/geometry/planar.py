@@ -137,6 +137,8 @@ class Arm:
         # A constant would have a value even where the points cannot be assembled.
         self.square = vector.squared() if length is None else valid_where(
             square(length), abs(vector.x), real(0.0))
+        # A square that is not tiny where the arm has a direction.
+        self._clear = self.square
         self._magnitude, self.length = magnitude, length
 
     @property
@@ -144,11 +146,6 @@ class Arm:
         """Its square, NaN where it has no direction."""
         return self.square if self.length or self._is_smooth else valid_where(
             self.square, self._clear - LEAST_SQUARE, real(0.0))
-
-    @property
-    def _clear(self) -> Real:
-        """Return a square that is not tiny where the arm has a direction."""
-        return self.square
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
@@ -217,39 +214,27 @@ class CrankArm(Arm):
         along = line.direction()
         turn = crank.zero * along.conjugate()
         s, h = _half_angle(crank.angle, turn)
-        h = h + where(abs(g - m) <= 0.0, TINY, 0.0) if smooth else h
+        is_isosceles = abs(g - m) <= 0.0
+        h = h + where(is_isosceles, TINY, 0.0) if smooth else h
         vector = along * Complex((g - m) + 2.0 * m * square(h), 2.0 * m * s * h)
         self.foot = crank.centre + crank.bar() if reverse else ground
         self.square = square(g - m) + 4.0 * g * m * square(h)
+        self._clear = square(h) + where(is_isosceles, 0.0, 1.0)
         self._crank, self._turn, self._is_reversed = crank, turn, reverse
         self._g, self._m, self._s, self._h, self._is_smooth = g, m, s, h, smooth
         # The arm between two equal lengths bisects them, also where it has no length itself.
-        turning = where(self._is_isosceles, 0.5,
+        turning = where(is_isosceles, 0.5,
                         m * ((m - g) + 2.0 * g * square(h)) / self.square)
         vector.spin = Rate((crank.angle,), lambda rate: rate * turning)
         self.vector = -vector if reverse else vector
 
-    @property
-    def _clear(self) -> Real:
-        return square(self._h) + where(self._is_isosceles, 0.0, 1.0)
-
-    @property
-    def _is_isosceles(self) -> Real:
-        return abs(self._g - self._m) <= 0.0
-
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
-        g, m = self._g, self._m
-        return self._half_angle_limit(radius, size, 1.0,
-                                      exact_sum(radius, -g, -m) * exact_sum(radius, g, m),
-                                      exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
+        return self._half_angle_limit(radius, size, 1.0)
 
     def beyond(self, radius: Real, size: Real) -> Limit:
         """Return the margin square - radius^2; the radius is made from lengths up to size."""
-        g, m = self._g, self._m
-        return self._half_angle_limit(radius, size, -1.0,
-                                      exact_sum(g, m, -radius) * exact_sum(g, m, radius),
-                                      exact_sum(g, -m, -radius) * exact_sum(g, -m, radius))
+        return self._half_angle_limit(radius, size, -1.0)
 
     def difference(self, first: Real, second: Real, shorter: Limit) -> Real:
         """Return `first - second`, or its like in the arm where the limit takes both as equal."""
@@ -266,13 +251,16 @@ class CrankArm(Arm):
         area = 2.0 * self._g * self._m * self._s * self._h
         return area if self._is_reversed else -area
 
-    def _half_angle_limit(self, radius: Real, size: Real, sign: float, start: Real,
-                          end: Real) -> Limit:
-        gm, s, h = 4.0 * self._g * self._m, self._s, self._h
+    def _half_angle_limit(self, radius: Real, size: Real, sign: float) -> Limit:
+        """Return the margin sign (radius^2 - square)."""
+        g, m, s, h = self._g, self._m, self._s, self._h
+        gm = 4.0 * g * m
+        start = sign * (exact_sum(radius, -g, -m) * exact_sum(radius, g, m))
+        end = sign * (exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
         # The margin can vanish only next to the smaller gap.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
                        end - sign * gm * square(h))
-        tolerance = TOLERANCE * abs(radius) * (size + self._g + self._m)
+        tolerance = TOLERANCE * abs(radius) * (size + g + m)
         gap, half = (start, s) if sign > 0.0 else (end, h)
         grown = square_root(gm) * self._first_sign(sign)
         smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
