@@ -129,7 +129,7 @@ class LinkageFormulas:
     def _rate_where_valid(self, rate: Real, value: Real) -> Real:
         """Return a rate by one input, NaN where the value is NaN because of other inputs."""
         alone = len(self.built.inputs) == 1 and rate.value is None
-        return rate if alone or not value.varies else valid_where(rate, abs(value), real(0.0))
+        return rate if alone or not value.varies else valid_where(rate, abs(value))
 
     def _angles(self, names: Names) -> List[Real]:
         return [self.output(name) for name in names]

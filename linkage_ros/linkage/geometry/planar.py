@@ -94,7 +94,7 @@ def unit(vector: Complex) -> Complex:
 def on_line(along: Complex, place: Real) -> Complex:
     """Return the vector of a length along a direction; both parts are NaN where the length is."""
     # Generated code omits products with zero, which would carry the NaN.
-    return Complex(*(valid_where(part * place, abs(place), real(0.0)) if part.value == 0.0
+    return Complex(*(valid_where(part * place, abs(place)) if part.value == 0.0
                      else part * place for part in (along.x, along.y)))
 
 
@@ -136,7 +136,7 @@ class Arm:
         self.vector = vector
         # A constant would have a value even where the points cannot be assembled.
         self.square = vector.squared() if length is None else valid_where(
-            square(length), abs(vector.x), real(0.0))
+            square(length), abs(vector.x))
         # A square that is not tiny where the arm has a direction.
         self._clear = self.square
         self._magnitude, self.length = magnitude, length
@@ -144,8 +144,8 @@ class Arm:
     @property
     def divisor(self) -> Real:
         """Its square, NaN where it has no direction."""
-        return self.square if self.length or self._is_smooth else valid_where(
-            self.square, self._clear - LEAST_SQUARE, real(0.0))
+        return self.square if self.length or self._is_smooth else \
+            valid_where(self.square, self._clear - LEAST_SQUARE)
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
@@ -169,7 +169,7 @@ class Arm:
             sum_and_error(second, length)
         margins = (((first + near) + near_error) * (first + far),
                    ((far - first) + far_error) * ((first - near) - near_error))
-        longer, shorter = (valid_where(margin, self.square, real(0.0)) for margin in margins)
+        longer, shorter = (valid_where(margin, self.square) for margin in margins)
         return (self._limit(first + second, size, longer),
                 self._limit(first - second, size, shorter))
 
@@ -188,7 +188,7 @@ class Arm:
         The bars first and second [m] go from that corner to the arm's end and to its foot. Vector
         and arm are the parallel sides of a trapezoid; their product is |first^2 - second^2|.
         """
-        power = valid_where((first - second) * (first + second), self.square, real(0.0))
+        power = valid_where((first - second) * (first + second), self.square)
         return self.vector * (power / self.divisor)
 
     def _limit(self, radius: Real, size: Real, margin: Real) -> Limit:
@@ -375,7 +375,7 @@ def _nan_with(other: Real, vector: Complex, part: Real) -> Real:
     """Return one part of a factor of a vector, NaN where the other is, as their product is."""
     # Generated code omits products with zero, which would carry the NaN.
     axial = 0.0 in (vector.x.value, vector.y.value)
-    return valid_where(part, abs(other), real(0.0)) if axial else part
+    return valid_where(part, abs(other)) if axial else part
 
 
 def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
@@ -407,18 +407,16 @@ def mirror(arm: Arm, image: Complex, offset: Real, ends: Sequence[Complex]
         bars.append(with_spin(bar + across, Rate(
             (*turning.of, *own.of), lambda *rates, own=own: valid_where(
                 2.0 * turning.formula(*rates[:len(turning.of)])
-                - own.formula(*rates[len(turning.of):]), abs(image.x + image.y), real(0.0)))))
+                - own.formula(*rates[len(turning.of):]), abs(image.x + image.y)))))
     return with_velocity(image, arm.foot, bars[0]), *bars
 
 
 def parallel(bar: Complex, place: Complex) -> Complex:
     """Return a bar equal to another one, NaN where the place of its end is NaN."""
-    def with_place(part: Real) -> Real:
-        return valid_where(part, abs(place.x), real(0.0))
-
     turning = spin(bar)
-    same = Complex(with_place(bar.x), with_place(bar.y))
-    same.spin = Rate(turning.of, lambda *rates: with_place(turning.formula(*rates)))
+    same = Complex(*(valid_where(part, abs(place.x)) for part in (bar.x, bar.y)))
+    same.spin = Rate(turning.of, lambda *rates: valid_where(
+        turning.formula(*rates), abs(place.x)))
     return same
 
 
@@ -470,7 +468,7 @@ def slot(arm: Arm, offset: Real, half: float) -> Tuple[Complex, Real, Limit]:
     limit = arm.beyond(offset, abs(offset))
     slide = limit.root() * half
     central, aside = abs(offset) <= 0.0, arm.vector * Complex(slide, -offset)
-    along = Complex(*(valid_where(where(central, way * half, part), arm.divisor, real(0.0))
+    along = Complex(*(valid_where(where(central, way * half, part), arm.divisor)
                       for way, part in ((arm.vector.x, aside.x), (arm.vector.y, aside.y))))
     turning = spin(arm.vector)
     return with_spin(along.direction(), Rate(
