@@ -84,7 +84,7 @@ class Formula:
             operands = stack[len(stack) - count:]
             del stack[len(stack) - count:]
             stack.append(_EXPRESSIONS[step](*operands) if count else
-                         symbols[step] if step in symbols else real(step))
+                         symbols[step] if isinstance(step, str) else real(step))
         return stack.pop()
 
     def value(self, dimensions: Mapping[str, Any]) -> Any:
@@ -126,7 +126,7 @@ class Formula:
             self._apply(waiting.pop())
 
     def _apply(self, step: str) -> None:
-        operands = self._steps[-_OPERANDS[step]:]
+        operands: List[Any] = self._steps[-_OPERANDS[step]:]
         if step == '/' and operands[1] == 0.0:
             self._add_constant(math.inf)
         if not all(isinstance(operand, float) for operand in operands):
