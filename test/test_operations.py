@@ -222,15 +222,12 @@ def test_the_derivative_is_what_differences_tend_to(name):
             assert pose.at(*row)[0] == pytest.approx(true, rel=1e-12, abs=1e-14)
 
 
-@pytest.mark.parametrize('name', NAMES)
-def test_what_is_known_of_signs_and_of_order_holds(name):
-    row, values = OPERATIONS[name], numbers(name)
-    for i in row.positive:
+@pytest.mark.parametrize('name', [name for name in NAMES if OPERATIONS[name].positive])
+def test_what_is_known_of_signs_holds(name):
+    values = numbers(name)
+    for i in OPERATIONS[name].positive:
         values[i] = np.abs(values[i]) + 1e-9
-    if row.positive:
-        assert np.all(by_floats(name, values) > 0.0)
-    if row.commutes:
-        assert np.array_equal(by_floats(name, values), by_floats(name, values[::-1]))
+    assert np.all(by_floats(name, values) > 0.0)
 
 
 def test_a_sum_keeps_every_digit_however_much_cancels():
