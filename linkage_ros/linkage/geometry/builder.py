@@ -248,7 +248,7 @@ class Builder:
     def _direction(self, origin: str, towards: str) -> Tuple[str, Complex, Real]:
         """Return the link of two joints, the direction between them, and its angle on the link."""
         side = self._side(origin, towards)
-        along = planar.unit(side.vector)
+        along = side.vector.direction()
         seen = along
         if side.link != GROUND:
             frame = self.frames[side.link]
@@ -440,7 +440,7 @@ class Builder:
         if link == GROUND:
             return seen
         axis, (joint, start) = self.directions[link], next(iter(self.frames[link].items()))
-        along = planar.unit(axis.vector)
+        along = axis.vector.direction()
         return self.points[joint].place + along * (seen - start)
 
     def _numbered(self, word: str) -> str:

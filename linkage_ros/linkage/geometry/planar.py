@@ -85,12 +85,6 @@ class CrankEnds(NamedTuple):
     theta: Real
 
 
-def unit(vector: Complex) -> Complex:
-    """Return the unit vector along a vector of constant length, with its spin."""
-    along = vector.direction()
-    return with_spin(along, spin(vector)) if along.x.varies else along
-
-
 def on_line(along: Complex, place: Real) -> Complex:
     """Return the vector of a length along a direction; both parts are NaN where the length is."""
     # Generated code omits products with zero, which would carry the NaN.
