@@ -97,7 +97,7 @@ def test_dead_points_of_an_arm_of_rounding_leave_the_other_outputs_their_answers
     # E is where Dc is, so that F is on either side of it by rounding alone.
     found = linkage('A ground -1.03 5.14', 'B ground -1.65 -0.565', 'C cylinder B A 0.83 left',
                     'D Db Dc inversor C A 1.45 0.66', 'E mirror D A Db',
-                    'F antiparallelogram A Dc E', 'G mirror Dc A F', 'J parallelogram E Db F')
+                    'F mirror A Dc E', 'G mirror Dc A F', 'J parallelogram E Db F')
     value, = found.joint_angles([5.4], ['Dc.y'])['Dc.y']
     assert len(found.dead_points()) > 100
     assert found.input_for('Dc.y', value) == pytest.approx(5.4, abs=1e-12)

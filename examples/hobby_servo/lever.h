@@ -692,8 +692,7 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     const float k26 = 0.025f; /* b - a */
     const float k27 = 0.000625f; /* (b - a) * (b - a) */
     const float k30 = 0.0036f; /* (4.0 * b) * a */
-    const float k36 = 1.0f;
-    const float k54 = 0.081f; /* 1.8 * b */
+    const float k51 = 0.081f; /* 1.8 * b */
     const float k73 = 0.000625f;
     const float k80 = 0.0f;
     const float k82 = -0.025f; /* a - b */
@@ -725,20 +724,20 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     const float v31 = v9 * v9;
     const float v32 = k30 * v31;
     const float v33 = k27 + v32;
-    const float v40 = lkr_valid_where(v33, (v31 + k36) - 7.888609e-31f, 0.0f);
-    const float v41 = lkr_valid_where(-((k22 * v7) * v9), v40, 0.0f);
-    const float v45 = lkr_valid_where(k26 + (k22 * v31), v40, 0.0f);
-    const float v48 = sqrtf((v41 * v41) + (v45 * v45));
-    const float v49 = v41 / v48;
-    const float v56 = v45 / v48;
+    const float v37 = lkr_valid_where(v33, (v31 + 1.0f) - 7.888609e-31f, 0.0f);
+    const float v38 = lkr_valid_where(-((k22 * v7) * v9), v37, 0.0f);
+    const float v42 = lkr_valid_where(k26 + (k22 * v31), v37, 0.0f);
+    const float v45 = sqrtf((v38 * v38) + (v42 * v42));
+    const float v46 = v38 / v45;
+    const float v53 = v42 / v45;
     const float v81 = lkr_root(k73 + v32, k80);
     const float v88 = ((length_a * (k82 + (k83 * v31))) / v33) + 0.0f;
-    p->L_x = v49 * k54;
-    p->L_y = k2 + (v56 * k54);
-    p->angle_lever = lkr_angle(-v49, v56);
+    p->L_x = v46 * k51;
+    p->L_y = k2 + (v53 * k51);
+    p->angle_lever = lkr_angle(-v46, v53);
     p->slide_slide = v81;
-    by_crank->L_x = -((v88 * v56) * k54);
-    by_crank->L_y = (v88 * v49) * k54;
+    by_crank->L_x = -((v88 * v53) * k51);
+    by_crank->L_y = (v88 * v46) * k51;
     by_crank->angle_lever = v88;
     by_crank->slide_slide = (-((((v7 * 0.5f) * v9) * 2.0f) * k30)) / (2.0f * v81);
     const float valid = 0.0f;
@@ -793,14 +792,12 @@ static inline int lever_solutions_angle_lever(const float *value,
     const float v19 = v9 / v18;
     const float v22 = v19 * 0.045f;
     const float v27 = lkr_root((0.02f + v22) * (0.02f - v22), 6.198883e-10f);
-    const float v28 = v19 * v27;
     const float v30 = v15 / v18;
     const float v31 = v30 * v22;
     const float v35 = -(v19 * v22);
-    const float v36 = v30 * v27;
-    q[0][0] = lkr_angle(-((-v28) - v31), v35 + v36);
+    q[0][0] = lkr_angle(-((-(v19 * v27)) - v31), v35 + (v30 * v27));
     /* A right */
-    q[1][0] = lkr_angle(-(v28 - v31), v35 - v36);
+    q[1][0] = lkr_angle(-((v27 * v19) - v31), v35 - (v27 * v30));
     return 2;
 }
 

@@ -203,7 +203,7 @@ def root(x: Real, tolerance: Real) -> Real:
     return operation('root', x, real(tolerance))
 
 
-def valid_where(x: Real, margin: Real, tolerance: Number) -> Real:
+def valid_where(x: Real, margin: Real, tolerance: Number = 0.0) -> Real:
     """Return x where the margin is not below zero by more than the tolerance, else NaN."""
     return operation('valid_where', x, margin, real(tolerance))
 
@@ -315,16 +315,10 @@ class Complex:
 
     def length(self) -> Real:
         """Return the length."""
-        if self.y.value == 0.0:
-            return abs(self.x)
-        if self.x.value == 0.0:
-            return abs(self.y)
         return square_root(self.squared())
 
     def direction(self) -> Complex:
         """Return the unit vector along this one; along x if dimensions make its length zero."""
-        if self.y.value == 0.0 and self.x.op == 'negative' and self.x.args[0].positive:
-            return Complex(-1.0, 0.0)
         length = self.length()
         if length.positive or length.varies:
             return self / length

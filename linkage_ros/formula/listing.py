@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from typing import Any, Callable, Dict, List, Mapping, Sequence, Tuple
 
 from .expression import Real, unknown
-from .operations import COMMUTING
 
 # Python's parser limits the nesting of parentheses.
 DEEPEST = 16
@@ -54,7 +53,7 @@ class Listing:
         if len(needed) == 1 and node.op in ('where', 'rated'):
             return self._known[needed[0]]
         args = tuple(self._known[a] for a in needed) or node.args
-        key = (node.op, tuple(sorted(args)) if node.op in COMMUTING else args)
+        key = node.op, args
         if key not in self._numbers:
             self._numbers[key] = len(self.entries)
             self.entries.append((node, args))

@@ -28,7 +28,7 @@ class Operation(NamedTuple):
     operator, for arrays too. `rate` returns the derivative, from `expression.operation`, the
     expression and the rates of its operands; None: piecewise constant. `folded` returns the
     result if it needs no evaluation, else None. The result is positive if the operands with the
-    indices `positive` are. If it `commutes`, the order of operands has no effect.
+    indices `positive` are.
     """
 
     name: str
@@ -39,7 +39,6 @@ class Operation(NamedTuple):
     rate: Any = None
     folded: Optional[Callable] = None
     positive: Tuple[int, ...] = ()
-    commutes: bool = False
 
     @property
     def array(self) -> str:
@@ -106,11 +105,11 @@ def _angle_rule(do: Callable, n: Any, dy: Any, dx: Any) -> Any:
 # In rules n is the expression that is differentiated, dx, dy, ... are the rates of its operands.
 OPERATIONS = {row.name: row for row in (
     Operation('add', '({} + {})', operator.add, lambda b, x, y: b.fadd(x, y), '({} + {})',
-              lambda do, n, dx, dy: dx + dy, _constants(operator.add), (0, 1), True),
+              lambda do, n, dx, dy: dx + dy, _constants(operator.add), (0, 1)),
     Operation('subtract', '({} - {})', operator.sub, lambda b, x, y: b.fsub(x, y), '({} - {})',
               lambda do, n, dx, dy: dx - dy, _constants(operator.sub)),
     Operation('multiply', '({} * {})', operator.mul, lambda b, x, y: b.fmul(x, y), '({} * {})',
-              _product_rule, _constants(operator.mul), (0, 1), True),
+              _product_rule, _constants(operator.mul), (0, 1)),
     # The exact rounding error of a sum. Source: Knuth, TAOCP 2, sec. 4.2.2, theorem B.
     Operation('sum_error', SUM_ERROR, _sum_error, _sum_error_in_llvm, SUM_ERROR,
               folded=_constants(_sum_error)),
@@ -122,7 +121,8 @@ OPERATIONS = {row.name: row for row in (
               'fabs{f}({})', lambda do, n, dx: do('where', n.args[0] < 0.0, -dx, dx),
               _constants(abs)),
     Operation('sqrt', 'sqrt({})', np.sqrt, lambda b, x: b.call_by_name('llvm.sqrt', x),
-              'sqrt{f}({})', lambda do, n, dx: dx / (2.0 * n), None, (0,)),
+              'sqrt{f}({})', lambda do, n, dx: dx / (2.0 * n),
+              _constants(lambda x: math.sqrt(x) if x >= 0.0 else math.nan), (0,)),
     Operation('sin', 'sin({})', np.sin, lambda b, x: b.call_by_name('llvm.sin', x), 'sin{f}({})',
               lambda do, n, dx: do('cos', *n.args) * dx, _constants(math.sin)),
     Operation('cos', 'cos({})', np.cos, lambda b, x: b.call_by_name('llvm.cos', x), 'cos{f}({})',
@@ -151,4 +151,3 @@ OPERATIONS = {row.name: row for row in (
 )}
 # Piecewise constant operations.
 WITHOUT_RATE = frozenset(row.name for row in OPERATIONS.values() if row.rate is None)
-COMMUTING = frozenset(row.name for row in OPERATIONS.values() if row.commutes)

@@ -18,7 +18,6 @@ from itertools import chain
 import math
 from operator import attrgetter
 import re
-from struct import Struct
 from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
 import warnings
 
@@ -125,8 +124,6 @@ class _Variant:
         self.arguments, self.outputs = arguments, len(outputs)
         self.constants = [self.listing.entries[n][0] for n in self.listing.constants]
         self.steps = in_order(self.constants)
-        # Packing floats as bytes takes a quarter of the time of numpy's conversion.
-        self.pack: Any = Struct(f'{self.outputs}d').pack_into
 
     @cached_property
     def float(self) -> Callable:
@@ -137,24 +134,17 @@ class _Variant:
         return _python(self.listing, ARRAYS, self.arguments)
 
     @cached_property
-    def loop(self) -> Future:
-        """Return the machine code for many poses, compiled in the background."""
+    def machine_code(self) -> Future:
+        """Return the machine code for arrays, compiled in the background."""
         def make() -> Any:
             with needs('llvmlite'):
-                from .llvm_code import Loop
-            return Loop(*self.listing.operations())
+                from .llvm_code import Arrays
+            return Arrays(*self.listing.operations())
 
         thread = ThreadPoolExecutor(1, 'linkage_ros compiler')
         made = thread.submit(make)
         thread.shutdown(wait=False)
         return made
-
-    @cached_property
-    def arrays(self) -> Any:
-        """Return the machine code for arrays of poses."""
-        with needs('llvmlite'):
-            from .llvm_code import Arrays
-        return Arrays(*self.listing.operations())
 
 
 class Program:
@@ -228,12 +218,6 @@ class CompiledFunction:
         constants = dict(zip((f'k{n}' for n in listing.constants), self.constants))
         return constants, *listing.statements(dialect)
 
-    def rows(self, count: int, argument: float) -> np.ndarray:
-        """Return the outputs at one argument, a float, in rows of so many numbers."""
-        rows = np.empty((self.variant.outputs // count, count))
-        self.variant.pack(rows, 0, *self.at(argument))
-        return rows
-
     def over(self, *arguments: Any) -> np.ndarray:
         """Return the outputs over broadcast arrays, shape (outputs, *shape)."""
         arrays = [np.asarray(a, float) for a in arguments]
@@ -254,7 +238,7 @@ class CompiledFunction:
         return solve(flat, first.size).reshape(self.variant.outputs, *first.shape)
 
     def _in_machine_code(self, given: Sequence[np.ndarray], _: int) -> np.ndarray:
-        return self.variant.arrays.solve(given, self._given)
+        return self.variant.machine_code.result().solve(given, self._given)
 
     def batch(self, rows: np.ndarray) -> Batch:
         """
@@ -263,8 +247,9 @@ class CompiledFunction:
         Raises ImportError without an llvmlite that works.
         """
         with needs('llvmlite'):
-            from . import llvm_code  # noqa: F401
-        return Batch(self.variant.loop, self._given, self.variant.arguments, rows)
+            from .llvm_code import LANES
+        return Batch(self.variant.machine_code, self._given, np.zeros(
+            (self.variant.arguments, max(len(rows), LANES))), rows)
 
     def _in_python(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
         return self._one_by_one(given, size) if size < FEW_POSES else self._blocks(given, size)
@@ -294,28 +279,29 @@ class CompiledFunction:
 
 class Batch:
     """
-    Poses that are solved repeatedly by machine code, in arrays at fixed addresses.
+    Poses that are solved repeatedly by machine code.
 
     Parameters
     ----------
-    loop : Future of Loop
+    code : Future of Arrays
         The machine code; if it fails, a warning has the reason.
     constants : float array
         The values of dimensions that it uses.
-    arguments : int
-        Number of arguments of a pose, whose values the user writes to the array `arguments`
+    arguments : float array (arguments, at least as many as poses)
+        The arguments of each pose, which the user writes to the attribute `arguments`
         (arguments, poses).
     rows : float array (poses, outputs)
         Where the outputs are written.
 
     """
 
-    def __init__(self, loop: Future, constants: np.ndarray, arguments: int, rows: np.ndarray):
-        self.arguments = np.zeros((arguments, len(rows)))
-        self._loop: Optional[Future] = loop
+    def __init__(self, code: Future, constants: np.ndarray, arguments: np.ndarray,
+                 rows: np.ndarray):
+        self.arguments = arguments[:, :len(rows)]
+        self._code: Optional[Future] = code
         self._run: Optional[Callable] = None
-        self._constants, self._rows = constants, rows
-        self._solved = np.empty(rows.shape[::-1])
+        self._constants, self._all, self._rows = constants, arguments, rows
+        self._solved = np.empty((rows.shape[1], arguments.shape[1]))
 
     def solve(self, shared: Sequence[Any] = ()) -> bool:
         """
@@ -323,16 +309,16 @@ class Batch:
 
         `shared` are the values of the first arguments if all poses have the same.
         """
-        if self._loop and self._loop.done():
-            loop, self._loop = self._loop, None
-            if error := loop.exception():
+        if self._code and self._code.done():
+            code, self._code = self._code, None
+            if error := code.exception():
                 warnings.warn(f'no machine code, plain Python is used: {error}', stacklevel=3)
                 return False
-            self._run = loop.result().bound(self.arguments, self._constants, self._solved)
+            self._run = code.result().bound(self._all, self._constants, self._solved)
         if self._run is None:
             return False
         for row, value in zip(self.arguments, shared):
             row.fill(value)
         self._run(0, len(self._rows))
-        self._rows[:] = self._solved.T
+        self._rows[:] = self._solved.T[:len(self._rows)]
         return True

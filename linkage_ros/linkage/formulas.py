@@ -129,7 +129,7 @@ class LinkageFormulas:
     def _rate_where_valid(self, rate: Real, value: Real) -> Real:
         """Return a rate by one input, NaN where the value is NaN because of other inputs."""
         alone = len(self.built.inputs) == 1 and rate.value is None
-        return rate if alone or not value.varies else valid_where(rate, abs(value), real(0.0))
+        return rate if alone or not value.varies else valid_where(rate, abs(value))
 
     def _angles(self, names: Names) -> List[Real]:
         return [self.output(name) for name in names]
@@ -216,9 +216,7 @@ class LinkageFormulas:
         def d(expression: Real) -> Real:
             return derivative(expression, speeds, known)
 
-        def turning(bar: Optional[Complex]) -> Real:
-            if bar is None:
-                return real(0.0)
+        def turning(bar: Complex) -> Real:
             turned = spin(bar)
             return turned.formula(*map(d, turned.of))
 
@@ -228,7 +226,9 @@ class LinkageFormulas:
                 return d(self.output(name))
             if arm := self._arm(name):
                 return turning(arm.vector)
-            return turning(directions.get(name)) - turning(directions.get(parents[name]))
+            own, parent = (turning(directions[link].vector) if link in directions else real(0.0)
+                           for link in (name, parents[name]))
+            return own - parent
 
         directions = self.built.directions
         parents = {link.name: link.parent for link in self.built.links}

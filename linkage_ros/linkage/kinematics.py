@@ -284,7 +284,7 @@ class Kinematics:
         if isinstance(theta, float) and len(self.inputs) == 1:
             names, pose = self._ready('points', points)
             if not pose.shape:
-                return dict(zip(names, pose.rows(len(self.axes), theta)))
+                return dict(zip(names, np.reshape(pose.at(theta), (-1, len(self.axes)))))
         return self._vectors('points', theta, points)
 
     def velocity(self, theta: Inputs, points: Names = None, by: int = 0) -> dict:

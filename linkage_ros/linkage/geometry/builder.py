@@ -30,7 +30,6 @@ from ...formula.expression import (
     Real,
     real,
     sine,
-    valid_where,
 )
 
 GROUND = 'ground'
@@ -106,7 +105,6 @@ class Builder:
         self.limits: List[planar.Limit] = []
         self.frames: Dict[str, Dict[str, Complex]] = {}
         self.joint_values: Dict[str, Real] = {}
-        self.directions: Dict[str, Complex] = {}
         self.transmissions: Dict[str, Real] = {}
         self.folds: List[planar.Limit] = []
         # Limits other than dead points: the ends of strokes.
@@ -124,7 +122,8 @@ class Builder:
         self.axes = 'xy'
         self.windows: List[Any] = []
         self._vectors: Dict[Tuple[str, str], _Vector] = {}
-        self._axes: Dict[str, _Vector] = {}
+        # Each link's bar, or the direction in which it slides or points.
+        self.directions: Dict[str, _Vector] = {}
         self.driven: Dict[str, Tuple[Input, Real]] = {}
 
     def require(self, amount: Real, problem: str, line: Any = None) -> None:
@@ -178,7 +177,6 @@ class Builder:
         self._place(name, pivot, found.second, link, bar)
         self.transmissions[name] = planar.transmission(found)
         barrel = self._add_link(base, name, found.first, None, self._numbered('barrel'))
-        self._axes[barrel] = _Vector(found.first, real(1.0), barrel)
         self._slide(word, barrel, base, name, length, found.first)
         self.cylinders.append((base, name))
 
@@ -189,12 +187,10 @@ class Builder:
         place = self.drive(Input(word, LENGTH, low, high), geared)
         # A carriage has no place beyond its ends, as a cylinder beyond its stroke.
         way = abs(low) + abs(high)
-        for margin in (place - low, high - place):
-            limit = planar.Limit(margin, TOLERANCE * way)
-            self.limits.append(limit)
-            self.ways.append(limit)
-            place = valid_where(place, limit.margin, limit.tolerance)
-        self._add_block(word, name, origin, towards, place, abs(low) + abs(high))
+        ends = [planar.Limit(margin, TOLERANCE * way) for margin in (place - low, high - place)]
+        self.limits += ends
+        self.ways += ends
+        self._add_block(word, name, origin, towards, planar.valid_within(place, ends), way)
 
     def yoke(self, name: str, pin: str, origin: str, towards: str) -> None:
         """Slide a block along a line between two joints; a pin runs in a slot across it."""
@@ -216,12 +212,11 @@ class Builder:
 
     def block(self, name: str, joint: str, along: Real, across: Real) -> None:
         """Add a joint to the block that slides with a joint: along its line, and to its left."""
-        link = next((x.name for x in self.links
-                     if x.kind == 'prismatic' and x.tip == joint and x.name in self._axes), None)
+        link = next((x.name for x in self.links if x.kind == 'prismatic' and x.tip == joint), None)
         if link is None:
             raise ConstructionError(f'{joint} is not a joint of a block')
         offset = Complex(along, across)
-        arm = planar.parallel(self._axes[link].vector * offset, self.points[joint].place)
+        arm = planar.parallel(self.directions[link].vector * offset, self.points[joint].place)
         self._place(name, joint, arm, link, offset.length())
         self.frames[link][name] = self.frames[link][joint] + offset
 
@@ -253,7 +248,7 @@ class Builder:
     def _direction(self, origin: str, towards: str) -> Tuple[str, Complex, Real]:
         """Return the link of two joints, the direction between them, and its angle on the link."""
         side = self._side(origin, towards)
-        along = planar.unit(side.vector)
+        along = side.vector.direction()
         seen = along
         if side.link != GROUND:
             frame = self.frames[side.link]
@@ -329,7 +324,8 @@ class Builder:
         """Mirror a joint in the line of two others: the far corner of a kite."""
         ends = [self._side(end, point).vector for end in (second, first)]
         place, arm = self.points[point].place, self.arm(second, first, smooth=True)
-        self._reflect(name, first, second, arm, place, arm.offset(place, ends[0]), ends,
+        offset = arm.offset(place, ends[0])
+        self._reflect(name, first, second, arm, place + arm.across(offset), offset, ends,
                       self._side(first, point).length, self._side(second, point).length)
 
     def parallelogram(self, name: str, corner: str, first: str, second: str) -> None:
@@ -346,26 +342,17 @@ class Builder:
     def antiparallelogram(self, name: str, corner: str, first: str, second: str) -> None:
         """Join two bars as long as those from a corner, but crossed."""
         to_first, to_second = (self._side(corner, end) for end in (first, second))
-        arm = self.arm(second, first, smooth=True)
-        opposite = self.points[first].place + to_second.vector
-        start = self.points[corner].place
-        offset = -arm.offset(start, -to_second.vector)
-        place = start + arm.to_opposite(to_first.length, to_second.length) \
-            if isinstance(arm, planar.CrankArm) else None
-        self._reflect(name, first, second, arm, opposite, offset,
-                      (to_first.vector, to_second.vector), to_second.length, to_first.length,
-                      place)
+        arm, start = self.arm(second, first, smooth=True), self.points[corner].place
+        self._reflect(name, first, second, arm,
+                      start + arm.to_opposite(to_first.length, to_second.length),
+                      -arm.offset(start, -to_second.vector), (to_first.vector, to_second.vector),
+                      to_second.length, to_first.length)
 
-    def _reflect(self, name: str, first: str, second: str, arm: planar.Arm, point: Complex,
-                 offset: Real, ends: Sequence[Complex], to_first: Real, to_second: Real,
-                 place: Optional[Complex] = None) -> None:
-        """
-        Join two bars at a point's mirror image, given its bars from second and first.
-
-        A place that is known in a better way is given.
-        """
+    def _reflect(self, name: str, first: str, second: str, arm: planar.Arm, image: Complex,
+                 offset: Real, ends: Sequence[Complex], to_first: Real, to_second: Real) -> None:
+        """Join two bars at the image of a point, given its offset and bars to it; see `mirror`."""
         self.folds.append(planar.Limit(offset, TOLERANCE * to_first * to_second))
-        place, from_second, from_first = planar.mirror(arm, point, offset, ends, place)
+        place, from_second, from_first = planar.mirror(arm, image, offset, ends)
         self._pair(name, first, second, planar.Dyad(from_first, from_second, ()), to_first,
                    to_second, place)
 
@@ -388,9 +375,9 @@ class Builder:
         along, slide, limit = planar.slot(self.arm(pivot, pin), offset, half)
         self.limits.append(limit)
         start = real(pi / 2) if self.points[pivot].link == GROUND else real(0.0)
-        lever = self._add_link(pivot, tip, along, length, self._numbered('lever'), start=start)
+        lever = self._add_link(pivot, tip, along, None, self._numbered('lever'), start=start)
+        self.frames[lever][tip] = Complex(length, 0.0)
         self._place(tip, pivot, along * length, lever, length)
-        self._axes[lever] = self._vectors[pivot, tip]
         self.transmissions[tip] = arctangent(abs(slide), offset)
         self._slide(self._numbered('slide'), lever, pivot, pin, slide, along)
         self.frames[self.links[-1].name][pin] = Complex(0.0, offset)
@@ -442,7 +429,7 @@ class Builder:
         if (first, second) not in self._vectors:
             for link, frame in self.frames.items():
                 if first in frame and second in frame:
-                    bar, across = self._axes[link], frame[second] - frame[first]
+                    bar, across = self.directions[link], frame[second] - frame[first]
                     self._vectors[first, second] = _Vector(
                         bar.vector * (across / bar.length), across.length(), link)
                     break
@@ -452,8 +439,8 @@ class Builder:
         """Return the place of a point that a link carries, from where it lies on the link."""
         if link == GROUND:
             return seen
-        axis, (joint, start) = self._axes[link], next(iter(self.frames[link].items()))
-        along = planar.unit(axis.vector)
+        axis, (joint, start) = self.directions[link], next(iter(self.frames[link].items()))
+        along = axis.vector.direction()
         return self.points[joint].place + along * (seen - start)
 
     def _numbered(self, word: str) -> str:
@@ -470,9 +457,8 @@ class Builder:
         self._check_new(name)
         self.links.append(Link(name, parent, joint, 'prismatic', real(direction), tip))
         self.joint_values[name] = place
-        self.directions[name] = along
         self.frames[name] = {tip: Complex(0.0, 0.0)}
-        self._axes[name] = _Vector(along, real(1.0), name)
+        self.directions[name] = _Vector(along, real(1.0), name)
 
     def arm(self, first: str, second: str, *, smooth: bool = False) -> planar.Arm:
         """Return the arm from one joint to another; see `planar.CrankArm` for `smooth`."""
@@ -515,21 +501,23 @@ class Builder:
         """
         Add a link that turns about a joint, and return its name.
 
-        Its tip is on it if that has a length [m]. Its angle is counted from `start` [rad], seen
-        from its parent: the link that the joint belongs to, unless another is given.
+        Its bar is a unit vector if it has no length [m], and then its tip is not on it. Its angle
+        is counted from `start` [rad], seen from its parent: the link that the joint belongs to,
+        unless another is given.
         """
         name = name or bar_name(joint, tip)
         self._check_new(name)
         parent, start = parent or self.points[joint].link, start or real(0.0)
         zero = Complex(0.0, 1.0) if start.value else Complex(1.0, 0.0)
-        relative = bar * self.directions.get(parent, zero).conjugate()
+        if parent in self.directions:
+            zero = self.directions[parent].vector
+        relative = bar * zero.conjugate()
         self.links.append(Link(name, parent, joint, 'revolute', start, tip))
-        self.directions[name] = bar
         self.joint_values[name] = arctangent(relative.y, relative.x)
         self.frames[name] = {joint: Complex(0.0, 0.0)}
         if length is not None:
             self.frames[name][tip] = Complex(length, 0.0)
-            self._axes[name] = _Vector(bar, length, name)
+        self.directions[name] = _Vector(bar, length or real(1.0), name)
         return name
 
     def _place(self, name: str, start: str, vector: Complex, link: str, length: Real,

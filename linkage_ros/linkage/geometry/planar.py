@@ -85,16 +85,10 @@ class CrankEnds(NamedTuple):
     theta: Real
 
 
-def unit(vector: Complex) -> Complex:
-    """Return the unit vector along a vector of constant length, with its spin."""
-    along = vector.direction()
-    return with_spin(along, spin(vector)) if along.x.varies else along
-
-
 def on_line(along: Complex, place: Real) -> Complex:
     """Return the vector of a length along a direction; both parts are NaN where the length is."""
     # Generated code omits products with zero, which would carry the NaN.
-    return Complex(*(valid_where(part * place, abs(place), real(0.0)) if part.value == 0.0
+    return Complex(*(valid_where(part * place, abs(place)) if part.value == 0.0
                      else part * place for part in (along.x, along.y)))
 
 
@@ -136,19 +130,16 @@ class Arm:
         self.vector = vector
         # A constant would have a value even where the points cannot be assembled.
         self.square = vector.squared() if length is None else valid_where(
-            square(length), abs(vector.x), real(0.0))
+            square(length), abs(vector.x))
+        # A square that is not tiny where the arm has a direction.
+        self._clear = self.square
         self._magnitude, self.length = magnitude, length
 
     @property
     def divisor(self) -> Real:
         """Its square, NaN where it has no direction."""
-        return self.square if self.length or self._is_smooth else valid_where(
-            self.square, self._clear - LEAST_SQUARE, real(0.0))
-
-    @property
-    def _clear(self) -> Real:
-        """Return a square that is not tiny where the arm has a direction."""
-        return self.square
+        return self.square if self.length or self._is_smooth else \
+            valid_where(self.square, self._clear - LEAST_SQUARE)
 
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
@@ -172,7 +163,7 @@ class Arm:
             sum_and_error(second, length)
         margins = (((first + near) + near_error) * (first + far),
                    ((far - first) + far_error) * ((first - near) - near_error))
-        longer, shorter = (valid_where(margin, self.square, real(0.0)) for margin in margins)
+        longer, shorter = (valid_where(margin, self.square) for margin in margins)
         return (self._limit(first + second, size, longer),
                 self._limit(first - second, size, shorter))
 
@@ -183,6 +174,16 @@ class Arm:
     def across(self, offset: Real) -> Complex:
         """Return the vector from a point of this offset to its mirror image in the arm's line."""
         return self.vector.turned() * (-2.0 * offset / self.divisor)
+
+    def to_opposite(self, first: Real, second: Real) -> Complex:
+        """
+        Return the vector from a corner of an antiparallelogram to the opposite one.
+
+        The bars first and second [m] go from that corner to the arm's end and to its foot. Vector
+        and arm are the parallel sides of a trapezoid; their product is |first^2 - second^2|.
+        """
+        power = valid_where((first - second) * (first + second), self.square)
+        return self.vector * (power / self.divisor)
 
     def _limit(self, radius: Real, size: Real, margin: Real) -> Limit:
         # At the limit the length is the radius: an error of a length changes the square by the
@@ -207,45 +208,34 @@ class CrankArm(Arm):
         along = line.direction()
         turn = crank.zero * along.conjugate()
         s, h = _half_angle(crank.angle, turn)
-        h = h + where(abs(g - m) <= 0.0, TINY, 0.0) if smooth else h
+        is_isosceles = abs(g - m) <= 0.0
+        h = h + where(is_isosceles, TINY, 0.0) if smooth else h
         vector = along * Complex((g - m) + 2.0 * m * square(h), 2.0 * m * s * h)
         self.foot = crank.centre + crank.bar() if reverse else ground
         self.square = square(g - m) + 4.0 * g * m * square(h)
+        self._clear = square(h) + where(is_isosceles, 0.0, 1.0)
         self._crank, self._turn, self._is_reversed = crank, turn, reverse
         self._g, self._m, self._s, self._h, self._is_smooth = g, m, s, h, smooth
         # The arm between two equal lengths bisects them, also where it has no length itself.
-        turning = where(self._is_isosceles, 0.5,
+        turning = where(is_isosceles, 0.5,
                         m * ((m - g) + 2.0 * g * square(h)) / self.square)
         vector.spin = Rate((crank.angle,), lambda rate: rate * turning)
         self.vector = -vector if reverse else vector
 
-    @property
-    def _clear(self) -> Real:
-        return square(self._h) + where(self._is_isosceles, 0.0, 1.0)
-
-    @property
-    def _is_isosceles(self) -> Real:
-        return abs(self._g - self._m) <= 0.0
-
     def within(self, radius: Real, size: Real) -> Limit:
         """Return the margin radius^2 - square; the radius is made from lengths up to size."""
-        g, m = self._g, self._m
-        return self._half_angle_limit(radius, size, 1.0,
-                                      exact_sum(radius, -g, -m) * exact_sum(radius, g, m),
-                                      exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
+        return self._half_angle_limit(radius, size, 1.0)
 
     def beyond(self, radius: Real, size: Real) -> Limit:
         """Return the margin square - radius^2; the radius is made from lengths up to size."""
-        g, m = self._g, self._m
-        return self._half_angle_limit(radius, size, -1.0,
-                                      exact_sum(g, m, -radius) * exact_sum(g, m, radius),
-                                      exact_sum(g, -m, -radius) * exact_sum(g, -m, radius))
+        return self._half_angle_limit(radius, size, -1.0)
 
     def difference(self, first: Real, second: Real, shorter: Limit) -> Real:
         """Return `first - second`, or its like in the arm where the limit takes both as equal."""
         apart, own = first - second, abs(self._g - self._m)
         return where(abs(shorter.ends.end) <= shorter.tolerance,
-                     where(apart < 0.0, -own, own), apart) if shorter.smooth else apart
+                     where(apart < 0.0, -own, own), apart
+                     ) if shorter.smooth and shorter.ends else apart
 
     def offset(self, point: Complex, to_point: Complex) -> Real:
         """Return the cross product of the arm and the vector from its foot to a point."""
@@ -255,23 +245,16 @@ class CrankArm(Arm):
         area = 2.0 * self._g * self._m * self._s * self._h
         return area if self._is_reversed else -area
 
-    def to_opposite(self, first: Real, second: Real) -> Complex:
-        """
-        Return the vector from a corner of an antiparallelogram to the opposite one.
-
-        The bars first and second [m] go from that corner to the arm's end and to its foot. Vector
-        and arm are the parallel sides of a trapezoid; their product is |first^2 - second^2|.
-        """
-        power = valid_where((first - second) * (first + second), self.square, real(0.0))
-        return self.vector * (power / self.divisor)
-
-    def _half_angle_limit(self, radius: Real, size: Real, sign: float, start: Real,
-                          end: Real) -> Limit:
-        gm, s, h = 4.0 * self._g * self._m, self._s, self._h
+    def _half_angle_limit(self, radius: Real, size: Real, sign: float) -> Limit:
+        """Return the margin sign (radius^2 - square)."""
+        g, m, s, h = self._g, self._m, self._s, self._h
+        gm = 4.0 * g * m
+        start = sign * (exact_sum(radius, -g, -m) * exact_sum(radius, g, m))
+        end = sign * (exact_sum(radius, -g, m) * exact_sum(radius, g, -m))
         # The margin can vanish only next to the smaller gap.
         margin = where(abs(start) <= abs(end), start + sign * gm * square(s),
                        end - sign * gm * square(h))
-        tolerance = TOLERANCE * abs(radius) * (size + self._g + self._m)
+        tolerance = TOLERANCE * abs(radius) * (size + g + m)
         gap, half = (start, s) if sign > 0.0 else (end, h)
         grown = square_root(gm) * self._first_sign(sign)
         smooth = where(abs(gap) <= tolerance, grown * half, root(margin, tolerance))
@@ -386,7 +369,7 @@ def _nan_with(other: Real, vector: Complex, part: Real) -> Real:
     """Return one part of a factor of a vector, NaN where the other is, as their product is."""
     # Generated code omits products with zero, which would carry the NaN.
     axial = 0.0 in (vector.x.value, vector.y.value)
-    return valid_where(part, abs(other), real(0.0)) if axial else part
+    return valid_where(part, abs(other)) if axial else part
 
 
 def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
@@ -404,34 +387,30 @@ def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
     return Complex(0.5 + (first - second) * (first + second) / twice, height / twice * side)
 
 
-def mirror(arm: Arm, point: Complex, offset: Real, ends: Sequence[Complex],
-           image: Optional[Complex] = None) -> Tuple[Complex, ...]:
+def mirror(arm: Arm, image: Complex, offset: Real, ends: Sequence[Complex]
+           ) -> Tuple[Complex, ...]:
     """
     Return the mirror image of a point in the line of an arm, and the bars from both ends to it.
 
     `offset` is the point's offset from the arm. `ends` are the bars to the point from the arm's
-    foot and from its end. `image` is a more accurate form of the image, if there is one. The spin
-    of a bar's image is twice the arm's minus the bar's own.
+    foot and from its end. The spin of a bar's image is twice the arm's minus the bar's own.
     """
     across, turning, bars = arm.across(offset), spin(arm.vector), []
-    image = image or point + across
     for bar in ends:
         own = spin(bar)
         bars.append(with_spin(bar + across, Rate(
             (*turning.of, *own.of), lambda *rates, own=own: valid_where(
                 2.0 * turning.formula(*rates[:len(turning.of)])
-                - own.formula(*rates[len(turning.of):]), abs(image.x + image.y), real(0.0)))))
+                - own.formula(*rates[len(turning.of):]), abs(image.x + image.y)))))
     return with_velocity(image, arm.foot, bars[0]), *bars
 
 
 def parallel(bar: Complex, place: Complex) -> Complex:
     """Return a bar equal to another one, NaN where the place of its end is NaN."""
-    def with_place(part: Real) -> Real:
-        return valid_where(part, abs(place.x), real(0.0))
-
     turning = spin(bar)
-    same = Complex(with_place(bar.x), with_place(bar.y))
-    same.spin = Rate(turning.of, lambda *rates: with_place(turning.formula(*rates)))
+    same = Complex(*(valid_where(part, abs(place.x)) for part in (bar.x, bar.y)))
+    same.spin = Rate(turning.of, lambda *rates: valid_where(
+        turning.formula(*rates), abs(place.x)))
     return same
 
 
@@ -483,7 +462,7 @@ def slot(arm: Arm, offset: Real, half: float) -> Tuple[Complex, Real, Limit]:
     limit = arm.beyond(offset, abs(offset))
     slide = limit.root() * half
     central, aside = abs(offset) <= 0.0, arm.vector * Complex(slide, -offset)
-    along = Complex(*(valid_where(where(central, way * half, part), arm.divisor, real(0.0))
+    along = Complex(*(valid_where(where(central, way * half, part), arm.divisor)
                       for way, part in ((arm.vector.x, aside.x), (arm.vector.y, aside.y))))
     turning = spin(arm.vector)
     return with_spin(along.direction(), Rate(

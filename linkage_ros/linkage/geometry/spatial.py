@@ -86,9 +86,7 @@ class Vector(NamedTuple):
 
     def length(self) -> Real:
         """Return the length."""
-        parts = [part for part in self if part.value != 0.0]
-        return abs(parts[0]) if len(parts) == 1 else square_root(
-            sum(map(square, parts), real(0.0)))
+        return square_root(self.dot(self))
 
     def over(self, divisor: Scalar) -> Vector:
         """Return a quotient."""

@@ -17,7 +17,8 @@ from typing import Any, Callable, Iterable, List, Mapping, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...formula.expression import Real, real, square_root, where
+from ...formula.expression import dimension, Real, real, square_root, where
+from ...formula.program import evaluate
 from ...words import quoted
 
 # A number, or the name of a dimension or an operation.
@@ -40,8 +41,6 @@ _EXPRESSIONS: Mapping[Step, Callable] = {
     '+': operator.add, '-': operator.sub, '*': operator.mul, '/': operator.truediv,
     'negative ': operator.neg, 'max': lambda x, y: where(x < y, y, x), 'sqrt': square_root,
     'deg': lambda x: x * (math.pi / 180.0)}
-_VALUES: Mapping[Step, Callable] = {
-    **_EXPRESSIONS, '/': np.divide, 'max': np.maximum, 'sqrt': np.sqrt}
 
 
 def in_range(number: ArrayLike) -> Any:
@@ -79,24 +78,19 @@ class Formula:
 
     def expression(self, symbols: Mapping[str, Real]) -> Real:
         """Return it as an expression of dimensions."""
-        return self._computed(lambda leaf: symbols[leaf] if leaf in symbols else real(leaf),
-                              _EXPRESSIONS)
-
-    def value(self, dimensions: Mapping[str, Any]) -> Any:
-        """Return its value for dimensions, numbers or arrays; not finite where undefined."""
-        with np.errstate(all='ignore'):
-            return self._computed(
-                lambda leaf: np.float64(leaf) if isinstance(leaf, float) else dimensions[leaf],
-                _VALUES)
-
-    def _computed(self, leaf: Callable, operations: Mapping[Step, Callable]) -> Any:
-        stack: List[Any] = []
+        stack: List[Real] = []
         for step in self._steps:
             count = _OPERANDS.get(step, 0)
             operands = stack[len(stack) - count:]
             del stack[len(stack) - count:]
-            stack.append(operations[step](*operands) if count else leaf(step))
+            stack.append(_EXPRESSIONS[step](*operands) if count else
+                         symbols[step] if isinstance(step, str) else real(step))
         return stack.pop()
+
+    def value(self, dimensions: Mapping[str, Any]) -> Any:
+        """Return its value for dimensions, numbers or arrays; not finite where undefined."""
+        symbols = {name: dimension(name, positive=False) for name in self.names}
+        return evaluate(self.expression(symbols), dimensions, {})
 
     def _parse(self, tokens: Iterable[str]) -> None:
         """Fill the steps; operators and parentheses wait until what they bind is complete."""
@@ -132,15 +126,14 @@ class Formula:
             self._apply(waiting.pop())
 
     def _apply(self, step: str) -> None:
-        operands = self._steps[-_OPERANDS[step]:]
+        operands: List[Any] = self._steps[-_OPERANDS[step]:]
         if step == '/' and operands[1] == 0.0:
             self._add_constant(math.inf)
         if not all(isinstance(operand, float) for operand in operands):
             self._steps.append(step)
             return
         del self._steps[-len(operands):]
-        with np.errstate(all='ignore'):
-            self._add_constant(float(_VALUES[step](*map(np.float64, operands))))
+        self._add_constant(float(evaluate(_EXPRESSIONS[step](*map(real, operands)), {}, {})))
 
     def _add_constant(self, number: float) -> None:
         if not in_range(number):
