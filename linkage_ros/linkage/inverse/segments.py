@@ -113,9 +113,12 @@ class Segments:
         farthest = math.pi if first.is_part else normalized.high
         offset = math.tau * abs(dict(linkage.design.turned).get(first.name, 0.0)) / self._unit
         ulps = 2.0 if first.period == 1 else 4.0
-        arcs = [tuple(end + side * ulps * (not normalized.is_cut(end)) * math.ulp(
-            max(abs(end) + offset, farthest))
-            for end, side in zip(arc, (1.0, -1.0))) for arc in arcs]
+
+        def inside(end: float, side: float) -> float:
+            return end if normalized.is_cut(end) else end + side * ulps * math.ulp(
+                max(abs(end) + offset, farthest))
+
+        arcs = [(inside(low, 1.0), inside(high, -1.0)) for low, high in arcs]
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
         length = sum(hi - lo for lo, hi in arcs)
         if not runs or len(self.jumps) > MAX_ENDS * max(1.0, length / math.tau) \
