@@ -64,9 +64,7 @@ def cut(letter):
           for name, shown, hint in (
             ('Z.y', "'Z.y'", ''), ('y' * 10 ** 6, cut('y'), ''),
             ('G.x.x', "'G.x.x'", '; did you mean G.x?'))),
-        ({'mechanism': 'jansen', 'output': 'O.x'}, 'O.x of jansen does not move with the crank'),
-        ({'mechanism': 'peaucellier', 'output': 'C.x'},
-         'C.x of peaucellier does not move with the crank')]),
+        ({'mechanism': 'jansen', 'output': 'O.x'}, 'O.x of jansen does not move with the crank')]),
     (TWO, [({'output': output}, f'{ONE} slotted lever; allowed: left, right, drop')
            for output in ('', 'lever')]),
     ({'mechanisms': ['jansen']}, [
