@@ -89,6 +89,16 @@ def by_dimensions(name, values):
     return np.asarray(alone)
 
 
+def by_loop(name, values):
+    pytest.importorskip('llvmlite')
+    rows, pose = np.empty((values[0].size, 1)), bound(name)
+    batch = pose.batch(rows)
+    batch.arguments[:] = values
+    pose.variant.loop.result()
+    assert batch.solve()
+    return rows[:, 0]
+
+
 def by_lanes(name, values):
     pytest.importorskip('llvmlite')
     return bound(name, True).over(*values)[0]
@@ -148,7 +158,7 @@ def test_there_is_a_truth_for_each():
 
 @pytest.mark.nightly(all_but=45)
 @pytest.mark.parametrize('back_end, column', [
-    (by_floats, 0), (by_dimensions, 1), (by_arrays, 1), (by_lanes, 2)],
+    (by_floats, 0), (by_dimensions, 1), (by_arrays, 1), (by_loop, 0), (by_lanes, 2)],
     ids=lambda x: getattr(x, '__name__', ''))
 @pytest.mark.parametrize('name', NAMES)
 def test_each_is_right_to_the_last_digit(name, back_end, column):
@@ -175,7 +185,7 @@ def test_infinity_zeros_and_nan_are_the_same_to_all(name, c_library):
     values = numbers(name, special=True)
     expected = by_arrays(name, values)
     zero = expected == 0.0
-    for found in (by_floats(name, values), by_dimensions(name, values),
+    for found in (by_floats(name, values), by_dimensions(name, values), by_loop(name, values),
                   by_lanes(name, values), c_library(name, values, np.float64)):
         np.testing.assert_allclose(found, expected, rtol=1e-15, atol=0.0)
         assert np.array_equal(np.signbit(found)[zero], np.signbit(expected)[zero])

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Compile expressions to machine code, by llvmlite: a loop over poses, eight at a time.
+Compile expressions to machine code, by llvmlite: a loop over poses.
 
-Operations and their order are those of the plain Python code, but sine, cosine and arctangent are
-those of `elementary`; the result of a pose depends neither on the other poses nor on the number of
-cores.
+One pose at a time, the operations and their order are those of the plain Python code, so the
+results have the same bits. Eight at a time, on all cores, sine, cosine and arctangent are those of
+`elementary`; the result of a pose depends neither on the other poses nor on the number of cores.
 """
 
 from __future__ import annotations
@@ -62,6 +62,10 @@ def compiled(module: ir.Module) -> llvm.ExecutionEngine:
 class Builder(ir.IRBuilder):
     """Appends operations on numbers, or on vectors of them, to the code of a function."""
 
+    def operations(self) -> Dict[str, Callable]:
+        """Return the code generators of operations, by name."""
+        return {name: partial(row.llvm, self) for name, row in OPERATIONS.items()}
+
     def call_by_name(self, name: str, *operands: ir.Value) -> ir.Value:
         """Append a call of a function of LLVM or the C library, all numbers of one kind."""
         kind = operands[0].type
@@ -88,31 +92,41 @@ class Builder(ir.IRBuilder):
         self.position_at_end(end)
 
 
-class Arrays:
+class Loop:
     """
-    Poses in arrays, solved by machine code, which lives as long as this object.
+    A loop over poses in machine code, which lives as long as this object.
 
     An operation is a number, a name and operands: numbers of other operations or of an argument,
     or a value. `constants` and `outputs` are the numbers of each call's constants and results.
     """
 
+    kind: ir.Type = NUMBER
+
     def __init__(self, operations: Sequence, constants: Sequence[int], outputs: Sequence[int]):
-        self._engine = compiled(_module(operations, constants, outputs))
-        self._run = SIGNATURE(self._engine.get_function_address('poses'))
-        self._outputs = len(outputs)
-        self._share = SHARE // (1 + len(operations))
+        self._engine = compiled(_module(self.kind, operations, constants, outputs))
+        self.run = SIGNATURE(self._engine.get_function_address('poses'))
 
     def bound(self, given: Sequence[np.ndarray], constants: np.ndarray, out: np.ndarray
               ) -> Callable:
         """
         Return the function that solves from a first pose to another, as long as the arrays live.
 
-        `given` are arrays (poses,), of LANES poses at least; the results are written to `out`
-        (outputs, poses).
+        `given` are arrays (poses,); the results are written to `out` (outputs, poses).
         """
         places = (ctypes.c_int64 * len(given))(*map(_address, given))
         rest = given[0].size, places, _address(constants), _address(out)
-        return lambda first, last: self._run(first, last, *rest)
+        return lambda first, last: self.run(first, last, *rest)
+
+
+class Arrays(Loop):
+    """Poses in arrays of any size, eight at a time."""
+
+    kind = VECTOR
+
+    def __init__(self, operations: Sequence, constants: Sequence[int], outputs: Sequence[int]):
+        super().__init__(operations, constants, outputs)
+        self._outputs = len(outputs)
+        self._share = SHARE // (1 + len(operations))
 
     def solve(self, given: Sequence[np.ndarray], constants: np.ndarray) -> np.ndarray:
         """Return the outputs, shape (outputs, poses), at arguments that are arrays (poses,)."""
@@ -152,25 +166,26 @@ def _threads(_: int, cores: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(cores, 'linkage_ros arrays')
 
 
-def _module(operations: Sequence, constants: Sequence[int], outputs: Sequence[int]) -> ir.Module:
-    """Return the code that solves poses, several in a vector."""
-    module, pointer = ir.Module(), NUMBER.as_pointer()
+def _module(kind: ir.Type, operations: Sequence, constants: Sequence[int],
+            outputs: Sequence[int]) -> ir.Module:
+    """Return the code that solves poses on numbers of one kind: one, or several in a vector."""
+    module, pointer, lanes = ir.Module(), NUMBER.as_pointer(), getattr(kind, 'count', 1)
     poses = ir.Function(module, ir.FunctionType(
         ir.VoidType(), [*3 * (COUNT,), pointer.as_pointer(), pointer, pointer]), 'poses')
     first, last, size, arguments, given, out = poses.args
     builder = Builder(poses.append_basic_block())
-    spell = _operators(builder)
-    known = {number: _in_all_lanes(builder, _load(builder, given, _count(i)))
+    spell = builder.operations() if kind == NUMBER else _operators(builder)
+    known = {number: _in_all_lanes(builder, kind, _load(builder, given, _count(i)))
              for i, number in enumerate(constants)}
 
     def numbers(array: ir.Value, offset: ir.Value) -> ir.Value:
-        return builder.bitcast(builder.gep(array, [offset]), VECTOR.as_pointer())
+        return builder.bitcast(builder.gep(array, [offset]), kind.as_pointer())
 
-    with builder.each(last, first, LANES) as i:
+    with builder.each(last, first, lanes) as i:
         # The last vector may overlap the one before.
-        latest = builder.sub(size, _count(LANES))
+        latest = builder.sub(size, _count(lanes))
         at = builder.select(builder.icmp_signed('<', i, latest), i, latest)
-        _append(operations, known, spell, lambda index: builder.load(
+        _append(operations, known, spell, kind, lambda index: builder.load(
             numbers(_load(builder, arguments, _count(index)), at), align=1))
         for column, number in enumerate(outputs):
             place = builder.add(builder.mul(_count(column), size), at)
@@ -179,17 +194,18 @@ def _module(operations: Sequence, constants: Sequence[int], outputs: Sequence[in
     return module
 
 
-def _in_all_lanes(builder: Builder, number: ir.Value) -> ir.Value:
-    none = ir.Constant(VECTOR, ir.Undefined)
+def _in_all_lanes(builder: Builder, kind: ir.Type, number: ir.Value) -> ir.Value:
+    if kind == NUMBER:
+        return number
+    none = ir.Constant(kind, ir.Undefined)
     return builder.shuffle_vector(
         builder.insert_element(none, number, _count(0)), none,
         ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
 
 
 def _operators(builder: Builder) -> Dict[str, Callable]:
-    """Return the code generators of operations on eight poses, by name."""
-    spell: Dict[str, Callable] = {
-        name: partial(row.llvm, builder) for name, row in OPERATIONS.items()}
+    """Return the code generators of operations on eight poses."""
+    spell = builder.operations()
     turned = _approximated(builder, spell, sine_and_cosine, (spell['sin'], spell['cos']))
     angle = _approximated(builder, spell, arctangent, (partial(_by_lane, builder, 'atan2'),))
     return {**spell, 'sin': lambda x: turned(x)[0], 'cos': lambda x: turned(x)[1],
@@ -212,7 +228,7 @@ def _approximated(builder: Builder, spell: Dict[str, Callable], approximation: C
     def appended(*operands: ir.Value) -> List[ir.Value]:
         operations, outputs = _listed(approximation, len(operands))
         known: Dict[int, ir.Value] = {}
-        _append(operations, known, spell, lambda index: operands[index])
+        _append(operations, known, spell, VECTOR, lambda index: operands[index])
         *near, holds = (known[number] for number in outputs)
         whole, before = builder.bitcast(holds, ir.IntType(LANES)), builder.block
         with builder.if_then(builder.icmp_unsigned('!=', whole, whole.type(-1)), likely=False):
@@ -235,12 +251,12 @@ def _listed(approximation: Callable, arguments: int) -> Tuple[Sequence, Sequence
     return operations, numbers
 
 
-def _append(operations: Sequence, known: dict, spell: dict,
-            argument: Callable[[int], ir.Value]) -> None:
-    """Append operations to the code; `known` receives their values."""
+def _append(operations: Sequence, known: dict, spell: dict, kind: ir.Type,
+           argument: Callable[[int], ir.Value]) -> None:
+    """Append operations on a type of numbers to the code; `known` receives their values."""
     for number, name, operands in operations:
         if name == 'constant':
-            known[number] = ir.Constant(VECTOR, operands[0])
+            known[number] = ir.Constant(kind, operands[0])
         elif name == 'argument':
             known[number] = argument(operands[0])
         else:

@@ -134,17 +134,24 @@ class _Variant:
         return _python(self.listing, ARRAYS, self.arguments)
 
     @cached_property
-    def machine_code(self) -> Future:
-        """Return the machine code for arrays, compiled in the background."""
+    def loop(self) -> Future:
+        """Return the machine code for many poses, compiled in the background."""
         def make() -> Any:
             with needs('llvmlite'):
-                from .llvm_code import Arrays
-            return Arrays(*self.listing.operations())
+                from .llvm_code import Loop
+            return Loop(*self.listing.operations())
 
         thread = ThreadPoolExecutor(1, 'linkage_ros compiler')
         made = thread.submit(make)
         thread.shutdown(wait=False)
         return made
+
+    @cached_property
+    def arrays(self) -> Any:
+        """Return the machine code for arrays of poses."""
+        with needs('llvmlite'):
+            from .llvm_code import Arrays
+        return Arrays(*self.listing.operations())
 
 
 class Program:
@@ -238,7 +245,7 @@ class CompiledFunction:
         return solve(flat, first.size).reshape(self.variant.outputs, *first.shape)
 
     def _in_machine_code(self, given: Sequence[np.ndarray], _: int) -> np.ndarray:
-        return self.variant.machine_code.result().solve(given, self._given)
+        return self.variant.arrays.solve(given, self._given)
 
     def batch(self, rows: np.ndarray) -> Batch:
         """
@@ -247,9 +254,8 @@ class CompiledFunction:
         Raises ImportError without an llvmlite that works.
         """
         with needs('llvmlite'):
-            from .llvm_code import LANES
-        return Batch(self.variant.machine_code, self._given, np.zeros(
-            (self.variant.arguments, max(len(rows), LANES))), rows)
+            from . import llvm_code  # noqa: F401
+        return Batch(self.variant.loop, self._given, self.variant.arguments, rows)
 
     def _in_python(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
         return self._one_by_one(given, size) if size < FEW_POSES else self._blocks(given, size)
@@ -279,29 +285,28 @@ class CompiledFunction:
 
 class Batch:
     """
-    Poses that are solved repeatedly by machine code.
+    Poses that are solved repeatedly by machine code, in arrays at fixed addresses.
 
     Parameters
     ----------
-    code : Future of Arrays
+    loop : Future of Loop
         The machine code; if it fails, a warning has the reason.
     constants : float array
         The values of dimensions that it uses.
-    arguments : float array (arguments, at least as many as poses)
-        The arguments of each pose, which the user writes to the attribute `arguments`
+    arguments : int
+        Number of arguments of a pose, whose values the user writes to the array `arguments`
         (arguments, poses).
     rows : float array (poses, outputs)
         Where the outputs are written.
 
     """
 
-    def __init__(self, code: Future, constants: np.ndarray, arguments: np.ndarray,
-                 rows: np.ndarray):
-        self.arguments = arguments[:, :len(rows)]
-        self._code: Optional[Future] = code
+    def __init__(self, loop: Future, constants: np.ndarray, arguments: int, rows: np.ndarray):
+        self.arguments = np.zeros((arguments, len(rows)))
+        self._loop: Optional[Future] = loop
         self._run: Optional[Callable] = None
-        self._constants, self._all, self._rows = constants, arguments, rows
-        self._solved = np.empty((rows.shape[1], arguments.shape[1]))
+        self._constants, self._rows = constants, rows
+        self._solved = np.empty(rows.shape[::-1])
 
     def solve(self, shared: Sequence[Any] = ()) -> bool:
         """
@@ -309,16 +314,16 @@ class Batch:
 
         `shared` are the values of the first arguments if all poses have the same.
         """
-        if self._code and self._code.done():
-            code, self._code = self._code, None
-            if error := code.exception():
+        if self._loop and self._loop.done():
+            loop, self._loop = self._loop, None
+            if error := loop.exception():
                 warnings.warn(f'no machine code, plain Python is used: {error}', stacklevel=3)
                 return False
-            self._run = code.result().bound(self._all, self._constants, self._solved)
+            self._run = loop.result().bound(self.arguments, self._constants, self._solved)
         if self._run is None:
             return False
         for row, value in zip(self.arguments, shared):
             row.fill(value)
         self._run(0, len(self._rows))
-        self._rows[:] = self._solved.T[:len(self._rows)]
+        self._rows[:] = self._solved.T
         return True

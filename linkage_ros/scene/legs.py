@@ -27,8 +27,8 @@ class Solution:
     A solver of all legs, and the numbers of its last solution: `values`, or `parts` of them.
 
     `function` is the result of `Mechanism.legs`. Several legs are solved by machine code, where
-    llvmlite works and as soon as the code is compiled; otherwise by plain Python, whose last
-    digits may differ.
+    llvmlite works and as soon as the code is compiled; otherwise by plain Python, which
+    returns the same bits.
 
     Attributes
     ----------
