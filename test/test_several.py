@@ -179,9 +179,10 @@ def test_two_dyads_beyond_the_ends_of_their_rockers_are_not_taken_for_the_other_
                 for there in solved:
                     away = np.angle(np.exp(1j * (np.array(
                         [*linkage.joint_angles(there, outputs).values()]) - values)))
-                    rates = np.abs(Solution(there, inverse).jacobian).max(axis=1)
-                    assert (np.abs(away) < np.fmax(1.5 * beyond, 64.0 * 2.0 ** -53 * np.nan_to_num(
-                        rates, nan=1e9))).all(), (lines, values)
+                    moved = np.abs(Solution(there, inverse).jacobian) @ np.fmax(
+                        1.0, np.abs(there))
+                    allowed = np.fmax(1.5 * beyond, 64.0 * 2.0 ** -53 * np.nan_to_num(moved))
+                    assert (np.abs(away) < allowed).all(), (lines, values)
                     found += 1
     assert found > 60
 
