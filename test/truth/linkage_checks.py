@@ -21,7 +21,7 @@ from . import drawing_accuracy, inverse_judge, random_linkages
 from .drawing import draw, FLOATS, Linkage
 
 # Arcs below this width, of an input about as large as an angle, are the rounding of one or two.
-NARROWEST = 1e-12
+NARROWEST = 1e-11
 # An arm that is shorter than this part of the longest length has no direction to speak of.
 SHORTEST = 1e-7
 # One on which accelerations lose a digit or more.

@@ -423,8 +423,7 @@ class Builder:
         ends = self.points[first], self.points[second]
         if ends[0].link == ends[1].link == GROUND:
             vector = ends[1].place - ends[0].place
-            if vector.length().value == 0.0:
-                raise ConstructionError(f'{first} and {second} are at the same place')
+            self.require(vector.length(), f'{first} and {second} are at the same place')
             return _Vector(vector, vector.length(), GROUND)
         if (first, second) not in self._vectors:
             for link, frame in self.frames.items():
