@@ -398,7 +398,8 @@ class Measure:
             return 'number'
         if 'fails' in needs:
             return 'nan' if 'slips' not in needs else 'any'
-        if needs & {'slips', 'adrift'}:
+        # A limit that may be closed may leave an arm without a direction.
+        if needs & {'slips', 'adrift'} or needs >= {'grazes', 'undirected'}:
             return 'any'
         return 'either' if 'grazes' in needs else 'maybe'
 
@@ -479,7 +480,9 @@ def _row(out, given, result, value, spread, due, rule, ulps, allowed):
         ratio = 0.0 if not excess or still else excess / spread if spread else math.inf
         if 0.0 < error <= allowed:
             ratio = min(ratio, rule * error / allowed)
-        problem = 'rule' if not ratio <= rule else ''
+        # A limit within GRAZE sensitivities may be closed, which moves by the root of it.
+        problem = 'rule' if not ratio <= rule * (
+            math.sqrt(GRAZE) if due == 'either' else 1.0) else ''
     return Row(out, tuple(map(float, given)), problem, math.inf if 'NaN' in problem else ratio,
                error, spread, result, value)
 

@@ -383,7 +383,9 @@ def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
             exact_sum(base, -first, second) * exact_sum(base, first, -second))
     twice = 2.0 * square(base)
     tolerance = TOLERANCE * square(first + second)
-    height = root(gaps[0], tolerance) * root(gaps[1], tolerance)
+    # Sides that are flat up to rounding are flat.
+    height = reduce(lambda x, y: x * y, (
+        root(where(abs(gap) <= tolerance, 0.0, gap), tolerance) for gap in gaps))
     return Complex(0.5 + (first - second) * (first + second) / twice, height / twice * side)
 
 
