@@ -403,8 +403,8 @@ def _vanishing(subject):
     held, values = subject.reachable(drawing), subject.values
     found = []
     for k, row in enumerate(_closures(drawing, values.shape)):
-        # What is zero all along is rounding, which a short arm may make larger here and there.
-        if not np.all(np.isfinite(row)) or np.median(np.abs(row)) < 1e-12:
+        # What is zero all along, but for lengths that are nearly equal, tells no place.
+        if not np.all(np.isfinite(row)) or np.median(np.abs(row)) < 1e-8:
             continue
         changes = np.flatnonzero((row[:-1] < 0.0) != (row[1:] < 0.0))
         for i in changes[held[changes] | held[changes + 1]][:20]:
