@@ -365,8 +365,8 @@ def dead_points(subject):
     mechanism = subject.mechanism
     dead = mechanism.dead_points(*subject.held)
     low, high = subject.inputs[0].low, subject.inputs[0].high
-    if dead != sorted(dead) or not all(low <= value < high or not subject.turns
-                                       and value == high for value in dead):
+    if dead != sorted(dead) or not all(low <= value < high or value == high
+                                       and not subject.inputs[0].wraps for value in dead):
         yield 'dead points out of order', f'{dead}'
     if any(value != 0.0 and abs(value) < 1e-300 * subject.scale for value in dead):
         yield 'dead point not quite zero', f'{dead}'
