@@ -232,7 +232,7 @@ class CrankArm(Arm):
 
     def difference(self, first: Real, second: Real, shorter: Limit) -> Real:
         """Return `first - second`, or its like in the arm where the limit takes both as equal."""
-        apart, own = first - second, abs(self._g - self._m)
+        apart, own = exact_sum(first, -second), abs(self._g - self._m)
         return where(abs(shorter.ends.end) <= shorter.tolerance,
                      where(apart < 0.0, -own, own), apart
                      ) if shorter.smooth and shorter.ends else apart
