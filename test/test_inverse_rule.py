@@ -53,6 +53,12 @@ SPECIAL = {
          'B ground -2.2125892959295577 0.6633161499057368', 'C crank A 0.436499480176793',
          'D mirror A C B', 'E Eb Ec inversor D A 0.7495014557578443 0.7495014557578443*1.8'], {},
         ['Ec.x'], np.array([-1.5866750307266744])),
+    'a reach of a few narrow arcs in many turns': (
+        ['A ground 0 -0.69', 'B ground -0.206 -0.233', 'C crank B 1.964',
+         'D dyad C B 1.067 1.992 left',
+         'E crank A 0.65 geared crank -1.4142135623730951 0 called drive',
+         'F Fb Fc inversor B E 1.518 0.433', 'G mirror D C B', 'H dyad C F 2.147 0.208 right'],
+        {}, ['Fb.y', 'F.x'], np.array([-8.47, -8.43])),
     'a gear without a place where the input is zero': (
         ['A ground 0 0', 'B ground 0.4 0', 'C cylinder A B 0.3 left',
          'D carriage B along A -0.7 -0.2 geared cylinder -1.5 0.2 called drive',

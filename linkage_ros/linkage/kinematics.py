@@ -245,13 +245,13 @@ class Kinematics:
                    for tolerance, start, end in values)
 
     def repeats(self, by: int, turns: float, kind: str, outputs: Tuple[str, ...], high: float,
-                gaps: Sequence[float] = ()) -> bool:
+                middles: Sequence[float] = ()) -> bool:
         """
         Return whether outputs are the same so many turns of an input later, from -high to high.
 
-        They are asked in gaps of the reach, too: samples alone miss narrow ones.
+        They are asked in the `middles` of arcs and gaps, too: samples alone miss narrow ones.
         """
-        now = np.append(high * np.linspace(-1.0, 1.0, COMPARED + 2)[1:-1], gaps)
+        now = np.append(high * np.linspace(-1.0, 1.0, COMPARED + 2)[1:-1], middles)
         later = now + math.tau * turns
         inputs = spread([self._with_stroke(x) for x in self.structure.built.inputs], len(now))
         pose, rows = self.compiled(kind, outputs), []

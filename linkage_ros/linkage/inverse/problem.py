@@ -71,10 +71,10 @@ class InverseProblem:
         """Return an input, with one turn as its period if the outputs repeat after that."""
         if not input_.is_part:
             return input_
-        arcs = reach_of(self.linkage) if self.n == 1 else []
-        gaps = [0.5 * (end + start) for (_, end), (start, _) in zip(arcs, arcs[1:])]
+        ends = np.ravel(reach_of(self.linkage)) if self.n == 1 else np.empty(0)
         # A value repeats only where the linkage can be assembled again.
-        repeats = self.linkage.repeats(by, 1, 'checked', self.outputs, input_.high, gaps)
+        repeats = self.linkage.repeats(by, 1, 'checked', self.outputs, input_.high,
+                                       0.5 * (ends[1:] + ends[:-1]))
         return Input(input_.name, speed=input_.speed) if repeats else input_
 
     @cached_property
