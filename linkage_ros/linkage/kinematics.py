@@ -245,7 +245,7 @@ class Kinematics:
                    for tolerance, start, end in values)
 
     def repeats(self, by: int, turns: float, kind: str, outputs: Tuple[str, ...], high: float,
-                middles: Sequence[float] = ()) -> bool:
+                middles: ArrayLike = ()) -> bool:
         """
         Return whether outputs are the same so many turns of an input later, from -high to high.
 
