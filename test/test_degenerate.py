@@ -111,3 +111,27 @@ def test_bars_that_differ_by_rounding_keep_their_lengths_beside_an_arm_of_hardly
     theta = np.array([-1e-3, -1e-12, -1e-15, 0.0, 1e-16, 1e-14, 1e-3])
     for places in (kite.solve(theta)['B'], np.array([kite.solve(x)['B'] for x in theta])):
         np.testing.assert_allclose(np.hypot(*(places - (1.0, 0.0)).T), 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize('apart', [1e-13, 2.3e-12, 1.3e-11, 1e-9, 1e-7])
+@pytest.mark.parametrize('x', [1.33087356405, 0.7, 2.123])
+def test_bars_that_are_sums_have_their_lengths_where_they_are_nearly_equal(x, apart):
+    bars = f'{x}+{x} {x}+{x}+{x}-d'
+    cell = linkage('A ground 0 0', f'B ground 0 -{x}', f'C crank A {x} up',
+                   f'D E F inversor B C {bars}', d=x * (1.0 + apart))
+    found = cell.solve(math.pi + np.array([-5.0, 5.0, 100.0]) * apart)
+    rhombus = found['D'] + found['F'] - found['C'] - found['E']
+    assert np.isfinite(rhombus).all() and np.abs(rhombus).max() < 1e-14
+    corner = linkage('A ground 0 0', 'C crank A b', f'E rigid A C {bars} left',
+                     d=x * (1.0 + apart), b=2.0 * x * apart).solve(0.7)['E']
+    assert np.hypot(*corner) == pytest.approx(2.0 * x, rel=4e-15)
+
+
+@pytest.mark.parametrize('base, sides', [('x', 'y x+y'), ('x', 'x+y y'), ('x+y', 'x y')])
+def test_the_corner_of_a_flat_triangle_is_on_the_line(base, sides):
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        found = linkage('A ground 0 0', f'C crank A {base}', f'E rigid A C {sides} left',
+                        **dict(zip('xy', rng.uniform(0.2, 3.0, 2)))).solve(0.7)
+        (a, b), (c, d) = found['C'], found['E']
+        assert abs(a * d - b * c) < 1e-14

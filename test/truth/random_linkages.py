@@ -4,8 +4,8 @@
 """
 Random linkages of every word of the language, a third of them nearly degenerate.
 
-A line is a form of `LINES` or `INPUTS` with joints, numbers and sides at random. It is kept if the
-library takes it and its drawing has a pose at some of two dozen random inputs. What is degenerate
+A line is a form of `LINES` or `INPUTS` with joints, numbers and sides at random. It is used if the
+library accepts it and its drawing has a pose at some of two dozen random inputs. What is degenerate
 is made on purpose: equal bars by one name or one number, change points, sums and differences of
 lengths, offsets of zero, and all that but for a rounding or a little more.
 """
@@ -185,7 +185,7 @@ class _Writer:
         while missing > 0:
             text = f'ground {self._coordinate()} {self._coordinate()}'
             if not any(line.endswith(text) for line in self.lines):
-                self._take([self._name()], text)
+                self._append([self._name()], text)
                 missing -= 1
 
     def _fold(self):
@@ -193,9 +193,9 @@ class _Writer:
         crank = self._nudged(ground) if self._rng.random() < 0.4 else self._number()
         names = dict(zip('OQAB', (self._name() for _ in 'OQAB')))
         place = self._rng.choice(('{} 0', '-{} 0', '0 {}', '0 -{}'))
-        self._take([names['O']], 'ground 0 0')
-        self._take([names['Q']], 'ground ' + place.format(ground))
-        self._take([names['A']], f'crank {names["O"]} {crank}' + self._rng.choice(('', ' up')))
+        self._append([names['O']], 'ground 0 0')
+        self._append([names['Q']], 'ground ' + place.format(ground))
+        self._append([names['A']], f'crank {names["O"]} {crank}' + self._rng.choice(('', ' up')))
         self.inputs = 1
         known = {**names, 'g': lambda: self._nudged(ground), 'k': lambda: self._nudged(crank),
                  'l': cache(self._number)}
@@ -223,7 +223,7 @@ class _Writer:
                 self._rng, lines, self.dimensions):
             self.dimensions, self._lengths = before
             return False
-        self._take(names, text)
+        self._append(names, text)
         return True
 
     def _picked(self, linkage):
@@ -249,7 +249,7 @@ class _Writer:
         return form in INPUTS or 'geared' in form or form.startswith('image') or any(
             joint in text.split() for joint in self._joints if joint not in fixed)
 
-    def _take(self, names, text):
+    def _append(self, names, text):
         self.lines.append(f'{" ".join(names)} {text}')
         self._joints += names
 
@@ -319,8 +319,8 @@ class _EqualBars(_Writer):
         self.dimensions = {'a': float(rng.choice((1.0, 0.3, 0.7))) * unit,
                            'b': float(rng.choice((1.0, 0.4, 2.5))) * unit}
         place = rng.choice(('a 0', '-a 0', '0 a', 'a a', '-a a'))
-        self._take([self._name()], 'ground 0 0')
-        self._take([self._name()], f'ground {place}')
+        self._append([self._name()], 'ground 0 0')
+        self._append([self._name()], f'ground {place}')
 
     def _number(self):
         return chosen(self._rng, self.LENGTHS)

@@ -85,6 +85,11 @@ class CrankEnds(NamedTuple):
     theta: Real
 
 
+def squares_apart(first: Real, second: Real) -> Real:
+    """Return first^2 - second^2, with the exact difference of lengths that are sums."""
+    return exact_sum(first, -second) * (first + second)
+
+
 def on_line(along: Complex, place: Real) -> Complex:
     """Return the vector of a length along a direction; both parts are NaN where the length is."""
     # Generated code omits products with zero, which would carry the NaN.
@@ -182,7 +187,7 @@ class Arm:
         The bars first and second [m] go from that corner to the arm's end and to its foot. Vector
         and arm are the parallel sides of a trapezoid; their product is |first^2 - second^2|.
         """
-        power = valid_where((first - second) * (first + second), self.square)
+        power = valid_where(squares_apart(first, second), self.square)
         return self.vector * (power / self.divisor)
 
     def _limit(self, radius: Real, size: Real, margin: Real) -> Limit:
@@ -381,12 +386,11 @@ def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
     """
     gaps = (exact_sum(first, second, -base) * exact_sum(first, second, base),
             exact_sum(base, -first, second) * exact_sum(base, first, -second))
-    twice = 2.0 * square(base)
-    tolerance = TOLERANCE * square(first + second)
-    # Sides that are flat up to rounding are flat.
-    height = reduce(lambda x, y: x * y, (
-        root(where(abs(gap) <= tolerance, 0.0, gap), tolerance) for gap in gaps))
-    return Complex(0.5 + (first - second) * (first + second) / twice, height / twice * side)
+    twice, sides = 2.0 * square(base), first + second
+    # Sides that are flat up to rounding, which moves a factor of a gap, are flat.
+    near, far = (root(where(abs(gap) <= tolerance, 0.0, gap), tolerance) for gap, tolerance in zip(
+        gaps, (TOLERANCE * square(sides), TOLERANCE * sides * base)))
+    return Complex(0.5 + squares_apart(first, second) / twice, near * far / twice * side)
 
 
 def mirror(arm: Arm, image: Complex, offset: Real, ends: Sequence[Complex]
@@ -448,7 +452,7 @@ def inversor(arm: Arm, long: Real, short: Real) -> Tuple[Dyad, Dyad, Complex]:
     """
     right = dyad(arm, long, short, -1.0)
     left = dyad(arm, long, short, 1.0)
-    power = (long - short) * (long + short)
+    power = squares_apart(long, short)
     inverse = arm.vector * (power / arm.divisor)
     return right, left, Complex(*(
         valid_within(part, right.limits) for part in (inverse.x, inverse.y)))
