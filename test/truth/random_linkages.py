@@ -5,7 +5,7 @@
 Random linkages of every word of the language, a third of them nearly degenerate.
 
 A line is a form of `LINES` or `INPUTS` with joints, numbers and sides at random. It is used if the
-library accepts it and its drawing has a pose at some of two dozen random inputs. What is degenerate
+library accepts it and its drawing has a pose at some of two dozen random inputs. The degenerate
 is made on purpose: equal bars by one name or one number, change points, sums and differences of
 lengths, offsets of zero, and all that but for a rounding or a little more.
 """
