@@ -34,12 +34,12 @@ from typing import NamedTuple
 from linkage_ros import scene
 from linkage_ros.linkage import LinkPoint
 from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.publishers import LATCHED
 from linkage_ros.robot_model import bodies, shapes, urdf
 import numpy as np
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import TimeoutException
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from ros_harness import DEADLINE
 from sensor_msgs.msg import JointState
@@ -50,7 +50,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 # Of fewer bytes no message is made.
 SHORTEST = 8
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # Types of markers by their ids, as docs/nodes-and-topics.md has them.
 KINDS = {0: Marker.LINE_LIST, 1: Marker.SPHERE_LIST, 3: Marker.LINE_LIST, 4: Marker.LINE_LIST,
          5: Marker.LINE_LIST, 6: Marker.LINE_LIST, 7: Marker.TRIANGLE_LIST,

@@ -8,13 +8,12 @@ from pathlib import Path
 
 from linkage_ros import mechanisms, palette, scene
 from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.publishers import LATCHED
 import numpy as np
 import pytest
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 WALKER = {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.scale': 0.01,
           'walker.leg_pairs': 3}
 ANKLE = {one.name.partition('.')[2]: one.value for one in scene.load(

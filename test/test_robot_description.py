@@ -16,15 +16,14 @@ pytest.importorskip('rclpy')
 
 from linkage_ros import scene  # noqa: E402
 from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
+from linkage_ros.nodes.publishers import LATCHED  # noqa: E402
 from linkage_ros.nodes.urdf_cli import main  # noqa: E402
 from linkage_ros.robot_model import urdf  # noqa: E402
-from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from robots import in_frame, Pinocchio  # noqa: E402
 from sensor_msgs.msg import JointState  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 CATALOGUE = Path(__file__).parents[1] / 'config' / 'all.yaml'
 POSE = [0.3, -0.2, 0.92, math.pi / 2.0, 0.4, -1.1]
 ROBOT = {'mechanisms': ['hand', 'arm', 'foot'], 'frame_id': 'torso', 'arm.type': 'four_bar',

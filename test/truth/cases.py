@@ -34,10 +34,6 @@ class Case(NamedTuple):
 
 # An excavator's idler stands so far from the ground bar when its piston is at zero [rad].
 IDLER = math.pi / 2 - 0.4305008189
-# The 2F-85's finger as in MuJoCo's menagerie, y and z of its right half: where the driver with its
-# coupler, the spring link and the tip of the follower are when the gripper is open [m].
-DRIVER, SPRING, KNUCKLE, CORNER, TIP = (0.0306011 + 0.054904j, 0.0132 + 0.0609j, 0.0502 + 0.1049j,
-                                        0.0682 + 0.0984j, 0.0493 + 0.11192j)
 # Cassie's tarsus, seen from itself: the foot's crank and the foot [m].
 CRANK, FOOT = 0.058 - 0.034j, 0.408 - 0.04j
 
@@ -78,17 +74,6 @@ CASES = {
         K parallelogram O A G
         L parallelogram A W K""",
         {'l': 142.07, 'u': 158.81, 'c': 40.0, 'd': 35.0}, ((1.9, 2.9), (0.7, 3.8))),
-    '2F-85 finger': Case("""
-        D ground dx dy
-        Z ground zx zy
-        S ground sx sy
-        P crank D d zero Z
-        F dyad P S f s right
-        T rigid P F t r right""",
-        {'dx': DRIVER.real, 'dy': DRIVER.imag, 'zx': CORNER.real, 'zy': CORNER.imag,
-         'sx': SPRING.real, 'sy': SPRING.imag, 'd': abs(CORNER - DRIVER),
-         'f': abs(KNUCKLE - CORNER), 's': abs(KNUCKLE - SPRING), 't': abs(TIP - CORNER),
-         'r': abs(TIP - KNUCKLE)}, ((0.0,), (0.8,))),
     # One dyad on the tarsus, which the first crank moves; a parallelogram but for 1 mm.
     "Cassie's toe": Case("""
         O ground 0 0
@@ -98,12 +83,6 @@ CASES = {
         B dyad A F r f right""",
         {'l': abs(FOOT), 'k': abs(CRANK), 'g': abs(FOOT - CRANK), 'a': 0.055, 'r': 0.35012,
          'f': math.hypot(0.05512, 0.006)}, ((-0.1, -1.5), (1.2, -2.2))),
-    'closed SDF four-bar': Case("""
-        O ground 0 0
-        Q ground b 0
-        A crank O a
-        B dyad A Q b a left""",
-        {'a': 0.2, 'b': 0.3}, ((0.3,), (2.8,))),
     'scissor lift': Case("""
         O ground 0 0
         X ground a 0
@@ -116,14 +95,6 @@ CASES = {
         E slider V h O 90deg out
         L block E 0 -w""",
         {'a': 1.0, 'h': 0.1, 'w': 1.5}, ((0.5,), (1.8,))),
-    'toggle clamp': Case("""
-        O ground 0 0
-        Q ground g h
-        A crank O m
-        B dyad A Q b c left
-        P rigid Q B e f right""",
-        {'g': 0.08, 'h': 0.01, 'm': 0.03, 'b': 0.05, 'c': 0.035, 'e': 0.09, 'f': 0.07},
-        ((1.5,), (-0.5,))),
     'Scotch yoke': Case("""
         O ground 0 0
         X ground r 0
@@ -143,13 +114,6 @@ CASES = {
         A crank O r
         B crank A r zero O geared crank -2 pi""",
         {'r': 0.1}, ((0.1,), (6.0,))),
-    # openarm [mm].
-    'gripper': Case("""
-        O ground 0 0
-        G ground 0 h
-        A crank O m
-        S slider A r G 0 out""",
-        {'m': 40.0, 'r': 17.5, 'h': 13.0}, ((0.0,), (0.8,))),
     'trammel of Archimedes': Case("""
         O ground 0 0
         X ground l 0
