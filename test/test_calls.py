@@ -88,7 +88,9 @@ def test_what_is_no_number_is_refused_with_its_name(bars, arm, wrong):
             ask()
 
 
-@pytest.mark.parametrize('wrong', ['x', None, {}, object(), [[1.0], 'x'], True, math.nan])
+@pytest.mark.parametrize('wrong', [
+    'x', None, {}, object(), [[1.0], 'x'], True, math.nan, 'distance(A,A)', 'distance(A,Z)',
+    'angle(A)', 'angle(A,B,C)', 'distance(A, B)', 'A.z', '', 'distance', '(A,B)', 7])
 def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong):
     ankle = mechanisms.create('rods', joints=(
         'O motor ground at 0 0 0 axis 0 0 1', 'S slide ground at 1 0 0 axis 1 0 0',
@@ -96,6 +98,7 @@ def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong
     assert not bars.has_output(wrong) and not bars.moves(wrong)
     for ask, text in (
             (lambda: bars.is_angle(wrong), 'has no output'),
+            (lambda: bars.input_for(wrong, 1.0), 'four_bar has no'),
             (lambda: bars.extremes(wrong), 'has no output'),
             (lambda: bars.extremes('QB', [wrong]), 'arcs must be'),
             (lambda: bars.function(xp=wrong or 'x'), 'xp must be a package'),

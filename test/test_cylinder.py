@@ -5,11 +5,12 @@
 
 import math
 
-from linkage_ros import mechanisms, scene
+from linkage_ros import mechanisms
 from linkage_ros.robot_model import urdf
 import numpy as np
 import pytest
 from robots import Pinocchio
+from scenes import alone
 
 
 @pytest.mark.parametrize('far, placed', [(1, True), (40, False)])
@@ -35,6 +36,4 @@ def test_the_barrel_of_an_isosceles_cylinder_keeps_its_digits_as_it_gets_short(l
 def test_a_carriage_alone_is_a_linkage():
     rail = ['O ground 0 0', 'X ground 1 0', 'R carriage O along X -0.2 0.7']
     assert mechanisms.create('custom', joints=rail).extremes('R.x') == [((-0.2, -0.2), (0.7, 0.7))]
-    mechanism = scene.read({
-        'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': rail}).mechanisms['m']
-    assert Pinocchio(urdf.describe([mechanism], 'world')).joints == ['m_carriage']
+    assert Pinocchio(urdf.describe([alone(rail)], 'world')).joints == ['m_carriage']

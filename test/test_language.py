@@ -94,6 +94,12 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('R ground 0 0; P slider A 1 R along O out', 'R and O are at the same place'),
     ('R ground 0 0; P dyad R O 1 1 left', 'R and O are at the same place'),
     ('R ground 1 0; S image O R Q; P dyad S O 1 1 left', 'S and O are at the same place'),
+    ('m mirrored O A', 'joint A must be on the ground'),
+    ('m mirrored O O', 'the joints that it is placed from must differ'),
+    ('9 mirrored O Q', "'9' cannot name a joint"),
+    ('m mirrored O X', 'joint X is not placed before'),
+    ('m mirrored O', 'expected "NAME mirrored FIRST SECOND"'),
+    ('m n mirrored O Q', 'expected "NAME mirrored FIRST SECOND"'),
     ('P' * 65 + ' ground 0 0', 'a letter, then up to 63 letters, digits and underscores'),
 ])
 def test_a_wrong_line_is_refused_with_the_line_and_what_is_allowed(line, problem):

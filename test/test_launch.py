@@ -81,21 +81,6 @@ def test_rviz_and_foxglove_show_what_the_nodes_of_the_scene_publish(graph, shown
         assert path['label'] == called[int(place)]
 
 
-def test_rviz_looks_from_where_the_linkages_are_seen(shown):
-    given = scene.load(str(CONFIG / 'all.yaml'))
-    manager = shown['Visualization Manager']
-    assert manager['Global Options']['Fixed Frame'] == given.frame_id
-    groups = [d['Name'] for d in manager['Displays'] if d['Class'] == rviz.GROUP]
-    assert groups == list(given.mechanisms)
-    enabled = {d['Class'] for d in displays(shown) if d['Enabled']}
-    assert enabled == {'rviz_default_plugins/Grid', 'rviz_default_plugins/MarkerArray',
-                       'rviz_default_plugins/Marker'}
-    # Along +y, on the plane x-z that they stand in.
-    assert manager['Views']['Current']['Yaw'] == pytest.approx(4.712389)
-    assert all(mechanism.pose[3:] == pytest.approx((1.5707963, 0.0, 0.0))
-               for mechanism in given.mechanisms.values())
-
-
 def test_rviz_shows_any_other_scene_too(shown):
     given = scene.load(str(CONFIG / 'all.yaml'))
     assert rviz.adapted(shown, given.mechanisms, given.frame_id) == shown

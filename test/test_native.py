@@ -15,7 +15,6 @@ from linkage_ros.formula import expression, program
 from linkage_ros.scene.legs import Assembly
 import numpy as np
 import pytest
-from truth import hard_cases
 
 native = pytest.importorskip('linkage_ros.formula.llvm_code')
 
@@ -51,16 +50,6 @@ def fresh(name):
         'O ground 0 0', 'Q ground 3 0', 'A crank O 1', f'{name} dyad A Q 2.5 2.5 left'])
 
 
-TYPES = [kind for kind in mechanisms.TYPES if len(mechanisms.create(kind).inputs) == 1]
-
-
-def angles(linkage):
-    """Return angles [rad] of every size, dead points and reach limits, and no numbers at all."""
-    ends = [end for arc in linkage.reach() for end in arc] + list(linkage.dead_points())
-    return np.concatenate([hard_cases.angles(np.random.default_rng(3), 200, ends),
-                           [math.inf, -math.inf, math.nan]])
-
-
 def wait_for_compilers():
     """Wait for the threads that compile."""
     for thread in threading.enumerate():
@@ -77,19 +66,6 @@ def by_batch(linkage, thetas):
     wait_for_compilers()
     assert batch.solve()
     return rows
-
-
-def one_by_one(linkage, thetas):
-    """Return what plain Python finds."""
-    return np.array([linkage.function()(*given) for given in np.atleast_2d(thetas).T.tolist()])
-
-
-@pytest.mark.nightly(all_but=3)
-@pytest.mark.parametrize('kind', TYPES)
-def test_every_bit_is_the_same(kind):
-    linkage = mechanisms.create(kind)
-    thetas = angles(linkage)
-    assert np.array_equal(by_batch(linkage, thetas), one_by_one(linkage, thetas), equal_nan=True)
 
 
 def test_nobody_waits_for_the_compiler(code):

@@ -16,7 +16,7 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-from c_libraries import alone, counted, expected, loaded, outputs, prove, shared, STAND_IN
+from c_libraries import counted, expected, loaded, outputs, prove, shared, STAND_IN
 from c_memories import compiled, memories, Memory, UNWRITTEN
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header, transmission
@@ -24,6 +24,7 @@ from linkage_ros.c_code.axes import actuators, joints
 from linkage_ros.c_code.package import package
 import numpy as np
 import pytest
+from scenes import alone
 
 ROOT = Path(__file__).parents[1]
 COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
@@ -299,14 +300,6 @@ def test_the_joints_are_chosen_by_their_names(mechanisms):
     for names in (['knee'], ['P.x', 'P.y'], ['leg_AP'], ['leg_AP', 'leg_AP']):
         with pytest.raises(ValueError, match='leg has 2 inputs: as many of its joints are needed'):
             joints(leg, names)
-
-
-def test_all_ground_links_of_the_catalogue_but_one_are_closed_forms():
-    linkages = [mechanisms.create(name) for name in mechanisms.TYPES]
-    closed = {(linkage.type, link.name): linkage.inverse(link.name).closed is not None
-              for linkage in linkages if len(linkage.inputs) == 1 for link in linkage.links
-              if link.parent == 'ground' and link.name != linkage.inputs[0].name}
-    assert len(closed) == 16 and [key for key in closed if not closed[key]] == [('klann', 'CF')]
 
 
 @pytest.mark.skipif(not shutil.which('avr-gcc'), reason='avr-gcc is not installed')
