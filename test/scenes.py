@@ -1,9 +1,21 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Scenes of one mechanism."""
+"""Scenes of one mechanism, and those of the package."""
+
+from pathlib import Path
 
 from linkage_ros import scene
+from linkage_ros.scene.writing import without_defaults
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = [*sorted((ROOT / 'config').glob('*.yaml')), *sorted((ROOT / 'examples').glob('*.yaml'))]
+
+
+def example(name):
+    """Return the parameters of an example."""
+    return without_defaults(scene.load(str(next(
+        path for path in EXAMPLES if path.stem == name))))
 
 
 def alone(linkage, name='m', **settings):

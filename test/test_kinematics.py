@@ -4,21 +4,20 @@
 """The kinematics node: what arrives on its topics is the linkage."""
 
 import math
-from pathlib import Path
 
-from linkage_ros import mechanisms, palette, scene
+from linkage_ros import mechanisms, palette
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.publishers import LATCHED
 import numpy as np
 import pytest
+from scenes import example
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
 WALKER = {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.scale': 0.01,
           'walker.leg_pairs': 3}
-ANKLE = {one.name.partition('.')[2]: one.value for one in scene.load(
-    str(Path(__file__).parents[1] / 'examples' / 'ankle.yaml')).parameters
-    if one.name.startswith('ankle.') and one.value != ()}
+ANKLE = {name.removeprefix('ankle.'): value for name, value in example('ankle').items()
+         if name.startswith('ankle.')}
 LIFT = ['O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C line O B 1.6']
 # A mechanism, where its inputs are, and what is said of it, called {m}.
 UNASSEMBLED = [

@@ -17,6 +17,7 @@ from linkage_ros import scene
 from linkage_ros.robot_model import rviz
 import numpy as np
 import pytest
+from scenes import example
 import yaml
 
 ROOT = Path(__file__).parents[1]
@@ -58,8 +59,7 @@ def test_rviz_and_foxglove_show_what_the_nodes_of_the_scene_publish(graph, shown
     from linkage_ros.nodes.kinematics import Kinematics
 
     given = scene.load(str(CONFIG / 'all.yaml'))
-    node = graph.start(Kinematics, {p.name: p.value for p in given.parameters
-                                    if p.value != ()})
+    node = graph.start(Kinematics, example('all'))
     published = set()
     for name, types in node.get_publisher_names_and_types_by_node('kinematics', '/'):
         for class_, type_ in MESSAGES.items():

@@ -5,8 +5,6 @@
 
 import math
 from pathlib import Path
-import subprocess
-import sys
 from xml.etree import ElementTree
 
 import numpy as np
@@ -133,14 +131,3 @@ def test_what_is_not_understood_is_refused_in_one_line(files, capsys, arguments,
     printed = capsys.readouterr()
     assert printed.out == '' and printed.err.count('\n') == 1 and complaint in printed.err
     assert printed.err.startswith('urdf: ')
-
-
-@pytest.mark.nightly
-def test_a_scene_is_described_without_ros():
-    code = ('import sys; sys.modules["rclpy"] = None; '
-            'from linkage_ros.robot_model.cli import main; sys.exit(main(sys.argv[1:]))')
-    for arguments, ended in (([str(CATALOGUE)], 0), (['--ros-args'], 1)):
-        process = subprocess.run([sys.executable, '-c', code, *arguments], capture_output=True,
-                                 text=True, timeout=60, cwd=Path(__file__).parents[1])
-        assert process.returncode == ended, process.stderr
-        assert ended == 0 or 'unrecognized arguments: --ros-args' in process.stderr

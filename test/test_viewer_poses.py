@@ -16,8 +16,8 @@ from linkage_ros.web import curves, poses
 from linkage_ros.web.nearest_pose import nearest_inputs, theta_of
 import numpy as np
 import pytest
-from scenes import alone
-from viewer_harness import DOUBLE, example, EXAMPLES, mechanism_of
+from scenes import alone, example, EXAMPLES
+from viewer_harness import DOUBLE, mechanism_of
 
 
 @pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
