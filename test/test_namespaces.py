@@ -36,7 +36,7 @@ def linkage(kind):
     if kind in files:
         return scene.load(files[kind]).mechanisms[kind].linkage
     if kind in CASES:
-        return mechanisms.create('custom', joints=CASES[kind].joints, **CASES[kind].numbers)
+        return mechanisms.create('custom', joints=CASES[kind].joints, **CASES[kind].dimensions)
     return mechanisms.create(kind)
 
 

@@ -69,7 +69,7 @@ LISTED = {
        for kind in mechanisms.TYPES},
     **{f'{kind} of {lengths}': random_linkages.Design(mechanisms.design(kind).joints, lengths, {})
        for kind, several in hard_cases.CATALOGUE.items() for lengths in several},
-    **{name: case.design for name, case in CASES.items()},
+    **CASES,
     **{name: random_linkages.Design(lines, {}, {}) for name, lines in OTHERS.items()}}
 
 

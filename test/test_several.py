@@ -34,8 +34,8 @@ def agree(linkage, outputs, values, expected, sure=1e-3):
 
 def made(name):
     """Return a collected case and its numbers."""
-    case = CASES[name]
-    return mechanisms.create('custom', joints=case.joints, **case.numbers), case.numbers
+    joints, numbers, _ = CASES[name]
+    return mechanisms.create('custom', joints=joints, **numbers), numbers
 
 
 @pytest.mark.parametrize('count', [

@@ -61,7 +61,7 @@ MACHINES = {
 }
 OWN = {name: lambda case=case, pairs=2 if name == 'Cardan gears' else 1: mechanism(
     case.joints, leg_pairs=pairs,
-    **{f'dimensions__{key}': value for key, value in case.numbers.items()})
+    **{f'dimensions__{key}': value for key, value in case.dimensions.items()})
     for name, case in CASES.items()}
 
 

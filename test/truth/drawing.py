@@ -408,21 +408,18 @@ class Linkage:
         return next((body for body in self.bodies if first in body and second in body), None)
 
     def _stand(self):
-        """Note the joints and the closures that each joint stands on, itself among them."""
-        self.stands, self.closures = {}, {}
+        """Note the closures that each joint stands on, its own among them."""
+        self.closures = {}
         closed = ('dyad', 'carriage', 'cylinder', 'block', 'inversor', 'slot', 'slider', 'mirror',
                   'antiparallelogram')
         for line in self.lines:
             joints = line.joints
             if line.word == 'block':
                 joints = (*joints, self.line_of_block(joints[0]))
-            below = set().union(*(self.stands[name] for name in joints), joints)
             needs = frozenset().union(*(self.closures[name] for name in joints))
             if line.word in closed:
                 needs = needs | {line.names[0]}
-            for name in line.names:
-                self.stands[name] = below | {name}
-                self.closures[name] = needs
+            self.closures.update(dict.fromkeys(line.names, needs))
 
     def base(self, numbers, first, second):
         """Return the length of a bar between two joints of one moving link, from its template."""
