@@ -1,26 +1,24 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The example robot: what arrives on `joint_states` closes the loops of its own URDF."""
+"""The example robots: what arrives on `joint_states` closes the loops of their own URDFs."""
 
 from importlib.util import find_spec
+import math
 from pathlib import Path
 import runpy
 import subprocess
 import sys
 from xml.etree import ElementTree
 
+from linkage_ros.nodes.crank_driver import CrankDriver
+from linkage_ros.nodes.kinematics import Kinematics
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
-from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from robots import in_frame, LIBRARIES  # noqa: E402
-from ros_harness import Graph  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from visualization_msgs.msg import MarkerArray  # noqa: E402
+from robots import in_frame, LIBRARIES, Pinocchio
+from ros_harness import Graph
+from sensor_msgs.msg import JointState
+from visualization_msgs.msg import MarkerArray
 
 EXAMPLES = Path(__file__).parents[1] / 'examples'
 URDF = (EXAMPLES / 'leg.urdf').read_text()
@@ -151,3 +149,20 @@ def test_the_picture_is_drawn_by_its_command(tmp_path, monkeypatch):
     subprocess.run([sys.executable, EXAMPLES / 'draw_leg.py', tmp_path / 'leg.png'], check=True,
                    timeout=60)
     assert (tmp_path / 'leg.png').read_bytes().startswith(b'\x89PNG')
+
+
+def test_the_example_s_rods_are_closed_in_its_own_urdf(graph):
+    graph.start(Kinematics, cli_args=['--ros-args', '--params-file', str(EXAMPLES / 'ankle.yaml')])
+    turn = graph.crank(['motor_right', 'motor_left'])
+    heard = graph.listen(JointState, 'ankle/joint_states')
+    robot = Pinocchio((EXAMPLES / 'ankle.urdf').read_text())
+    lengths = {'right': math.dist((0.0395, -0.0164, 0.2112), (0.022, -0.015, -0.0096)),
+               'left': math.dist((0.035, 0.0165, 0.1469), (0.022, 0.015, -0.0096))}
+    for motors in np.random.default_rng(1).uniform(-0.2, 0.2, (20, 2)).tolist():
+        message = turn(motors, heard)
+        joints = {'motor_right': motors[0], 'motor_left': motors[1],
+                  **dict(zip(message.name, message.position))}
+        assert joints.keys() == {*robot.joints}
+        for side, length in lengths.items():
+            ends = robot.places(joints, [f'{side}_pin', f'{side}_eye']).values()
+            assert abs(math.dist(*ends) - length) < 1e-12

@@ -16,17 +16,13 @@ import sys
 import textwrap
 from xml.etree import ElementTree
 
+from linkage_ros import mechanisms, scene
 import pytest
-
-pytest.importorskip('rclpy')
-pytest.importorskip('linkage_interfaces')
-yaml = pytest.importorskip('yaml')
-
-from linkage_ros import mechanisms, scene  # noqa: E402
-from robots import LIBRARIES  # noqa: E402
-from ros_harness import Process  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from std_msgs.msg import Float64MultiArray  # noqa: E402
+from robots import LIBRARIES
+from ros_harness import Process
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+import yaml
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / 'docs'
@@ -116,6 +112,7 @@ def message_type(type_):
 @pytest.fixture
 def reader(graph, capsys, monkeypatch, tmp_path):
     """Return a reader in a folder with `examples/` in it."""
+    pytest.importorskip('linkage_interfaces')
     (tmp_path / 'examples').symlink_to(ROOT / 'examples')
     monkeypatch.chdir(tmp_path)
     return Reader(graph, capsys)

@@ -7,20 +7,17 @@ import math
 from pathlib import Path
 from xml.etree import ElementTree
 
+from linkage_ros import scene
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.publishers import LATCHED
+from linkage_ros.nodes.urdf_cli import main
+from linkage_ros.robot_model import urdf
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
-from linkage_ros import scene  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.publishers import LATCHED  # noqa: E402
-from linkage_ros.nodes.urdf_cli import main  # noqa: E402
-from linkage_ros.robot_model import urdf  # noqa: E402
-from robots import in_frame, Pinocchio  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
-from visualization_msgs.msg import MarkerArray  # noqa: E402
+from robots import in_frame, Pinocchio
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from visualization_msgs.msg import MarkerArray
 
 CATALOGUE = Path(__file__).parents[1] / 'config' / 'all.yaml'
 POSE = [0.3, -0.2, 0.92, math.pi / 2.0, 0.4, -1.1]
