@@ -5,11 +5,7 @@
 
 import math
 
-from linkage_interfaces.srv import (
-    InputsFor,
-    ServoInverse as Service,
-    ServoInverse as ServoInverseType,
-)
+from linkage_interfaces.srv import InputsFor, ServoInverse as Service
 from linkage_ros import mechanisms, scene
 from linkage_ros.nodes import scene_process
 from linkage_ros.nodes.crank_driver import CrankDriver
@@ -155,25 +151,27 @@ def test_what_cannot_be_asked_of_several_inputs_gets_the_reason(graph):
             message=message, names=['leg_crank', 'motor'])
 
 
+def test_dimensions_change_while_the_node_runs(graph):
+    node, request = graph.start(ServoInverse), Service.Request(lever_angle=[0.8])
+    assert not node.answer(request, Service.Response()).success
+    graph.change(node, {}, slotted_lever__dimensions__a=140.0)
+    response = node.answer(request, Service.Response())
+    assert lever_of(response.servo_angle[0], a=140.0) == pytest.approx(0.8)
+
+
 # --- beside the other nodes in one process ---
 
 LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever', 'lever.crank.speed': 2.0}
 
 
-@pytest.fixture
-def nodes(graph):
-    """Start them as the process does."""
-    return [graph.start(kind, LEVER) for kind in (Kinematics, ServoInverse, CrankDriver)]
-
-
-def test_the_service_answers_on_the_working_branch_wherever_the_crank_is(graph, nodes):
-    *_, driver = nodes
-    client = graph.node.create_client(ServoInverseType, 'servo_inverse')
+def test_the_service_answers_on_the_working_branch_wherever_the_crank_is(graph):
+    *_, driver = [graph.start(kind, LEVER) for kind in (Kinematics, ServoInverse, CrankDriver)]
+    client = graph.node.create_client(Service, 'servo_inverse')
     cranks = graph.listen(JointState, 'crank_states')
     for start in (0.4, 2.9):
         graph.set(driver, lever__crank__start=start, lever__crank__speed=0.0)
         graph.until(lambda start=start: cranks and cranks[-1].position[0] == start)
-        found = graph.call(client, ServoInverseType.Request(lever_angle=[lever_of(0.4)]))
+        found = graph.call(client, Service.Request(lever_angle=[lever_of(0.4)]))
         assert found.success and found.servo_angle[0] == pytest.approx(0.4, abs=1e-9)
 
 
