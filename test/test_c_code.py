@@ -5,7 +5,6 @@
 
 import ctypes
 import math
-from pathlib import Path
 import re
 import shutil
 import subprocess
@@ -15,9 +14,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import cli, header
 import numpy as np
 import pytest
-from scenes import alone
-
-ROOT = Path(__file__).parents[1]
+from scenes import alone, ROOT
 
 pytestmark = pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
 

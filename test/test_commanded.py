@@ -11,7 +11,6 @@ beside it: at inputs that differ by 1e-3 rad or sizes. Python says where they ar
 from contextlib import suppress
 from itertools import product
 import math
-from pathlib import Path
 import subprocess
 
 from c_libraries import COMPILER, loaded, SANITIZED
@@ -21,11 +20,10 @@ from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import actuators, joints
 import numpy as np
 import pytest
-from scenes import alone
+from scenes import alone, ROOT
 from truth import random_linkages
 
 pytestmark = pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
-ROOT = Path(__file__).parents[1]
 NUMBERS = pytest.mark.parametrize('number', ['double', 'float'])
 # Linkages for which a closed form was missing an assembly mode; in float, one beside a limit.
 FAULTS = [(['A ground 0 0', 'B ground 0 1.4', 'C cylinder B A 1.0157 right',

@@ -5,7 +5,6 @@
 
 from importlib.util import find_spec
 import math
-from pathlib import Path
 import runpy
 import subprocess
 import sys
@@ -17,10 +16,11 @@ import numpy as np
 import pytest
 from robots import in_frame, LIBRARIES, Pinocchio
 from ros_harness import Graph
+from scenes import ROOT
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import MarkerArray
 
-EXAMPLES = Path(__file__).parents[1] / 'examples'
+EXAMPLES = ROOT / 'examples'
 URDF = (EXAMPLES / 'leg.urdf').read_text()
 ARGS = ['--ros-args', '--params-file', str(EXAMPLES / 'leg.yaml'),
         '-r', 'crank_states:=joint_states']

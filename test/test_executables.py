@@ -5,15 +5,14 @@
 
 from importlib import import_module
 import os
-from pathlib import Path
 import re
 import signal
 import time
 
 import pytest
 from ros_harness import module, Process
+from scenes import ROOT
 
-ROOT = Path(__file__).parents[1]
 NODES = ('crank_driver', 'kinematics', 'servo_inverse')
 EXECUTABLES = (*NODES, 'scene', 'viewer')
 

@@ -17,10 +17,9 @@ from linkage_ros import scene
 from linkage_ros.robot_model import rviz
 import numpy as np
 import pytest
-from scenes import example
+from scenes import example, ROOT
 import yaml
 
-ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / 'config'
 LAUNCH = ROOT / 'launch' / 'scene.launch.py'
 MESSAGES = {

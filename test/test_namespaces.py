@@ -6,14 +6,13 @@
 
 from functools import cache
 import math
-from pathlib import Path
 
 from linkage_ros import mechanisms, scene
 import numpy as np
 import pytest
+from scenes import ROOT
 from truth.cases import CASES
 
-ROOT = Path(__file__).parents[1]
 # Outputs with an inverse in closed form.
 INVERSES = {'five_bar': ('P.x', 'P.y'), 'ankle': ('pitch', 'roll'), 'four_bar': ('QB',),
             'slotted_lever': ('lever',), 'slider_crank': ('block',),

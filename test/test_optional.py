@@ -6,7 +6,6 @@
 from contextlib import suppress
 from importlib import import_module
 import os
-from pathlib import Path
 import re
 import signal
 import sys
@@ -15,8 +14,8 @@ from linkage_ros import mechanisms, optional
 from linkage_ros.scene.legs import Assembly
 import numpy as np
 import pytest
+from scenes import ROOT
 
-ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / 'config'
 ROBOTS = ROOT / 'test' / 'robot_files'
 # What a package does that is imported; an empty one has none of its names.

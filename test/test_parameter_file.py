@@ -3,7 +3,6 @@
 
 """A parameter file says the same to the library and to a node, whatever is in it."""
 
-from pathlib import Path
 import re
 
 from linkage_ros import scene
@@ -13,8 +12,8 @@ import pytest
 from rcl_interfaces.msg import ParameterDescriptor
 import rclpy
 from rclpy.node import Node
+from scenes import ROOT
 
-ROOT = Path(__file__).parents[1]
 # `{b:1}` is left out: libyaml reads it one way or another, by its version.
 VALUES = r"""
 1e-2 1E5 1_0 1:30 010 0x1F 08 +5 -5 nan .nan .inf -.inf +.inf inf Infinity -0 -0.0

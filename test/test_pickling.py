@@ -4,14 +4,13 @@
 """Mechanisms, and those of scenes, are copied and pickled, and answer the same."""
 
 from copy import copy, deepcopy
-from pathlib import Path
 import pickle
 
 from linkage_ros import mechanisms, scene
 import numpy as np
 import pytest
+from scenes import EXAMPLES
 
-CONFIG = Path(__file__).parents[1] / 'config'
 FIVE = np.array([-3.0, 0.0, 0.4, 1.3, 1e6])
 CRANK = mechanisms.create('custom', tracer='A', r=1.2, joints=(
     'O ground 0 0', 'Q ground 3 0', 'A crank O r', 'B dyad A Q 2.5 2.5 left'))
@@ -78,7 +77,7 @@ def test_a_copy_of_an_accelerated_one_is_accelerated():
 
 
 @pytest.mark.nightly(all_but=4)
-@pytest.mark.parametrize('file', sorted(CONFIG.glob('*.yaml')), ids=lambda file: file.stem)
+@pytest.mark.parametrize('file', EXAMPLES, ids=lambda file: file.stem)
 def test_scenes_and_what_is_in_them_can_be_sent(file):
     sent = scene.load(str(file))
     for way in WAYS.values():

@@ -25,9 +25,8 @@ from matplotlib.colors import to_rgb
 import numpy as np
 from PIL import Image
 import pytest
-from scenes import alone
+from scenes import alone, ROOT
 
-ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / 'config'
 TABLE = [line.split() for line in (ROOT / 'pictures' / 'pictures.txt').read_text().splitlines()
          if line and not line.startswith('#')]

@@ -4,7 +4,6 @@
 """The robot model on its topic: an unchanged robot_state_publisher sees what the markers show."""
 
 import math
-from pathlib import Path
 from xml.etree import ElementTree
 
 from linkage_ros import scene
@@ -15,11 +14,12 @@ from linkage_ros.robot_model import urdf
 import numpy as np
 import pytest
 from robots import in_frame, Pinocchio
+from scenes import ROOT
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-CATALOGUE = Path(__file__).parents[1] / 'config' / 'all.yaml'
+CATALOGUE = ROOT / 'config' / 'all.yaml'
 POSE = [0.3, -0.2, 0.92, math.pi / 2.0, 0.4, -1.1]
 ROBOT = {'mechanisms': ['hand', 'arm', 'foot'], 'frame_id': 'torso', 'arm.type': 'four_bar',
          'hand.type': 'slider_crank', 'foot.type': 'four_bar', 'foot.only_named': True,

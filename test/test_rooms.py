@@ -5,15 +5,14 @@
 
 import ast
 from functools import cache
-from pathlib import Path
 import re
 import sys
 from xml.etree import ElementTree
 
 from linkage_ros import optional
 import pytest
+from scenes import ROOT
 
-ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / 'linkage_ros'
 # From the ground up: a module imports from its own room and from those below.
 ROOMS = ('words', 'optional', 'palette', 'cache', 'formula', 'linkage', 'mechanisms', 'scene',

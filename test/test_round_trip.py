@@ -4,7 +4,6 @@
 """What is written of a robot model is read again: read(write(x)) = x in URDF, SDF and MJCF."""
 
 from contextlib import suppress
-from pathlib import Path
 
 from linkage_ros import scene
 from linkage_ros.robot_files import readers
@@ -13,11 +12,11 @@ from linkage_ros.robot_model.bodies import assembled
 import numpy as np
 import pytest
 from robots import of_text, ROBOTS
+from scenes import EXAMPLES
 from test_robot_files import random_linkage
 from test_robot_model import turned
 from test_urdf import ARM
 
-CONFIGS = sorted(Path(__file__).parents[1].glob('config/*.yaml'))
 FORMATS = {'urdf': urdf.write, 'sdf': sdf.write, 'mjcf': mjcf.write}
 
 
@@ -103,7 +102,7 @@ def prepared(mechanisms, form, frame_id='world'):
 
 @pytest.mark.nightly(all_but=12)
 @pytest.mark.parametrize('form', FORMATS)
-@pytest.mark.parametrize('config', CONFIGS, ids=lambda config: config.stem)
+@pytest.mark.parametrize('config', EXAMPLES, ids=lambda config: config.stem)
 def test_robots_of_the_shipped_scenes_come_back(tmp_path, config, form):
     given = scene.load(str(config))
     for mechanism in given.mechanisms.values():

@@ -3,11 +3,8 @@
 
 """What a scene may be, what it says about one that cannot be, and how its cranks move. No ROS."""
 
-from glob import glob
 import itertools
 import math
-import os
-import pathlib
 import re
 from xml.etree import ElementTree
 
@@ -19,9 +16,9 @@ from linkage_ros.scene.legs import Assembly
 from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
+from scenes import EXAMPLES, ROOT
 from test_rods import G1
 
-CONFIG = os.path.join(os.path.dirname(__file__), '..', 'config')
 CELL = {'mechanisms': ['cell'], 'cell.type': 'peaucellier'}
 OWN = {'mechanisms': ['own'], 'own.type': 'custom'}
 YEAR = 365 * 86400 * 10 ** 9
@@ -47,9 +44,9 @@ def test_without_parameters_the_scene_is_the_catalogue():
 
 
 @pytest.mark.nightly(all_but=4)
-@pytest.mark.parametrize('file', sorted(glob(os.path.join(CONFIG, '*.yaml'))))
+@pytest.mark.parametrize('file', EXAMPLES)
 def test_a_scene_is_written_as_the_few_values_that_tell_it(file, tmp_path):
-    before = scene.load(file)
+    before = scene.load(str(file))
     kept = writing.without_defaults(before)
     again = tmp_path / 'again.yaml'
     again.write_text(writing.in_yaml(kept))
@@ -322,7 +319,7 @@ def test_every_parameter_says_what_it_is_of_with_its_unit():
 
 
 def test_the_nodes_that_use_a_parameter_are_those_of_the_page():
-    page = pathlib.Path(CONFIG, '../docs/nodes-and-topics.md').read_text()
+    page = (ROOT / 'docs' / 'nodes-and-topics.md').read_text()
     rows = re.findall(r'^\| (`.*) \| (.*) \| (.*) \|$', page.partition(
         '### Who owns a value')[2].partition('\n## ')[0], re.M)
     every = ('crank_driver', 'kinematics', 'servo_inverse')

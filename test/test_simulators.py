@@ -4,7 +4,6 @@
 """Linkages with masses and closed loops, as MuJoCo has them, and read back from SDF and MJCF."""
 
 import math
-from pathlib import Path
 from xml.etree import ElementTree
 
 from linkage_ros import scene
@@ -14,9 +13,9 @@ from linkage_ros.robot_model.bodies import assembled
 import numpy as np
 import pytest
 from robots import MuJoCo, of_text, published
+from scenes import EXAMPLES
 from test_urdf import drives, in_space, MACHINES, OWN, posed
 
-SCENES = sorted(Path(__file__).parents[1].glob('config/*.yaml'))
 # On the way to a change point: the side seen at the start is not the one behind it.
 FOLDS = {'water_drop'}
 
@@ -40,7 +39,8 @@ def some_quick(names, quick):
 
 def some_scenes(*quick):
     return [pytest.param(path, id=path.stem, marks=(
-        () if path.stem in quick else pytest.mark.nightly)) for path in SCENES]
+        () if path.stem in quick else pytest.mark.nightly))
+        for path in EXAMPLES if path.parent.name == 'config']
 
 
 def model(mechanisms, frame_id='world', **given):

@@ -83,28 +83,3 @@ def test_places_are_those_of_the_table_of_the_original_program(kind, lengths, jo
     for theta, *places in (map(float, line.split()) for line in table.strip().splitlines()):
         found = linkage.solve(math.radians(theta), [*joints])
         np.testing.assert_allclose(np.ravel([*found.values()]), places, rtol=0.0, atol=5e-4)
-
-
-SQUEEZER = (
-    'O ground 0 0', 'A ground -0.06934 -0.00227', 'B ground -0.03635 0.03273',
-    'F crank O 0.007', 'E dyad F B 0.028 0.035 {}', 'G dyad E A 0.02 0.04 {}',
-    'H dyad E A 0.02 0.04 {}')
-
-
-def test_andrews_squeezer_stands_as_published():
-    # Mazzia and Magherini, "Test Set for Initial Value Problem Solvers", problem "Andrews'
-    # squeezing mechanism": the seven angles at the start.
-    beta, theta, gamma = -0.0617138900142764496, 0.0, 0.455279819163070380
-    phi, delta, omega, epsilon = (0.222668390165885885, 0.487364979543842550,
-                                  -0.222668390165885885, 1.23054744454982119)
-    sides = 'left', 'right', 'left'
-    place = mechanisms.create('custom', joints=[
-        *SQUEEZER[:4], *(line.format(side) for line, side in zip(SQUEEZER[4:], sides))
-    ]).solve(beta)
-    at = {name: complex(*where) for name, where in place.items()}
-    found = [np.angle(at['F'] - at['E']) - beta, np.angle((at['B'] - at['E']) / 1j),
-             np.angle((at['G'] - at['E']) / 1j) - np.angle(at['G'] - at['A']),
-             np.angle(at['G'] - at['A']),
-             np.angle(at['E'] - at['H']) - np.angle((at['A'] - at['H']) / 1j),
-             np.angle((at['A'] - at['H']) / 1j)]
-    np.testing.assert_allclose(found, [theta, gamma, phi, delta, omega, epsilon], atol=2e-14)

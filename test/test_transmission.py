@@ -24,10 +24,9 @@ from linkage_ros.c_code.axes import actuators, joints
 from linkage_ros.c_code.package import package
 import numpy as np
 import pytest
-from scenes import alone
+from scenes import alone, ROOT
 from test_rods import G1
 
-ROOT = Path(__file__).parents[1]
 COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
     not shutil.which(name), reason=f'{name} is not installed')) for name in ('g++', 'clang++')]
 SCENES = [*sorted((ROOT / 'config').glob('*.yaml')), ROOT / 'examples' / 'leg.yaml']

@@ -4,7 +4,6 @@
 """Robot models, read and moved by libraries that know nothing of this package. No ROS."""
 
 import math
-from pathlib import Path
 import re
 from xml.etree import ElementTree
 
@@ -16,7 +15,6 @@ from robots import LIBRARIES, Pinocchio, rotation, Yourdfpy
 from scenes import alone
 from truth.cases import CASES
 
-ROOT = Path(__file__).parents[1]
 TOLERANCE = 1e-12
 SLIDES = {'slide', 'block', 'cylinder', 'left0_block', 'left1_block', 'right0_block',
           'right1_block'}
