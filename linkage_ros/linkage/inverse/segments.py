@@ -98,7 +98,7 @@ class Segments:
 
     def __init__(self, linkage: Kinematics, output: str, others: Sequence[float], first: Input):
         analysis, self._input = Analysis(linkage, others, first), first
-        self._curve, arcs = analysis.curve('output', output), analysis.reach()
+        self._curve = analysis.curve('output', output)
         is_angle, own = linkage.is_angle(output), first.turn if first.wraps else math.inf
         self._period = (own if output == first.name else math.tau) if is_angle else math.inf
         self._size = 1.0 if is_angle else linkage.longest
@@ -118,7 +118,7 @@ class Segments:
             return end if normalized.is_cut(end) else end + side * ulps * math.ulp(
                 max(abs(end) + offset, farthest))
 
-        arcs = [(inside(low, 1.0), inside(high, -1.0)) for low, high in arcs]
+        arcs = [(inside(low, 1.0), inside(high, -1.0)) for low, high in analysis.reach()]
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
         length = sum(hi - lo for lo, hi in arcs)
         if not runs or len(self.jumps) > MAX_ENDS * max(1.0, length / math.tau) \
