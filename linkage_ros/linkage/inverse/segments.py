@@ -55,31 +55,16 @@ class Segment(NamedTuple):
 
     Attributes
     ----------
-    theta, value : float array (samples,)
-        The input in its size, and the output times the sign of its rate. Both ascend.
+    theta, value : sequence of float
+        The input, and the output times the sign of its rate. Both ascend.
     sign : float
         1.0 where the output rises, -1.0 where it falls.
 
     """
 
-    theta: np.ndarray
-    value: np.ndarray
+    theta: Any
+    value: Any
     sign: float
-
-
-class Table(NamedTuple):
-    """
-    A segment as values need it: a range of output values, and the samples between which they are.
-
-    Values in the outer cells, in which the input does not change, are answered by the end of the
-    segment.
-    """
-
-    low: float
-    high: float
-    sign: float
-    theta: List[float]
-    value: List[float]
 
     def bracket(self, target: float) -> Bracket:
         """Return the bracket of a value of the range, times the sign."""
@@ -128,30 +113,32 @@ class Segments:
         self.all.sort(key=lambda segment: float(segment.theta[0]))
         # Whether the output goes on after the last input of each segment.
         self._goes_on = [*map(self._continues, self.all, self.all[1:] + self.all[:1])]
-        self._tables = [*map(self._table, range(len(self.all)))]
+        self._answers = [*map(self._answered, range(len(self.all)))]
 
-    def _table(self, number: int) -> Table:
-        """Return a segment as values need it."""
+    def _answered(self, number: int) -> Segment:
+        """
+        Return the input and all values that a segment answers.
+
+        The values of the outer cells, in which the input does not change, are those of its ends.
+        """
         theta, value, sign = self.all[number]
         slack = self._slack(number, 0), self._slack(number, -1)
-        least, greatest = float(value[0] - slack[0]), float(value[-1] + slack[1])
-        # Values so near to an end of the segment are the end's.
         near = np.minimum(slack, ONE * self._size)
-        theta = np.pad(theta, 1, 'edge') * self._unit
-        value = np.pad(value.clip(value[0] + near[0], value[-1] - near[1]), 1, 'edge')
-        return Table(least, greatest, sign, theta.tolist(), value.tolist())
+        inner = value.clip(value[0] + near[0], value[-1] - near[1])
+        return Segment((np.pad(theta, 1, 'edge') * self._unit).tolist(), [
+            float(value[0] - slack[0]), *inner.tolist(), float(value[-1] + slack[1])], sign)
 
     # --- candidates ---
 
     def candidates(self, values: Sequence[float]) -> List[Bracket]:
         """Return a bracket for each input that has the value."""
         brackets, period = [], self._period
-        for table in self._tables:
-            low, target = table.low, table.sign * values[0]
+        for segment in self._answers:
+            low, target = segment.value[0], segment.sign * values[0]
             if period < math.inf and not low <= target < low + period:
                 target += period * math.ceil((low - target) / period)
-            while low <= target <= table.high:
-                brackets.append(table.bracket(target))
+            while low <= target <= segment.value[-1]:
+                brackets.append(segment.bracket(target))
                 target += period
         return brackets
 
@@ -161,12 +148,12 @@ class Segments:
         period, none = self._period, np.empty(0, int)
         # They are searched faster in order.
         order = values[0].argsort()
-        for low, high, sign, *samples in self._tables:
+        for *samples, sign in self._answers:
             theta, value = map(np.array, samples)
             target = sign * values[0, order]
             if period < math.inf:
-                target = target + period * np.ceil((low - target) / period)
-            while len(inside := np.flatnonzero((low <= target) & (target <= high))):
+                target = target + period * np.ceil((value[0] - target) / period)
+            while len(inside := np.flatnonzero((value[0] <= target) & (target <= value[-1]))):
                 goal = target[inside]
                 i = value[1:-1].searchsorted(goal, 'right')
                 found.append((np.full(len(i), len(found)), order[inside], np.stack([
@@ -195,11 +182,11 @@ class Segments:
         target += math.remainder(sign * (value + residual) - target, self._period)
         target -= sign * residual
         for _ in range(2 * len(self.all)):
-            table = self._tables[number]
-            if table.low <= target <= table.high:
-                bracket = table.bracket(target)
+            answers = self._answers[number]
+            if answers.value[0] <= target <= answers.value[-1]:
+                bracket = answers.bracket(target)
                 return bracket, (turns + bracket.seed,)
-            end, side = (-1, 1) if target > table.high else (0, -1)
+            end, side = (-1, 1) if target > answers.value[-1] else (0, -1)
             if not self._goes_on[number if end else number - 1]:
                 break
             here, number = self.all[number], (number + side) % len(self.all)
