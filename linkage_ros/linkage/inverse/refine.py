@@ -66,7 +66,6 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Br
     """Return the solution in a bracket, which Newton's method does not leave; None if none."""
     low, high, x, sign, place, others = bracket
     n, at, ulp = problem.n, problem.newton.at, math.ulp(values[place]) / problem.scales[place]
-    x = x if low <= x <= high else 0.5 * (low + high)
     best, best_x = (math.inf, math.inf), x
     for _ in range(HALVINGS):
         trial = at(x, *others, *values)

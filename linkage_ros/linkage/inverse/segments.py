@@ -111,8 +111,6 @@ class Segments:
             runs, self.jumps = [], []
         self.all = [segment for run in runs for segment in self._monotone(*run)]
         self.all.sort(key=lambda segment: float(segment.theta[0]))
-        # Whether the output goes on after the last input of each segment.
-        self._goes_on = [*map(self._continues, self.all, self.all[1:] + self.all[:1])]
         self._answers = [*map(self._answered, range(len(self.all)))]
 
     def _answered(self, number: int) -> Segment:
@@ -186,11 +184,10 @@ class Segments:
             if answers.value[0] <= target <= answers.value[-1]:
                 bracket = answers.bracket(target)
                 return bracket, (turns + bracket.seed,)
-            end, side = (-1, 1) if target > answers.value[-1] else (0, -1)
-            if not self._goes_on[number if end else number - 1]:
+            end = -1 if target > answers.value[-1] else 0
+            if (beyond := self._beyond(number, end)) is None:
                 break
-            here, number = self.all[number], (number + side) % len(self.all)
-            there = self.all[number]
+            here, there, number = self.all[number], self.all[beyond], beyond
             # The same value, or whole periods from it.
             target += float(there.value[-1 - end] - here.value[end])
             turns += self._input.turns_of(
@@ -229,8 +226,7 @@ class Segments:
 
     def _runs(self, lo: float, hi: float, marks: Sequence[float]) -> Iterator[Tuple]:
         """Yield samples as inputs, values and rates, cut where the output jumps."""
-        theta = np.concatenate([sampled(*arc) for arc in _cut([(lo, hi)], marks)])
-        theta = ascending(theta)
+        theta = ascending(np.concatenate([sampled(*arc) for arc in _cut([(lo, hi)], marks)]))
         most = MAX_SAMPLES + 4 * len(theta)
         theta, jumped = self._divided(theta, most)
         if len(theta) > most:
@@ -312,21 +308,24 @@ class Segments:
     def _slack(self, number: int, end: int) -> float:
         """Return how far beyond an end of a segment, 0 or -1, values are those of the end."""
         theta, value, sign = self.all[number]
-        if self._goes_on[number if end else number - 1]:
-            there = self.all[(number + (1 if end else -1)) % len(self.all)]
-            return self._rounding + abs(self._difference(there.value[-1 - end] - value[end]))
+        if (beyond := self._beyond(number, end)) is not None:
+            gap = self.all[beyond].value[-1 - end] - value[end]
+            return self._rounding + abs(self._difference(gap))
         # An end is a float, too: next to it the output may change quickly.
         ulps = ULPS * np.spacing(max(abs(theta[end]), 1.0))
         beside = theta[end:end + 1 or None] + math.copysign(ulps, theta[-1 - end] - theta[end])
         change = abs(self._difference(self._curve(beside)[0, 0] - sign * value[end]))
         return float(np.fmin(np.fmax(change, CLOSE * self._size), SINGULAR * self._size))
 
-    def _continues(self, segment: Segment, other: Segment) -> bool:
-        """Return whether the output goes on from a segment to the next one."""
-        step = float(other.theta[0] - segment.theta[-1]) * self._unit
-        return other.sign == segment.sign and abs(
-            step - self._input.turns_of(step)) <= ONE * self._unit and bool(abs(
-                self._difference(other.value[0] - segment.value[-1])) <= CLOSE * self._size)
+    def _beyond(self, number: int, end: int) -> Optional[int]:
+        """Return the number of the segment on which the output goes on beyond an end, 0 or -1."""
+        beyond = (number + (1 if end else -1)) % len(self.all)
+        here, there = self.all[number], self.all[beyond]
+        step = float(there.theta[-1 - end] - here.theta[end]) * self._unit
+        goes_on = there.sign == here.sign and abs(
+            step - self._input.turns_of(step)) <= ONE * self._unit and abs(
+                self._difference(there.value[-1 - end] - here.value[end])) <= CLOSE * self._size
+        return beyond if goes_on else None
 
 
 def segments_of(linkage: Kinematics, output: str, others: Sequence[float] = (),
