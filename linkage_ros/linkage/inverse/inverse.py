@@ -269,10 +269,10 @@ class Inverse:
         Each has the solutions of the turns around its `seed` (inputs, m), if these are many.
         Their shape is (solutions, inputs and rates, m), with one solution at least.
         """
-        n, count = self._n, values.shape[1]
+        n, count, source = self._n, values.shape[1], self._source
         solutions, alone = np.empty((0, n + n * n, count)), np.arange(count)
-        if not (count <= FEW_POSES or isinstance(self._source, Grid) or self._is_part and len(seed)):
-            solutions, alone = solve_arrays(self.problem, values, self._source.candidate_arrays)
+        if not (count <= FEW_POSES or isinstance(source, Grid) or self._is_part and len(seed)):
+            solutions, alone = solve_arrays(self.problem, values, source.candidate_arrays)
         rows = [self._all(column[:n], column[n:])
                 for column in map(tuple, np.vstack([values, *seed]).T[alone].tolist())]
         most = max([1, len(solutions), *map(len, rows)])

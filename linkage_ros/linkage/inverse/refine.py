@@ -118,7 +118,8 @@ def distinct(problem: InverseProblem, solutions: Sequence[Row]) -> List[Row]:
     return distinct
 
 
-def solve_arrays(problem: InverseProblem, values: np.ndarray, candidate_arrays: Callable
+def solve_arrays(problem: InverseProblem, values: np.ndarray,
+                 candidate_arrays: Callable[[np.ndarray], Tuple[np.ndarray, ...]]
                  ) -> Tuple[np.ndarray, np.ndarray]:
     """
     Return all solutions for columns of values (outputs, m), and columns to be solved alone.

@@ -69,7 +69,7 @@ class Segment(NamedTuple):
     def bracket(self, target: float) -> Bracket:
         """Return the bracket of a value of the range, times the sign."""
         i = bisect_right(self.value, target, 1, len(self.value) - 1)
-        low, high, least, greatest = *self.theta[i - 1:i + 1], *self.value[i - 1:i + 1]
+        (low, high), (least, greatest) = self.theta[i - 1:i + 1], self.value[i - 1:i + 1]
         part = (target - least) / (greatest - least) if greatest > least else 0.5
         return Bracket(low, high, low + part * (high - low), self.sign)
 
@@ -340,14 +340,13 @@ def extremes_of(linkage: Kinematics, output: str, arcs: Optional[Sequence[Arc]],
                 others: Sequence[float]) -> list:
     """Implement `Mechanism.extremes`."""
     linkage.check_output(output)
-    pose, angular = linkage.compiled('output', output), np.array([linkage.is_angle(output)])
+    pose, is_angle = linkage.compiled('output', output), linkage.is_angle(output)
     size = linkage.inputs[0].step
     parts = reach_of(linkage, tuple(others)) if arcs is None else arcs
     if arcs is None and (segments := segments_of(linkage, output, others)).jumps:
         parts = [(low * size, high * size) for low, high in segments.arcs]
-    found = [extremes(lambda value: pose.searched(value, *others)[:1], low, high,
-                      angular)[0].tolist() for low, high in parts]
-    return [(tuple(least), tuple(greatest)) for least, greatest in found]
+    return [tuple(extremes(lambda value: pose.searched(value, *others)[0], low, high, is_angle))
+            for low, high in parts]
 
 
 def _cut(arcs: Sequence[Arc], marks: Any) -> Iterator[Arc]:
