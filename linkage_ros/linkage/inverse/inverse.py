@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from . import rods
 from .choice import Choice
 from .follow import follow
-from .grid import check_dependence, Grid
+from .grid import Grid
 from .linkage import decompose, InverseLinkage
 from .modes import chosen_of, Modes, modes_of, SINGLE
 from .problem import InverseProblem, Row
@@ -132,9 +132,8 @@ class Inverse:
         if len(outputs) != len(linkage.inputs):
             raise ValueError(f'{linkage.type} has {len(linkage.inputs)} inputs: as many outputs '
                              f'are needed, got {listed(outputs)}')
-        if outputs[1:] == tuple(input_.name for input_ in linkage.inputs[1:]):
+        if self._n == 1:
             linkage.check_output(outputs[0])
-        check_dependence(linkage, outputs)
         self.problem = InverseProblem(linkage, outputs)
         self._choice = Choice(self.problem)
         self.inputs = self.problem.inputs
