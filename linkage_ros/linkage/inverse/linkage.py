@@ -232,13 +232,11 @@ class _Sketch(Dyads):
             return Hinge(bodies, (hangs, self._frames[link.name][link.joint]), 1.0, link.zero,
                          link.name)
         along, name = cmath.rect(1.0, link.zero), link.name
-        for axis, part in ('x', along.real), ('y', along.imag):
+        for axis, part, start in ('x', along.real, hangs.real), ('y', along.imag, hangs.imag):
             # The slide of a block on a fixed line determines the coordinates of the block.
-            if link.parent == GROUND and f'{link.tip}.{axis}' in self._outputs and \
-                    abs(part) > CLOSE and link.tip in self._frames[link.name]:
-                name, start = f'{link.tip}.{axis}', hangs + along * self._frames[
-                    link.name][link.tip]
-                self._scaled[name] = part, start.real if axis == 'x' else start.imag
+            output = f'{link.tip}.{axis}'
+            if link.parent == GROUND and output in self._outputs and abs(part) > CLOSE:
+                name, self._scaled[output] = output, (part, start)
         return Slide(bodies, (hangs, 0.0j), (along, 1.0 + 0.0j), name)
 
     def _place(self, joint: str) -> complex:
@@ -281,9 +279,8 @@ class _Sketch(Dyads):
         # Bodies that never turn: the ground, and carriages of joints with known coordinates.
         level = {joint: body for joint, pin in self._named.items()
                  for body in (GROUND, f'{joint}.xy') if body in pin}
-        for body in self._named[first].keys() & self._named[second].keys() & self._frames.keys():
-            frame = self._frames[body]
-            for joint in frame.keys() & level.keys():
+        for body, frame in self._frames.items():
+            for joint in [joint for joint in level if {joint, first, second} <= frame.keys()]:
                 places = self._named[joint][level[joint]], frame[joint]
                 return Hinge((level[joint], body), places, 1.0,
                              -cmath.phase(frame[second] - frame[first]), output)
