@@ -143,12 +143,11 @@ class Drawing(Dyads):
                     axes=[sign * float(np.sign(hinge.axis @ up))] * 2))
                 self.still += [other.name for other, _ in joint.chain if other is not hinge]
 
-    def is_in_pose(self, name: str) -> bool:
-        """Return whether a joint of the lines is where the file has it."""
-        linkage = mechanisms.create('custom', joints=self.lines)
+    def error(self, lines: Sequence[str], name: str) -> float:
+        """Return how far lines have a joint from where the file has it [m]."""
+        linkage = mechanisms.create('custom', joints=lines)
         place = linkage.solve(theta_of([drive.value for drive in self.drives]), name)[name]
-        near = self.size * max(ROUNDING, 30.0 * self.gap / self.size + self.lean)
-        return all(abs(complex(*place) - on[name]) < near for on in self.on.values() if name in on)
+        return max(abs(complex(*place) - on[name]) for on in self.on.values() if name in on)
 
     def measured_by(self, joint: Joint) -> Tuple[str, float, float]:
         """
@@ -297,8 +296,10 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
     for i, line in enumerate(best.lines if best.drives else ()):
         # With a change point, the side in this pose may be the wrong one.
         name, *_, side = line.split()
-        if side in _OTHER and not best.is_in_pose(name):
-            best.lines[i] = line[:-len(side)] + _OTHER[side]
+        if side in _OTHER:
+            other = [*best.lines]
+            other[i] = line[:-len(side)] + _OTHER[side]
+            best.lines = min(best.lines, other, key=lambda lines: best.error(lines, name))
     return best
 
 
