@@ -21,17 +21,7 @@ import numpy as np
 from . import check, loops
 from .spatial import CROSSING, EXACT
 from .. import mechanisms, scene
-from ..linkage import (
-    bar_name,
-    Dyads,
-    Hinge,
-    Motor,
-    Pin,
-    ROUNDING,
-    short,
-    Slide,
-    theta_of,
-)
+from ..linkage import bar_name, Dyads, Hinge, Pin, ROUNDING, short, Slide, theta_of
 from ..robot_model.robot import at, coordinates, HINGE, Joint, NotDriven, plain, Robot, SLIDE
 from ..scene import FARTHEST
 
@@ -93,17 +83,15 @@ class Drawing(Dyads):
                 pins = [other for other in pins if other not in same]
                 pins.append({body: place for other in (*same, pin)
                              for body, place in other.items()})
-        moved: List[Motor] = [
-            Slide(joint.bodies, (joint.places[1] - joint.axis * joint.start,
-                                 joint.places[1]), (joint.axis, joint.axis), joint)
-            if joint.kind == SLIDE else
-            Hinge(joint.bodies, joint.places, joint.axis, -joint.axis * joint.start,
-                  joint) for joint in self.joints]
+        slides = {joint: Slide(
+            joint.bodies, (joint.places[1] - joint.axis * joint.start, joint.places[1]),
+            (joint.axis, joint.axis), joint) for joint in self.joints if joint.kind == SLIDE}
         super().__init__(
             group.ground, [body for joint in self.joints for body in joint.bodies], pins,
-            [slide for slide in moved if isinstance(slide, Slide)
-             and slide.joint not in self.driven],
-            [motor for motor in moved if motor.joint in self.driven], size, near)
+            [slide for joint, slide in slides.items() if joint not in self.driven],
+            [slides.get(joint) or Hinge(joint.bodies, joint.places, joint.axis,
+                                        -joint.axis * joint.start, joint)
+             for joint in self.driven], size, near)
         self.take_apart()
 
     def _flatten(self, group: loops.Group, drives: Sequence[str]) -> None:
