@@ -17,7 +17,7 @@ from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Optional, Seque
 import numpy as np
 
 from .shapes import Piece
-from ..words import listed, meant, RequestError
+from ..words import meant, RequestError, suggestion
 
 HINGE, SLIDE, BALL, FIXED, UNIVERSAL, FREE = (
     'hinge', 'slide', 'ball', 'fixed', 'universal', 'free')
@@ -334,9 +334,8 @@ class Robot:
         """Raise RequestError for a name that no joint of one degree of freedom has."""
         for name in names:
             if name not in self.positions:
-                raise RequestError(f'there is no joint {name!r}; allowed: '
-                                   f'{listed(self.positions, 200)}'
-                                   f'{meant(name, self.positions)}')
+                raise RequestError(
+                    f'there is no joint {name!r}{suggestion(name, self.positions, 200)}')
 
     def sources(self, name: str) -> list[tuple[str, float, float]]:
         """Return a joint and those that it depends on in turn, each with ratio and offset."""
