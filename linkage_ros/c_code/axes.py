@@ -4,7 +4,7 @@
 """The actuators and the commanded joints of a mechanism, one of each for every input."""
 
 import math
-from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple, TypeVar
 
 import numpy as np
 
@@ -17,15 +17,16 @@ from ..words import listed
 # Relative size of a Jacobian below which outputs do not determine the inputs, and the poses in
 # which it is looked at.
 DEPENDENT, SPREAD = 1e-9, 200
+Number = TypeVar('Number', float, np.ndarray)
 
 
 class Axis(NamedTuple):
     """
     An actuator or a joint, whose position [rad or m] is factor * output + offset.
 
-    `output` is one of the linkage, in its own units, as are its `size` and its period `turn`; that
-    is 0 for inputs and geared links, which count turns. If it `wraps`, its position is published
-    within half a turn of zero. `role` is its name in the linkage.
+    `output` is one of the linkage, in its own units. `size` and `turn` are the size of the position
+    and its period; that is 0 for inputs and geared links, which count turns. If it `wraps`, its
+    position is published within half a turn of zero. `role` is its name in the linkage.
     """
 
     name: str
@@ -37,6 +38,10 @@ class Axis(NamedTuple):
     wraps: bool
     role: str
 
+    def position(self, value: Number) -> Number:
+        """Return the position where the output has a value."""
+        return self.factor * value + self.offset
+
 
 def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float = 1.0,
          offset: float = 0.0, wraps: bool = False) -> Axis:
@@ -44,8 +49,9 @@ def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float =
     linkage = mechanism.linkage
     is_angle = linkage.is_angle(output)
     turns = is_angle and output not in (*mechanism.inputs, *linkage.geared)
-    return Axis(name, output, factor * mechanism.scale_of(output), offset,
-                1.0 if is_angle else linkage.longest, math.tau * turns, wraps and turns, output)
+    factor *= mechanism.scale_of(output)
+    return Axis(name, output, factor, offset, abs(factor) * (1.0 if is_angle else linkage.longest),
+                abs(factor) * math.tau * turns, wraps and turns, output)
 
 
 def actuators(mechanism: SceneMechanism) -> List[Axis]:

@@ -108,7 +108,7 @@ def _values(request: Request, single: bool) -> Dict[str, Any]:
             ('ACTUATOR', 'JOINT'), sides)),
         'axes': comment('; '.join(f'{side}: {_with_units(linkage, axes)}' for side, axes in zip(
             ('Actuators', 'joints'), sides))),
-        'model': '\n'.join([*tables.functions.values(), *parts])}
+        'model': '\n'.join([*tables.functions, *parts])}
 
 
 def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> Dict[str, List[Axis]]:

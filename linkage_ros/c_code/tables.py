@@ -19,7 +19,7 @@ import numpy as np
 from .axes import Axis, gears, loads, pieces, start
 from .code import Code, indented
 from .formulas import Formulas
-from .names import comment, filled, template
+from .names import comment, distinct, filled, template
 from .series import series
 from ..formula.program import Program
 from ..linkage import InverseLinkage, Mode
@@ -44,8 +44,8 @@ class Tables:
 
     Attributes
     ----------
-    functions : dict
-        The functions for the solutions of inverses, by their names.
+    functions : list of str
+        The functions for the solutions of inverses.
     solutions : int
         The most solutions of an inverse.
 
@@ -54,7 +54,8 @@ class Tables:
     def __init__(self, mechanism: SceneMechanism, code: Code, formulas: Formulas):
         self.mechanism, self.linkage, self._code, self._formulas = (
             mechanism, mechanism.linkage, code, formulas)
-        self.functions: Dict[str, str] = {}
+        self.functions: List[str] = []
+        self._names: Dict[tuple, str] = {}
         self.solutions = 1
 
     def text(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], tag: str = '',
@@ -65,9 +66,6 @@ class Tables:
         `sides` are the actuators and the commanded joints; an inverse alone has no actuators, and
         a `tag` at the end of its names. `passive` are joints that are not commanded.
         """
-        row, everywhere = self._code.row, (-math.inf, math.inf)
-        sweeps = [row(not tag and settings.ends or everywhere)
-                  for settings in self.mechanism.inputs.values()]
         rows = sides[0], [*sides[1], *passive]
         return filled(template('model.h.in'), {
             'name': self.mechanism.name, 'tag': tag, 'number': self._code.number,
@@ -76,11 +74,7 @@ class Tables:
             'names': ', '.join(map(self._solutions, sides)),
             'at': '\n'.join(indented(self._at(rows, len(sides[1])))),
             'actuators': self._rows(rows[0]), 'joints': self._rows(rows[1]),
-            'turns': ', '.join(row(self._turns(axes)) for axes in sides),
-            'sizes': row(scale * input_.size for scale, input_ in zip(
-                self.mechanism.scales, self.linkage.inputs)),
-            'start': row(start(self.mechanism)),
-            'sweeps': ', '.join(sweeps)})
+            'inputs': ', '.join(self._inputs(sides, has_sweeps=not tag))})
 
     def _at(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], commanded: int) -> Iterator[str]:
         """Yield the statements for values, rates by each input, and loads."""
@@ -89,17 +83,22 @@ class Tables:
         yield from (f'if (!{formulas.call()}) {{', '    return 0;', '}')
         for side, axes in enumerate(sides):
             for i, each in enumerate(axes):
-                field, unit = formulas.fields[each.output], 1.0 / scale_of(each.output)
-                yield f'p->value[{side}][{i}] = {code.times(f"s.{field}", unit)};'
+                field, factor = formulas.fields[each.output], each.factor / scale_of(each.output)
+                place, position = f'p->position[{side}][{i}]', code.times(f's.{field}', factor)
+                if each.offset:
+                    position += f' + {code.literal(each.offset)}'
+                if each.wraps:
+                    position = f'lkr_wrapped({position}, {code.literal(each.turn)})'
+                yield f'{place} = {position};'
                 for j, by in enumerate(formulas.by):
-                    yield f'p->rate[{side}][{i}][{j}] = {code.times(f"{by}.{field}", unit)};'
+                    yield f'p->rate[{side}][{i}][{j}] = {code.times(f"{by}.{field}", factor)};'
         # An inverse alone needs no efforts.
         powers = [*loads(self.mechanism)] if sides[0] else []
         for j, by in enumerate(formulas.by):
             terms = [code.times(f'{by}.{formulas.fields[output]}', -load / scale_of(output))
                      for output, load in powers]
             yield f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
-        needed = [f'p->value[{side}][{i}]' for side, axes in enumerate(sides)
+        needed = [f'p->position[{side}][{i}]' for side, axes in enumerate(sides)
                   for i in range(min(len(axes), commanded))]
         yield f'return isfinite({" + ".join(needed)});'
 
@@ -109,17 +108,23 @@ class Tables:
         """Return the rows of a side's axes."""
         rows, counted = [], gears(self.linkage, axes)
         for k, each in enumerate(axes):
-            i, ratio, shift = counted.get(k, (-1, 0.0, 0.0))
-            numbers = self._code.row((ratio / self.mechanism.scales[i], shift, 1.0 / each.size,
-                                      each.turn, each.factor, each.offset))
-            rows.append(f'{{ {i}, {numbers[2:-2]}, {int(each.wraps)} }}')
-        return ', '.join(rows) or '{ -1, 0, 0, 0, 0, 0, 0, 0 }'
+            i, ratio, shift = counted.get(k, (0, 0.0, 0.0))
+            numbers = self._code.row((
+                each.factor * ratio / self.mechanism.scales[i], each.position(shift),
+                1.0 / each.size, each.turn))
+            rows.append(f'{{ {i}, {numbers[2:-2]} }}')
+        return ', '.join(rows) or '{ 0, 0, 0, 0, 0 }'
 
-    def _turns(self, axes: Sequence[Axis]) -> List[float]:
-        """Return after how much of each input the positions of axes are the same, or 0."""
-        counted = {i for i, _, _ in gears(self.linkage, axes).values()}
-        return [input_.turn if input_.wraps and i not in counted else 0.0
-                for i, input_ in enumerate(self.linkage.inputs)]
+    def _inputs(self, sides: Sequence[Sequence[Axis]], has_sweeps: bool) -> Iterator[str]:
+        """Yield the rows of the inputs, as `lkr_input` has them."""
+        counted = [{i for i, _, _ in gears(self.linkage, axes).values()} for axes in sides]
+        for i, (settings, first) in enumerate(zip(
+                self.mechanism.inputs.values(), start(self.mechanism))):
+            input_, sweep = self.linkage.inputs[i], has_sweeps and settings.ends
+            turns = [input_.turn * (input_.wraps and i not in each) for each in counted]
+            numbers = self._code.row((self.mechanism.scales[i] * input_.size, first,
+                                      *(sweep or (-math.inf, math.inf))))
+            yield f'{numbers[:-2]}, {self._code.row(turns)} }}'
 
     # --- inverses ---
 
@@ -128,13 +133,25 @@ class Tables:
         outputs = tuple(each.output for each in axes)
         if len(gears(self.linkage, axes)) == len(axes):
             return '0'
-        name = '_'.join([f'{self.mechanism.name}_solutions', *(
-            self._formulas.fields[output] for output in outputs)])
-        closed = self.linkage.inverse(outputs).closed
-        count, self.functions[name] = self._closed(
-            name, closed, outputs) if closed else self._series(name, *axes)
-        self.solutions = max(self.solutions, count)
-        return name
+        # Axes of the same outputs may have other signs and offsets.
+        key = tuple((each.output, each.factor, each.offset) for each in axes)
+        if key not in self._names:
+            name = '_'.join([f'{self.mechanism.name}_solutions', *(
+                self._formulas.fields[output] for output in outputs)])
+            self._names[key] = name = distinct([*self._names.values(), name])[-1]
+            closed = self.linkage.inverse(outputs).closed
+            count, function = self._closed(name, closed, axes) if closed else self._series(
+                name, *axes)
+            self.functions.append(function)
+            self.solutions = max(self.solutions, count)
+        return self._names[key]
+
+    def _value(self, i: int, axis: Axis) -> str:
+        """Return the output, in its own units, of an axis at position i."""
+        code, literal = f'position[{i}]', self._code.literal
+        if axis.offset:
+            code = f'({code} - {literal(axis.offset)})'
+        return code if axis.factor == 1.0 else f'{code} / {literal(axis.factor)}'
 
     def _series(self, name: str, axis: Axis) -> Tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""
@@ -142,21 +159,21 @@ class Tables:
         found = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
         rows = [f'    {{ {", ".join(map(code.literal, row[:7]))}, {code.row(row[7:])} }},'
                 for row in found.tolist()]
-        sizes = map(code.literal, (axis.size, axis.turn))
+        sizes = ', '.join(code.literal(size / abs(axis.factor)) for size in (axis.size, axis.turn))
         # Where two pieces of a monotone part meet, both have the input.
         return min(len(rows), 2 * len(monotone)), '\n'.join([
             f'/* The inputs of an output, in each of {len(rows)} pieces of the reach. */',
-            f'static inline int {name}(const {code.number} *value,',
+            f'static inline int {name}(const {code.number} *position,',
             f'    {code.number} (*q)[LKR_MAX_INPUTS])', '{',
             f'    static const lkr_piece piece[{len(rows)}] LKR_IN_FLASH = {{',
             *indented(rows), '    };',
-            f'    return lkr_series({len(rows)}, piece, {", ".join(sizes)}, value[0], q);', '}'])
+            f'    return lkr_series({len(rows)}, piece, {sizes}, {self._value(0, axis)}, q);', '}'])
 
-    def _closed(self, name: str, closed: InverseLinkage, outputs: Sequence[str]
+    def _closed(self, name: str, closed: InverseLinkage, axes: Sequence[Axis]
                 ) -> Tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
         code = self._code
-        modes = self._modes_in_reach(outputs[0], closed)
+        modes = self._modes_in_reach(axes[0].output, closed)
         # If an input has a period of several turns, each turn has its own pose.
         turns = [*product(*closed.turns)]
         blocks = [(', '.join(
@@ -171,9 +188,9 @@ class Tables:
         lines = '\n'.join(f'     {comment(line)}' for line in closed.lines)
         return count, code.function(
             f'/* The inputs in each assembly mode of the inverse linkage, NAN where there is '
-            f'none:\n{lines}\n*/\nstatic inline int {name}(const {code.number} *value,\n'
+            f'none:\n{lines}\n*/\nstatic inline int {name}(const {code.number} *position,\n'
             f'    {code.number} (*q)[LKR_MAX_INPUTS])',
-            [f'value[{i}]' for i in range(len(outputs))],
+            [self._value(i, each) for i, each in enumerate(axes)],
             blocks, f'return {count};', closed.arguments)
 
     def _modes_in_reach(self, output: str, closed: InverseLinkage) -> Sequence[Mode]:

@@ -41,6 +41,12 @@ struct Linkage
 inline const std::array<std::vector<std::string>, 3> interfaces{
   {{"position"}, {"velocity"}, {"effort", "torque", "force"}}};
 
+/// The values of each quantity.
+inline std::array<lkr_real *, 3> quantities(lkr_side & side)
+{
+  return {side.position, side.velocity, side.effort};
+}
+
 /// Logs why values are held, from a thread of its own: a control loop only sets bits.
 class HeldLog
 {
@@ -91,8 +97,7 @@ private:
 };
 
 /// The handles of all actuators, or of all joints, by interface: position, velocity, effort. The
-/// first `needed` of them have to be there. Offsets and reductions of `infos` go into the
-/// linkage's `table`.
+/// first `needed` of them have to be there.
 template <class Handle>
 class Handles
 {
@@ -100,7 +105,7 @@ public:
   template <class Infos>
   void find(
     const std::string & what, const std::vector<Axis> & axes, std::size_t needed,
-    const Infos & infos, const std::vector<Handle> & given, lkr_axis * table)
+    const Infos & infos, const std::vector<Handle> & given)
   {
     using transmission_interface::Exception;
     needed_ = needed;
@@ -127,9 +132,7 @@ public:
       }
       // A reduction is that of the built-in transmissions: from the joint to the actuator.
       const double factor = is_actuator ? info.mechanical_reduction : 1.0 / info.mechanical_reduction;
-      table[i].factor *= factor;
-      table[i].offset = table[i].offset * factor + info.offset;
-      rows_[i].name = info.name;
+      rows_[i] = {info.name, {{{factor, info.offset, {}}, {factor, 0.0, {}}, {1.0 / factor, 0.0, {}}}}};
     }
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       if (rows_[i].name.empty()) {
@@ -139,7 +142,7 @@ public:
         rows_[i].name = axes[i].name;
       }
       for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
-        auto & own = rows_[i].handles[kind];
+        auto & own = rows_[i].channels[kind].handles;
         for (const auto & interface : interfaces[kind]) {
           const auto found =
             transmission_interface::get_ordered_handles(given, {rows_[i].name}, interface);
@@ -158,7 +161,7 @@ public:
   {
     std::size_t sum = 0;
     for (std::size_t i = 0; i < needed_; ++i) {
-      sum += rows_[i].handles[kind].size();
+      sum += rows_[i].channels[kind].handles.size();
     }
     return sum;
   }
@@ -167,44 +170,50 @@ public:
   lkr_side read() const
   {
     lkr_side values{};
-    for (std::size_t i = 0; i < needed_; ++i) {
-      values.position[i] = value(i, 0);
-      values.velocity[i] = value(i, 1);
-      values.effort[i] = value(i, 2);
+    for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
+      for (std::size_t i = 0; i < needed_; ++i) {
+        const auto & channel = rows_[i].channels[kind];
+        for (const auto & handle : channel.handles) {
+          quantities(values)[kind][i] = (handle.get_value() - channel.offset) / channel.factor;
+        }
+      }
     }
     return values;
   }
 
   /// Write values, those that are finite.
-  void write(const lkr_side & values)
+  void write(lkr_side & values)
   {
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      const std::array<double, 3> own{values.position[i], values.velocity[i], values.effort[i]};
-      for (std::size_t kind = 0; kind < own.size(); ++kind) {
-        auto & handles = rows_[i].handles[kind];
-        if (!handles.empty() && std::isfinite(own[kind])) {
-          (void)handles.front().set_value(own[kind]);
+    for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
+      for (std::size_t i = 0; i < rows_.size(); ++i) {
+        auto & channel = rows_[i].channels[kind];
+        const double value = channel.factor * quantities(values)[kind][i] + channel.offset;
+        for (auto & handle : channel.handles) {
+          if (std::isfinite(value)) {
+            (void)handle.set_value(value);
+          }
         }
       }
     }
   }
 
 private:
-  /// An axis, with one handle for each quantity, or none.
+  /// One handle or none, whose value is factor * that of the scene + offset.
+  struct Channel
+  {
+    double factor = 1.0, offset = 0.0;
+    std::vector<Handle> handles;
+  };
+
+  /// An axis, with its quantities.
   struct Row
   {
     std::string name;
-    std::array<std::vector<Handle>, 3> handles;
+    std::array<Channel, 3> channels;
   };
 
   static constexpr bool is_actuator =
     std::is_same_v<Handle, transmission_interface::ActuatorHandle>;
-
-  double value(std::size_t i, std::size_t kind) const
-  {
-    const auto & handles = rows_[i].handles[kind];
-    return handles.empty() ? 0.0 : handles.front().get_value();
-  }
 
   /// The place of a role; of a name, if there is no role.
   static std::size_t place(
@@ -244,10 +253,8 @@ public:
       refuse("there is no parameter '" + info_.parameters.begin()->first +
         "': write the package again for other lengths");
     }
-    model_ = linkage_.model;
-    actuators_.find(
-      "actuator", linkage_.actuators, size_, info_.actuators, actuator_handles, model_.axis[0]);
-    joints_.find("joint", linkage_.joints, size_, info_.joints, joint_handles, model_.axis[1]);
+    actuators_.find("actuator", linkage_.actuators, size_, info_.actuators, actuator_handles);
+    joints_.find("joint", linkage_.joints, size_, info_.joints, joint_handles);
     for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
       const auto count = actuators_.count(kind) + joints_.count(kind);
       if (count != 2 * size_ && (count != 0 || kind == 0)) {
@@ -255,7 +262,7 @@ public:
           (kind ? ", or none of them" : ": velocities and efforts depend on the pose"));
       }
     }
-    lkr_begin(&model_, &memory_);
+    lkr_begin(&linkage_.model, &memory_);
   }
 
   void actuator_to_joint() override { transmit(LKR_ACTUATORS, actuators_, joints_); }
@@ -280,11 +287,11 @@ private:
   {
     const auto values = from.read();
     lkr_side result;
-    for (auto kind : {result.position, result.velocity, result.effort}) {
+    for (auto kind : quantities(result)) {
       // What is not set is not written.
       std::fill_n(kind, LKR_MAX_JOINTS, LKR_NAN);
     }
-    status_ = lkr_transmit(&model_, &memory_, side, &values, &result);
+    status_ = lkr_transmit(&linkage_.model, &memory_, side, &values, &result);
     if (joints_.count(1) + joints_.count(2) == 0) {
       status_ &= ~SINGULAR;
     }
@@ -295,8 +302,6 @@ private:
   const Linkage & linkage_;
   hardware_interface::TransmissionInfo info_;
   std::size_t size_;
-  /// With the offsets and reductions of this robot.
-  lkr_model model_{};
   lkr_memory memory_{};
   Handles<transmission_interface::ActuatorHandle> actuators_;
   Handles<transmission_interface::JointHandle> joints_;
