@@ -8,7 +8,7 @@ from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple, 
 
 import numpy as np
 
-from ..linkage import GROUND, Link, loaded_links, Mechanism, ROUNDING, spread
+from ..linkage import GROUND, Link, loaded_links, Mechanism, spread
 from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion
@@ -131,25 +131,9 @@ def invertible(mechanism: SceneMechanism, axes: List[Axis]) -> List[Axis]:
     if len(axes) > 1:
         raise ValueError(f'{what} have no inverse in closed form, and a search of several inputs '
                          'may miss; choose other joints, or the inputs')
-    if not pieces(linkage, *names):
+    if not len(linkage.monotone(*names)):
         raise ValueError(f'{what} moves nowhere')
     return axes
-
-
-def pieces(linkage: Mechanism, output: str) -> List[Tuple[float, ...]]:
-    """Return parts of a turn in which an output only rises or falls: inputs, and outputs."""
-    # In a piece an angle changes by half a turn at most, so that its gaps are known.
-    is_angle = linkage.is_angle(output)
-    parts, _ = linkage.monotone(output, math.pi if is_angle else math.inf)
-    inputs, outputs = np.hsplit(np.reshape(parts, (-1, 4)), 2)
-    # They end a few floats inside the reach, at whose end the rate may be infinite.
-    ends = np.ravel(linkage.reach())
-    nearest = ends[np.abs(np.subtract.outer(inputs, ends)).argmin(axis=-1)]
-    there = linkage.posed((), (output,)).over(nearest)[0]
-    there -= is_angle * math.tau * np.round((there - outputs) / math.tau)
-    is_end = (np.abs(nearest - inputs) <= ROUNDING * linkage.inputs[0].size) & np.isfinite(there)
-    inputs, outputs = np.where(is_end, nearest, inputs), np.where(is_end, there, outputs)
-    return [tuple(part) for part in np.hstack([inputs, outputs]).tolist() if part[2] != part[3]]
 
 
 def loads(mechanism: SceneMechanism) -> Iterator[Tuple[str, float]]:

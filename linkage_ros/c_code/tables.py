@@ -16,7 +16,7 @@ from typing import Dict, Iterator, List, Sequence, Tuple
 
 import numpy as np
 
-from .axes import Axis, gears, loads, pieces, start
+from .axes import Axis, gears, loads, start
 from .code import Code, indented
 from .formulas import Formulas
 from .names import comment, distinct, filled, template
@@ -155,7 +155,7 @@ class Tables:
 
     def _series(self, name: str, axis: Axis) -> Tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""
-        code, monotone = self._code, pieces(self.linkage, axis.output)
+        code, monotone = self._code, self.linkage.monotone(axis.output)
         found = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
         rows = [f'    {{ {", ".join(map(code.literal, row[:7]))}, {code.row(row[7:])} }},'
                 for row in found.tolist()]
@@ -198,10 +198,10 @@ class Tables:
         linkage, modes, (first, *others) = self.linkage, closed.modes, self.linkage.inputs
         if others:
             return modes
-        parts, _ = linkage.monotone(output, math.inf)
         # Where the inverse linkage has a dead point of its own, the mode changes.
         steps = (np.arange(SAMPLES) + 0.382) / SAMPLES
-        inputs = np.ravel([low + steps * (high - low) for low, high, *_ in parts])
+        low, high = linkage.monotone(output).T[:2, :, None]
+        inputs = (low + steps * (high - low)).ravel()
         starts = linkage.bind(Program([mode.inputs[0] for mode in modes], 1, closed.arguments)
                               ).over(linkage.posed((), (output,)).over(inputs)[0])
         apart = first.apart(np.add.outer(closed.turns[0], starts), inputs)
