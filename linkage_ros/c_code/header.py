@@ -128,14 +128,17 @@ def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> Dict[str, List
 
 def _inverse(mechanism: SceneMechanism, axes: Sequence[Axis], tag: str, number: str) -> str:
     """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
-    n, (first, *_) = len(axes), mechanism.inputs
-    place = f'{first}_' if n == 1 else 'inputs'
-    return filled(template('inverse.h.in'), {
-        'what': first if n == 1 else place, 'name': mechanism.name, 'tag': tag,
-        'outputs': _with_units(mechanism.linkage, axes),
-        'parameters': f'{number} value, {number} near, {number} *{place}' if n == 1 else
-        f'const {number} value[{n}], const {number} near[{n}], {number} inputs[{n}]',
-        'arguments': f'&value, &near, {place}' if n == 1 else 'value, near, inputs'})
+    n, (what, *_), name = len(axes), mechanism.inputs, mechanism.name
+    parameters = f'{number} value, {number} near, {number} *{what}_'
+    arguments = f'&value, &near, {what}_'
+    if n > 1:
+        what, arguments = 'inputs', 'value, near, inputs'
+        parameters = f'const {number} value[{n}], const {number} near[{n}], {number} inputs[{n}]'
+    return (f'/* The {what} for {_with_units(mechanism.linkage, axes)}, nearest to `near`, whole '
+            f'turns included.\n   Returns 0, and leaves {what} alone, where there is none. */\n'
+            f'static inline int {name}_{what}_for{tag}({parameters})\n{{\n'
+            f'    lkr_point p;\n'
+            f'    return lkr_inverse(&{name}_model{tag}, LKR_JOINTS, {arguments}, &p);\n}}\n')
 
 
 def _about(mechanism: SceneMechanism) -> Iterator[str]:

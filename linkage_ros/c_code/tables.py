@@ -66,15 +66,15 @@ class Tables:
         `sides` are the actuators and the commanded joints; an inverse alone has no actuators, and
         a `tag` at the end of its names. `passive` are joints that are not commanded.
         """
-        rows = sides[0], [*sides[1], *passive]
+        row, rows = self._code.row, (sides[0], [*sides[1], *passive])
         return filled(template('model.h.in'), {
             'name': self.mechanism.name, 'tag': tag, 'number': self._code.number,
             'about': 'the inverse' if tag else 'the actuators and joints',
             'n': len(self.mechanism.scales), 'counts': ', '.join(str(len(axes)) for axes in rows),
             'names': ', '.join(map(self._solutions, sides)),
             'at': '\n'.join(indented(self._at(rows, len(sides[1])))),
-            'actuators': self._rows(rows[0]), 'joints': self._rows(rows[1]),
-            'inputs': ', '.join(self._inputs(sides, has_sweeps=not tag))})
+            'actuators': row(self._rows(rows[0])), 'joints': row(self._rows(rows[1])),
+            'inputs': row(self._inputs(sides, has_sweeps=not tag))})
 
     def _at(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], commanded: int) -> Iterator[str]:
         """Yield the statements for values, rates by each input, and loads."""
@@ -84,14 +84,15 @@ class Tables:
         for side, axes in enumerate(sides):
             for i, each in enumerate(axes):
                 field, factor = formulas.fields[each.output], each.factor / scale_of(each.output)
-                place, position = f'p->position[{side}][{i}]', code.times(f's.{field}', factor)
+                position, *rates = [code.times(f'{struct}.{field}', factor)
+                                    for struct in ('s', *formulas.by)]
                 if each.offset:
                     position += f' + {code.literal(each.offset)}'
                 if each.wraps:
                     position = f'lkr_wrapped({position}, {code.literal(each.turn)})'
-                yield f'{place} = {position};'
-                for j, by in enumerate(formulas.by):
-                    yield f'p->rate[{side}][{i}][{j}] = {code.times(f"{by}.{field}", factor)};'
+                yield f'p->position[{side}][{i}] = {position};'
+                for j, rate in enumerate(rates):
+                    yield f'p->rate[{side}][{i}][{j}] = {rate};'
         # An inverse alone needs no efforts.
         powers = [*loads(self.mechanism)] if sides[0] else []
         for j, by in enumerate(formulas.by):
@@ -104,27 +105,25 @@ class Tables:
 
     # --- tables ---
 
-    def _rows(self, axes: Sequence[Axis]) -> str:
-        """Return the rows of a side's axes."""
-        rows, counted = [], gears(self.linkage, axes)
+    def _rows(self, axes: Sequence[Axis]) -> Iterator[Tuple]:
+        """Yield the rows of a side's axes, as `lkr_axis` has them."""
+        counted = gears(self.linkage, axes)
         for k, each in enumerate(axes):
             i, ratio, shift = counted.get(k, (0, 0.0, 0.0))
-            numbers = self._code.row((
-                each.factor * ratio / self.mechanism.scales[i], each.position(shift),
-                1.0 / each.size, each.turn))
-            rows.append(f'{{ {i}, {numbers[2:-2]} }}')
-        return ', '.join(rows) or '{ 0, 0, 0, 0, 0 }'
+            yield (str(i), each.factor * ratio / self.mechanism.scales[i], each.position(shift),
+                   1.0 / each.size, each.turn)
+        if not axes:
+            yield '0',
 
-    def _inputs(self, sides: Sequence[Sequence[Axis]], has_sweeps: bool) -> Iterator[str]:
+    def _inputs(self, sides: Sequence[Sequence[Axis]], has_sweeps: bool) -> Iterator[Tuple]:
         """Yield the rows of the inputs, as `lkr_input` has them."""
         counted = [{i for i, _, _ in gears(self.linkage, axes).values()} for axes in sides]
         for i, (settings, first) in enumerate(zip(
                 self.mechanism.inputs.values(), start(self.mechanism))):
             input_, sweep = self.linkage.inputs[i], has_sweeps and settings.ends
             turns = [input_.turn * (input_.wraps and i not in each) for each in counted]
-            numbers = self._code.row((self.mechanism.scales[i] * input_.size, first,
-                                      *(sweep or (-math.inf, math.inf))))
-            yield f'{numbers[:-2]}, {self._code.row(turns)} }}'
+            yield (self.mechanism.scales[i] * input_.size, first,
+                   *(sweep or (-math.inf, math.inf)), turns)
 
     # --- inverses ---
 
@@ -157,9 +156,8 @@ class Tables:
         """Return the most inputs of an output, and the function for them by series."""
         code, monotone = self._code, self.linkage.monotone(axis.output)
         found = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
-        rows = [f'    {{ {", ".join(map(code.literal, row[:7]))}, {code.row(row[7:])} }},'
-                for row in found.tolist()]
-        sizes = ', '.join(code.literal(size / abs(axis.factor)) for size in (axis.size, axis.turn))
+        rows = [f'    {code.row([*row[:7], row[7:]])},' for row in found.tolist()]
+        size, turn = (code.literal(each / abs(axis.factor)) for each in (axis.size, axis.turn))
         # Where two pieces of a monotone part meet, both have the input.
         return min(len(rows), 2 * len(monotone)), '\n'.join([
             f'/* The inputs of an output, in each of {len(rows)} pieces of the reach. */',
@@ -167,7 +165,8 @@ class Tables:
             f'    {code.number} (*q)[LKR_MAX_INPUTS])', '{',
             f'    static const lkr_piece piece[{len(rows)}] LKR_IN_FLASH = {{',
             *indented(rows), '    };',
-            f'    return lkr_series({len(rows)}, piece, {sizes}, {self._value(0, axis)}, q);', '}'])
+            f'    return lkr_series({len(rows)}, piece, {size}, {turn}, {self._value(0, axis)}, q);',
+            '}'])
 
     def _closed(self, name: str, closed: InverseLinkage, axes: Sequence[Axis]
                 ) -> Tuple[int, str]:

@@ -383,21 +383,23 @@ static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_rea
     return isfinite(away) ? away : INFINITY;
 }
 
-/* From positions to the inputs nearest to q, and their pose; returns 0 if there are none. */
-static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *position, lkr_real *q,
-    lkr_point *p)
+/* From positions to the inputs q nearest to `from`, and their pose; returns 0, and leaves q alone, if
+   there are none. */
+static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *position,
+    const lkr_real *from, lkr_real *q, lkr_point *p)
 {
+    const size_t size = (size_t)model->inputs * sizeof *q;
     lkr_real x[LKR_MAX_SOLUTIONS + 1][LKR_MAX_INPUTS];
     lkr_real away[LKR_MAX_SOLUTIONS + 1];
-    lkr_real near[LKR_MAX_INPUTS];
+    lkr_real near[LKR_MAX_INPUTS] = { 0 }, found[LKR_MAX_INPUTS];
     int i, k, s;
     int count = 1;
     if (!lkr_are_finite(model->inputs, position)) {
         return 0;
     }
-    memcpy(near, q, sizeof near);
+    memcpy(near, from, size);
     /* Without a function for solutions, there is one, of counted inputs. */
-    memcpy(x[0], q, sizeof near);
+    memcpy(x[0], near, sizeof near);
     if (model->solutions[side]) {
         count = model->solutions[side](position, x);
     }
@@ -409,7 +411,7 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
         }
     }
     for (k = 0; k < count; k++) {
-        away[k] = lkr_bring(model, side, near, x[k], q);
+        away[k] = lkr_bring(model, side, near, x[k], found);
     }
     /* The last: rounding may hide a solution next to the near inputs. */
     memcpy(x[count], near, sizeof near);
@@ -424,32 +426,19 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
         }
         away[nearest] = INFINITY;
         if (lkr_refine(model, side, position, x[nearest], p)
-            && lkr_bring(model, side, near, x[nearest], q) < INFINITY) {
+            && lkr_bring(model, side, near, x[nearest], found) < INFINITY) {
             /* Positions that count inputs have their turns. */
             for (s = LKR_ACTUATORS; s <= LKR_JOINTS; s++) {
                 for (i = 0; i < model->count[s]; i++) {
                     const lkr_axis *axis = &model->axis[s][i];
-                    p->position[s][i] += axis->ratio * (q[axis->input] - x[nearest][axis->input]);
+                    p->position[s][i] +=
+                        axis->ratio * (found[axis->input] - x[nearest][axis->input]);
                 }
             }
+            memcpy(q, found, size);
             return 1;
         }
     }
-}
-
-/* The inputs for outputs, nearest to near ones, all in the scene's units. */
-static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *output, const lkr_real *near,
-    lkr_real *inputs)
-{
-    const size_t size = (size_t)model->inputs * sizeof *inputs;
-    lkr_real q[LKR_MAX_INPUTS] = { 0 };
-    lkr_point p;
-    memcpy(q, near, size);
-    if (!lkr_inverse(model, LKR_JOINTS, output, q, &p)) {
-        return 0;
-    }
-    memcpy(inputs, q, size);
-    return 1;
 }
 
 /* --- actuators and joints --- */
@@ -483,18 +472,16 @@ static inline void lkr_copy(int n, const lkr_real *from, lkr_real *to)
 static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, const lkr_real *position)
 {
     const int other = 1 - side;
-    lkr_real q[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS];
+    lkr_real q[LKR_MAX_INPUTS] = { 0 }, gap[LKR_MAX_INPUTS];
     lkr_point p = m->point;
     if (!lkr_are_finite(model->inputs, position)) {
         return LKR_NOT_KNOWN;
     }
     /* Where it is already it stays, whatever rounding says; but a command has to be in the sweeps. */
-    if (!m->is_known || lkr_gap(model, side, position, &p, gap) > LKR_ENOUGH
-        || lkr_bring(model, side, m->q, m->q, q) != 0) {
-        memcpy(q, m->q, sizeof q);
-        if (!lkr_inverse(model, side, position, q, &p)) {
-            return LKR_OUT_OF_REACH;
-        }
+    if ((!m->is_known || lkr_gap(model, side, position, &p, gap) > LKR_ENOUGH
+            || lkr_bring(model, side, m->q, m->q, q) != 0)
+        && !lkr_inverse(model, side, position, m->q, q, &p)) {
+        return LKR_OUT_OF_REACH;
     }
     m->is_known = 1;
     m->point = p;
