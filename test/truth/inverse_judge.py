@@ -74,8 +74,8 @@ class Output:
             gap / self.period))
 
     def ulp_changes(self, at):
-        """Return by how much four ulps of an input change the output."""
-        beside = self.at(at + 4.0 * np.spacing(abs(at)) * SIDES)
+        """Return by how much four ulps of an input, or of its size, change the output."""
+        beside = self.at(at + 4.0 * np.spacing(max(abs(at), self.first.size)) * SIDES)
         return np.nanmax([0.0, *self.away(beside, self.at(at))])
 
     def stands_still(self, at):
@@ -157,7 +157,7 @@ def judge(linkage, name, rng, count=6, others=()):
     if len(steps) < 20 or np.median(steps) < 1e-9 * output.size:
         return found, worst
     names = (name, *(input_.name for input_ in linkage.inputs[1:]))
-    inverse = linkage.inverse(names)
+    inverse, reach = linkage.inverse(names), linkage.reach(*others)
     first = inverse.inputs[0]
     for kind, at in output.questions(rng, count):
         value = float(output.at(at))
@@ -171,6 +171,8 @@ def judge(linkage, name, rng, count=6, others=()):
             kind = 'singular'
         elif output.stands_still(at) or output.ulp_changes(at) > SINGULAR * output.size:
             kind = 'no direction'
+        elif 'ends' in kind and not output.first.on(reach, at):
+            kind = 'beyond the reach'
         found[kind, 'questions'] += 1
         expected = [at]
         if kind == 'ordinary':
