@@ -157,7 +157,8 @@ class Tables:
         code, monotone = self._code, self.linkage.monotone(axis.output)
         found = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
         rows = [f'    {code.row([*row[:7], row[7:]])},' for row in found.tolist()]
-        size, turn = (code.literal(each / abs(axis.factor)) for each in (axis.size, axis.turn))
+        given = ', '.join([*(code.literal(each / abs(axis.factor)) for each in (
+            axis.size, axis.turn)), self._value(0, axis)])
         # Where two pieces of a monotone part meet, both have the input.
         return min(len(rows), 2 * len(monotone)), '\n'.join([
             f'/* The inputs of an output, in each of {len(rows)} pieces of the reach. */',
@@ -165,8 +166,7 @@ class Tables:
             f'    {code.number} (*q)[LKR_MAX_INPUTS])', '{',
             f'    static const lkr_piece piece[{len(rows)}] LKR_IN_FLASH = {{',
             *indented(rows), '    };',
-            f'    return lkr_series({len(rows)}, piece, {size}, {turn}, {self._value(0, axis)}, q);',
-            '}'])
+            f'    return lkr_series({len(rows)}, piece, {given}, q);', '}'])
 
     def _closed(self, name: str, closed: InverseLinkage, axes: Sequence[Axis]
                 ) -> Tuple[int, str]:
