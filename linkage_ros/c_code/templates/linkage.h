@@ -494,29 +494,29 @@ static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, cons
 static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int side,
     const lkr_real *velocity, lkr_real *other)
 {
-    const int n = model->inputs, count = model->count[1 - side];
     lkr_real speed[LKR_MAX_INPUTS] = { 0 };
-    lkr_real found[LKR_MAX_JOINTS] = { 0 };
+    int status = LKR_OK;
     int i, j;
-    memset(other, 0, sizeof found);
-    if (!lkr_are_finite(n, velocity)) {
+    memset(other, 0, LKR_MAX_JOINTS * sizeof *other);
+    if (!lkr_are_finite(model->inputs, velocity)) {
         return LKR_NOT_KNOWN;
     }
     memcpy(speed, velocity, sizeof speed);
     if (!lkr_solve(model, side, p, 0, LKR_SINGULAR, speed)) {
         return LKR_SINGULAR_POSE;
     }
-    for (i = 0; i < count; i++) {
-        for (j = 0; j < n; j++) {
-            found[i] += p->rate[1 - side][i][j] * speed[j];
+    for (i = 0; i < model->count[1 - side]; i++) {
+        lkr_real sum = 0;
+        for (j = 0; j < model->inputs; j++) {
+            sum += p->rate[1 - side][i][j] * speed[j];
+        }
+        if (isfinite(sum)) {
+            other[i] = sum;
+        } else if (i < model->inputs) {
+            status = LKR_SINGULAR_POSE;
         }
     }
-    if (!lkr_are_finite(n, found)) {
-        return LKR_SINGULAR_POSE;
-    }
-    /* A joint that is not commanded does not stop the others. */
-    lkr_copy(count, found, other);
-    return LKR_OK;
+    return status;
 }
 
 /* The same for efforts, in the place of those before if it can be. The power of the actuators is that

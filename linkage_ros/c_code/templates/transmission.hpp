@@ -96,8 +96,7 @@ private:
   std::thread thread_;
 };
 
-/// The handles of all actuators, or of all joints, by interface: position, velocity, effort. The
-/// first `needed` of them have to be there.
+/// The handles of all actuators, or of all joints; those of the first `needed` have to be there.
 template <class Handle>
 class Handles
 {
@@ -109,21 +108,27 @@ public:
   {
     using transmission_interface::Exception;
     needed_ = needed;
-    rows_.assign(axes.size(), {});
+    channels_.clear();
     std::string allowed;
     for (std::size_t i = 0; i < needed; ++i) {
       allowed += std::string(" '") + axes[i].name + "' (role '" + axes[i].role + "')";
     }
+    // What this robot calls each axis, and where it is there: factor * position + offset.
+    struct Own { std::string name; double factor = 1.0, offset = 0.0; };
+    std::vector<Own> owns(axes.size());
     for (const auto & info : infos) {
-      std::size_t i = place(axes, info.name, info.role);
-      if (i == axes.size() && is_added(info)) {
-        // It is the only actuator, or one beside that of the description.
-        if (!rows_[0].name.empty()) {
+      std::size_t i = 0;
+      while (i < axes.size() && (info.role.empty() ? info.name != axes[i].name : info.role != axes[i].role)) {
+        ++i;
+      }
+      // To hardware of type "actuator", ros2_control adds an actuator: the only one, or one beside it.
+      if (is_actuator && axes.size() == 1 && info.name == "actuator1" && info.role == "actuator1") {
+        if (!owns[0].name.empty()) {
           continue;
         }
         i = 0;
       }
-      if (i == axes.size() || !rows_[i].name.empty()) {
+      if (i == axes.size() || !owns[i].name.empty()) {
         throw Exception(what + " '" + info.name + "', role '" + info.role + "', is none of" + allowed);
       }
       if (!std::isfinite(info.offset) || !std::isnormal(info.mechanical_reduction)) {
@@ -131,26 +136,26 @@ public:
           "mechanical_reduction other than 0");
       }
       // A reduction is that of the built-in transmissions: from the joint to the actuator.
-      const double factor = is_actuator ? info.mechanical_reduction : 1.0 / info.mechanical_reduction;
-      rows_[i] = {info.name, {{{factor, info.offset, {}}, {factor, 0.0, {}}, {1.0 / factor, 0.0, {}}}}};
+      const double reduction = info.mechanical_reduction;
+      owns[i] = {info.name, is_actuator ? reduction : 1.0 / reduction, info.offset};
     }
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      if (rows_[i].name.empty()) {
-        if (i < needed) {
-          throw Exception(what + " '" + axes[i].name + "' is missing; needed are" + allowed);
-        }
-        rows_[i].name = axes[i].name;
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+      if (owns[i].name.empty() && i < needed) {
+        throw Exception(what + " '" + axes[i].name + "' is missing; needed are" + allowed);
       }
+      const std::string name = owns[i].name.empty() ? axes[i].name : owns[i].name;
       for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
-        auto & own = rows_[i].channels[kind].handles;
+        std::vector<Handle> found;
         for (const auto & interface : interfaces[kind]) {
-          const auto found =
-            transmission_interface::get_ordered_handles(given, {rows_[i].name}, interface);
-          own.insert(own.end(), found.begin(), found.end());
+          const auto handles = transmission_interface::get_ordered_handles(given, {name}, interface);
+          found.insert(found.end(), handles.begin(), handles.end());
         }
-        if (own.size() > 1) {
-          throw Exception(what + " '" + rows_[i].name + "' has several handles for " +
-            interfaces[kind][0]);
+        if (found.size() > 1) {
+          throw Exception(what + " '" + name + "' has several handles for " + interfaces[kind][0]);
+        }
+        const double factor = kind == 2 ? 1.0 / owns[i].factor : owns[i].factor;
+        for (const auto & handle : found) {
+          channels_.push_back({handle, kind, i, factor, kind == 0 ? owns[i].offset : 0.0});
         }
       }
     }
@@ -160,8 +165,8 @@ public:
   std::size_t count(std::size_t kind) const
   {
     std::size_t sum = 0;
-    for (std::size_t i = 0; i < needed_; ++i) {
-      sum += rows_[i].channels[kind].handles.size();
+    for (const auto & channel : channels_) {
+      sum += channel.kind == kind && channel.axis < needed_;
     }
     return sum;
   }
@@ -170,12 +175,10 @@ public:
   lkr_side read() const
   {
     lkr_side values{};
-    for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
-      for (std::size_t i = 0; i < needed_; ++i) {
-        const auto & channel = rows_[i].channels[kind];
-        for (const auto & handle : channel.handles) {
-          quantities(values)[kind][i] = (handle.get_value() - channel.offset) / channel.factor;
-        }
+    for (const auto & channel : channels_) {
+      if (channel.axis < needed_) {
+        quantities(values)[channel.kind][channel.axis] =
+          (channel.handle.get_value() - channel.offset) / channel.factor;
       }
     }
     return values;
@@ -184,55 +187,29 @@ public:
   /// Write values, those that are finite.
   void write(lkr_side & values)
   {
-    for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
-      for (std::size_t i = 0; i < rows_.size(); ++i) {
-        auto & channel = rows_[i].channels[kind];
-        const double value = channel.factor * quantities(values)[kind][i] + channel.offset;
-        for (auto & handle : channel.handles) {
-          if (std::isfinite(value)) {
-            (void)handle.set_value(value);
-          }
-        }
+    for (auto & channel : channels_) {
+      const double value =
+        channel.factor * quantities(values)[channel.kind][channel.axis] + channel.offset;
+      if (std::isfinite(value)) {
+        (void)channel.handle.set_value(value);
       }
     }
   }
 
 private:
-  /// One handle or none, whose value is factor * that of the scene + offset.
+  /// A handle for one quantity of an axis, whose value is factor * that of the scene + offset.
   struct Channel
   {
-    double factor = 1.0, offset = 0.0;
-    std::vector<Handle> handles;
-  };
-
-  /// An axis, with its quantities.
-  struct Row
-  {
-    std::string name;
-    std::array<Channel, 3> channels;
+    Handle handle;
+    std::size_t kind, axis;
+    double factor, offset;
   };
 
   static constexpr bool is_actuator =
     std::is_same_v<Handle, transmission_interface::ActuatorHandle>;
 
-  /// The place of a role; of a name, if there is no role.
-  static std::size_t place(
-    const std::vector<Axis> & axes, const std::string & name, const std::string & role)
-  {
-    return static_cast<std::size_t>(std::find_if(axes.begin(), axes.end(), [&](const Axis & axis) {
-      return role.empty() ? name == axis.name : role == axis.role;
-    }) - axes.begin());
-  }
-
-  /// Whether ros2_control has added an actuator, which it does to hardware of type "actuator".
-  template <class Info>
-  bool is_added(const Info & info) const
-  {
-    return rows_.size() == 1 && is_actuator && info.name == "actuator1" && info.role == "actuator1";
-  }
-
   std::size_t needed_ = 0;
-  std::vector<Row> rows_;
+  std::vector<Channel> channels_;
 };
 
 /// A linkage between actuators and joints.
