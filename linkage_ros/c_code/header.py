@@ -81,7 +81,7 @@ def headers(requests: Sequence[Request], single: bool, common: Sequence[str]) ->
 def _values(request: Request, single: bool) -> Dict[str, Any]:
     """Return the values of the template of a header."""
     mechanism, linkage = request.mechanism, request.mechanism.linkage
-    name, n, code = mechanism.name, len(linkage.inputs), Code(linkage, single)
+    name, code = mechanism.name, Code(linkage, single)
     sides = actuators(mechanism), joints(mechanism, request.joints)
     inverses = _inverses(mechanism, request.outputs)
     formulas = Formulas(mechanism, code, [
@@ -95,14 +95,9 @@ def _values(request: Request, single: bool) -> Dict[str, Any]:
     whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
     return {
         'about': '\n'.join(f' * {line}' for line in about),
-        'name': name, 'N': prefix(name), 'float': int(single), 'number': code.number,
-        'own_inputs': n, 'own_solutions': tables.solutions,
+        **formulas.names, 'N': prefix(name), 'float': int(single),
+        'own_inputs': len(linkage.inputs), 'own_solutions': tables.solutions,
         'fields': formulas.struct(), 'pose': formulas.function(),
-        'parameters': ', '.join(f'{code.number} {each}' for each in formulas.parameters),
-        'arguments': ', '.join(formulas.parameters), 'by': ', '.join(formulas.by),
-        'by_places': ', '.join(f'&{by}' for by in formulas.by),
-        'by_pointers': ', '.join(f'{name}_pose *{by}' for by in formulas.by),
-        'inputs_named': ' and by '.join(formulas.inputs),
         'whole': '\n'.join(indented([f'return isfinite({whole});'])),
         'enums': '\n'.join(_enum(f'{prefix(name)}_{side}', axes) for side, axes in zip(
             ('ACTUATOR', 'JOINT'), sides)),

@@ -68,7 +68,7 @@ class Tables:
         """
         row, rows = self._code.row, (sides[0], [*sides[1], *passive])
         return filled(template('model.h.in'), {
-            'name': self.mechanism.name, 'tag': tag, 'number': self._code.number,
+            **self._formulas.names, 'tag': tag,
             'about': 'the inverse' if tag else 'the actuators and joints',
             'n': len(self.mechanism.scales), 'counts': ', '.join(str(len(axes)) for axes in rows),
             'names': ', '.join(map(self._solutions, sides)),
@@ -79,8 +79,6 @@ class Tables:
     def _at(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], commanded: int) -> Iterator[str]:
         """Yield the statements for values, rates by each input, and loads."""
         code, formulas, scale_of = self._code, self._formulas, self.mechanism.scale_of
-        yield f'{self.mechanism.name}_pose s, {", ".join(formulas.by)};'
-        yield from (f'if (!{formulas.call()}) {{', '    return 0;', '}')
         for side, axes in enumerate(sides):
             for i, each in enumerate(axes):
                 field, factor = formulas.fields[each.output], each.factor / scale_of(each.output)
