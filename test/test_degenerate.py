@@ -8,6 +8,7 @@ import tracemalloc
 
 from effort import few_calls
 from linkage_ros import mechanisms
+from linkage_ros.scene.legs import Assembly
 import numpy as np
 import pytest
 
@@ -135,3 +136,17 @@ def test_the_corner_of_a_flat_triangle_is_on_the_line(base, sides):
                         **dict(zip('xy', rng.uniform(0.2, 3.0, 2)))).solve(0.7)
         (a, b), (c, d) = found['C'], found['E']
         assert abs(a * d - b * c) < 1e-14
+
+
+def test_angles_have_the_same_bits_with_rates_that_are_infinite():
+    cell = mechanisms.create('peaucellier')
+    end = cell.reach()[0][0]
+    angles, both = (Assembly(cell).solution((), cell.joints[1:], rates)
+                    for rates in (None, cell.joints[1:]))
+    infinite = 0
+    for theta in end - np.spacing(1.0) * np.arange(20):
+        angles.solve([theta])
+        both.solve([theta], [1.0])
+        infinite += math.isinf(both.parts['rows']['rates'][0][0])
+        assert angles.rows.tolist() == both.parts['rows']['angles'].tolist()
+    assert infinite

@@ -43,6 +43,22 @@ ARRAYS = Dialect({name: row.array for name, row in OPERATIONS.items()}, {
     **{name: row.numpy for name, row in OPERATIONS.items()}, 'nan': np.nan, 'inf': np.inf})
 
 
+def _of_c(function: Callable) -> Callable:
+    """Return a function of the C library for numpy's scalars; it is NaN where that raises."""
+    def applied(*operands: float) -> np.float64:
+        try:
+            return np.float64(function(*operands))
+        except ValueError:
+            return np.float64(np.nan)
+
+    return applied
+
+
+# Code on arrays, for numpy's scalars. On many processors numpy's own functions have other bits.
+QUIET = Dialect(ARRAYS.templates, {**ARRAYS.names, **{
+    name: _of_c(getattr(math, name)) for name in ('sin', 'cos', 'atan2')}})
+
+
 def evaluate(node: Real, dimensions: Mapping, known: dict) -> Any:
     """Evaluate an expression of dimensions alone; `known` is shared between calls."""
     evaluate_in_order(unknown([node], _OPERANDS, known), dimensions, known)
@@ -134,6 +150,10 @@ class _Variant:
         return _python(self.listing, ARRAYS, self.arguments)
 
     @cached_property
+    def quiet(self) -> Callable:
+        return _python(self.listing, QUIET, self.arguments)
+
+    @cached_property
     def loop(self) -> Future:
         """Return the machine code for many poses, compiled in the background."""
         def make() -> Any:
@@ -212,7 +232,9 @@ class CompiledFunction:
 
     def _quietly(self, *arguments: float) -> tuple:
         """Return the outputs at one pose with inf or nan where Python's floats raise."""
-        return tuple(self._blocks([np.array([float(x)]) for x in arguments], 1)[:, 0].tolist())
+        with np.errstate(all='ignore'):
+            return tuple(map(float, self.variant.quiet(*self.constants)(
+                *map(np.float64, arguments))))
 
     def on(self, dialect: Dialect) -> Callable:
         """Return the function of arrays in a dialect of `ARRAYS`, which returns a tuple."""
