@@ -4,7 +4,7 @@
 """The actuators and the commanded joints of a mechanism, one of each for every input."""
 
 import math
-from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple, TypeVar
+from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -14,10 +14,9 @@ from ..scene.joint_names import JointName
 from ..scene.motion import Motion
 from ..words import listed
 
-# Relative size of a Jacobian below which outputs do not determine the inputs, and the poses in
+# Size of a Jacobian below which outputs do not determine the inputs, and the poses in
 # which it is looked at.
 DEPENDENT, SPREAD = 1e-9, 200
-Number = TypeVar('Number', float, np.ndarray)
 
 
 class Axis(NamedTuple):
@@ -37,10 +36,6 @@ class Axis(NamedTuple):
     turn: float
     wraps: bool
     role: str
-
-    def position(self, value: Number) -> Number:
-        """Return the position where the output has a value."""
-        return self.factor * value + self.offset
 
 
 def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float = 1.0,
@@ -190,5 +185,4 @@ def _tell(mechanism: SceneMechanism, outputs: Sequence[str]) -> bool:
     sizes = np.array([1.0 if linkage.is_angle(each) else linkage.longest for each in outputs])
     units = np.array([each.size for each in linkage.inputs])
     scaled = np.moveaxis(np.nan_to_num(rates * units[:, None, None] / sizes[:, None]), -1, 0)
-    least = DEPENDENT * np.maximum(1.0, np.abs(scaled).max(axis=(1, 2)))
-    return len(outputs) in np.linalg.matrix_rank(scaled, least)
+    return len(outputs) in np.linalg.matrix_rank(scaled, DEPENDENT)

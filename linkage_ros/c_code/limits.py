@@ -25,7 +25,7 @@ def lines(mechanism: SceneMechanism, names: Sequence[str] = ()) -> Iterator[str]
     for axis in joints(mechanism, names):
         values = np.array(linkage.extremes(axis.output, arcs[0].tolist()))[..., 0] if len(
             arcs) == 1 else _values(mechanism, axis, arcs)
-        low, high = sorted(axis.position(float(end))
+        low, high = sorted(float(axis.factor * end + axis.offset)
                            for end in (np.nanmin(values), np.nanmax(values)))
         # What counts turns may do so in a sweep only.
         turns = axis.turn or linkage.is_angle(axis.output) and not any(

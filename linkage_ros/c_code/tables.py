@@ -74,7 +74,8 @@ class Tables:
             'names': ', '.join(map(self._solutions, sides)),
             'at': '\n'.join(indented(self._at(rows, len(sides[1])))),
             'actuators': row(self._rows(rows[0])), 'joints': row(self._rows(rows[1])),
-            'inputs': row(self._inputs(sides, has_sweeps=not tag))})
+            'inputs': row(self._inputs(sides, has_sweeps=not tag)),
+            'start': row(start(self.mechanism))})
 
     def _at(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], commanded: int) -> Iterator[str]:
         """Yield the statements for values, rates by each input, and loads."""
@@ -108,20 +109,19 @@ class Tables:
         counted = gears(self.linkage, axes)
         for k, each in enumerate(axes):
             i, ratio, shift = counted.get(k, (0, 0.0, 0.0))
-            yield (str(i), each.factor * ratio / self.mechanism.scales[i], each.position(shift),
-                   1.0 / each.size, each.turn)
+            yield (str(i), each.factor * ratio / self.mechanism.scales[i],
+                   each.factor * shift + each.offset, 1.0 / each.size, each.turn)
         if not axes:
             yield '0',
 
     def _inputs(self, sides: Sequence[Sequence[Axis]], has_sweeps: bool) -> Iterator[Tuple]:
         """Yield the rows of the inputs, as `lkr_input` has them."""
         counted = [{i for i, _, _ in gears(self.linkage, axes).values()} for axes in sides]
-        for i, (settings, first) in enumerate(zip(
-                self.mechanism.inputs.values(), start(self.mechanism))):
+        for i, settings in enumerate(self.mechanism.inputs.values()):
             input_, sweep = self.linkage.inputs[i], has_sweeps and settings.ends
             turns = [input_.turn * (input_.wraps and i not in each) for each in counted]
-            yield (self.mechanism.scales[i] * input_.size, first,
-                   *(sweep or (-math.inf, math.inf)), turns)
+            yield (self.mechanism.scales[i] * input_.size, *(sweep or (-math.inf, math.inf)),
+                   turns)
 
     # --- inverses ---
 

@@ -99,17 +99,14 @@ LKR_FORMULA lkr_real lkr_wrapped(lkr_real x, lkr_real turn)
 }
 
 /* A limit that is missed by rounding counts as reached. */
-static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
-{
-    if (x > 0) {
-        return LKR_MATH(sqrt)(x);
-    }
-    return x >= -tolerance ? 0 : LKR_NAN;
-}
-
 static inline lkr_real lkr_valid_where(lkr_real x, lkr_real margin, lkr_real tolerance)
 {
     return margin >= -tolerance ? x : LKR_NAN;
+}
+
+static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
+{
+    return lkr_valid_where(LKR_MATH(sqrt)(lkr_max(0, x)), x, tolerance);
 }
 
 /* The angle of (x, y); a compiler leaves it out where it is not used. */
@@ -163,9 +160,9 @@ typedef struct {
     lkr_real scale, turn;
 } lkr_axis;
 
-/* An input: its size, where it starts, and its sweep. */
+/* An input: its size and its sweep. */
 typedef struct {
-    lkr_real size, start, low, high;
+    lkr_real size, low, high;
     /* After how much of it the actuators or the joints repeat, or 0. */
     lkr_real turn[2];
 } lkr_input;
@@ -182,6 +179,8 @@ typedef struct {
     int (*solutions[2])(const lkr_real *position, lkr_real (*q)[LKR_MAX_INPUTS]);
     lkr_axis axis[2][LKR_MAX_JOINTS];
     lkr_input input[LKR_MAX_INPUTS];
+    /* Where the inputs start. */
+    lkr_real start[LKR_MAX_INPUTS];
 } lkr_model;
 
 /* A part of the reach in which an output only rises, or only falls: the middle of its values and how
@@ -204,18 +203,18 @@ typedef struct {
 
 /* --- positions at a pose --- */
 
-/* Gaps from a pose to positions, the shorter way round; returns the largest, in sizes. */
+/* Gaps from a pose to positions, the shorter way round; returns their sum, in sizes. */
 static inline lkr_real lkr_gap(const lkr_model *model, int side, const lkr_real *position,
     const lkr_point *p, lkr_real *gap)
 {
-    lkr_real most = 0;
+    lkr_real sum = 0;
     int i;
     for (i = 0; i < model->inputs; i++) {
         const lkr_axis *axis = &model->axis[side][i];
         gap[i] = lkr_wrapped(position[i] - p->position[side][i], axis->turn);
-        most = lkr_max(most, LKR_MATH(fabs)(gap[i]) * axis->scale);
+        sum += LKR_MATH(fabs)(gap[i]) * axis->scale;
     }
-    return most;
+    return sum;
 }
 
 /* Solve J x = b in place, b in x, with the rates J of a side's positions by the inputs, or with their
@@ -394,9 +393,6 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
     lkr_real near[LKR_MAX_INPUTS] = { 0 }, found[LKR_MAX_INPUTS];
     int i, k, s;
     int count = 1;
-    if (!lkr_are_finite(model->inputs, position)) {
-        return 0;
-    }
     memcpy(near, from, size);
     /* Without a function for solutions, there is one, of counted inputs. */
     memcpy(x[0], near, sizeof near);
@@ -448,9 +444,7 @@ static inline void lkr_begin(const lkr_model *model, lkr_memory *m)
 {
     int i;
     memset(m, 0, sizeof *m);
-    for (i = 0; i < model->inputs; i++) {
-        m->q[i] = model->input[i].start;
-    }
+    memcpy(m->q, model->start, sizeof m->q);
     for (i = 0; i < LKR_MAX_JOINTS; i++) {
         m->held[LKR_ACTUATORS].position[i] = LKR_NAN;
         m->held[LKR_JOINTS].position[i] = LKR_NAN;

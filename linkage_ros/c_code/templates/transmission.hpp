@@ -217,7 +217,7 @@ class Transmission : public linkage_ros::LinkageTransmission
 {
 public:
   Transmission(const Linkage & linkage, const hardware_interface::TransmissionInfo & info)
-  : linkage_(linkage), info_(info), size_(linkage.actuators.size()), log_(info.name)
+  : linkage_(linkage), info_(info), log_(info.name)
   {
   }
 
@@ -230,11 +230,11 @@ public:
       refuse("there is no parameter '" + info_.parameters.begin()->first +
         "': write the package again for other lengths");
     }
-    actuators_.find("actuator", linkage_.actuators, size_, info_.actuators, actuator_handles);
-    joints_.find("joint", linkage_.joints, size_, info_.joints, joint_handles);
+    actuators_.find("actuator", linkage_.actuators, num_joints(), info_.actuators, actuator_handles);
+    joints_.find("joint", linkage_.joints, num_joints(), info_.joints, joint_handles);
     for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
       const auto count = actuators_.count(kind) + joints_.count(kind);
-      if (count != 2 * size_ && (count != 0 || kind == 0)) {
+      if (count != 2 * num_joints() && (count != 0 || kind == 0)) {
         refuse("all its actuators and joints need a handle for " + interfaces[kind][0] +
           (kind ? ", or none of them" : ": velocities and efforts depend on the pose"));
       }
@@ -246,9 +246,9 @@ public:
 
   void joint_to_actuator() override { transmit(LKR_JOINTS, joints_, actuators_); }
 
-  std::size_t num_actuators() const override { return size_; }
+  std::size_t num_actuators() const override { return linkage_.actuators.size(); }
 
-  std::size_t num_joints() const override { return size_; }
+  std::size_t num_joints() const override { return linkage_.actuators.size(); }
 
   int status() const noexcept override { return status_; }
 
@@ -278,7 +278,6 @@ private:
 
   const Linkage & linkage_;
   hardware_interface::TransmissionInfo info_;
-  std::size_t size_;
   lkr_memory memory_{};
   Handles<transmission_interface::ActuatorHandle> actuators_;
   Handles<transmission_interface::JointHandle> joints_;
