@@ -4,11 +4,11 @@
 """The actuators and the commanded joints of a mechanism, one of each for every input."""
 
 import math
-from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ..linkage import GROUND, Link, loaded_links, Mechanism, spread
+from ..linkage import GROUND, Link, loaded_links, spread
 from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion
@@ -25,7 +25,9 @@ class Axis(NamedTuple):
 
     `output` is one of the linkage, in its own units. `size` and `turn` are the position's size and
     period; that is 0 for inputs and geared links, which count turns. If it `wraps`, its position
-    is published within half a turn of zero. `role` is its name in the linkage.
+    is published within half a turn of zero. `role` is its name in the linkage. If its position
+    counts an input, it is ratio * input + shift, for the input of number `input`; else the ratio
+    is 0.
     """
 
     name: str
@@ -36,6 +38,9 @@ class Axis(NamedTuple):
     turn: float
     wraps: bool
     role: str
+    input: int
+    ratio: float
+    shift: float
 
 
 def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float = 1.0,
@@ -43,10 +48,15 @@ def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float =
     """Return the axis of an output, with a factor and an offset from its value in the scene."""
     linkage = mechanism.linkage
     is_angle = linkage.is_angle(output)
-    turns = is_angle and output not in (*mechanism.inputs, *linkage.geared)
     factor *= mechanism.scale_of(output)
+    counted, ratio, shift = next((
+        (i, *((1.0, 0.0) if output == input_.name else linkage.gear(output, i)))
+        for i, input_ in enumerate(linkage.inputs)
+        if output in (input_.name, *linkage.geared_to(i))), (0, 0.0, 0.0))
+    turns = is_angle and not ratio
     return Axis(name, output, factor, offset, abs(factor) * (1.0 if is_angle else linkage.longest),
-                abs(factor) * math.tau * turns, wraps and turns, output)
+                abs(factor) * math.tau * turns, wraps and turns, output, counted,
+                factor * ratio / mechanism.scales[counted], factor * shift + offset)
 
 
 def actuators(mechanism: SceneMechanism) -> List[Axis]:
@@ -106,18 +116,11 @@ def output_of(mechanism: SceneMechanism, name: str) -> Optional[str]:
     return output if output != name and mechanism.linkage.has_output(output) else None
 
 
-def gears(linkage: Mechanism, axes: Sequence[Axis]) -> Dict[int, Tuple[int, float, float]]:
-    """Return input, ratio and offset of the axes that count an input, maybe geared, by number."""
-    return {k: (i, 1.0, 0.0) if each.output == input_.name else (i, *linkage.gear(each.output, i))
-            for k, each in enumerate(axes) for i, input_ in enumerate(linkage.inputs)
-            if each.output in (input_.name, *linkage.geared_to(i))}
-
-
 def invertible(mechanism: SceneMechanism, axes: List[Axis]) -> List[Axis]:
     """Return axes; raise ValueError if positions of them do not give the inputs for certain."""
     linkage, names = mechanism.linkage, [each.output for each in axes]
     what = f'{listed(names)} of {mechanism.name}'
-    if len({i for i, _, _ in gears(linkage, axes).values()}) == len(axes):
+    if len({each.input for each in axes if each.ratio}) == len(axes):
         return axes
     if any(input_.is_part for input_ in linkage.inputs):
         raise ValueError(f'{what} has no inverse, since it repeats after too many turns')

@@ -16,7 +16,7 @@ from typing import Dict, Iterator, List, Sequence, Tuple
 
 import numpy as np
 
-from .axes import Axis, gears, loads, start
+from .axes import Axis, loads, start
 from .code import Code, indented
 from .formulas import Formulas
 from .names import comment, distinct, filled, template
@@ -73,7 +73,8 @@ class Tables:
             'n': len(self.mechanism.scales), 'counts': ', '.join(str(len(axes)) for axes in rows),
             'names': ', '.join(map(self._solutions, sides)),
             'at': '\n'.join(indented(self._at(rows, len(sides[1])))),
-            'actuators': row(self._rows(rows[0])), 'joints': row(self._rows(rows[1])),
+            'axes': row(row((str(each.input), each.ratio, each.shift, 1.0 / each.size, each.turn)
+                            for each in axes) if axes else '{ { 0 } }' for axes in rows),
             'inputs': row(self._inputs(sides, has_sweeps=not tag)),
             'start': row(start(self.mechanism))})
 
@@ -104,19 +105,9 @@ class Tables:
 
     # --- tables ---
 
-    def _rows(self, axes: Sequence[Axis]) -> Iterator[Tuple]:
-        """Yield the rows of a side's axes, as `lkr_axis` has them."""
-        counted = gears(self.linkage, axes)
-        for k, each in enumerate(axes):
-            i, ratio, shift = counted.get(k, (0, 0.0, 0.0))
-            yield (str(i), each.factor * ratio / self.mechanism.scales[i],
-                   each.factor * shift + each.offset, 1.0 / each.size, each.turn)
-        if not axes:
-            yield '0',
-
     def _inputs(self, sides: Sequence[Sequence[Axis]], has_sweeps: bool) -> Iterator[Tuple]:
         """Yield the rows of the inputs, as `lkr_input` has them."""
-        counted = [{i for i, _, _ in gears(self.linkage, axes).values()} for axes in sides]
+        counted = [{each.input for each in axes if each.ratio} for axes in sides]
         for i, settings in enumerate(self.mechanism.inputs.values()):
             input_, sweep = self.linkage.inputs[i], has_sweeps and settings.ends
             turns = [input_.turn * (input_.wraps and i not in each) for each in counted]
@@ -128,7 +119,7 @@ class Tables:
     def _solutions(self, axes: Sequence[Axis]) -> str:
         """Return the name of the function for all inputs of outputs, and note it; 0: none."""
         outputs = tuple(each.output for each in axes)
-        if len(gears(self.linkage, axes)) == len(axes):
+        if all(each.ratio for each in axes):
             return '0'
         # Axes of the same outputs may have other signs and offsets.
         key = tuple((each.output, each.factor, each.offset) for each in axes)
