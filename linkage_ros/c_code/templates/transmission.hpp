@@ -176,10 +176,8 @@ public:
   {
     lkr_side values{};
     for (const auto & channel : channels_) {
-      if (channel.axis < needed_) {
-        quantities(values)[channel.kind][channel.axis] =
-          (channel.handle.get_value() - channel.offset) / channel.factor;
-      }
+      quantities(values)[channel.kind][channel.axis] =
+        (channel.handle.get_value() - channel.offset) / channel.factor;
     }
     return values;
   }
