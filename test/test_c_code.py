@@ -135,6 +135,9 @@ NEAR_ENDS = np.array([0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1])
 INVERSES = [
     *((name, output, {}) for name, outputs in OUTPUTS.items() for output in outputs),
     ('slotted_lever', 'lever', {'nears': [math.tau * 100, math.tau * 10_000]}),
+    # A sweep is for the actuator alone.
+    ({'type': 'slotted_lever', 'crank.sweep': [-0.4, 0.4]}, 'lever',
+     {'inputs': [1.0], 'nears': [0.5, 1.5]}),
     # At an end of the reach an output changes infinitely fast, which is no excuse for an error.
     (ENDING, 'C.y', {'inputs': [END, END - 1e-12, END - 1e-9, END - 1e-6],
                      'nears': [END, END - 1e-3, END + 1.0], 'close': 2e-8}),

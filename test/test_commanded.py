@@ -81,8 +81,7 @@ def placed(mechanism, axes, inputs):
 
 def away(axes, positions, others):
     """Return how far positions are from others, in sizes, the shorter way round."""
-    size, turn = np.transpose([(each.size, each.turn) for each in axes]) * np.abs(
-        [each.factor for each in axes])
+    size, turn = np.transpose([(each.size, each.turn) for each in axes])
     gap = positions - others
     gap -= turn * np.round(gap / np.where(turn, turn, np.inf))
     return np.abs(gap / size).max(axis=-1)

@@ -7,6 +7,7 @@ import doctest
 import json
 from pathlib import Path
 import re
+import sys
 
 from benchmark import calls, document
 from benchmark.nodes import report
@@ -22,6 +23,9 @@ MADE = {ROOT / 'docs' / 'mechanisms' / f'{name}.md'
         for name in ('index', 'constructions', *mechanisms.TYPES)}
 LINK = re.compile(r'!?\[[^]]*\]\(([^)\s]+)\)')
 FENCE = re.compile(r'^```(\w*)\n(.*?)^```', re.MULTILINE | re.DOTALL)
+JOURNEYS = {
+    'The life of a crank message': lambda graph, node, crank, received: crank([0.4], received),
+    'A change of a parameter': lambda graph, node, crank, received: graph.set(node, m__scale=2.0)}
 
 
 @pytest.fixture
@@ -173,6 +177,41 @@ def test_what_is_measured_is_of_a_commit():
     parts = [part.partition('<!-- end of')[0] for page in (ROOT / 'docs').rglob('*.md')
              for part in page.read_text().split('<!-- measured')[1:]]
     assert len(parts) >= 6 and not [part for part in parts if 'dirty' in part]
+
+
+@pytest.mark.parametrize('heading', JOURNEYS)
+def test_the_files_of_a_journey_are_those_that_run(graph, heading):
+    pytest.importorskip('rclpy')
+    from linkage_ros.nodes import ownership
+    from linkage_ros.nodes.kinematics import Kinematics
+    from sensor_msgs.msg import JointState
+    from std_msgs.msg import String
+
+    page = (ROOT / 'docs' / 'design' / 'architecture.md').read_text()
+    steps = re.findall(r'^\d\. .*(?:\n   .*)*', page.partition(f'## {heading}')[2].partition(
+        '\n## ')[0], re.MULTILINE)
+    named = {file for step in steps for file in re.findall(r'`((?:nodes|scene)/\w+\.py)`', step)}
+    node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': 'jansen'})
+    crank, received = graph.crank(['m_crank']), graph.listen(JointState, 'm/joint_states')
+    # The last that the worker does at a start.
+    described = graph.listen(String, 'robot_description', ownership.LATCHED)
+    graph.until(lambda: described)
+    for angle in (0.2, 0.3):
+        crank([angle], received)
+    ran, room = set(), str(ROOT / 'linkage_ros') + '/'
+
+    def called(frame, event, _):
+        if event == 'call' and frame.f_code.co_filename.startswith(room):
+            ran.add(frame.f_code.co_filename.removeprefix(room))
+
+    sys.setprofile(called)
+    try:
+        JOURNEYS[heading](graph, node, crank, received)
+    finally:
+        sys.setprofile(None)
+    assert len(named) >= 5 and named <= ran, named - ran
+    if heading == 'The life of a crank message':
+        assert ran == named
 
 
 def test_every_file_that_the_architecture_names_is_there():

@@ -4,12 +4,16 @@
 """After any history the kinematics node publishes what the library says, on every topic."""
 
 import math
+import os
+from pathlib import Path
+import subprocess
+import sys
 
 from oracle import Bench, everything, history, message, SCENES
 import pytest
 from ros_harness import Graph
 
-# Of each scene a short history, 11 and 48.
+# Of each scene a short history, 11 and 48; nightly all of them without llvmlite, too.
 SEEDS = [pytest.param(range(1), 40, id='few'),
          pytest.param(range(1, 12), 60, id='some', marks=pytest.mark.nightly),
          pytest.param(range(12, 60), 60, id='many', marks=pytest.mark.nightly)]
@@ -77,3 +81,24 @@ def test_what_a_sensor_cannot_say_is_no_pose(graph, bad):
     bench.run([*everything(MEASURED), odd[0], good, *odd, good, other, odd[0], other,
                ('compiled',), good, good, *odd, other, good, message({'a_QB': 0.44}, [0.5], 4)])
     assert bench.model.states['a'].values == [pytest.approx(0.54, abs=0.1)]
+
+
+WITHOUT = 'LINKAGE_ROS_WITHOUT_LLVMLITE'
+# What replaces llvmlite: nothing, and a package whose library cannot be loaded.
+REPLACED = {'missing': ('sitecustomize.py', "import sys\nsys.modules['llvmlite'] = None\n"),
+            'broken': ('llvmlite.py', "raise OSError('libllvmlite.so cannot be loaded')\n")}
+
+
+@pytest.mark.nightly
+@pytest.mark.skipif(WITHOUT in os.environ, reason='this is without')
+@pytest.mark.parametrize('replaced', REPLACED)
+def test_all_this_holds_without_llvmlite(tmp_path, replaced):
+    name, text = REPLACED[replaced]
+    (tmp_path / name).write_text(text)
+    paths = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
+    done = subprocess.run(
+        [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider',
+         '-W', 'ignore:no machine code', __file__],
+        env={**os.environ, 'PYTHONPATH': paths, WITHOUT: '1'}, cwd=Path(__file__).parents[1],
+        capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-5000:]

@@ -526,6 +526,16 @@ def test_a_reload_and_another_viewer_keep_what_is_seen_and_a_lost_connection_is_
     seen.complaints.clear()
 
 
+@pytest.mark.nightly
+def test_a_phone_may_reload_the_page_as_often_as_it_likes(start):
+    running, seen = start({**example('all'), 'rate': 20.0})
+    seen.resize(390, 844, 'light')
+    for _ in range(180):
+        seen.open(running.url)
+        seen.becomes('document.querySelectorAll("section").length === 4 && '
+                     'document.querySelectorAll("section tbody tr").length > 3')
+
+
 # --- layout ---
 
 @pytest.mark.nightly

@@ -66,6 +66,7 @@ SCENE = {
     'int.joint_names': ['QB=while/1:x']}
 GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
           'D crank Q 0.27 geared crank -2 0', 'B dyad A D 2.661 2.4 left']
+DRAG = ['O ground 0 0', 'Q ground 0.3 0', 'A crank O 1', 'B dyad A Q 0.9 1.1 left']
 SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 out 0.08']
 
 
@@ -157,6 +158,10 @@ CHOICES = [
      [(0.02 * math.cos(0.9), None), (0.02 * math.cos(0.8), 0.8), (0.02 * math.cos(0.2), 0.2)]),
     *((SLOT, {'crank.start': 0.5, 'crank.sweep': [0.2, end]}, ['A.y'], 1,
        [(0.02 * math.cos(end), end)]) for end in (0.6, 0.7, 0.9, 1.0, 1.1)),
+    # A turn from what is nearest may be in it.
+    *((DRAG, {'crank.start': 0.0, 'crank.sweep': sorted((0.0, side * 5.0))}, ['QB'], 1,
+       [(mechanisms.create('custom', joints=DRAG).joint_angles(side * 4.5)['QB'], side * 4.5)])
+      for side in (1.0, -1.0)),
     # What is beyond it by more weighs ten times.
     (SLOT, {'crank.measures': 'A.y', 'crank.start': 0.2, 'crank.sweep': [-1.0, 0.2]},
      ['crank'], 0, [(0.02 * math.cos(0.3), -0.3)])]

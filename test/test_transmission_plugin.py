@@ -36,8 +36,7 @@ SCENE = {
     'knee.crank.sweep': [-0.45, 0.7],
     'knee.joints': ['O ground 0 0', 'Q ground 0 -0.25', 'A crank O 0.045',
                     'B dyad A Q 0.25 0.036 left'],
-    'drag.type': 'custom', 'drag.joints': [
-        'O ground 0 0', 'Q ground 0.3 0', 'A crank O 1', 'B dyad A Q 0.9 1.1 left'],
+    'drag.type': 'custom', 'drag.joints': test_transmission.DRAG,
     **{key: value for key, value in test_transmission.SCENE.items()
        if key.partition('.')[0] in ('lever', 'leg', 'lift') and key != 'lever.loads'}}
 OTHER = {'mechanisms': ['rocker'], 'rocker.type': 'four_bar', 'rocker.crank.start': 1.0}
