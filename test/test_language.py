@@ -132,20 +132,29 @@ def test_a_line_that_comes_too_early_says_which_one_to_move(lines, problem):
         mechanisms.create('custom', joints=lines)
 
 
-@pytest.mark.parametrize('joints', [
-    None, [], (), '', 'O ground 0 0', 'O ground 0 0\nA crank O 1', b'O ground 0 0', 5, 0.5, True,
-    {'O ground 0 0'}, frozenset(FOUR_BAR), dict.fromkeys(FOUR_BAR), len, str, object(), iter(()),
-    np.array('O ground 0 0'), np.array([])])
-def test_joints_are_a_list_of_lines(joints):
-    with pytest.raises(ValueError, match='joints must be a list of lines, one per joint'):
-        mechanisms.create('custom', joints=joints)
+# What takes it, what is said of it, and values of other kinds.
+OTHER_KINDS = [
+    (lambda value: mechanisms.create('custom', joints=value),
+     'joints must be a list of lines, one per joint', [
+         None, [], (), '', 'O ground 0 0', 'O ground 0 0\nA crank O 1', b'O ground 0 0', 5, 0.5,
+         True, {'O ground 0 0'}, frozenset(FOUR_BAR), dict.fromkeys(FOUR_BAR), len, str, object(),
+         iter(()), np.array('O ground 0 0'), np.array([])]),
+    (made, 'joints must be lines of text, but line 5 is', [
+        None, 5, b'P ground 0 0', ['P ground 0 0'], {}, 1j, math.nan,
+        np.array(['P', 'ground', '0', '0']), 10 ** 5000]),
+    (lambda value: mechanisms.create('custom', joints=FOUR_BAR, tracer=value, **LENGTHS),
+     'tracer must be the name of a joint, got', [
+         3, [], ['B'], {}, b'B', 0.5, True, False, object(), ('B',)]),
+    (lambda value: mechanisms.design('custom', FOUR_BAR, None, value),
+     'dimensions must be a list|cannot name a dimension', [
+         5, None, [None], [5], [['g']], [b'g'], 'g h'])]
 
 
-@pytest.mark.parametrize('line', [None, 5, b'P ground 0 0', ['P ground 0 0'], {}, 1j, math.nan,
-                                  np.array(['P', 'ground', '0', '0']), HUGE])
-def test_a_line_is_a_text(line):
-    with pytest.raises(ValueError, match='joints must be lines of text, but line 5 is'):
-        made(line)
+@pytest.mark.parametrize('ask, problem, values', OTHER_KINDS, ids=range(4))
+def test_what_is_of_another_kind_is_refused(ask, problem, values):
+    for value in values:
+        with pytest.raises(ValueError, match=problem):
+            ask(value)
 
 
 @pytest.mark.parametrize('kind', [list, tuple, iter, np.array, lambda lines: map(str, lines)])
@@ -328,12 +337,6 @@ def test_any_minus_one_is_the_other_sign(sign):
     assert made(branches={'B': sign}).branches == {'B': -1}
 
 
-@pytest.mark.parametrize('tracer', [3, [], ['B'], {}, b'B', 0.5, True, False, object(), ('B',)])
-def test_a_tracer_is_a_name(tracer):
-    with pytest.raises(ValueError, match='tracer must be the name of a joint, got'):
-        mechanisms.create('custom', joints=FOUR_BAR, tracer=tracer, **LENGTHS)
-
-
 @pytest.mark.parametrize('kind', [None, 5, [], {}, set(), ['custom'], b'custom', True, 1j,
                                   object(), np.array(['custom', 'jansen']), HUGE, 'Jansen', ''])
 def test_a_type_is_one_of_the_catalogue_or_custom(kind):
@@ -341,12 +344,6 @@ def test_a_type_is_one_of_the_catalogue_or_custom(kind):
         with pytest.raises(ValueError, match='type .*; allowed: water_drop, jansen') as said:
             ask(kind)
         assert len(str(said.value)) < 300
-
-
-@pytest.mark.parametrize('names', [5, None, [None], [5], [['g']], [b'g'], 'g h'])
-def test_the_names_of_dimensions_are_texts(names):
-    with pytest.raises(ValueError, match='dimensions must be a list|cannot name a dimension'):
-        mechanisms.design('custom', FOUR_BAR, None, names)
 
 
 def four_bar_scene(**more):
