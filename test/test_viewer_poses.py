@@ -17,7 +17,21 @@ from linkage_ros.web.nearest_pose import nearest_inputs, theta_of
 import numpy as np
 import pytest
 from scenes import alone, example, EXAMPLES
-from viewer_harness import DOUBLE, mechanism_of
+
+# An excavator twice as large, in the middle of its strokes.
+DOUBLE = {'scale': 2.0, **{
+    f'{name}.{key}': value for name, ends in (
+        ('boom', [1.6, 2.4]), ('arm', [1.88, 3.0]), ('bucket', [1.72, 2.6]))
+    for key, value in (('sweep', ends), ('start', sum(ends) / 2.0))}}
+
+
+def mechanism_of(name, **changed):
+    """Return the mechanism of an example with some values changed, and its inputs at the start."""
+    values = example(name)
+    key, = values['mechanisms']
+    mechanism, = scene.read({**values, **{
+        f'{key}.{name}': value for name, value in changed.items()}}).mechanisms.values()
+    return mechanism, [drive.start for drive in mechanism.inputs.values()]
 
 
 @pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)

@@ -24,7 +24,7 @@ import numpy as np
 import pytest
 import rclpy
 from rclpy.serialization import deserialize_message, serialize_message
-from scenes import example, ROOT
+from scenes import ROOT
 from visualization_msgs.msg import MarkerArray
 
 PAGE = ROOT / 'linkage_ros' / 'web' / 'page'
@@ -34,24 +34,10 @@ LEVER = {**RATE, 'mechanisms': ['lever', 'drop'], 'lever.type': 'slotted_lever',
          'drop.type': 'water_drop'}
 LEG = {**RATE, 'mechanisms': ['leg'], 'leg.type': 'jansen', 'leg.crank.speed': 0.0,
        'leg.crank.start': 1.0}
-# An excavator twice as large, in the middle of its strokes.
-DOUBLE = {'scale': 2.0, **{
-    f'{name}.{key}': value for name, ends in (
-        ('boom', [1.6, 2.4]), ('arm', [1.88, 3.0]), ('bucket', [1.72, 2.6]))
-    for key, value in (('sweep', ends), ('start', sum(ends) / 2.0))}}
 CLOSED = aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSING, aiohttp.WSMsgType.CLOSED
 
 needs_browser = pytest.mark.skipif(
     not browser.found(), reason=f'none of {", ".join(browser.NAMES)} is installed')
-
-
-def mechanism_of(name, **changed):
-    """Return the mechanism of an example with some values changed, and its inputs at the start."""
-    values = example(name)
-    key, = values['mechanisms']
-    mechanism, = scene.read({**values, **{
-        f'{key}.{name}': value for name, value in changed.items()}}).mechanisms.values()
-    return mechanism, [drive.start for drive in mechanism.inputs.values()]
 
 
 class Show(contextlib.ExitStack):
