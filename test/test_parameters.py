@@ -6,7 +6,6 @@
 from importlib.metadata import version
 import json
 import math
-import re
 import threading
 
 from effort import few_calls
@@ -25,14 +24,9 @@ from rcl_interfaces.msg import (
     ParameterValue,
     SetParametersResult,
 )
-from rcl_interfaces.srv import (
-    DescribeParameters,
-    GetParameterTypes,
-    SetParameters,
-    SetParametersAtomically,
-)
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
 from ros_harness import Graph
 from sensor_msgs.msg import JointState
 
@@ -60,31 +54,23 @@ class Client:
 
     def __init__(self, graph, node):
         self._graph, self.node = graph, node
-        self._clients = {}
+        self.services = AsyncParameterClient(graph.node, node.get_fully_qualified_name())
+        graph.until(self.services.services_are_ready)
 
-    def ask(self, type_, **request):
-        """Call a service; return the future."""
-        name = re.sub('(?<=[a-z])(?=[A-Z])', '_', type_.__name__).lower()
-        if type_ not in self._clients:
-            self._clients[type_] = self._graph.node.create_client(
-                type_, f'{self.node.get_fully_qualified_name()}/{name}')
-            self._graph.until(self._clients[type_].service_is_ready)
-        return self._clients[type_].call_async(type_.Request(**request))
-
-    def call(self, type_, **request):
-        """Call a service; return the response."""
-        future = self.ask(type_, **request)
+    def call(self, service, given):
+        """Return the response of a service."""
+        future = getattr(self.services, service)(given)
         self._graph.until(future.done, 60.0)
         return future.result()
 
     def set(self, *values):
         """Set name after name to a value in one request; return the results."""
-        return self.call(SetParameters, parameters=[_message(*one) for one in values]).results
+        return self.call('set_parameters', [_message(*one) for one in values]).results
 
     def about(self, names):
         """Return descriptor and type of each parameter."""
-        return (self.call(DescribeParameters, names=names).descriptors,
-                self.call(GetParameterTypes, names=names).types)
+        return (self.call('describe_parameters', names).descriptors,
+                self.call('get_parameter_types', names).types)
 
 
 def _message(name, value):
@@ -147,16 +133,16 @@ def test_every_parameter_is_described_as_the_scene_has_it(graph, kind):
 def test_names_and_types_that_there_are_not_are_refused(graph):
     client = Client(graph, graph.start(Kinematics, LEG))
     odd = ParameterMessage(name='leg.scale', value=ParameterValue(type=200))
-    results = client.call(SetParameters, parameters=[
+    results = client.call('set_parameters', [
         odd, *[_message(name, 1.0) for name in ('', 'leg', 'leg.', '.', 'nobody', 'x' * 10 ** 6)],
         _message('leg.crank.speed', 2.0), _message('leg.scale', 3.0)]).results
     assert [r.successful for r in results] == [False] * 8 + [True]
     assert all(0 < len(r.reason) < 300 for r in results[:8])
-    together = client.call(SetParametersAtomically, parameters=[
+    together = client.call('set_parameters_atomically', [
         _message('leg.scale', 4.0), _message('nobody', 1.0)]).result
     assert not together.successful
     assert 'nobody is not a parameter of /kinematics' in together.reason
-    assert client.call(DescribeParameters, names=['leg.scale', 'nobody']).descriptors == []
+    assert client.call('describe_parameters', ['leg.scale', 'nobody']).descriptors == []
 
 
 # Every list that may be empty.
@@ -353,7 +339,7 @@ def test_messages_are_handled_between_requests_that_come_at_once(executor):
         # The last one is refused.
         wanted = [1.0 + 0.01 * i for i in range(50)]
         for value in [*wanted, -1.0]:
-            client.ask(SetParameters, parameters=[_message('leg.scale', value)])
+            client.services.set_parameters([_message('leg.scale', value)])
         crank.publish(JointState(name=['leg_crank']))
         graph.until(lambda: wanted[-1] in handled and node.is_settled)
     assert [value for value in handled if value is not None] == wanted
@@ -399,7 +385,7 @@ def test_what_was_refused_keeps_nothing_from_being_accepted(graph, refused):
         assert node.set_parameters_atomically(both).successful
         assert node.scene.mechanisms['leg'].scale == 5.0
         assert client.set(('leg.scale', scale))[0].successful
-    together = client.call(SetParametersAtomically, parameters=[
+    together = client.call('set_parameters_atomically', [
         _message('leg.scale', 4.0), _message(*refused)]).result
     node.declare_parameter('own', 1.0)
     assert not together.successful and node.scene.mechanisms['leg'].scale == 3.0
