@@ -83,7 +83,8 @@ class Segments:
 
     def __init__(self, linkage: Kinematics, output: str, others: Sequence[float], first: Input):
         analysis, self._input = Analysis(linkage, others, first), first
-        self._curve = analysis.curve('output', output)
+        self._curve, arcs = analysis.curve('output', output), analysis.reach()
+        self._ends = np.ravel(arcs)
         is_angle, own = linkage.is_angle(output), first.turn if first.wraps else math.inf
         self._period = (own if output == first.name else math.tau) if is_angle else math.inf
         self._size = 1.0 if is_angle else linkage.longest
@@ -103,7 +104,7 @@ class Segments:
             return end if normalized.is_cut(end) else end + side * ulps * math.ulp(
                 max(abs(end) + offset, farthest))
 
-        arcs = [(inside(low, 1.0), inside(high, -1.0)) for low, high in analysis.reach()]
+        arcs = [(inside(low, 1.0), inside(high, -1.0)) for low, high in arcs]
         runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
         length = sum(hi - lo for lo, hi in arcs)
         if not runs or len(self.jumps) > MAX_ENDS * max(1.0, length / math.tau) \
@@ -206,17 +207,24 @@ class Segments:
                 low, high))
         return joined
 
-    def pieces(self, most: float) -> List[Tuple[float, float, float, float]]:
-        """Return pieces of the segments, each two inputs and outputs at most `most` apart."""
+    def pieces(self) -> np.ndarray:
+        """Return pieces of the segments: two inputs, and two outputs within half a period."""
         cut = []
         for theta, value, sign in self.all:
             places = [0]
             while (last := places[-1]) < len(theta) - 1:
-                farthest = int(value.searchsorted(value[last] + most, 'right')) - 1
+                farthest = int(value.searchsorted(value[last] + 0.5 * self._period, 'right')) - 1
                 places.append(max(farthest, last + 1))
-            cut += [(float(theta[i]), float(theta[k]), float(sign * value[i]),
-                     float(sign * value[k])) for i, k in zip(places, places[1:])]
-        return cut
+            cut += [(theta[i], theta[k], sign * value[i], sign * value[k])
+                    for i, k in zip(places, places[1:])]
+        theta, value = np.reshape(cut, (-1, 2, 2)).swapaxes(0, 1)
+        # At an end of the reach there may be a pose, too.
+        end = self._ends[np.abs(np.subtract.outer(theta, self._ends)).argmin(axis=-1)]
+        there = value + self._difference(self._curve(end.ravel())[0].reshape(end.shape) - value)
+        is_end = (np.abs(end - theta) <= ROUNDING) & np.isfinite(there)
+        pieces = np.hstack([np.where(is_end, end, theta) * self._unit,
+                            np.where(is_end, there, value)])
+        return pieces[pieces[:, 2] != pieces[:, 3]]
 
     # --- how they are found ---
 
