@@ -53,7 +53,7 @@ class Grid:
     def candidates(self, values: Sequence[float]) -> Iterator[Union[Bracket, Row]]:
         """Yield inputs, or brackets of the first, at which the outputs may have some values."""
         problem, place = self._problem, self._sought
-        held = {by: values[place] for by, place in self._held.items()}
+        held = {by: values[row] for by, row in self._held.items()}
         if place is not None:
             others = tuple(held[by] for by in range(1, problem.n))
             for bracket in segments_of(problem.linkage, problem.outputs[place],

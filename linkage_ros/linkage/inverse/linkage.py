@@ -327,15 +327,11 @@ class _Sketch(Dyads):
 
     def _read(self, by: int, input_: Input) -> _Read:
         """Return where an input is read: from its own link, or from one that is geared to it."""
-        counted = not input_.is_part
-        for name in (input_.name, *(self._linkage.geared_to(by) if counted else ())):
-            try:
-                joints, value = self._value(self._links[name])
-                break
-            except ValueError:
-                continue
-        else:
+        names = (input_.name, *(() if input_.is_part else self._linkage.geared_to(by)))
+        placed = [name for name in names if {name, self._links[name].parent} <= self.parts.keys()]
+        if not placed:
             raise ValueError(f'{input_.name} is not placed')
+        name, (joints, value) = placed[0], self._value(self._links[placed[0]])
         ratio, offset = (1.0, 0.0) if name == input_.name else self._linkage.gear(name, by)
         is_output = name in self._outputs and name == input_.name
         count = round(abs(ratio) * input_.period) if input_.wraps and not is_output else 1
@@ -345,8 +341,6 @@ class _Sketch(Dyads):
 
     def _value(self, link: Link) -> Tuple[Tuple[str, ...], Callable]:
         """Return the joints that tell the position of a link on its parent, and its formula."""
-        if not {link.name, link.parent} <= self.parts.keys():
-            raise ValueError(f'{link.name} is not placed')
         zero = cmath.rect(1.0, link.zero)
         if link.kind == 'revolute':
             ends, ahead = self._direction(link.name, 1.0 + 0.0j)

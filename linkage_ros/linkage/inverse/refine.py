@@ -133,7 +133,7 @@ def solve_arrays(problem: InverseProblem, values: np.ndarray,
     # What closed forms lose next to a singular pose; more is another assembly.
     low, high, inputs, far = -math.inf, math.inf, candidates, SINGULAR
     if n == 1:
-        low, high, inputs, far = *candidates[:2], candidates[2:3], math.inf
+        low, high, inputs, far = *candidates[:2], candidates[2:], math.inf
     best = over(*inputs.clip(low, high), *here)
     unclear = ~np.isfinite(best).all(axis=0)
     again = np.flatnonzero((best[0] > 0.0) & (best[0] <= far))

@@ -145,21 +145,18 @@ class Segments:
         """Return numbers of brackets of a value, of values (1, m) that have them, and brackets."""
         found: List[Tuple[np.ndarray, ...]] = []
         period, none = self._period, np.empty(0, int)
-        # They are searched faster in order.
-        order = values[0].argsort()
         for *samples, sign in self._answers:
             theta, value = map(np.array, samples)
-            target = sign * values[0, order]
+            target = sign * values[0]
             if period < math.inf:
                 target = target + period * np.ceil((value[0] - target) / period)
             while len(inside := np.flatnonzero((value[0] <= target) & (target <= value[-1]))):
                 goal = target[inside]
                 i = value[1:-1].searchsorted(goal, 'right')
-                found.append((np.full(len(i), len(found)), order[inside], np.stack([
-                    theta[i], theta[i + 1], np.interp(goal, value, theta),
-                    np.full(len(i), sign)])))
+                found.append((np.full(len(i), len(found)), inside, np.stack([
+                    theta[i], theta[i + 1], np.interp(goal, value, theta)])))
                 target = target + period
-        numbers, places, brackets = zip((none, none, np.empty((4, 0))), *found)
+        numbers, places, brackets = zip((none, none, np.empty((3, 0))), *found)
         return np.concatenate(numbers), np.concatenate(places), np.hstack(brackets)
 
     def follow(self, value: float, residual: float, seed: float
