@@ -14,13 +14,14 @@ import math
 from pathlib import Path
 import subprocess
 
-from c_libraries import alone, COMPILER, loaded, SANITIZED
+from c_libraries import COMPILER, loaded, SANITIZED
 from c_memories import memories, Memory
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import actuators, joints
 import numpy as np
 import pytest
+from scenes import alone
 from truth import random_linkages
 
 pytestmark = pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
@@ -82,8 +83,7 @@ def placed(mechanism, axes, inputs):
 
 def away(axes, positions, others):
     """Return how far positions are from others, in sizes, the shorter way round."""
-    size, turn = np.transpose([(each.size, each.turn) for each in axes]) * np.abs(
-        [each.factor for each in axes])
+    size, turn = np.transpose([(each.size, each.turn) for each in axes])
     gap = positions - others
     gap -= turn * np.round(gap / np.where(turn, turn, np.inf))
     return np.abs(gap / size).max(axis=-1)

@@ -16,7 +16,7 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-from c_libraries import alone, counted, expected, loaded, outputs, prove, shared, STAND_IN
+from c_libraries import counted, expected, loaded, outputs, prove, shared, STAND_IN
 from c_memories import compiled, memories, Memory, UNWRITTEN
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header, transmission
@@ -24,6 +24,8 @@ from linkage_ros.c_code.axes import actuators, joints
 from linkage_ros.c_code.package import package
 import numpy as np
 import pytest
+from scenes import alone
+from test_rods import G1
 
 ROOT = Path(__file__).parents[1]
 COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
@@ -54,13 +56,7 @@ SCENE = {
         'O ground 0 0', 'R ground 1 0', 'A carriage O along R 0.1 0.7', 'Q ground 0 1',
         'B dyad A Q 0.9 0.6 left'], 'rack.loads': ['B=2 -5'],
     'foot.type': 'rods', 'foot.right.sweep': [-0.25, 0.25], 'foot.left.sweep': [-0.2, 0.2],
-    'foot.joints': [
-        'pitch hinge ground at 0 0 0 axis 0 1 0 within -50deg 30deg',
-        'roll hinge pitch at 0 0 -0.0176 axis 1 0 0 within -15deg 15deg',
-        'right motor ground at 0.022 0 0.2159 axis 1 0 0',
-        'left motor ground at 0.022 0 0.1509 axis 1 0 0',
-        'R rod right 0.0395 -0.0164 0.2112 roll 0.022 -0.015 -0.0096',
-        'L rod left 0.035 0.0165 0.1469 roll 0.022 0.015 -0.0096'],
+    'foot.joints': G1,
     'foot.loads': ['L_roll=1 2 -30', 'roll=2.0'],
     # One joint counts an input that has another size than 1, and the other depends on both.
     'sled.type': 'custom', 'sled.only_named': True,
@@ -71,6 +67,7 @@ SCENE = {
     'int.joint_names': ['QB=while/1:x']}
 GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
           'D crank Q 0.27 geared crank -2 0', 'B dyad A D 2.661 2.4 left']
+DRAG = ['O ground 0 0', 'Q ground 0.3 0', 'A crank O 1', 'B dyad A Q 0.9 1.1 left']
 SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 out 0.08']
 
 
@@ -162,6 +159,10 @@ CHOICES = [
      [(0.02 * math.cos(0.9), None), (0.02 * math.cos(0.8), 0.8), (0.02 * math.cos(0.2), 0.2)]),
     *((SLOT, {'crank.start': 0.5, 'crank.sweep': [0.2, end]}, ['A.y'], 1,
        [(0.02 * math.cos(end), end)]) for end in (0.6, 0.7, 0.9, 1.0, 1.1)),
+    # A turn from what is nearest may be in it.
+    *((DRAG, {'crank.start': 0.0, 'crank.sweep': sorted((0.0, side * 5.0))}, ['QB'], 1,
+       [(mechanisms.create('custom', joints=DRAG).joint_angles(side * 4.5)['QB'], side * 4.5)])
+      for side in (1.0, -1.0)),
     # What is beyond it by more weighs ten times.
     (SLOT, {'crank.measures': 'A.y', 'crank.start': 0.2, 'crank.sweep': [-1.0, 0.2]},
      ['crank'], 0, [(0.02 * math.cos(0.3), -0.3)])]
@@ -299,14 +300,6 @@ def test_the_joints_are_chosen_by_their_names(mechanisms):
     for names in (['knee'], ['P.x', 'P.y'], ['leg_AP'], ['leg_AP', 'leg_AP']):
         with pytest.raises(ValueError, match='leg has 2 inputs: as many of its joints are needed'):
             joints(leg, names)
-
-
-def test_all_ground_links_of_the_catalogue_but_one_are_closed_forms():
-    linkages = [mechanisms.create(name) for name in mechanisms.TYPES]
-    closed = {(linkage.type, link.name): linkage.inverse(link.name).closed is not None
-              for linkage in linkages if len(linkage.inputs) == 1 for link in linkage.links
-              if link.parent == 'ground' and link.name != linkage.inputs[0].name}
-    assert len(closed) == 16 and [key for key in closed if not closed[key]] == [('klann', 'CF')]
 
 
 @pytest.mark.skipif(not shutil.which('avr-gcc'), reason='avr-gcc is not installed')

@@ -4,17 +4,17 @@
 """The actuators and the commanded joints of a mechanism, one of each for every input."""
 
 import math
-from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from ..linkage import GROUND, Link, loaded_links, Mechanism, ROUNDING, spread
+from ..linkage import GROUND, Link, loaded_links, spread
 from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion
 from ..words import listed
 
-# Relative size of a Jacobian below which outputs do not determine the inputs, and the poses in
+# Size of a Jacobian below which outputs do not determine the inputs, and the poses in
 # which it is looked at.
 DEPENDENT, SPREAD = 1e-9, 200
 
@@ -23,9 +23,11 @@ class Axis(NamedTuple):
     """
     An actuator or a joint, whose position [rad or m] is factor * output + offset.
 
-    `output` is one of the linkage, in its own units, as are its `size` and its period `turn`; that
-    is 0 for inputs and geared links, which count turns. If it `wraps`, its position is published
-    within half a turn of zero. `role` is its name in the linkage.
+    `output` is one of the linkage, in its own units. `size` and `turn` are the position's size and
+    period; that is 0 for inputs and geared links, which count turns. If it `wraps`, its position
+    is published within half a turn of zero. `role` is its name in the linkage. If its position
+    counts an input, it is ratio * input + shift, for the input of number `input`; else the ratio
+    is 0.
     """
 
     name: str
@@ -36,6 +38,9 @@ class Axis(NamedTuple):
     turn: float
     wraps: bool
     role: str
+    input: int
+    ratio: float
+    shift: float
 
 
 def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float = 1.0,
@@ -43,9 +48,15 @@ def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float =
     """Return the axis of an output, with a factor and an offset from its value in the scene."""
     linkage = mechanism.linkage
     is_angle = linkage.is_angle(output)
-    turns = is_angle and output not in (*mechanism.inputs, *linkage.geared)
-    return Axis(name, output, factor * mechanism.scale_of(output), offset,
-                1.0 if is_angle else linkage.longest, math.tau * turns, wraps and turns, output)
+    factor *= mechanism.scale_of(output)
+    counted, ratio, shift = next((
+        (i, *((1.0, 0.0) if output == input_.name else linkage.gear(output, i)))
+        for i, input_ in enumerate(linkage.inputs)
+        if output in (input_.name, *linkage.geared_to(i))), (0, 0.0, 0.0))
+    turns = is_angle and not ratio
+    return Axis(name, output, factor, offset, abs(factor) * (1.0 if is_angle else linkage.longest),
+                abs(factor) * math.tau * turns, wraps and turns, output, counted,
+                factor * ratio / mechanism.scales[counted], factor * shift + offset)
 
 
 def actuators(mechanism: SceneMechanism) -> List[Axis]:
@@ -105,18 +116,11 @@ def output_of(mechanism: SceneMechanism, name: str) -> Optional[str]:
     return output if output != name and mechanism.linkage.has_output(output) else None
 
 
-def gears(linkage: Mechanism, axes: Sequence[Axis]) -> Dict[int, Tuple[int, float, float]]:
-    """Return input, ratio and offset of the axes that count an input, maybe geared, by number."""
-    return {k: (i, 1.0, 0.0) if each.output == input_.name else (i, *linkage.gear(each.output, i))
-            for k, each in enumerate(axes) for i, input_ in enumerate(linkage.inputs)
-            if each.output in (input_.name, *linkage.geared_to(i))}
-
-
 def invertible(mechanism: SceneMechanism, axes: List[Axis]) -> List[Axis]:
     """Return axes; raise ValueError if positions of them do not give the inputs for certain."""
     linkage, names = mechanism.linkage, [each.output for each in axes]
     what = f'{listed(names)} of {mechanism.name}'
-    if len({i for i, _, _ in gears(linkage, axes).values()}) == len(axes):
+    if len({each.input for each in axes if each.ratio}) == len(axes):
         return axes
     if any(input_.is_part for input_ in linkage.inputs):
         raise ValueError(f'{what} has no inverse, since it repeats after too many turns')
@@ -125,25 +129,9 @@ def invertible(mechanism: SceneMechanism, axes: List[Axis]) -> List[Axis]:
     if len(axes) > 1:
         raise ValueError(f'{what} have no inverse in closed form, and a search of several inputs '
                          'may miss; choose other joints, or the inputs')
-    if not pieces(linkage, *names):
+    if not len(linkage.monotone(*names)):
         raise ValueError(f'{what} moves nowhere')
     return axes
-
-
-def pieces(linkage: Mechanism, output: str) -> List[Tuple[float, ...]]:
-    """Return parts of a turn in which an output only rises or falls: inputs, and outputs."""
-    # In a piece an angle changes by half a turn at most, so that its gaps are known.
-    is_angle = linkage.is_angle(output)
-    parts, _ = linkage.monotone(output, math.pi if is_angle else math.inf)
-    inputs, outputs = np.hsplit(np.reshape(parts, (-1, 4)), 2)
-    # They end a few floats inside the reach, at whose end the rate may be infinite.
-    ends = np.ravel(linkage.reach())
-    nearest = ends[np.abs(np.subtract.outer(inputs, ends)).argmin(axis=-1)]
-    there = linkage.posed((), (output,)).over(nearest)[0]
-    there -= is_angle * math.tau * np.round((there - outputs) / math.tau)
-    is_end = (np.abs(nearest - inputs) <= ROUNDING * linkage.inputs[0].size) & np.isfinite(there)
-    inputs, outputs = np.where(is_end, nearest, inputs), np.where(is_end, there, outputs)
-    return [tuple(part) for part in np.hstack([inputs, outputs]).tolist() if part[2] != part[3]]
 
 
 def loads(mechanism: SceneMechanism) -> Iterator[Tuple[str, float]]:
@@ -200,5 +188,4 @@ def _tell(mechanism: SceneMechanism, outputs: Sequence[str]) -> bool:
     sizes = np.array([1.0 if linkage.is_angle(each) else linkage.longest for each in outputs])
     units = np.array([each.size for each in linkage.inputs])
     scaled = np.moveaxis(np.nan_to_num(rates * units[:, None, None] / sizes[:, None]), -1, 0)
-    least = DEPENDENT * np.maximum(1.0, np.abs(scaled).max(axis=(1, 2)))
-    return len(outputs) in np.linalg.matrix_rank(scaled, least)
+    return len(outputs) in np.linalg.matrix_rank(scaled, DEPENDENT)

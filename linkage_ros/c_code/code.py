@@ -70,9 +70,11 @@ class Code:
         # The shortest text of a float32, as Python writes it: versions of numpy differ.
         return f'{float(str(np.float32(value)))!r}f' if abs(value) > 1.2e-38 else '0.0f'
 
-    def row(self, row: Iterable[float]) -> str:
-        """Return numbers as an initializer."""
-        return '{ %s }' % ', '.join(map(self.literal, row))
+    def row(self, values: Iterable[Any]) -> str:
+        """Return numbers, texts and rows of them as an initializer."""
+        return '{ %s }' % ', '.join(
+            value if isinstance(value, str) else self.literal(value)
+            if isinstance(value, (int, float)) else self.row(value) for value in values)
 
     def times(self, code: str, factor: float) -> str:
         """Return code times a number."""

@@ -29,20 +29,29 @@ class Formulas:
 
     Attributes
     ----------
-    parameters, by : list of str
-        The inputs as parameters, and the names of the rates by them.
+    by : list of str
+        The names of the rates by the inputs.
     fields : dict
         The fields of a pose, by output.
+    names : dict
+        Names of the mechanism, its inputs and their rates, for templates.
 
     """
 
     def __init__(self, mechanism: SceneMechanism, code: Code, outputs: Sequence[str]):
         self._mechanism, self._code = mechanism, code
         self._linkage = linkage = mechanism.linkage
-        self.inputs = [input_.name for input_ in linkage.inputs]
+        self.by = [f'by_{name}' for name in mechanism.inputs]
         # No word of C and no macro ends so.
-        self.parameters = [f'{name}_' for name in self.inputs]
-        self.by = [f'by_{name}' for name in self.inputs]
+        self._parameters = [f'{name}_' for name in mechanism.inputs]
+        self.names = {
+            'name': mechanism.name, 'number': code.number, 'by': ', '.join(self.by),
+            'by_places': ', '.join(f'&{by}' for by in self.by),
+            'by_pointers': ', '.join(f'{mechanism.name}_pose *{by}' for by in self.by),
+            'arguments': ', '.join(self._parameters),
+            'parameters': ', '.join(f'{code.number} {each}' for each in self._parameters),
+            'inputs_named': ' and by '.join(mechanism.inputs),
+            'elements': ', '.join(f'q[{i}]' for i in range(len(self.by)))}
         # Points in space are of no use on a board.
         self._points = () if mechanism.in_space else linkage.points
         named = dict.fromkeys((
@@ -66,21 +75,20 @@ class Formulas:
         structure = self._linkage.structure
         blocks = [(about, self._assigned(outputs)) for about, outputs in self._groups()]
         limits = [limit for limit in structure.built.limits if limit.margin.varies]
-        if len(self.inputs) == 1 and self._linkage.inputs[0].is_whole(self._linkage.reach()):
+        if len(self.by) == 1 and self._linkage.inputs[0].is_whole(self._linkage.reach()):
             # It can be assembled at any input, whatever rounding says.
             limits = []
         valid = real(0.0)
         for limit in limits:
             valid = valid_where(valid, limit.margin, limit.tolerance)
-        name, number = self._mechanism.name, self._code.number
-        poses = ', '.join(f'{name}_pose *{each}' for each in ['p', *self.by])
         return self._code.function(
-            f'/* The pose, and its rates by {" and by ".join(self.inputs)}. Returns 0 if a limit '
-            f'is exceeded. */\nLKR_FORMULA int {name}_formulas('
-            f'{", ".join(f"{number} {each}" for each in self.parameters)}, {poses})',
-            [self._code.times(each, 1.0 / self._mechanism.scale_of(name))
-             for each, name in zip(self.parameters, self.inputs)],
-            [*blocks, ('', {f'const {number} valid': valid})], 'return isfinite(valid);')
+            '/* The pose, and its rates by {inputs_named}. Returns 0 if a limit is exceeded. */\n'
+            'LKR_FORMULA int {name}_formulas({parameters}, {name}_pose *p, {by_pointers})'.format(
+                **self.names),
+            [self._code.times(each, 1.0 / scale)
+             for each, scale in zip(self._parameters, self._mechanism.scales)],
+            [*blocks, ('', {f'const {self._code.number} valid': valid})],
+            'return isfinite(valid);')
 
     def _groups(self) -> Iterator[Tuple[str, List[str]]]:
         """Yield the joint lines, with the outputs that each adds."""
@@ -104,13 +112,7 @@ class Formulas:
         """Return outputs and their rates by each input, by their places in C."""
         structure, scale_of = self._linkage.structure, self._mechanism.scale_of
         values = [*map(structure.output, outputs), *structure.parts(((), (), tuple(outputs)))]
-        units = [1.0, *map(scale_of, self.inputs)]
+        units = [1.0, *self._mechanism.scales]
         return {f'{pose}->{self.fields[output]}': value * (scale_of(output) / unit)
                 for ((pose, unit), output), value in zip(
                     product(zip(['p', *self.by], units), outputs), values)}
-
-    def call(self) -> str:
-        """Return a call of the function for inputs q, to s and the rates."""
-        values = [f'q[{i}]' for i in range(len(self.inputs))]
-        results = ['&s', *(f'&{by}' for by in self.by)]
-        return f'{self._mechanism.name}_formulas({", ".join(values + results)})'

@@ -81,7 +81,7 @@ def headers(requests: Sequence[Request], single: bool, common: Sequence[str]) ->
 def _values(request: Request, single: bool) -> Dict[str, Any]:
     """Return the values of the template of a header."""
     mechanism, linkage = request.mechanism, request.mechanism.linkage
-    name, n, code = mechanism.name, len(linkage.inputs), Code(linkage, single)
+    name, code = mechanism.name, Code(linkage, single)
     sides = actuators(mechanism), joints(mechanism, request.joints)
     inverses = _inverses(mechanism, request.outputs)
     formulas = Formulas(mechanism, code, [
@@ -95,20 +95,15 @@ def _values(request: Request, single: bool) -> Dict[str, Any]:
     whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
     return {
         'about': '\n'.join(f' * {line}' for line in about),
-        'name': name, 'N': prefix(name), 'float': int(single), 'number': code.number,
-        'own_inputs': n, 'own_solutions': tables.solutions,
+        **formulas.names, 'N': prefix(name), 'float': int(single),
+        'own_inputs': len(linkage.inputs), 'own_solutions': tables.solutions,
         'fields': formulas.struct(), 'pose': formulas.function(),
-        'parameters': ', '.join(f'{code.number} {each}' for each in formulas.parameters),
-        'arguments': ', '.join(formulas.parameters), 'by': ', '.join(formulas.by),
-        'by_places': ', '.join(f'&{by}' for by in formulas.by),
-        'by_pointers': ', '.join(f'{name}_pose *{by}' for by in formulas.by),
-        'inputs_named': ' and by '.join(formulas.inputs),
         'whole': '\n'.join(indented([f'return isfinite({whole});'])),
         'enums': '\n'.join(_enum(f'{prefix(name)}_{side}', axes) for side, axes in zip(
             ('ACTUATOR', 'JOINT'), sides)),
         'axes': comment('; '.join(f'{side}: {_with_units(linkage, axes)}' for side, axes in zip(
             ('Actuators', 'joints'), sides))),
-        'model': '\n'.join([*tables.functions.values(), *parts])}
+        'model': '\n'.join([*tables.functions, *parts])}
 
 
 def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> Dict[str, List[Axis]]:
@@ -128,14 +123,17 @@ def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> Dict[str, List
 
 def _inverse(mechanism: SceneMechanism, axes: Sequence[Axis], tag: str, number: str) -> str:
     """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
-    n, (first, *_) = len(axes), mechanism.inputs
-    place = f'{first}_' if n == 1 else 'inputs'
-    return filled(template('inverse.h.in'), {
-        'what': first if n == 1 else place, 'name': mechanism.name, 'tag': tag,
-        'outputs': _with_units(mechanism.linkage, axes),
-        'parameters': f'{number} value, {number} near, {number} *{place}' if n == 1 else
-        f'const {number} value[{n}], const {number} near[{n}], {number} inputs[{n}]',
-        'arguments': f'&value, &near, {place}' if n == 1 else 'value, near, inputs'})
+    n, (what, *_), name = len(axes), mechanism.inputs, mechanism.name
+    parameters = f'{number} value, {number} near, {number} *{what}_'
+    arguments = f'&value, &near, {what}_'
+    if n > 1:
+        what, arguments = 'inputs', 'value, near, inputs'
+        parameters = f'const {number} value[{n}], const {number} near[{n}], {number} inputs[{n}]'
+    return (f'/* The {what} for {_with_units(mechanism.linkage, axes)}, nearest to `near`, whole '
+            f'turns included.\n   Returns 0, and leaves {what} alone, where there is none. */\n'
+            f'static inline int {name}_{what}_for{tag}({parameters})\n{{\n'
+            f'    lkr_point p;\n'
+            f'    return lkr_inverse(&{name}_model{tag}, LKR_JOINTS, {arguments}, &p);\n}}\n')
 
 
 def _about(mechanism: SceneMechanism) -> Iterator[str]:

@@ -25,8 +25,8 @@ def lines(mechanism: SceneMechanism, names: Sequence[str] = ()) -> Iterator[str]
     for axis in joints(mechanism, names):
         values = np.array(linkage.extremes(axis.output, arcs[0].tolist()))[..., 0] if len(
             arcs) == 1 else _values(mechanism, axis, arcs)
-        low, high = sorted(axis.factor * end + axis.offset
-                           for end in (float(np.nanmin(values)), float(np.nanmax(values))))
+        low, high = sorted(float(axis.factor * end + axis.offset)
+                           for end in (np.nanmin(values), np.nanmax(values)))
         # What counts turns may do so in a sweep only.
         turns = axis.turn or linkage.is_angle(axis.output) and not any(
             settings.ends for settings in inputs.values())

@@ -67,17 +67,23 @@ def _parts(package_name: str, type_: str, mechanism: SceneMechanism, commanded: 
     def rows(axes: Sequence[Axis]) -> str:
         return ', '.join(f'{{{literal(axis.name)}, {literal(axis.role)}}}' for axis in axes)
 
-    sides = actuators(mechanism), commanded
-    named = [escape(comment(', '.join(axis.name for axis in axes))) for axes in sides]
-    values = {
-        'package': package_name, 'namespace': f'{package_name}_plugins', 'type': type_,
-        'name': mechanism.name, 'axes': ' and '.join(named),
-        'actuators': rows(sides[0]), 'joints': rows([*commanded, *others]),
-        'lines': '\n'.join(f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(axis.role)}/>'
-                           for kind, axes in zip(('actuator', 'joint'), sides) for axis in axes)}
+    sides, name = (actuators(mechanism), commanded), mechanism.name
+    first, second = (escape(comment(', '.join(axis.name for axis in axes))) for axes in sides)
+    plugin, loader = f'{package_name}/{type_}', f'{package_name}_plugins::{type_}Loader'
+    described = [f'  <{kind} name={quoteattr(axis.name)} role={quoteattr(axis.role)}/>'
+                 for kind, axes in zip(('actuator', 'joint'), sides) for axis in axes]
     return {
-        'rows': f'| `{package_name}/{type_}` | {named[0]} | {named[1]} |',
-        'includes': f'#include "{mechanism.name}_linkage.h"',
-        **{key: filled(template(file), values).rstrip() for key, file in (
-            ('classes', 'class.xml'), ('transmissions', 'transmission.xml'),
-            ('linkages', 'linkage.cpp.in'), ('exports', 'export.cpp.in'))}}
+        'rows': f'| `{plugin}` | {first} | {second} |',
+        'includes': f'#include "{name}_linkage.h"',
+        'linkages': f'const Linkage {name}_linkage{{{name}_model, {{{rows(sides[0])}}}, '
+                    f'{{{rows([*commanded, *others])}}}}};\n'
+                    f'using {type_}Loader = LoaderOf<{name}_linkage>;',
+        'exports': 'PLUGINLIB_EXPORT_CLASS(\n'
+                   f'  {loader}, transmission_interface::TransmissionLoader)',
+        'classes': f'  <class name="{plugin}" type="{loader}"\n'
+                   '         base_class_type="transmission_interface::TransmissionLoader">\n'
+                   f'    <description>The linkage {name} between {first} and {second}.'
+                   '</description>\n  </class>',
+        'transmissions': '\n'.join([
+            f'<transmission name="{name}">', f'  <plugin>{plugin}</plugin>', *described,
+            '</transmission>'])}

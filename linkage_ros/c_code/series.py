@@ -4,7 +4,6 @@
 """Inverses without a closed form, as series of Chebyshev polynomials in parts of the reach."""
 
 import math
-from typing import Sequence
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -23,7 +22,7 @@ HALVINGS = 60
 MAX_PIECES = 10_000
 
 
-def series(linkage: Mechanism, output: str, parts: Sequence[Sequence[float]], single: bool,
+def series(linkage: Mechanism, output: str, parts: np.ndarray, single: bool,
            scale: float = 1.0) -> np.ndarray:
     """
     Return the pieces of parts in which an output only rises or only falls: inputs and outputs.
@@ -62,7 +61,7 @@ def series(linkage: Mechanism, output: str, parts: Sequence[Sequence[float]], si
         return below
 
     # Each part in two halves, from its ends to where the output is half way.
-    low, high, first, last = np.transpose(np.divide(parts, [unit, unit, 1.0, 1.0]))[..., None]
+    low, high, first, last = (parts / [unit, unit, 1.0, 1.0]).T[..., None]
     cut = halved(np.full_like(low, 0.5), low, high, first, last - first)
     halves = np.vstack([np.hstack([start, cut, end, 0.5 * (first + last) - end])
                         for start, end in ((low, first), (high, last))])

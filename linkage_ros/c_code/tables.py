@@ -16,10 +16,10 @@ from typing import Dict, Iterator, List, Sequence, Tuple
 
 import numpy as np
 
-from .axes import Axis, gears, loads, pieces, start
+from .axes import Axis, loads, start
 from .code import Code, indented
 from .formulas import Formulas
-from .names import comment, filled, template
+from .names import comment, distinct, filled, template
 from .series import series
 from ..formula.program import Program
 from ..linkage import InverseLinkage, Mode
@@ -44,8 +44,8 @@ class Tables:
 
     Attributes
     ----------
-    functions : dict
-        The functions for the solutions of inverses, by their names.
+    functions : list of str
+        The functions for the solutions of inverses.
     solutions : int
         The most solutions of an inverse.
 
@@ -54,7 +54,8 @@ class Tables:
     def __init__(self, mechanism: SceneMechanism, code: Code, formulas: Formulas):
         self.mechanism, self.linkage, self._code, self._formulas = (
             mechanism, mechanism.linkage, code, formulas)
-        self.functions: Dict[str, str] = {}
+        self.functions: List[str] = []
+        self._names: Dict[tuple, str] = {}
         self.solutions = 1
 
     def text(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], tag: str = '',
@@ -65,98 +66,102 @@ class Tables:
         `sides` are the actuators and the commanded joints; an inverse alone has no actuators, and
         a `tag` at the end of its names. `passive` are joints that are not commanded.
         """
-        row, everywhere = self._code.row, (-math.inf, math.inf)
-        sweeps = [row(not tag and settings.ends or everywhere)
-                  for settings in self.mechanism.inputs.values()]
-        rows = sides[0], [*sides[1], *passive]
+        row, rows = self._code.row, (sides[0], [*sides[1], *passive])
         return filled(template('model.h.in'), {
-            'name': self.mechanism.name, 'tag': tag, 'number': self._code.number,
+            **self._formulas.names, 'tag': tag,
             'about': 'the inverse' if tag else 'the actuators and joints',
             'n': len(self.mechanism.scales), 'counts': ', '.join(str(len(axes)) for axes in rows),
             'names': ', '.join(map(self._solutions, sides)),
             'at': '\n'.join(indented(self._at(rows, len(sides[1])))),
-            'actuators': self._rows(rows[0]), 'joints': self._rows(rows[1]),
-            'turns': ', '.join(row(self._turns(axes)) for axes in sides),
-            'sizes': row(scale * input_.size for scale, input_ in zip(
-                self.mechanism.scales, self.linkage.inputs)),
-            'start': row(start(self.mechanism)),
-            'sweeps': ', '.join(sweeps)})
+            'axes': row(row((str(each.input), each.ratio, each.shift, 1.0 / each.size, each.turn)
+                            for each in axes) if axes else '{ { 0 } }' for axes in rows),
+            'inputs': row(self._inputs(sides, has_sweeps=not tag)),
+            'start': row(start(self.mechanism))})
 
     def _at(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], commanded: int) -> Iterator[str]:
         """Yield the statements for values, rates by each input, and loads."""
         code, formulas, scale_of = self._code, self._formulas, self.mechanism.scale_of
-        yield f'{self.mechanism.name}_pose s, {", ".join(formulas.by)};'
-        yield from (f'if (!{formulas.call()}) {{', '    return 0;', '}')
         for side, axes in enumerate(sides):
             for i, each in enumerate(axes):
-                field, unit = formulas.fields[each.output], 1.0 / scale_of(each.output)
-                yield f'p->value[{side}][{i}] = {code.times(f"s.{field}", unit)};'
-                for j, by in enumerate(formulas.by):
-                    yield f'p->rate[{side}][{i}][{j}] = {code.times(f"{by}.{field}", unit)};'
+                field, factor = formulas.fields[each.output], each.factor / scale_of(each.output)
+                position, *rates = [code.times(f'{struct}.{field}', factor)
+                                    for struct in ('s', *formulas.by)]
+                if each.offset:
+                    position += f' + {code.literal(each.offset)}'
+                if each.wraps:
+                    position = f'lkr_wrapped({position}, {code.literal(each.turn)})'
+                yield f'p->position[{side}][{i}] = {position};'
+                for j, rate in enumerate(rates):
+                    yield f'p->rate[{side}][{i}][{j}] = {rate};'
         # An inverse alone needs no efforts.
         powers = [*loads(self.mechanism)] if sides[0] else []
         for j, by in enumerate(formulas.by):
             terms = [code.times(f'{by}.{formulas.fields[output]}', -load / scale_of(output))
                      for output, load in powers]
             yield f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
-        needed = [f'p->value[{side}][{i}]' for side, axes in enumerate(sides)
+        needed = [f'p->position[{side}][{i}]' for side, axes in enumerate(sides)
                   for i in range(min(len(axes), commanded))]
         yield f'return isfinite({" + ".join(needed)});'
 
     # --- tables ---
 
-    def _rows(self, axes: Sequence[Axis]) -> str:
-        """Return the rows of a side's axes."""
-        rows, counted = [], gears(self.linkage, axes)
-        for k, each in enumerate(axes):
-            i, ratio, shift = counted.get(k, (-1, 0.0, 0.0))
-            numbers = self._code.row((ratio / self.mechanism.scales[i], shift, 1.0 / each.size,
-                                      each.turn, each.factor, each.offset))
-            rows.append(f'{{ {i}, {numbers[2:-2]}, {int(each.wraps)} }}')
-        return ', '.join(rows) or '{ -1, 0, 0, 0, 0, 0, 0, 0 }'
-
-    def _turns(self, axes: Sequence[Axis]) -> List[float]:
-        """Return after how much of each input the positions of axes are the same, or 0."""
-        counted = {i for i, _, _ in gears(self.linkage, axes).values()}
-        return [input_.turn if input_.wraps and i not in counted else 0.0
-                for i, input_ in enumerate(self.linkage.inputs)]
+    def _inputs(self, sides: Sequence[Sequence[Axis]], has_sweeps: bool) -> Iterator[Tuple]:
+        """Yield the rows of the inputs, as `lkr_input` has them."""
+        counted = [{each.input for each in axes if each.ratio} for axes in sides]
+        for i, settings in enumerate(self.mechanism.inputs.values()):
+            input_, sweep = self.linkage.inputs[i], has_sweeps and settings.ends
+            turns = [input_.turn * (input_.wraps and i not in each) for each in counted]
+            yield (self.mechanism.scales[i] * input_.size, *(sweep or (-math.inf, math.inf)),
+                   turns)
 
     # --- inverses ---
 
     def _solutions(self, axes: Sequence[Axis]) -> str:
         """Return the name of the function for all inputs of outputs, and note it; 0: none."""
         outputs = tuple(each.output for each in axes)
-        if len(gears(self.linkage, axes)) == len(axes):
+        if all(each.ratio for each in axes):
             return '0'
-        name = '_'.join([f'{self.mechanism.name}_solutions', *(
-            self._formulas.fields[output] for output in outputs)])
-        closed = self.linkage.inverse(outputs).closed
-        count, self.functions[name] = self._closed(
-            name, closed, outputs) if closed else self._series(name, *axes)
-        self.solutions = max(self.solutions, count)
-        return name
+        # Axes of the same outputs may have other signs and offsets.
+        key = tuple((each.output, each.factor, each.offset) for each in axes)
+        if key not in self._names:
+            name = '_'.join([f'{self.mechanism.name}_solutions', *(
+                self._formulas.fields[output] for output in outputs)])
+            self._names[key] = name = distinct([*self._names.values(), name])[-1]
+            closed = self.linkage.inverse(outputs).closed
+            count, function = self._closed(name, closed, axes) if closed else self._series(
+                name, *axes)
+            self.functions.append(function)
+            self.solutions = max(self.solutions, count)
+        return self._names[key]
+
+    def _value(self, i: int, axis: Axis) -> str:
+        """Return the output, in its own units, of an axis at position i."""
+        code, literal = f'position[{i}]', self._code.literal
+        if axis.offset:
+            code = f'({code} - {literal(axis.offset)})'
+        return code if axis.factor == 1.0 else f'{code} / {literal(axis.factor)}'
 
     def _series(self, name: str, axis: Axis) -> Tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""
-        code, monotone = self._code, pieces(self.linkage, axis.output)
+        code, monotone = self._code, self.linkage.monotone(axis.output)
         found = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
-        rows = [f'    {{ {", ".join(map(code.literal, row[:7]))}, {code.row(row[7:])} }},'
-                for row in found.tolist()]
-        sizes = map(code.literal, (axis.size, axis.turn))
+        rows = [f'    {code.row([*row[:7], row[7:]])},' for row in found.tolist()]
+        given = ', '.join([*(code.literal(each / abs(axis.factor)) for each in (
+            axis.size, axis.turn)), self._value(0, axis)])
         # Where two pieces of a monotone part meet, both have the input.
         return min(len(rows), 2 * len(monotone)), '\n'.join([
             f'/* The inputs of an output, in each of {len(rows)} pieces of the reach. */',
-            f'static inline int {name}(const {code.number} *value,',
+            f'static inline int {name}(const {code.number} *position,',
             f'    {code.number} (*q)[LKR_MAX_INPUTS])', '{',
             f'    static const lkr_piece piece[{len(rows)}] LKR_IN_FLASH = {{',
             *indented(rows), '    };',
-            f'    return lkr_series({len(rows)}, piece, {", ".join(sizes)}, value[0], q);', '}'])
+            f'    return lkr_series({len(rows)}, piece, {given}, q);', '}'])
 
-    def _closed(self, name: str, closed: InverseLinkage, outputs: Sequence[str]
+    def _closed(self, name: str, closed: InverseLinkage, axes: Sequence[Axis]
                 ) -> Tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
         code = self._code
-        modes = self._modes_in_reach(outputs[0], closed)
+        modes = self._modes_in_reach(axes[0].output, closed)
         # If an input has a period of several turns, each turn has its own pose.
         turns = [*product(*closed.turns)]
         blocks = [(', '.join(
@@ -171,9 +176,9 @@ class Tables:
         lines = '\n'.join(f'     {comment(line)}' for line in closed.lines)
         return count, code.function(
             f'/* The inputs in each assembly mode of the inverse linkage, NAN where there is '
-            f'none:\n{lines}\n*/\nstatic inline int {name}(const {code.number} *value,\n'
+            f'none:\n{lines}\n*/\nstatic inline int {name}(const {code.number} *position,\n'
             f'    {code.number} (*q)[LKR_MAX_INPUTS])',
-            [f'value[{i}]' for i in range(len(outputs))],
+            [self._value(i, each) for i, each in enumerate(axes)],
             blocks, f'return {count};', closed.arguments)
 
     def _modes_in_reach(self, output: str, closed: InverseLinkage) -> Sequence[Mode]:
@@ -181,10 +186,10 @@ class Tables:
         linkage, modes, (first, *others) = self.linkage, closed.modes, self.linkage.inputs
         if others:
             return modes
-        parts, _ = linkage.monotone(output, math.inf)
         # Where the inverse linkage has a dead point of its own, the mode changes.
         steps = (np.arange(SAMPLES) + 0.382) / SAMPLES
-        inputs = np.ravel([low + steps * (high - low) for low, high, *_ in parts])
+        low, high = linkage.monotone(output).T[:2, :, None]
+        inputs = (low + steps * (high - low)).ravel()
         starts = linkage.bind(Program([mode.inputs[0] for mode in modes], 1, closed.arguments)
                               ).over(linkage.posed((), (output,)).over(inputs)[0])
         apart = first.apart(np.add.outer(closed.turns[0], starts), inputs)

@@ -18,7 +18,6 @@ from .kinematics import Inputs, Kinematics
 from .motion.reach import reach_of
 from .motion.singularities import Analysis
 from .text.arguments import numbers
-from ..formula.program import CompiledFunction
 from ..words import quoted
 
 
@@ -201,16 +200,10 @@ class Mechanism(Kinematics):
             raise ValueError(f'arcs must be pairs of two numbers, got {quoted(arcs)}')
         return extremes_of(self, output, arcs, self._fixed(others))
 
-    def monotone(self, output: str, most: float, others: Sequence[float] = ()
-                 ) -> Tuple[List[Tuple[float, ...]], CompiledFunction]:
+    def monotone(self, output: str) -> np.ndarray:
         """
-        Return pieces of the first input's reach on which an output is monotone, and its code.
+        Return pieces of the reach on which an output rises, or falls, by half a turn at most.
 
-        Each piece has the input [rad or m] and the output at both ends; the output changes by
-        `most` at most. The code computes the output and its rate.
+        Each row has the input [rad or m] at both ends, and the output.
         """
-        size = self.inputs[0].step
-        self.check_output(output)
-        return [(low * size, high * size, *values) for low, high, *values
-                in segments_of(self, output, self._fixed(others)).pieces(most)], self.compiled(
-                    'output', output)
+        return segments_of(self, output).pieces()

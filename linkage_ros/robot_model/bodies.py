@@ -275,9 +275,9 @@ def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Arc]:
     if len(inputs) > 1 or not kinds:
         return {}
     turning = np.array([kind != 'prismatic' for kind in kinds.values()])
-    ends = linkage.cache.get_or_make(('travels', *reach), lambda: np.array([extremes(
-        lambda theta: np.stack([*linkage.joint_angles(theta, [*kinds]).values()]), *arc, turning)
-        for arc in reach]))
+    ends = linkage.cache.get_or_make(('travels', *reach), lambda: np.array([[extremes(
+        lambda theta, name=name: linkage.joint_angles(theta, [name])[name], *arc, turns)
+        for name, turns in zip(kinds, turning)] for arc in reach]))
     slack = np.where(turning, SLACK, SLACK * float(linkage.longest))
     lows, highs = ends[:, :, 0, 0].min(axis=0) - slack, ends[:, :, 1, 0].max(axis=0) + slack
     return {name: (low, high) for name, turns, low, high in zip(

@@ -80,19 +80,16 @@ struct Robot
 struct Pose
 {
   lkr_point point;
-  double position[2][LKR_MAX_JOINTS];
-  bool placed, good;
+  bool good;
 };
 
 Pose pose(const double (&q)[n])
 {
   Pose made{};
   double zero[n] = {};
-  made.placed = model.at(q, &made.point) != 0;
-  made.good = made.placed;
+  made.good = model.at(q, &made.point) != 0;
   for (int side = 0; side < 2; ++side) {
     made.good = made.good && lkr_solve(&model, side, &made.point, 0, 1e-2, zero) != 0;
-    lkr_to_positions(&model, side, &made.point, made.position[side]);
   }
   return made;
 }
@@ -101,17 +98,16 @@ Pose pose(const double (&q)[n])
 double apart(int side, int i, double one, double other)
 {
   const lkr_axis & axis = model.axis[side][i];
-  const double gap = (one - other) / axis.factor;
-  return std::fabs(gap - lkr_turns(gap, axis.turn)) * axis.scale;
+  return std::fabs(lkr_wrapped(one - other, axis.turn)) * axis.scale;
 }
 
 void at(Robot & robot, const Pose & where)
 {
   for (int i = 0; i < n; ++i) {
-    robot.actuator[0][i] = where.position[0][i];
+    robot.actuator[0][i] = where.point.position[0][i];
     robot.actuator[1][i] = 0.0;
     for (int k = 0; k < n; ++k) {
-      robot.actuator[1][i] += where.point.rate[0][i][k] * model.axis[0][i].factor * (k + 1);
+      robot.actuator[1][i] += where.point.rate[0][i][k] * (k + 1);
     }
     robot.actuator[2][i] = 1.0 + i;
   }
@@ -145,8 +141,8 @@ bool there_and_back(Robot & robot, const double (&q)[n], long state)
   at(robot, here);
   check(robot.transmission.status() == 0, "joints are not OK", state);
   for (int i = 0; i < n; ++i) {
-    const double difference = apart(1, i, high.position[1][i], low.position[1][i]);
-    const double rate = std::fabs(robot.joint[1][i] / model.axis[1][i].factor) * model.axis[1][i].scale;
+    const double difference = apart(1, i, high.point.position[1][i], low.point.position[1][i]);
+    const double rate = std::fabs(robot.joint[1][i]) * model.axis[1][i].scale;
     // What a difference misses grows so next to a pose where the rate is infinite.
     check(std::fabs(difference / (2.0 * h) - rate) <= 1e-7 * (1.0 + rate) + 1e-10 * std::pow(rate, 5),
       "a velocity differs from the difference of positions", state);
@@ -163,7 +159,7 @@ bool there_and_back(Robot & robot, const double (&q)[n], long state)
   robot.transmission.joint_to_actuator();
   check(robot.transmission.status() == 0, "actuators are not OK", state);
   for (int i = 0; i < n; ++i) {
-    check(apart(0, i, robot.actuator[0][i], here.position[0][i]) <= 1e-10,
+    check(apart(0, i, robot.actuator[0][i], here.point.position[0][i]) <= 1e-10,
       "an actuator does not come back", state);
     check(std::fabs(robot.actuator[2][i] - 1.0 - i) <= 1e-9, "an effort does not come back", state);
   }

@@ -24,30 +24,27 @@
 #if LKR_FLOAT
 typedef float lkr_real;
 #define LKR_MATH(name) name##f
-/* A Jacobian below this part of its size is singular: for velocities, and for Newton's method. */
-#define LKR_SINGULAR 1e-3f
-#define LKR_LEAST 1e-5f
-/* A position is reached at ENOUGH; where rounding allows no less, CLOSE times the rate or STEEPEST
-   may be left [rad, sizes]. */
-#define LKR_ENOUGH 2e-6f
-#define LKR_CLOSE 4e-6f
-#define LKR_STEEPEST 1e3f
-/* Terms of a series. */
-#define LKR_TERMS 8
-#else
-#if DBL_MANT_DIG < 53
+#define LKR_OF(in_double, in_float) in_float
+#elif DBL_MANT_DIG < 53
 #error "double is a float on this machine: print the header again with --float"
-#endif
+#else
 typedef double lkr_real;
 #define LKR_MATH(name) name
-#define LKR_SINGULAR 1e-6
-#define LKR_LEAST 1e-12
-#define LKR_ENOUGH 1e-14
-#define LKR_CLOSE 1e-13
-#define LKR_STEEPEST 4e6
-#define LKR_TERMS 20
+#define LKR_OF(in_double, in_float) in_double
 #endif
 
+/* A Jacobian below this part of its size is singular: for velocities, and for Newton's method. */
+#define LKR_SINGULAR LKR_OF(1e-6, 1e-3f)
+#define LKR_LEAST LKR_OF(1e-12, 1e-5f)
+/* A command may be so far beyond a sweep: half of all digits, which next to an extreme is rounding. */
+#define LKR_BEYOND LKR_OF(1e-6, 5e-4f)
+/* A position is reached at ENOUGH; where rounding allows no less, CLOSE times the rate or STEEPEST
+   may be left [rad, sizes]. */
+#define LKR_ENOUGH LKR_OF(1e-14, 2e-6f)
+#define LKR_CLOSE LKR_OF(1e-13, 4e-6f)
+#define LKR_STEEPEST LKR_OF(4e6, 1e3f)
+/* Terms of a series. */
+#define LKR_TERMS LKR_OF(20, 8)
 /* Steps of Newton's method from a solution that rounding has moved. */
 #define LKR_MAX_STEPS 3
 #define LKR_NAN ((lkr_real)NAN)
@@ -95,18 +92,21 @@ LKR_FORMULA lkr_real lkr_turns(lkr_real x, lkr_real turn)
     return turn * LKR_MATH(floor)(x * (1 / turn) + (lkr_real)0.5);
 }
 
-/* A limit that is missed by rounding counts as reached. */
-static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
+/* x within half a turn of 0, if there are turns. */
+LKR_FORMULA lkr_real lkr_wrapped(lkr_real x, lkr_real turn)
 {
-    if (x > 0) {
-        return LKR_MATH(sqrt)(x);
-    }
-    return x >= -tolerance ? 0 : LKR_NAN;
+    return x - lkr_turns(x, turn);
 }
 
+/* A limit that is missed by rounding counts as reached. */
 static inline lkr_real lkr_valid_where(lkr_real x, lkr_real margin, lkr_real tolerance)
 {
     return margin >= -tolerance ? x : LKR_NAN;
+}
+
+static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
+{
+    return lkr_valid_where(LKR_MATH(sqrt)(lkr_max(0, x)), x, tolerance);
 }
 
 /* The angle of (x, y); a compiler leaves it out where it is not used. */
@@ -143,25 +143,29 @@ typedef struct {
     lkr_real effort[LKR_MAX_JOINTS];
 } lkr_side;
 
-/* A pose: values of the actuators' outputs [0] and the joints' [1], their rates by each input, and the
-   inputs' efforts against the loads. */
+/* A pose: positions of the actuators [0] and the joints [1], their rates by each input, and the inputs'
+   efforts against the loads. */
 typedef struct {
-    lkr_real value[2][LKR_MAX_JOINTS];
+    lkr_real position[2][LKR_MAX_JOINTS];
     lkr_real rate[2][LKR_MAX_JOINTS][LKR_MAX_INPUTS];
     lkr_real load[LKR_MAX_INPUTS];
 } lkr_point;
 
-/* An actuator or a joint, and the output whose value it is. */
+/* An actuator or a joint. */
 typedef struct {
-    /* The input of which the value is ratio * input + shift, whole turns included; -1: of none. */
+    /* The input of which the position is ratio * input + shift, whole turns included; ratio 0: of none. */
     int input;
     lkr_real ratio, shift;
-    /* One over the size of the value, and what it may change by without effect, or 0. */
+    /* One over the size of the position, and what it may change by without effect, or 0. */
     lkr_real scale, turn;
-    /* The position is factor * value + offset; if it wraps, within half of its turn of 0. */
-    lkr_real factor, offset;
-    int wraps;
 } lkr_axis;
+
+/* An input: its size and its sweep. */
+typedef struct {
+    lkr_real size, low, high;
+    /* After how much of it the actuators or the joints repeat, or 0. */
+    lkr_real turn[2];
+} lkr_input;
 
 /* A linkage. Inputs q are in the scene's units. */
 typedef struct {
@@ -170,16 +174,13 @@ typedef struct {
     int count[2];
     /* The pose at inputs; returns 0 if it cannot be assembled. */
     int (*at)(const lkr_real *q, lkr_point *p);
-    /* All inputs that a side's outputs may have, NaN where there is none; returns their number. 0 where
-       the axes count all inputs. */
-    int (*solutions[2])(const lkr_real *value, lkr_real (*q)[LKR_MAX_INPUTS]);
+    /* All inputs that a side's positions may have, NaN where there is none; returns their number. 0
+       where the axes count all inputs. */
+    int (*solutions[2])(const lkr_real *position, lkr_real (*q)[LKR_MAX_INPUTS]);
     lkr_axis axis[2][LKR_MAX_JOINTS];
-    /* After how much of each input the actuators or the joints repeat, or 0. */
-    lkr_real turn[2][LKR_MAX_INPUTS];
-    /* The size of each input, where it starts, and its sweep. */
-    lkr_real size[LKR_MAX_INPUTS];
+    lkr_input input[LKR_MAX_INPUTS];
+    /* Where the inputs start. */
     lkr_real start[LKR_MAX_INPUTS];
-    lkr_real sweep[LKR_MAX_INPUTS][2];
 } lkr_model;
 
 /* A part of the reach in which an output only rises, or only falls: the middle of its values and how
@@ -200,69 +201,44 @@ typedef struct {
     lkr_side held[2];
 } lkr_memory;
 
-/* --- a pose and values --- */
+/* --- positions at a pose --- */
 
-/* From positions to values of outputs. */
-static inline void lkr_to_values(const lkr_model *model, int side, const lkr_real *position,
-    lkr_real *value)
-{
-    int i;
-    for (i = 0; i < model->inputs; i++) {
-        const lkr_axis *axis = &model->axis[side][i];
-        value[i] = (position[i] - axis->offset) / axis->factor;
-    }
-}
-
-/* From the values of a pose to positions. */
-static inline void lkr_to_positions(const lkr_model *model, int side, const lkr_point *p,
-    lkr_real *position)
-{
-    int i;
-    for (i = 0; i < model->count[side]; i++) {
-        const lkr_axis *axis = &model->axis[side][i];
-        position[i] = axis->factor * p->value[side][i] + axis->offset;
-        if (axis->wraps) {
-            position[i] -= lkr_turns(position[i], LKR_MATH(fabs)(axis->factor) * axis->turn);
-        }
-    }
-}
-
-/* Gaps from a pose to values, the shorter way round; returns the largest, in sizes. */
-static inline lkr_real lkr_gap(const lkr_model *model, int side, const lkr_real *value,
+/* Gaps from a pose to positions, the shorter way round; returns their sum, in sizes. */
+static inline lkr_real lkr_gap(const lkr_model *model, int side, const lkr_real *position,
     const lkr_point *p, lkr_real *gap)
 {
-    lkr_real most = 0;
+    lkr_real sum = 0;
     int i;
     for (i = 0; i < model->inputs; i++) {
         const lkr_axis *axis = &model->axis[side][i];
-        gap[i] = value[i] - p->value[side][i];
-        gap[i] -= lkr_turns(gap[i], axis->turn);
-        most = lkr_max(most, LKR_MATH(fabs)(gap[i]) * axis->scale);
+        gap[i] = lkr_wrapped(position[i] - p->position[side][i], axis->turn);
+        sum += LKR_MATH(fabs)(gap[i]) * axis->scale;
     }
-    return most;
+    return sum;
 }
 
-/* Solve J x = b in place, b in x, with the rates J of a side's values by the inputs, or with their
+/* Solve J x = b in place, b in x, with the rates J of a side's positions by the inputs, or with their
    transpose. Returns 0 where J is singular, all in sizes. */
 static inline int lkr_solve(const lkr_model *model, int side, const lkr_point *p, int is_transposed,
     lkr_real least, lkr_real *x)
 {
     /* A compiler knows this bound. */
     const int n = model->inputs < LKR_MAX_INPUTS ? model->inputs : LKR_MAX_INPUTS;
-    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS];
+    /* The last column is that of b. */
+    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS + 1];
     lkr_real most = 1;
     int i, j, k;
     for (i = 0; i < n; i++) {
         const lkr_real scale = model->axis[side][i].scale;
         for (j = 0; j < n; j++) {
-            const lkr_real rate = p->rate[side][i][j] * scale * model->size[j];
+            const lkr_real rate = p->rate[side][i][j] * scale * model->input[j].size;
             a[is_transposed ? j : i][is_transposed ? i : j] = rate;
             most = lkr_max(most, LKR_MATH(fabs)(rate));
         }
-        x[i] *= is_transposed ? model->size[i] : scale;
+        a[i][n] = x[i] * (is_transposed ? model->input[i].size : scale);
     }
     for (k = 0; k < n; k++) {
-        lkr_real pivot, value;
+        lkr_real pivot;
         int best = k;
         for (i = k + 1; i < n; i++) {
             best = LKR_MATH(fabs)(a[i][k]) > LKR_MATH(fabs)(a[best][k]) ? i : best;
@@ -271,24 +247,20 @@ static inline int lkr_solve(const lkr_model *model, int side, const lkr_point *p
         if (!(LKR_MATH(fabs)(pivot) > least * most)) {
             return 0;
         }
-        for (j = k; j < n; j++) {
-            value = a[best][j];
+        for (j = k; j <= n; j++) {
+            const lkr_real value = a[best][j] / pivot;
             a[best][j] = a[k][j];
-            a[k][j] = value / pivot;
+            a[k][j] = value;
         }
-        value = x[best];
-        x[best] = x[k];
-        x[k] = value / pivot;
         for (i = 0; i < n; i++) {
             const lkr_real factor = i == k ? 0 : a[i][k];
-            for (j = k; j < n; j++) {
+            for (j = k; j <= n; j++) {
                 a[i][j] -= factor * a[k][j];
             }
-            x[i] -= factor * x[k];
         }
     }
     for (i = 0; i < n; i++) {
-        x[i] *= is_transposed ? model->axis[side][i].scale : model->size[i];
+        x[i] = a[i][n] * (is_transposed ? model->axis[side][i].scale : model->input[i].size);
     }
     return lkr_are_finite(n, x);
 }
@@ -302,8 +274,7 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
     int i, k, solutions = 0;
     for (k = 0; k < count && solutions < LKR_MAX_SOLUTIONS; k++) {
         const lkr_piece *part = &piece[k];
-        lkr_real gap = value - LKR_FROM_FLASH(part->middle);
-        gap -= lkr_turns(gap, turn);
+        const lkr_real gap = lkr_wrapped(value - LKR_FROM_FLASH(part->middle), turn);
         if (LKR_MATH(fabs)(gap) <= LKR_FROM_FLASH(part->reach) + LKR_CLOSE * size) {
             const lkr_real square =
                 gap * LKR_FROM_FLASH(part->scale) + LKR_FROM_FLASH(part->shift);
@@ -326,8 +297,8 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
     return solutions;
 }
 
-/* From inputs q to those of values next to them, and their pose; returns 0 if there are none. */
-static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *value, lkr_real *q,
+/* From inputs q to those of positions next to them, and their pose; returns 0 if there are none. */
+static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position, lkr_real *q,
     lkr_point *p)
 {
     lkr_real gap[LKR_MAX_INPUTS] = { 0 };
@@ -338,10 +309,8 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *v
     memcpy(x, q, sizeof x);
     for (step = 0; step <= LKR_MAX_STEPS; step++) {
         lkr_point next;
-        lkr_real now = INFINITY;
-        if (model->at(x, &next)) {
-            now = lkr_gap(model, side, value, &next, gap);
-        }
+        const lkr_real now =
+            model->at(x, &next) ? lkr_gap(model, side, position, &next, gap) : INFINITY;
         if (!(now < left)) {
             break;
         }
@@ -362,139 +331,110 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *v
     if (!(left < LKR_OTHER)) {
         return 0;
     }
-    /* What is left may be rounding: of the inputs, where a value changes fast; at an end of the
-       reach the rate is infinite, yet rounding is not. */
+    /* What is left may be rounding: of the positions; of the inputs, where a position changes fast; at
+       an end of the reach the rate is infinite, yet rounding is not. */
     for (i = 0; i < model->inputs; i++) {
+        const lkr_real scale = model->axis[side][i].scale;
+        steepest = lkr_max(steepest, LKR_MATH(fabs)(position[i]) * scale);
         for (j = 0; j < model->inputs; j++) {
-            const lkr_real rate = LKR_MATH(fabs)(p->rate[side][i][j]) * model->axis[side][i].scale;
-            steepest = lkr_max(steepest, rate * lkr_max(model->size[j], LKR_MATH(fabs)(q[j])));
+            steepest = lkr_max(steepest, LKR_MATH(fabs)(p->rate[side][i][j]) * scale
+                * lkr_max(model->input[j].size, LKR_MATH(fabs)(q[j])));
         }
     }
     return left <= LKR_CLOSE * lkr_min(steepest, LKR_STEEPEST);
 }
 
-/* How far rounding of values moves an input, in sizes: next to an extreme, half of all digits, and
-   at most so far where the pose is not known yet. */
-static inline lkr_real lkr_slack(const lkr_model *model, int side, const lkr_point *p, int input)
+/* The input nearest to x in the sweep. */
+static inline lkr_real lkr_inside(lkr_real x, const lkr_input *input)
 {
-    lkr_real slack = LKR_SINGULAR;
-    int i;
-    for (i = 0; p && i < model->inputs; i++) {
-        const lkr_real rate = LKR_MATH(fabs)(p->rate[side][i][input]) * model->axis[side][i].scale
-            * model->size[input];
-        if (rate * slack > LKR_CLOSE) {
-            slack = LKR_CLOSE / rate;
-        }
-    }
-    return slack;
+    return lkr_min(lkr_max(x, input->low), input->high);
 }
 
-/* Add the turns to x that bring it nearest to inputs; returns how far it is from there, -1 if not
-   allowed. A command has to be in the sweeps, up to rounding. What is measured may be outside, which
-   counts ten times more. The pose at x is p, or null. */
+/* From inputs x to those whole turns from them that are nearest to near ones and the sweeps; returns
+   how far they are from near ones, INFINITY if not allowed. A command has to be in the sweeps, up to
+   rounding. What is measured may be outside, which counts ten times more. */
 static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_real *near,
-    const lkr_real *x, const lkr_point *p, lkr_real *q)
+    const lkr_real *x, lkr_real *q)
 {
-    const int is_command = side == LKR_JOINTS;
     lkr_real away = 0;
     int i;
     for (i = 0; i < model->inputs; i++) {
-        const lkr_real low = model->sweep[i][0];
-        const lkr_real high = model->sweep[i][1];
-        const lkr_real turn = model->turn[side][i];
-        const lkr_real inside = lkr_min(lkr_max(near[i], low), high);
-        const lkr_real slack = LKR_CLOSE * lkr_max(model->size[i], LKR_MATH(fabs)(near[i]))
-            + lkr_slack(model, side, p, i) * model->size[i];
+        const lkr_input *input = &model->input[i];
+        const lkr_real turn = input->turn[side];
+        const lkr_real slack = LKR_BEYOND * input->size + LKR_CLOSE * LKR_MATH(fabs)(near[i]);
+        const lkr_real low = input->low - slack, high = input->high + slack;
         lkr_real beyond;
-        q[i] = x[i] + lkr_turns((is_command ? inside : near[i]) - x[i], turn);
-        if (is_command && (q[i] < low - slack || q[i] > high + slack)) {
-            q[i] += q[i] < low ? turn : -turn;
+        q[i] = x[i] + lkr_turns(lkr_inside(near[i], input) - x[i], turn);
+        if (q[i] < low && q[i] + turn <= high) {
+            q[i] += turn;
+        } else if (q[i] > high && q[i] - turn >= low) {
+            q[i] -= turn;
         }
-        beyond = lkr_max(0, lkr_max(low - q[i], q[i] - high));
-        if (is_command) {
+        beyond = LKR_MATH(fabs)(q[i] - lkr_inside(q[i], input));
+        if (side == LKR_JOINTS) {
             if (beyond > slack) {
-                return -1;
+                return INFINITY;
             }
-            q[i] = lkr_min(lkr_max(q[i], low), high);
+            q[i] = lkr_inside(q[i], input);
         }
-        away += (LKR_MATH(fabs)(q[i] - near[i]) + 10 * beyond) / model->size[i];
+        away += (LKR_MATH(fabs)(q[i] - near[i]) + 10 * beyond) / input->size;
     }
-    return isfinite(away) ? away : -1;
+    return isfinite(away) ? away : INFINITY;
 }
 
-/* From values to the inputs nearest to q, and their pose; returns 0 if there are none. */
-static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *value, lkr_real *q,
-    lkr_point *p)
+/* From positions to the inputs q nearest to `from`, and their pose; returns 0, and leaves q alone, if
+   there are none. */
+static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *position,
+    const lkr_real *from, lkr_real *q, lkr_point *p)
 {
+    const size_t size = (size_t)model->inputs * sizeof *q;
     lkr_real x[LKR_MAX_SOLUTIONS + 1][LKR_MAX_INPUTS];
     lkr_real away[LKR_MAX_SOLUTIONS + 1];
-    lkr_real near[LKR_MAX_INPUTS];
+    lkr_real near[LKR_MAX_INPUTS] = { 0 }, found[LKR_MAX_INPUTS];
     int i, k, s;
     int count = 1;
-    if (!lkr_are_finite(model->inputs, value)) {
-        return 0;
-    }
-    memcpy(near, q, sizeof near);
+    memcpy(near, from, size);
     /* Without a function for solutions, there is one, of counted inputs. */
-    memcpy(x[0], q, sizeof near);
+    memcpy(x[0], near, sizeof near);
     if (model->solutions[side]) {
-        count = model->solutions[side](value, x);
+        count = model->solutions[side](position, x);
     }
     for (i = 0; i < model->inputs; i++) {
         const lkr_axis *axis = &model->axis[side][i];
-        for (k = 0; k < count && axis->input >= 0; k++) {
-            near[axis->input] = (value[i] - axis->shift) / axis->ratio;
+        for (k = 0; k < count && axis->ratio != 0; k++) {
+            near[axis->input] = (position[i] - axis->shift) / axis->ratio;
             x[k][axis->input] = near[axis->input];
         }
     }
     for (k = 0; k < count; k++) {
-        away[k] = lkr_bring(model, side, near, x[k], NULL, q);
+        away[k] = lkr_bring(model, side, near, x[k], found);
     }
-    /* Rounding may hide a solution next to the near inputs. */
+    /* The last: rounding may hide a solution next to the near inputs. */
     memcpy(x[count], near, sizeof near);
-    away[count] = INFINITY;
+    away[count] = FLT_MAX;
     for (;;) {
-        int nearest = -1;
-        for (k = 0; k <= count; k++) {
-            if (away[k] >= 0 && (nearest < 0 || away[k] < away[nearest])) {
-                nearest = k;
-            }
+        int nearest = 0;
+        for (k = 1; k <= count; k++) {
+            nearest = away[k] < away[nearest] ? k : nearest;
         }
-        if (nearest < 0) {
+        if (!(away[nearest] < INFINITY)) {
             return 0;
         }
-        away[nearest] = -1;
-        if (lkr_refine(model, side, value, x[nearest], p)
-            && lkr_bring(model, side, near, x[nearest], p, q) >= 0) {
-            /* Values that count inputs have their turns. */
+        away[nearest] = INFINITY;
+        if (lkr_refine(model, side, position, x[nearest], p)
+            && lkr_bring(model, side, near, x[nearest], found) < INFINITY) {
+            /* Positions that count inputs have their turns. */
             for (s = LKR_ACTUATORS; s <= LKR_JOINTS; s++) {
                 for (i = 0; i < model->count[s]; i++) {
                     const lkr_axis *axis = &model->axis[s][i];
-                    if (axis->input >= 0) {
-                        p->value[s][i] += axis->ratio * (q[axis->input] - x[nearest][axis->input]);
-                    }
+                    p->position[s][i] +=
+                        axis->ratio * (found[axis->input] - x[nearest][axis->input]);
                 }
             }
+            memcpy(q, found, size);
             return 1;
         }
     }
-}
-
-/* The inputs for outputs, nearest to near ones, all in the scene's units. */
-static inline int lkr_inputs_for(const lkr_model *model, const lkr_real *output, const lkr_real *near,
-    lkr_real *inputs)
-{
-    const size_t size = (size_t)model->inputs * sizeof *inputs;
-    lkr_real q[LKR_MAX_INPUTS] = { 0 };
-    lkr_real value[LKR_MAX_INPUTS];
-    lkr_point p;
-    memcpy(q, near, size);
-    lkr_to_values(model, LKR_JOINTS, output, value);
-    if (!lkr_inverse(model, LKR_JOINTS, value, q, &p)) {
-        return 0;
-    }
-    memcpy(inputs, q, size);
-    return 1;
 }
 
 /* --- actuators and joints --- */
@@ -525,60 +465,52 @@ static inline void lkr_copy(int n, const lkr_real *from, lkr_real *to)
 /* Find the pose of positions, and keep it as the newest; returns a status. */
 static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, const lkr_real *position)
 {
-    const int n = model->inputs;
     const int other = 1 - side;
+    lkr_real q[LKR_MAX_INPUTS] = { 0 }, gap[LKR_MAX_INPUTS];
     lkr_point p = m->point;
-    lkr_real q[LKR_MAX_INPUTS], value[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS], found[LKR_MAX_JOINTS];
-    int is_there;
-    if (!lkr_are_finite(n, position)) {
+    if (!lkr_are_finite(model->inputs, position)) {
         return LKR_NOT_KNOWN;
     }
-    lkr_to_values(model, side, position, value);
     /* Where it is already it stays, whatever rounding says; but a command has to be in the sweeps. */
-    is_there = m->is_known
-        && lkr_gap(model, side, value, &p, gap) <= LKR_ENOUGH
-        && lkr_bring(model, side, m->q, m->q, &p, q) == 0;
-    memcpy(q, m->q, sizeof q);
-    if (!is_there && !lkr_inverse(model, side, value, q, &p)) {
-        return LKR_OUT_OF_REACH;
-    }
-    lkr_to_positions(model, other, &p, found);
-    if (!lkr_are_finite(n, found)) {
+    if ((!m->is_known || lkr_gap(model, side, position, &p, gap) > LKR_ENOUGH
+            || lkr_bring(model, side, m->q, m->q, q) != 0)
+        && !lkr_inverse(model, side, position, m->q, q, &p)) {
         return LKR_OUT_OF_REACH;
     }
     m->is_known = 1;
     m->point = p;
     memcpy(m->q, q, sizeof q);
-    lkr_copy(model->count[other], found, m->held[other].position);
+    lkr_copy(model->count[other], p.position[other], m->held[other].position);
     return LKR_OK;
 }
 
-/* From velocities at a pose to those of the other side; returns a status. */
+/* From velocities at a pose to those of the other side, or 0; returns a status. */
 static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int side,
     const lkr_real *velocity, lkr_real *other)
 {
-    const int n = model->inputs;
     lkr_real speed[LKR_MAX_INPUTS] = { 0 };
-    int i, j, is_regular;
-    if (!lkr_are_finite(n, velocity)) {
+    int status = LKR_OK;
+    int i, j;
+    memset(other, 0, LKR_MAX_JOINTS * sizeof *other);
+    if (!lkr_are_finite(model->inputs, velocity)) {
         return LKR_NOT_KNOWN;
     }
-    for (i = 0; i < n; i++) {
-        speed[i] = velocity[i] / model->axis[side][i].factor;
+    memcpy(speed, velocity, sizeof speed);
+    if (!lkr_solve(model, side, p, 0, LKR_SINGULAR, speed)) {
+        return LKR_SINGULAR_POSE;
     }
-    is_regular = lkr_solve(model, side, p, 0, LKR_SINGULAR, speed);
     for (i = 0; i < model->count[1 - side]; i++) {
-        other[i] = 0;
-        for (j = 0; j < n; j++) {
-            other[i] += p->rate[1 - side][i][j] * speed[j];
+        lkr_real sum = 0;
+        for (j = 0; j < model->inputs; j++) {
+            sum += p->rate[1 - side][i][j] * speed[j];
         }
-        other[i] *= model->axis[1 - side][i].factor;
-        if (i >= n && !isfinite(other[i])) {
-            /* A joint that is not commanded does not stop the others. */
-            other[i] = 0;
+        if (isfinite(sum)) {
+            other[i] = sum;
+        } else if (i < model->inputs) {
+            status = LKR_SINGULAR_POSE;
         }
     }
-    return is_regular && lkr_are_finite(n, other) ? LKR_OK : LKR_SINGULAR_POSE;
+    return status;
 }
 
 /* The same for efforts, in the place of those before if it can be. The power of the actuators is that
@@ -588,21 +520,17 @@ static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int si
 {
     const int n = model->inputs;
     lkr_real x[LKR_MAX_INPUTS] = { 0 };
-    int i, j, is_regular;
+    int i, j;
     if (!lkr_are_finite(n, effort)) {
         return LKR_NOT_KNOWN;
     }
     for (i = 0; i < n; i++) {
         x[i] = side == LKR_JOINTS ? p->load[i] : -p->load[i];
         for (j = 0; j < n; j++) {
-            x[i] += p->rate[side][j][i] * model->axis[side][j].factor * effort[j];
+            x[i] += p->rate[side][j][i] * effort[j];
         }
     }
-    is_regular = lkr_solve(model, 1 - side, p, 1, LKR_SINGULAR, x);
-    for (i = 0; i < n; i++) {
-        x[i] /= model->axis[1 - side][i].factor;
-    }
-    if (!is_regular || !lkr_are_finite(n, x)) {
+    if (!lkr_solve(model, 1 - side, p, 1, LKR_SINGULAR, x)) {
         return LKR_SINGULAR_POSE;
     }
     lkr_copy(n, x, other);
@@ -632,10 +560,8 @@ static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, 
         velocity = LKR_NOT_KNOWN;
         effort = LKR_NOT_KNOWN;
     }
-    if (velocity != LKR_OK || position == LKR_OUT_OF_REACH) {
-        memset(held->velocity, 0, sizeof held->velocity);
-    }
     if (position == LKR_OUT_OF_REACH) {
+        memset(held->velocity, 0, sizeof held->velocity);
         velocity &= LKR_NOT_KNOWN;
     }
     if (effort & missing) {

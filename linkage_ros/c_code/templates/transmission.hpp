@@ -41,6 +41,12 @@ struct Linkage
 inline const std::array<std::vector<std::string>, 3> interfaces{
   {{"position"}, {"velocity"}, {"effort", "torque", "force"}}};
 
+/// The values of each quantity.
+inline std::array<lkr_real *, 3> quantities(lkr_side & side)
+{
+  return {side.position, side.velocity, side.effort};
+}
+
 /// Logs why values are held, from a thread of its own: a control loop only sets bits.
 class HeldLog
 {
@@ -90,9 +96,7 @@ private:
   std::thread thread_;
 };
 
-/// The handles of all actuators, or of all joints, by interface: position, velocity, effort. The
-/// first `needed` of them have to be there. Offsets and reductions of `infos` go into the
-/// linkage's `table`.
+/// The handles of all actuators, or of all joints; those of the first `needed` have to be there.
 template <class Handle>
 class Handles
 {
@@ -100,25 +104,31 @@ public:
   template <class Infos>
   void find(
     const std::string & what, const std::vector<Axis> & axes, std::size_t needed,
-    const Infos & infos, const std::vector<Handle> & given, lkr_axis * table)
+    const Infos & infos, const std::vector<Handle> & given)
   {
     using transmission_interface::Exception;
     needed_ = needed;
-    rows_.assign(axes.size(), {});
+    channels_.clear();
     std::string allowed;
     for (std::size_t i = 0; i < needed; ++i) {
       allowed += std::string(" '") + axes[i].name + "' (role '" + axes[i].role + "')";
     }
+    // What this robot calls each axis, and where it is there: factor * position + offset.
+    struct Own { std::string name; double factor = 1.0, offset = 0.0; };
+    std::vector<Own> owns(axes.size());
     for (const auto & info : infos) {
-      std::size_t i = place(axes, info.name, info.role);
-      if (i == axes.size() && is_added(info)) {
-        // It is the only actuator, or one beside that of the description.
-        if (!rows_[0].name.empty()) {
+      std::size_t i = 0;
+      while (i < axes.size() && (info.role.empty() ? info.name != axes[i].name : info.role != axes[i].role)) {
+        ++i;
+      }
+      // To hardware of type "actuator", ros2_control adds an actuator: the only one, or one beside it.
+      if (is_actuator && axes.size() == 1 && info.name == "actuator1" && info.role == "actuator1") {
+        if (!owns[0].name.empty()) {
           continue;
         }
         i = 0;
       }
-      if (i == axes.size() || !rows_[i].name.empty()) {
+      if (i == axes.size() || !owns[i].name.empty()) {
         throw Exception(what + " '" + info.name + "', role '" + info.role + "', is none of" + allowed);
       }
       if (!std::isfinite(info.offset) || !std::isnormal(info.mechanical_reduction)) {
@@ -126,28 +136,26 @@ public:
           "mechanical_reduction other than 0");
       }
       // A reduction is that of the built-in transmissions: from the joint to the actuator.
-      const double factor = is_actuator ? info.mechanical_reduction : 1.0 / info.mechanical_reduction;
-      table[i].factor *= factor;
-      table[i].offset = table[i].offset * factor + info.offset;
-      rows_[i].name = info.name;
+      const double reduction = info.mechanical_reduction;
+      owns[i] = {info.name, is_actuator ? reduction : 1.0 / reduction, info.offset};
     }
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      if (rows_[i].name.empty()) {
-        if (i < needed) {
-          throw Exception(what + " '" + axes[i].name + "' is missing; needed are" + allowed);
-        }
-        rows_[i].name = axes[i].name;
+    for (std::size_t i = 0; i < axes.size(); ++i) {
+      if (owns[i].name.empty() && i < needed) {
+        throw Exception(what + " '" + axes[i].name + "' is missing; needed are" + allowed);
       }
+      const std::string name = owns[i].name.empty() ? axes[i].name : owns[i].name;
       for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
-        auto & own = rows_[i].handles[kind];
+        std::vector<Handle> found;
         for (const auto & interface : interfaces[kind]) {
-          const auto found =
-            transmission_interface::get_ordered_handles(given, {rows_[i].name}, interface);
-          own.insert(own.end(), found.begin(), found.end());
+          const auto handles = transmission_interface::get_ordered_handles(given, {name}, interface);
+          found.insert(found.end(), handles.begin(), handles.end());
         }
-        if (own.size() > 1) {
-          throw Exception(what + " '" + rows_[i].name + "' has several handles for " +
-            interfaces[kind][0]);
+        if (found.size() > 1) {
+          throw Exception(what + " '" + name + "' has several handles for " + interfaces[kind][0]);
+        }
+        const double factor = kind == 2 ? 1.0 / owns[i].factor : owns[i].factor;
+        for (const auto & handle : found) {
+          channels_.push_back({handle, kind, i, factor, kind == 0 ? owns[i].offset : 0.0});
         }
       }
     }
@@ -157,8 +165,8 @@ public:
   std::size_t count(std::size_t kind) const
   {
     std::size_t sum = 0;
-    for (std::size_t i = 0; i < needed_; ++i) {
-      sum += rows_[i].handles[kind].size();
+    for (const auto & channel : channels_) {
+      sum += channel.kind == kind && channel.axis < needed_;
     }
     return sum;
   }
@@ -167,63 +175,39 @@ public:
   lkr_side read() const
   {
     lkr_side values{};
-    for (std::size_t i = 0; i < needed_; ++i) {
-      values.position[i] = value(i, 0);
-      values.velocity[i] = value(i, 1);
-      values.effort[i] = value(i, 2);
+    for (const auto & channel : channels_) {
+      quantities(values)[channel.kind][channel.axis] =
+        (channel.handle.get_value() - channel.offset) / channel.factor;
     }
     return values;
   }
 
   /// Write values, those that are finite.
-  void write(const lkr_side & values)
+  void write(lkr_side & values)
   {
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-      const std::array<double, 3> own{values.position[i], values.velocity[i], values.effort[i]};
-      for (std::size_t kind = 0; kind < own.size(); ++kind) {
-        auto & handles = rows_[i].handles[kind];
-        if (!handles.empty() && std::isfinite(own[kind])) {
-          (void)handles.front().set_value(own[kind]);
-        }
+    for (auto & channel : channels_) {
+      const double value =
+        channel.factor * quantities(values)[channel.kind][channel.axis] + channel.offset;
+      if (std::isfinite(value)) {
+        (void)channel.handle.set_value(value);
       }
     }
   }
 
 private:
-  /// An axis, with one handle for each quantity, or none.
-  struct Row
+  /// A handle for one quantity of an axis, whose value is factor * that of the scene + offset.
+  struct Channel
   {
-    std::string name;
-    std::array<std::vector<Handle>, 3> handles;
+    Handle handle;
+    std::size_t kind, axis;
+    double factor, offset;
   };
 
   static constexpr bool is_actuator =
     std::is_same_v<Handle, transmission_interface::ActuatorHandle>;
 
-  double value(std::size_t i, std::size_t kind) const
-  {
-    const auto & handles = rows_[i].handles[kind];
-    return handles.empty() ? 0.0 : handles.front().get_value();
-  }
-
-  /// The place of a role; of a name, if there is no role.
-  static std::size_t place(
-    const std::vector<Axis> & axes, const std::string & name, const std::string & role)
-  {
-    return static_cast<std::size_t>(std::find_if(axes.begin(), axes.end(), [&](const Axis & axis) {
-      return role.empty() ? name == axis.name : role == axis.role;
-    }) - axes.begin());
-  }
-
-  /// Whether ros2_control has added an actuator, which it does to hardware of type "actuator".
-  template <class Info>
-  bool is_added(const Info & info) const
-  {
-    return rows_.size() == 1 && is_actuator && info.name == "actuator1" && info.role == "actuator1";
-  }
-
   std::size_t needed_ = 0;
-  std::vector<Row> rows_;
+  std::vector<Channel> channels_;
 };
 
 /// A linkage between actuators and joints.
@@ -231,7 +215,7 @@ class Transmission : public linkage_ros::LinkageTransmission
 {
 public:
   Transmission(const Linkage & linkage, const hardware_interface::TransmissionInfo & info)
-  : linkage_(linkage), info_(info), size_(linkage.actuators.size()), log_(info.name)
+  : linkage_(linkage), info_(info), log_(info.name)
   {
   }
 
@@ -244,27 +228,25 @@ public:
       refuse("there is no parameter '" + info_.parameters.begin()->first +
         "': write the package again for other lengths");
     }
-    model_ = linkage_.model;
-    actuators_.find(
-      "actuator", linkage_.actuators, size_, info_.actuators, actuator_handles, model_.axis[0]);
-    joints_.find("joint", linkage_.joints, size_, info_.joints, joint_handles, model_.axis[1]);
+    actuators_.find("actuator", linkage_.actuators, num_joints(), info_.actuators, actuator_handles);
+    joints_.find("joint", linkage_.joints, num_joints(), info_.joints, joint_handles);
     for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
       const auto count = actuators_.count(kind) + joints_.count(kind);
-      if (count != 2 * size_ && (count != 0 || kind == 0)) {
+      if (count != 2 * num_joints() && (count != 0 || kind == 0)) {
         refuse("all its actuators and joints need a handle for " + interfaces[kind][0] +
           (kind ? ", or none of them" : ": velocities and efforts depend on the pose"));
       }
     }
-    lkr_begin(&model_, &memory_);
+    lkr_begin(&linkage_.model, &memory_);
   }
 
   void actuator_to_joint() override { transmit(LKR_ACTUATORS, actuators_, joints_); }
 
   void joint_to_actuator() override { transmit(LKR_JOINTS, joints_, actuators_); }
 
-  std::size_t num_actuators() const override { return size_; }
+  std::size_t num_actuators() const override { return linkage_.actuators.size(); }
 
-  std::size_t num_joints() const override { return size_; }
+  std::size_t num_joints() const override { return linkage_.actuators.size(); }
 
   int status() const noexcept override { return status_; }
 
@@ -280,11 +262,11 @@ private:
   {
     const auto values = from.read();
     lkr_side result;
-    for (auto kind : {result.position, result.velocity, result.effort}) {
+    for (auto kind : quantities(result)) {
       // What is not set is not written.
       std::fill_n(kind, LKR_MAX_JOINTS, LKR_NAN);
     }
-    status_ = lkr_transmit(&model_, &memory_, side, &values, &result);
+    status_ = lkr_transmit(&linkage_.model, &memory_, side, &values, &result);
     if (joints_.count(1) + joints_.count(2) == 0) {
       status_ &= ~SINGULAR;
     }
@@ -294,9 +276,6 @@ private:
 
   const Linkage & linkage_;
   hardware_interface::TransmissionInfo info_;
-  std::size_t size_;
-  /// With the offsets and reductions of this robot.
-  lkr_model model_{};
   lkr_memory memory_{};
   Handles<transmission_interface::ActuatorHandle> actuators_;
   Handles<transmission_interface::JointHandle> joints_;
