@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 from linkage_ros import mechanisms, scene
 from linkage_ros.cli import RequestError
 from linkage_ros.linkage import theta_of
-from linkage_ros.robot_files import check, cli, closing, readers
+from linkage_ros.robot_files import check, cli, closing, loops, readers
 import numpy as np
 import pytest
 from robots import (
@@ -284,6 +284,21 @@ def test_hinges_that_cross_at_the_end_of_a_rod_are_a_ball(tmp_path):
         'name="shoulder" type="continuous"', 'name="shoulder" type="spherical"'))
     assert re.search('not planar: (coupler|rocker) hangs on balls alone, and is no rod',
                      refused(loose))
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_hinges_of_a_ball_lead_from_its_first_body_to_its_second(seed):
+    robot, rng = readers.read(str(ROBOTS / 'rod.urdf')), np.random.default_rng(seed)
+    rng.shuffle(robot.joints)
+    for joint in robot.joints:
+        joint.bodies = joint.bodies[::rng.choice([1, -1])]
+    group, = loops.groups(robot)
+    ball, = (joint for joint in group.joints if joint.parts)
+    body = ball.bodies[0]
+    for hinge, sign in ball.parts:
+        assert hinge.bodies[sign < 0.0] == body
+        body = hinge.bodies[sign > 0.0]
+    assert len(ball.parts) == 3 and body == ball.bodies[1]
 
 
 def test_hinges_of_a_rod_that_its_other_end_needs_do_not_stay(tmp_path):

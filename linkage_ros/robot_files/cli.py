@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 import math
 import shlex
 import sys
@@ -24,6 +25,8 @@ NAME = 'from_robot'
 # The report on a mechanism that differs from its robot, or could not be compared.
 WRONG = 'compared with the robot'
 OTHERS = 'others'
+# What loops raise that are no mechanism.
+_FAULTS = ArithmeticError, ValueError
 READING = 'joint_names: QB=-knee+0.6 is to be read as knee = 0.6 - angle of QB.'
 
 
@@ -90,16 +93,13 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]
             if fault and not isinstance(fault, NotDriven):
                 raise fault
             for part in group.parts:
-                try:
+                # What is no planar mechanism may be a part of one in space.
+                with suppress(*_FAULTS if group.why else ()):
                     imported.append(planar.described(robot, part, imported))
-                except (ArithmeticError, ValueError):
-                    if not group.why:
-                        raise
-                    continue
-                joints = [joint for joint in joints if joint not in part.joints]
+                    joints = [joint for joint in joints if joint not in part.joints]
             if joints:
                 imported.append(rods.described(robot, group._replace(joints=joints), imported))
-        except (ArithmeticError, ValueError) as error:
+        except _FAULTS as error:
             is_driven = any(joint.name in robot.driven for joint in joints)
             why = fault if fault and (is_driven or isinstance(error, NotDriven)) else error
             in_space = f'{group.why}; ' + 'as rods in space: ' * (why is not fault)

@@ -55,7 +55,7 @@ class Rods:
         # Third hinges of balls, which stay.
         self.still: List[str] = []
         self._names: Set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
-        rods = {body: tuple(held) for body, held in _on_bodies(group.joints).items()
+        rods = {body: held for body, held in _on_bodies(group.joints).items()
                 if body != ground and [joint.kind for joint in held] == [BALL, BALL]}
         joints = [hinge for joint in group.joints for hinge in (
             [joint] if {*joint.bodies} & rods.keys() else joint.hinges)]
@@ -73,14 +73,16 @@ class Rods:
             raise ValueError(f'{listed(joint.name for joint in left)} close loops that have more '
                              'than rods in them')
         for body, held in rods.items():
-            self._rod(body, held)
+            one, two = held
+            self._rod(one.name, self._end(one, body), self._end(two, body),
+                      one.place(body) - two.place(body))
             self._universal(body, held)
         for half in halves:
             self._cylinder(half, [next(joint for joint in held_by[body] if joint is not half)
                                   for body in half.bodies])
 
-    def _named(self, joint: Joint) -> str:
-        name = plain(joint.name, 50)
+    def _named(self, name: str) -> str:
+        name = plain(name, 50)
         while name in self._names:
             name += '_'
         self._names.add(name)
@@ -97,10 +99,8 @@ class Rods:
         if joint.kind != HINGE and (is_driven or joint.kind != SLIDE):
             raise ValueError(f'{joint.name} is a joint of type {joint.kind}, no end of a rod and '
                              'no cylinder')
-        name = self._bodies[body] = self._named(joint)
-        self.links[name] = joint
-        self._ends[name] = (f'{self._bodies[base]} at {self._text(joint.place(base))} axis '
-                            f'{self._text(joint.motion(body), False)}')
+        name = self._bodies[body] = self._link(
+            joint, self._bodies[base], joint.place(base), joint.motion(body))
         if is_driven:
             self.drives.append(check.Source(name, joint.name, 1.0, 0.0 - joint.start, 0.0))
 
@@ -111,14 +111,19 @@ class Rods:
             raise ValueError(f'{joint.name} holds {body} to {other}, which hangs on rods alone')
         return f'{self._bodies[other]} {self._text(joint.place(other))}'
 
-    def _rod(self, body: str, held: Tuple[Joint, ...]) -> None:
-        ends = [joint.place(body) for joint in held]
-        length = short(float(np.linalg.norm(ends[0] - ends[1])))
-        name = self._named(held[0])
-        self.rods.append(f'{name} rod {self._end(held[0], body)} {self._end(held[1], body)} '
-                         f'length {length}')
+    def _link(self, joint: Joint, base: str, place: np.ndarray, axis: np.ndarray) -> str:
+        """Add a link on a joint with another one, and return its name."""
+        name = self._named(joint.name)
+        self.links[name] = joint
+        self._ends[name] = f'{base} at {self._text(place)} axis {self._text(axis, False)}'
+        return name
 
-    def _universal(self, body: str, held: Tuple[Joint, ...]) -> None:
+    def _rod(self, name: str, first: str, second: str, way: np.ndarray) -> None:
+        """Add a rod between two ends."""
+        length = short(float(np.linalg.norm(way)))
+        self.rods.append(f'{self._named(name)} rod {first} {second} length {length}')
+
+    def _universal(self, body: str, held: Sequence[Joint]) -> None:
         """Add two hinges of a ball at an end of a rod, if it has some; a third one stays."""
         for ball, other in held, held[::-1]:
             base, place = ball.other(body), ball.place(body)
@@ -138,15 +143,10 @@ class Rods:
                 continue
             link = self._bodies[base]
             for hinge, axis, mark in zip((first, second), axes, marks):
-                name = self._named(hinge)
                 # The limits of a rod's hinges do not count.
-                self.links[name] = replace(hinge, limits=None)
-                self._ends[name] = f'{link} at {self._text(place)} axis {self._text(axis, False)}'
-                link = name
-                self.rods.append(
-                    f'{self._named(replace(hinge, name=f"{hinge.name}_mark"))} rod '
-                    f'{self._end(other, body)} {link} {self._text(place + mark)} '
-                    f'length {short(float(np.linalg.norm(way - mark)))}')
+                link = self._link(replace(hinge, limits=None), link, place, axis)
+                self._rod(f'{hinge.name}_mark', self._end(other, body),
+                          f'{link} {self._text(place + mark)}', way - mark)
             self.still += [hinge.name for hinge in chain if hinge not in (first, second)]
             return
 
@@ -155,7 +155,7 @@ class Rods:
         way = ends[1] - ends[0]
         if np.linalg.norm(np.cross(half.axis, way)) > 1e-6 * np.linalg.norm(way):
             raise ValueError(f'{half.name} does not slide along the line of its balls')
-        name = self._named(half)
+        name = self._named(half.name)
         self.rods.append(f'{name} cylinder ' + ' '.join(
             self._end(ball, body) for ball, body in zip(balls, half.bodies)))
         length = float(np.linalg.norm(way))

@@ -346,14 +346,20 @@ def _add_slots(mechanism: SceneMechanism, robot: Robot) -> None:
             robot.meets[end] = point
 
 
-def numbers(*values: float) -> str:
-    """Return numbers with all their digits; adding zero makes -0.0 plain."""
-    return ' '.join(repr(float(value) + 0.0) for value in values)
+def add(parent: Element, tag: str, text: Any = None, **attributes: Any) -> Element:
+    """
+    Add an element to a robot model in XML; its text and attributes are words or numbers.
 
-
-def add(parent: Element, tag: str, *values: Any, **attributes: str) -> Element:
-    """Add an element to a robot model in XML; its text is a word or numbers."""
-    made = SubElement(parent, tag, attributes)
-    if values:
-        made.text = values[0] if isinstance(values[0], str) else numbers(*values)
+    Those that are None are omitted.
+    """
+    made = SubElement(parent, tag, {
+        key: _text(value) for key, value in attributes.items() if value is not None})
+    if text is not None:
+        made.text = _text(text)
     return made
+
+
+def _text(value: Any) -> str:
+    """Return a word, or numbers with all their digits; adding zero makes -0.0 plain."""
+    return value if isinstance(value, str) else ' '.join(
+        repr(number + 0.0) for number in np.ravel(value).astype(float).tolist())

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from xml.etree.ElementTree import Element, indent, tostring
 
-from .bodies import add, COLOURS, Model, numbers
+from .bodies import add, COLOURS, Model
 from .robot import Body, HINGE, Joint, Robot
 from .shapes import BALL, BOX, CYLINDER
 
@@ -33,10 +33,10 @@ def write(model: Model) -> str:
         arm for robot in model.parts for _, arm in robot.servos.values())]))
     root = Element('mujoco', model=model.name)
     add(root, 'compiler', angle='radian', eulerseq='XYZ')
-    add(root, 'option', timestep=numbers(step), integrator='implicitfast')
+    add(root, 'option', timestep=step, integrator='implicitfast')
     usual = add(root, 'default')
-    add(usual, 'geom', contype='0', conaffinity='0', density=numbers(model.density))
-    add(usual, 'equality', solref=numbers(2.0 * step, 1.0), solimp='0.9999 0.9999 1')
+    add(usual, 'geom', contype='0', conaffinity='0', density=model.density)
+    add(usual, 'equality', solref=(2.0 * step, 1.0), solimp='0.9999 0.9999 1')
     elements = {model.root: add(root, 'worldbody')}
     equality, actuator = add(root, 'equality'), add(root, 'actuator')
     starts = []
@@ -47,34 +47,29 @@ def write(model: Model) -> str:
         joints = {joint.name: joint for joint in robot.joints}
         for cut, met in robot.meets.items():
             add(equality, 'connect', name=cut, body1=bodies[met].parent, body2=bodies[cut].parent,
-                anchor=numbers(*bodies[met].pose[:3]))
+                anchor=bodies[met].pose[:3])
         for name in robot.follows:
             other, ratio, offset = robot.changes(name)
-            add(equality, 'joint', joint1=name, joint2=other,
-                polycoef=numbers(offset, ratio, 0.0, 0.0, 0.0))
+            add(equality, 'joint', joint1=name, joint2=other, polycoef=(offset, ratio, 0, 0, 0))
         for name in robot.driven:
             _add_motor(actuator, joints[name], robot)
             starts.append(robot.positions[name])
-    add(add(root, 'keyframe'), 'key', name='start', ctrl=numbers(*starts))
+    add(add(root, 'keyframe'), 'key', name='start', ctrl=starts)
     indent(root)
     return tostring(root, encoding='unicode')
 
 
 def _add_body(parent: Element, body: Body, robot: Robot) -> Element:
-    made = add(parent, 'body', name=body.name, pos=numbers(*body.pose[:3]),
-               euler=numbers(*body.pose[3:]))
+    made = add(parent, 'body', name=body.name, pos=body.pose[:3], euler=body.pose[3:])
     if joint := body.joint:
-        moved = add(made, 'joint', name=joint.name, type=joint.kind, axis=numbers(*body.axis),
-                    ref=numbers(joint.start))
-        if joint.limits:
-            moved.set('range', numbers(*joint.limits))
+        add(made, 'joint', name=joint.name, type=joint.kind, axis=body.axis, ref=joint.start,
+            range=joint.limits)
     for piece in robot.pieces.get(body.name, ()):
         half, thickness = 0.5 * piece.length, piece.thickness
         sizes = {CYLINDER: (thickness, half), BOX: (half, 0.5 * thickness, 0.5 * thickness),
                  BALL: (thickness,)}[piece.shape]
-        add(made, 'geom', type=piece.shape, pos=numbers(*piece.pose[:3]),
-            euler=numbers(*piece.pose[3:]), size=numbers(*sizes),
-            rgba=numbers(*COLOURS[piece.colour]))
+        add(made, 'geom', type=piece.shape, pos=piece.pose[:3], euler=piece.pose[3:], size=sizes,
+            rgba=COLOURS[piece.colour])
     return made
 
 
@@ -83,7 +78,5 @@ def _add_motor(actuator: Element, joint: Joint, robot: Robot) -> None:
     mass, arm = robot.servos[joint.name]
     turns = joint.kind == HINGE
     force, path = mass * GRAVITY * (arm if turns else 1.0), YIELD * (1.0 if turns else arm)
-    made = add(actuator, 'position', name=joint.name, joint=joint.name, dampratio='1',
-               kp=numbers(force / path), forcerange=numbers(-STRENGTH * force, STRENGTH * force))
-    if joint.limits:
-        made.set('ctrlrange', numbers(*joint.limits))
+    add(actuator, 'position', name=joint.name, joint=joint.name, dampratio='1', kp=force / path,
+        forcerange=(-STRENGTH * force, STRENGTH * force), ctrlrange=joint.limits)

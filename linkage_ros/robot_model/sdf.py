@@ -13,7 +13,10 @@ Format: the SDFormat specification (sdformat.org/spec).
 
 from __future__ import annotations
 
+from typing import Any
 from xml.etree.ElementTree import Element, indent, tostring
+
+import numpy as np
 
 from .bodies import add, COLOURS, Model
 from .robot import Body, HINGE, Joint, Robot, SLIDE
@@ -47,18 +50,20 @@ def write(model: Model) -> str:
     return tostring(root, encoding='unicode')
 
 
+def _fill(element: Element, **texts: Any) -> Element:
+    """Add elements with these texts to another one, and return that."""
+    for tag, text in texts.items():
+        add(element, tag, text)
+    return element
+
+
 def _add_plugin(made: Element, file: str, name: str, **values: str) -> None:
-    plugin = add(made, 'plugin', filename=f'gz-sim-{file}-system',
-                 name=f'gz::sim::systems::{name}')
-    for tag, text in values.items():
-        add(plugin, tag, text)
+    _fill(add(made, 'plugin', filename=f'gz-sim-{file}-system',
+              name=f'gz::sim::systems::{name}'), **values)
 
 
 def _add_joint(made: Element, name: str, kind: str, parent: str, child: str) -> Element:
-    joint = add(made, 'joint', name=name, type=kind)
-    add(joint, 'parent', parent)
-    add(joint, 'child', child)
-    return joint
+    return _fill(add(made, 'joint', name=name, type=kind), parent=parent, child=child)
 
 
 def _add_body(made: Element, model: Model, robot: Robot, body: Body) -> None:
@@ -66,36 +71,25 @@ def _add_body(made: Element, model: Model, robot: Robot, body: Body) -> None:
     base, parent = (('__model__', 'world') if body.parent == model.root else
                     (body.parent, body.parent))
     link = add(made, 'link', name=body.name)
-    add(link, 'pose', *body.pose, relative_to=base)
+    add(link, 'pose', body.pose, relative_to=base)
     if pieces := robot.pieces.get(body.name):
         mass, centre, moments = weight(pieces, model.density)
-        inertial = add(link, 'inertial')
-        add(inertial, 'pose', *centre, *4 * (0.0,))
-        add(inertial, 'mass', mass)
-        inertia = add(inertial, 'inertia')
-        for tag, moment in zip(('ixx', 'iyy', 'izz', 'ixy'), moments):
-            add(inertia, tag, moment)
+        inertial = _fill(add(link, 'inertial'), pose=(*centre, 0.0, 0.0, 0.0, 0.0), mass=mass)
+        _fill(add(inertial, 'inertia'), **dict(zip(('ixx', 'iyy', 'izz', 'ixy'), moments)))
     for i, piece in enumerate(pieces or ()):
-        visual = add(link, 'visual', name=f'{body.name}_{i}')
-        add(visual, 'pose', *piece.pose)
-        shape = add(add(visual, 'geometry'), piece.shape)
-        for tag, values in piece.sizes.items():
-            add(shape, tag, *values)
-        material = add(visual, 'material')
-        for tag in 'ambient', 'diffuse':
-            add(material, tag, *COLOURS[piece.colour])
+        visual = _fill(add(link, 'visual', name=f'{body.name}_{i}'), pose=piece.pose)
+        _fill(add(add(visual, 'geometry'), piece.shape), **piece.sizes)
+        colour = COLOURS[piece.colour]
+        _fill(add(visual, 'material'), ambient=colour, diffuse=colour)
     if not (joint := body.joint):
         _add_joint(made, f'{body.name}_fixed', 'fixed', parent, body.name)
         return
     kind = 'prismatic' if joint.kind == SLIDE else 'revolute'
-    axis = add(_add_joint(made, joint.name, kind, parent, body.name), 'axis')
-    add(axis, 'xyz', *body.axis)
+    made_joint = _add_joint(made, joint.name, kind, parent, body.name)
+    axis = _fill(add(made_joint, 'axis'), xyz=body.axis)
     if joint.name in robot.follows:
         other, ratio, offset = robot.changes(joint.name)
-        mimic = add(axis, 'mimic', joint=other)
-        for tag, value in ('multiplier', ratio), ('offset', offset), ('reference', 0.0):
-            add(mimic, tag, value)
+        _fill(add(axis, 'mimic', joint=other), multiplier=ratio, offset=offset, reference=0.0)
     if joint.limits:
-        limit = add(axis, 'limit')
-        for tag, end in zip(('lower', 'upper'), joint.limits):
-            add(limit, tag, end - joint.start)
+        lower, upper = np.subtract(joint.limits, joint.start)
+        _fill(add(axis, 'limit'), lower=lower, upper=upper)

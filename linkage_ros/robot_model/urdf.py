@@ -12,12 +12,13 @@ Format: the URDF XML specification of ROS (wiki.ros.org/urdf/XML).
 
 from __future__ import annotations
 
-import math
 from typing import Iterable, Sequence
 from xml.etree.ElementTree import Element, indent, tostring
 
+import numpy as np
+
 from . import bodies
-from .bodies import add, COLOURS, Model, numbers
+from .bodies import add, COLOURS, Model
 from .robot import Body, HINGE
 from .shapes import Piece
 from ..scene import SceneMechanism
@@ -35,7 +36,7 @@ def write(model: Model) -> str:
     """Return a robot model as URDF."""
     root = Element('robot', name=model.name)
     for colour, rgba in COLOURS.items():
-        add(add(root, 'material', name=colour), 'color', rgba=numbers(*rgba))
+        add(add(root, 'material', name=colour), 'color', rgba=rgba)
     add(root, 'link', name=model.root)
     for robot in model.parts:
         for body in robot.bodies():
@@ -54,20 +55,18 @@ def _add_link(root: Element, body: Body, pieces: Iterable[Piece]) -> None:
         turns, limits = moving.kind == HINGE, moving.limits
         joint.set('name', moving.name)
         joint.set('type', 'prismatic' if not turns else 'revolute' if limits else 'continuous')
-        add(joint, 'axis', xyz=numbers(*body.axis))
+        add(joint, 'axis', xyz=body.axis)
         if limits or not turns:
-            lower, upper = (numbers(end if math.isfinite(end) else math.copysign(FAR, end))
-                            for end in moving.range)
+            lower, upper = np.nan_to_num(moving.range, posinf=FAR, neginf=-FAR)
             add(joint, 'limit', lower=lower, upper=upper, effort='0', velocity='0')
     link = add(root, 'link', name=body.name)
     for piece in pieces:
         visual = add(link, 'visual')
         _add_origin(visual, piece.pose)
-        add(add(visual, 'geometry'), piece.shape, **{
-            key: numbers(*values) for key, values in piece.sizes.items()})
+        add(add(visual, 'geometry'), piece.shape, **piece.sizes)
         add(visual, 'material', name=piece.colour)
 
 
 def _add_origin(element: Element, pose: Sequence[float]) -> None:
     if any(pose):
-        add(element, 'origin', xyz=numbers(*pose[:3]), rpy=numbers(*pose[3:]))
+        add(element, 'origin', xyz=pose[:3], rpy=pose[3:])
