@@ -118,14 +118,17 @@ LKR_FORMULA lkr_real lkr_wrapped(lkr_real x, lkr_real turn)
 }
 
 /* A limit that is missed by rounding counts as reached. */
+static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
+{
+    if (x > 0) {
+        return LKR_MATH(sqrt)(x);
+    }
+    return x >= -tolerance ? 0 : LKR_NAN;
+}
+
 static inline lkr_real lkr_valid_where(lkr_real x, lkr_real margin, lkr_real tolerance)
 {
     return margin >= -tolerance ? x : LKR_NAN;
-}
-
-static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
-{
-    return lkr_valid_where(LKR_MATH(sqrt)(lkr_max(0, x)), x, tolerance);
 }
 
 /* The angle of (x, y); a compiler leaves it out where it is not used. */
