@@ -11,7 +11,7 @@ import sys
 from typing import Any, Callable, List, Mapping, NoReturn, Optional, Sequence
 
 from .scene import SceneError, SceneMechanism
-from .words import meant, RequestError, sentence
+from .words import meant, RequestError, sentence, suggestion
 
 
 class Parser(argparse.ArgumentParser):
@@ -86,8 +86,8 @@ def chosen(mechanisms: Mapping[str, SceneMechanism], names: Sequence[str]) -> Li
     """Return the named mechanisms, or all; raise RequestError for an unknown name."""
     for name in names:
         if name not in mechanisms:
-            raise RequestError(f'there is no mechanism {name!r}; allowed: {", ".join(mechanisms)}'
-                               f'{meant(name, mechanisms)}')
+            raise RequestError(
+                f'there is no mechanism {name!r}{suggestion(name, mechanisms, 200)}')
     return [mechanisms[name] for name in names or mechanisms]
 
 

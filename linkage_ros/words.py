@@ -56,6 +56,12 @@ def meant(word: Any, names: Iterable[str]) -> str:
     return ''.join(f'; did you mean {elided(by_case[name])}?' for name in near)
 
 
+def suggestion(word: Any, names: Iterable[str], most: int = MAX_QUOTED) -> str:
+    """Return the end of a sentence on an unknown word: the allowed names, and the most similar."""
+    names = list(names)
+    return f'; allowed: {listed(names, most)}{meant(word, names)}'
+
+
 def listed(names: Iterable[str], most: int = MAX_QUOTED) -> str:
     """Return names separated by commas; of many, the first ones and the number of all."""
     names = list(names)

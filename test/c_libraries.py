@@ -13,7 +13,6 @@ import shutil
 import subprocess
 import sys
 
-from linkage_ros import scene
 from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import joints
 from linkage_ros.scene.joint_names import JointName
@@ -45,16 +44,6 @@ def shared(tmp_path_factory, name):
     with open(folder / f'{name}.lock', 'w') as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield folder / name
-
-
-def alone(linkage, name='m', **settings):
-    """Return the mechanism of a type or of joint lines, alone in its scene."""
-    if not isinstance(linkage, dict):
-        linkage = {'type': linkage} if isinstance(linkage, str) else {
-            'type': 'custom', 'joints': [*linkage]}
-    return scene.read({'mechanisms': [name], **{
-        f'{name}.{key}': value for key, value in {**linkage, **settings}.items()}}
-        ).mechanisms[name]
 
 
 def loaded(folder, code, *flags):

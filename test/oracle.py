@@ -34,14 +34,15 @@ from typing import NamedTuple
 from linkage_ros import scene
 from linkage_ros.linkage import LinkPoint
 from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.publishers import LATCHED
 from linkage_ros.robot_model import bodies, shapes, urdf
 import numpy as np
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import TimeoutException
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from ros_harness import DEADLINE
+from scenes import example
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from test_reading import big_endian
@@ -50,7 +51,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 # Of fewer bytes no message is made.
 SHORTEST = 8
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # Types of markers by their ids, as docs/nodes-and-topics.md has them.
 KINDS = {0: Marker.LINE_LIST, 1: Marker.SPHERE_LIST, 3: Marker.LINE_LIST, 4: Marker.LINE_LIST,
          5: Marker.LINE_LIST, 6: Marker.LINE_LIST, 7: Marker.TRIANGLE_LIST,
@@ -884,14 +884,7 @@ SCENES = {
     'several inputs': {
         'mechanisms': ['five_bar', 'm'], 'm.type': 'five_bar', 'm.scale': 2.0,
         'm.loads': ['C=0 -1'], 'm.crank.source': 'motor', 'five_bar.crank2.source': 'motor'},
-    'an excavator': {
-        'mechanisms': ['excavator'], 'excavator.type': 'custom', 'excavator.joints': [
-            'O ground 0 0', 'P ground 0.30 -0.3964', 'B cylinder P O 1.04858 right',
-            'A rigid O B 2.4 1.5 right', 'C rigid O A 1.45 1.12156 left',
-            'D cylinder C A 0.41031 left', 'H rigid A D 1.3 1.66 right',
-            'E line H A 0.25639', 'F rigid A E 0.28 1.04039 left',
-            'G cylinder F E 0.36 left', 'J dyad G H 0.3098 0.26344 left',
-            'T rigid H J 0.6 0.75 right'], 'excavator.tracer': 'T'},
+    'an excavator': example('excavator'),
     'sensors': {
         'mechanisms': ['lever', 'bars'], 'lever.type': 'slotted_lever',
         'lever.crank.measures': 'lever', 'lever.crank.ratio': 0.5, 'lever.crank.offset': 0.05,

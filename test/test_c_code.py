@@ -10,11 +10,12 @@ import re
 import shutil
 import subprocess
 
-from c_libraries import alone, COMPILER, inverter, loaded, STRICT
+from c_libraries import COMPILER, inverter, loaded, STRICT
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import cli, header
 import numpy as np
 import pytest
+from scenes import alone
 
 ROOT = Path(__file__).parents[1]
 
@@ -200,26 +201,6 @@ def check_nearest(folder, mechanism, output, inputs=None, nears=None, beside=Non
     assert parts is not None or close > 2e-14 or max(taken) == 1
     for value in (1e3, -1e3, math.nan, math.inf):
         assert linkage.is_angle(output) and math.isfinite(value) or not invert(value, 0.0)[0]
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('name, output', [('klann', 'CF'), ('jansen', 'G.x')])
-def test_a_search_misses_none_of_ten_thousand(mechanisms, tmp_path, name, output):
-    mechanism, rng = mechanisms[name], np.random.default_rng(7)
-    linkage, scale = mechanism.linkage, mechanism.scale_of(output)
-    assert linkage.inverse(output).closed is None
-    invert = inverter(tmp_path, mechanism, output)
-    (low, high), = mechanism.first.reach
-    inputs, nears = rng.uniform(low, high, 10_000), rng.uniform(-9.0, 9.0, 10_000)
-    values = linkage.joint_angles(inputs, [output])[output]
-    cranks = np.array([found for found, _ in map(invert, values * scale, nears)])
-    gap = linkage.joint_angles(cranks, [output])[output] - values
-    gap -= linkage.is_angle(output) * math.tau * np.round(gap / math.tau)
-    assert np.abs(gap).max() < 1e-13 * max(1.0, linkage.longest)
-    # No known answer is nearer.
-    known = inputs - nears
-    assert (np.abs(cranks - nears) < np.abs(known - math.tau * np.round(known / math.tau))
-            + 1e-6).all()
 
 
 def test_several_inputs_are_found_for_as_many_outputs(mechanisms, tmp_path):

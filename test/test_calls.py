@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The calls that users type: what they accept, what they return, and what they cost."""
+"""The calls that users type: what they accept, names too, what they return, and what they cost."""
 
+from enum import Enum
 import math
 
 from effort import calls
-from linkage_ros import mechanisms
+from linkage_ros import mechanisms, scene
+from linkage_ros.c_code import header
 from linkage_ros.linkage import Answer, Solution
 import numpy as np
 import pytest
@@ -88,7 +90,9 @@ def test_what_is_no_number_is_refused_with_its_name(bars, arm, wrong):
             ask()
 
 
-@pytest.mark.parametrize('wrong', ['x', None, {}, object(), [[1.0], 'x'], True, math.nan])
+@pytest.mark.parametrize('wrong', [
+    'x', None, {}, object(), [[1.0], 'x'], True, math.nan, 'distance(A,A)', 'distance(A,Z)',
+    'angle(A)', 'angle(A,B,C)', 'distance(A, B)', 'A.z', '', 'distance', '(A,B)', 7])
 def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong):
     ankle = mechanisms.create('rods', joints=(
         'O motor ground at 0 0 0 axis 0 0 1', 'S slide ground at 1 0 0 axis 1 0 0',
@@ -96,6 +100,7 @@ def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong
     assert not bars.has_output(wrong) and not bars.moves(wrong)
     for ask, text in (
             (lambda: bars.is_angle(wrong), 'has no output'),
+            (lambda: bars.input_for(wrong, 1.0), 'four_bar has no'),
             (lambda: bars.extremes(wrong), 'has no output'),
             (lambda: bars.extremes('QB', [wrong]), 'arcs must be'),
             (lambda: bars.function(xp=wrong or 'x'), 'xp must be a package'),
@@ -215,3 +220,55 @@ def test_the_margin_of_a_pose_without_rates_is_zero():
 def test_wrong_dimensions_branches_and_tracers_are_named(given, problem):
     with pytest.raises(ValueError, match=problem):
         mechanisms.create('slider_crank', **given)
+
+
+# --- names of any class of text ---
+
+def member(text):
+    """Return a text as a member of an enum."""
+    return Enum('Joint', {'ONE': text}, type=str).ONE
+
+
+GIVEN = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
+LEVER = scene.read(GIVEN)
+LEG = mechanisms.create('jansen')
+FIVE_BAR = mechanisms.create('five_bar')
+
+
+def custom(made):
+    """Return a four-bar, all texts of which are of a class."""
+    return mechanisms.create('custom', tracer=made('A'), branches={made('B'): -1}, joints=[*map(
+        made, ('O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'B dyad A Q 2.5 2.5 left'))])
+
+
+# What is asked with names, which a function makes of texts.
+ASKED = {
+    'dimensions': lambda made: mechanisms.create(made('jansen'), **{made('m'): 14.0}).dimensions,
+    'changed dimensions': lambda made: mechanisms.create('jansen').with_dimensions(
+        **{made('m'): 14.0}).dimensions,
+    'type': lambda made: mechanisms.create(made('jansen')).type,
+    'points': lambda made: [*LEG.solve(0.5, [made('G'), made('F')]), *LEG.velocity(
+        [0.5, 0.6], (made('C'),)), *LEG.acceleration(0.5, 1.0, 0.0, made('D'))],
+    'joints': lambda made: [*LEG.joint_angles([0.5], [made('BC'), made('G.y')]), *LEG.joint_rates(
+        0.5, (made('EF'),)), *LEG.transmission_angles(0.5, made('E'))],
+    'function': lambda made: LEG.function([made('G')], (made('BC'),), (made('BC'),))(0.5),
+    'inverse': lambda made: [*LEG.input_for(made('BC'), 1.3), *LEG.extremes(made('EF'))],
+    'loads': lambda made: [*LEG.effort(0.5, {made('G'): (1.0, 2.0), made('BC'): 3.0}),
+                           LEG.output_effort(made('G.x'), 0.5, 1.0)],
+    'lines': lambda made: [custom(made).tracer, *custom(made).branches, *custom(made).points],
+    'header': lambda made: header.written(LEVER.mechanisms['lever'], [made('lever')]),
+    'several outputs': lambda made: FIVE_BAR.inputs_for(
+        [made('P.x'), made('P.y')], FIVE_BAR.solve((0.5, 2.0), 'P')['P']),
+    'scene': lambda made: scene.read({
+        made(name): value for name, value in GIVEN.items()}).parameters,
+    'changed scene': lambda made: [each.name for each in scene.changed(
+        LEVER, {made('lever.dimensions.e'): 1.5}).changed_from(LEVER)]}
+
+
+@pytest.mark.parametrize('made', [np.str_, member])
+@pytest.mark.parametrize('what', ASKED)
+def test_what_is_asked_by_names_of_any_class_is_the_same(made, what):
+    found, later = ASKED[what](made), ASKED[what](str)
+    assert found == later and len(found) > 0
+    # Nor are later callers given names of that class.
+    assert all(type(each) is str for each in (*found, *later) if isinstance(each, str))

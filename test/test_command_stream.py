@@ -33,7 +33,7 @@ SEVERAL = {
     'digger.type': 'custom', 'digger.joints': DIGGER.joints, 'digger.cylinder.start': 108.0,
     'digger.cylinder.offset': 80.0, 'digger.cylinder2.start': 132.0,
     'digger.cylinder3.start': 119.0,
-    **{f'digger.dimensions.{name}': value for name, value in DIGGER.numbers.items()}}
+    **{f'digger.dimensions.{name}': value for name, value in DIGGER.dimensions.items()}}
 FOOT = ['leg_P.x', 'leg_P.y']
 BUCKET = [f'digger_{output}' for output in ('H.x', 'H.y', 'angle(H,J)')]
 
@@ -176,7 +176,7 @@ def actuators(foot, bucket):
     """Return where the motors and pistons are in the mode that the scene starts in."""
     (left, right), _ = min(five_bar(LEG, complex(*foot)), key=lambda row: abs(row[0][0] - 1.9)
                            + abs(row[0][1] - 1.24))
-    (boom, arm, tip), _ = min(excavator(DIGGER.numbers, complex(*bucket[:2]), bucket[2]),
+    (boom, arm, tip), _ = min(excavator(DIGGER.dimensions, complex(*bucket[:2]), bucket[2]),
                               key=lambda row: row[0][1])
     return np.array([left, (right - 0.2) / -0.5, boom - 80.0, arm, tip])
 

@@ -14,13 +14,14 @@ import math
 from pathlib import Path
 import subprocess
 
-from c_libraries import alone, COMPILER, loaded, SANITIZED
+from c_libraries import COMPILER, loaded, SANITIZED
 from c_memories import memories, Memory
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import actuators, joints
 import numpy as np
 import pytest
+from scenes import alone
 from truth import random_linkages
 
 pytestmark = pytest.mark.skipif(not COMPILER, reason='there is no C compiler')

@@ -23,6 +23,9 @@ MADE = {ROOT / 'docs' / 'mechanisms' / f'{name}.md'
         for name in ('index', 'constructions', *mechanisms.TYPES)}
 LINK = re.compile(r'!?\[[^]]*\]\(([^)\s]+)\)')
 FENCE = re.compile(r'^```(\w*)\n(.*?)^```', re.MULTILINE | re.DOTALL)
+JOURNEYS = {
+    'The life of a crank message': lambda graph, node, crank, received: crank([0.4], received),
+    'A change of a parameter': lambda graph, node, crank, received: graph.set(node, m__scale=2.0)}
 
 
 @pytest.fixture
@@ -174,11 +177,6 @@ def test_what_is_measured_is_of_a_commit():
     parts = [part.partition('<!-- end of')[0] for page in (ROOT / 'docs').rglob('*.md')
              for part in page.read_text().split('<!-- measured')[1:]]
     assert len(parts) >= 6 and not [part for part in parts if 'dirty' in part]
-
-
-JOURNEYS = {
-    'The life of a crank message': lambda graph, node, crank, received: crank([0.4], received),
-    'A change of a parameter': lambda graph, node, crank, received: graph.set(node, m__scale=2.0)}
 
 
 @pytest.mark.parametrize('heading', JOURNEYS)

@@ -1,27 +1,24 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The example robot: what arrives on `joint_states` closes the loops of its own URDF."""
+"""The example robots: what arrives on `joint_states` closes the loops of their own URDFs."""
 
-import ast
 from importlib.util import find_spec
+import math
 from pathlib import Path
 import runpy
 import subprocess
 import sys
 from xml.etree import ElementTree
 
+from linkage_ros.nodes.crank_driver import CrankDriver
+from linkage_ros.nodes.kinematics import Kinematics
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
-from linkage_ros.nodes.crank_driver import CrankDriver  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from robots import in_frame, LIBRARIES  # noqa: E402
-from ros_harness import Graph  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from visualization_msgs.msg import MarkerArray  # noqa: E402
+from robots import in_frame, LIBRARIES, Pinocchio
+from ros_harness import Graph
+from sensor_msgs.msg import JointState
+from visualization_msgs.msg import MarkerArray
 
 EXAMPLES = Path(__file__).parents[1] / 'examples'
 URDF = (EXAMPLES / 'leg.urdf').read_text()
@@ -132,14 +129,6 @@ def test_a_simulated_motor_says_what_the_real_one_would(graph):
         assert set(state.name) in (MOTORS, PASSIVE) and len(state.velocity) == len(state.name)
 
 
-def test_the_launch_file_starts_what_there_is():
-    tree = ast.parse((EXAMPLES / 'leg.launch.py').read_text())
-    nodes = [{word.arg: word.value for word in call.keywords} for call in ast.walk(tree)
-             if isinstance(call, ast.Call) and ast.unparse(call.func) == 'Node']
-    assert [node['executable'].value for node in nodes] == [
-        'robot_state_publisher', 'kinematics', 'crank_driver']
-
-
 @pytest.mark.skipif(not find_spec('launch_ros'), reason='launch_ros is not installed')
 @pytest.mark.parametrize('simulated, left_out', [('true', set()), ('false', {'crank_driver'})])
 def test_the_motors_are_simulated_where_that_is_wanted(simulated, left_out):
@@ -160,3 +149,20 @@ def test_the_picture_is_drawn_by_its_command(tmp_path, monkeypatch):
     subprocess.run([sys.executable, EXAMPLES / 'draw_leg.py', tmp_path / 'leg.png'], check=True,
                    timeout=60)
     assert (tmp_path / 'leg.png').read_bytes().startswith(b'\x89PNG')
+
+
+def test_the_example_s_rods_are_closed_in_its_own_urdf(graph):
+    graph.start(Kinematics, cli_args=['--ros-args', '--params-file', str(EXAMPLES / 'ankle.yaml')])
+    turn = graph.crank(['motor_right', 'motor_left'])
+    heard = graph.listen(JointState, 'ankle/joint_states')
+    robot = Pinocchio((EXAMPLES / 'ankle.urdf').read_text())
+    lengths = {'right': math.dist((0.0395, -0.0164, 0.2112), (0.022, -0.015, -0.0096)),
+               'left': math.dist((0.035, 0.0165, 0.1469), (0.022, 0.015, -0.0096))}
+    for motors in np.random.default_rng(1).uniform(-0.2, 0.2, (20, 2)).tolist():
+        message = turn(motors, heard)
+        joints = {'motor_right': motors[0], 'motor_left': motors[1],
+                  **dict(zip(message.name, message.position))}
+        assert joints.keys() == {*robot.joints}
+        for side, length in lengths.items():
+            ends = robot.places(joints, [f'{side}_pin', f'{side}_eye']).values()
+            assert abs(math.dist(*ends) - length) < 1e-12

@@ -4,14 +4,14 @@
 """Gears of any ratio: the inverse, the reach and the motion in any turn."""
 
 from fractions import Fraction
-import itertools
 import math
 
-from linkage_ros import mechanisms, scene
+from linkage_ros import mechanisms
 from linkage_ros.c_code import header
 from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
+from scenes import alone
 
 # Ratios with their periods.
 RATIOS = {'1/64': 64, '1/80': 80, '1/100': 100, '0.31': 100, '22/7': 7, '3/7': 7, '-2.37': 100,
@@ -20,8 +20,8 @@ RATIOS = {'1/64': 64, '1/80': 80, '1/100': 100, '0.31': 100, '22/7': 7, '3/7': 7
 # Turns of the motor in which is asked.
 TURNS = 0.0, 13.3, -1e5
 
-# Fractions and a speed-up whose first question is quick.
-QUICK = '1/3', '180'
+# A fraction, a ratio that never repeats and a speed-up whose first question is quick.
+QUICK = '1/3', 'sqrt(2)', '180'
 
 
 def motor(ratio, *more):
@@ -37,18 +37,10 @@ def two(ratio):
         f'D crank R 1 geared crank {ratio} 0.3', 'B dyad A Q 2.5 2 left', 'E dyad B D 9 8 left'])
 
 
-def chained(ratio):
-    """Return a crank that is geared to a geared one."""
-    return mechanisms.create('custom', joints=[
-        'O ground 0 0', 'R ground 10 0', 'A crank O 1', f'D crank R 1 geared crank {ratio} 0.3',
-        'E crank O 2 geared crank2 sqrt(2) 0.1'])
-
-
-def limited(ratio):
+def limited(ratio, lines):
     """Return two cranks that can be assembled in a part of the turns."""
     return mechanisms.create('custom', joints=[
-        'O ground 0 0', 'Q ground 2 0', 'A crank O 1', f'D crank Q 0.7 geared crank {ratio} 0.3',
-        'B dyad A D 1.1 1.2 left'])
+        'O ground 0 0', 'Q ground 2 0', 'A crank O 1', *lines.format(ratio).split('; ')])
 
 
 @pytest.mark.parametrize('ratio, period', RATIOS.items())
@@ -103,11 +95,16 @@ def test_as_many_answers_as_brute_force_finds(ratio):
     assert np.sum(inside & (gap[1:] * gap[:-1] <= 0.0)) == len(found.input_for('E.x', 8.0321))
 
 
-@pytest.mark.nightly(all_but=2)
-@pytest.mark.parametrize('ratio', [
-    '1/3', '0.31', '1/80', pytest.param('1000', marks=pytest.mark.nightly), 'sqrt(2)', '0.12345'])
-def test_the_reach_is_where_it_can_be_assembled(ratio):
-    found = limited(ratio)
+BOTH = 'D crank Q 0.7 geared crank {} 0.3; B dyad A D 1.1 1.2 left'
+ONE = 'D crank O 0.7 geared crank {} 0.3; B dyad D Q 0.9 1.2 left'
+
+
+@pytest.mark.nightly(all_but=4)
+@pytest.mark.parametrize('ratio, lines', [
+    *((ratio, ONE) for ratio in ('2', '-3', '0.5')), ('1/3', BOTH), ('0.31', BOTH), ('1/80', BOTH),
+    pytest.param('1000', BOTH, marks=pytest.mark.nightly), ('sqrt(2)', BOTH), ('0.12345', BOTH)])
+def test_the_reach_is_where_it_can_be_assembled(ratio, lines):
+    found = limited(ratio, lines)
     first, = found.inputs
     theta = np.random.default_rng(0).uniform(first.low, first.high, 4001)
     whole = np.isfinite(found.solve(theta)['B']).all(axis=1)
@@ -121,28 +118,6 @@ def test_the_reach_is_where_it_can_be_assembled(ratio):
     assert first.is_part == all(first.on(reach, 1e6 + k) for k in range(99))
 
 
-@pytest.mark.parametrize('ratio', ['2', '-3', '0.5'])
-def test_the_reach_ends_where_a_geared_crank_is_too_far_from_a_ground_joint(ratio):
-    found = mechanisms.create('custom', joints=[
-        'O ground 0 0', 'A crank O 1', f'D crank O 0.7 geared crank {ratio} 0.3',
-        'Q ground 2 0', 'B dyad D Q 0.9 1.2 left'])
-    first, = found.inputs
-    theta = np.random.default_rng(0).uniform(first.low, first.high, 1001)
-    whole = np.isfinite(found.solve(theta)['B']).all(axis=1)
-    assert whole.any() and not whole.all()
-    assert [first.on(found.reach(), x) for x in theta.tolist()] == whole.tolist()
-
-
-def test_a_linkage_is_the_same_whole_turns_on():
-    for make, ratio, turns in itertools.product(
-            (two, chained), ('1/3', 'sqrt(2)', '1.2345678'), (32, -640)):
-        found = make(ratio)
-        there, start = found.turned(turns), math.tau * turns
-        for theta in (-1.0, 0.3, 90.0):
-            assert there.solve(theta)['E'] == pytest.approx(
-                found.solve(theta + start)['E'], abs=1e-11)
-
-
 @pytest.mark.parametrize('ratio', ['1001', '-2e3', '1e9'])
 def test_a_gear_that_is_too_fast_is_refused_with_what_is_allowed(ratio):
     with pytest.raises(ValueError, match=r'crank2 turns \S+ times as fast as the crank; '
@@ -152,8 +127,7 @@ def test_a_gear_that_is_too_fast_is_refused_with_what_is_allowed(ratio):
 
 @pytest.mark.parametrize('ratio', ['1/80', '0.12345', 'sqrt(2)', '22/7'])
 def test_a_driver_goes_on_without_a_jump_until_all_comes_round(ratio):
-    mechanism = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
-        'O ground 0 0', 'M crank O 0.01', f'A crank O 1 geared crank {ratio} 0']}).mechanisms['m']
+    mechanism = alone(['O ground 0 0', 'M crank O 0.01', f'A crank O 1 geared crank {ratio} 0'])
     motion, gear = Motion.of(mechanism.first), Fraction(mechanism.linkage.gear('crank2')[0])
     for seconds in (1, 10 ** 4, 10 ** 7):
         angle, _ = motion.at(seconds * 10 ** 9)
@@ -164,8 +138,7 @@ def test_a_driver_goes_on_without_a_jump_until_all_comes_round(ratio):
 
 
 def test_what_cannot_be_searched_in_c_is_refused():
-    mechanism = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
-        'O ground 0 0', 'M crank O 0.01', 'A crank O 1 geared crank sqrt(2) 0'],
-        'm.crank.sweep': [-1.0, 1.0]}).mechanisms['m']
+    mechanism = alone(['O ground 0 0', 'M crank O 0.01', 'A crank O 1 geared crank sqrt(2) 0'],
+                      crank__sweep=[-1.0, 1.0])
     with pytest.raises(ValueError, match='A.x of m .* repeats after too many turns'):
         header.written(mechanism, ['A.x'])

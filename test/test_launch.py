@@ -17,6 +17,7 @@ from linkage_ros import scene
 from linkage_ros.robot_model import rviz
 import numpy as np
 import pytest
+from scenes import example
 import yaml
 
 ROOT = Path(__file__).parents[1]
@@ -58,8 +59,7 @@ def test_rviz_and_foxglove_show_what_the_nodes_of_the_scene_publish(graph, shown
     from linkage_ros.nodes.kinematics import Kinematics
 
     given = scene.load(str(CONFIG / 'all.yaml'))
-    node = graph.start(Kinematics, {p.name: p.value for p in given.parameters
-                                    if p.value != ()})
+    node = graph.start(Kinematics, example('all'))
     published = set()
     for name, types in node.get_publisher_names_and_types_by_node('kinematics', '/'):
         for class_, type_ in MESSAGES.items():
@@ -79,21 +79,6 @@ def test_rviz_and_foxglove_show_what_the_nodes_of_the_scene_publish(graph, shown
         name, place = found.groups()
         called = [joint.name for joint in given.mechanisms[name].joints.values()]
         assert path['label'] == called[int(place)]
-
-
-def test_rviz_looks_from_where_the_linkages_are_seen(shown):
-    given = scene.load(str(CONFIG / 'all.yaml'))
-    manager = shown['Visualization Manager']
-    assert manager['Global Options']['Fixed Frame'] == given.frame_id
-    groups = [d['Name'] for d in manager['Displays'] if d['Class'] == rviz.GROUP]
-    assert groups == list(given.mechanisms)
-    enabled = {d['Class'] for d in displays(shown) if d['Enabled']}
-    assert enabled == {'rviz_default_plugins/Grid', 'rviz_default_plugins/MarkerArray',
-                       'rviz_default_plugins/Marker'}
-    # Along +y, on the plane x-z that they stand in.
-    assert manager['Views']['Current']['Yaw'] == pytest.approx(4.712389)
-    assert all(mechanism.pose[3:] == pytest.approx((1.5707963, 0.0, 0.0))
-               for mechanism in given.mechanisms.values())
 
 
 def test_rviz_shows_any_other_scene_too(shown):

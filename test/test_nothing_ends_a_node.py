@@ -17,14 +17,12 @@ from linkage_ros.nodes.servo_inverse import ServoInverse
 import pytest
 from rclpy.logging import LoggingSeverity
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_harness import Graph, Process
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import MarkerArray
 
 CONFIG = Path(__file__).parents[1] / 'config'
-LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}
 
 

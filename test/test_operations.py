@@ -11,12 +11,12 @@ import operator
 
 from c_libraries import loaded
 import gmpy2
-from linkage_ros import scene
 from linkage_ros.c_code import header
 from linkage_ros.formula import expression, program
 from linkage_ros.formula.operations import OPERATIONS, WITHOUT_RATE
 import numpy as np
 import pytest
+from scenes import alone
 
 NAN = gmpy2.nan()
 # What each comes to, in as many digits as are asked for.
@@ -108,8 +108,7 @@ def by_lanes(name, values):
 def c_library(tmp_path_factory):
     """Return a function that does an operation in C, for double or float."""
     libraries = {}
-    lever = scene.read(
-        {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}).mechanisms['lever']
+    lever = alone('slotted_lever')
     for kind, f in (('double', ''), ('float', 'f')):
         text = [header.written(lever, (), bool(f))]
         for name, row in OPERATIONS.items():

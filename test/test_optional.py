@@ -22,9 +22,7 @@ ROBOTS = ROOT / 'test' / 'robot_files'
 # What a package does that is imported; an empty one has none of its names.
 WAYS = {
     'missing': "raise ModuleNotFoundError('No module named NAME', name='NAME')",
-    'ImportError': "raise ImportError('undefined symbol: PyUnicode_AsUTF8', name='NAME._core')",
     'AttributeError': 'import sys; sys.version_infos',
-    'SystemError': "raise SystemError('initialization of _core failed')",
     'empty': '',
     'OSError': "raise OSError('libNAME.so: cannot open shared object file')",
 }

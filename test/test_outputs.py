@@ -44,15 +44,6 @@ def test_their_rates_are_differences(type_, output):
     assert function(0.3)[1] == linkage.joint_rates(0.3, [output])[output]
 
 
-@pytest.mark.parametrize('name', ['distance(A,A)', 'distance(A,Z)', 'angle(A)', 'angle(A,B,C)',
-                                  'distance(A, B)', 'A.z', '', 'distance', '(A,B)', 7, None])
-def test_what_is_no_output_is_refused_by_its_name(name):
-    linkage = mechanisms.create('four_bar')
-    assert not linkage.has_output(name)
-    with pytest.raises(ValueError, match='four_bar has no'):
-        linkage.input_for(name, 1.0)
-
-
 # --- following a measured value ---
 
 def test_whole_turns_are_kept_and_what_cannot_be_is_not_a_number():

@@ -20,19 +20,18 @@ from linkage_ros.web.viewer import Viewer
 import numpy as np
 from PIL import Image
 import pytest
+from scenes import example, ROOT
 from sensor_msgs.msg import JointState
 from truth.working_modes import lever_of
 from viewer_harness import (
     BLUE,
     coloured,
-    example,
     GREEN,
     LEG,
     LEVER,
     needs_browser,
     PURPLE,
     RATE,
-    ROOT,
     Seen,
     spoilt,
     walker,

@@ -25,6 +25,7 @@ from matplotlib.colors import to_rgb
 import numpy as np
 from PIL import Image
 import pytest
+from scenes import alone
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / 'config'
@@ -33,8 +34,7 @@ TABLE = [line.split() for line in (ROOT / 'pictures' / 'pictures.txt').read_text
 
 
 def mechanism(type_, **parameters):
-    given = {f'{type_}.{name.replace("__", ".")}': value for name, value in parameters.items()}
-    return scene.read({'mechanisms': [type_], **given}).mechanisms[type_]
+    return alone(type_, type_, **parameters)
 
 
 def picture_of(*mechanisms, times=(0.0,), **kwargs):

@@ -5,26 +5,20 @@
 
 import math
 from pathlib import Path
-import subprocess
-import sys
 from xml.etree import ElementTree
 
+from linkage_ros import scene
+from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.publishers import LATCHED
+from linkage_ros.nodes.urdf_cli import main
+from linkage_ros.robot_model import urdf
 import numpy as np
 import pytest
+from robots import in_frame, Pinocchio
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from visualization_msgs.msg import MarkerArray
 
-pytest.importorskip('rclpy')
-
-from linkage_ros import scene  # noqa: E402
-from linkage_ros.nodes.kinematics import Kinematics  # noqa: E402
-from linkage_ros.nodes.urdf_cli import main  # noqa: E402
-from linkage_ros.robot_model import urdf  # noqa: E402
-from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
-from robots import in_frame, Pinocchio  # noqa: E402
-from sensor_msgs.msg import JointState  # noqa: E402
-from std_msgs.msg import String  # noqa: E402
-from visualization_msgs.msg import MarkerArray  # noqa: E402
-
-LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 CATALOGUE = Path(__file__).parents[1] / 'config' / 'all.yaml'
 POSE = [0.3, -0.2, 0.92, math.pi / 2.0, 0.4, -1.1]
 ROBOT = {'mechanisms': ['hand', 'arm', 'foot'], 'frame_id': 'torso', 'arm.type': 'four_bar',
@@ -134,14 +128,3 @@ def test_what_is_not_understood_is_refused_in_one_line(files, capsys, arguments,
     printed = capsys.readouterr()
     assert printed.out == '' and printed.err.count('\n') == 1 and complaint in printed.err
     assert printed.err.startswith('urdf: ')
-
-
-@pytest.mark.nightly
-def test_a_scene_is_described_without_ros():
-    code = ('import sys; sys.modules["rclpy"] = None; '
-            'from linkage_ros.robot_model.cli import main; sys.exit(main(sys.argv[1:]))')
-    for arguments, ended in (([str(CATALOGUE)], 0), (['--ros-args'], 1)):
-        process = subprocess.run([sys.executable, '-c', code, *arguments], capture_output=True,
-                                 text=True, timeout=60, cwd=Path(__file__).parents[1])
-        assert process.returncode == ended, process.stderr
-        assert ended == 0 or 'unrecognized arguments: --ros-args' in process.stderr

@@ -17,6 +17,7 @@ from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
 import numpy as np
 import pytest
 from robots import rotation
+from scenes import alone
 from test_simulators import model, simulated, some_quick
 from test_urdf import ARM, in_space, MACHINES, OWN, posed
 
@@ -232,8 +233,7 @@ def test_a_linkage_in_space_makes_no_model():
 def test_what_has_no_length_is_not_drawn():
     # At its shortest the cylinder has no length, and so has its barrel.
     lines = ['P ground 0 0', 'O ground 1 0', 'B cylinder P O 1 right']
-    one = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.cylinder.start': 1.0,
-                      'm.joints': lines}).mechanisms['m']
+    one = alone(lines, cylinder__start=1.0)
     pieces = [piece for pieces in model([one]).parts[0].pieces.values() for piece in pieces]
     assert {(piece.shape, piece.length > 0.0) for piece in pieces} == {
         ('sphere', False), ('cylinder', True)}

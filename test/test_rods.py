@@ -8,12 +8,13 @@ import random
 import re
 
 import gmpy2
-from linkage_ros import mechanisms, scene
+from linkage_ros import mechanisms
 from linkage_ros.c_code import header
 from linkage_ros.linkage import FORMS, WindowError
 from linkage_ros.linkage.geometry import window as proof
 import numpy as np
 import pytest
+from scenes import alone
 from truth import rods
 from truth.hostile_texts import NUMBERS
 
@@ -464,8 +465,7 @@ def test_a_linkage_a_million_times_the_size_has_the_same_angles(g1):
 
 
 def test_the_pose_in_c_has_no_loop_and_no_heap():
-    text = header.written(scene.read({'mechanisms': ['ankle'], 'ankle.type': 'rods',
-                                      'ankle.joints': list(G1)}).mechanisms['ankle'])
+    text = header.written(alone('rods', 'ankle', joints=G1))
     pose_ = text[text.index('#endif /* LINKAGE'):text.index('ANKLE_OK')]
     assert 'ankle_solve' in pose_ and 'ankle_rates' in pose_ and not re.search(
         r'\b(for|while|do|goto|malloc)\b(?! it)', re.sub(r'/\*.*?\*/', '', pose_, flags=re.S))

@@ -12,10 +12,11 @@ import itertools
 import math
 import re
 
-from linkage_ros import mechanisms, scene
+from linkage_ros import mechanisms
 from linkage_ros.scene.inverse_request import InverseRequest, present_inputs
 import numpy as np
 import pytest
+from scenes import alone
 from test_rods import G1
 from truth.working_modes import five_bar
 
@@ -61,11 +62,8 @@ class Case:
         type_, lengths, lines, given, self.outputs, self.inputs = CASES[name]
         self.given, self.scale = {**given, **more}, given['scale']
         own = {'joints': list(lines)} if lines else {}
-        self.mechanism = scene.read({'mechanisms': ['m'], **{
-            f'm.{key}': value for key, value in {
-                'type': type_, **own, **self.given,
-                **{f'dimensions.{key}': value for key, value in lengths.items()}}.items()
-        }}).mechanisms['m']
+        self.mechanism = alone({'type': type_, **own, **self.given, **{
+            f'dimensions.{key}': value for key, value in lengths.items()}})
         self.linkage = mechanisms.create(type_, **own, **{
             key: self.scale * value for key, value in lengths.items()})
         self.drives = [*self.mechanism.inputs.values()]
@@ -173,8 +171,7 @@ def test_where_the_way_leads_out_of_the_sweep_one_input_jumps_into_it():
             ([0.2, 1.5], -0.5, 0.9), ([-1.5, -0.2], 0.5, -0.9), ([-1.5, 1.5], -0.5, -0.9),
             ([-1.5, 0.9], 0.5, 0.9), ([0.9, 1.5], -0.5, 0.9), ([-0.8, 0.8], 0.5, math.nan),
             ([5.0, 6.0], 0.5, math.tau - 0.9)):
-        mechanism = scene.read({'mechanisms': ['m'], 'm.type': 'slider_crank', 'm.scale': 0.5,
-                                'm.dimensions.c': 0.0, 'm.crank.sweep': sweep}).mechanisms['m']
+        mechanism = alone('slider_crank', scale=0.5, dimensions__c=0.0, crank__sweep=sweep)
         for jumps in (False, True):
             near(InverseRequest(mechanism, ['block']).command(
                 [0.5 * block], None, [near_], jumps).inputs, [expected])
@@ -187,16 +184,15 @@ def test_several_inputs_jump_only_if_they_may(scale):
     modes = [inputs for inputs, _ in five_bar(mechanisms.defaults('five_bar'), foot)]
     start = max(modes)
     ends = [min(inputs[0] for inputs in modes) - 0.1, start[0] - 0.1]
-    given = {'mechanisms': ['m'], 'm.type': 'five_bar', 'm.scale': scale}
-    swept = {**given, 'm.crank.sweep': ends, 'm.crank.start': ends[0]}
+    swept = {'crank.sweep': ends, 'crank.start': ends[0]}
     values = [scale * foot.real, scale * foot.imag]
-    for parameters in (given, swept):
-        request = InverseRequest(scene.read(parameters).mechanisms['m'], ['P.x', 'P.y'])
-        inside = [mode for mode in modes if parameters is given or mode[0] < ends[1]]
+    for more in ({}, swept):
+        request = InverseRequest(alone('five_bar', scale=scale, **more), ['P.x', 'P.y'])
+        inside = [mode for mode in modes if not more or mode[0] < ends[1]]
         expected = sorted(inside, key=lambda mode: math.dist(mode, start))
         for jumps in (False, True):
             found = request.command(values, [0.1, 0.0], start, jumps)
-            near(found.inputs, expected[0] if jumps or parameters is given else 2 * [math.nan])
+            near(found.inputs, expected[0] if jumps or not more else 2 * [math.nan])
         near(sorted(inputs for inputs, _ in request.answers(values)), sorted(inside))
     assert inside and len(inside) < len(modes)
 

@@ -4,20 +4,24 @@
 """The servo service: right answers, or the reason why there is none."""
 
 import math
-from types import SimpleNamespace
 
-from linkage_interfaces.srv import InputsFor, ServoInverse as Service
+from linkage_interfaces.srv import (
+    InputsFor,
+    ServoInverse as Service,
+    ServoInverse as ServoInverseType,
+)
 from linkage_ros import mechanisms, scene
+from linkage_ros.nodes import scene_process
+from linkage_ros.nodes.crank_driver import CrankDriver
+from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.servo_inverse import ServoInverse
 import numpy as np
 import pytest
+from sensor_msgs.msg import JointState
 from truth.working_modes import five_bar, lever_of
 
 TWO = {'mechanisms': ['left', 'right', 'drop'], 'left.type': 'slotted_lever',
        'right.type': 'slotted_lever', 'right.dimensions.a': 200.0, 'drop.type': 'water_drop'}
-SWEPT = {'mechanisms': ['slotted_lever'], 'slotted_lever.crank.sweep': [-1.3, 0.8]}
-
-
 def test_each_servo_angle_puts_the_lever_where_it_is_wanted(graph):
     wanted = [0.0, 0.1, -0.3, 0.5, math.asin(80.0 / 150.0) * (1.0 - 1e-9)]
     graph.start(ServoInverse)
@@ -151,18 +155,29 @@ def test_what_cannot_be_asked_of_several_inputs_gets_the_reason(graph):
             message=message, names=['leg_crank', 'motor'])
 
 
-@pytest.mark.parametrize('bad', [
-    {'slotted_lever.crank.sweep': [1e16, 1e16 + 8.0]}, {'slotted_lever.scale': 1e308},
-    {'slotted_lever.scale': 1e-308}])
-def test_what_would_cost_an_answer_its_digits_is_refused(graph, bad):
-    with pytest.raises(scene.SceneError):
-        graph.start(ServoInverse, {**SWEPT, **bad})
+# --- beside the other nodes in one process ---
+
+LEVER = {'mechanisms': ['lever'], 'lever.type': 'slotted_lever', 'lever.crank.speed': 2.0}
 
 
-def test_dimensions_change_while_the_node_runs(graph):
-    node = graph.start(ServoInverse)
-    request = SimpleNamespace(mechanism='', lever_angle=[0.8], servo_near=[], output='')
-    assert not node.answer(request, Service.Response()).success
-    graph.change(node, {}, slotted_lever__dimensions__a=140.0)
-    response = node.answer(request, Service.Response())
-    assert lever_of(response.servo_angle[0], a=140.0) == pytest.approx(0.8)
+@pytest.fixture
+def nodes(graph):
+    """Start them as the process does."""
+    return [graph.start(kind, LEVER) for kind in (Kinematics, ServoInverse, CrankDriver)]
+
+
+def test_the_service_answers_on_the_working_branch_wherever_the_crank_is(graph, nodes):
+    *_, driver = nodes
+    client = graph.node.create_client(ServoInverseType, 'servo_inverse')
+    cranks = graph.listen(JointState, 'crank_states')
+    for start in (0.4, 2.9):
+        graph.set(driver, lever__crank__start=start, lever__crank__speed=0.0)
+        graph.until(lambda start=start: cranks and cranks[-1].position[0] == start)
+        found = graph.call(client, ServoInverseType.Request(lever_angle=[lever_of(0.4)]))
+        assert found.success and found.servo_angle[0] == pytest.approx(0.4, abs=1e-9)
+
+
+def test_a_bad_scene_ends_them_all_in_one_sentence(capfd):
+    assert scene_process.main(['scene', '--ros-args', '-p', 'mechanisms:=[leg]']) == 1
+    printed = capfd.readouterr().err
+    assert printed.count('[FATAL]') == 1 and 'leg.type must be a text' in printed

@@ -7,11 +7,12 @@ from itertools import product
 import math
 
 from effort import few_calls
-from linkage_ros import mechanisms, scene
+from linkage_ros import mechanisms
 from linkage_ros.linkage import Solution
 from linkage_ros.scene.inverse_request import InverseRequest
 import numpy as np
 import pytest
+from scenes import alone
 from truth.cases import CASES
 from truth.working_modes import arm, excavator, five_bar
 
@@ -33,8 +34,8 @@ def agree(linkage, outputs, values, expected, sure=1e-3):
 
 def made(name):
     """Return a collected case and its numbers."""
-    case = CASES[name]
-    return mechanisms.create('custom', joints=case.joints, **case.numbers), case.numbers
+    joints, numbers, _ = CASES[name]
+    return mechanisms.create('custom', joints=joints, **numbers), numbers
 
 
 @pytest.mark.parametrize('count', [
@@ -222,15 +223,13 @@ def test_a_place_to_start_from_may_be_anything():
 
 
 def test_answers_lie_in_the_sweeps_or_the_reason_says_so():
-    swept = {'mechanisms': ['leg'], 'leg.type': 'five_bar', 'leg.crank.sweep': [6.0, 9.0]}
-    wanted = InverseRequest(scene.read(swept).mechanisms['leg'], ('P.x', 'P.y'))
+    wanted = InverseRequest(alone('five_bar', crank__sweep=[6.0, 9.0]), ('P.x', 'P.y'))
     answers = wanted.answers((0.05, 0.15), (0.0, 0.0))
     assert answers and all(6.0 <= inputs[0] <= 9.0 for inputs, _ in answers)
     assert answers[0][0][0] == pytest.approx(min(inputs[0] for inputs, _ in answers))
     found, _, _ = wanted.command((0.05, 0.15), None, (0.0, 0.0), jumps=True)
     assert found == pytest.approx(answers[0][0])
-    swept['leg.crank.sweep'] = [3.0, 3.5]
-    wanted = InverseRequest(scene.read(swept).mechanisms['leg'], ('P.x', 'P.y'))
+    wanted = InverseRequest(alone('five_bar', crank__sweep=[3.0, 3.5]), ('P.x', 'P.y'))
     assert wanted.answers((0.05, 0.15), (3.2, 0.0)) == []
     assert wanted.reason(0.05, 0.15) == (
         'P.x, P.y at 0.05, 0.15 needs the crank at 1.74732 rad, crank2 at 1.58104 rad, outside '

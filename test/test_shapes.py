@@ -11,6 +11,7 @@ from linkage_ros.robot_model import shapes
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD
 import numpy as np
 import pytest
+from scenes import alone
 
 ENGINE = ('O ground 0 0', 'G ground 0 -20', 'A crank O 40', 'B slider A 120 G 0.5 out',
           'P rigid A B 50 90 left')
@@ -23,18 +24,13 @@ RACK = ('O ground 0 0', 'H ground 1 0.5', 'S carriage O along H 0.1 0.9', 'A gro
         'B dyad S A 0.6 0.5 left', 'm mirrored O H')
 
 
-def mechanism(type_='custom', **given):
-    return scene.read({'mechanisms': ['m'], 'm.type': type_, **{
-        f'm.{name.replace("__", ".")}': value for name, value in given.items()}}).mechanisms['m']
-
-
 MACHINES = {
     'excavator': lambda: scene.load('config/excavator.yaml').mechanisms['excavator'],
-    'boxer engine': lambda: mechanism(joints=ENGINE, leg_pairs=2, scale=0.01),
-    'guide on a coupler': lambda: mechanism(joints=MOVING, crank__sweep=[0.8, 1.6], scale=3.0),
-    'rack and its image': lambda: mechanism(joints=RACK),
-    'slotted_lever': lambda: mechanism('slotted_lever', dimensions__e=20.0, scale=1e-3),
-    'slider_crank': lambda: mechanism('slider_crank'),
+    'boxer engine': lambda: alone(ENGINE, leg_pairs=2, scale=0.01),
+    'guide on a coupler': lambda: alone(MOVING, crank__sweep=[0.8, 1.6], scale=3.0),
+    'rack and its image': lambda: alone(RACK),
+    'slotted_lever': lambda: alone('slotted_lever', dimensions__e=20.0, scale=1e-3),
+    'slider_crank': lambda: alone('slider_crank'),
 }
 
 
@@ -105,7 +101,7 @@ BOOM = 'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right'
 @pytest.mark.parametrize('sweep, barrel', [
     ([0.8, 0.9], 0.4), ([0.8, 1.4], 0.6), ([0.6, 1.4], 0.54), ([0.8, 1.2], 0.4)])
 def test_a_barrel_is_as_long_as_the_stroke_from_half_to_nine_tenths(sweep, barrel):
-    one = mechanism(joints=BOOM, scale=3.0, cylinder__sweep=[3.0 * end for end in sweep])
+    one = alone(BOOM, scale=3.0, cylinder__sweep=[3.0 * end for end in sweep])
     outer, rod = shapes.shapes(one)
     assert (outer.start, outer.end.x, outer.end.y) == (
         LinkPoint('barrel', 0.0, 0.0), pytest.approx(barrel), 0.0)
@@ -141,7 +137,7 @@ def test_cranks_are_bars_that_inputs_turn_and_marks_are_below_the_ground():
     toe = mechanisms.create('custom', joints=CASSIE)
     assert shapes.cranks(toe) == [('O', 'F'), ('K', 'A')]
     assert shapes.cranks(MACHINES['rack and its image']().linkage) == []
-    engine = mechanism(joints=ENGINE).linkage
+    engine = alone(ENGINE).linkage
     height = engine.longest / 15.0
     assert shapes.marks(engine, ['G', 'A']) == [(
         'G', *(LinkPoint('ground', pytest.approx(side * 0.6 * height),
@@ -157,9 +153,9 @@ def test_a_guide_stays_on_the_link_that_it_is_on():
 
 
 def test_what_nobody_wants_is_not_drawn():
-    one = mechanism(joints=MOVING, points=['O', 'A', 'B'], crank__sweep=[0.8, 1.6])
+    one = alone(MOVING, points=['O', 'A', 'B'], crank__sweep=[0.8, 1.6])
     assert shapes.shapes(one) and not shapes.drawn(one, one.points)
-    assert not shapes.shapes(scene.read({'mechanisms': ['jansen']}).mechanisms['jansen'])
+    assert not shapes.shapes(alone('jansen'))
 
 
 def test_a_linkage_without_a_bar_is_as_large_as_its_stroke():

@@ -3,7 +3,6 @@
 
 """Efforts that balance loads; on any linkage they are compared in `linkage_checks`."""
 
-import math
 
 from linkage_ros import mechanisms
 import numpy as np
@@ -35,8 +34,8 @@ def test_what_is_not_loaded_needs_no_effort_even_at_a_dead_point():
 def test_the_effort_of_an_output_asks_for_one_input_and_an_output_that_moves():
     with pytest.raises(ValueError, match='five_bar has several inputs'):
         mechanisms.create('five_bar').output_effort('P.x', (1.9, 0.4), 1.0)
-    for output, problem in (('Q.x', 'does not move'), ('Z.x', 'has no output'),
-                            (7, 'has no output')):
+    for output, problem in (('Q.x', 'Q.x of four_bar does not move with the crank'),
+                            ('Z.x', 'has no output'), (7, 'has no output')):
         with pytest.raises(ValueError, match=problem):
             mechanisms.create('four_bar').output_effort(output, 0.4, 1.0)
 
@@ -52,31 +51,12 @@ def test_the_effort_of_an_output_has_the_power_of_the_input(output, theta):
     np.testing.assert_allclose(found * (after - before) / (2.0 * step), 6.0, rtol=1e-7)
 
 
-def test_next_to_a_dead_point_it_grows_without_bound():
-    cell = mechanisms.create('peaucellier')
-    end = cell.reach()[0][1]
-    efforts = [abs(cell.effort(end - gap, {'B': (1.0, 0.3)})[0]) for gap in (1e-2, 1e-6, 1e-10)]
-    assert efforts[1] / efforts[0] == pytest.approx(1e2, rel=0.1)
-    assert efforts[2] / efforts[1] == pytest.approx(1e2, rel=0.1)
-    assert not abs(cell.effort(end, {'B': (1.0, 0.3)})[0]) < 1e6
-    assert math.isinf(mechanisms.create('slider_crank', c=0.0).output_effort(
-        'block', 0.0, 1.0))
-
-
 @pytest.mark.parametrize('loads, said', [
     ({'Z': (1.0, 2.0)}, "no joint or link 'Z' to load; allowed: O, Q, A"),
     ({'B': 3.0}, 'the load on the joint B must be a force x, y'),
     ({'B': (1.0, 2.0, 3.0)}, 'the load on the joint B must be a force x, y'),
-    ({'QB': 'much'}, 'the load on QB')])
+    ({'QB': 'much'}, 'the load on QB'),
+    *((loads, 'loads must be a mapping') for loads in ([1.0, 2.0], 'B', 3.0, None))])
 def test_a_load_that_cannot_be_is_refused(loads, said):
     with pytest.raises(ValueError, match=said):
         mechanisms.create('four_bar').effort(0.4, loads)
-
-
-def test_loads_and_outputs_that_are_none_are_refused():
-    linkage = mechanisms.create('four_bar')
-    for loads in ([1.0, 2.0], 'B', 3.0, None):
-        with pytest.raises(ValueError, match='loads must be a mapping'):
-            linkage.effort(0.5, loads)
-    with pytest.raises(ValueError, match='O.x of four_bar does not move with the crank'):
-        linkage.output_effort('O.x', 0.5, 1.0)

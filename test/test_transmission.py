@@ -16,7 +16,7 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-from c_libraries import alone, counted, expected, loaded, outputs, prove, shared, STAND_IN
+from c_libraries import counted, expected, loaded, outputs, prove, shared, STAND_IN
 from c_memories import compiled, memories, Memory, UNWRITTEN
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header, transmission
@@ -24,6 +24,8 @@ from linkage_ros.c_code.axes import actuators, joints
 from linkage_ros.c_code.package import package
 import numpy as np
 import pytest
+from scenes import alone
+from test_rods import G1
 
 ROOT = Path(__file__).parents[1]
 COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
@@ -54,13 +56,7 @@ SCENE = {
         'O ground 0 0', 'R ground 1 0', 'A carriage O along R 0.1 0.7', 'Q ground 0 1',
         'B dyad A Q 0.9 0.6 left'], 'rack.loads': ['B=2 -5'],
     'foot.type': 'rods', 'foot.right.sweep': [-0.25, 0.25], 'foot.left.sweep': [-0.2, 0.2],
-    'foot.joints': [
-        'pitch hinge ground at 0 0 0 axis 0 1 0 within -50deg 30deg',
-        'roll hinge pitch at 0 0 -0.0176 axis 1 0 0 within -15deg 15deg',
-        'right motor ground at 0.022 0 0.2159 axis 1 0 0',
-        'left motor ground at 0.022 0 0.1509 axis 1 0 0',
-        'R rod right 0.0395 -0.0164 0.2112 roll 0.022 -0.015 -0.0096',
-        'L rod left 0.035 0.0165 0.1469 roll 0.022 0.015 -0.0096'],
+    'foot.joints': G1,
     'foot.loads': ['L_roll=1 2 -30', 'roll=2.0'],
     # One joint counts an input that has another size than 1, and the other depends on both.
     'sled.type': 'custom', 'sled.only_named': True,
@@ -304,14 +300,6 @@ def test_the_joints_are_chosen_by_their_names(mechanisms):
     for names in (['knee'], ['P.x', 'P.y'], ['leg_AP'], ['leg_AP', 'leg_AP']):
         with pytest.raises(ValueError, match='leg has 2 inputs: as many of its joints are needed'):
             joints(leg, names)
-
-
-def test_all_ground_links_of_the_catalogue_but_one_are_closed_forms():
-    linkages = [mechanisms.create(name) for name in mechanisms.TYPES]
-    closed = {(linkage.type, link.name): linkage.inverse(link.name).closed is not None
-              for linkage in linkages if len(linkage.inputs) == 1 for link in linkage.links
-              if link.parent == 'ground' and link.name != linkage.inputs[0].name}
-    assert len(closed) == 16 and [key for key in closed if not closed[key]] == [('klann', 'CF')]
 
 
 @pytest.mark.skipif(not shutil.which('avr-gcc'), reason='avr-gcc is not installed')

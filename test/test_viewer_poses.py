@@ -16,7 +16,8 @@ from linkage_ros.web import curves, poses
 from linkage_ros.web.nearest_pose import nearest_inputs, theta_of
 import numpy as np
 import pytest
-from viewer_harness import DOUBLE, example, EXAMPLES, mechanism_of
+from scenes import alone, example, EXAMPLES
+from viewer_harness import DOUBLE, mechanism_of
 
 
 @pytest.mark.parametrize('path', EXAMPLES, ids=lambda path: path.stem)
@@ -66,10 +67,9 @@ def test_no_joint_of_a_linkage_in_space_is_dragged():
 
 def test_a_bar_follows_a_dimension_that_can_only_become_shorter():
     # Longer, A, B and C are no triangle.
-    bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'custom', 'bar.dimensions.p': 4.0,
-                      'bar.joints': ['O ground 0 0', 'Q ground 4 0', 'A crank O 1',
-                                     'B dyad A Q 3 3 left', 'C rigid A B p 1 left']})
-    assert poses.tunable(bar.mechanisms['bar'])['bars'] == {'dimensions.p': [('A', 'C')]}
+    bar = alone(['O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'B dyad A Q 3 3 left',
+                 'C rigid A B p 1 left'], dimensions__p=4.0)
+    assert poses.tunable(bar)['bars'] == {'dimensions.p': [('A', 'C')]}
 
 
 @pytest.mark.parametrize('name', ['excavator', 'jansen', 'peaucellier', 'scissor_lift'])
@@ -151,17 +151,16 @@ def test_an_input_goes_where_it_is_wanted_or_as_near_as_it_gets(
 
 
 def test_an_input_goes_to_the_nearest_of_two_arcs_and_not_where_nothing_can_be_assembled():
-    bar = scene.read({'mechanisms': ['bar'], 'bar.type': 'four_bar', 'bar.crank.start': 1.0, **{
-        f'bar.dimensions.{name}': length for name, length in zip('abcd', (3.0, 2.0, 2.5, 3.0))}})
-    bar = bar.mechanisms['bar']
+    bar = alone('four_bar', crank__start=1.0, **{
+        f'dimensions.{name}': length for name, length in zip('abcd', (3.0, 2.0, 2.5, 3.0))})
     (low, beside), (beyond, high) = bar.first.reach
     for value, expected in ((3.0, high), (-3.0, low), (3.5, low), (0.01, beyond), (-0.01, beside)):
         (found,), reach = poses.reached(bar, [1.0], {'output': 'crank', 'value': value})
         assert found == pytest.approx(expected, abs=1e-12) and reach['arcs'] == bar.first.reach
     inside = 0.5 * (beyond + high)
     assert poses.reached(bar, [1.0], {'output': 'crank', 'value': inside}) == ([inside], None)
-    five, = scene.read({'mechanisms': ['five_bar']}).mechanisms.values()
-    with pytest.raises(scene.SceneError, match='^five_bar cannot be assembled there$'):
+    five = alone('five_bar')
+    with pytest.raises(scene.SceneError, match='^m cannot be assembled there$'):
         poses.reached(five, [1.9, 1.24], {'output': 'crank2', 'value': -1.9})
 
 
@@ -197,8 +196,7 @@ def test_an_output_goes_where_it_is_wanted_or_to_the_end_of_its_reach(name, chan
 
 @pytest.mark.parametrize('leg', range(6))
 def test_a_joint_of_any_leg_goes_where_it_is_wanted_or_as_near_as_it_gets(leg):
-    walker = scene.read({'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.leg_pairs': 3,
-                         'walker.scale': 0.01}).mechanisms['walker']
+    walker = alone('jansen', leg_pairs=3, scale=0.01)
 
     def foot(crank):
         # A pair is behind the one before, and its right leg is the mirror image.
@@ -313,8 +311,7 @@ def test_an_output_is_what_it_is_however_small_and_rounding_is_zero(scale):
 
 
 def test_arrows_of_force_are_the_loads_and_what_holds_them():
-    mechanism = scene.read({'mechanisms': ['lever'], 'lever.type': 'slotted_lever',
-                            'lever.loads': ['L=3 -4', 'lever=2']}).mechanisms['lever']
+    mechanism = alone('slotted_lever', loads=['L=3 -4', 'lever=2'])
     found = poses.arrows(mechanism, [0.5], 'force', {'crank': 1.0})
     effort, = mechanism.efforts([0.5])
     assert found == {'unit': 'N', 'at': {'L': (3.0, -4.0)}, 'efforts': {'crank': [effort, 'N·m']}}
@@ -341,8 +338,7 @@ def test_a_position_is_drawn_as_it_bends_even_next_to_a_dead_point(name, output)
 
 
 def test_no_line_goes_through_a_pole():
-    mechanism = scene.read({'mechanisms': ['slotted_lever']}).mechanisms['slotted_lever']
-    curve = curves.curve(mechanism, [0.3], 'force ratio', 'lever')
+    curve = curves.curve(alone('slotted_lever'), [0.3], 'force ratio', 'lever')
     x, y = np.array(curve['x']), np.array(curve['y'], float)
     turns = math.pi - math.acos(80.0 / 150.0)
     gaps = x[np.isnan(y)].reshape(2, 2)

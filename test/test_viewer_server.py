@@ -22,7 +22,8 @@ from browser import until
 from linkage_ros import palette, scene
 from linkage_ros.web.viewer import Viewer
 import pytest
-from viewer_harness import LEG, PAGE, Page, resident, ROOT
+from scenes import ROOT
+from viewer_harness import LEG, PAGE, Page, resident
 
 NONSENSE = [
     '', '[]', 'null', '\x00', '{"op": 1}', '{"op": {}}', '["op"]', '[' * 60000, '{"a":' * 10000,
@@ -226,14 +227,6 @@ def test_the_page_is_served_with_nothing_from_outside(lever, name):
                          'http://www.w3.org/2000/svg', 'https://github.com/leeoniya/uPlot'}
 
 
-def test_the_page_is_as_small_as_the_docs_say():
-    said = re.search(r'\| ([0-9]+) kB, of which plots',
-                     (ROOT / 'docs' / 'design' / 'page.md').read_text())
-    size = sum(file.stat().st_size for file in PAGE.rglob('*')
-               if file.suffix in ('.html', '.css', '.js', '.svg'))
-    assert size == pytest.approx(1000.0 * float(said[1]), rel=0.1)
-
-
 @pytest.mark.parametrize('name', [
     '%2e%2e%2fserver.py', 'vendor%2f..%2f..%2fserver.py', 'server.py', 'none.html',
     'page/main.js'])
@@ -340,18 +333,3 @@ def test_make_view_says_where_to_look_and_ends_all_that_it_started(stop):
     finally:
         process.terminate()
         process.wait(browser.DEADLINE)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize('arguments', [
-    ('view.py', ROOT / 'config' / 'jansen.yaml', '0'), ('demo.py',)], ids=lambda some: some[0])
-def test_make_view_and_make_demo_end_quietly_when_nobody_reads_what_they_print(arguments):
-    name, *others = arguments
-    environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(sys.path)}
-    process = subprocess.Popen(
-        [sys.executable, ROOT / 'demo' / name, *others], env=environment,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    process.stdout.close()
-    said = process.stderr.read()
-    assert process.wait(browser.DEADLINE) == 0
-    assert [line for line in said.splitlines() if '[INFO]' not in line] == []

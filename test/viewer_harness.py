@@ -19,17 +19,15 @@ from linkage_ros.nodes import messages
 from linkage_ros.nodes.crank_driver import CrankDriver
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.servo_inverse import ServoInverse
-from linkage_ros.scene.writing import without_defaults
 from linkage_ros.web.viewer import Viewer
 import numpy as np
 import pytest
 import rclpy
 from rclpy.serialization import deserialize_message, serialize_message
+from scenes import example, ROOT
 from visualization_msgs.msg import MarkerArray
 
-ROOT = Path(__file__).parents[1]
 PAGE = ROOT / 'linkage_ros' / 'web' / 'page'
-EXAMPLES = [*sorted((ROOT / 'config').glob('*.yaml')), *sorted((ROOT / 'examples').glob('*.yaml'))]
 NODES = (CrankDriver, Kinematics, ServoInverse)
 RATE = {'rate': 40.0}
 LEVER = {**RATE, 'mechanisms': ['lever', 'drop'], 'lever.type': 'slotted_lever',
@@ -45,12 +43,6 @@ CLOSED = aiohttp.WSMsgType.CLOSE, aiohttp.WSMsgType.CLOSING, aiohttp.WSMsgType.C
 
 needs_browser = pytest.mark.skipif(
     not browser.found(), reason=f'none of {", ".join(browser.NAMES)} is installed')
-
-
-def example(name):
-    """Return the parameters of an example."""
-    return without_defaults(scene.load(str(next(
-        path for path in EXAMPLES if path.stem == name))))
 
 
 def mechanism_of(name, **changed):

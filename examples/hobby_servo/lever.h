@@ -700,8 +700,8 @@ typedef lkr_memory lever_memory;
 /* The inputs in each assembly mode of the inverse linkage, NAN where there is none:
      O ground 0.0 0.0
      Q ground 0.0 -0.045
-     X crank Q 0.081 up
-     A slider O 0.02 Q along X out
+     L crank Q 0.081 up
+     A slider O 0.02 Q along L out
 */
 static inline int lever_solutions_angle_lever(const float *position,
     float (*q)[LKR_MAX_INPUTS])

@@ -9,7 +9,7 @@ from . import header
 from .axes import output_of
 from .. import cli, scene
 from ..scene import SceneMechanism
-from ..words import listed, meant
+from ..words import suggestion
 
 NAME = 'c_code'
 
@@ -37,8 +37,7 @@ def with_joints(mechanisms: Sequence[SceneMechanism], names: Sequence[str]
               for mechanism in mechanisms]
     known = [joint.name for mechanism in mechanisms for joint in mechanism.joints.values()]
     for name in sorted({*names}.difference(*(joints for _, joints in chosen))):
-        raise cli.RequestError(f'no mechanism has a joint {name!r}; allowed: '
-                               f'{listed(known, 200)}{meant(name, known)}')
+        raise cli.RequestError(f'no mechanism has a joint {name!r}{suggestion(name, known, 200)}')
     return chosen
 
 

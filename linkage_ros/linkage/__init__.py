@@ -3,7 +3,7 @@
 
 """Linkages in the plane and in space: what other rooms import; `__all__` lists it. No ROS."""
 
-from .dyads import bar_name, Dyads, Hinge, Motor, Pin, short, Slide
+from .dyads import bar_name, Dyads, Hinge, Pin, short, Slide
 from .formulas import Leg, LinkPoint
 from .geometry.builder import GROUND, Link
 from .geometry.spatial import IN_SINGLE
@@ -23,6 +23,6 @@ from .tolerances import CLOSE, ROUNDING, TOLERANCE
 __all__ = ['Answer', 'Arc', 'ascending', 'bar_name', 'checked_branches', 'checked_dimensions',
            'CLOSE', 'Design', 'Dyads', 'extremes', 'FORMS', 'Formula',
            'GROUND', 'Hinge', 'IN_SINGLE', 'Input', 'Inverse', 'InverseLinkage', 'joint_lines',
-           'Leg', 'Link', 'LinkPoint', 'loaded_links', 'Mechanism', 'Mode', 'Motor', 'Pin',
+           'Leg', 'Link', 'LinkPoint', 'loaded_links', 'Mechanism', 'Mode', 'Pin',
            'reachable_arcs', 'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide', 'Solution',
            'spread', 'theta_of', 'TOLERANCE', 'WindowError']

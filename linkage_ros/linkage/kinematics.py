@@ -27,7 +27,7 @@ from ..formula.expression import derivative, Real, real
 from ..formula.namespace import array_function
 from ..formula.program import CompiledFunction, evaluate, evaluate_in_order, Program
 from ..optional import needs
-from ..words import listed, meant, plain_text, quoted
+from ..words import listed, meant, plain_text, quoted, suggestion
 
 # Quantities of joints; all others are of links.
 OF_POINTS = 'points', 'velocities', 'point accelerations'
@@ -497,6 +497,6 @@ class Kinematics:
         names = tuple(map(plain_text, (requested,) if isinstance(requested, str) else requested))
         for name in names:
             if name not in allowed and not (what == 'joint' and self.has_output(name)):
-                raise ValueError(f'{self.type} has no {what} {quoted(name)}; '
-                                 f'allowed: {listed(allowed)}{meant(name, allowed)}')
+                raise ValueError(f'{self.type} has no {what} {quoted(name)}'
+                                 f'{suggestion(name, allowed)}')
         return names

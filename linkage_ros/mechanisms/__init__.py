@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from . import custom
 from ..linkage import checked_branches, checked_dimensions, Design, Mechanism
-from ..words import meant, plain_text, quoted
+from ..words import plain_text, quoted, suggestion
 
 # The mechanisms of a scene without names, and their scales: they are 0.5 m to 1.5 m in size.
 CATALOGUE = {'water_drop': 0.1, 'jansen': 0.005, 'peaucellier': 0.1, 'slotted_lever': 0.002}
@@ -50,9 +50,8 @@ def design(type_: str, /, joints: Optional[Sequence[str]] = None, tracer: Option
 
     """
     if not isinstance(type_, str) or type_ not in (*TYPES, *WRITTEN):
-        raise ValueError(f'unknown mechanism type {quoted(type_)}; '
-                         f'allowed: {", ".join((*TYPES, *WRITTEN))}'
-                         f'{meant(type_, (*TYPES, *WRITTEN))}')
+        raise ValueError(f'unknown mechanism type {quoted(type_)}'
+                         f'{suggestion(type_, (*TYPES, *WRITTEN), 200)}')
     if type_ in WRITTEN:
         return custom.checked_design(plain_text(type_), joints, tracer, dimensions)
     if joints is not None or tracer is not None:

@@ -9,7 +9,7 @@ from typing import Any, Iterable, Optional, Tuple
 
 from ..cache import cached
 from ..linkage import Design, joint_lines, rod_lines
-from ..words import listed, meant, plain_text, quoted
+from ..words import listed, meant, plain_text, quoted, suggestion
 
 MOST_LINES = 2000
 # The modules that read joint lines, by the type of the linkage.
@@ -42,8 +42,7 @@ def design(type_: str, joints: Tuple[str, ...], tracer: Optional[str],
     used = joint_lines.lengths(lines)
     placed = words.points(lines)
     if tracer is not None and tracer not in placed:
-        raise ValueError(f'tracer {quoted(tracer)} is not a joint; allowed: {listed(placed)}'
-                         f'{meant(tracer, placed)}')
+        raise ValueError(f'tracer {quoted(tracer)} is not a joint{suggestion(tracer, placed)}')
     signed = frozenset(name for name, length in used.items() if not length)
     return Design(type_, dict.fromkeys(used, 1.0), joints, tracer or placed[-1], signed,
                   words is rod_lines, is_written=True)

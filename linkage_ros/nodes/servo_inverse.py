@@ -20,7 +20,7 @@ from ..cache import Cache
 from ..optional import needs
 from ..robot_model import bodies
 from ..scene.inverse_request import InverseRequest, LEVER, present_inputs
-from ..words import elided, listed, meant, MESSAGE, quoted
+from ..words import elided, listed, MESSAGE, quoted, suggestion
 
 # Other callers and messages wait for an answer: the maximum number of values in a request.
 MAX_VALUES = 10_000
@@ -172,8 +172,7 @@ def _chosen(mechanisms: Mapping[str, scene.SceneMechanism], name: str,
         return next(iter(default.values()))
     problem = (f'there is no mechanism {quoted(name)}' if name else
                f'mechanism may be empty only if the scene has a single {what}')
-    raise ValueError(f'{problem}; allowed: {listed(mechanisms, MAX_NAMES_LENGTH)}'
-                     f'{meant(name, mechanisms)}')
+    raise ValueError(f'{problem}{suggestion(name, mechanisms, MAX_NAMES_LENGTH)}')
 
 
 def _unreachable(inverse: InverseRequest, values: Sequence[float]) -> str:

@@ -14,7 +14,7 @@ from .. import scene
 from ..cli import add_scene, chosen, Parser, RequestError, run, within
 from ..linkage import Formula
 from ..optional import needs
-from ..words import meant
+from ..words import suggestion
 
 IMAGES, VIDEOS = ('.png', '.svg'), ('.gif', '.mp4')
 FPS, MAX_GIF_FPS, MAX_FPS = 25.0, 50.0, 240.0
@@ -173,8 +173,8 @@ def parts_of_a_picture(text):
     """Return the parts between commas."""
     for word in words(text):
         if word not in parts.PARTS:
-            raise argparse.ArgumentTypeError(f'unknown part {word}; allowed: '
-                                             f'{", ".join(parts.PARTS)}{meant(word, parts.PARTS)}')
+            raise argparse.ArgumentTypeError(
+                f'unknown part {word}{suggestion(word, parts.PARTS, 200)}')
     return frozenset(words(text))
 
 

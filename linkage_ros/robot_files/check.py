@@ -19,7 +19,7 @@ import numpy as np
 from .spatial import Component, components, EXACT
 from .. import scene
 from ..linkage import short, theta_of
-from ..robot_model.robot import Robot, SLIDE
+from ..robot_model.robot import Robot
 from ..scene.joint_names import quoted_name
 
 # Number of paths of several motors, of poses on all paths, and of poses that a check needs.
@@ -166,16 +166,14 @@ class _Loops:
 
     def _check_start(self) -> None:
         """Raise Difference if a joint is not where the file has it."""
-        positions = self._positions({
-            name: np.full((1, 1), value) for name, value in self._start.items()})
-        for joint in self._component.joints:
-            if joint.name in positions and joint.position is not None:
-                off = float(positions[joint.name][0, 0]) - joint.position
-                off = off / self._component.size if joint.kind == SLIDE else math.remainder(
-                    off, math.tau)
-                if abs(off) > OTHER + self._slack:
-                    raise Difference(f'{self._at(self._start)} {joint.name} is off by '
-                                     f'{abs(off):.2g}')
+        component = self._component
+        start = self._positions({name: np.array([value]) for name, value in self._start.items()})
+        seen = component.read(component.moved_to(component.start, start))
+        for name in start:
+            off = float(seen[name][0]) - component.positions[name]
+            off = abs(off) / component.unit[component.named[name]]
+            if off > OTHER + self._slack:
+                raise Difference(f'{self._at(self._start)} {name} is off by {off:.2g}')
 
     def _walk_to(self, targets: np.ndarray) -> Tuple[Walk, str]:
         """

@@ -92,9 +92,15 @@ def _with_balls(robot: Robot) -> List[Joint]:
                 and (BALL in (first.kind, second.kind)
                      or np.linalg.norm(np.cross(first.axis, second.axis)) > ASKEW):
             ball = Joint(f'{first.name}+{second.name}', BALL, ends, places, first.axes,
-                         parts=(first, second))
+                         parts=(*_chain(first, ends[0]), *_chain(second, body)))
             joints = [*(joint for joint in joints if joint not in held), ball]
     return joints
+
+
+def _chain(joint: Joint, start: str) -> Sequence[Tuple[Joint, float]]:
+    """Return the hinges of a joint from one of its bodies to the other, with their signs."""
+    parts = joint.parts or [(joint, 1.0)]
+    return parts if joint.bodies[0] == start else [(hinge, -sign) for hinge, sign in parts[::-1]]
 
 
 def check_planar(ground: str, joints: Sequence[Joint], drives: Sequence[str] = ()

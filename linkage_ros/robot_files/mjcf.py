@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import mujoco
@@ -13,14 +12,7 @@ from mujoco import MjSpec
 import numpy as np
 
 from .elements import turned_by
-from ..cli import RequestError
 from ..robot_model.robot import at, BALL, FIXED, Robot
-
-# What MuJoCo says of a file, and the sentence for it.
-_ERRORS = [
-    (r"Error opening file '(.*)'", 'it includes {!r}, which is not there'),
-    (r'plugin (\S+) not found', 'it uses the plugin {!r}, which this MuJoCo does not have: remove '
-     'that from <extension>, and what refers to it')]
 
 
 def read(path: str) -> Robot:
@@ -63,13 +55,7 @@ def _compiled(path: str) -> Any:
     """Return a model without meshes, whose files may be missing."""
     # Warnings, which MuJoCo writes to a file, concern dynamics.
     mujoco.set_mju_user_warning(lambda text: None)
-    try:
-        spec = MjSpec.from_file(path)
-    except ValueError as error:
-        for pattern, why in _ERRORS:
-            if match := re.search(pattern, str(error)):
-                raise RequestError(why.format(match[1])) from None
-        raise
+    spec = MjSpec.from_file(path)
     for geom in spec.geoms:
         if geom.meshname or geom.hfieldname:
             geom.type, geom.meshname, geom.hfieldname = mujoco.mjtGeom.mjGEOM_SPHERE, '', ''

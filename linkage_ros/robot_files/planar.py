@@ -21,17 +21,7 @@ import numpy as np
 from . import check, loops
 from .spatial import CROSSING, EXACT
 from .. import mechanisms, scene
-from ..linkage import (
-    bar_name,
-    Dyads,
-    Hinge,
-    Motor,
-    Pin,
-    ROUNDING,
-    short,
-    Slide,
-    theta_of,
-)
+from ..linkage import bar_name, Dyads, Hinge, Pin, ROUNDING, short, Slide, theta_of
 from ..robot_model.robot import at, coordinates, HINGE, Joint, NotDriven, plain, Robot, SLIDE
 from ..scene import FARTHEST
 
@@ -93,17 +83,15 @@ class Drawing(Dyads):
                 pins = [other for other in pins if other not in same]
                 pins.append({body: place for other in (*same, pin)
                              for body, place in other.items()})
-        moved: List[Motor] = [
-            Slide(joint.bodies, (joint.places[1] - joint.axis * joint.start,
-                                 joint.places[1]), (joint.axis, joint.axis), joint)
-            if joint.kind == SLIDE else
-            Hinge(joint.bodies, joint.places, joint.axis, -joint.axis * joint.start,
-                  joint) for joint in self.joints]
+        slides = {joint: Slide(
+            joint.bodies, (joint.places[1] - joint.axis * joint.start, joint.places[1]),
+            (joint.axis, joint.axis), joint) for joint in self.joints if joint.kind == SLIDE}
         super().__init__(
             group.ground, [body for joint in self.joints for body in joint.bodies], pins,
-            [slide for slide in moved if isinstance(slide, Slide)
-             and slide.joint not in self.driven],
-            [motor for motor in moved if motor.joint in self.driven], size, near)
+            [slide for joint, slide in slides.items() if joint not in self.driven],
+            [slides.get(joint) or Hinge(joint.bodies, joint.places, joint.axis,
+                                        -joint.axis * joint.start, joint)
+             for joint in self.driven], size, near)
         self.take_apart()
 
     def _flatten(self, group: loops.Group, drives: Sequence[str]) -> None:
@@ -143,12 +131,11 @@ class Drawing(Dyads):
                     axes=[sign * float(np.sign(hinge.axis @ up))] * 2))
                 self.still += [other.name for other, _ in joint.chain if other is not hinge]
 
-    def is_in_pose(self, name: str) -> bool:
-        """Return whether a joint of the lines is where the file has it."""
-        linkage = mechanisms.create('custom', joints=self.lines)
+    def error(self, lines: Sequence[str], name: str) -> float:
+        """Return how far lines have a joint from where the file has it [m]."""
+        linkage = mechanisms.create('custom', joints=lines)
         place = linkage.solve(theta_of([drive.value for drive in self.drives]), name)[name]
-        near = self.size * max(ROUNDING, 30.0 * self.gap / self.size + self.lean)
-        return all(abs(complex(*place) - on[name]) < near for on in self.on.values() if name in on)
+        return max(abs(complex(*place) - on[name]) for on in self.on.values() if name in on)
 
     def measured_by(self, joint: Joint) -> Tuple[str, float, float]:
         """
@@ -297,8 +284,10 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
     for i, line in enumerate(best.lines if best.drives else ()):
         # With a change point, the side in this pose may be the wrong one.
         name, *_, side = line.split()
-        if side in _OTHER and not best.is_in_pose(name):
-            best.lines[i] = line[:-len(side)] + _OTHER[side]
+        if side in _OTHER:
+            other = [*best.lines]
+            other[i] = line[:-len(side)] + _OTHER[side]
+            best.lines = min(best.lines, other, key=lambda lines: best.error(lines, name))
     return best
 
 

@@ -63,9 +63,8 @@ class Rods:
         halves = [joint for joint in joints if joint.kind == SLIDE and joint.name in self._driven
                   and all(len(held_by[body]) == 2 and body != ground for body in joint.bodies)]
         self._bodies = {ground: 'ground'}
-        left = [joint for joint in joints if joint not in halves and not {
-            *joint.bodies} & rods.keys() and not any({*joint.bodies} & {*half.bodies}
-                                                     for half in halves)]
+        apart = {*rods, *(body for half in halves for body in half.bodies)}
+        left = [joint for joint in joints if not apart & {*joint.bodies}]
         while reached := [joint for joint in left
                           if len({*joint.bodies} & self._bodies.keys()) == 1]:
             self._add(reached[0])

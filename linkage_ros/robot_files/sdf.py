@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 import math
-from typing import Dict, Iterator, Optional, Tuple
+from typing import Dict, Iterable, Iterator, Optional, Tuple
 
 import numpy as np
 
@@ -23,8 +23,17 @@ def read(root: Element) -> Robot:
     for model in (*root.findall('model'), *root.findall('world/model')):
         parts = [*_parts(model, '')]
         if any(part.tag == 'joint' for _, part in parts):
-            return _Model(once(parts), is_old).robot()
+            return _Model(once(parts), is_old, {'world': np.eye(4)}).robot()
     raise RequestError('the SDF has no model with joints')
+
+
+def join(robot: Robot, joints: Iterable[Element]) -> None:
+    """Add the joints of an SDF to a robot that has their links."""
+    named = [(joint.get('name', ''), joint) for joint in joints]
+    links = [(name, Element('link')) for name in robot.frames]
+    model = _Model(once([*links, *named]), False, {'': np.eye(4), **robot.frames})
+    for name, joint in named:
+        model.join(robot, name, joint, model.ends(name, joint))
 
 
 def _parts(model: Element, name: str) -> Iterator[Tuple[str, Element]]:
@@ -44,23 +53,22 @@ def _parts(model: Element, name: str) -> Iterator[Tuple[str, Element]]:
 class _Model:
     """Frames of a model's parts; a name is relative to the model in which it stands."""
 
-    def __init__(self, parts: Dict[str, Element], is_old: bool):
-        self._parts, self._axes_in_model = parts, '1' if is_old else ''
+    def __init__(self, parts: Dict[str, Element], is_old: bool, known: Dict[str, np.ndarray]):
+        self._parts, self._known = parts, known
+        self._axes_in_model = '1' if is_old else ''
         self.frame = lru_cache(None)(self._frame)
 
     def robot(self) -> Robot:
         """Return the robot of the model."""
         links = [name for name, part in self._parts.items() if part.tag == 'link']
         joints = {name: part for name, part in self._parts.items() if part.tag == 'joint'}
-        ends = {name: (self.body(self.named(name, text(part, 'parent'))),
-                       self.body(self.named(name, text(part, 'child'))))
-                for name, part in joints.items()}
+        ends = {name: self.ends(name, part) for name, part in joints.items()}
         children = {child for _, child in ends.values()}
         bodies = ['world'] * any('world' in pair for pair in ends.values()) + sorted(
             links, key=children.__contains__)
         robot = Robot(bodies[0], {name: self.frame(name) for name in bodies})
         for name, part in joints.items():
-            self._join(robot, name, part, ends[name])
+            self.join(robot, name, part, ends[name], 0.0)
         for model in (part for part in self._parts.values() if part.tag == 'model'):
             for plugin in model.findall('plugin'):
                 kind = f'{plugin.get("name")} {plugin.get("filename")}'.lower()
@@ -81,6 +89,11 @@ class _Model:
             raise RequestError(f'{where or "the model"} names {name!r}, which is not there')
         return full
 
+    def ends(self, name: str, joint: Element) -> Tuple[str, str]:
+        """Return the links that a joint joins."""
+        return (self.body(self.named(name, text(joint, 'parent'))),
+                self.body(self.named(name, text(joint, 'child'))))
+
     def body(self, name: str) -> str:
         """Return the link that a frame is on."""
         if name == 'world' or self._parts[name].tag == 'link':
@@ -94,8 +107,8 @@ class _Model:
             part, 'child', '__model__')))
 
     def _frame(self, name: str) -> np.ndarray:
-        if name == 'world':
-            return np.eye(4)
+        if name in self._known:
+            return self._known[name]
         part = self._parts[name]
         seen = attribute(part, 'pose', 'relative_to') or part.get('attached_to') or text(
             part, 'child')
@@ -106,10 +119,12 @@ class _Model:
                                'which is not read: give it a pose of its own')
         return made
 
-    def _join(self, robot: Robot, name: str, part: Element, ends: Tuple[str, str]) -> None:
+    def join(self, robot: Robot, name: str, part: Element, ends: Tuple[str, str],
+             position: Optional[float] = None) -> None:
+        """Add a joint to a robot."""
         second = part.find('axis2')
         robot.join(name, part.get('type', ''), ends, self.frame(name),
-                   self._axis(name, part.find('axis')), None, 0.0,
+                   self._axis(name, part.find('axis')), None, position,
                    [text(part, f'axis/limit/{end}', otherwise) for end, otherwise in (
                        ('lower', '-inf'), ('upper', 'inf'))],
                    None if second is None else self._axis(name, second))

@@ -18,10 +18,11 @@ from typing import Any, Mapping, Sequence
 
 import numpy as np
 
-from .elements import attribute, Element, numbers, once, origin, text, weld
+from . import sdf
+from .elements import attribute, Element, numbers, once, origin, weld
 from ..cli import RequestError
-from ..robot_model.robot import at, BALL, FIXED, HINGE, pose, Robot, UNIVERSAL
-from ..words import listed, meant, quoted
+from ..robot_model.robot import at, BALL, FIXED, HINGE, Robot, UNIVERSAL
+from ..words import quoted, suggestion
 
 # The keys of a file of loops; the last two have no effect.
 _KEYS = ('closures', 'closed_loop', 'pin_loops', 'ball_loops', 'type', 'joint_name',
@@ -58,7 +59,8 @@ def read(root: Element) -> Robot:
     _close_by_elements(robot, root)
     _close_by_drake(robot, root)
     _close_by_frames(robot)
-    _join_by_gazebo(robot, root)
+    sdf.join(robot, root.findall('gazebo/joint'))
+    weld(robot, root.findall('gazebo/plugin'))
     robot.driven = [joint.get('name', '') for joint in (
         *root.findall('transmission/joint'),
         *root.findall('ros2_control/joint[command_interface]'))]
@@ -115,26 +117,11 @@ def _close_by_frames(robot: Robot) -> None:
             _pair(robot, match['name'], HINGE if len(axes) == 2 else BALL, ends, *axes)
 
 
-def _join_by_gazebo(robot: Robot, root: Element) -> None:
-    for cut in root.findall('gazebo/joint'):
-        parent, child = (attribute(cut, tag, 'link') or text(cut, tag) for tag in (
-            'parent', 'child'))
-        frame = robot.frames[child] @ pose(*numbers(text(cut, 'pose', '0 0 0 0 0 0'), 6))
-        axis = numbers(text(cut, 'axis/xyz') or attribute(cut, 'axis', 'xyz', '0 0 1'))
-        if text(cut, 'axis/use_parent_model_frame') in ('1', 'true'):
-            axis = frame[:3, :3].T @ axis
-        second = text(cut, 'axis2/xyz')
-        robot.join(cut.get('name', ''), cut.get('type', ''), (parent, child), frame, axis,
-                   second=numbers(second) if second else None)
-    weld(robot, root.findall('gazebo/plugin'))
-
-
 def close(robot: Robot, loops: Mapping[str, Any]) -> None:
     """Add the loops of another file; raise RequestError for a key that is not known."""
     for key in loops:
         if key not in _KEYS:
-            raise RequestError(f'there is no key {quoted(key)}; allowed: {listed(_KEYS, 200)}'
-                               f'{meant(key, _KEYS)}')
+            raise RequestError(f'there is no key {quoted(key)}{suggestion(key, _KEYS, 200)}')
     for i, cut in enumerate(loops.get('closures', ())):
         point = at(numbers(cut['point']))
         robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), point,

@@ -19,8 +19,9 @@ Legs of a walker have their prefix before link and point, and one crank for all 
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter
 from dataclasses import dataclass, replace
+from itertools import product
 import math
 from typing import Any, Dict, Iterable, Iterator, List, Optional, Sequence
 from xml.etree.ElementTree import Element, SubElement
@@ -274,9 +275,9 @@ def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Arc]:
     if len(inputs) > 1 or not kinds:
         return {}
     turning = np.array([kind != 'prismatic' for kind in kinds.values()])
-    ends = linkage.cache.get_or_make(('travels', *reach), lambda: np.array([extremes(
-        lambda theta: np.stack([*linkage.joint_angles(theta, [*kinds]).values()]), *arc, turning)
-        for arc in reach]))
+    ends = linkage.cache.get_or_make(('travels', *reach), lambda: np.array([[extremes(
+        lambda theta, name=name: linkage.joint_angles(theta, [name])[name], *arc, turns)
+        for name, turns in zip(kinds, turning)] for arc in reach]))
     slack = np.where(turning, SLACK, SLACK * float(linkage.longest))
     lows, highs = ends[:, :, 0, 0].min(axis=0) - slack, ends[:, :, 1, 0].max(axis=0) + slack
     return {name: (low, high) for name, turns, low, high in zip(
@@ -300,14 +301,10 @@ def _started(part: Robot, density: float) -> Robot:
     mechanism, joints = part.mechanism, part.mechanism.joints
     assembly, linkage, inputs = mechanism.assembly(), mechanism.linkage, mechanism.inputs
     values = {name: Motion.of(settings).at(0)[0] for name, settings in inputs.items()}
-    starts, rates = [*values.values()], defaultdict[str, Dict[str, float]](dict)
-    solution = assembly.solution((), assembly.joints, linkage.geared)
-    for driving in inputs:
-        solution.solve(starts, [float(name == driving) for name in inputs])
-        for prefix, row in zip(assembly.legs, solution.rows.tolist()):
-            values.update((prefix + name, value) for name, value in zip(assembly.joints, row))
-            for name, rate in zip(linkage.geared, row[len(assembly.joints):]):
-                rates[prefix + name][driving] = rate
+    starts, solution = [*values.values()], assembly.solution((), assembly.joints)
+    solution.solve(starts)
+    for prefix, row in zip(assembly.legs, solution.rows.tolist()):
+        values.update((prefix + name, value) for name, value in zip(assembly.joints, row))
     if not np.isfinite([*values.values()]).all():
         keys = ' and '.join(f'{mechanism.name}.{name}.start' for name in inputs)
         raise SceneError(f'{keys} must be where {mechanism.name} can be assembled, not at '
@@ -326,12 +323,12 @@ def _started(part: Robot, density: float) -> Robot:
     sweeps = {joints[name].name: tuple(sorted(map(joints[name].of, settings.sweep)))
               for name, settings in inputs.items() if settings.sweep}
     robot.joints = [replace(joint, limits=sweeps.get(joint.name)) for joint in robot.joints]
-    for name, by in rates.items():
-        driving = max(by, key=lambda name: abs(by[name]))
-        geared, other = joints[name], joints[driving]
-        ratio = geared.sign * by[driving] * other.sign
-        robot.follow(geared.name, other.name, ratio,
-                     positions[geared.name] - ratio * positions[other.name])
+    for by, driving in enumerate(inputs):
+        for prefix, name in product(assembly.legs, linkage.geared_to(by)):
+            geared, other = joints[prefix + name], joints[driving]
+            ratio = geared.sign * linkage.gear(name, by)[0] * other.sign
+            robot.follow(geared.name, other.name, ratio,
+                         positions[geared.name] - ratio * positions[other.name])
     return robot
 
 

@@ -38,13 +38,12 @@ def write(model: Model) -> str:
     add(usual, 'geom', contype='0', conaffinity='0', density=numbers(model.density))
     add(usual, 'equality', solref=numbers(2.0 * step, 1.0), solimp='0.9999 0.9999 1')
     elements = {model.root: add(root, 'worldbody')}
-    for robot in model.parts:
-        for body in robot.bodies():
-            elements[body.name] = _add_body(elements[body.parent], body, robot)
     equality, actuator = add(root, 'equality'), add(root, 'actuator')
     starts = []
     for robot in model.parts:
         bodies = {body.name: body for body in robot.bodies()}
+        for body in bodies.values():
+            elements[body.name] = _add_body(elements[body.parent], body, robot)
         joints = {joint.name: joint for joint in robot.joints}
         for cut, met in robot.meets.items():
             add(equality, 'connect', name=cut, body1=bodies[met].parent, body2=bodies[cut].parent,

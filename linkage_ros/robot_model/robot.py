@@ -17,7 +17,7 @@ from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Optional, Seque
 import numpy as np
 
 from .shapes import Piece
-from ..words import listed, meant, RequestError
+from ..words import meant, RequestError, suggestion
 
 HINGE, SLIDE, BALL, FIXED, UNIVERSAL, FREE = (
     'hinge', 'slide', 'ball', 'fixed', 'universal', 'free')
@@ -92,8 +92,9 @@ class Joint:
         The limits of the file and why they do not count, if they do not.
     is_cut : bool
         Whether it closes a loop of a tree, so that its two frames may be apart.
-    parts : tuple of Joint
-        The hinges that a ball is made of, if it is.
+    parts : sequence of (Joint, float)
+        The hinges that a ball is made of, from its first body to its second, if it is; with each
+        its sign: 1 if its second body is nearer to that of the ball.
 
     """
 
@@ -107,7 +108,7 @@ class Joint:
     no_limits: str = ''
     turns: Any = (np.eye(3), np.eye(3))
     is_cut: bool = False
-    parts: tuple[Joint, ...] = ()
+    parts: Sequence[tuple[Joint, float]] = ()
 
     def other(self, body: str) -> str:
         """Return the body that it joins to one."""
@@ -137,24 +138,14 @@ class Joint:
         return self.limits or (-math.inf, math.inf)
 
     @property
-    def chain(self) -> list[tuple[Joint, float]]:
-        """
-        Return the hinges of a ball from its first body to its second, if all have positions.
-
-        With each its sign: 1 if its second body is nearer to that of the ball.
-        """
-        chain: list[tuple[Joint, float]] = []
-        body, left = self.bodies[0], self.hinges if self.parts else []
-        while near := [joint for joint in left if body in joint.bodies]:
-            hinge = near[0]
-            chain.append((hinge, 1.0 if hinge.bodies[0] == body else -1.0))
-            body, left = hinge.other(body), [joint for joint in left if joint is not hinge]
-        return [] if any(hinge.position is None for hinge, _ in chain) else chain
+    def chain(self) -> Sequence[tuple[Joint, float]]:
+        """Return the hinges of a ball and their signs, if all have positions."""
+        return () if any(hinge.position is None for hinge, _ in self.parts) else self.parts
 
     @property
     def hinges(self) -> list[Joint]:
         """Return the hinges of a ball that is made of some, else the joint itself."""
-        return [hinge for part in self.parts for hinge in part.hinges] or [self]
+        return [hinge for hinge, _ in self.parts] or [self]
 
 
 def plain(name: str, length: int) -> str:
@@ -343,9 +334,8 @@ class Robot:
         """Raise RequestError for a name that no joint of one degree of freedom has."""
         for name in names:
             if name not in self.positions:
-                raise RequestError(f'there is no joint {name!r}; allowed: '
-                                   f'{listed(self.positions, 200)}'
-                                   f'{meant(name, self.positions)}')
+                raise RequestError(
+                    f'there is no joint {name!r}{suggestion(name, self.positions, 200)}')
 
     def sources(self, name: str) -> list[tuple[str, float, float]]:
         """Return a joint and those that it depends on in turn, each with ratio and offset."""

@@ -13,7 +13,7 @@ import sys
 from typing import Any, Callable, Collection, Iterable, Mapping, NamedTuple, Optional, Sequence
 
 from ..cache import cached
-from ..words import elided, listed, meant, MESSAGE, quoted
+from ..words import elided, listed, meant, MESSAGE, quoted, suggestion
 
 # The nodes that use parameters; KINEMATICS owns each that it uses.
 DRIVER, INVERSE, KINEMATICS = ALL = 'crank_driver', 'servo_inverse', 'kinematics'
@@ -207,8 +207,8 @@ class Values:
         for name in sorted(self._unused):
             if not _ROS.match(name):
                 names = [f'{name}.type'] * (f'{name}.*' in known) + [*known]
-                raise SceneError(f'{elided(name)} is not a parameter of the scene; allowed: '
-                                 f'{listed(names, 120)}{meant(name, names)}')
+                raise SceneError(f'{elided(name)} is not a parameter of the scene'
+                                 f'{suggestion(name, names, 120)}')
 
 
 def read_lines(name: str, lines: Iterable[str], pattern: re.Pattern, names: Collection[str],

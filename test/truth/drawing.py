@@ -345,28 +345,6 @@ class Linkage:
         return sorted({found for line in self.lines for text in line.numbers
                        for found in literals(text)})
 
-    @precisely
-    def scaled(self, size):
-        """Return lines and dimensions with all lengths times a number; None if that needs more."""
-        joints, angles = [], ' '.join(
-            number for line in self.lines for kind, number in zip(line.kinds, line.numbers)
-            if kind != 'n')
-        for text, line in zip(self.joints, self.lines):
-            parts, at = text.split(), len(line.names) + 1
-            for kind, number in zip(line.kinds, line.numbers):
-                at = parts.index(number, at) + 1
-                if kind == 'n' and re.fullmatch(rf'-?{_TOKEN.pattern}', number) \
-                        and literals(number):
-                    parts[at - 1] = repr(float(number) * size)
-            joints.append(' '.join(parts))
-        dimensions = {name: x if name in re.findall(r'\w+', angles) else x * size
-                      for name, x in self.dimensions.items()}
-        is_so = all(
-            y == (x * size if kind == 'n' else x)
-            for line, *rows in zip(self.lines, self.numbers, Linkage(joints, dimensions).numbers)
-            for kind, x, y in zip(line.kinds, *rows))
-        return (joints, dimensions) if is_so else None
-
     def _driven(self):
         """Return for each input or geared line the name that its input has."""
         found = {}
@@ -430,21 +408,18 @@ class Linkage:
         return next((body for body in self.bodies if first in body and second in body), None)
 
     def _stand(self):
-        """Note the joints and the closures that each joint stands on, itself among them."""
-        self.stands, self.closures = {}, {}
+        """Note the closures that each joint stands on, its own among them."""
+        self.closures = {}
         closed = ('dyad', 'carriage', 'cylinder', 'block', 'inversor', 'slot', 'slider', 'mirror',
                   'antiparallelogram')
         for line in self.lines:
             joints = line.joints
             if line.word == 'block':
                 joints = (*joints, self.line_of_block(joints[0]))
-            below = set().union(*(self.stands[name] for name in joints), joints)
             needs = frozenset().union(*(self.closures[name] for name in joints))
             if line.word in closed:
                 needs = needs | {line.names[0]}
-            for name in line.names:
-                self.stands[name] = below | {name}
-                self.closures[name] = needs
+            self.closures.update(dict.fromkeys(line.names, needs))
 
     def base(self, numbers, first, second):
         """Return the length of a bar between two joints of one moving link, from its template."""

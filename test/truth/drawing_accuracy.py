@@ -505,16 +505,3 @@ def strict(mechanism):
     """Return the measure of a mechanism by the strict rule."""
     linkage = Linkage(mechanism.design.joints, mechanism.dimensions, mechanism.branches)
     return Measure(linkage, outputs(linkage, mechanism.links), linkage.passings()[0], strict=True)
-
-
-def measured(mechanism, thetas, rates=False):
-    """Measure all that a mechanism answers at crank angles [rad], by the strict rule."""
-    measure, given = strict(mechanism), np.asarray(thetas, float)[:, None]
-    return judge(measure, given, answers(mechanism, given, measure.poses, rates), rates)
-
-
-def summary(mechanism, rows, count=5):
-    """Return the worst failures as text that reproduces them."""
-    return '\n'.join([f'{mechanism.type} {mechanism.dimensions} {mechanism.branches}', *(
-        f'{row.problem} {row.output} at {row.values}: ratio {row.ratio:.3g}, error {row.error:.3g}'
-        f', sensitivity {row.sensitivity:.3g}' for row in broken(rows)[:count])])

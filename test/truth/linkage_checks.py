@@ -500,7 +500,7 @@ def followed(subject):
                 yield 'followed', f'{output} to {wanted!r} from {near!r}: {found} is {gap} off'
 
 
-# --- forces and sizes ---------------------------------------------------------------------------
+# --- forces -------------------------------------------------------------------------------------
 
 @checked
 def efforts(subject):
@@ -526,34 +526,7 @@ def efforts(subject):
         yield 'effort', f'{found}, not {wanted}, for {loads}, {given}'
 
 
-@checked
-def sizes(subject):
-    """Ask for the same linkage 2^80 times as large or small: all its digits are the same."""
-    mechanism, rows = subject.mechanism, asked(subject, 3)
-    size = 2.0 ** (80 if mechanism.longest < 1.0 else -80)
-    scaled = subject.linkage.scaled(size)
-    if not scaled:
-        return
-    other = mechanisms.create(
-        'custom', joints=scaled[0], branches=mechanism.branches, **scaled[1])
-    lengths = [link.name for link in mechanism.links if link.kind == 'prismatic']
-    units = [1.0 if input_.turns else size for input_ in mechanism.inputs]
-    found = _all(other, _given(rows * units, (3,)))
-    for key, value in _all(mechanism, _given(rows, (3,))).items():
-        ask, name, *by = key.split()
-        unit = size if ask in ('solve', 'velocity') or name in lengths else 1.0
-        unit /= units[int(*by)] if by else 1.0
-        if not np.array_equal(found[key], unit * value, equal_nan=True):
-            yield 'size', f'{key} at {rows.tolist()}: {found[key]} is not {unit * value}'
-    others = np.multiply(subject.held, units[1:])
-    for ask in 'reach', 'dead_points':
-        ends, expected = getattr(other, ask)(*others), getattr(mechanism, ask)(*subject.held)
-        if not np.array_equal(ends, units[0] * np.array(expected)):
-            yield 'size', f'{ask} {ends} is not {expected} times {units[0]}'
-
-
-CHECKS = (poses, rates, accelerations, forms, reach, dead_points, inverse, followed,
-          efforts, sizes)
+CHECKS = poses, rates, accelerations, forms, reach, dead_points, inverse, followed, efforts
 
 
 def problems(design, rng, checks=CHECKS, samples=4000):

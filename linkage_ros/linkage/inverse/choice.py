@@ -10,7 +10,7 @@ one formula (`expressions`) run the same code.
 
 from __future__ import annotations
 
-from itertools import chain, count
+from itertools import chain, count, islice
 import math
 from typing import Any, List, Sequence
 
@@ -102,15 +102,12 @@ class Choice:
     def _code(self, follows: bool, limited: Sequence[bool]) -> Any:
         """Return the code for the better one, and a state of no solution."""
         problem, numbers = self._problem, map(argument, count())
-
-        def arguments(number: int) -> Reals:
-            return [x for _, x in zip(range(number), numbers)]
-
         n = problem.n
-        solution = arguments(n), arguments(n * n)
-        seed = arguments(n * follows)
-        state = ranked(problem, *solution, seed, [arguments(2 * each) for each in limited])
-        best = better(state, [arguments(len(part)) for part in state])
+        solution = [*islice(numbers, n)], [*islice(numbers, n * n)]
+        seed = [*islice(numbers, n * follows)]
+        state = ranked(problem, *solution, seed, [[*islice(numbers, 2 * each)]
+                                                  for each in limited])
+        best = better(state, [[*islice(numbers, len(part))] for part in state])
         return problem.linkage.bind(Program([*chain(*best)], next(numbers).args[0])), [
             math.nan] * sum(map(len, best))
 

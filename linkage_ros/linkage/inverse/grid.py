@@ -12,17 +12,14 @@ Source: Nocedal and Wright, "Numerical Optimization", sec. 11.2.
 
 from __future__ import annotations
 
-from itertools import chain, combinations
 import math
-from typing import Iterator, List, Sequence, Union
+from typing import Iterator, List, Optional, Sequence, Union
 
 import numpy as np
 
 from .problem import ACCEPTED, InverseProblem, Row
 from .segments import Bracket, segments_of
-from ..formulas import Names
 from ..inputs import spread
-from ..kinematics import Kinematics
 from ..motion.curves import HALVINGS
 from ..tolerances import CLOSE, SINGULAR
 from ...words import listed
@@ -31,21 +28,6 @@ from ...words import listed
 COUNTS, ASSEMBLED = (4096, 65536), 500
 # The longest step [rad, sizes]: longer ones lead away from folds.
 MAX_STEP = 0.7
-
-
-def check_dependence(linkage: Kinematics, outputs: Names) -> None:
-    """Raise ValueError if some of the outputs depend on fewer inputs than they are."""
-    rows = range(len(outputs))
-    needs = [{by for by in rows if linkage.moves(name, by)} for name in outputs]
-    for some in chain(*(combinations(rows, count) for count in range(1, len(outputs) + 1))):
-        if len(set().union(*(needs[row] for row in some))) < len(some):
-            raise dependent(outputs, some)
-
-
-def dependent(outputs: Names, rows: Sequence[int]) -> ValueError:
-    """Return the error for outputs of which some depend on too few inputs."""
-    return ValueError(f'{listed(outputs)} do not determine all inputs: too few of them move '
-                      f'{listed(outputs[row] for row in rows)}')
 
 
 class Grid:
@@ -61,17 +43,19 @@ class Grid:
         self._held = {by: problem.outputs.index(input_.name)
                       for by, input_ in enumerate(self._inputs) if input_.name in problem.outputs}
         # With all others known, the first input is searched as if it were the only one.
-        self.is_held = {*self._held} == {*range(1, problem.n)}
-        if not self.is_held:
+        self._sought: Optional[int] = None
+        if {*self._held} == {*range(1, problem.n)}:
+            self._sought, = {*range(problem.n)} - {*self._held.values()}
+            problem.linkage.check_output(problem.outputs[self._sought])
+        else:
             self._check_independent()
 
     def candidates(self, values: Sequence[float]) -> Iterator[Union[Bracket, Row]]:
         """Yield inputs, or brackets of the first, at which the outputs may have some values."""
-        problem, n = self._problem, self._problem.n
+        problem, place = self._problem, self._sought
         held = {by: values[place] for by, place in self._held.items()}
-        if self.is_held:
-            place, = {*range(n)} - {*self._held.values()}
-            others = tuple(held[by] for by in range(1, n))
+        if place is not None:
+            others = tuple(held[by] for by in range(1, problem.n))
             for bracket in segments_of(problem.linkage, problem.outputs[place],
                                        others).candidates(values[place:place + 1]):
                 yield bracket._replace(place=place, others=others)
@@ -118,11 +102,15 @@ class Grid:
         zeros = [0.0] * n
         rates = self._solved(self._starts({}, zeros), zeros)[-n * n:]
         rates = rates[:, np.isfinite(rates).all(axis=0)].T.reshape(-1, n, n).swapaxes(1, 2)
-        values = np.linalg.svd(self._problem.scaled(rates), compute_uv=False)
+        outputs, (weights, values, _) = self._problem.outputs, np.linalg.svd(
+            self._problem.scaled(rates))
         # An output may stand still in a tenth of the poses.
         if len(values) and np.quantile(values[:, -1] / np.fmax(values[:, 0], 1e-300),
                                        0.9) <= CLOSE:
-            raise dependent(self._problem.outputs, range(n))
+            some = np.median(np.abs(weights[:, :, -1]), axis=0) > CLOSE
+            raise ValueError(
+                f'{listed(outputs)} do not determine all inputs: too few of them move '
+                f'{listed([name for name, depends in zip(outputs, some) if depends])}')
 
     def _descended(self, q: np.ndarray, values: Sequence[float]) -> List[Row]:
         """Return the inputs next to solutions that steps of Newton's method reach."""

@@ -22,11 +22,11 @@ from numpy.typing import ArrayLike
 from . import rods
 from .choice import Choice
 from .follow import follow
-from .grid import check_dependence, Grid
+from .grid import Grid
 from .linkage import decompose, InverseLinkage
 from .modes import chosen_of, Modes, modes_of, SINGLE
 from .problem import InverseProblem, Row
-from .refine import distinct, distinct_arrays, refine, refine_arrays
+from .refine import distinct, refine, solve_arrays
 from .segments import Segments, segments_of
 from ..inputs import theta_of
 from ..kinematics import Kinematics
@@ -67,17 +67,14 @@ class Solution(NamedTuple):
         from the line between the crank's joints, +1 left; and 'det', the sign of the determinant
         of d outputs / d inputs. 0 where rounding hides the sign.
         """
-        linkage, inputs = self.inverse.linkage, self.inputs
-        names = [input_.name for input_ in linkage.inputs if input_.turns]
-        cranks = {link.name: link for link in linkage.links if link.name in names}
-        places, signs = linkage.solve(theta_of(inputs)), {}
+        linkage, signs = self.inverse.linkage, {}
+        cranks = [input_.name for input_ in linkage.inputs if input_.turns]
+        angles = linkage.joint_angles(theta_of(self.inputs))
         for link in linkage.links if linkage.axes == 'xy' else ():
-            crank = cranks.get(link.parent)
-            if crank and link.kind == 'revolute' and link.joint != crank.joint:
-                (a, b), (c, d) = (places[end] - places[start] for start, end in (
-                    (crank.joint, link.joint), (link.joint, link.tip)))
-                cross, size = a * d - b * c, math.hypot(a, b) * math.hypot(c, d)
-                signs[link.name] = int(np.sign(cross)) if abs(cross) > SINGULAR * size else 0
+            if link.parent in cranks and link.kind == 'revolute' and any(
+                    place := linkage.frames[link.parent][link.joint]):
+                sine = math.sin(angles[link.name] + link.zero - math.atan2(*place[::-1]))
+                signs[link.name] = int(np.sign(sine)) if abs(sine) > SINGULAR else 0
         signs['det'] = 0 if self.is_singular else int(np.sign(np.linalg.det(
             self.inverse.problem.scaled(self.jacobian))))
         return signs
@@ -135,9 +132,8 @@ class Inverse:
         if len(outputs) != len(linkage.inputs):
             raise ValueError(f'{linkage.type} has {len(linkage.inputs)} inputs: as many outputs '
                              f'are needed, got {listed(outputs)}')
-        if outputs[1:] == tuple(input_.name for input_ in linkage.inputs[1:]):
+        if self._n == 1:
             linkage.check_output(outputs[0])
-        check_dependence(linkage, outputs)
         self.problem = InverseProblem(linkage, outputs)
         self._choice = Choice(self.problem)
         self.inputs = self.problem.inputs
@@ -272,19 +268,19 @@ class Inverse:
         Each has the solutions of the turns around its `seed` (inputs, m), if these are many.
         Their shape is (solutions, inputs and rates, m), with one solution at least.
         """
-        problem, n, count = self.problem, self._n, values.shape[1]
-        if count <= FEW_POSES or isinstance(self._source, Grid) or self._is_part and len(seed):
-            rows = [self._all(column[:n], column[n:])
-                    for column in map(tuple, np.vstack([values, *seed]).T.tolist())]
-            solutions = np.full((max(map(len, rows), default=0) or 1, n + n * n, count), math.nan)
-            for k, row in enumerate(rows):
-                solutions[:len(row), :, k] = row or math.nan
-            return solutions
-        values = problem.reduced_arrays(values)
-        numbers, places, candidates = self._source.candidate_arrays(values)
-        solutions = np.full((numbers.max(initial=0) + 1, n + n * n, count), math.nan)
-        solutions[numbers, :, places] = refine_arrays(problem, values[:, places], candidates).T
-        return distinct_arrays(problem, solutions)
+        n, count, source = self._n, values.shape[1], self._source
+        solutions, alone = np.empty((0, n + n * n, count)), np.arange(count)
+        if not (count <= FEW_POSES or isinstance(source, Grid) or self._is_part and len(seed)):
+            solutions, alone = solve_arrays(self.problem, values, source.candidate_arrays)
+        rows = [self._all(column[:n], column[n:])
+                for column in map(tuple, np.vstack([values, *seed]).T[alone].tolist())]
+        most = max([1, len(solutions), *map(len, rows)])
+        solutions = np.pad(solutions, ((0, most - len(solutions)), (0, 0), (0, 0)),
+                           constant_values=math.nan)
+        for k, row in zip(alone.tolist(), rows):
+            solutions[:, :, k] = math.nan
+            solutions[:len(row), :, k] = row or math.nan
+        return solutions[:max(int(np.isfinite(solutions[:, 0]).any(axis=1).sum()), 1)]
 
     # --- arguments ---
 
@@ -314,18 +310,16 @@ class Inverse:
 
     def _limits(self, ends: Ends) -> Tuple[Tuple[float, ...], ...]:
         """Return the ends of each input as floats, () if it has none."""
-        if ends is None:
-            return ((),) * self._n
         try:
-            limits = tuple(() if pair is None else tuple(map(float, pair)) for pair in ends)
+            limits = tuple(() if pair is None else tuple(map(float, pair))
+                           for pair in ([None] * self._n if ends is None else ends))
+            if len(limits) == self._n and all(
+                    -math.inf < low <= high < math.inf for low, high in filter(None, limits)):
+                return limits
         except (TypeError, ValueError):
-            limits = ()
-        if len(limits) != self._n or any(
-                len(pair) != 2 or not -math.inf < pair[0] <= pair[1] < math.inf
-                for pair in limits if pair):
-            raise ValueError('ends must be two finite numbers in order, or None, for each input, '
-                             'got ' + quoted(ends))
-        return limits
+            pass
+        raise ValueError('ends must be two finite numbers in order, or None, for each input, '
+                         'got ' + quoted(ends))
 
     # --- one of the solutions ---
 

@@ -149,8 +149,6 @@ class _Read(NamedTuple):
 
 def decompose(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
     """Return the inverse linkage for outputs, None where no closed form is known."""
-    if len(set(outputs)) < len(outputs):
-        return None
     pose = _pose(linkage)
     if pose is None:
         return None
@@ -188,18 +186,20 @@ class _Sketch(Dyads):
     def __init__(self, linkage: Kinematics, outputs: Names, ground: str, pose: Dict[str, float]):
         self._linkage, self._outputs, self._pose = linkage, outputs, pose
         self._links = {link.name: link for link in linkage.links}
-        self.drives: List[Tuple[str, float, float]] = []
-        self._scaled: Dict[str, Tuple[float, float]] = {}
-        self._named: Dict[str, Dict[str, complex]] = {}
-        # The origin and the direction of each body in the pose.
-        self._at: Dict[str, Tuple[complex, complex]] = {GROUND: (0.0j, 1.0 + 0.0j)}
-        slides: List[Slide] = []
-        motors: List[Motor] = []
         # Each link in its own frame, whose x axis is its bar.
         self._frames = {GROUND: {name: complex(pose[f'{name}.x'], pose[f'{name}.y'])
                                  for name in linkage.grounded},
                         **{name: {joint: complex(*place) for joint, place in frame.items()}
                            for name, frame in linkage.frames.items()}}
+        size = max(linkage.longest, *(
+            abs(place) for frame in self._frames.values() for place in frame.values()))
+        super().__init__(ground, (), (), (), (), size, CLOSE * size)
+        self.farthest = 4.0 * (sum(linkage.bar_lengths.values()) + size)
+        self.drives: List[Tuple[str, float, float]] = []
+        self._scaled: Dict[str, Tuple[float, float]] = {}
+        self._named: Dict[str, Dict[str, complex]] = {}
+        # The origin and the direction of each body in the pose.
+        self._at: Dict[str, Tuple[complex, complex]] = {GROUND: (0.0j, 1.0 + 0.0j)}
         for body, frame in self._frames.items():
             for joint, place in frame.items():
                 self._named.setdefault(joint, {})[body] = place
@@ -210,28 +210,18 @@ class _Sketch(Dyads):
             self._at[link.name] = self._place(joint) - turn * origin, turn
             motion = self._motion(link)
             if motion.joint in outputs:
-                motors.append(motion)
+                self.motors.append(motion)
             elif isinstance(motion, Slide):
-                slides.append(motion)
+                self.slides.append(motion)
         for block, pin in linkage.yokes.items():
-            slides.append(self._guided(pin, f'{block}-{pin}', block, 1j, self._at[block][1]))
-        done = [motor.joint for motor in motors]
+            self.slides.append(self._guided(pin, f'{block}-{pin}', block, 1j, self._at[block][1]))
+        done = [motor.joint for motor in self.motors]
         for output in sorted(outputs, key=lambda name: name.startswith('angle(')):
             if output not in done:
-                done += self._add(output, slides, motors)
-        size = max(linkage.longest, *(
-            abs(place) for frame in self._frames.values() for place in frame.values()))
-        bodies = [*self._frames, *(body for pin in self._named.values() for body in pin),
-                  *(body for each in (*slides, *motors) for body in each.bodies)]
-        # A joint on a single body is needed only if an input is read from it.
-        read = {end for name in (*linkage.geared, *(input_.name for input_ in linkage.inputs))
-                if self._links[name].kind == 'prismatic'
-                for end in (self._links[name].joint, self._links[name].tip)}
-        self._named = {name: pin for name, pin in self._named.items()
-                       if len(pin) > 1 or name in read}
-        super().__init__(ground, list(dict.fromkeys(bodies)), list(self._named.values()), slides,
-                         motors, size, CLOSE * size)
-        self.farthest = 4.0 * (sum(linkage.bar_lengths.values()) + size)
+                done += self._add(output)
+        # A joint on a single body is placed only if an input is read from it.
+        self.pins = [pin for pin in self._named.values() if len(pin) > 1]
+        self.on = {body: {} for body in self._at}
         self.take_apart()
         self.reads = [self._read(by, input_) for by, input_ in enumerate(linkage.inputs)]
 
@@ -242,13 +232,11 @@ class _Sketch(Dyads):
             return Hinge(bodies, (hangs, self._frames[link.name][link.joint]), 1.0, link.zero,
                          link.name)
         along, name = cmath.rect(1.0, link.zero), link.name
-        for axis, part in ('x', along.real), ('y', along.imag):
+        for axis, part, start in ('x', along.real, hangs.real), ('y', along.imag, hangs.imag):
             # The slide of a block on a fixed line determines the coordinates of the block.
-            if link.parent == GROUND and f'{link.tip}.{axis}' in self._outputs and \
-                    abs(part) > CLOSE and link.tip in self._frames[link.name]:
-                name, start = f'{link.tip}.{axis}', hangs + along * self._frames[
-                    link.name][link.tip]
-                self._scaled[name] = part, start.real if axis == 'x' else start.imag
+            output = f'{link.tip}.{axis}'
+            if link.parent == GROUND and output in self._outputs and abs(part) > CLOSE:
+                name, self._scaled[output] = output, (part, start)
         return Slide(bodies, (hangs, 0.0j), (along, 1.0 + 0.0j), name)
 
     def _place(self, joint: str) -> complex:
@@ -265,13 +253,13 @@ class _Sketch(Dyads):
         """Put a joint on a line through the origin of a body; `turn` is the body's direction."""
         return Slide((base, self._pin(joint, body, turn)), (0.0j, 0.0j), (axis, axis), body)
 
-    def _add(self, output: str, slides: List[Slide], motors: List[Motor]) -> List[str]:
+    def _add(self, output: str) -> List[str]:
         """Add bodies that measure an output other than a joint's value; return what they do."""
         if pair := PAIR.fullmatch(output):
             first, second = pair.groups()
             apart = self._place(second) - self._place(first)
             along = apart / abs(apart) if apart else 1.0 + 0.0j
-            motors.append(self._aimed(output, first, second, along, slides) if output.startswith(
+            self.motors.append(self._aimed(output, first, second, along) if output.startswith(
                 'angle') else Slide((self._pin(first, f'{output} barrel', along),
                                      self._pin(second, f'{output} rod', along)),
                                     (0.0j, 0.0j), (1.0 + 0.0j, 1.0 + 0.0j), output))
@@ -279,28 +267,27 @@ class _Sketch(Dyads):
         joint, axis = output.split('.')
         along, other = (1.0 + 0.0j, f'{joint}.y') if axis == 'x' else (1j, f'{joint}.x')
         self._at[output] = self._place(joint), 1.0 + 0.0j
-        motors.append(Slide((GROUND, output), (0.0j, 0.0j), (along, along), output))
+        self.motors.append(Slide((GROUND, output), (0.0j, 0.0j), (along, along), output))
         # Along the other axis, whose coordinate may drive it.
         across = self._guided(joint, f'{joint}.xy', output, 1.0 + 1.0j - along)
-        (motors if other in self._outputs else slides).append(across._replace(joint=other))
+        (self.motors if other in self._outputs else self.slides).append(
+            across._replace(joint=other))
         return [output, other]
 
-    def _aimed(self, output: str, first: str, second: str, along: complex,
-               slides: List[Slide]) -> Hinge:
+    def _aimed(self, output: str, first: str, second: str, along: complex) -> Hinge:
         """Return the motor for the angle of two joints, relative to the ground."""
         # Bodies that never turn: the ground, and carriages of joints with known coordinates.
         level = {joint: body for joint, pin in self._named.items()
                  for body in (GROUND, f'{joint}.xy') if body in pin}
-        for body in self._named[first].keys() & self._named[second].keys() & self._frames.keys():
-            frame = self._frames[body]
-            for joint in frame.keys() & level.keys():
+        for body, frame in self._frames.items():
+            for joint in [joint for joint in level if {joint, first, second} <= frame.keys()]:
                 places = self._named[joint][level[joint]], frame[joint]
                 return Hinge((level[joint], body), places, 1.0,
                              -cmath.phase(frame[second] - frame[first]), output)
         for start, end in ((first, second), (second, first)):
             if start in level:
                 body = self._pin(start, output, along)
-                slides.append(self._guided(end, f'{output} pin', body, 1.0 + 0.0j, along))
+                self.slides.append(self._guided(end, f'{output} pin', body, 1.0 + 0.0j, along))
                 return Hinge((level[start], body), (self._named[start][level[start]], 0.0j), 1.0,
                              0.0, output)
         raise ValueError(f'neither joint of {output} is on a body that never turns')
@@ -358,6 +345,8 @@ class _Sketch(Dyads):
 
     def _value(self, link: Link) -> Tuple[Tuple[str, ...], Callable]:
         """Return the joints that tell the position of a link on its parent, and its formula."""
+        if not {link.name, link.parent} <= self.parts.keys():
+            raise ValueError(f'{link.name} is not placed')
         zero = cmath.rect(1.0, link.zero)
         if link.kind == 'revolute':
             ends, ahead = self._direction(link.name, 1.0 + 0.0j)
@@ -367,7 +356,8 @@ class _Sketch(Dyads):
                 turned = ahead(built) * back(built).conjugate()
                 return arctangent(turned.y, turned.x)
             return ends + others, angle
-        tip, origin = self._joint(link.name, link.tip), self._joint(link.parent, link.joint)
+        (tip, _), (origin, _) = (self.fixed(body, self._frames[body][joint]) for body, joint in (
+            (link.name, link.tip), (link.parent, link.joint)))
         parent = self._links.get(link.parent)
         if parent and len(self._frames[parent.name]) == 1 and parent.kind == 'revolute':
             # A cylinder: its length is the distance of its ends.
@@ -383,18 +373,10 @@ class _Sketch(Dyads):
         """Return the joints that tell the direction of a body, and the formula of that vector."""
         if body == self.ground:
             return (), lambda built: _constant(along)
-        if body not in self.parts:
-            raise ValueError(f'{body} is not placed')
         first, start = self.end(body)
         second, end = self.other(body, first)
         turn = _constant(along * (end - start).conjugate() / abs(end - start))
         return (first, second), lambda built: built.arm(first, second).vector * turn
-
-    def _joint(self, body: str, joint: str) -> str:
-        """Return the name of a joint in the lines; raise ValueError if no line places it."""
-        if name := self.joint_at(body, self._frames[body][joint]):
-            return name
-        raise ValueError(f'{joint} is not placed')
 
 
 def _constant(value: complex) -> Complex:

@@ -7,14 +7,14 @@ From candidates to solutions: Newton's method on the forward formula, and one ju
 A candidate is a solution if the outputs there have their values up to rounding: that of the
 outputs, and that of the inputs times their rates. Steps end where one no longer improves: what
 rounding explains may still be many last digits of a small value. `refine` works on floats,
-`refine_arrays` does the same on arrays, both with one code of a step. Where a bracket is known,
-Newton's method stays inside it.
+`solve_arrays` on arrays, both with one code of a step. Where a bracket is known, Newton's method
+stays inside it.
 """
 
 from __future__ import annotations
 
 import math
-from typing import List, Optional, Sequence, Union
+from typing import Callable, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -66,7 +66,6 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Br
     """Return the solution in a bracket, which Newton's method does not leave; None if none."""
     low, high, x, sign, place, others = bracket
     n, at, ulp = problem.n, problem.newton.at, math.ulp(values[place]) / problem.scales[place]
-    x = x if low <= x <= high else 0.5 * (low + high)
     best, best_x = (math.inf, math.inf), x
     for _ in range(HALVINGS):
         trial = at(x, *others, *values)
@@ -93,40 +92,6 @@ def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Br
     return *inputs, *rates
 
 
-def refine_arrays(problem: InverseProblem, values: np.ndarray, candidates: np.ndarray
-                  ) -> np.ndarray:
-    """
-    Return what `refine` does for columns of values (outputs, m) and of candidates.
-
-    The solutions have the shape (inputs and rates, m), NaN where there is none.
-    """
-    n, over = problem.n, problem.newton.over
-    # What closed forms lose next to a singular pose; more is another assembly.
-    low, high, inputs, far = -math.inf, math.inf, candidates, SINGULAR
-    if n == 1:
-        low, high, inputs, far = *candidates[:2], candidates[2:3], math.inf
-    best = over(*inputs.clip(low, high), *values)
-    left = ~np.isfinite(best).all(axis=0)
-    again = np.flatnonzero((best[0] > 0.0) & (best[0] <= far))
-    for _ in range(HALVINGS):
-        if not len(again):
-            break
-        x = best[2 + n:2 + 2 * n].clip(low, high)[:, again]
-        trial = over(*x, *values[:, again])
-        better = trial[0] < best[0, again]
-        again = again[better]
-        best[:, again] = trial[:, better]
-    # What is left is refined one by one.
-    left = (left | ~(best[1] <= ACCEPTED)) & ~(best[0] > far)
-    solutions = np.where(best[1] <= ACCEPTED, best[2 + 2 * n:], math.nan)
-    for k in np.flatnonzero(left).tolist():
-        candidate = candidates[:, k].tolist()
-        row = refine(problem, values[:, k].tolist(),
-                     Bracket(*candidate) if n == 1 else tuple(candidate))
-        solutions[:, k] = row or math.nan
-    return solutions
-
-
 def _are_one(problem: InverseProblem, solution: Row, other: Row) -> bool:
     """
     Return whether two solutions are one.
@@ -148,24 +113,46 @@ def distinct(problem: InverseProblem, solutions: Sequence[Row]) -> List[Row]:
     """Return solutions in order, one of those that are one."""
     distinct: List[Row] = []
     for solution in sorted(solutions):
-        # Of one input only neighbours can be one, a turn apart too.
-        others = distinct if problem.n > 1 else distinct[-1:] + distinct[:-1][:1]
-        if not any(_are_one(problem, solution, other) for other in others):
+        if not any(_are_one(problem, solution, other) for other in distinct):
             distinct.append(solution)
     return distinct
 
 
-def distinct_arrays(problem: InverseProblem, solutions: np.ndarray) -> np.ndarray:
-    """Return solutions (solutions, inputs and rates, m) in order, one of those that are one."""
-    n = problem.n
+def solve_arrays(problem: InverseProblem, values: np.ndarray,
+                 candidate_arrays: Callable[[np.ndarray], Tuple[np.ndarray, ...]]
+                 ) -> Tuple[np.ndarray, np.ndarray]:
+    """
+    Return all solutions for columns of values (outputs, m), and columns to be solved alone.
+
+    The solutions (solutions, inputs and rates, m) are in order, padded with NaN. A column is to be
+    solved alone if a candidate is not clear after a few steps, or if two solutions may be one.
+    """
+    n, over, values = problem.n, problem.newton.over, problem.reduced_arrays(values)
+    numbers, places, candidates = candidate_arrays(values)
+    here = values[:, places]
+    # What closed forms lose next to a singular pose; more is another assembly.
+    low, high, inputs, far = -math.inf, math.inf, candidates, SINGULAR
+    if n == 1:
+        low, high, inputs, far = *candidates[:2], candidates[2:3], math.inf
+    best = over(*inputs.clip(low, high), *here)
+    unclear = ~np.isfinite(best).all(axis=0)
+    again = np.flatnonzero((best[0] > 0.0) & (best[0] <= far))
+    for _ in range(HALVINGS):
+        if not len(again):
+            break
+        x = best[2 + n:2 + 2 * n].clip(low, high)[:, again]
+        trial = over(*x, *here[:, again])
+        better = trial[0] < best[0, again]
+        again = again[better]
+        best[:, again] = trial[:, better]
+    is_solved = best[1] <= ACCEPTED
+    solutions = np.full((numbers.max(initial=0) + 1, n + n * n, values.shape[1]), math.nan)
+    solutions[numbers, :, places] = np.where(is_solved, best[2 + 2 * n:], math.nan).T
     order = np.lexsort(solutions[:, :n].swapaxes(0, 1)[::-1], axis=0)
     solutions = np.take_along_axis(solutions, order[:, None], 0)
     pairs = np.triu_indices(len(solutions), 1)
     distances = np.max([input_.apart(*(solutions[k, by] for k in pairs)) / size for by, (
         input_, size) in enumerate(zip(problem.inputs, problem.sizes))], axis=0)
-    for k in np.flatnonzero((distances <= SINGULAR).any(axis=0)).tolist():
-        rows = distinct(problem, [row for row in map(tuple, solutions[:, :, k].tolist())
-                                  if row[0] == row[0]])
-        solutions[:, :, k] = math.nan
-        solutions[:len(rows), :, k] = rows
-    return solutions[:max(int(np.isfinite(solutions[:, 0]).any(axis=1).sum()), 1)]
+    alone = (distances <= SINGULAR).any(axis=0)
+    alone[places[(unclear | ~is_solved) & ~(best[0] > far)]] = True
+    return solutions, np.flatnonzero(alone)

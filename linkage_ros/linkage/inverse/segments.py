@@ -55,36 +55,21 @@ class Segment(NamedTuple):
 
     Attributes
     ----------
-    theta, value : float array (samples,)
-        The input in its size, and the output times the sign of its rate. Both ascend.
+    theta, value : sequence of float
+        The input, and the output times the sign of its rate. Both ascend.
     sign : float
         1.0 where the output rises, -1.0 where it falls.
 
     """
 
-    theta: np.ndarray
-    value: np.ndarray
+    theta: Any
+    value: Any
     sign: float
-
-
-class Table(NamedTuple):
-    """
-    A segment as values need it: a range of output values, and the samples between which they are.
-
-    Values in the outer cells, in which the input does not change, are answered by the end of the
-    segment.
-    """
-
-    low: float
-    high: float
-    sign: float
-    theta: List[float]
-    value: List[float]
 
     def bracket(self, target: float) -> Bracket:
         """Return the bracket of a value of the range, times the sign."""
         i = bisect_right(self.value, target, 1, len(self.value) - 1)
-        low, high, least, greatest = *self.theta[i - 1:i + 1], *self.value[i - 1:i + 1]
+        (low, high), (least, greatest) = self.theta[i - 1:i + 1], self.value[i - 1:i + 1]
         part = (target - least) / (greatest - least) if greatest > least else 0.5
         return Bracket(low, high, low + part * (high - low), self.sign)
 
@@ -127,32 +112,32 @@ class Segments:
             runs, self.jumps = [], []
         self.all = [segment for run in runs for segment in self._monotone(*run)]
         self.all.sort(key=lambda segment: float(segment.theta[0]))
-        # Whether the output goes on after the last input of each segment.
-        self._goes_on = [*map(self._continues, self.all, self.all[1:] + self.all[:1])]
-        self._tables = [*map(self._table, range(len(self.all)))]
+        self._answers = [*map(self._answered, range(len(self.all)))]
 
-    def _table(self, number: int) -> Table:
-        """Return a segment as values need it."""
+    def _answered(self, number: int) -> Segment:
+        """
+        Return the input and all values that a segment answers.
+
+        The values of the outer cells, in which the input does not change, are those of its ends.
+        """
         theta, value, sign = self.all[number]
         slack = self._slack(number, 0), self._slack(number, -1)
-        least, greatest = float(value[0] - slack[0]), float(value[-1] + slack[1])
-        # Values so near to an end of the segment are the end's.
         near = np.minimum(slack, ONE * self._size)
-        theta = np.pad(theta, 1, 'edge') * self._unit
-        value = np.pad(value.clip(value[0] + near[0], value[-1] - near[1]), 1, 'edge')
-        return Table(least, greatest, sign, theta.tolist(), value.tolist())
+        inner = value.clip(value[0] + near[0], value[-1] - near[1])
+        return Segment((np.pad(theta, 1, 'edge') * self._unit).tolist(), [
+            float(value[0] - slack[0]), *inner.tolist(), float(value[-1] + slack[1])], sign)
 
     # --- candidates ---
 
     def candidates(self, values: Sequence[float]) -> List[Bracket]:
         """Return a bracket for each input that has the value."""
         brackets, period = [], self._period
-        for table in self._tables:
-            low, target = table.low, table.sign * values[0]
+        for segment in self._answers:
+            low, target = segment.value[0], segment.sign * values[0]
             if period < math.inf and not low <= target < low + period:
                 target += period * math.ceil((low - target) / period)
-            while low <= target <= table.high:
-                brackets.append(table.bracket(target))
+            while low <= target <= segment.value[-1]:
+                brackets.append(segment.bracket(target))
                 target += period
         return brackets
 
@@ -162,12 +147,12 @@ class Segments:
         period, none = self._period, np.empty(0, int)
         # They are searched faster in order.
         order = values[0].argsort()
-        for low, high, sign, *samples in self._tables:
+        for *samples, sign in self._answers:
             theta, value = map(np.array, samples)
             target = sign * values[0, order]
             if period < math.inf:
-                target = target + period * np.ceil((low - target) / period)
-            while len(inside := np.flatnonzero((low <= target) & (target <= high))):
+                target = target + period * np.ceil((value[0] - target) / period)
+            while len(inside := np.flatnonzero((value[0] <= target) & (target <= value[-1]))):
                 goal = target[inside]
                 i = value[1:-1].searchsorted(goal, 'right')
                 found.append((np.full(len(i), len(found)), order[inside], np.stack([
@@ -196,15 +181,14 @@ class Segments:
         target += math.remainder(sign * (value + residual) - target, self._period)
         target -= sign * residual
         for _ in range(2 * len(self.all)):
-            table = self._tables[number]
-            if table.low <= target <= table.high:
-                bracket = table.bracket(target)
+            answers = self._answers[number]
+            if answers.value[0] <= target <= answers.value[-1]:
+                bracket = answers.bracket(target)
                 return bracket, (turns + bracket.seed,)
-            end, side = (-1, 1) if target > table.high else (0, -1)
-            if not self._goes_on[number if end else number - 1]:
+            end = -1 if target > answers.value[-1] else 0
+            if (beyond := self._beyond(number, end)) is None:
                 break
-            here, number = self.all[number], (number + side) % len(self.all)
-            there = self.all[number]
+            here, there, number = self.all[number], self.all[beyond], beyond
             # The same value, or whole periods from it.
             target += float(there.value[-1 - end] - here.value[end])
             turns += self._input.turns_of(
@@ -250,8 +234,7 @@ class Segments:
 
     def _runs(self, lo: float, hi: float, marks: Sequence[float]) -> Iterator[Tuple]:
         """Yield samples as inputs, values and rates, cut where the output jumps."""
-        theta = np.concatenate([sampled(*arc) for arc in _cut([(lo, hi)], marks)])
-        theta = ascending(theta)
+        theta = ascending(np.concatenate([sampled(*arc) for arc in _cut([(lo, hi)], marks)]))
         most = MAX_SAMPLES + 4 * len(theta)
         theta, jumped = self._divided(theta, most)
         if len(theta) > most:
@@ -333,21 +316,24 @@ class Segments:
     def _slack(self, number: int, end: int) -> float:
         """Return how far beyond an end of a segment, 0 or -1, values are those of the end."""
         theta, value, sign = self.all[number]
-        if self._goes_on[number if end else number - 1]:
-            there = self.all[(number + (1 if end else -1)) % len(self.all)]
-            return self._rounding + abs(self._difference(there.value[-1 - end] - value[end]))
+        if (beyond := self._beyond(number, end)) is not None:
+            gap = self.all[beyond].value[-1 - end] - value[end]
+            return self._rounding + abs(self._difference(gap))
         # An end is a float, too: next to it the output may change quickly.
         ulps = ULPS * np.spacing(max(abs(theta[end]), 1.0))
         beside = theta[end:end + 1 or None] + math.copysign(ulps, theta[-1 - end] - theta[end])
         change = abs(self._difference(self._curve(beside)[0, 0] - sign * value[end]))
         return float(np.fmin(np.fmax(change, CLOSE * self._size), SINGULAR * self._size))
 
-    def _continues(self, segment: Segment, other: Segment) -> bool:
-        """Return whether the output goes on from a segment to the next one."""
-        step = float(other.theta[0] - segment.theta[-1]) * self._unit
-        return other.sign == segment.sign and abs(
-            step - self._input.turns_of(step)) <= ONE * self._unit and bool(abs(
-                self._difference(other.value[0] - segment.value[-1])) <= CLOSE * self._size)
+    def _beyond(self, number: int, end: int) -> Optional[int]:
+        """Return the number of the segment on which the output goes on beyond an end, 0 or -1."""
+        beyond = (number + (1 if end else -1)) % len(self.all)
+        here, there = self.all[number], self.all[beyond]
+        step = float(there.theta[-1 - end] - here.theta[end]) * self._unit
+        goes_on = there.sign == here.sign and abs(
+            step - self._input.turns_of(step)) <= ONE * self._unit and abs(
+                self._difference(there.value[-1 - end] - here.value[end])) <= CLOSE * self._size
+        return beyond if goes_on else None
 
 
 def segments_of(linkage: Kinematics, output: str, others: Sequence[float] = (),
@@ -362,14 +348,13 @@ def extremes_of(linkage: Kinematics, output: str, arcs: Optional[Sequence[Arc]],
                 others: Sequence[float]) -> list:
     """Implement `Mechanism.extremes`."""
     linkage.check_output(output)
-    pose, angular = linkage.compiled('output', output), np.array([linkage.is_angle(output)])
+    pose, is_angle = linkage.compiled('output', output), linkage.is_angle(output)
     size = linkage.inputs[0].step
     parts = reach_of(linkage, tuple(others)) if arcs is None else arcs
     if arcs is None and (segments := segments_of(linkage, output, others)).jumps:
         parts = [(low * size, high * size) for low, high in segments.arcs]
-    found = [extremes(lambda value: pose.searched(value, *others)[:1], low, high,
-                      angular)[0].tolist() for low, high in parts]
-    return [(tuple(least), tuple(greatest)) for least, greatest in found]
+    return [tuple(extremes(lambda value: pose.searched(value, *others)[0], low, high, is_angle))
+            for low, high in parts]
 
 
 def _cut(arcs: Sequence[Arc], marks: Any) -> Iterator[Arc]:

@@ -11,7 +11,7 @@ few dozen times for any number of results.
 from __future__ import annotations
 
 import math
-from typing import Callable, Tuple
+from typing import Callable, List, Tuple
 
 import numpy as np
 
@@ -103,39 +103,36 @@ def turning_points(values: np.ndarray, rates: np.ndarray, least: float) -> np.nd
     return np.array(found, np.intp)
 
 
-def extremes(curve: Callable, lo: float, hi: float, angular: np.ndarray) -> np.ndarray:
+def extremes(curve: Callable, lo: float, hi: float, is_angle: bool = False
+             ) -> List[Tuple[float, float]]:
     """
-    Return each output's minimum on an arc and its place, then its maximum: (outputs, 2, 2).
+    Return the minimum of an output on an arc and its place, then the maximum and its place.
 
-    The curve takes values of an input (n,) and returns the outputs (outputs, n). Those that are
-    `angular` (outputs,) are angles [rad], continued past -pi and pi.
+    The curve takes values of an input (n,) and returns those of the output (n,); an angle [rad]
+    continues past -pi and pi.
     """
     theta = np.linspace(lo, hi, TURN_SAMPLES + 1)
     value = curve(theta)
-    for i, known in zip(np.flatnonzero(angular), np.isfinite(value[angular])):
-        value[i, known] = np.unwrap(value[i, known])
-    # Two searches for maxima: of each output's negative, and of each output.
-    row, sign = np.tile(np.arange(len(value)), 2), np.repeat([-1.0, 1.0], len(value))[:, None]
-    height = np.where(np.isfinite(value)[row], value[row] * sign, -np.inf)
-    beside = np.pad(height, ((0, 0), (1, 1)), constant_values=-np.inf)
-    peaks = (height >= beside[:, :-2]) & (height >= beside[:, 2:])
-    best = np.argsort(np.where(peaks, -height, np.inf), axis=1)[:, :REFINED_PEAKS]
-    row, sign = row.repeat(best.shape[1]), sign.repeat(best.shape[1], axis=0)
-    best = best.ravel()
-    top, at = value[row, best], theta[best]
+    known = np.isfinite(value)
+    if is_angle:
+        value[known] = np.unwrap(value[known])
+    found = []
+    for sign in (-1.0, 1.0):
+        height = np.where(known, sign * value, -np.inf)
+        beside = np.pad(height, 1, constant_values=-np.inf)
+        peaks = np.flatnonzero((height >= beside[:-2]) & (height >= beside[2:]))
+        best = peaks[np.argsort(-height[peaks])[:REFINED_PEAKS]]
+        top = value[best, None]
 
-    def depth(x: np.ndarray) -> np.ndarray:
-        """Return how far curves are below zero, or above for minima, in the turn of their top."""
-        now = curve(x.ravel()).reshape(len(value), *x.shape)[row, np.arange(len(row))]
-        turns = np.where(angular[row, None], np.round((top[:, None] - now) / math.tau), 0.0)
-        return -sign * (now + math.tau * turns)
+        def depth(x: np.ndarray, sign: float = sign, top: np.ndarray = top) -> np.ndarray:
+            """Return how far the curve is below zero, or above for a minimum, next to a top."""
+            now = curve(x.ravel()).reshape(x.shape)
+            return -sign * (now + math.tau * np.round((top - now) / math.tau) if is_angle else now)
 
-    with np.errstate(invalid='ignore'):
         refined_at = lowest(depth, theta[(best - 1).clip(0)],
                             theta[(best + 1).clip(max=TURN_SAMPLES)])
-        refined_top = -(sign * depth(refined_at[:, None]))[:, 0]
-        higher = sign[:, 0] * refined_top > sign[:, 0] * top
-    found = np.where(higher, (refined_top, refined_at), (top, at)).reshape(2, 2 * len(value), -1)
-    rank = np.where(np.isfinite(found[0]), found[0] * sign.reshape(found[0].shape), -np.inf)
-    place = rank.argmax(axis=1)[None, :, None]
-    return np.take_along_axis(found, place, 2).reshape(2, 2, -1).transpose(2, 1, 0)
+        heights = np.append(sign * top[:, 0], -depth(refined_at[:, None])[:, 0])
+        highest = np.where(np.isfinite(heights), heights, -np.inf).argmax()
+        found.append((float(sign * heights[highest]),
+                      float(np.append(theta[best], refined_at)[highest])))
+    return found

@@ -10,7 +10,7 @@ from typing import Any, Optional
 import numpy as np
 
 from .design import Design
-from ...words import listed, meant, quoted
+from ...words import listed, quoted, suggestion
 
 # The eighth power of a length is a normal number.
 SHORTEST_LENGTH, LONGEST_LENGTH = 1e-30, 1e30
@@ -20,9 +20,8 @@ def checked_dimensions(design: Design, given: Mapping[str, Any]) -> dict:
     """Return all dimensions of a design with defaults; raise ValueError if one is invalid."""
     for name in given:
         if name not in design.dimensions:
-            raise ValueError(f'{design.name} has no dimension {quoted(name)}; '
-                             f'allowed: {listed(design.dimensions)}'
-                             f'{meant(name, design.dimensions)}')
+            raise ValueError(f'{design.name} has no dimension {quoted(name)}'
+                             f'{suggestion(name, design.dimensions)}')
     lengths = {name: _checked(design, name, given.get(name, default))
                for name, default in design.dimensions.items()}
     try:
@@ -83,8 +82,8 @@ def checked_branches(design: Design, given: Optional[Mapping[str, int]]) -> dict
     signs = dict(design.branches)
     for name, sign in (given or {}).items():
         if name not in signs:
-            raise ValueError(f'{design.name} has no branch {quoted(name)}; '
-                             f'allowed: {listed(signs)}{meant(name, signs)}')
+            raise ValueError(f'{design.name} has no branch {quoted(name)}'
+                             f'{suggestion(name, signs)}')
         if not isinstance(sign, Real) or isinstance(sign, bool) or sign not in (1, -1):
             raise ValueError(f'{design.name}: branch {name} must be +1 or -1, '
                              f'got {quoted(sign)}')
