@@ -228,7 +228,7 @@ static inline int lkr_solve(const lkr_model *model, int side, const lkr_point *p
     /* A compiler knows this bound. */
     const int n = model->inputs < LKR_MAX_INPUTS ? model->inputs : LKR_MAX_INPUTS;
     /* The last column is that of b. */
-    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS + 1];
+    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS + 1] = { { 0 } };
     lkr_real most = 1;
     int i, j, k;
     for (i = 0; i < n; i++) {
