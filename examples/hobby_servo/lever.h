@@ -765,7 +765,7 @@ static inline int lever_at_angle_lever(const float *q, lkr_point *p)
 static const lkr_model lever_model_angle_lever = {
     1, { 0, 1 }, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, the inputs and their starts. */
-    { { { 0 } }, { { 0, 0.0f, 0.0f, 1.0f, 6.2831855f } } },
+    { { { 0, 0, 0, 0, 0 } }, { { 0, 0.0f, 0.0f, 1.0f, 6.2831855f } } },
     { { 1.0f, -INFINITY, INFINITY, { 6.2831855f, 6.2831855f } } }, { 0.0f }
 };
 
