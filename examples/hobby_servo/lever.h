@@ -91,15 +91,15 @@ typedef double lkr_real;
 
 /* --- numbers --- */
 
-/* The larger and the smaller one, quicker than fmax and fmin; b is left out if it is NaN. */
+/* The larger one, quicker than fmax; b is left out if it is NaN. */
 static inline lkr_real lkr_max(lkr_real a, lkr_real b)
 {
     return b > a ? b : a;
 }
 
-static inline lkr_real lkr_min(lkr_real a, lkr_real b)
+static inline lkr_real lkr_clamped(lkr_real x, lkr_real low, lkr_real high)
 {
-    return b < a ? b : a;
+    return x > high ? high : lkr_max(x, low);
 }
 
 /* The whole turns nearest to x, if there are turns; a compiler divides where it compiles. */
@@ -118,14 +118,17 @@ LKR_FORMULA lkr_real lkr_wrapped(lkr_real x, lkr_real turn)
 }
 
 /* A limit that is missed by rounding counts as reached. */
+static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
+{
+    if (x > 0) {
+        return LKR_MATH(sqrt)(x);
+    }
+    return x >= -tolerance ? 0 : LKR_NAN;
+}
+
 static inline lkr_real lkr_valid_where(lkr_real x, lkr_real margin, lkr_real tolerance)
 {
     return margin >= -tolerance ? x : LKR_NAN;
-}
-
-static inline lkr_real lkr_root(lkr_real x, lkr_real tolerance)
-{
-    return lkr_valid_where(LKR_MATH(sqrt)(lkr_max(0, x)), x, tolerance);
 }
 
 /* The angle of (x, y); a compiler leaves it out where it is not used. */
@@ -244,7 +247,7 @@ static inline int lkr_solve(const lkr_model *model, int side, const lkr_point *p
     /* A compiler knows this bound. */
     const int n = model->inputs < LKR_MAX_INPUTS ? model->inputs : LKR_MAX_INPUTS;
     /* The last column is that of b. */
-    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS + 1];
+    lkr_real a[LKR_MAX_INPUTS][LKR_MAX_INPUTS + 1] = { { 0 } };
     lkr_real most = 1;
     int i, j, k;
     for (i = 0; i < n; i++) {
@@ -308,8 +311,8 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
                 sum = next;
             }
             sum = x * sum - before + LKR_FROM_FLASH(part->term[0]);
-            q[solutions][0] = lkr_min(
-                lkr_max(sum, LKR_FROM_FLASH(part->low)), LKR_FROM_FLASH(part->high));
+            q[solutions][0] =
+                lkr_clamped(sum, LKR_FROM_FLASH(part->low), LKR_FROM_FLASH(part->high));
             solutions++;
         }
     }
@@ -347,11 +350,11 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
             x[i] += q[i];
         }
     }
-    if (!(left < LKR_OTHER)) {
+    /* At an end of the reach the rate is infinite, yet rounding is not. */
+    if (left > LKR_CLOSE * LKR_STEEPEST) {
         return 0;
     }
-    /* What is left may be rounding: of the positions; of the inputs, where a position changes fast; at
-       an end of the reach the rate is infinite, yet rounding is not. */
+    /* What is left may be rounding: of the positions; of the inputs, where a position changes fast. */
     for (i = 0; i < model->inputs; i++) {
         const lkr_real scale = model->axis[side][i].scale;
         steepest = lkr_max(steepest, LKR_MATH(fabs)(position[i]) * scale);
@@ -360,13 +363,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
                 * lkr_max(model->input[j].size, LKR_MATH(fabs)(q[j])));
         }
     }
-    return left <= LKR_CLOSE * lkr_min(steepest, LKR_STEEPEST);
-}
-
-/* The input nearest to x in the sweep. */
-static inline lkr_real lkr_inside(lkr_real x, const lkr_input *input)
-{
-    return lkr_min(lkr_max(x, input->low), input->high);
+    return left <= LKR_CLOSE * steepest;
 }
 
 /* From inputs x to those whole turns from them that are nearest to near ones and the sweeps; returns
@@ -382,19 +379,20 @@ static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_rea
         const lkr_real turn = input->turn[side];
         const lkr_real slack = LKR_BEYOND * input->size + LKR_CLOSE * LKR_MATH(fabs)(near[i]);
         const lkr_real low = input->low - slack, high = input->high + slack;
-        lkr_real beyond;
-        q[i] = x[i] + lkr_turns(lkr_inside(near[i], input) - x[i], turn);
+        lkr_real inside, beyond;
+        q[i] = x[i] + lkr_turns(lkr_clamped(near[i], input->low, input->high) - x[i], turn);
         if (q[i] < low && q[i] + turn <= high) {
             q[i] += turn;
         } else if (q[i] > high && q[i] - turn >= low) {
             q[i] -= turn;
         }
-        beyond = LKR_MATH(fabs)(q[i] - lkr_inside(q[i], input));
+        inside = lkr_clamped(q[i], input->low, input->high);
+        beyond = LKR_MATH(fabs)(q[i] - inside);
         if (side == LKR_JOINTS) {
             if (beyond > slack) {
                 return INFINITY;
             }
-            q[i] = lkr_inside(q[i], input);
+            q[i] = inside;
         }
         away += (LKR_MATH(fabs)(q[i] - near[i]) + 10 * beyond) / input->size;
     }
@@ -767,7 +765,7 @@ static inline int lever_at_angle_lever(const float *q, lkr_point *p)
 static const lkr_model lever_model_angle_lever = {
     1, { 0, 1 }, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, the inputs and their starts. */
-    { { { 0 } }, { { 0, 0.0f, 0.0f, 1.0f, 6.2831855f } } },
+    { { { 0, 0, 0, 0, 0 } }, { { 0, 0.0f, 0.0f, 1.0f, 6.2831855f } } },
     { { 1.0f, -INFINITY, INFINITY, { 6.2831855f, 6.2831855f } } }, { 0.0f }
 };
 

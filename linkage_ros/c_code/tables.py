@@ -74,7 +74,8 @@ class Tables:
             'names': ', '.join(map(self._solutions, sides)),
             'at': '\n'.join(indented(self._at(rows, len(sides[1])))),
             'axes': row(row((str(each.input), each.ratio, each.shift, 1.0 / each.size, each.turn)
-                            for each in axes) if axes else '{ { 0 } }' for axes in rows),
+                            for each in axes) if axes else '{ { 0, 0, 0, 0, 0 } }'
+                           for axes in rows),
             'inputs': row(self._inputs(sides, has_sweeps=not tag)),
             'start': row(start(self.mechanism))})
 
