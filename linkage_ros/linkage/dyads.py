@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from cmath import phase
 from functools import partial
-from itertools import combinations
+from itertools import chain, combinations
 import math
 from typing import (
     Any,
@@ -258,10 +258,10 @@ class Dyads:
              ) -> Tuple[Pin, str, complex]:
         """Return the joint at a place on a body, one further along an axis, and the direction."""
         origin, at = self.fixed(body, place)
-        name, end = next(((name, end) for name, end in self.on[body].items()
-                          if name not in (origin, but)
-                          and abs(((end - at) / axis).imag) < ROUNDING * self.size), None) \
-            or self.fixed(body, at + axis * self.size)
+        along = [(name, end) for name, end in self.on[body].items()
+                 if abs(((end - at) / axis).imag) < ROUNDING * self.size]
+        beyond = (self.fixed(body, at + side * axis * self.size) for side in (1, -1))
+        name, end = next(pin for pin in chain(along, beyond) if pin[0] not in (origin, but))
         return (origin, at), name, (end - at) / abs(end - at)
 
     def end(self, body: str) -> Pin:
