@@ -39,8 +39,9 @@ ARITHMETIC_WORDS = 'pi', 'deg', 'max', 'sqrt'
 
 _EXPRESSIONS: Mapping[Step, Callable] = {
     '+': operator.add, '-': operator.sub, '*': operator.mul, '/': operator.truediv,
-    'negative ': operator.neg, 'max': lambda x, y: where(x < y, y, x), 'sqrt': square_root,
-    'deg': lambda x: x * (math.pi / 180.0)}
+    'negative ': operator.neg, 'sqrt': square_root, 'deg': lambda x: x * (math.pi / 180.0),
+    # NaN if one of them is.
+    'max': lambda x, y: where(x < y, y, where(y <= x, x, x + y))}
 
 
 def in_range(number: ArrayLike) -> Any:
