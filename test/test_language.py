@@ -77,6 +77,8 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P ground 0 sqrt(1-2)', "'sqrt(1-2)' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0 max(1,sqrt(1-2))', "'max(1,sqrt(1-2))' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0 max(sqrt(1-2),1)', "'max(sqrt(1-2),1)' must be 0 or between 1e-70 and 1e70"),
+    ('P ground 0 max(1,-1/(b-b))', "'max(1,-1/(b-b))' must be 0 or between 1e-70 and 1e70"),
+    ('P ground 0 1/(1/(b-b))', "'1/(1/(b-b))' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0 m/(g-4)', 'must be 0 or between'),
     ('P ground 0 1e-71*m', "'1e-71*m' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0 ' + '9' * 310, 'must be 0 or between 1e-70 and 1e70'),

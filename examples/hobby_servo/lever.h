@@ -616,11 +616,11 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     const float k26 = 0.025f; /* b - a */
     const float k27 = 0.000625f; /* (b - a) * (b - a) */
     const float k30 = 0.0036f; /* (4.0 * b) * a */
-    const float k54 = 0.081f; /* 1.8 * b */
-    const float k76 = 0.000625f;
-    const float k83 = 0.0f;
-    const float k85 = -0.025f; /* a - b */
-    const float k86 = 0.09f; /* 2.0 * b */
+    const float k51 = 0.081f; /* 1.8 * b */
+    const float k73 = 0.000625f;
+    const float k80 = 0.0f;
+    const float k82 = -0.025f; /* a - b */
+    const float k83 = 0.09f; /* 2.0 * b */
     const float x0 = crank_;
     /* O ground 0 0 */
     p->O_x = 0.0f;
@@ -653,17 +653,17 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     const float v42 = lkr_valid_where(k26 + (k22 * v31), v37, 0.0f);
     const float v45 = sqrtf((v38 * v38) + (v42 * v42));
     const float v46 = v38 / v45;
-    const float v56 = v42 / v45;
-    const float v84 = lkr_root(k76 + v32, k83);
-    const float v91 = ((length_a * (k85 + (k86 * v31))) / v33) + 0.0f;
-    p->L_x = v46 * k54;
-    p->L_y = k2 + (v56 * k54);
-    p->angle_lever = lkr_angle(-v46, v56);
-    p->slide_slide = v84;
-    by_crank->L_x = -((v91 * v56) * k54);
-    by_crank->L_y = (v91 * v46) * k54;
-    by_crank->angle_lever = v91;
-    by_crank->slide_slide = (-((((v7 * 0.5f) * v9) * 2.0f) * k30)) / (2.0f * v84);
+    const float v53 = v42 / v45;
+    const float v81 = lkr_root(k73 + v32, k80);
+    const float v88 = ((length_a * (k82 + (k83 * v31))) / v33) + 0.0f;
+    p->L_x = v46 * k51;
+    p->L_y = k2 + (v53 * k51);
+    p->angle_lever = lkr_angle(-v46, v53);
+    p->slide_slide = v81;
+    by_crank->L_x = -((v88 * v53) * k51);
+    by_crank->L_y = (v88 * v46) * k51;
+    by_crank->angle_lever = v88;
+    by_crank->slide_slide = (-((((v7 * 0.5f) * v9) * 2.0f) * k30)) / (2.0f * v81);
     const float valid = 0.0f;
     return isfinite(valid);
 }

@@ -9,10 +9,11 @@ Arithmetic in joint lines: expressions of numbers and dimensions, without spaces
 
 from __future__ import annotations
 
+from functools import reduce
 import math
 import operator
 import re
-from typing import Any, Callable, Iterable, List, Mapping, Union
+from typing import Any, Callable, Dict, Iterable, List, Mapping, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,9 +40,8 @@ ARITHMETIC_WORDS = 'pi', 'deg', 'max', 'sqrt'
 
 _EXPRESSIONS: Mapping[Step, Callable] = {
     '+': operator.add, '-': operator.sub, '*': operator.mul, '/': operator.truediv,
-    'negative ': operator.neg, 'sqrt': square_root, 'deg': lambda x: x * (math.pi / 180.0),
-    # NaN if one of them is.
-    'max': lambda x, y: where(x < y, y, where(y <= x, x, x + y))}
+    'negative ': operator.neg, 'max': lambda x, y: where(x < y, y, x), 'sqrt': square_root,
+    'deg': lambda x: x * (math.pi / 180.0)}
 
 
 def in_range(number: ArrayLike) -> Any:
@@ -89,9 +89,12 @@ class Formula:
         return stack.pop()
 
     def value(self, dimensions: Mapping[str, Any]) -> Any:
-        """Return its value for dimensions, numbers or arrays; not finite where undefined."""
+        """Return its value for dimensions, numbers or arrays; NaN where a part is not finite."""
         symbols = {name: dimension(name, positive=False) for name in self.names}
-        return evaluate(self.expression(symbols), dimensions, {})
+        parts: Dict[Real, Any] = {}
+        value = evaluate(self.expression(symbols), dimensions, parts)
+        is_finite = reduce(np.logical_and, map(np.isfinite, parts.values()))
+        return np.where(is_finite, value, np.nan)[()]
 
     def _parse(self, tokens: Iterable[str]) -> None:
         """Fill the steps; operators and parentheses wait until what they bind is complete."""
