@@ -24,10 +24,9 @@ class Axis(NamedTuple):
     An actuator or a joint, whose position [rad or m] is factor * output + offset.
 
     `output` is one of the linkage, in its own units. `size` and `turn` are the position's size and
-    period; that is 0 for inputs and geared links, which count turns. If it `wraps`, its position
-    is published within half a turn of zero. `role` is its name in the linkage. If its position
-    counts an input, it is ratio * input + shift, for the input of number `input`; else the ratio
-    is 0.
+    period; the period is 0 for inputs and geared links, which count turns. If it `wraps`, its
+    position is published within half a turn of zero. `role` is its name in the linkage. If its
+    position counts the input of number `input`, it is ratio * input + shift; else the ratio is 0.
     """
 
     name: str
