@@ -32,7 +32,7 @@ from . import shapes
 from .robot import HINGE, posed, Robot, SLIDE
 from .shapes import BALL, BOX, CYLINDER, Piece, Place, weight
 from .. import palette
-from ..linkage import Arc, extremes, GROUND, Leg, Link, Mechanism
+from ..linkage import Arc, extremes, GROUND, Leg, Link
 from ..scene import SceneError, SceneMechanism
 from ..scene.motion import Motion
 from ..words import listed
@@ -152,12 +152,7 @@ class _Tree:
         self._mechanism, legs = mechanism, mechanism.assembly().legs
         self._shapes = shapes.shapes(mechanism)
         self._frames = {GROUND: shapes.ground_frame(mechanism.linkage), **mechanism.linkage.frames}
-        self._travels = {
-            name: (mechanism.scale_of(name) * low, mechanism.scale_of(name) * high)
-            for name, (low, high) in travels(mechanism.linkage, mechanism.reach).items()}
-        # The crank of several legs is limited by all of them.
-        if len(legs) == 1:
-            self._travels.update(_input_travels(mechanism))
+        self._travels = travels(mechanism)
         ground = self._body('', GROUND)
         self.robot = Robot(ground, {ground: np.eye(4)}, pieces={ground: []}, base=base,
                            pose=mechanism.pose, mechanism=mechanism)
@@ -239,50 +234,34 @@ class _Tree:
         return (side * x, y) if name == GROUND else (x, side * y)
 
 
-def _input_travels(mechanism: SceneMechanism) -> Dict[str, Arc]:
-    """Return the outermost ends of each input's reach that is no full rotation."""
+def travels(mechanism: SceneMechanism) -> Dict[str, Arc]:
+    """
+    Return the travel of each joint: lower and upper end of its value [rad or m].
+
+    That of an input is its reach; a full rotation and the crank of several legs, which all of them
+    limit, have none. That of another joint is wider by SLACK; one that turns past +-pi has none.
+    With several inputs, whose reach depends on each other, no other joint has one.
+    """
+    linkage, reach, scale = mechanism.linkage, mechanism.reach, mechanism.scale_of
     ends: Dict[str, Arc] = {}
+    has_one_leg = mechanism.leg_pairs == 1 and not mechanism.mirrored
     for name, settings in mechanism.inputs.items():
-        if settings.sweep and not settings.input.is_whole(settings.reach):
+        if has_one_leg and settings.sweep and not settings.input.is_whole(settings.reach):
             low, high = np.min(settings.reach), np.max(settings.reach)
             # A crank's angle is in the turn of its sweep.
             turns = math.tau * ((settings.sweep[1] - low) // math.tau) * settings.input.turns
             ends[name] = float(low + turns), float(high + turns)
+    others = [name for name in linkage.joints if name not in mechanism.inputs]
+    if len(mechanism.inputs) == 1 and others:
+        found = linkage.cache.get_or_make(('travels', *reach), lambda: np.array([[extremes(
+            lambda theta, name=name: linkage.joint_angles(theta, [name])[name], *arc,
+            linkage.is_angle(name)) for arc in reach] for name in others]))
+        for name, lows, highs in zip(others, *found[..., 0].transpose(2, 0, 1)):
+            slack = SLACK if linkage.is_angle(name) else SLACK * float(linkage.longest)
+            low, high = float(lows.min()) - slack, float(highs.max()) + slack
+            if not linkage.is_angle(name) or -math.pi < low < high <= math.pi:
+                ends[name] = scale(name) * low, scale(name) * high
     return ends
-
-
-def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Arc]:
-    """
-    Return the travel of each joint except the inputs.
-
-    Parameters
-    ----------
-    linkage : Mechanism
-        The linkage.
-    reach : sequence of (float, float)
-        Arcs of its input [rad or m].
-
-    Returns
-    -------
-    dict
-        For joints the bounds (lo, hi) of their values in `joint_angles` [rad; a slide: m], wider
-        by SLACK; none for a joint that turns past +-pi. With several inputs, whose reach depends
-        on each other, it is empty.
-
-    """
-    inputs = {input_.name for input_ in linkage.inputs}
-    kinds = {link.name: link.kind for link in linkage.links if link.name not in inputs}
-    if len(inputs) > 1 or not kinds:
-        return {}
-    turning = np.array([kind != 'prismatic' for kind in kinds.values()])
-    ends = linkage.cache.get_or_make(('travels', *reach), lambda: np.array([[extremes(
-        lambda theta, name=name: linkage.joint_angles(theta, [name])[name], *arc, turns)
-        for name, turns in zip(kinds, turning)] for arc in reach]))
-    slack = np.where(turning, SLACK, SLACK * float(linkage.longest))
-    lows, highs = ends[:, :, 0, 0].min(axis=0) - slack, ends[:, :, 1, 0].max(axis=0) + slack
-    return {name: (low, high) for name, turns, low, high in zip(
-        kinds, turning, lows.tolist(), highs.tolist())
-        if not turns or -math.pi < low < high <= math.pi}
 
 
 def assembled(model: Model, density: float = DENSITY) -> Model:
