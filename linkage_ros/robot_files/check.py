@@ -40,8 +40,8 @@ class Imported(NamedTuple):
     """
     A mechanism's name, its parameters and its report.
 
-    Also the joints that move it, its sources or what follows them, the misfit of the file, of the
-    size, and hinges of balls that may stay where they are.
+    Also the joints that move it, its sources or what follows them, and the misfit of the file, of
+    the size.
     """
 
     name: str
@@ -49,7 +49,6 @@ class Imported(NamedTuple):
     reports: List[str]
     driven: Sequence[str]
     slack: float = 0.0
-    still: Sequence[str] = ()
 
 
 def name_beside(others: Sequence[Imported], name: str) -> str:

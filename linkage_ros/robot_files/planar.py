@@ -45,8 +45,6 @@ class Drawing(Dyads):
         1 or -1. Of a ball in the plane it is the hinge that turns.
     gap, lean : float
         The distance that cannot be closed [m], and the inclination of axes [rad].
-    still : list of str
-        Hinges of balls that stay.
     drives : list of Source
         The inputs.
     driven : list of Joint
@@ -105,7 +103,6 @@ class Drawing(Dyads):
         self.frame = at(base[:3, :3].T @ (origin.places[0] - base[:3, 3]), turned)
         seen = np.linalg.inv(base @ self.frame)
         self.joints: List[Joint] = []
-        self.still: List[str] = []
         self.gap = 0.0
         up = hinges[0].axis
         stiff = {body for joint in group.joints for body in joint.bodies
@@ -116,7 +113,6 @@ class Drawing(Dyads):
             pins = [(hinge, sign) for hinge, sign in joint.chain if hinge in loops.pins(joint, up)]
             if pins and not stiff & {*joint.bodies}:
                 (hinge, sign), *_ = pins
-                self.still += [other.name for other, _ in joint.chain if other is not hinge]
                 joint = replace(joint, name=hinge.name, kind=HINGE, position=hinge.position,
                                 axes=(sign * hinge.axis,) * 2)
             first, second = (complex(*(seen @ [*place, 1.0])[:2]) for place in joint.places)
@@ -239,7 +235,7 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
         reports.append(f'Warning: the file is not exact: axes lean by {drawing.lean:.2g} rad, and '
                        f'loops stay open by {drawing.gap:.2g} m; so is what is published.')
     driven = [joint.name for joint in drawing.driven]
-    return check.Imported(name, parameters, reports, driven, slack, drawing.still)
+    return check.Imported(name, parameters, reports, driven, slack)
 
 
 def _sweep(drive: check.Source, limits: Tuple[float, float], settings: scene.InputSettings
