@@ -207,9 +207,7 @@ class Component:
         if not slopes:
             return error, np.zeros(0)
         parents = frames[:, self._parents]
-        turned, twists = parents[..., :3, :3].swapaxes(2, 3), (parents @ self._twists)[..., :3, :]
-        twists[..., :3] = twists[..., :3] @ turned
-        twists[..., 3:] -= twists[..., :3] @ parents[..., :3, 3:]
+        twists = (parents @ self._twists @ np.linalg.inv(parents))[..., :3, :]
         rates = seen.reshape(len(seen), -1, 4) @ twists.reshape(len(seen), -1, 4).swapaxes(1, 2)
         rates = rates.reshape(len(seen), *self._signs.shape, 3) * self._signs[..., None]
         slope = rates.sum(axis=2).swapaxes(2, 3)
