@@ -310,12 +310,6 @@ class Component:
         pose = np.random.default_rng(2).uniform(-0.3, 0.3, len(fixed)) * self.unit
         return len(self.free_ways(pose, fixed))
 
-    def stiffness(self, poses: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-        """Return the product of singular values of the loops in each pose: 0 at a dead point."""
-        slope = self.errors(poses, True)[1][:, :, ~fixed] / self.size
-        count = np.sum(~fixed) - self.nullity(fixed)
-        return np.prod(np.linalg.svd(slope, compute_uv=False)[:, :count], axis=1)
-
     def loose(self, pose: np.ndarray, motors: Sequence[str], least: float = DEAD_POINT
               ) -> Tuple[List[str], np.ndarray]:
         """Return the joints that move while motors do not, and the ways in which they do."""
