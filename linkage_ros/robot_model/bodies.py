@@ -20,10 +20,10 @@ Legs of a walker have their prefix before link and point, and one crank for all 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 import math
-from typing import Any, Dict, Iterable, Iterator, List, Optional, Sequence
+from typing import Any, Dict, Iterable, Iterator, Optional, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -56,30 +56,10 @@ DENSITY = 2700.0
 SLACK = 1e-6
 
 
-@dataclass
-class Model:
-    """
-    Robots below a root link: what all formats are written from.
-
-    Attributes
-    ----------
-    parts : list of Robot
-        That of each mechanism, or that of a file.
-    density : float
-        Of all bodies [kg/m^3], for a simulation.
-
-    """
-
-    name: str
-    root: str
-    parts: List[Robot]
-    density: float = 0.0
-
-
 def robot(mechanisms: Iterable[SceneMechanism], frame_id: str,
-          width: Optional[float] = None) -> Model:
+          width: Optional[float] = None, density: float = 0.0) -> Robot:
     """
-    Return mechanisms as one robot model.
+    Return mechanisms as one robot.
 
     Parameters
     ----------
@@ -89,27 +69,34 @@ def robot(mechanisms: Iterable[SceneMechanism], frame_id: str,
         The root link: the frame of the poses of mechanisms without their own frame.
     width : float, optional
         Thickness of bars [m], with all else in proportion; None: 1/40 of the longest bar.
+    density : float, optional
+        That of a robot for simulators [kg/m^3], with closed loops, masses, gears and motors. All
+        inputs are at their starts, so that loops are closed at the beginning of a simulation.
 
     Raises
     ------
     SceneError
-        If the links would not form a tree, or the longest bar is out of range.
+        If the links would not form a tree, the longest bar is out of range, or a robot for
+        simulators has no pose.
 
     """
-    return merged([Model(mechanism.name, base, [_Tree(mechanism, base, width).robot])
-                   for mechanism in mechanisms for base in [mechanism.frame_id or frame_id]])
+    trees = [(mechanism, _Tree(mechanism, mechanism.frame_id or frame_id, width).robot)
+             for mechanism in mechanisms]
+    made = merged([_started(*tree, density) if density else tree[1] for tree in trees])
+    return replace(made, density=density)
 
 
-def merged(models: Sequence[Model]) -> Model:
+def merged(robots: Sequence[Robot]) -> Robot:
     """
-    Return robot models as one; raise SceneError if they do not form a tree.
+    Return robots of mechanisms as one; raise SceneError if they do not form a tree.
 
     They must have the same root link, or the root of one must be a link of another.
     """
-    parts = [part for model in models for part in model.parts]
-    below = {link: part.base for part in parts for link in part.frames}
-    # From the base of each part the bases below it, up to the last.
-    lines = {part.base: [part.base] for part in parts}
+    links = [(link, robot.root) for robot in robots for link in (
+        *robot.grounds, *(joint.bodies[1] for joint in robot.joints))]
+    below = dict(links)
+    # From each root the roots below it, up to the last.
+    lines = {robot.root: [robot.root] for robot in robots}
     for line in lines.values():
         while len(line) <= len(lines) and line[-1] in below:
             line.append(below[line[-1]])
@@ -117,17 +104,22 @@ def merged(models: Sequence[Model]) -> Model:
     if more or root in below:
         raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
                          f'link of another one of them, not {listed(bases, 120)}')
-    roots = [part.root for part in parts]
-    joints = [joint for part in parts for joint in part.joints]
-    for tag, names in (('link', [root, *roots, *(joint.bodies[1] for joint in joints)]),
-                       ('joint', [*map('{}_fixed'.format, roots),
-                                  *(joint.name for joint in joints)])):
+    made = Robot(root, {root: np.eye(4)}, name='linkages' if len(robots) > 1 else robots[0].name)
+    for robot in sorted(robots, key=lambda robot: len(lines[robot.root])):
+        made.frames.update({link: frame for link, frame in robot.frames.items()
+                            if link != robot.root})
+        made.joints += robot.joints
+        made.driven += robot.driven
+        for key in ('follows', 'pieces', 'meets', 'servos', 'grounds'):
+            getattr(made, key).update(getattr(robot, key))
+    for tag, names in (('link', [root, *(link for link, _ in links)]),
+                       ('joint', [*map('{}_fixed'.format, made.grounds),
+                                  *(joint.name for joint in made.joints)])):
         (name, count), = Counter(names).most_common(1)
         if count > 1:
-            raise SceneError(f'{listed(f"{model.name}.joints" for model in models)} must have '
+            raise SceneError(f'{listed(f"{robot.name}.joints" for robot in robots)} must have '
                              f'other names: the robot model would have two {tag}s {name}')
-    return Model('linkages' if len(models) > 1 else models[0].name, root,
-                 sorted(parts, key=lambda part: len(lines[part.base])))
+    return made
 
 
 def size(mechanism: SceneMechanism) -> float:
@@ -154,8 +146,8 @@ class _Tree:
         self._frames = {GROUND: shapes.ground_frame(mechanism.linkage), **mechanism.linkage.frames}
         self._travels = travels(mechanism)
         ground = self._body('', GROUND)
-        self.robot = Robot(ground, {ground: np.eye(4)}, pieces={ground: []}, base=base,
-                           pose=mechanism.pose, mechanism=mechanism)
+        self.robot = Robot(base, {base: np.eye(4), ground: np.eye(4)}, pieces={ground: []},
+                           grounds={ground: (base, mechanism.pose)}, name=mechanism.name)
         self._shared = mechanism.linkage.links[0] if len(legs) > 1 else None
         if self._shared:
             self._hang('', 1.0, self._shared)
@@ -264,20 +256,9 @@ def travels(mechanism: SceneMechanism) -> Dict[str, Arc]:
     return ends
 
 
-def assembled(model: Model, density: float = DENSITY) -> Model:
-    """
-    Return a robot model for simulators, with closed loops, masses, gears and motors.
-
-    All inputs are at their starts, so that every loop is closed at the beginning of a simulation;
-    raises SceneError if there is no pose.
-    """
-    return replace(model, density=density, parts=[
-        _started(part, density) for part in model.parts])
-
-
-def _started(part: Robot, density: float) -> Robot:
+def _started(mechanism: SceneMechanism, part: Robot, density: float) -> Robot:
     """Return the robot of a mechanism at the start of its inputs, with motors and gears."""
-    mechanism, joints = part.mechanism, part.mechanism.joints
+    joints = mechanism.joints
     assembly, linkage, inputs = mechanism.assembly(), mechanism.linkage, mechanism.inputs
     values = {name: Motion.of(settings).at(0)[0] for name, settings in inputs.items()}
     starts, solution = [*values.values()], assembly.solution((), assembly.joints)
