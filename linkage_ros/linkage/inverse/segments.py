@@ -17,6 +17,7 @@ from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
+from .problem import Candidate
 from ..inputs import Arc, Input
 from ..kinematics import Kinematics
 from ..motion.curves import ascending, CUTS, extremes, refined, sampled, turning_points
@@ -31,18 +32,6 @@ ULPS = 64.0
 JUMP = 0.05
 # More additional samples of an arc are those of a linkage that is singular nearly everywhere.
 MAX_SAMPLES = 10000
-
-
-class Bracket(NamedTuple):
-    """
-    Two values of the first input [rad or m] between which an output has a value once.
-
-    `seed` is an estimate of all inputs. The bracket of a special input has no width.
-    """
-
-    low: float
-    high: float
-    seed: Tuple[float, ...]
 
 
 class Segment(NamedTuple):
@@ -62,12 +51,12 @@ class Segment(NamedTuple):
     value: Any
     sign: float
 
-    def bracket(self, target: float) -> Bracket:
-        """Return the bracket of a value of the range, times the sign."""
+    def candidate(self, target: float) -> Candidate:
+        """Return the candidate of a value of the range, times the sign."""
         i = bisect_right(self.value, target, 1, len(self.value) - 1)
         (low, high), (least, greatest) = self.theta[i - 1:i + 1], self.value[i - 1:i + 1]
         part = (target - least) / (greatest - least) if greatest > least else 0.5
-        return Bracket(low, high, (low + part * (high - low),))
+        return Candidate((low + part * (high - low),), low, high)
 
 
 class Segments:
@@ -125,17 +114,17 @@ class Segments:
 
     # --- candidates ---
 
-    def candidates(self, values: Sequence[float]) -> List[Bracket]:
-        """Return a bracket for each input that has the value."""
-        brackets, period = [], self._period
+    def candidates(self, values: Sequence[float]) -> List[Candidate]:
+        """Return a candidate for each input that has the value."""
+        found, period = [], self._period
         for segment in self._answers:
             low, target = segment.value[0], segment.sign * values[0]
             if period < math.inf and not low <= target < low + period:
                 target += period * math.ceil((low - target) / period)
             while low <= target <= segment.value[-1]:
-                brackets.append(segment.bracket(target))
+                found.append(segment.candidate(target))
                 target += period
-        return brackets
+        return found
 
     def candidate_arrays(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return numbers of brackets of a value, of values (1, m) that have them, and brackets."""
@@ -156,9 +145,9 @@ class Segments:
         return np.concatenate(numbers), np.concatenate(places), np.hstack(brackets)
 
     def follow(self, value: float, residual: float, seed: float
-               ) -> Optional[Tuple[Bracket, Tuple[float]]]:
+               ) -> Optional[Tuple[Candidate, Tuple[float]]]:
         """
-        Return the bracket of a value on the segment of a seed or those that continue it.
+        Return the candidate of a value on the segment of a seed or those that continue it.
 
         The output goes straight there, from `residual` above it; also returned is the input that
         is estimated there, with its whole turns.
@@ -176,8 +165,8 @@ class Segments:
         for _ in range(2 * len(self.all)):
             answers = self._answers[number]
             if answers.value[0] <= target <= answers.value[-1]:
-                bracket = answers.bracket(target)
-                return bracket, (turns + bracket.seed[0],)
+                candidate = answers.candidate(target)
+                return candidate, (turns + candidate.inputs[0],)
             end = -1 if target > answers.value[-1] else 0
             if (beyond := self._beyond(number, end)) is None:
                 break
@@ -233,8 +222,8 @@ class Segments:
         if len(theta) > most:
             return
         self.jumps += theta[jumped].tolist()
-        digit = 4.0 * np.spacing(np.abs(theta).clip(1e-3))
-        around = (theta + digit * np.array([[0.0], [1.0], [-1.0]])).clip(lo, hi)
+        ulps = ULPS * np.spacing(np.abs(theta).clip(1e-3))
+        around = (theta + ulps * np.array([[0.0], [1.0], [-1.0]])).clip(lo, hi)
         value, rate = self._curve(around.ravel()).reshape(2, *around.shape)
         with np.errstate(invalid='ignore'):
             noise = np.abs(self._difference(value[1:] - value[0])).max(axis=0)
