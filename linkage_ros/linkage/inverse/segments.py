@@ -20,7 +20,7 @@ import numpy as np
 from .problem import Candidate
 from ..inputs import Arc, Input
 from ..kinematics import Kinematics
-from ..motion.curves import ascending, CUTS, extremes, refined, sampled, turning_points
+from ..motion.curves import CUTS, extremes, refined, sampled, turning_points
 from ..motion.reach import MAX_ENDS, reach_of
 from ..motion.singularities import Analysis, NEAR
 from ..tolerances import CLOSE, LEAST, ONE, ROUNDING, SINGULAR, TOLERANCE
@@ -75,10 +75,9 @@ class Segments:
         self._size = 1.0 if is_angle else linkage.longest
         self._rounding, self._unit = TOLERANCE * self._size, first.step
         normalized = first.normalized()
-        # Where a dyad is at a dead point, and where it nearly is.
-        near_zeros = analysis.near_zeros()
-        special = normalized.distinct(x.value for x in near_zeros if x.gap <= x.rounding)
-        marks = normalized.distinct(x.value for x in near_zeros if x.gap <= NEAR * x.size)
+        # Where a dyad is at a dead point, or nearly is.
+        marks = normalized.distinct(
+            x.value for x in analysis.near_zeros() if x.gap <= NEAR * x.size)
         self.jumps: List[float] = []
         # Next to an end of the reach there is a pose also when turns are added, and behind gears.
         farthest = math.pi if first.is_part else normalized.high
@@ -90,7 +89,7 @@ class Segments:
                 max(abs(end) + offset, farthest))
 
         arcs = [(inside(low, 1.0), inside(high, -1.0)) for low, high in arcs]
-        runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
+        runs = [run for arc in _cut(arcs, marks) for run in self._runs(*arc)]
         length = sum(hi - lo for lo, hi in arcs)
         if not runs or len(self.jumps) > MAX_ENDS * max(1.0, length / math.tau) \
                 or not self._moves(runs):
@@ -214,9 +213,9 @@ class Segments:
         return gap if self._period == math.inf else gap - self._period * np.round(
             gap / self._period)
 
-    def _runs(self, lo: float, hi: float, marks: Sequence[float]) -> Iterator[Tuple]:
+    def _runs(self, lo: float, hi: float) -> Iterator[Tuple]:
         """Yield samples as inputs, values and rates, cut where the output jumps."""
-        theta = ascending(np.concatenate([sampled(*arc) for arc in _cut([(lo, hi)], marks)]))
+        theta = sampled(lo, hi)
         most = MAX_SAMPLES + 4 * len(theta)
         theta, jumped = self._divided(theta, most)
         if len(theta) > most:
