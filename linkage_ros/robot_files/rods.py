@@ -124,10 +124,10 @@ class Rods:
     def _universal(self, body: str, held: Sequence[Joint]) -> None:
         """Add two hinges of a ball at an end of a rod, if it has some; a third one stays."""
         for ball, other in held, held[::-1]:
-            base, place = ball.other(body), ball.place(body)
-            chain = [hinge for hinge, _ in ball.chain]
+            base, place, chain = ball.other(body), ball.place(body), ball.hinges
             # A third hinge stays, unless the other end needs it.
-            if not 2 <= len(chain) <= 2 + (len(other.hinges) != 2):
+            if not 2 <= len(chain) <= 2 + (len(other.hinges) != 2) or None in [
+                    hinge.position for hinge in chain]:
                 continue
             (first, second), way = (chain if ball.bodies[1] == body else chain[::-1])[:2], (
                 other.place(body) - place)

@@ -270,9 +270,7 @@ def _started(mechanism: SceneMechanism, part: Robot, density: float) -> Robot:
         raise SceneError(f'{keys} must be where {mechanism.name} can be assembled, not at '
                          f'{", ".join(f"{start:g}" for start in starts)}')
     positions = {joints[name].name: joints[name].of(value) for name, value in values.items()}
-    robot = replace(part, pieces={**part.pieces}, meets={**part.meets},
-                    driven=[], servos={}, follows={})
-    robot = posed(robot, {name: positions[name] for name in robot.positions})
+    robot = posed(part, {name: positions[name] for name in part.positions})
     _add_slots(mechanism, robot)
     mass = sum(weight(pieces, density)[0] for pieces in robot.pieces.values() if pieces)
     tips = {link.name: link.tip for link in linkage.links}

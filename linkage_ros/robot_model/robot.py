@@ -138,11 +138,6 @@ class Joint:
         return self.limits or (-math.inf, math.inf)
 
     @property
-    def chain(self) -> Sequence[tuple[Joint, float]]:
-        """Return the hinges of a ball and their signs, if all have positions."""
-        return () if any(hinge.position is None for hinge, _ in self.parts) else self.parts
-
-    @property
     def hinges(self) -> list[Joint]:
         """Return the hinges of a ball that is made of some, else the joint itself."""
         return [hinge for hinge, _ in self.parts] or [self]
