@@ -145,8 +145,7 @@ class _Loops:
             self._ends[drive.source] = max(low, ends[0]), min(high, ends[1])
         self._slack = MISFIT * max(made.slack for made in parts)
         self._allowed = (EXACT + self._slack) * component.size
-        self._pose = component.start
-        self._misfit = component.errors(self._pose)[0]
+        self._misfit = component.errors(component.start)[0]
 
     def report(self) -> str:
         """Return the report; raise Difference as `_walk_to` does, or for another start."""
@@ -209,7 +208,7 @@ class _Loops:
         joints = self._positions(sources)
         fixed = component.is_of([*joints])
         isnan = np.any([np.isnan(values) for values in joints.values()], axis=0)
-        pose, gaps, poses = np.repeat(self._pose, len(targets), axis=0), np.empty(isnan.shape), []
+        pose, gaps, poses = np.repeat(component.start, len(targets), axis=0), np.empty(isnan.shape), []
         for k in range(steps):
             here = {name: np.where(isnan[:, k], component.positions[name], values[:, k])
                     for name, values in joints.items()}
@@ -243,7 +242,7 @@ class _Loops:
         ways.
         """
         component, gap = self._component, float(walk.gaps[path, step])
-        poses = [self._pose, *(pose[[path]] for pose in walk.poses[:step])]
+        poses = [component.start, *(pose[[path]] for pose in walk.poses[:step])]
         if math.isnan(gap) or not component.is_of([*walk.joints]).all():
             motors = {name: walk.joints[name][path, [step]] for name in self._motors}
             fixed = component.is_of([*motors])

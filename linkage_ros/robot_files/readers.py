@@ -15,7 +15,7 @@ from . import sdf, urdf
 from .elements import parse
 from ..cli import RequestError
 from ..optional import needs
-from ..robot_model.robot import posed, Robot
+from ..robot_model.robot import Robot
 from ..robot_model.urdf import write
 
 
@@ -50,12 +50,7 @@ def read(path: str, loops: Optional[str] = None) -> Robot:
 
 def description(path: str, robot: Robot) -> str:
     """Return a robot as robot_state_publisher takes it: its URDF as it is, else its tree."""
-    return Path(path).read_text() if parse(path).tag == 'robot' else write(drawn(robot))
-
-
-def drawn(robot: Robot) -> Robot:
-    """Return a robot as it is written, its joints at zero."""
-    return posed(robot, dict.fromkeys(robot.positions, 0.0))
+    return Path(path).read_text() if parse(path).tag == 'robot' else write(robot)
 
 
 @contextmanager

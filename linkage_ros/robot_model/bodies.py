@@ -183,18 +183,13 @@ class _Tree:
             zero += math.pi
         x, y = self._place(side, link.parent, self._frames[link.parent][link.joint])
         called = self._mechanism.joints[prefix + link.name]
-        # The link's position at a published value of zero.
-        back = -called.sign * called.offset
-        if slides:
-            x, y = x + side * back * math.cos(zero), y + side * back * math.sin(zero)
         travel = self._travels.get(link.name)
         limits = travel and called.travel((side * travel[0], side * travel[1]))
         self.robot.hang(
             self._body(prefix, link.name), self._body(prefix, link.parent),
-            (x, y, 0.0, 0.0, 0.0, zero if slides else zero + back),
-            SLIDE if slides else HINGE,
+            (x, y, 0.0, 0.0, 0.0, zero), SLIDE if slides else HINGE,
             (called.sign * side, 0.0, 0.0) if slides else (0.0, 0.0, called.sign),
-            limits, called.name)
+            limits, called.name, called.offset)
 
     def _pieces(self, side: float, name: str) -> Iterator[Piece]:
         """Yield the bars of a link, and the guides, blocks, barrels and rods on it."""

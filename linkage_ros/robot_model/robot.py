@@ -198,12 +198,13 @@ class Robot:
 
     def hang(self, name: str, parent: str, place: Sequence[float], kind: str = FIXED,
              axis: Sequence[float] = (0.0, 0.0, 1.0),
-             limits: Optional[tuple[float, float]] = None, joint: str = '') -> None:
-        """Add a body on another one, at x, y, z [m], roll, pitch, yaw [rad], by its joint at 0."""
+             limits: Optional[tuple[float, float]] = None, joint: str = '',
+             position: float = 0.0) -> None:
+        """Add a body on another one, at x, y, z [m], roll, pitch, yaw [rad], and its joint."""
         frame = self.frames[name] = self.frames[parent] @ pose(*place)
         self.joints.append(Joint(
             joint or f'{name}_fixed', kind, (parent, name), (frame[:3, 3],) * 2,
-            (frame[:3, :3] @ axis,) * 2, None if kind == FIXED else 0.0, limits, '',
+            (frame[:3, :3] @ axis,) * 2, None if kind == FIXED else position, limits, '',
             (frame[:3, :3],) * 2))
 
     def bodies(self) -> Iterator[Body]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from . import bodies
 from .bodies import add, COLOURS
-from .robot import Body, HINGE, Robot
+from .robot import Body, HINGE, posed, Robot
 from .shapes import Piece
 from ..scene import SceneMechanism
 
@@ -33,7 +33,8 @@ def describe(mechanisms: Iterable[SceneMechanism], frame_id: str) -> str:
 
 
 def write(robot: Robot) -> str:
-    """Return a robot model as URDF."""
+    """Return a robot as URDF, which has it with all joints at zero."""
+    robot = posed(robot, dict.fromkeys(robot.positions, 0.0))
     root = Element('robot', name=robot.name)
     for colour, rgba in COLOURS.items():
         add(add(root, 'material', name=colour), 'color', rgba=rgba)
