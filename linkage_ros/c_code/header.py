@@ -23,7 +23,7 @@ from ..words import listed, plain_text
 
 # Poses of a solution of an inverse or of the near inputs: the first, and LKR_MAX_STEPS of Newton's
 # method.
-POSES = 4
+POSES = 5
 
 
 class Request(NamedTuple):
@@ -125,9 +125,9 @@ def _inverse(mechanism: SceneMechanism, axes: Sequence[Axis], tag: str, number: 
     """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
     n, (what, *_), name = len(axes), mechanism.inputs, mechanism.name
     parameters = f'{number} value, {number} near, {number} *{what}_'
-    arguments = f'&value, &near, {what}_'
+    arguments = f'&value, &near, 0, {what}_'
     if n > 1:
-        what, arguments = 'inputs', 'value, near, inputs'
+        what, arguments = 'inputs', 'value, near, 0, inputs'
         parameters = f'const {number} value[{n}], const {number} near[{n}], {number} inputs[{n}]'
     return (f'/* The {what} for {_with_units(mechanism.linkage, axes)}, nearest to `near`, whole '
             f'turns included.\n   Returns 0, and leaves {what} alone, where there is none. */\n'

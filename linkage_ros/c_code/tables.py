@@ -73,7 +73,8 @@ class Tables:
             'n': len(self.mechanism.scales), 'counts': ', '.join(str(len(axes)) for axes in rows),
             'names': ', '.join(map(self._solutions, sides)),
             'at': '\n'.join(indented(self._at(rows, len(sides[1])))),
-            'axes': row(row((str(each.input), each.ratio, each.shift, 1.0 / each.size, each.turn)
+            'axes': row(row((str(each.input), each.ratio, each.shift, 1.0 / each.size,
+                             each.turn or math.inf)
                             for each in axes) if axes else '{ { 0, 0, 0, 0, 0 } }'
                            for axes in rows),
             'inputs': row(self._inputs(sides, has_sweeps=not tag)),
@@ -111,9 +112,10 @@ class Tables:
         counted = [{each.input for each in axes if each.ratio} for axes in sides]
         for i, settings in enumerate(self.mechanism.inputs.values()):
             input_, sweep = self.linkage.inputs[i], has_sweeps and settings.ends
-            turns = [input_.turn * (input_.wraps and i not in each) for each in counted]
-            yield (self.mechanism.scales[i] * input_.size, *(sweep or (-math.inf, math.inf)),
-                   turns)
+            turns = [input_.turn if input_.wraps and i not in each else math.inf
+                     for each in counted]
+            size = self.mechanism.scales[i] * input_.size
+            yield size, 1.0 / size, *(sweep or (-math.inf, math.inf)), turns
 
     # --- inverses ---
 
@@ -148,7 +150,7 @@ class Tables:
         found = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
         rows = [f'    {code.row([*row[:7], row[7:]])},' for row in found.tolist()]
         given = ', '.join([*(code.literal(each / abs(axis.factor)) for each in (
-            axis.size, axis.turn)), self._value(0, axis)])
+            axis.size, axis.turn or math.inf)), self._value(0, axis)])
         # Where two pieces of a monotone part meet, both have the input.
         return min(len(rows), 2 * len(monotone)), '\n'.join([
             f'/* The inputs of an output, in each of {len(rows)} pieces of the reach. */',
@@ -165,7 +167,7 @@ class Tables:
         modes = self._modes_in_reach(axes[0].output, closed)
         # If an input has a period of several turns, each turn has its own pose.
         turns = [*product(*closed.turns)]
-        blocks = [(', '.join(
+        blocks = [('/* %s */' % ', '.join(
             f'{joint} {"left" if mode.linkage.branches[joint] > 0 else "right"}'
             for joint in closed.branches), {
                 f'q[{k * len(turns) + j}][{i}]': (value + turn) * scale
