@@ -3,7 +3,7 @@
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * It can be assembled in [-3.14159, 3.14159] rad.
- * A call takes at most 15 poses.
+ * A call takes at most 10 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -184,9 +184,6 @@ typedef struct {
 
 /* An actuator or a joint. */
 typedef struct {
-    /* The input of which the position is ratio * input + shift, whole turns included; ratio 0: of none. */
-    int input;
-    lkr_real ratio, shift;
     /* One over the size of the position, and what it may change by without effect, or INFINITY. */
     lkr_real scale, turn;
 } lkr_axis;
@@ -205,8 +202,7 @@ typedef struct {
     int count[2];
     /* The pose at inputs, with rates and loads if wanted; returns 0 if it cannot be assembled. */
     int (*at)(const lkr_real *q, int has_rates, lkr_point *p);
-    /* All inputs that a side's positions may have, NaN where there is none; returns their number. 0
-       where the axes count all inputs. */
+    /* All inputs that a side's positions may have, NaN where there is none; returns their number. */
     int (*solutions[2])(const lkr_real *position, lkr_real (*q)[LKR_MAX_INPUTS]);
     lkr_axis axis[2][LKR_MAX_JOINTS];
     lkr_input input[LKR_MAX_INPUTS];
@@ -434,39 +430,24 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
     const lkr_real *from, int has_rates, lkr_real *q, lkr_point *p)
 {
     const size_t size = (size_t)model->inputs * sizeof *q;
-    lkr_real x[LKR_MAX_SOLUTIONS + 1][LKR_MAX_INPUTS];
+    lkr_real x[LKR_MAX_SOLUTIONS][LKR_MAX_INPUTS];
     lkr_real away[LKR_MAX_SOLUTIONS + 1];
     lkr_real near[LKR_MAX_INPUTS] = { 0 };
+    const int count = model->solutions[side](position, x);
     int i, k;
-    int count = 1;
-    memcpy(near, from, size);
-    /* Without a function for solutions, there is one, of counted inputs. */
-    memcpy(x[0], near, sizeof near);
-    if (model->solutions[side]) {
-        count = model->solutions[side](position, x);
-    }
     for (i = 0; i < model->inputs; i++) {
-        const lkr_axis *axis = &model->axis[side][i];
-        for (k = 0; k < count && axis->ratio != 0; k++) {
-            near[axis->input] = (position[i] - axis->shift) / axis->ratio;
-            x[k][axis->input] = near[axis->input];
-        }
-    }
-    for (i = 0; i < model->inputs; i++) {
-        near[i] = lkr_clamped(near[i], model->input[i].low, model->input[i].high);
+        near[i] = lkr_clamped(from[i], model->input[i].low, model->input[i].high);
     }
     for (k = 0; k < count; k++) {
         away[k] = lkr_bring(model, side, near, x[k]);
     }
-    /* The last: rounding may hide a solution next to the near inputs. */
-    memcpy(x[count], near, sizeof near);
-    away[count] = FLT_MAX;
+    away[count] = INFINITY;
     for (;;) {
         int nearest = count, found;
         for (k = 0; k < count; k++) {
             nearest = away[k] < away[nearest] ? k : nearest;
         }
-        if (!(away[nearest] < INFINITY)) {
+        if (nearest == count) {
             return 0;
         }
         away[nearest] = INFINITY;
@@ -631,7 +612,7 @@ typedef struct {
     float slide_slide;            /* [m] */
 } lever_pose;
 
-/* The pose, and its rates by crank if wanted. Returns 0 if a limit is exceeded. */
+/* The pose, and its rates by crank if wanted. Returns 0 beyond a limit. */
 LKR_FORMULA int lever_formulas(float crank_, int has_rates, lever_pose *p,
     lever_pose *by_crank)
 {
@@ -729,12 +710,21 @@ typedef lkr_side lever_actuators;
 typedef lkr_side lever_joints;
 typedef lkr_memory lever_memory;
 
+/* The inputs, counted. */
+static inline int lever_solutions_angle_crank(const float *position,
+    float (*q)[LKR_MAX_INPUTS])
+{
+    const float x0 = position[0];
+    q[0][0] = x0;
+    return 1;
+}
+
 /* The inputs in each assembly mode of the inverse linkage, NAN where there is none:
      O ground 0.0 0.0
      Q ground 0.0 -0.045
      L crank Q 0.081 up
      A slider O 0.02 Q along L out
-*/
+ */
 static inline int lever_solutions_angle_lever(const float *position,
     float (*q)[LKR_MAX_INPUTS])
 {
@@ -774,9 +764,9 @@ static inline int lever_at(const float *q, int has_rates, lkr_point *p)
 
 /* Tables of the actuators and joints, see lkr_model. */
 static const lkr_model lever_model = {
-    1, { 1, 1 }, lever_at, { 0, lever_solutions_angle_lever },
+    1, { 1, 1 }, lever_at, { lever_solutions_angle_crank, lever_solutions_angle_lever },
     /* The actuators, the joints, the inputs and their starts. */
-    { { { 0, 1.0f, 0.0f, 1.0f, INFINITY } }, { { 0, 0.0f, 0.0f, 1.0f, 6.2831855f } } },
+    { { { 1.0f, INFINITY } }, { { 1.0f, 6.2831855f } } },
     { { 1.0f, 1.0f, -INFINITY, INFINITY, { INFINITY, 6.2831855f } } }, { 0.0f }
 };
 
@@ -797,7 +787,7 @@ static inline int lever_at_angle_lever(const float *q, int has_rates, lkr_point 
 static const lkr_model lever_model_angle_lever = {
     1, { 0, 1 }, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, the inputs and their starts. */
-    { { { 0, 0, 0, 0, 0 } }, { { 0, 0.0f, 0.0f, 1.0f, 6.2831855f } } },
+    { { { 0, 0 } }, { { 1.0f, 6.2831855f } } },
     { { 1.0f, 1.0f, -INFINITY, INFINITY, { 6.2831855f, 6.2831855f } } }, { 0.0f }
 };
 

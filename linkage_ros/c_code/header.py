@@ -21,8 +21,7 @@ from ..linkage import Mechanism
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
-# Poses of a solution of an inverse or of the near inputs: the first, and LKR_MAX_STEPS of Newton's
-# method.
+# Poses of a solution of an inverse: the first, again with rates, and LKR_MAX_STEPS of Newton's method.
 POSES = 5
 
 
@@ -91,7 +90,7 @@ def _values(request: Request, single: bool) -> Dict[str, Any]:
     parts = [tables.text(sides, '', request.passive)]
     for tag, axes in inverses.items():
         parts += [tables.text(([], axes), tag), _inverse(mechanism, axes, tag, code.number)]
-    about = [*_about(mechanism), f'A call takes at most {POSES * (tables.solutions + 1)} poses.']
+    about = [*_about(mechanism), f'A call takes at most {POSES * tables.solutions} poses.']
     whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
     return {
         'about': '\n'.join(f' * {line}' for line in about),

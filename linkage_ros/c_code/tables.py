@@ -12,15 +12,16 @@ from __future__ import annotations
 
 from itertools import product
 import math
-from typing import Dict, Iterator, List, Sequence, Tuple
+from typing import Dict, Iterator, List, Mapping, Sequence, Tuple
 
 import numpy as np
 
 from .axes import Axis, loads, start
-from .code import Code, indented
+from .code import Block, Code, indented
 from .formulas import Formulas
 from .names import comment, distinct, filled, template
 from .series import series
+from ..formula.expression import argument, Real
 from ..formula.program import Program
 from ..linkage import InverseLinkage, Mode
 from ..scene import SceneMechanism
@@ -73,9 +74,8 @@ class Tables:
             'n': len(self.mechanism.scales), 'counts': ', '.join(str(len(axes)) for axes in rows),
             'names': ', '.join(map(self._solutions, sides)),
             'at': '\n'.join(indented(self._at(rows, len(sides[1])))),
-            'axes': row(row((str(each.input), each.ratio, each.shift, 1.0 / each.size,
-                             each.turn or math.inf)
-                            for each in axes) if axes else '{ { 0, 0, 0, 0, 0 } }'
+            'axes': row(row((1.0 / each.size, each.turn or math.inf)
+                            for each in axes) if axes else '{ { 0, 0 } }'
                            for axes in rows),
             'inputs': row(self._inputs(sides, has_sweeps=not tag)),
             'start': row(start(self.mechanism))})
@@ -109,7 +109,7 @@ class Tables:
 
     def _inputs(self, sides: Sequence[Sequence[Axis]], has_sweeps: bool) -> Iterator[Tuple]:
         """Yield the rows of the inputs, as `lkr_input` has them."""
-        counted = [{each.input for each in axes if each.ratio} for axes in sides]
+        counted = [{each.input for each in axes} for axes in sides]
         for i, settings in enumerate(self.mechanism.inputs.values()):
             input_, sweep = self.linkage.inputs[i], has_sweeps and settings.ends
             turns = [input_.turn if input_.wraps and i not in each else math.inf
@@ -122,7 +122,7 @@ class Tables:
     def _solutions(self, axes: Sequence[Axis]) -> str:
         """Return the name of the function for all inputs of outputs, and note it; 0: none."""
         outputs = tuple(each.output for each in axes)
-        if all(each.ratio for each in axes):
+        if not axes:
             return '0'
         # Axes of the same outputs may have other signs and offsets.
         key = tuple((each.output, each.factor, each.offset) for each in axes)
@@ -130,9 +130,14 @@ class Tables:
             name = '_'.join([f'{self.mechanism.name}_solutions', *(
                 self._formulas.fields[output] for output in outputs)])
             self._names[key] = name = distinct([*self._names.values(), name])[-1]
-            closed = self.linkage.inverse(outputs).closed
-            count, function = self._closed(name, closed, axes) if closed else self._series(
-                name, *axes)
+            counted = {each.input: (argument(i) - each.shift) / each.ratio
+                       for i, each in enumerate(axes) if each.input is not None}
+            if len(counted) == len(axes):
+                count, function = self._counted(name, axes, counted)
+            elif closed := self.linkage.inverse(outputs).closed:
+                count, function = self._closed(name, axes, counted, closed)
+            else:
+                count, function = self._series(name, *axes)
             self.functions.append(function)
             self.solutions = max(self.solutions, count)
         return self._names[key]
@@ -160,29 +165,42 @@ class Tables:
             *indented(rows), '    };',
             f'    return lkr_series({len(rows)}, piece, {given}, q);', '}'])
 
-    def _closed(self, name: str, closed: InverseLinkage, axes: Sequence[Axis]
-                ) -> Tuple[int, str]:
+    def _counted(self, name: str, axes: Sequence[Axis], counted: Mapping[int, Real]
+                 ) -> Tuple[int, str]:
+        """Return the number of solutions of outputs that count all inputs, and the function."""
+        return 1, self._function(name, axes, 'The inputs, counted.', [('', {
+            f'q[0][{i}]': value * self.mechanism.scales[i] for i, value in counted.items()})], 1)
+
+    def _closed(self, name: str, axes: Sequence[Axis], counted: Mapping[int, Real],
+                closed: InverseLinkage) -> Tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
-        code = self._code
         modes = self._modes_in_reach(axes[0].output, closed)
         # If an input has a period of several turns, each turn has its own pose.
-        turns = [*product(*closed.turns)]
+        turns = [*product(*((0.0,) if i in counted else own
+                            for i, own in enumerate(closed.turns)))]
         blocks = [('/* %s */' % ', '.join(
             f'{joint} {"left" if mode.linkage.branches[joint] > 0 else "right"}'
             for joint in closed.branches), {
-                f'q[{k * len(turns) + j}][{i}]': (value + turn) * scale
+                f'q[{k * len(turns) + j}][{i}]': counted.get(i, value + turn) * scale
                 for j, turned in enumerate(turns)
                 for i, (value, turn, scale) in enumerate(zip(
                     mode.inputs, turned, self.mechanism.scales))})
             for k, mode in enumerate(modes)]
         count = len(modes) * len(turns)
-        lines = '\n'.join(f'     {comment(line)}' for line in closed.lines)
-        return count, code.function(
-            f'/* The inputs in each assembly mode of the inverse linkage, NAN where there is '
-            f'none:\n{lines}\n*/\nstatic inline int {name}(const {code.number} *position,\n'
-            f'    {code.number} (*q)[LKR_MAX_INPUTS])',
-            [self._value(i, each) for i, each in enumerate(axes)],
-            blocks, f'return {count};', closed.arguments)
+        lines = ''.join(f'\n     {comment(line)}' for line in closed.lines)
+        return count, self._function(
+            name, axes, 'The inputs in each assembly mode of the inverse linkage, NAN where there '
+            f'is none:{lines}\n', blocks, count, closed.arguments)
+
+    def _function(self, name: str, axes: Sequence[Axis], about: str, blocks: Sequence[Block],
+                  count: int, replaced: Mapping[Real, Real] = {}) -> str:
+        """Return the function that assigns so many solutions, see `Code.function`."""
+        number = self._code.number
+        return self._code.function(
+            f'/* {about} */\nstatic inline int {name}(const {number} *position,\n'
+            f'    {number} (*q)[LKR_MAX_INPUTS])',
+            [self._value(i, each) for i, each in enumerate(axes)], blocks, f'return {count};',
+            replaced)
 
     def _modes_in_reach(self, output: str, closed: InverseLinkage) -> Sequence[Mode]:
         """Return the assembly modes in which the linkage is anywhere in its reach, if known."""

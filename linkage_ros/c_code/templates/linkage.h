@@ -165,9 +165,6 @@ typedef struct {
 
 /* An actuator or a joint. */
 typedef struct {
-    /* The input of which the position is ratio * input + shift, whole turns included; ratio 0: of none. */
-    int input;
-    lkr_real ratio, shift;
     /* One over the size of the position, and what it may change by without effect, or INFINITY. */
     lkr_real scale, turn;
 } lkr_axis;
@@ -186,8 +183,7 @@ typedef struct {
     int count[2];
     /* The pose at inputs, with rates and loads if wanted; returns 0 if it cannot be assembled. */
     int (*at)(const lkr_real *q, int has_rates, lkr_point *p);
-    /* All inputs that a side's positions may have, NaN where there is none; returns their number. 0
-       where the axes count all inputs. */
+    /* All inputs that a side's positions may have, NaN where there is none; returns their number. */
     int (*solutions[2])(const lkr_real *position, lkr_real (*q)[LKR_MAX_INPUTS]);
     lkr_axis axis[2][LKR_MAX_JOINTS];
     lkr_input input[LKR_MAX_INPUTS];
@@ -415,39 +411,24 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
     const lkr_real *from, int has_rates, lkr_real *q, lkr_point *p)
 {
     const size_t size = (size_t)model->inputs * sizeof *q;
-    lkr_real x[LKR_MAX_SOLUTIONS + 1][LKR_MAX_INPUTS];
+    lkr_real x[LKR_MAX_SOLUTIONS][LKR_MAX_INPUTS];
     lkr_real away[LKR_MAX_SOLUTIONS + 1];
     lkr_real near[LKR_MAX_INPUTS] = { 0 };
+    const int count = model->solutions[side](position, x);
     int i, k;
-    int count = 1;
-    memcpy(near, from, size);
-    /* Without a function for solutions, there is one, of counted inputs. */
-    memcpy(x[0], near, sizeof near);
-    if (model->solutions[side]) {
-        count = model->solutions[side](position, x);
-    }
     for (i = 0; i < model->inputs; i++) {
-        const lkr_axis *axis = &model->axis[side][i];
-        for (k = 0; k < count && axis->ratio != 0; k++) {
-            near[axis->input] = (position[i] - axis->shift) / axis->ratio;
-            x[k][axis->input] = near[axis->input];
-        }
-    }
-    for (i = 0; i < model->inputs; i++) {
-        near[i] = lkr_clamped(near[i], model->input[i].low, model->input[i].high);
+        near[i] = lkr_clamped(from[i], model->input[i].low, model->input[i].high);
     }
     for (k = 0; k < count; k++) {
         away[k] = lkr_bring(model, side, near, x[k]);
     }
-    /* The last: rounding may hide a solution next to the near inputs. */
-    memcpy(x[count], near, sizeof near);
-    away[count] = FLT_MAX;
+    away[count] = INFINITY;
     for (;;) {
         int nearest = count, found;
         for (k = 0; k < count; k++) {
             nearest = away[k] < away[nearest] ? k : nearest;
         }
-        if (!(away[nearest] < INFINITY)) {
+        if (nearest == count) {
             return 0;
         }
         away[nearest] = INFINITY;
