@@ -612,7 +612,7 @@ typedef struct {
     float slide_slide;            /* [m] */
 } lever_pose;
 
-/* The pose, and its rates by crank if wanted. Returns 0 beyond a limit. */
+/* The pose; if wanted, its rates by crank. Returns 0 beyond a limit. */
 LKR_FORMULA int lever_formulas(float crank_, int has_rates, lever_pose *p,
     lever_pose *by_crank)
 {
@@ -710,7 +710,7 @@ typedef lkr_side lever_actuators;
 typedef lkr_side lever_joints;
 typedef lkr_memory lever_memory;
 
-/* The inputs, counted. */
+/* The inputs. */
 static inline int lever_solutions_angle_crank(const float *position,
     float (*q)[LKR_MAX_INPUTS])
 {

@@ -23,8 +23,6 @@ from ..linkage import IN_SINGLE, Mechanism
 _NAMED = re.compile(r'\b[kx]\d+\b')
 # Expressions that are true or false.
 _CONDITIONS = ('less', 'less_equal')
-# A line above values that a function assigns, by their places.
-Block = Tuple[str, Mapping[str, Real]]
 # Longest line of code, and longest formula of a constant in its comment.
 LINE, MAX_FORMULA = 100, 50
 
@@ -83,7 +81,7 @@ class Code:
         return bare(code) if factor == 1.0 else f'{self.literal(factor)} * {code}'
 
     def function(self, head: str, arguments: Sequence[str],
-                 blocks: Sequence[Block], last: str,
+                 blocks: Sequence[Tuple[str, Mapping[str, Real]]], last: str,
                  replaced: Mapping[Real, Real] = {}) -> str:
         """
         Return a C function, from the code of its arguments; see `Program`.

@@ -21,7 +21,8 @@ from ..linkage import Mechanism
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
-# Poses of a solution of an inverse: the first, again with rates, and LKR_MAX_STEPS of Newton's method.
+# Poses of a solution of an inverse: the first, again with its rates, and LKR_MAX_STEPS of Newton's
+# method.
 POSES = 5
 
 

@@ -17,7 +17,7 @@ from typing import Dict, Iterator, List, Mapping, Sequence, Tuple
 import numpy as np
 
 from .axes import Axis, loads, start
-from .code import Block, Code, indented
+from .code import Code, indented
 from .formulas import Formulas
 from .names import comment, distinct, filled, template
 from .series import series
@@ -133,7 +133,7 @@ class Tables:
             counted = {each.input: (argument(i) - each.shift) / each.ratio
                        for i, each in enumerate(axes) if each.input is not None}
             if len(counted) == len(axes):
-                count, function = self._counted(name, axes, counted)
+                count, function = self._function(name, axes, 'The inputs.', [('', counted)])
             elif closed := self.linkage.inverse(outputs).closed:
                 count, function = self._closed(name, axes, counted, closed)
             else:
@@ -165,42 +165,35 @@ class Tables:
             *indented(rows), '    };',
             f'    return lkr_series({len(rows)}, piece, {given}, q);', '}'])
 
-    def _counted(self, name: str, axes: Sequence[Axis], counted: Mapping[int, Real]
-                 ) -> Tuple[int, str]:
-        """Return the number of solutions of outputs that count all inputs, and the function."""
-        return 1, self._function(name, axes, 'The inputs, counted.', [('', {
-            f'q[0][{i}]': value * self.mechanism.scales[i] for i, value in counted.items()})], 1)
-
     def _closed(self, name: str, axes: Sequence[Axis], counted: Mapping[int, Real],
                 closed: InverseLinkage) -> Tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
-        modes = self._modes_in_reach(axes[0].output, closed)
         # If an input has a period of several turns, each turn has its own pose.
         turns = [*product(*((0.0,) if i in counted else own
                             for i, own in enumerate(closed.turns)))]
-        blocks = [('/* %s */' % ', '.join(
+        solutions = [('' if any(turned) else '/* %s */' % ', '.join(
             f'{joint} {"left" if mode.linkage.branches[joint] > 0 else "right"}'
             for joint in closed.branches), {
-                f'q[{k * len(turns) + j}][{i}]': counted.get(i, value + turn) * scale
-                for j, turned in enumerate(turns)
-                for i, (value, turn, scale) in enumerate(zip(
-                    mode.inputs, turned, self.mechanism.scales))})
-            for k, mode in enumerate(modes)]
-        count = len(modes) * len(turns)
+                i: counted.get(i, value + turn)
+                for i, (value, turn) in enumerate(zip(mode.inputs, turned))})
+            for mode in self._modes_in_reach(axes[0].output, closed) for turned in turns]
         lines = ''.join(f'\n     {comment(line)}' for line in closed.lines)
-        return count, self._function(
+        return self._function(
             name, axes, 'The inputs in each assembly mode of the inverse linkage, NAN where there '
-            f'is none:{lines}\n', blocks, count, closed.arguments)
+            f'is none:{lines}\n', solutions, closed.arguments)
 
-    def _function(self, name: str, axes: Sequence[Axis], about: str, blocks: Sequence[Block],
-                  count: int, replaced: Mapping[Real, Real] = {}) -> str:
-        """Return the function that assigns so many solutions, see `Code.function`."""
-        number = self._code.number
-        return self._code.function(
+    def _function(self, name: str, axes: Sequence[Axis], about: str,
+                  solutions: Sequence[Tuple[str, Mapping[int, Real]]],
+                  replaced: Mapping[Real, Real] = {}) -> Tuple[int, str]:
+        """Return the number of solutions, each a line above it and inputs, and the function."""
+        number, scales = self._code.number, self.mechanism.scales
+        return len(solutions), self._code.function(
             f'/* {about} */\nstatic inline int {name}(const {number} *position,\n'
             f'    {number} (*q)[LKR_MAX_INPUTS])',
-            [self._value(i, each) for i, each in enumerate(axes)], blocks, f'return {count};',
-            replaced)
+            [self._value(i, each) for i, each in enumerate(axes)],
+            [(above, {f'q[{k}][{i}]': value * scales[i] for i, value in inputs.items()})
+             for k, (above, inputs) in enumerate(solutions)],
+            f'return {len(solutions)};', replaced)
 
     def _modes_in_reach(self, output: str, closed: InverseLinkage) -> Sequence[Mode]:
         """Return the assembly modes in which the linkage is anywhere in its reach, if known."""
