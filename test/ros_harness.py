@@ -104,11 +104,7 @@ class Graph:
         deadline = time.monotonic() + seconds
         while not (held := predicate()):
             assert time.monotonic() < deadline, 'did not happen in time'
-            try:
-                self.executor.spin_once(timeout_sec=0.005)
-            except InvalidHandle:
-                # Another thread ended a node while this one waited for it.
-                continue
+            self.executor.spin_once(timeout_sec=0.005)
         return held
 
     def log(self):
