@@ -4,6 +4,7 @@
 """What is written of a robot model is read again: read(write(x)) = x in URDF, SDF and MJCF."""
 
 from contextlib import suppress
+from functools import cache
 
 from linkage_ros import scene
 from linkage_ros.robot_files import readers
@@ -119,6 +120,7 @@ def test_a_hand_on_an_arm_comes_back(tmp_path, link, form):
     check_read(prepared(mechanisms, form), form, tmp_path)
 
 
+@cache
 def random_mechanism(seed):
     """Return a random linkage as a mechanism in a random pose, at a start where it has a pose."""
     if not (made := random_linkage(seed)):
