@@ -6,7 +6,6 @@
 import contextlib
 import itertools
 import json
-import math
 from pathlib import Path
 import resource
 import threading
