@@ -50,7 +50,8 @@ class Graph:
         rclpy.init(context=self.context, domain_id=self._domain or self._own.id)
         self.executor = self._executor(context=self.context)
         self._nodes = []
-        self.node = self._add(rclpy.create_node('tester', context=self.context))
+        self.node = self._add(rclpy.create_node(
+            'tester', context=self.context, start_parameter_services=False))
         return self
 
     def __exit__(self, *_):
