@@ -241,20 +241,25 @@ def module(name):
 
 
 class Process:
-    """An executable of this package as users start it, with a parameter file."""
+    """
+    An executable of this package as users start it, with a parameter file.
 
-    def __init__(self, name, parameter_file, *arguments, domain=None, env=None, as_module=False):
+    What a folder has that is `first` is imported before anything else.
+    """
+
+    def __init__(self, name, parameter_file, *arguments, domain=None, first='', as_module=False):
         self._domain = None if domain else Domain()
         self.domain = domain or self._domain.id
         start = ('-m', module(name)) if as_module else (
             '-c', f'from linkage_ros import executables; executables.{name}()')
         # A pipe that nobody reads would hold up who writes more than it holds.
+        path = os.pathsep.join([str(first), os.environ.get('PYTHONPATH', '')])
         with tempfile.NamedTemporaryFile() as file:
             self._printed = open(file.name, encoding='utf-8')
             self._process = subprocess.Popen(
                 [sys.executable, *start, *arguments, '--ros-args',
                  '--params-file', str(parameter_file)], stdout=file, stderr=subprocess.STDOUT,
-                env={**os.environ, **(env or {}), 'ROS_DOMAIN_ID': str(self.domain)})
+                env={**os.environ, 'ROS_DOMAIN_ID': str(self.domain), 'PYTHONPATH': path})
 
     def __enter__(self):
         return self
