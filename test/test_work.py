@@ -8,10 +8,11 @@ import dis
 
 from linkage_ros import mechanisms
 from linkage_ros.nodes.kinematics import Kinematics
+from linkage_ros.nodes.publishers import LATCHED
 from linkage_ros.scene.legs import Assembly
 import pytest
 from sensor_msgs.msg import JointState
-from visualization_msgs.msg import MarkerArray
+from visualization_msgs.msg import Marker, MarkerArray
 
 CRANKS = ['water_drop_crank', 'jansen_crank', 'peaucellier_crank', 'slotted_lever_crank']
 WALKER = {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.leg_pairs': 3}
@@ -74,6 +75,20 @@ def _operations(linkage, *points):
     """Return the sums and products behind some points at a crank angle."""
     return [operation for operation in dis.get_instructions(linkage.function(points))
             if operation.opname.startswith('BINARY')]
+
+
+def test_the_locus_is_sent_once_and_a_late_subscriber_gets_it(graph):
+    node = graph.start(Kinematics)
+    early, other = (graph.listen(Marker, f'{name}/locus', LATCHED)
+                    for name in ('jansen', 'slotted_lever'))
+    turn, heard = graph.crank(CRANKS), graph.listen(MarkerArray, 'jansen/markers')
+    for theta in (0.1, 0.2, 0.3):
+        turn([theta] * 4, heard)
+    late = graph.listen(Marker, 'jansen/locus', LATCHED)
+    graph.until(lambda: late and other)
+    assert graph.set(node, slotted_lever__dimensions__a=81.0).successful
+    graph.until(lambda: len(other) == 2)
+    assert len(early) == len(late) == 1
 
 
 def test_all_legs_of_a_walker_are_solved_in_one_call(graph, work):
