@@ -74,8 +74,8 @@ class Output:
             gap / self.period))
 
     def ulp_changes(self, at):
-        """Return by how much four ulps of an input, or of its size, change the output."""
-        beside = self.at(at + 4.0 * np.spacing(max(abs(at), self.first.size)) * SIDES)
+        """Return by how much 64 ulps of an input, or of its size, change the output."""
+        beside = self.at(at + 64.0 * np.spacing(max(abs(at), self.first.size)) * SIDES)
         return np.nanmax([0.0, *self.away(beside, self.at(at))])
 
     def stands_still(self, at):
@@ -209,19 +209,17 @@ def judge(linkage, name, rng, count=6, others=()):
 
 def _error(output, first, x, value):
     """Return the error of an answer in units of the rule, and the output there."""
-    step = 2.0 * np.spacing(max(abs(x), 1e-3 * first.size))
-    reached, *beside = output.at(np.array([x, x + step, x - step])).tolist()
-    if reached != reached and first.wraps and not first.low <= x <= first.high:
-        # The turns that were added to an end rounded it.
-        reached = max(beside, key=np.isfinite)
     # What an ulp of the input changes, on the side where there is a pose; and what 64 do. An end
     # is the same in all turns.
-    sizes = np.array([abs(x), first.size]), np.array([abs(x), first.size, abs(first.high)])
-    far = [np.nanmax([0.0, *output.away(
-        output.at(x + 64.0 * np.spacing(each.max()) * SIDES), reached)]) for each in sizes]
-    change = max(np.nanmax([0.0, *output.away(beside, reached)]) / 4.0, far[0] / 128.0)
-    return float(output.away(reached, value)) / (2.0 ** -53 * output.size + change), reached, min(
-        1e-6 * output.size, 2.0 * far[1])
+    sizes = np.array([1e-3 * first.size, first.size, max(first.size, abs(first.high))])
+    steps = np.array([2.0, 64.0, 64.0]) * np.spacing(np.maximum(abs(x), sizes))
+    values = output.at(x + np.append(0.0, np.outer(steps, SIDES)))
+    # An end or an extreme that has no pose is judged by the nearest one.
+    reached = next(filter(np.isfinite, values), math.nan)
+    ulp, ulps, end_ulps = np.fmax.reduce(
+        output.away(values[1:], reached).reshape(3, 2), axis=1, initial=0.0)
+    error = output.away(reached, value) / (2.0 ** -53 * output.size + max(ulp / 4.0, ulps / 128.0))
+    return float(error), reached, min(1e-6 * output.size, 2.0 * end_ulps)
 
 
 def judge_several(linkage, names, rng, count=6):

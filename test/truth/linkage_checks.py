@@ -518,7 +518,7 @@ def efforts(subject):
         moved += zip(of, load)
     rates = [mechanism.joint_rates(given, {*dict(moved)}, by)
              for by in range(len(mechanism.inputs))]
-    # The rule says nothing where four ulps of an input change an output by more than 1e-6.
+    # The rule says nothing of arms of nearly no length.
     sure = [by for by, row in enumerate(rates) if (np.abs([*row.values()]) < 1e9).all()]
     found = mechanism.effort(given, loads)[sure]
     wanted = [-sum(rates[by][output] * load for output, load in moved) for by in sure]

@@ -58,7 +58,7 @@ class Grid:
             others = tuple(held[by] for by in range(1, problem.n))
             for bracket in segments_of(problem.linkage, problem.outputs[place],
                                        others).candidates(values[place:place + 1]):
-                yield bracket._replace(place=place, others=others)
+                yield bracket._replace(seed=bracket.seed + others)
         else:
             solutions = self._descended(self._starts(held, values), values)
             yield from solutions

@@ -14,7 +14,7 @@ stays inside it.
 from __future__ import annotations
 
 import math
-from typing import Callable, List, Optional, Sequence, Tuple, Union
+from typing import Callable, Iterator, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -23,9 +23,9 @@ from .segments import Bracket
 from ..motion.curves import HALVINGS
 from ..tolerances import ONE, SINGULAR
 
-# Beside a candidate without a pose one is looked for so many times, each time 16 times as far as
-# before from two ulps on: where the margin is 1e-6, rounding of the outputs leads as far out.
-OUTSIDE = 6
+# Beside a candidate without a pose or rates these are looked for so many times, each time 4 times as
+# far as before from an ulp on: where the margin is 1e-6, rounding of the outputs leads as far out.
+BESIDE = 12
 
 
 def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Bracket, Row],
@@ -35,20 +35,21 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
 
     A larger error than `far` [sizes] is that of another assembly mode.
     """
-    if isinstance(candidate, Bracket):
-        return _refine_inside(problem, values, candidate)
-    n, inputs, at = problem.n, candidate, problem.newton.at
+    n, at, is_one = problem.n, problem.newton.at, isinstance(candidate, Bracket)
+    low, high, inputs = candidate if is_one else (-math.inf, math.inf, candidate)
     best = at(*inputs, *values)
+    beside = inputs, best
+    if not _is_known(best, n):
+        beside = next(((x, pose) for x in _beside(inputs)
+                       if _is_known(pose := at(*x, *values), n)), beside)
     if not best[0] < math.inf:
         # Rounding of the outputs may have led out of the reach.
-        around = ((*inputs[:by], inputs[by] + side * 16.0 ** k * math.ulp(inputs[by]),
-                   *inputs[by + 1:])
-                  for k in range(OUTSIDE) for side in (2.0, -2.0) for by in range(n))
-        inputs = next((x for x in around if at(*x, *values)[0] < math.inf), inputs)
-        best = at(*inputs, *values)
+        inputs, best = beside
     following = best[2 + n:2 + 2 * n]
     for _ in range(HALVINGS):
-        if following == inputs or not best[0] <= far:
+        if is_one and not low <= following[0] <= high:
+            following = (0.5 * (low + high), *inputs[1:])
+        if following == inputs or not (is_one or best[0] <= far):
             break
         trial = at(*following, *values)
         if trial[0] < best[0]:
@@ -58,38 +59,23 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
         else:
             # Next to an extreme a whole step leads too far.
             following = tuple([0.5 * (x + y) for x, y in zip(following, inputs)])
-    return best[2 + 2 * n:] if best[1] <= ACCEPTED else None
-
-
-def _refine_inside(problem: InverseProblem, values: Sequence[float], bracket: Bracket
-                   ) -> Optional[Row]:
-    """Return the solution in a bracket, which Newton's method does not leave; None if none."""
-    low, high, x, sign, place, others = bracket
-    n, at, ulp = problem.n, problem.newton.at, math.ulp(values[place]) / problem.scales[place]
-    best, best_x = (math.inf, math.inf), x
-    for _ in range(HALVINGS):
-        trial = at(x, *others, *values)
-        if trial[0] < best[0]:
-            best, best_x = trial, x
-        elif best[1] <= ACCEPTED:
-            break
-        error, following = trial[2 + place], trial[2 + n]
-        if following == x or trial[0] <= ulp:
-            break
-        low, high = (x, high) if error * sign < 0.0 else (low, x)
-        x = following if low < following < high else 0.5 * (low + high)
-        if x in (low, high):
-            break
     # At a jump or in noise both sides enclose values that the output never has.
-    if not best[0] <= SINGULAR:
+    if not (best[0] <= SINGULAR if is_one else best[1] <= ACCEPTED):
         return None
-    inputs, rates = best[2 + 2 * n:2 + 3 * n], best[2 + 3 * n:]
-    if not math.isfinite(rates[place]):
-        # At an end of a segment, rates are those of the nearest float that has them.
-        around = (at(best_x + side * 2.0 ** k * math.ulp(best_x), *others, *values)[2 + 3 * n:]
-                  for k in range(HALVINGS // 2) for side in (1, -1))
-        rates = next((each for each in around if math.isfinite(each[place])), rates)
-    return *inputs, *rates
+    # At an end of a segment, rates are those of the nearest float that has them.
+    rates = (best if _is_known(best, n) else beside[1])[2 + 3 * n:]
+    return *best[2 + 2 * n:2 + 3 * n], *rates
+
+
+def _is_known(step: Row, n: int) -> bool:
+    """Return whether a step begins at a pose that has rates."""
+    return math.isfinite(sum(step[2 + 3 * n:], step[0]))
+
+
+def _beside(inputs: Row) -> Iterator[Row]:
+    """Yield other inputs, each time farther away."""
+    return ((*inputs[:by], inputs[by] + side * 4.0 ** k * math.ulp(inputs[by]), *inputs[by + 1:])
+            for k in range(BESIDE) for side in (1.0, -1.0) for by in range(len(inputs)))
 
 
 def _are_one(problem: InverseProblem, solution: Row, other: Row) -> bool:

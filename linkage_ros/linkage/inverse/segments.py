@@ -37,16 +37,12 @@ class Bracket(NamedTuple):
     """
     Two values of the first input [rad or m] between which an output has a value once.
 
-    `seed` is an estimate, `sign` that of the output's rate, `place` the output's number, and
-    `others` are the values of the other inputs. The bracket of a special input has no width.
+    `seed` is an estimate of all inputs. The bracket of a special input has no width.
     """
 
     low: float
     high: float
-    seed: float
-    sign: float
-    place: int = 0
-    others: Tuple[float, ...] = ()
+    seed: Tuple[float, ...]
 
 
 class Segment(NamedTuple):
@@ -71,7 +67,7 @@ class Segment(NamedTuple):
         i = bisect_right(self.value, target, 1, len(self.value) - 1)
         (low, high), (least, greatest) = self.theta[i - 1:i + 1], self.value[i - 1:i + 1]
         part = (target - least) / (greatest - least) if greatest > least else 0.5
-        return Bracket(low, high, low + part * (high - low), self.sign)
+        return Bracket(low, high, (low + part * (high - low),))
 
 
 class Segments:
@@ -181,7 +177,7 @@ class Segments:
             answers = self._answers[number]
             if answers.value[0] <= target <= answers.value[-1]:
                 bracket = answers.bracket(target)
-                return bracket, (turns + bracket.seed,)
+                return bracket, (turns + bracket.seed[0],)
             end = -1 if target > answers.value[-1] else 0
             if (beyond := self._beyond(number, end)) is None:
                 break
@@ -240,15 +236,12 @@ class Segments:
         digit = 4.0 * np.spacing(np.abs(theta).clip(1e-3))
         around = (theta + digit * np.array([[0.0], [1.0], [-1.0]])).clip(lo, hi)
         value, rate = self._curve(around.ravel()).reshape(2, *around.shape)
-        with np.errstate(all='ignore'):
-            # The change over an ulp of the input that the rate does not explain is rounding.
-            noise = np.abs(self._difference(value[1:] - value[0])
-                           - rate[0] * (around[1:] - theta)).max(axis=0)
-        noise[~np.isfinite(noise)] = 0.0
+        with np.errstate(invalid='ignore'):
+            noise = np.abs(self._difference(value[1:] - value[0])).max(axis=0)
         known = np.isfinite(value[0])
         cuts = sorted({*np.flatnonzero(~known).tolist(), *(jumped + 1).tolist()})
         for run in np.split(np.arange(len(theta)), cuts):
-            clear = np.flatnonzero((known & (noise <= SINGULAR * self._size))[run])
+            clear = np.flatnonzero((known & ~(noise > SINGULAR * self._size))[run])
             if len(clear) > 1 and theta[run[-1]] - theta[run[0]] > ROUNDING:
                 run = run[clear[0]:clear[-1] + 1]
                 yield (theta[run], np.unwrap(value[0, run], period=self._period) if self._period
