@@ -200,6 +200,16 @@ def test_any_name_of_a_joint_can_be_quoted(name):
     assert joints['BC'] == (name, -1.0, 1.0, True, True)
 
 
+def test_only_mechanisms_that_are_given_something_else_are_read_again():
+    given = {'jansen.dimensions.m': 15.0, 'peaucellier.scale': 0.1}
+    before = scene.read(given)
+    after = scene.changed(
+        before, {'jansen.dimensions.m': 14.9, 'peaucellier.scale': 0.1}).mechanisms
+    assert {name for name in after if after[name] is not before.mechanisms[name]} == {'jansen'}
+    assert [p.name for p in scene.changed(before, {'rate': 9.0}).changed_from(before)] == [
+        'rate']
+
+
 def test_a_crank_that_cannot_turn_swings_within_its_reach():
     mechanism = scene.read(CELL).mechanisms['cell']
     (low, high), = mechanism.reach
@@ -327,6 +337,15 @@ def test_the_nodes_that_use_a_parameter_are_those_of_the_page():
         assert each.field.owner == scene.KINEMATICS or scene.KINEMATICS not in each.field.readers
         assert each.field.read_only == (written[key][1] or still), each.name
     assert found == written
+
+
+def test_scenes_of_the_same_values_are_equal_however_they_are_written():
+    few, all_ = scene.read({}), scene.read({'frame_id': 'world', 'jansen.scale': 0.005,
+                                            'jansen.leg_pairs': 1, 'jansen.dimensions.m': 15})
+    for name in few.mechanisms:
+        one, other = few.mechanisms[name], all_.mechanisms[name]
+        assert one == other and repr(one) == repr(other) and 'Parameter(' not in repr(one)
+    assert few.mechanisms['jansen'] != scene.read({'jansen.scale': 0.1}).mechanisms['jansen']
 
 
 @pytest.mark.parametrize('given, reason', [
