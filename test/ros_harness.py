@@ -123,14 +123,19 @@ class Graph:
         self.until(lambda: any(message.msg == end for message in log))
         return log
 
+    def parameters(self, node):
+        """Return a client of a node's parameters."""
+        client = AsyncParameterClient(self.node, node.get_fully_qualified_name())
+        self.until(client.services_are_ready)
+        return client
+
     def set(self, node, meanwhile=lambda: None, **values):
         """
         Set parameters through the node's service; __ stands for a point in a name.
 
         `meanwhile` is called once they are answered, and before what they change is waited for.
         """
-        client = AsyncParameterClient(self.node, node.get_fully_qualified_name())
-        self.until(client.services_are_ready)
+        client = self.parameters(node)
         parameters = [value if isinstance(value, Parameter) else
                       Parameter(name.replace('__', '.'), value=value)
                       for name, value in values.items()]
