@@ -8,7 +8,7 @@ import math
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
-from truth import inverse_judge
+from truth import inverse_judge, linkage_checks
 
 FOUR_BAR_OUTPUTS = 'P.x', 'P.y', 'B.x', 'B.y', 'QB', 'AB'
 EVERYWHERE = np.linspace(-3.1, 3.1, 40)
@@ -118,6 +118,13 @@ def test_of_two_inputs_no_ordinary_solution_is_lost_or_invented(outputs):
     found, _ = inverse_judge.judge_several(
         mechanisms.create('five_bar'), outputs, np.random.default_rng(1), 60)
     assert found['ordinary', 'questions'] > 15 and not counts(found, 'ordinary')
+
+
+def test_with_the_other_inputs_held_a_search_loses_nothing_next_to_an_extreme():
+    (_, linkage, rng), = linkage_checks.assembled([7])
+    assert not linkage.inverse(('K.x', 'drive', 'crank')).closed
+    found, _ = inverse_judge.judge(linkage, 'K.x', rng, others=(2.7, -2.8))
+    assert found['next to ends', 'questions'] and not counts(found, 'ordinary', 'next to ends')
 
 
 def test_another_assembly_mode_leads_to_no_solution():

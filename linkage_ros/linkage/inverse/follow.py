@@ -23,7 +23,7 @@ from typing import Optional, Sequence
 
 import numpy as np
 
-from .problem import InverseProblem, Row
+from .problem import Candidate, InverseProblem, Row
 from .refine import refine
 from .segments import Segments
 from ..motion.curves import HALVINGS
@@ -42,15 +42,15 @@ def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[floa
     if not isinstance(source, Segments):
         side = _side(start[-problem.n ** 2:])
         return _followed(problem, values, residuals, seed, side, HALVINGS) if side else None
-    bracket, estimate = source.follow(values[0], residuals[0], seed[0]) or (None, ())
-    solution = bracket and refine(problem, values, bracket)
+    candidate, estimate = source.follow(values[0], residuals[0], seed[0]) or (None, ())
+    solution = candidate and refine(problem, values, candidate)
     return solution and (*problem.nearest_equivalent(solution, estimate), solution[1])
 
 
 def _followed(problem: InverseProblem, values: Sequence[float], residuals: Sequence[float],
               seed: Sequence[float], side: float, halvings: int) -> Optional[Row]:
     """Return the end of a motion of the outputs from `residuals` above values; None if none."""
-    if solution := refine(problem, values, tuple(seed), FAR):
+    if solution := refine(problem, values, Candidate(tuple(seed)), FAR):
         inputs, rates = problem.nearest_equivalent(solution, seed), solution[problem.n:]
         # A fold is not passed.
         if _side(rates) == side:

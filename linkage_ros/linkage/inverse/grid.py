@@ -13,12 +13,12 @@ Source: Nocedal and Wright, "Numerical Optimization", sec. 11.2.
 from __future__ import annotations
 
 import math
-from typing import Iterator, List, Optional, Sequence, Union
+from typing import Iterator, List, Optional, Sequence
 
 import numpy as np
 
-from .problem import ACCEPTED, InverseProblem, Row
-from .segments import Bracket, segments_of
+from .problem import ACCEPTED, Candidate, InverseProblem, Row
+from .segments import segments_of
 from ..inputs import spread
 from ..motion.curves import HALVINGS
 from ..tolerances import CLOSE, SINGULAR
@@ -50,19 +50,20 @@ class Grid:
         else:
             self._check_independent()
 
-    def candidates(self, values: Sequence[float]) -> Iterator[Union[Bracket, Row]]:
-        """Yield inputs, or brackets of the first, at which the outputs may have some values."""
+    def candidates(self, values: Sequence[float]) -> Iterator[Candidate]:
+        """Yield inputs at which the outputs may have some values."""
         problem, place = self._problem, self._sought
         held = {by: values[row] for by, row in self._held.items()}
         if place is not None:
             others = tuple(held[by] for by in range(1, problem.n))
-            for bracket in segments_of(problem.linkage, problem.outputs[place],
+            for candidate in segments_of(problem.linkage, problem.outputs[place],
                                        others).candidates(values[place:place + 1]):
-                yield bracket._replace(seed=bracket.seed + others)
+                yield candidate._replace(inputs=candidate.inputs + others)
         else:
             solutions = self._descended(self._starts(held, values), values)
-            yield from solutions
-            yield from self._descended(self._across_folds(solutions, values), values)
+            yield from map(Candidate, solutions)
+            yield from map(Candidate, self._descended(
+                self._across_folds(solutions, values), values))
 
     def _solved(self, q: np.ndarray, values: Sequence[float]) -> np.ndarray:
         """Return what a step of Newton's method returns, for rows of inputs."""

@@ -19,7 +19,7 @@ import numpy as np
 
 from .choice import better, ranked
 from .linkage import InverseLinkage
-from .problem import InverseProblem, nearest
+from .problem import Candidate, InverseProblem, nearest
 from ..geometry.spatial import IN_SINGLE
 from ..tolerances import CLOSE
 from ...formula.expression import argument, Real, real, substituted, valid_where
@@ -41,13 +41,13 @@ class Modes:
         self._problem = problem
         self._pose = problem.linkage.bind(Program([*chain(*closed.solutions())], problem.n))
 
-    def candidates(self, values: Sequence[float]) -> Iterator[Tuple[float, ...]]:
+    def candidates(self, values: Sequence[float]) -> Iterator[Candidate]:
         """Yield the inputs of each mode that can be assembled."""
         flat, n = self._pose.at(*values), self._problem.n
         for start in range(0, len(flat), n):
             inputs = flat[start:start + n]
             if math.isfinite(sum(inputs)):
-                yield inputs
+                yield Candidate(inputs)
 
     def candidate_arrays(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return numbers of modes, of values (outputs, m) that they have, and the inputs there."""

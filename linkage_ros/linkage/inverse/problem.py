@@ -13,7 +13,7 @@ from __future__ import annotations
 from functools import cached_property, reduce
 from itertools import combinations
 import math
-from typing import Dict, Sequence, Tuple
+from typing import Dict, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -34,6 +34,19 @@ LONGEST_BAR = '[longest bar]'
 
 # The inputs of a solution, then the rates of all outputs by the first input, by the second etc.
 Row = Tuple[float, ...]
+
+
+class Candidate(NamedTuple):
+    """
+    An estimate of a solution's inputs [rad or m].
+
+    Of one unknown input two others may be known between which an output has its value once, or a
+    special one, with `low` and `high` equal. That it is a solution is then known, too.
+    """
+
+    inputs: Row
+    low: float = -math.inf
+    high: float = math.inf
 
 
 class InverseProblem:

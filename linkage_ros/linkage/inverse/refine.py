@@ -14,29 +14,28 @@ stays inside it.
 from __future__ import annotations
 
 import math
-from typing import Callable, Iterator, List, Optional, Sequence, Tuple, Union
+from typing import Callable, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .problem import ACCEPTED, InverseProblem, Row
-from .segments import Bracket
+from .problem import ACCEPTED, Candidate, InverseProblem, Row
 from ..motion.curves import HALVINGS
 from ..tolerances import ONE, SINGULAR
 
-# Beside a candidate without a pose or rates these are looked for so many times, each time 4 times as
-# far as before from an ulp on: where the margin is 1e-6, rounding of the outputs leads as far out.
-BESIDE = 12
+# Beside a candidate without a pose or rates these are looked for so many times, each time twice as
+# far as before, from an ulp on: where the margin is 1e-6, rounding of the outputs leads as far.
+BESIDE = 22
 
 
-def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Bracket, Row],
+def refine(problem: InverseProblem, values: Sequence[float], candidate: Candidate,
            far: float = SINGULAR) -> Optional[Row]:
     """
     Return the solution at a candidate, its inputs and rates; None if there is none.
 
     A larger error than `far` [sizes] is that of another assembly mode.
     """
-    n, at, is_one = problem.n, problem.newton.at, isinstance(candidate, Bracket)
-    low, high, inputs = candidate if is_one else (-math.inf, math.inf, candidate)
+    n, at, (inputs, low, high) = problem.n, problem.newton.at, candidate
+    is_certain = low > -math.inf
     best = at(*inputs, *values)
     beside = inputs, best
     if not _is_known(best, n):
@@ -47,9 +46,9 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
         inputs, best = beside
     following = best[2 + n:2 + 2 * n]
     for _ in range(HALVINGS):
-        if is_one and not low <= following[0] <= high:
+        if is_certain and not low <= following[0] <= high:
             following = (0.5 * (low + high), *inputs[1:])
-        if following == inputs or not (is_one or best[0] <= far):
+        if following == inputs or not (is_certain or best[0] <= far):
             break
         trial = at(*following, *values)
         if trial[0] < best[0]:
@@ -60,7 +59,7 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Union[Br
             # Next to an extreme a whole step leads too far.
             following = tuple([0.5 * (x + y) for x, y in zip(following, inputs)])
     # At a jump or in noise both sides enclose values that the output never has.
-    if not (best[0] <= SINGULAR if is_one else best[1] <= ACCEPTED):
+    if not (best[0] <= SINGULAR if is_certain else best[1] <= ACCEPTED):
         return None
     # At an end of a segment, rates are those of the nearest float that has them.
     rates = (best if _is_known(best, n) else beside[1])[2 + 3 * n:]
@@ -74,7 +73,7 @@ def _is_known(step: Row, n: int) -> bool:
 
 def _beside(inputs: Row) -> Iterator[Row]:
     """Yield other inputs, each time farther away."""
-    return ((*inputs[:by], inputs[by] + side * 4.0 ** k * math.ulp(inputs[by]), *inputs[by + 1:])
+    return ((*inputs[:by], inputs[by] + side * 2.0 ** k * math.ulp(inputs[by]), *inputs[by + 1:])
             for k in range(BESIDE) for side in (1.0, -1.0) for by in range(len(inputs)))
 
 

@@ -17,9 +17,10 @@ from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
+from .problem import Candidate
 from ..inputs import Arc, Input
 from ..kinematics import Kinematics
-from ..motion.curves import ascending, CUTS, extremes, refined, sampled, turning_points
+from ..motion.curves import CUTS, extremes, refined, sampled, turning_points
 from ..motion.reach import MAX_ENDS, reach_of
 from ..motion.singularities import Analysis, NEAR
 from ..tolerances import CLOSE, LEAST, ONE, ROUNDING, SINGULAR, TOLERANCE
@@ -31,18 +32,6 @@ ULPS = 64.0
 JUMP = 0.05
 # More additional samples of an arc are those of a linkage that is singular nearly everywhere.
 MAX_SAMPLES = 10000
-
-
-class Bracket(NamedTuple):
-    """
-    Two values of the first input [rad or m] between which an output has a value once.
-
-    `seed` is an estimate of all inputs. The bracket of a special input has no width.
-    """
-
-    low: float
-    high: float
-    seed: Tuple[float, ...]
 
 
 class Segment(NamedTuple):
@@ -62,12 +51,12 @@ class Segment(NamedTuple):
     value: Any
     sign: float
 
-    def bracket(self, target: float) -> Bracket:
-        """Return the bracket of a value of the range, times the sign."""
+    def candidate(self, target: float) -> Candidate:
+        """Return the candidate of a value of the range, times the sign."""
         i = bisect_right(self.value, target, 1, len(self.value) - 1)
         (low, high), (least, greatest) = self.theta[i - 1:i + 1], self.value[i - 1:i + 1]
         part = (target - least) / (greatest - least) if greatest > least else 0.5
-        return Bracket(low, high, (low + part * (high - low),))
+        return Candidate((low + part * (high - low),), low, high)
 
 
 class Segments:
@@ -86,10 +75,9 @@ class Segments:
         self._size = 1.0 if is_angle else linkage.longest
         self._rounding, self._unit = TOLERANCE * self._size, first.step
         normalized = first.normalized()
-        # Where a dyad is at a dead point, and where it nearly is.
-        near_zeros = analysis.near_zeros()
-        special = normalized.distinct(x.value for x in near_zeros if x.gap <= x.rounding)
-        marks = normalized.distinct(x.value for x in near_zeros if x.gap <= NEAR * x.size)
+        # Where a dyad is at a dead point, or nearly is.
+        marks = normalized.distinct(
+            x.value for x in analysis.near_zeros() if x.gap <= NEAR * x.size)
         self.jumps: List[float] = []
         # Next to an end of the reach there is a pose also when turns are added, and behind gears.
         farthest = math.pi if first.is_part else normalized.high
@@ -101,7 +89,7 @@ class Segments:
                 max(abs(end) + offset, farthest))
 
         arcs = [(inside(low, 1.0), inside(high, -1.0)) for low, high in arcs]
-        runs = [run for arc in _cut(arcs, special) for run in self._runs(*arc, marks)]
+        runs = [run for arc in _cut(arcs, marks) for run in self._runs(*arc)]
         length = sum(hi - lo for lo, hi in arcs)
         if not runs or len(self.jumps) > MAX_ENDS * max(1.0, length / math.tau) \
                 or not self._moves(runs):
@@ -125,17 +113,17 @@ class Segments:
 
     # --- candidates ---
 
-    def candidates(self, values: Sequence[float]) -> List[Bracket]:
-        """Return a bracket for each input that has the value."""
-        brackets, period = [], self._period
+    def candidates(self, values: Sequence[float]) -> List[Candidate]:
+        """Return a candidate for each input that has the value."""
+        found, period = [], self._period
         for segment in self._answers:
             low, target = segment.value[0], segment.sign * values[0]
             if period < math.inf and not low <= target < low + period:
                 target += period * math.ceil((low - target) / period)
             while low <= target <= segment.value[-1]:
-                brackets.append(segment.bracket(target))
+                found.append(segment.candidate(target))
                 target += period
-        return brackets
+        return found
 
     def candidate_arrays(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return numbers of brackets of a value, of values (1, m) that have them, and brackets."""
@@ -156,9 +144,9 @@ class Segments:
         return np.concatenate(numbers), np.concatenate(places), np.hstack(brackets)
 
     def follow(self, value: float, residual: float, seed: float
-               ) -> Optional[Tuple[Bracket, Tuple[float]]]:
+               ) -> Optional[Tuple[Candidate, Tuple[float]]]:
         """
-        Return the bracket of a value on the segment of a seed or those that continue it.
+        Return the candidate of a value on the segment of a seed or those that continue it.
 
         The output goes straight there, from `residual` above it; also returned is the input that
         is estimated there, with its whole turns.
@@ -176,8 +164,8 @@ class Segments:
         for _ in range(2 * len(self.all)):
             answers = self._answers[number]
             if answers.value[0] <= target <= answers.value[-1]:
-                bracket = answers.bracket(target)
-                return bracket, (turns + bracket.seed[0],)
+                candidate = answers.candidate(target)
+                return candidate, (turns + candidate.inputs[0],)
             end = -1 if target > answers.value[-1] else 0
             if (beyond := self._beyond(number, end)) is None:
                 break
@@ -225,16 +213,16 @@ class Segments:
         return gap if self._period == math.inf else gap - self._period * np.round(
             gap / self._period)
 
-    def _runs(self, lo: float, hi: float, marks: Sequence[float]) -> Iterator[Tuple]:
+    def _runs(self, lo: float, hi: float) -> Iterator[Tuple]:
         """Yield samples as inputs, values and rates, cut where the output jumps."""
-        theta = ascending(np.concatenate([sampled(*arc) for arc in _cut([(lo, hi)], marks)]))
+        theta = sampled(lo, hi)
         most = MAX_SAMPLES + 4 * len(theta)
         theta, jumped = self._divided(theta, most)
         if len(theta) > most:
             return
         self.jumps += theta[jumped].tolist()
-        digit = 4.0 * np.spacing(np.abs(theta).clip(1e-3))
-        around = (theta + digit * np.array([[0.0], [1.0], [-1.0]])).clip(lo, hi)
+        ulps = ULPS * np.spacing(np.abs(theta).clip(1e-3))
+        around = (theta + ulps * np.array([[0.0], [1.0], [-1.0]])).clip(lo, hi)
         value, rate = self._curve(around.ravel()).reshape(2, *around.shape)
         with np.errstate(invalid='ignore'):
             noise = np.abs(self._difference(value[1:] - value[0])).max(axis=0)
