@@ -25,8 +25,8 @@ class Axis(NamedTuple):
 
     `output` is one of the linkage, in its own units. `size` and `turn` are the position's size and
     period; the period is 0 for inputs and geared links, which count turns. If it `wraps`, its
-    position is published within half a turn of zero. `role` is its name in the linkage. If its
-    position counts the input of number `input`, it is ratio * input + shift; else the ratio is 0.
+    position is published within half a turn of zero. `role` is its name in the linkage. If the
+    output counts the input of number `input`, it is ratio * input + shift, all in own units.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Axis(NamedTuple):
     turn: float
     wraps: bool
     role: str
-    input: int
+    input: Optional[int]
     ratio: float
     shift: float
 
@@ -48,14 +48,13 @@ def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float =
     linkage = mechanism.linkage
     is_angle = linkage.is_angle(output)
     factor *= mechanism.scale_of(output)
-    counted, ratio, shift = next((
+    counted, *gear = next((
         (i, *((1.0, 0.0) if output == input_.name else linkage.gear(output, i)))
         for i, input_ in enumerate(linkage.inputs)
-        if output in (input_.name, *linkage.geared_to(i))), (0, 0.0, 0.0))
-    turns = is_angle and not ratio
+        if output in (input_.name, *linkage.geared_to(i))), (None, 1.0, 0.0))
+    turns = is_angle and counted is None
     return Axis(name, output, factor, offset, abs(factor) * (1.0 if is_angle else linkage.longest),
-                abs(factor) * math.tau * turns, wraps and turns, output, counted,
-                factor * ratio / mechanism.scales[counted], factor * shift + offset)
+                abs(factor) * math.tau * turns, wraps and turns, output, counted, *gear)
 
 
 def actuators(mechanism: SceneMechanism) -> List[Axis]:
@@ -119,7 +118,7 @@ def invertible(mechanism: SceneMechanism, axes: List[Axis]) -> List[Axis]:
     """Return axes; raise ValueError if positions of them do not give the inputs for certain."""
     linkage, names = mechanism.linkage, [each.output for each in axes]
     what = f'{listed(names)} of {mechanism.name}'
-    if len({each.input for each in axes if each.ratio}) == len(axes):
+    if len({each.input for each in axes} - {None}) == len(axes):
         return axes
     if any(input_.is_part for input_ in linkage.inputs):
         raise ValueError(f'{what} has no inverse, since it repeats after too many turns')
