@@ -11,10 +11,9 @@ from linkage_ros.robot_files import readers
 from linkage_ros.robot_model import bodies, mjcf, sdf, urdf
 import numpy as np
 import pytest
-from robots import of_text, ROBOTS
+from robots import of_text, ROBOTS, turned
 from scenes import EXAMPLES
 from test_robot_files import random_linkage
-from test_robot_model import turned
 from test_urdf import ARM
 
 FORMATS = {'urdf': urdf.write, 'sdf': sdf.write, 'mjcf': mjcf.write}
