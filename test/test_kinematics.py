@@ -8,6 +8,7 @@ import struct
 from types import SimpleNamespace
 import warnings
 
+from geometry_msgs.msg import Point
 from linkage_ros import mechanisms, palette
 from linkage_ros.nodes import kinematics, log
 from linkage_ros.nodes.kinematics import Kinematics
@@ -16,8 +17,9 @@ import numpy as np
 import pytest
 from rclpy.logging import LoggingSeverity
 from rclpy.serialization import serialize_message
+from robots import in_frame, rotation
 from ros_harness import hastened
-from scenes import example
+from scenes import BOOM, example
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -25,7 +27,6 @@ WALKER = {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.scale': 0.0
           'walker.leg_pairs': 3}
 ANKLE = {name.removeprefix('ankle.'): value for name, value in example('ankle').items()
          if name.startswith('ankle.')}
-LIFT = ['O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C line O B 1.6']
 # A mechanism, where its inputs are, and what is said of it, called {m}.
 UNASSEMBLED = [
     # The right leg is the mirror image of a left one at pi minus the angle.
@@ -40,7 +41,7 @@ UNASSEMBLED = [
      'no place for "D cylinder O Q 1 left"'),
     (ANKLE, [0.3, 0.3], 'no place for "pitch hinge ground at 0 0 0 axis 0 1 0 within -50deg '
      '30deg"'),
-    ({'type': 'custom', 'joints': LIFT, 'scale': 2.0}, [9.0],
+    ({'type': 'custom', 'joints': BOOM, 'scale': 2.0}, [9.0],
      '{m} cannot be assembled at cylinder length 9 m; the reach is [1.12297, 3.27703] m'),
     ({'type': 'four_bar'}, [math.nan], '{m} cannot be assembled: {m}_crank is at nan'),
     # A crank alone, which nothing needs to be assembled with.
@@ -74,9 +75,8 @@ def test_what_cannot_be_assembled_is_said_with_the_reason(graph):
         assert text.endswith(said.format(m=name))
 
 
-BOOM = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
-    'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C line O B 1.6',
-    'D rigid O B 0.6 0.7 left', 'E cylinder D B 0.4 left']}
+ARM = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
+    *BOOM, 'C line O B 1.6', 'D rigid O B 0.6 0.7 left', 'E cylinder D B 0.4 left']}
 # Type, colour, width as a part of the longest bar, and layer above the plane, by the marker's id.
 LOOKS = {
     0: (Marker.LINE_LIST, 'BAR', 40, 0), 1: (Marker.SPHERE_LIST, 'JOINT', 20, 0),
@@ -89,7 +89,7 @@ LOOKS = {
 @pytest.mark.parametrize('name, given, size, ids', [
     ('walker', WALKER, 0.01 * 65.7, {0, 1, 2, 5, 7, 8}),
     ('lever', {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}, 270.0,
-     {0, 1, 2, 3, 4, 5, 8}), ('boom', BOOM, 3.2, {0, 1, 6, 7, 8})])
+     {0, 1, 2, 3, 4, 5, 8}), ('boom', ARM, 3.2, {0, 1, 6, 7, 8})])
 def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, given, size, ids):
     pose = [1.0, -2.0, 3.0, 0.4, -0.3, 2.5]
     node = graph.start(Kinematics, {
@@ -99,9 +99,7 @@ def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, g
     mechanism, = node.scene.mechanisms.values()
     push = graph.crank([drive.source for drive in mechanism.inputs.values()])
     markers = push([0.3] if len(ids) > 5 else [2.0, 1.1], drawn).markers
-    (cr, cp, cy), (sr, sp, sy) = np.cos(pose[3:]), np.sin(pose[3:])
-    # The third column of the rotation about x, then y, then z.
-    up = np.array([cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr])
+    ahead, _, up = rotation(pose[3:]).T
     if 2 in ids:
         markers = [*markers, graph.until(locus.copy)[-1]]
     assert {marker.id for marker in markers} == ids and len(markers) == len(ids)
@@ -110,21 +108,18 @@ def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, g
         if (name, marker.id) == ('walker', 2):
             # Both curves of mirrored legs, as a list of lines.
             type_ = Marker.LINE_LIST
-        p, q, scale, rgba = (marker.pose.position, marker.pose.orientation, marker.scale,
-                             marker.color)
+        p, scale, rgba = marker.pose.position, marker.scale, marker.color
         whole = part in (None, 20)
         width = size / part if part else 1.0
         assert (marker.ns, marker.type, marker.action, marker.header.frame_id) == (
             name, type_, Marker.ADD, 'robot/floor')
-        assert [p.x, p.y, p.z] == pytest.approx(list(pose[:3] + layer * size / 250.0 * up))
+        place = pose[:3] + layer * size / 250.0 * up
+        assert [p.x, p.y, p.z] == pytest.approx(list(place))
+        for point, way in ((Point(x=1.0), ahead), (Point(z=1.0), up)):
+            assert in_frame(marker.pose, point) == pytest.approx(place + way)
         assert [scale.x, scale.y, scale.z] == pytest.approx([width] + [width * whole] * 2)
         assert [rgba.r, rgba.g, rgba.b, rgba.a] == pytest.approx(
             [*palette.rgb(getattr(palette, colour)), 1.0], abs=1e-7)
-        # The first and the third column, of the quaternion.
-        assert 2.0 * np.array([
-            0.5 - q.y ** 2 - q.z ** 2, q.x * q.y + q.w * q.z, q.x * q.z - q.w * q.y,
-            q.x * q.z + q.w * q.y, q.y * q.z - q.w * q.x,
-            0.5 - q.x ** 2 - q.y ** 2]) == pytest.approx([cy * cp, sy * cp, -sp, *up])
         face = palette.rgb(palette.PLATE if marker.id == 7 else getattr(palette, colour))
         assert [pytest.approx([*face, 1.0], abs=1e-7)] * len(marker.colors) == [
             [one.r, one.g, one.b, one.a] for one in marker.colors]

@@ -15,7 +15,7 @@ from linkage_ros.robot_model.cli import main
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
 import numpy as np
 import pytest
-from robots import rotation
+from robots import turned
 from scenes import alone
 from test_simulators import model, simulated, some_quick
 from test_urdf import ARM, in_space, MACHINES, OWN, posed
@@ -25,13 +25,6 @@ QUICK = ('jansen', 'slotted_lever', 'engine with zeros elsewhere', 'five_bar',
 GREY, BLUE, ORANGE = ([round(part / 255, 3) for part in colour] + [1.0] for colour in (
     (0x8a, 0x8a, 0x8a), (0x00, 0x81, 0xc9), (0xc8, 0x78, 0x00)))
 DENSITY, WIDTHS = 1234.5, {'boom and arm': 0.06, 'slotted_lever': 0.01}
-
-
-def turned(x, y, z, *angles):
-    """Return a pose as a matrix: about the fixed axes x, y and z in turn."""
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = rotation(angles), (x, y, z)
-    return made
 
 
 def numbers(text):

@@ -3,7 +3,7 @@
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * It can be assembled in [-3.14159, 3.14159] rad.
- * A call takes at most 12 poses.
+ * A call takes at most 10 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -57,6 +57,8 @@ typedef double lkr_real;
 #define LKR_LEAST LKR_OF(1e-12, 1e-5f)
 /* A command may be so far beyond a sweep: half of all digits, which next to an extreme is rounding. */
 #define LKR_BEYOND LKR_OF(1e-6, 5e-4f)
+/* Rounding of inputs, and of a pose at them. */
+#define LKR_ROUNDING (4 * LKR_OF(DBL_EPSILON, FLT_EPSILON))
 /* A position is reached at ENOUGH; where rounding allows no less, CLOSE times the rate or STEEPEST
    may be left [rad, sizes]. */
 #define LKR_ENOUGH LKR_OF(1e-14, 2e-6f)
@@ -77,6 +79,13 @@ typedef double lkr_real;
 #else
 #define LKR_FORMULA static inline
 #define LKR_PURE static inline
+#endif
+
+/* A struct of zeros. */
+#ifdef __cplusplus
+#define LKR_ZERO { }
+#else
+#define LKR_ZERO { 0 }
 #endif
 
 /* Series stay in the flash memory of an AVR, which has another address space than its RAM. */
@@ -102,16 +111,16 @@ static inline lkr_real lkr_clamped(lkr_real x, lkr_real low, lkr_real high)
     return x > high ? high : lkr_max(x, low);
 }
 
-/* The whole turns nearest to x, if there are turns; a compiler divides where it compiles. */
+/* The whole turns nearest to x. */
 LKR_FORMULA lkr_real lkr_turns(lkr_real x, lkr_real turn)
 {
-    if (!(turn > 0) || LKR_MATH(fabs)(x) <= turn / 2) {
+    if (LKR_MATH(fabs)(x) <= turn / 2) {
         return 0;
     }
-    return turn * LKR_MATH(floor)(x * (1 / turn) + (lkr_real)0.5);
+    return turn * LKR_MATH(floor)(x / turn + (lkr_real)0.5);
 }
 
-/* x within half a turn of 0, if there are turns. */
+/* x within half a turn of 0. */
 LKR_FORMULA lkr_real lkr_wrapped(lkr_real x, lkr_real turn)
 {
     return x - lkr_turns(x, turn);
@@ -175,17 +184,14 @@ typedef struct {
 
 /* An actuator or a joint. */
 typedef struct {
-    /* The input of which the position is ratio * input + shift, whole turns included; ratio 0: of none. */
-    int input;
-    lkr_real ratio, shift;
-    /* One over the size of the position, and what it may change by without effect, or 0. */
+    /* One over the size of the position, and what it may change by without effect, or INFINITY. */
     lkr_real scale, turn;
 } lkr_axis;
 
-/* An input: its size and its sweep. */
+/* An input: its size and one over it, its sweep. */
 typedef struct {
-    lkr_real size, low, high;
-    /* After how much of it the actuators or the joints repeat, or 0. */
+    lkr_real size, scale, low, high;
+    /* After how much of it the actuators or the joints repeat, or INFINITY. */
     lkr_real turn[2];
 } lkr_input;
 
@@ -194,10 +200,9 @@ typedef struct {
     int inputs;
     /* The number of actuators, as many as inputs, and of joints: first as many that are commanded. */
     int count[2];
-    /* The pose at inputs; returns 0 if it cannot be assembled. */
-    int (*at)(const lkr_real *q, lkr_point *p);
-    /* All inputs that a side's positions may have, NaN where there is none; returns their number. 0
-       where the axes count all inputs. */
+    /* The pose at inputs, with rates and loads if wanted; returns 0 if it cannot be assembled. */
+    int (*at)(const lkr_real *q, int has_rates, lkr_point *p);
+    /* All inputs that a side's positions may have, NaN where there is none; returns their number. */
     int (*solutions[2])(const lkr_real *position, lkr_real (*q)[LKR_MAX_INPUTS]);
     lkr_axis axis[2][LKR_MAX_JOINTS];
     lkr_input input[LKR_MAX_INPUTS];
@@ -319,9 +324,21 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
     return solutions;
 }
 
-/* From inputs q to those of positions next to them, and their pose; returns 0 if there are none. */
-static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position, lkr_real *q,
-    lkr_point *p)
+/* How far rounding of inputs may move positions, in sizes. */
+static inline lkr_real lkr_rounding(const lkr_model *model, const lkr_real *q)
+{
+    lkr_real most = 0;
+    int i;
+    for (i = 0; i < model->inputs; i++) {
+        most = lkr_max(most, LKR_MATH(fabs)(q[i]) * model->input[i].scale);
+    }
+    return LKR_ROUNDING * most;
+}
+
+/* From inputs q to those of positions next to them, and their pose, see lkr_model.at; returns 0 if
+   there are none, 1 if they are q, else 2. */
+static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position,
+    int has_rates, lkr_real *q, lkr_point *p)
 {
     lkr_real gap[LKR_MAX_INPUTS] = { 0 };
     lkr_real x[LKR_MAX_INPUTS];
@@ -332,16 +349,17 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
     for (step = 0; step <= LKR_MAX_STEPS; step++) {
         lkr_point next;
         const lkr_real now =
-            model->at(x, &next) ? lkr_gap(model, side, position, &next, gap) : INFINITY;
+            model->at(x, has_rates, &next) ? lkr_gap(model, side, position, &next, gap) : INFINITY;
         if (!(now < left)) {
             break;
         }
         left = now;
         *p = next;
         memcpy(q, x, sizeof x);
-        if (left <= LKR_ENOUGH) {
-            return 1;
+        if (left <= LKR_ENOUGH || left <= lkr_rounding(model, q)) {
+            return step ? 2 : 1;
         }
+        has_rates = has_rates || model->at(q, 1, p);
         memcpy(x, gap, sizeof x);
         if (!lkr_solve(model, side, p, 0, LKR_LEAST, x)) {
             break;
@@ -363,92 +381,78 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
                 * lkr_max(model->input[j].size, LKR_MATH(fabs)(q[j])));
         }
     }
-    return left <= LKR_CLOSE * steepest;
+    return left <= LKR_CLOSE * steepest ? 2 : 0;
 }
 
-/* From inputs x to those whole turns from them that are nearest to near ones and the sweeps; returns
-   how far they are from near ones, INFINITY if not allowed. A command has to be in the sweeps, up to
-   rounding. What is measured may be outside, which counts ten times more. */
+/* How far x is beyond the sweep. */
+static inline lkr_real lkr_beyond(const lkr_input *input, lkr_real x)
+{
+    return LKR_MATH(fabs)(x - lkr_clamped(x, input->low, input->high));
+}
+
+/* Turn inputs to where they are nearest to near ones and the sweeps; returns how far they are from
+   near ones, INFINITY or NAN if not allowed. A command has to be in the sweeps, up to rounding. What
+   is measured may be outside, which counts ten times more. */
 static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_real *near,
-    const lkr_real *x, lkr_real *q)
+    lkr_real *q)
 {
     lkr_real away = 0;
     int i;
     for (i = 0; i < model->inputs; i++) {
         const lkr_input *input = &model->input[i];
-        const lkr_real turn = input->turn[side];
-        const lkr_real slack = LKR_BEYOND * input->size + LKR_CLOSE * LKR_MATH(fabs)(near[i]);
-        const lkr_real low = input->low - slack, high = input->high + slack;
-        lkr_real inside, beyond;
-        q[i] = x[i] + lkr_turns(lkr_clamped(near[i], input->low, input->high) - x[i], turn);
-        if (q[i] < low && q[i] + turn <= high) {
-            q[i] += turn;
-        } else if (q[i] > high && q[i] - turn >= low) {
-            q[i] -= turn;
-        }
+        lkr_real inside;
+        q[i] += lkr_turns(near[i] - q[i], input->turn[side]);
         inside = lkr_clamped(q[i], input->low, input->high);
-        beyond = LKR_MATH(fabs)(q[i] - inside);
-        if (side == LKR_JOINTS) {
-            if (beyond > slack) {
-                return INFINITY;
+        if (q[i] != inside) {
+            const lkr_real slack = LKR_BEYOND * input->size;
+            const lkr_real turn = q[i] < inside ? input->turn[side] : -input->turn[side];
+            if (lkr_beyond(input, q[i]) > slack
+                && lkr_beyond(input, q[i] + turn) < lkr_beyond(input, q[i])) {
+                q[i] += turn;
             }
-            q[i] = inside;
+            if (side == LKR_JOINTS) {
+                if (lkr_beyond(input, q[i]) > slack) {
+                    return INFINITY;
+                }
+                q[i] = lkr_clamped(q[i], input->low, input->high);
+            }
+            away += 10 * lkr_beyond(input, q[i]) * input->scale;
         }
-        away += (LKR_MATH(fabs)(q[i] - near[i]) + 10 * beyond) / input->size;
+        away += LKR_MATH(fabs)(q[i] - near[i]) * input->scale;
     }
-    return isfinite(away) ? away : INFINITY;
+    return away;
 }
 
-/* From positions to the inputs q nearest to `from`, and their pose; returns 0, and leaves q alone, if
-   there are none. */
+/* From positions to the inputs q nearest to `from`, and their pose, see lkr_model.at; returns 0, and
+   leaves q alone, if there are none. */
 static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *position,
-    const lkr_real *from, lkr_real *q, lkr_point *p)
+    const lkr_real *from, int has_rates, lkr_real *q, lkr_point *p)
 {
     const size_t size = (size_t)model->inputs * sizeof *q;
-    lkr_real x[LKR_MAX_SOLUTIONS + 1][LKR_MAX_INPUTS];
+    lkr_real x[LKR_MAX_SOLUTIONS][LKR_MAX_INPUTS];
     lkr_real away[LKR_MAX_SOLUTIONS + 1];
-    lkr_real near[LKR_MAX_INPUTS] = { 0 }, found[LKR_MAX_INPUTS];
-    int i, k, s;
-    int count = 1;
-    memcpy(near, from, size);
-    /* Without a function for solutions, there is one, of counted inputs. */
-    memcpy(x[0], near, sizeof near);
-    if (model->solutions[side]) {
-        count = model->solutions[side](position, x);
-    }
+    lkr_real near[LKR_MAX_INPUTS] = { 0 };
+    const int count = model->solutions[side](position, x);
+    int i, k;
     for (i = 0; i < model->inputs; i++) {
-        const lkr_axis *axis = &model->axis[side][i];
-        for (k = 0; k < count && axis->ratio != 0; k++) {
-            near[axis->input] = (position[i] - axis->shift) / axis->ratio;
-            x[k][axis->input] = near[axis->input];
-        }
+        near[i] = lkr_clamped(from[i], model->input[i].low, model->input[i].high);
     }
     for (k = 0; k < count; k++) {
-        away[k] = lkr_bring(model, side, near, x[k], found);
+        away[k] = lkr_bring(model, side, near, x[k]);
     }
-    /* The last: rounding may hide a solution next to the near inputs. */
-    memcpy(x[count], near, sizeof near);
-    away[count] = FLT_MAX;
+    away[count] = INFINITY;
     for (;;) {
-        int nearest = 0;
-        for (k = 1; k <= count; k++) {
+        int nearest = count, found;
+        for (k = 0; k < count; k++) {
             nearest = away[k] < away[nearest] ? k : nearest;
         }
-        if (!(away[nearest] < INFINITY)) {
+        if (nearest == count) {
             return 0;
         }
         away[nearest] = INFINITY;
-        if (lkr_refine(model, side, position, x[nearest], p)
-            && lkr_bring(model, side, near, x[nearest], found) < INFINITY) {
-            /* Positions that count inputs have their turns. */
-            for (s = LKR_ACTUATORS; s <= LKR_JOINTS; s++) {
-                for (i = 0; i < model->count[s]; i++) {
-                    const lkr_axis *axis = &model->axis[s][i];
-                    p->position[s][i] +=
-                        axis->ratio * (found[axis->input] - x[nearest][axis->input]);
-                }
-            }
-            memcpy(q, found, size);
+        found = lkr_refine(model, side, position, has_rates, x[nearest], p);
+        if (found == 1 || (found && lkr_bring(model, side, near, x[nearest]) < INFINITY)) {
+            memcpy(q, x[nearest], size);
             return 1;
         }
     }
@@ -482,22 +486,22 @@ static inline void lkr_copy(int n, const lkr_real *from, lkr_real *to)
 /* Find the pose of positions, and keep it as the newest; returns a status. */
 static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, const lkr_real *position)
 {
-    const int other = 1 - side;
-    lkr_real q[LKR_MAX_INPUTS] = { 0 }, gap[LKR_MAX_INPUTS];
+    lkr_real q[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS];
     lkr_point p = m->point;
     if (!lkr_are_finite(model->inputs, position)) {
         return LKR_NOT_KNOWN;
     }
+    memcpy(q, m->q, sizeof q);
     /* Where it is already it stays, whatever rounding says; but a command has to be in the sweeps. */
     if ((!m->is_known || lkr_gap(model, side, position, &p, gap) > LKR_ENOUGH
-            || lkr_bring(model, side, m->q, m->q, q) != 0)
-        && !lkr_inverse(model, side, position, m->q, q, &p)) {
+            || lkr_bring(model, side, m->q, q) != 0)
+        && !lkr_inverse(model, side, position, m->q, 1, q, &p)) {
         return LKR_OUT_OF_REACH;
     }
     m->is_known = 1;
     m->point = p;
     memcpy(m->q, q, sizeof q);
-    lkr_copy(model->count[other], p.position[other], m->held[other].position);
+    lkr_copy(model->count[1 - side], p.position[1 - side], m->held[1 - side].position);
     return LKR_OK;
 }
 
@@ -607,31 +611,28 @@ typedef struct {
     float slide_slide;            /* [m] */
 } lever_pose;
 
-/* The pose, and its rates by crank. Returns 0 if a limit is exceeded. */
-LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank)
+/* The pose; if wanted, its rates by crank. Returns 0 beyond a limit. */
+LKR_FORMULA int lever_formulas(float crank_, int has_rates, lever_pose *p,
+    lever_pose *by_crank)
 {
     const float length_a = 0.02f;
     const float k2 = -0.045f; /* -b */
-    const float k22 = 0.04f; /* 2.0 * a */
-    const float k26 = 0.025f; /* b - a */
-    const float k27 = 0.000625f; /* (b - a) * (b - a) */
-    const float k30 = 0.0036f; /* (4.0 * b) * a */
-    const float k51 = 0.081f; /* 1.8 * b */
-    const float k73 = 0.000625f;
-    const float k80 = 0.0f;
+    const float k19 = 0.04f; /* 2.0 * a */
+    const float k23 = 0.025f; /* b - a */
+    const float k24 = 0.000625f; /* (b - a) * (b - a) */
+    const float k27 = 0.0036f; /* (4.0 * b) * a */
+    const float k48 = 0.081f; /* 1.8 * b */
+    const float k70 = 0.000625f;
+    const float k77 = 0.0f;
     const float k82 = -0.025f; /* a - b */
     const float k83 = 0.09f; /* 2.0 * b */
     const float x0 = crank_;
     /* O ground 0 0 */
     p->O_x = 0.0f;
     p->O_y = 0.0f;
-    by_crank->O_x = 0.0f;
-    by_crank->O_y = 0.0f;
     /* Q ground 0 -b */
     p->Q_x = 0.0f;
     p->Q_y = k2;
-    by_crank->Q_x = 0.0f;
-    by_crank->Q_y = 0.0f;
     /* A crank O a up */
     const float v6 = 0.5f * x0;
     const float v7 = sinf(v6);
@@ -641,30 +642,41 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
     p->A_x = v13;
     p->A_y = v18;
     p->angle_crank = x0;
+    /* L slot Q A e out max(1.8*b,a+b) */
+    const float v28 = v9 * v9;
+    const float v29 = k27 * v28;
+    const float v30 = k24 + v29;
+    const float v34 = lkr_valid_where(v30, (v28 + 1.0f) - 7.888609e-31f, 0.0f);
+    const float v35 = lkr_valid_where(-((k19 * v7) * v9), v34, 0.0f);
+    const float v39 = lkr_valid_where(k23 + (k19 * v28), v34, 0.0f);
+    const float v42 = sqrtf((v35 * v35) + (v39 * v39));
+    const float v43 = v35 / v42;
+    const float v50 = v39 / v42;
+    const float v78 = lkr_root(k70 + v29, k77);
+    p->L_x = v43 * k48;
+    p->L_y = k2 + (v50 * k48);
+    p->angle_lever = lkr_angle(-v43, v50);
+    p->slide_slide = v78;
+    const float valid = 0.0f;
+    if (!has_rates) {
+        return isfinite(valid);
+    }
+    /* Rates of O ground 0 0 */
+    by_crank->O_x = 0.0f;
+    by_crank->O_y = 0.0f;
+    /* Rates of Q ground 0 -b */
+    by_crank->Q_x = 0.0f;
+    by_crank->Q_y = 0.0f;
+    /* Rates of A crank O a up */
     by_crank->A_x = -v18;
     by_crank->A_y = v13;
     by_crank->angle_crank = lkr_valid_where(1.0f, fabsf(x0), 0.0f);
-    /* L slot Q A e out max(1.8*b,a+b) */
-    const float v31 = v9 * v9;
-    const float v32 = k30 * v31;
-    const float v33 = k27 + v32;
-    const float v37 = lkr_valid_where(v33, (v31 + 1.0f) - 7.888609e-31f, 0.0f);
-    const float v38 = lkr_valid_where(-((k22 * v7) * v9), v37, 0.0f);
-    const float v42 = lkr_valid_where(k26 + (k22 * v31), v37, 0.0f);
-    const float v45 = sqrtf((v38 * v38) + (v42 * v42));
-    const float v46 = v38 / v45;
-    const float v53 = v42 / v45;
-    const float v81 = lkr_root(k73 + v32, k80);
-    const float v88 = ((length_a * (k82 + (k83 * v31))) / v33) + 0.0f;
-    p->L_x = v46 * k51;
-    p->L_y = k2 + (v53 * k51);
-    p->angle_lever = lkr_angle(-v46, v53);
-    p->slide_slide = v81;
-    by_crank->L_x = -((v88 * v53) * k51);
-    by_crank->L_y = (v88 * v46) * k51;
+    /* Rates of L slot Q A e out max(1.8*b,a+b) */
+    const float v88 = ((length_a * (k82 + (k83 * v28))) / v30) + 0.0f;
+    by_crank->L_x = -((v88 * v50) * k48);
+    by_crank->L_y = (v88 * v43) * k48;
     by_crank->angle_lever = v88;
-    by_crank->slide_slide = (-((((v7 * 0.5f) * v9) * 2.0f) * k30)) / (2.0f * v81);
-    const float valid = 0.0f;
+    by_crank->slide_slide = (-((((v7 * 0.5f) * v9) * 2.0f) * k27)) / (2.0f * v78);
     return isfinite(valid);
 }
 
@@ -672,7 +684,7 @@ LKR_FORMULA int lever_formulas(float crank_, lever_pose *p, lever_pose *by_crank
 static inline int lever_solve(float crank_, lever_pose *p)
 {
     lever_pose by_crank;
-    (void)lever_formulas(crank_, p, &by_crank);
+    (void)lever_formulas(crank_, 0, p, &by_crank);
     return isfinite(p->O_x + p->O_y + p->Q_x + p->Q_y + p->A_x + p->A_y + p->L_x + p->L_y +
         p->angle_crank + p->angle_lever + p->slide_slide);
 }
@@ -681,7 +693,7 @@ static inline int lever_solve(float crank_, lever_pose *p)
 static inline void lever_rates(float crank_, lever_pose *by_crank)
 {
     lever_pose p;
-    (void)lever_formulas(crank_, &p, by_crank);
+    (void)lever_formulas(crank_, 1, &p, by_crank);
 }
 
 enum {
@@ -697,12 +709,21 @@ typedef lkr_side lever_actuators;
 typedef lkr_side lever_joints;
 typedef lkr_memory lever_memory;
 
+/* The inputs. */
+static inline int lever_solutions_angle_crank(const float *position,
+    float (*q)[LKR_MAX_INPUTS])
+{
+    const float x0 = position[0];
+    q[0][0] = x0;
+    return 1;
+}
+
 /* The inputs in each assembly mode of the inverse linkage, NAN where there is none:
      O ground 0.0 0.0
      Q ground 0.0 -0.045
      L crank Q 0.081 up
      A slider O 0.02 Q along L out
-*/
+ */
 static inline int lever_solutions_angle_lever(const float *position,
     float (*q)[LKR_MAX_INPUTS])
 {
@@ -725,11 +746,11 @@ static inline int lever_solutions_angle_lever(const float *position,
     return 2;
 }
 
-/* Positions and rates at inputs; 0 if it cannot be assembled. */
-static inline int lever_at(const float *q, lkr_point *p)
+/* Positions, and rates if wanted, else 0, at inputs; returns 0 if it cannot be assembled. */
+static inline int lever_at(const float *q, int has_rates, lkr_point *p)
 {
-    lever_pose s, by_crank;
-    if (!lever_formulas(q[0], &s, &by_crank)) {
+    lever_pose s, by_crank = LKR_ZERO;
+    if (!lever_formulas(q[0], has_rates, &s, &by_crank)) {
         return 0;
     }
     p->position[0][0] = s.angle_crank;
@@ -742,17 +763,17 @@ static inline int lever_at(const float *q, lkr_point *p)
 
 /* Tables of the actuators and joints, see lkr_model. */
 static const lkr_model lever_model = {
-    1, { 1, 1 }, lever_at, { 0, lever_solutions_angle_lever },
+    1, { 1, 1 }, lever_at, { lever_solutions_angle_crank, lever_solutions_angle_lever },
     /* The actuators, the joints, the inputs and their starts. */
-    { { { 0, 1.0f, 0.0f, 1.0f, 0.0f } }, { { 0, 0.0f, 0.0f, 1.0f, 6.2831855f } } },
-    { { 1.0f, -INFINITY, INFINITY, { 0.0f, 6.2831855f } } }, { 0.0f }
+    { { { 1.0f, INFINITY } }, { { 1.0f, 6.2831855f } } },
+    { { 1.0f, 1.0f, -INFINITY, INFINITY, { INFINITY, 6.2831855f } } }, { 0.0f }
 };
 
-/* Positions and rates at inputs; 0 if it cannot be assembled. */
-static inline int lever_at_angle_lever(const float *q, lkr_point *p)
+/* Positions, and rates if wanted, else 0, at inputs; returns 0 if it cannot be assembled. */
+static inline int lever_at_angle_lever(const float *q, int has_rates, lkr_point *p)
 {
-    lever_pose s, by_crank;
-    if (!lever_formulas(q[0], &s, &by_crank)) {
+    lever_pose s, by_crank = LKR_ZERO;
+    if (!lever_formulas(q[0], has_rates, &s, &by_crank)) {
         return 0;
     }
     p->position[1][0] = s.angle_lever;
@@ -765,8 +786,8 @@ static inline int lever_at_angle_lever(const float *q, lkr_point *p)
 static const lkr_model lever_model_angle_lever = {
     1, { 0, 1 }, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, the inputs and their starts. */
-    { { { 0, 0, 0, 0, 0 } }, { { 0, 0.0f, 0.0f, 1.0f, 6.2831855f } } },
-    { { 1.0f, -INFINITY, INFINITY, { 6.2831855f, 6.2831855f } } }, { 0.0f }
+    { { { 0, 0 } }, { { 1.0f, 6.2831855f } } },
+    { { 1.0f, 1.0f, -INFINITY, INFINITY, { 6.2831855f, 6.2831855f } } }, { 0.0f }
 };
 
 /* The crank for lever [rad], nearest to `near`, whole turns included.
@@ -774,7 +795,7 @@ static const lkr_model lever_model_angle_lever = {
 static inline int lever_crank_for_angle_lever(float value, float near, float *crank_)
 {
     lkr_point p;
-    return lkr_inverse(&lever_model_angle_lever, LKR_JOINTS, &value, &near, crank_, &p);
+    return lkr_inverse(&lever_model_angle_lever, LKR_JOINTS, &value, &near, 0, crank_, &p);
 }
 
 /* Initialize the memory; returns 1. */

@@ -3,20 +3,15 @@
 
 """The actuators and the commanded joints of a mechanism, one of each for every input."""
 
+from itertools import permutations
 import math
 from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
-import numpy as np
-
-from ..linkage import GROUND, Link, loaded_links, spread
+from ..linkage import GROUND, Link, loaded_links
 from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion
 from ..words import listed
-
-# Size of a Jacobian below which outputs do not determine the inputs, and the poses in
-# which it is looked at.
-DEPENDENT, SPREAD = 1e-9, 200
 
 
 class Axis(NamedTuple):
@@ -25,8 +20,8 @@ class Axis(NamedTuple):
 
     `output` is one of the linkage, in its own units. `size` and `turn` are the position's size and
     period; the period is 0 for inputs and geared links, which count turns. If it `wraps`, its
-    position is published within half a turn of zero. `role` is its name in the linkage. If its
-    position counts the input of number `input`, it is ratio * input + shift; else the ratio is 0.
+    position is published within half a turn of zero. `role` is its name in the linkage. If the
+    output counts the input of number `input`, it is ratio * input + shift, all in own units.
     """
 
     name: str
@@ -37,7 +32,7 @@ class Axis(NamedTuple):
     turn: float
     wraps: bool
     role: str
-    input: int
+    input: Optional[int]
     ratio: float
     shift: float
 
@@ -48,14 +43,13 @@ def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float =
     linkage = mechanism.linkage
     is_angle = linkage.is_angle(output)
     factor *= mechanism.scale_of(output)
-    counted, ratio, shift = next((
+    counted, *gear = next((
         (i, *((1.0, 0.0) if output == input_.name else linkage.gear(output, i)))
         for i, input_ in enumerate(linkage.inputs)
-        if output in (input_.name, *linkage.geared_to(i))), (0, 0.0, 0.0))
-    turns = is_angle and not ratio
+        if output in (input_.name, *linkage.geared_to(i))), (None, 1.0, 0.0))
+    turns = is_angle and counted is None
     return Axis(name, output, factor, offset, abs(factor) * (1.0 if is_angle else linkage.longest),
-                abs(factor) * math.tau * turns, wraps and turns, output, counted,
-                factor * ratio / mechanism.scales[counted], factor * shift + offset)
+                abs(factor) * math.tau * turns, wraps and turns, output, counted, *gear)
 
 
 def actuators(mechanism: SceneMechanism) -> List[Axis]:
@@ -119,7 +113,7 @@ def invertible(mechanism: SceneMechanism, axes: List[Axis]) -> List[Axis]:
     """Return axes; raise ValueError if positions of them do not give the inputs for certain."""
     linkage, names = mechanism.linkage, [each.output for each in axes]
     what = f'{listed(names)} of {mechanism.name}'
-    if len({each.input for each in axes if each.ratio}) == len(axes):
+    if len({each.input for each in axes} - {None}) == len(axes):
         return axes
     if any(input_.is_part for input_ in linkage.inputs):
         raise ValueError(f'{what} has no inverse, since it repeats after too many turns')
@@ -178,13 +172,7 @@ def _chain(mechanism: SceneMechanism) -> List[str]:
 
 
 def _tell(mechanism: SceneMechanism, outputs: Sequence[str]) -> bool:
-    """Return whether outputs determine the inputs in any of many poses."""
-    linkage = mechanism.linkage
-    rates = np.reshape(linkage.posed((), (), tuple(outputs)).over(*spread(
-        linkage.inputs, SPREAD)), (len(linkage.inputs), len(outputs), -1))
-    if not np.isfinite(rates).all(axis=(0, 1)).any():
-        return True
-    sizes = np.array([1.0 if linkage.is_angle(each) else linkage.longest for each in outputs])
-    units = np.array([each.size for each in linkage.inputs])
-    scaled = np.moveaxis(np.nan_to_num(rates * units[:, None, None] / sizes[:, None]), -1, 0)
-    return len(outputs) in np.linalg.matrix_rank(scaled, DEPENDENT)
+    """Return whether each output may depend on another one of the inputs."""
+    moves = mechanism.linkage.moves
+    return any(all(map(moves, outputs, inputs)) for inputs in permutations(
+        range(len(mechanism.inputs)), len(outputs)))

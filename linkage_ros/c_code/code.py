@@ -86,8 +86,8 @@ class Code:
         """
         Return a C function, from the code of its arguments; see `Program`.
 
-        Each of its `blocks` is a comment and the values that it assigns, by their places. `last`
-        is its last statement. Values take the place of `replaced` expressions.
+        Each of its `blocks` is a line above it and the values that it assigns, by their places.
+        `last` is its last statement. Values take the place of `replaced` expressions.
         """
         results = tolerant(substituted(
             [x for _, assigned in blocks for x in assigned.values()], replaced), self._rounding)
@@ -101,11 +101,11 @@ class Code:
         constants, statements, codes = pose.statements(self._dialect)
         # A value is computed in the first block that needs it.
         numbers, reached, body = pose.variant.listing.outputs, -1, []
-        for about, assigned in blocks:
+        for above, assigned in blocks:
             n = len(assigned)
             reached = max([reached, *numbers[:n]])
             ready = [line for line in statements if int(line[0][1:]) <= reached]
-            body += [f'/* {comment(about)} */'] * bool(about)
+            body += [above] * bool(above)
             body += [f'const {self.number} {name} = {bare(code)};' for name, code in ready]
             body += [f'{place} = {bare(code)};' for place, code in zip(assigned, codes)]
             statements, numbers, codes = statements[len(ready):], numbers[n:], codes[n:]

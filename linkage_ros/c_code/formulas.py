@@ -9,7 +9,7 @@ from itertools import product
 from typing import Dict, Iterator, List, Sequence, Tuple
 
 from .code import Code
-from .names import distinct, field
+from .names import comment, distinct, field
 from ..formula.expression import Real, real, valid_where
 from ..scene import SceneMechanism
 
@@ -46,6 +46,7 @@ class Formulas:
         self._parameters = [f'{name}_' for name in mechanism.inputs]
         self.names = {
             'name': mechanism.name, 'number': code.number, 'by': ', '.join(self.by),
+            'by_zero': ', '.join(f'{by} = LKR_ZERO' for by in self.by),
             'by_places': ', '.join(f'&{by}' for by in self.by),
             'by_pointers': ', '.join(f'{mechanism.name}_pose *{by}' for by in self.by),
             'arguments': ', '.join(self._parameters),
@@ -72,8 +73,7 @@ class Formulas:
 
     def function(self) -> str:
         """Return the function for all fields and their rates."""
-        structure = self._linkage.structure
-        blocks = [(about, self._assigned(outputs)) for about, outputs in self._groups()]
+        structure, groups = self._linkage.structure, [*self._groups()]
         limits = [limit for limit in structure.built.limits if limit.margin.varies]
         if len(self.by) == 1 and self._linkage.inputs[0].is_whole(self._linkage.reach()):
             # It can be assembled at any input, whatever rounding says.
@@ -82,12 +82,16 @@ class Formulas:
         for limit in limits:
             valid = valid_where(valid, limit.margin, limit.tolerance)
         return self._code.function(
-            '/* The pose, and its rates by {inputs_named}. Returns 0 if a limit is exceeded. */\n'
-            'LKR_FORMULA int {name}_formulas({parameters}, {name}_pose *p, {by_pointers})'.format(
-                **self.names),
+            '/* The pose; if wanted, its rates by {inputs_named}. Returns 0 beyond a limit. */\n'
+            'LKR_FORMULA int {name}_formulas({parameters}, int has_rates, {name}_pose *p,\n'
+            '    {by_pointers})'.format(**self.names),
             [self._code.times(each, 1.0 / scale)
              for each, scale in zip(self._parameters, self._mechanism.scales)],
-            [*blocks, ('', {f'const {self._code.number} valid': valid})],
+            [*((f'/* {comment(about)} */', self._positions(outputs)) for about, outputs in groups),
+             ('', {f'const {self._code.number} valid': valid}),
+             ('if (!has_rates) {\n    return isfinite(valid);\n}', {}),
+             *((f'/* Rates of {comment(about)} */', self._rates(outputs))
+               for about, outputs in groups)],
             'return isfinite(valid);')
 
     def _groups(self) -> Iterator[Tuple[str, List[str]]]:
@@ -108,11 +112,15 @@ class Formulas:
             if outputs:
                 yield about, outputs
 
-    def _assigned(self, outputs: Sequence[str]) -> Dict[str, Real]:
-        """Return outputs and their rates by each input, by their places in C."""
-        structure, scale_of = self._linkage.structure, self._mechanism.scale_of
-        values = [*map(structure.output, outputs), *structure.parts(((), (), tuple(outputs)))]
-        units = [1.0, *self._mechanism.scales]
-        return {f'{pose}->{self.fields[output]}': value * (scale_of(output) / unit)
-                for ((pose, unit), output), value in zip(
-                    product(zip(['p', *self.by], units), outputs), values)}
+    def _positions(self, outputs: Sequence[str]) -> Dict[str, Real]:
+        """Return outputs, by their places in C."""
+        structure = self._linkage.structure
+        return {f'p->{self.fields[output]}': structure.output(output) * self._mechanism.scale_of(
+            output) for output in outputs}
+
+    def _rates(self, outputs: Sequence[str]) -> Dict[str, Real]:
+        """Return the rates of outputs by each input, by their places in C."""
+        rates = self._linkage.structure.parts(((), (), tuple(outputs)))
+        return {f'{by}->{self.fields[output]}': rate * (self._mechanism.scale_of(output) / unit)
+                for ((by, unit), output), rate in zip(
+                    product(zip(self.by, self._mechanism.scales), outputs), rates)}

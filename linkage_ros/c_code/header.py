@@ -21,9 +21,9 @@ from ..linkage import Mechanism
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
-# Poses of a solution of an inverse or of the near inputs: the first, and LKR_MAX_STEPS of Newton's
+# Poses of a solution of an inverse: the first, again with its rates, and LKR_MAX_STEPS of Newton's
 # method.
-POSES = 4
+POSES = 5
 
 
 class Request(NamedTuple):
@@ -91,7 +91,7 @@ def _values(request: Request, single: bool) -> Dict[str, Any]:
     parts = [tables.text(sides, '', request.passive)]
     for tag, axes in inverses.items():
         parts += [tables.text(([], axes), tag), _inverse(mechanism, axes, tag, code.number)]
-    about = [*_about(mechanism), f'A call takes at most {POSES * (tables.solutions + 1)} poses.']
+    about = [*_about(mechanism), f'A call takes at most {POSES * tables.solutions} poses.']
     whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
     return {
         'about': '\n'.join(f' * {line}' for line in about),
@@ -125,9 +125,9 @@ def _inverse(mechanism: SceneMechanism, axes: Sequence[Axis], tag: str, number: 
     """Return the users' inverse: from outputs and near inputs, in scene units, to inputs."""
     n, (what, *_), name = len(axes), mechanism.inputs, mechanism.name
     parameters = f'{number} value, {number} near, {number} *{what}_'
-    arguments = f'&value, &near, {what}_'
+    arguments = f'&value, &near, 0, {what}_'
     if n > 1:
-        what, arguments = 'inputs', 'value, near, inputs'
+        what, arguments = 'inputs', 'value, near, 0, inputs'
         parameters = f'const {number} value[{n}], const {number} near[{n}], {number} inputs[{n}]'
     return (f'/* The {what} for {_with_units(mechanism.linkage, axes)}, nearest to `near`, whole '
             f'turns included.\n   Returns 0, and leaves {what} alone, where there is none. */\n'

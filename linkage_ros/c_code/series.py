@@ -8,14 +8,14 @@ import math
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from ..linkage import Mechanism, ROUNDING
+from ..linkage import Mechanism
 
 # Terms of a series in double and in single precision, as in `linkage.h`, and how far it may miss
 # an output [rad, longest bar]: so little that its pose needs no correction.
 TERMS, CLOSE = (20, 8), (4e-15, 1e-7)
-# Where rounding of the poses allows no less, a short piece may miss by more, which Newton's method
-# corrects; the shortest one is next to an end of the reach.
-CORRECTED, SHORT, SHORTEST = 1e-9, 1.0 / 32.0, 1e-5
+# Where an input's last digit changes the output by more, it may miss by so many times that; inputs
+# of a piece that is shorter are next to an end of the reach.
+DIGITS, SHORTEST = 16.0, 1e-5
 # Halvings of a piece that bring an input to its rounding.
 HALVINGS = 60
 # Pieces at most: a curve that needs more is rounding.
@@ -39,8 +39,6 @@ def series(linkage: Mechanism, output: str, parts: np.ndarray, single: bool,
     unit, pose = linkage.inputs[0].size, linkage.posed((), (output,))
     is_angle, terms = linkage.is_angle(output), TERMS[single]
     size = 1.0 if is_angle else linkage.longest
-    # A fast link's angle has the rounding of the input, times its speed.
-    close = max(CLOSE[single], linkage.inputs[0].speed * CLOSE[False])
     nodes = chebyshev.chebpts1(terms)
     # Ever denser towards both ends.
     checked = np.tanh(np.linspace(-18.0, 18.0, 129))
@@ -74,22 +72,22 @@ def series(linkage: Mechanism, output: str, parts: np.ndarray, single: bool,
                              f'and a series of more than {MAX_PIECES} pieces')
         start, cut, end, change = halves[own].T[..., None]
         center, half = roots.mean(axis=1, keepdims=True), 0.5 * np.diff(roots)
+        squares = roots ** 2
+        bounds = np.sort(halved(squares, start, cut, end, change))
         fitted = chebyshev.chebfit(nodes, halved(
             (center + half * nodes) ** 2, start, cut, end, change).T, terms - 1)
         inputs = chebyshev.chebval(checked, fitted).clip(
             np.minimum(start, cut), np.maximum(start, cut))
-        missed = np.abs(passed(inputs, end, change) - (center + half * checked) ** 2).max(
-            axis=1, keepdims=True)
-        enough = np.where(half > SHORT, close, max(close, CORRECTED))
-        # Beside an end of the reach a part may be as short as the rounding of its inputs.
-        is_done = ((missed * np.abs(change) <= enough * size) | (half < SHORTEST)
-                   | (np.abs(cut - start) < ROUNDING))[:, 0]
-        squares = roots ** 2
+        found = passed(inputs, end, change)
+        missed, digit = (np.abs(others - found).max(axis=1, keepdims=True) for others in (
+            (center + half * checked) ** 2, passed(np.nextafter(inputs, cut), end, change)))
+        is_done = ((missed <= np.maximum(CLOSE[single] * size / np.abs(change), DIGITS * digit))
+                   | (np.diff(bounds) < SHORTEST))[:, 0]
         middle = change * squares.mean(axis=1, keepdims=True)
         steepness = 1.0 / (change * half * half)
         pieces = np.hstack([
             end + middle, 0.5 * np.abs(change) * np.diff(squares),
-            unit * scale * np.sort(halved(squares, start, cut, end, change)), steepness,
+            unit * scale * bounds, steepness,
             middle * steepness, center / half, unit * scale * fitted.T.round(17)])
         rows = np.vstack([rows, pieces[is_done]])
         ends = np.insert(roots[~is_done], [1], center[~is_done], axis=1)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from itertools import product
 import math
-from typing import Dict, Iterator, List, Sequence, Tuple
+from typing import Dict, Iterator, List, Mapping, Sequence, Tuple
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from .code import Code, indented
 from .formulas import Formulas
 from .names import comment, distinct, filled, template
 from .series import series
+from ..formula.expression import argument, Real
 from ..formula.program import Program
 from ..linkage import InverseLinkage, Mode
 from ..scene import SceneMechanism
@@ -73,8 +74,8 @@ class Tables:
             'n': len(self.mechanism.scales), 'counts': ', '.join(str(len(axes)) for axes in rows),
             'names': ', '.join(map(self._solutions, sides)),
             'at': '\n'.join(indented(self._at(rows, len(sides[1])))),
-            'axes': row(row((str(each.input), each.ratio, each.shift, 1.0 / each.size, each.turn)
-                            for each in axes) if axes else '{ { 0, 0, 0, 0, 0 } }'
+            'axes': row(row((1.0 / each.size, each.turn or math.inf)
+                            for each in axes) if axes else '{ { 0, 0 } }'
                            for axes in rows),
             'inputs': row(self._inputs(sides, has_sweeps=not tag)),
             'start': row(start(self.mechanism))})
@@ -108,19 +109,20 @@ class Tables:
 
     def _inputs(self, sides: Sequence[Sequence[Axis]], has_sweeps: bool) -> Iterator[Tuple]:
         """Yield the rows of the inputs, as `lkr_input` has them."""
-        counted = [{each.input for each in axes if each.ratio} for axes in sides]
+        counted = [{each.input for each in axes} for axes in sides]
         for i, settings in enumerate(self.mechanism.inputs.values()):
             input_, sweep = self.linkage.inputs[i], has_sweeps and settings.ends
-            turns = [input_.turn * (input_.wraps and i not in each) for each in counted]
-            yield (self.mechanism.scales[i] * input_.size, *(sweep or (-math.inf, math.inf)),
-                   turns)
+            turns = [input_.turn if input_.wraps and i not in each else math.inf
+                     for each in counted]
+            size = self.mechanism.scales[i] * input_.size
+            yield size, 1.0 / size, *(sweep or (-math.inf, math.inf)), turns
 
     # --- inverses ---
 
     def _solutions(self, axes: Sequence[Axis]) -> str:
         """Return the name of the function for all inputs of outputs, and note it; 0: none."""
         outputs = tuple(each.output for each in axes)
-        if all(each.ratio for each in axes):
+        if not axes:
             return '0'
         # Axes of the same outputs may have other signs and offsets.
         key = tuple((each.output, each.factor, each.offset) for each in axes)
@@ -128,9 +130,14 @@ class Tables:
             name = '_'.join([f'{self.mechanism.name}_solutions', *(
                 self._formulas.fields[output] for output in outputs)])
             self._names[key] = name = distinct([*self._names.values(), name])[-1]
-            closed = self.linkage.inverse(outputs).closed
-            count, function = self._closed(name, closed, axes) if closed else self._series(
-                name, *axes)
+            counted = {each.input: (argument(i) - each.shift) / each.ratio
+                       for i, each in enumerate(axes) if each.input is not None}
+            if len(counted) == len(axes):
+                count, function = self._function(name, axes, 'The inputs.', [('', counted)])
+            elif closed := self.linkage.inverse(outputs).closed:
+                count, function = self._closed(name, axes, counted, closed)
+            else:
+                count, function = self._series(name, *axes)
             self.functions.append(function)
             self.solutions = max(self.solutions, count)
         return self._names[key]
@@ -148,7 +155,7 @@ class Tables:
         found = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
         rows = [f'    {code.row([*row[:7], row[7:]])},' for row in found.tolist()]
         given = ', '.join([*(code.literal(each / abs(axis.factor)) for each in (
-            axis.size, axis.turn)), self._value(0, axis)])
+            axis.size, axis.turn or math.inf)), self._value(0, axis)])
         # Where two pieces of a monotone part meet, both have the input.
         return min(len(rows), 2 * len(monotone)), '\n'.join([
             f'/* The inputs of an output, in each of {len(rows)} pieces of the reach. */',
@@ -158,29 +165,35 @@ class Tables:
             *indented(rows), '    };',
             f'    return lkr_series({len(rows)}, piece, {given}, q);', '}'])
 
-    def _closed(self, name: str, closed: InverseLinkage, axes: Sequence[Axis]
-                ) -> Tuple[int, str]:
+    def _closed(self, name: str, axes: Sequence[Axis], counted: Mapping[int, Real],
+                closed: InverseLinkage) -> Tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
-        code = self._code
-        modes = self._modes_in_reach(axes[0].output, closed)
         # If an input has a period of several turns, each turn has its own pose.
-        turns = [*product(*closed.turns)]
-        blocks = [(', '.join(
+        turns = [*product(*((0.0,) if i in counted else own
+                            for i, own in enumerate(closed.turns)))]
+        solutions = [('' if any(turned) else '/* %s */' % ', '.join(
             f'{joint} {"left" if mode.linkage.branches[joint] > 0 else "right"}'
             for joint in closed.branches), {
-                f'q[{k * len(turns) + j}][{i}]': (value + turn) * scale
-                for j, turned in enumerate(turns)
-                for i, (value, turn, scale) in enumerate(zip(
-                    mode.inputs, turned, self.mechanism.scales))})
-            for k, mode in enumerate(modes)]
-        count = len(modes) * len(turns)
-        lines = '\n'.join(f'     {comment(line)}' for line in closed.lines)
-        return count, code.function(
-            f'/* The inputs in each assembly mode of the inverse linkage, NAN where there is '
-            f'none:\n{lines}\n*/\nstatic inline int {name}(const {code.number} *position,\n'
-            f'    {code.number} (*q)[LKR_MAX_INPUTS])',
+                i: counted.get(i, value + turn)
+                for i, (value, turn) in enumerate(zip(mode.inputs, turned))})
+            for mode in self._modes_in_reach(axes[0].output, closed) for turned in turns]
+        lines = ''.join(f'\n     {comment(line)}' for line in closed.lines)
+        return self._function(
+            name, axes, 'The inputs in each assembly mode of the inverse linkage, NAN where there '
+            f'is none:{lines}\n', solutions, closed.arguments)
+
+    def _function(self, name: str, axes: Sequence[Axis], about: str,
+                  solutions: Sequence[Tuple[str, Mapping[int, Real]]],
+                  replaced: Mapping[Real, Real] = {}) -> Tuple[int, str]:
+        """Return the number of solutions, each a line above it and inputs, and the function."""
+        number, scales = self._code.number, self.mechanism.scales
+        return len(solutions), self._code.function(
+            f'/* {about} */\nstatic inline int {name}(const {number} *position,\n'
+            f'    {number} (*q)[LKR_MAX_INPUTS])',
             [self._value(i, each) for i, each in enumerate(axes)],
-            blocks, f'return {count};', closed.arguments)
+            [(above, {f'q[{k}][{i}]': value * scales[i] for i, value in inputs.items()})
+             for k, (above, inputs) in enumerate(solutions)],
+            f'return {len(solutions)};', replaced)
 
     def _modes_in_reach(self, output: str, closed: InverseLinkage) -> Sequence[Mode]:
         """Return the assembly modes in which the linkage is anywhere in its reach, if known."""

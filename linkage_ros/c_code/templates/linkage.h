@@ -38,6 +38,8 @@ typedef double lkr_real;
 #define LKR_LEAST LKR_OF(1e-12, 1e-5f)
 /* A command may be so far beyond a sweep: half of all digits, which next to an extreme is rounding. */
 #define LKR_BEYOND LKR_OF(1e-6, 5e-4f)
+/* Rounding of inputs, and of a pose at them. */
+#define LKR_ROUNDING (4 * LKR_OF(DBL_EPSILON, FLT_EPSILON))
 /* A position is reached at ENOUGH; where rounding allows no less, CLOSE times the rate or STEEPEST
    may be left [rad, sizes]. */
 #define LKR_ENOUGH LKR_OF(1e-14, 2e-6f)
@@ -58,6 +60,13 @@ typedef double lkr_real;
 #else
 #define LKR_FORMULA static inline
 #define LKR_PURE static inline
+#endif
+
+/* A struct of zeros. */
+#ifdef __cplusplus
+#define LKR_ZERO { }
+#else
+#define LKR_ZERO { 0 }
 #endif
 
 /* Series stay in the flash memory of an AVR, which has another address space than its RAM. */
@@ -83,16 +92,16 @@ static inline lkr_real lkr_clamped(lkr_real x, lkr_real low, lkr_real high)
     return x > high ? high : lkr_max(x, low);
 }
 
-/* The whole turns nearest to x, if there are turns; a compiler divides where it compiles. */
+/* The whole turns nearest to x. */
 LKR_FORMULA lkr_real lkr_turns(lkr_real x, lkr_real turn)
 {
-    if (!(turn > 0) || LKR_MATH(fabs)(x) <= turn / 2) {
+    if (LKR_MATH(fabs)(x) <= turn / 2) {
         return 0;
     }
-    return turn * LKR_MATH(floor)(x * (1 / turn) + (lkr_real)0.5);
+    return turn * LKR_MATH(floor)(x / turn + (lkr_real)0.5);
 }
 
-/* x within half a turn of 0, if there are turns. */
+/* x within half a turn of 0. */
 LKR_FORMULA lkr_real lkr_wrapped(lkr_real x, lkr_real turn)
 {
     return x - lkr_turns(x, turn);
@@ -156,17 +165,14 @@ typedef struct {
 
 /* An actuator or a joint. */
 typedef struct {
-    /* The input of which the position is ratio * input + shift, whole turns included; ratio 0: of none. */
-    int input;
-    lkr_real ratio, shift;
-    /* One over the size of the position, and what it may change by without effect, or 0. */
+    /* One over the size of the position, and what it may change by without effect, or INFINITY. */
     lkr_real scale, turn;
 } lkr_axis;
 
-/* An input: its size and its sweep. */
+/* An input: its size and one over it, its sweep. */
 typedef struct {
-    lkr_real size, low, high;
-    /* After how much of it the actuators or the joints repeat, or 0. */
+    lkr_real size, scale, low, high;
+    /* After how much of it the actuators or the joints repeat, or INFINITY. */
     lkr_real turn[2];
 } lkr_input;
 
@@ -175,10 +181,9 @@ typedef struct {
     int inputs;
     /* The number of actuators, as many as inputs, and of joints: first as many that are commanded. */
     int count[2];
-    /* The pose at inputs; returns 0 if it cannot be assembled. */
-    int (*at)(const lkr_real *q, lkr_point *p);
-    /* All inputs that a side's positions may have, NaN where there is none; returns their number. 0
-       where the axes count all inputs. */
+    /* The pose at inputs, with rates and loads if wanted; returns 0 if it cannot be assembled. */
+    int (*at)(const lkr_real *q, int has_rates, lkr_point *p);
+    /* All inputs that a side's positions may have, NaN where there is none; returns their number. */
     int (*solutions[2])(const lkr_real *position, lkr_real (*q)[LKR_MAX_INPUTS]);
     lkr_axis axis[2][LKR_MAX_JOINTS];
     lkr_input input[LKR_MAX_INPUTS];
@@ -300,9 +305,21 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
     return solutions;
 }
 
-/* From inputs q to those of positions next to them, and their pose; returns 0 if there are none. */
-static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position, lkr_real *q,
-    lkr_point *p)
+/* How far rounding of inputs may move positions, in sizes. */
+static inline lkr_real lkr_rounding(const lkr_model *model, const lkr_real *q)
+{
+    lkr_real most = 0;
+    int i;
+    for (i = 0; i < model->inputs; i++) {
+        most = lkr_max(most, LKR_MATH(fabs)(q[i]) * model->input[i].scale);
+    }
+    return LKR_ROUNDING * most;
+}
+
+/* From inputs q to those of positions next to them, and their pose, see lkr_model.at; returns 0 if
+   there are none, 1 if they are q, else 2. */
+static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position,
+    int has_rates, lkr_real *q, lkr_point *p)
 {
     lkr_real gap[LKR_MAX_INPUTS] = { 0 };
     lkr_real x[LKR_MAX_INPUTS];
@@ -313,16 +330,17 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
     for (step = 0; step <= LKR_MAX_STEPS; step++) {
         lkr_point next;
         const lkr_real now =
-            model->at(x, &next) ? lkr_gap(model, side, position, &next, gap) : INFINITY;
+            model->at(x, has_rates, &next) ? lkr_gap(model, side, position, &next, gap) : INFINITY;
         if (!(now < left)) {
             break;
         }
         left = now;
         *p = next;
         memcpy(q, x, sizeof x);
-        if (left <= LKR_ENOUGH) {
-            return 1;
+        if (left <= LKR_ENOUGH || left <= lkr_rounding(model, q)) {
+            return step ? 2 : 1;
         }
+        has_rates = has_rates || model->at(q, 1, p);
         memcpy(x, gap, sizeof x);
         if (!lkr_solve(model, side, p, 0, LKR_LEAST, x)) {
             break;
@@ -344,92 +362,78 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
                 * lkr_max(model->input[j].size, LKR_MATH(fabs)(q[j])));
         }
     }
-    return left <= LKR_CLOSE * steepest;
+    return left <= LKR_CLOSE * steepest ? 2 : 0;
 }
 
-/* From inputs x to those whole turns from them that are nearest to near ones and the sweeps; returns
-   how far they are from near ones, INFINITY if not allowed. A command has to be in the sweeps, up to
-   rounding. What is measured may be outside, which counts ten times more. */
+/* How far x is beyond the sweep. */
+static inline lkr_real lkr_beyond(const lkr_input *input, lkr_real x)
+{
+    return LKR_MATH(fabs)(x - lkr_clamped(x, input->low, input->high));
+}
+
+/* Turn inputs to where they are nearest to near ones and the sweeps; returns how far they are from
+   near ones, INFINITY or NAN if not allowed. A command has to be in the sweeps, up to rounding. What
+   is measured may be outside, which counts ten times more. */
 static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_real *near,
-    const lkr_real *x, lkr_real *q)
+    lkr_real *q)
 {
     lkr_real away = 0;
     int i;
     for (i = 0; i < model->inputs; i++) {
         const lkr_input *input = &model->input[i];
-        const lkr_real turn = input->turn[side];
-        const lkr_real slack = LKR_BEYOND * input->size + LKR_CLOSE * LKR_MATH(fabs)(near[i]);
-        const lkr_real low = input->low - slack, high = input->high + slack;
-        lkr_real inside, beyond;
-        q[i] = x[i] + lkr_turns(lkr_clamped(near[i], input->low, input->high) - x[i], turn);
-        if (q[i] < low && q[i] + turn <= high) {
-            q[i] += turn;
-        } else if (q[i] > high && q[i] - turn >= low) {
-            q[i] -= turn;
-        }
+        lkr_real inside;
+        q[i] += lkr_turns(near[i] - q[i], input->turn[side]);
         inside = lkr_clamped(q[i], input->low, input->high);
-        beyond = LKR_MATH(fabs)(q[i] - inside);
-        if (side == LKR_JOINTS) {
-            if (beyond > slack) {
-                return INFINITY;
+        if (q[i] != inside) {
+            const lkr_real slack = LKR_BEYOND * input->size;
+            const lkr_real turn = q[i] < inside ? input->turn[side] : -input->turn[side];
+            if (lkr_beyond(input, q[i]) > slack
+                && lkr_beyond(input, q[i] + turn) < lkr_beyond(input, q[i])) {
+                q[i] += turn;
             }
-            q[i] = inside;
+            if (side == LKR_JOINTS) {
+                if (lkr_beyond(input, q[i]) > slack) {
+                    return INFINITY;
+                }
+                q[i] = lkr_clamped(q[i], input->low, input->high);
+            }
+            away += 10 * lkr_beyond(input, q[i]) * input->scale;
         }
-        away += (LKR_MATH(fabs)(q[i] - near[i]) + 10 * beyond) / input->size;
+        away += LKR_MATH(fabs)(q[i] - near[i]) * input->scale;
     }
-    return isfinite(away) ? away : INFINITY;
+    return away;
 }
 
-/* From positions to the inputs q nearest to `from`, and their pose; returns 0, and leaves q alone, if
-   there are none. */
+/* From positions to the inputs q nearest to `from`, and their pose, see lkr_model.at; returns 0, and
+   leaves q alone, if there are none. */
 static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *position,
-    const lkr_real *from, lkr_real *q, lkr_point *p)
+    const lkr_real *from, int has_rates, lkr_real *q, lkr_point *p)
 {
     const size_t size = (size_t)model->inputs * sizeof *q;
-    lkr_real x[LKR_MAX_SOLUTIONS + 1][LKR_MAX_INPUTS];
+    lkr_real x[LKR_MAX_SOLUTIONS][LKR_MAX_INPUTS];
     lkr_real away[LKR_MAX_SOLUTIONS + 1];
-    lkr_real near[LKR_MAX_INPUTS] = { 0 }, found[LKR_MAX_INPUTS];
-    int i, k, s;
-    int count = 1;
-    memcpy(near, from, size);
-    /* Without a function for solutions, there is one, of counted inputs. */
-    memcpy(x[0], near, sizeof near);
-    if (model->solutions[side]) {
-        count = model->solutions[side](position, x);
-    }
+    lkr_real near[LKR_MAX_INPUTS] = { 0 };
+    const int count = model->solutions[side](position, x);
+    int i, k;
     for (i = 0; i < model->inputs; i++) {
-        const lkr_axis *axis = &model->axis[side][i];
-        for (k = 0; k < count && axis->ratio != 0; k++) {
-            near[axis->input] = (position[i] - axis->shift) / axis->ratio;
-            x[k][axis->input] = near[axis->input];
-        }
+        near[i] = lkr_clamped(from[i], model->input[i].low, model->input[i].high);
     }
     for (k = 0; k < count; k++) {
-        away[k] = lkr_bring(model, side, near, x[k], found);
+        away[k] = lkr_bring(model, side, near, x[k]);
     }
-    /* The last: rounding may hide a solution next to the near inputs. */
-    memcpy(x[count], near, sizeof near);
-    away[count] = FLT_MAX;
+    away[count] = INFINITY;
     for (;;) {
-        int nearest = 0;
-        for (k = 1; k <= count; k++) {
+        int nearest = count, found;
+        for (k = 0; k < count; k++) {
             nearest = away[k] < away[nearest] ? k : nearest;
         }
-        if (!(away[nearest] < INFINITY)) {
+        if (nearest == count) {
             return 0;
         }
         away[nearest] = INFINITY;
-        if (lkr_refine(model, side, position, x[nearest], p)
-            && lkr_bring(model, side, near, x[nearest], found) < INFINITY) {
-            /* Positions that count inputs have their turns. */
-            for (s = LKR_ACTUATORS; s <= LKR_JOINTS; s++) {
-                for (i = 0; i < model->count[s]; i++) {
-                    const lkr_axis *axis = &model->axis[s][i];
-                    p->position[s][i] +=
-                        axis->ratio * (found[axis->input] - x[nearest][axis->input]);
-                }
-            }
-            memcpy(q, found, size);
+        found = lkr_refine(model, side, position, has_rates, x[nearest], p);
+        if (found == 1 || (found && lkr_bring(model, side, near, x[nearest]) < INFINITY)) {
+            memcpy(q, x[nearest], size);
             return 1;
         }
     }
@@ -463,22 +467,22 @@ static inline void lkr_copy(int n, const lkr_real *from, lkr_real *to)
 /* Find the pose of positions, and keep it as the newest; returns a status. */
 static inline int lkr_move(const lkr_model *model, lkr_memory *m, int side, const lkr_real *position)
 {
-    const int other = 1 - side;
-    lkr_real q[LKR_MAX_INPUTS] = { 0 }, gap[LKR_MAX_INPUTS];
+    lkr_real q[LKR_MAX_INPUTS], gap[LKR_MAX_INPUTS];
     lkr_point p = m->point;
     if (!lkr_are_finite(model->inputs, position)) {
         return LKR_NOT_KNOWN;
     }
+    memcpy(q, m->q, sizeof q);
     /* Where it is already it stays, whatever rounding says; but a command has to be in the sweeps. */
     if ((!m->is_known || lkr_gap(model, side, position, &p, gap) > LKR_ENOUGH
-            || lkr_bring(model, side, m->q, m->q, q) != 0)
-        && !lkr_inverse(model, side, position, m->q, q, &p)) {
+            || lkr_bring(model, side, m->q, q) != 0)
+        && !lkr_inverse(model, side, position, m->q, 1, q, &p)) {
         return LKR_OUT_OF_REACH;
     }
     m->is_known = 1;
     m->point = p;
     memcpy(m->q, q, sizeof q);
-    lkr_copy(model->count[other], p.position[other], m->held[other].position);
+    lkr_copy(model->count[1 - side], p.position[1 - side], m->held[1 - side].position);
     return LKR_OK;
 }
 
