@@ -208,7 +208,8 @@ class _Loops:
         joints = self._positions(sources)
         fixed = component.is_of([*joints])
         isnan = np.any([np.isnan(values) for values in joints.values()], axis=0)
-        pose, gaps, poses = np.repeat(component.start, len(targets), axis=0), np.empty(isnan.shape), []
+        pose = np.repeat(component.start, len(targets), axis=0)
+        gaps, poses = np.empty(isnan.shape), []
         for k in range(steps):
             here = {name: np.where(isnan[:, k], component.positions[name], values[:, k])
                     for name, values in joints.items()}
