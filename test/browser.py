@@ -35,9 +35,14 @@ threading.Thread(target=_loop.run_forever, name='browser', daemon=True).start()
 _tasks = set()
 
 
+def begin(coroutine):
+    """Start a coroutine in the thread of all of them; return its future."""
+    return asyncio.run_coroutine_threadsafe(coroutine, _loop)
+
+
 def run(coroutine):
-    """Return the result of a coroutine, which is run in the thread of all of them."""
-    return asyncio.run_coroutine_threadsafe(coroutine, _loop).result(2 * DEADLINE)
+    """Return the result of a coroutine."""
+    return begin(coroutine).result(2 * DEADLINE)
 
 
 def task(coroutine):

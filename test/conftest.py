@@ -155,7 +155,7 @@ def show(graph):
         yield lambda *args, **kwargs: shows.enter_context(Show(graph, *args, **kwargs))
 
 
-@pytest.fixture(scope='session')
+@pytest.fixture(scope='module')
 def lever():
     """Yield a running lever and drop that no test changes, with a page."""
     from ros_harness import Graph

@@ -50,7 +50,8 @@ class Graph:
         rclpy.init(context=self.context, domain_id=self._domain or self._own.id)
         self.executor = self._executor(context=self.context)
         self._nodes = []
-        self.node = self._add(rclpy.create_node('tester', context=self.context))
+        self.node = self._add(rclpy.create_node(
+            'tester', context=self.context, start_parameter_services=False))
         return self
 
     def __exit__(self, *_):
@@ -104,11 +105,7 @@ class Graph:
         deadline = time.monotonic() + seconds
         while not (held := predicate()):
             assert time.monotonic() < deadline, 'did not happen in time'
-            try:
-                self.executor.spin_once(timeout_sec=0.005)
-            except InvalidHandle:
-                # Another thread ended a node while this one waited for it.
-                continue
+            self.executor.spin_once(timeout_sec=0.005)
         return held
 
     def log(self):
@@ -126,14 +123,19 @@ class Graph:
         self.until(lambda: any(message.msg == end for message in log))
         return log
 
+    def parameters(self, node):
+        """Return a client of a node's parameters."""
+        client = AsyncParameterClient(self.node, node.get_fully_qualified_name())
+        self.until(client.services_are_ready)
+        return client
+
     def set(self, node, meanwhile=lambda: None, **values):
         """
         Set parameters through the node's service; __ stands for a point in a name.
 
         `meanwhile` is called once they are answered, and before what they change is waited for.
         """
-        client = AsyncParameterClient(self.node, node.get_fully_qualified_name())
-        self.until(client.services_are_ready)
+        client = self.parameters(node)
         parameters = [value if isinstance(value, Parameter) else
                       Parameter(name.replace('__', '.'), value=value)
                       for name, value in values.items()]
@@ -244,20 +246,25 @@ def module(name):
 
 
 class Process:
-    """An executable of this package as users start it, with a parameter file."""
+    """
+    An executable of this package as users start it, with a parameter file.
 
-    def __init__(self, name, parameter_file, *arguments, domain=None, env=None, as_module=False):
+    What a folder has that is `first` is imported before anything else.
+    """
+
+    def __init__(self, name, parameter_file, *arguments, domain=None, first='', as_module=False):
         self._domain = None if domain else Domain()
         self.domain = domain or self._domain.id
         start = ('-m', module(name)) if as_module else (
             '-c', f'from linkage_ros import executables; executables.{name}()')
         # A pipe that nobody reads would hold up who writes more than it holds.
+        path = os.pathsep.join([str(first), os.environ.get('PYTHONPATH', '')])
         with tempfile.NamedTemporaryFile() as file:
             self._printed = open(file.name, encoding='utf-8')
             self._process = subprocess.Popen(
                 [sys.executable, *start, *arguments, '--ros-args',
                  '--params-file', str(parameter_file)], stdout=file, stderr=subprocess.STDOUT,
-                env={**os.environ, **(env or {}), 'ROS_DOMAIN_ID': str(self.domain)})
+                env={**os.environ, 'ROS_DOMAIN_ID': str(self.domain), 'PYTHONPATH': path})
 
     def __enter__(self):
         return self

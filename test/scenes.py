@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Scenes of one mechanism, and those of the package."""
+"""Scenes of one mechanism, joint lines that several files ask about, and the package's scenes."""
 
 from pathlib import Path
 
@@ -10,6 +10,15 @@ from linkage_ros.scene.writing import without_defaults
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = [*sorted((ROOT / 'config').glob('*.yaml')), *sorted((ROOT / 'examples').glob('*.yaml'))]
+
+# A cylinder below a boom, an engine that is out of line, a four-bar with a rocker, one that is
+# dragged round, and a slotted lever.
+BOOM = ['O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right']
+ENGINE = ['O ground 0 0', 'G ground 0 -20', 'A crank O 40', 'B slider A 120 G 0.5 out',
+          'P rigid A B 50 90 left']
+LIFT = ['O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left']
+DRAG = ['O ground 0 0', 'Q ground 0.3 0', 'A crank O 1', 'B dyad A Q 0.9 1.1 left']
+SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 out 0.08']
 
 
 def example(name):

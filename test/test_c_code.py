@@ -14,7 +14,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import cli, header
 import numpy as np
 import pytest
-from scenes import alone, ROOT
+from scenes import alone, BOOM, ROOT
 
 pytestmark = pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
 
@@ -22,8 +22,8 @@ pytestmark = pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
 SCENE = {
     'mechanisms': [*mechanisms.TYPES, 'boom', 'rack', 'bent', 'cam'],
     **{f'{name}.type': name for name in mechanisms.TYPES}, 'jansen.scale': 0.01,
-    'slotted_lever.scale': 1e-3, 'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
-        'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C rigid O B 2 1.4 left'],
+    'slotted_lever.scale': 1e-3, 'boom.type': 'custom', 'boom.scale': 2.0,
+    'boom.joints': [*BOOM, 'C rigid O B 2 1.4 left'],
     'rack.type': 'custom', 'rack.joints': [
         'O ground 0 0', 'R ground 1 0', 'A carriage O along R 0 2', 'Q ground 0 1',
         'B dyad A Q 0.9 0.6 left'],

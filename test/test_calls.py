@@ -12,6 +12,7 @@ from linkage_ros.c_code import header
 from linkage_ros.linkage import Answer, Solution
 import numpy as np
 import pytest
+from test_language import made
 
 WRONG = 'x', ['x'], None, {}, object(), b'3', 10 ** 400, 1j, [[1.0], 'x']
 
@@ -128,6 +129,8 @@ def test_there_are_as_many_numbers_as_inputs(bars, arm):
             arm.input_for('P.x', 0.1, others=others)
     with pytest.raises(ValueError, match='four_bar has 1 inputs: the values of all except'):
         bars.reach(0.1)
+    with pytest.raises(ValueError, match='theta must be a sequence of as many values'):
+        arm.solve(0.5)
 
 
 def test_arrays_of_shapes_that_do_not_broadcast_are_refused_with_their_shapes(bars, arm):
@@ -276,22 +279,6 @@ def test_what_is_asked_by_names_of_any_class_is_the_same(made, what):
 
 # --- linkages of the user's own: two cranks, arrays of dimensions ---
 
-FOUR_BAR = ('O ground 0 0', 'Q ground g 0', 'A crank O m', 'B dyad A Q b c left')
-
-
-def four_bar(m, b, c, g, side=1):
-    """Return a four-bar of crank m, coupler b, rocker c and ground g."""
-    return mechanisms.create('custom', joints=FOUR_BAR, branches={'B': side}, m=m, b=b, c=c, g=g)
-
-
-def test_every_crank_is_asked_for():
-    linkage = mechanisms.create('five_bar')
-    with pytest.raises(ValueError, match='five_bar has 2 inputs: the values of all except'):
-        linkage.reach()
-    with pytest.raises(ValueError, match='theta must be a sequence of as many values'):
-        linkage.solve(0.5)
-
-
 @pytest.mark.filterwarnings('error')
 @pytest.mark.parametrize('shape', [(), (1,), (3,), (3, 2)])
 @pytest.mark.parametrize('turned', [(), (2,), (1, 2)])
@@ -303,12 +290,12 @@ def test_an_array_of_dimensions_is_broadcast_against_the_angle(shape, turned):
         expected = np.broadcast_shapes(shape, turned)
     except ValueError:
         pytest.skip('not broadcast')
-    linkage = four_bar(1.0, swept, 2.5, 4.0)
+    linkage = made(b=swept)
     place = linkage.solve(theta)
     assert place['B'].shape == (*expected, 2) and place['O'].shape == (*expected, 2)
     lengths, thetas = np.broadcast_arrays(swept, theta)
     for index in np.ndindex(expected):
-        one = four_bar(1.0, float(lengths[index]), 2.5, 4.0)
+        one = made(b=float(lengths[index]))
         np.testing.assert_allclose(place['B'][index], one.solve(float(thetas[index]))['B'],
                                    rtol=1e-14)
         np.testing.assert_allclose(linkage.transmission_angles(theta)['B'][index],
@@ -323,7 +310,7 @@ def test_of_arrays_of_dimensions_one_may_have_no_rate():
 
 
 def test_questions_about_the_reach_are_for_one_set_of_dimensions():
-    linkage = four_bar(1.0, np.array([3.0, 3.1]), 2.5, 4.0)
+    linkage = made(b=np.array([3.0, 3.1]))
     for ask in (linkage.reach, linkage.dead_points, lambda: linkage.input_for('QB', 1.0)):
         with pytest.raises(ValueError, match='for one set of dimensions, not for arrays'):
             ask()
@@ -331,13 +318,12 @@ def test_questions_about_the_reach_are_for_one_set_of_dimensions():
 
 def test_arrays_of_dimensions_are_checked_too():
     with pytest.raises(ValueError, match='dimension b must be positive'):
-        four_bar(1.0, np.array([3.0, -3.0]), 2.5, 4.0)
+        made(b=np.array([3.0, -3.0]))
     for line, wrong in (('P line A B b-c', 'the bar A-P must be longer'),
                         ('P rigid A B 2 0.7 left', 'no triangle has these sides'),
                         ('P carriage O along Q 2.75 b', 'the lower end of the carriage must be')):
         with pytest.raises(ValueError, match=f'line "{line}": {wrong}'):
-            mechanisms.create('custom', joints=(*FOUR_BAR, line), m=1.0, g=4.0, c=2.5,
-                              b=np.array([3.0, 2.5]))
+            made(line, b=np.array([3.0, 2.5]))
 
 
 def test_a_joint_of_a_carriage_stands_still_while_that_is_held():

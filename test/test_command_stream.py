@@ -17,7 +17,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from truth.cases import CASES
-from truth.working_modes import excavator, five_bar
+from truth.working_modes import excavator, five_bar, lever_of
 
 # A hobby servo with a gear of 2 turns a crank of 80, 150 from the pivot of a lever.
 LEVER = {'mechanisms': ['lever', 'bar'], 'lever.type': 'slotted_lever',
@@ -62,8 +62,7 @@ def stream(graph):
 
 def flap(servo):
     """Return where the flap is, from the textbook: the pin of the crank turns the slot."""
-    crank = 0.5 * servo + 0.25
-    return 0.1 - math.atan2(80.0 * math.sin(crank), 150.0 + 80.0 * math.cos(crank))
+    return 0.1 - lever_of(0.5 * servo + 0.25)
 
 
 def slope(function, at):

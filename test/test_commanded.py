@@ -20,7 +20,7 @@ from linkage_ros.c_code import header
 from linkage_ros.c_code.axes import actuators, joints
 import numpy as np
 import pytest
-from scenes import alone, ROOT
+from scenes import alone, LIFT, ROOT, SLOT
 from truth import random_linkages
 
 pytestmark = pytest.mark.skipif(not COMPILER, reason='there is no C compiler')
@@ -31,9 +31,7 @@ FAULTS = [(['A ground 0 0', 'B ground 0 1.4', 'C cylinder B A 1.0157 right',
           (['A ground 0 -466877.40017928416', 'C ground 1817220.0129748432 0',
             'D crank C 1186290.2285410194', 'E antiparallelogram C D A'], 'E.y', 500)]
 # Linkages with extremes of an output, and how far that may be from a command at its rounding.
-NEXT_TO_EXTREMES = [
-    (['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 out 0.08'], 'lever'),
-    (['O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left'], 'B.y')]
+NEXT_TO_EXTREMES = (SLOT, 'lever'), (LIFT, 'B.y')
 CLOSE = {'double': 1e-12, 'float': 1e-6}
 # Poses of a linkage, and how far joints and actuators may be from those of Python [rad, sizes].
 POSES, NEAR, SLACK = 300, {'double': 1e-9, 'float': 1e-6}, {'double': 1e-6, 'float': 1e-2}

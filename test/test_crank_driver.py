@@ -93,17 +93,6 @@ def test_the_crank_moves_as_the_parameters_say(graph, parameters, steps):
             assert driver.at(round(step[0] * SECOND)) == step[1]
 
 
-def test_a_new_sweep_takes_the_crank_where_it_is(graph):
-    driver = Driver(graph, DROP)
-    driver.at(SECOND)
-    driver.at(2 * SECOND)
-    graph.change(driver.node, DROP, drop__crank__sweep=(0.5, 1.5))
-    assert driver.at(2 * SECOND + SECOND // 4) == (1.25, 1.0)
-    assert driver.at(3 * SECOND) == (1.0, -1.0)
-    graph.change(driver.node, DROP, drop__crank__sweep=())
-    assert driver.at(5 * SECOND) == (3.0, 1.0)
-
-
 def test_a_new_dimension_keeps_the_crank_in_its_new_reach(graph):
     driver = Driver(graph, {**CELL, 'cell.crank.speed': 0.0, 'cell.crank.start': 1.1})
     assert driver.at(SECOND) == (1.1, 0.0)

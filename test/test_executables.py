@@ -4,7 +4,6 @@
 """The executables as users start them: how they end, and what they say of a bad scene."""
 
 from importlib import import_module
-import os
 import re
 import signal
 import time
@@ -68,9 +67,7 @@ def test_what_python_does_at_its_end_holds_up_no_node(tmp_path, name):
     """However it is started: much garbage takes seconds."""
     (tmp_path / 'sitecustomize.py').write_text(
         'import atexit, time\natexit.register(time.sleep, 100.0)\n')
-    path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
-    process = Process(name, ROOT / 'config' / 'all.yaml', env={'PYTHONPATH': path},
-                              as_module=True)
+    process = Process(name, ROOT / 'config' / 'all.yaml', first=tmp_path, as_module=True)
     # Whoever follows starts with the values of `kinematics`.
     for node in ('kinematics', 'servo_inverse', 'crank_driver') if name == 'scene' else (name,):
         assert f'[{node}]: ' in process.line()
@@ -100,8 +97,7 @@ sys.meta_path.insert(0, Slow())
 @pytest.mark.parametrize('name', EXECUTABLES)
 def test_a_signal_ends_what_is_still_being_imported(tmp_path, name, stop):
     (tmp_path / 'sitecustomize.py').write_text(IMPORTS_FOR_EVER)
-    path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
-    process = Process(name, ROOT / 'config' / 'all.yaml', env={'PYTHONPATH': path})
+    process = Process(name, ROOT / 'config' / 'all.yaml', first=tmp_path)
     assert process.line() == 'importing\n'
     process.interrupt(stop)
     assert process.end() == (0, '')

@@ -18,27 +18,27 @@ from linkage_ros.robot_model import bodies
 PAIR = {'mechanisms': ['m3', 'm4'], 'm3.type': 'four_bar', 'm4.type': 'slider_crank'}
 
 
-def linkages(a):
-    """Return the linkages of jansens with a dimension, of three sizes."""
+def jansens(a):
+    """Return jansens with a dimension, of three sizes."""
     given = {f'{name}.{key}': value for i, name in enumerate('xyz') for key, value in (
         ('type', 'jansen'), ('scale', 1.0 + i), ('dimensions.a', a))}
     shown = scene.read({'mechanisms': [*'xyz'], **given})
-    return [mechanism.linkage for mechanism in shown.mechanisms.values()]
+    return [*shown.mechanisms.values()]
 
 
 def test_equal_linkages_are_one_and_their_travels_are_found_once():
-    first, *others = linkages(38.0625)
-    assert all(other is first for other in others)
-    travels = bodies.travels(first, first.reach())
-    with few_calls(100):
-        assert bodies.travels(others[0], others[0].reach()) == travels
-    assert linkages(38.125)[0] is not first
+    first, *others = jansens(38.0625)
+    assert all(other.linkage is first.linkage for other in others)
+    travels = bodies.travels(first)
+    with few_calls(500):
+        assert bodies.travels(others[0]) == travels
+    assert jansens(38.125)[0].linkage is not first.linkage
 
 
 def test_a_linkage_that_nobody_holds_is_gone_after_some_others():
-    gone = weakref.ref(linkages(38.25)[0])
+    gone = weakref.ref(jansens(38.25)[0].linkage)
     for i in range(20):
-        linkages(39.0 + i / 64)
+        jansens(39.0 + i / 64)
     gc.collect()
     assert gone() is None
 

@@ -22,6 +22,7 @@ from robots import LIBRARIES
 from ros_harness import Process
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
+from truth.working_modes import lever_of
 import yaml
 
 ROOT = Path(__file__).parents[1]
@@ -161,9 +162,7 @@ def test_a_flap_is_put_where_a_planner_wants_it(reader):
     reader.follow('commands')
     command = reader.received[0]
     assert command.name == ['servo']
-    crank = 0.5 * command.position[0]
-    lever = math.atan2(80.0 * math.sin(crank), 150.0 + 80.0 * math.cos(crank))
-    assert 0.1 - lever == pytest.approx(0.2, abs=1e-12)
+    assert 0.1 - lever_of(0.5 * command.position[0]) == pytest.approx(0.2, abs=1e-12)
 
 
 @pytest.mark.nightly

@@ -17,7 +17,7 @@ import pytest
 from rclpy.logging import LoggingSeverity
 from rclpy.serialization import serialize_message
 from ros_harness import hastened
-from scenes import example
+from scenes import BOOM, example
 from sensor_msgs.msg import JointState
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -25,7 +25,6 @@ WALKER = {'mechanisms': ['walker'], 'walker.type': 'jansen', 'walker.scale': 0.0
           'walker.leg_pairs': 3}
 ANKLE = {name.removeprefix('ankle.'): value for name, value in example('ankle').items()
          if name.startswith('ankle.')}
-LIFT = ['O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C line O B 1.6']
 # A mechanism, where its inputs are, and what is said of it, called {m}.
 UNASSEMBLED = [
     # The right leg is the mirror image of a left one at pi minus the angle.
@@ -40,7 +39,7 @@ UNASSEMBLED = [
      'no place for "D cylinder O Q 1 left"'),
     (ANKLE, [0.3, 0.3], 'no place for "pitch hinge ground at 0 0 0 axis 0 1 0 within -50deg '
      '30deg"'),
-    ({'type': 'custom', 'joints': LIFT, 'scale': 2.0}, [9.0],
+    ({'type': 'custom', 'joints': BOOM, 'scale': 2.0}, [9.0],
      '{m} cannot be assembled at cylinder length 9 m; the reach is [1.12297, 3.27703] m'),
     ({'type': 'four_bar'}, [math.nan], '{m} cannot be assembled: {m}_crank is at nan'),
     # A crank alone, which nothing needs to be assembled with.
@@ -74,9 +73,8 @@ def test_what_cannot_be_assembled_is_said_with_the_reason(graph):
         assert text.endswith(said.format(m=name))
 
 
-BOOM = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
-    'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C line O B 1.6',
-    'D rigid O B 0.6 0.7 left', 'E cylinder D B 0.4 left']}
+ARM = {'mechanisms': ['boom'], 'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
+    *BOOM, 'C line O B 1.6', 'D rigid O B 0.6 0.7 left', 'E cylinder D B 0.4 left']}
 # Type, colour, width as a part of the longest bar, and layer above the plane, by the marker's id.
 LOOKS = {
     0: (Marker.LINE_LIST, 'BAR', 40, 0), 1: (Marker.SPHERE_LIST, 'JOINT', 20, 0),
@@ -89,7 +87,7 @@ LOOKS = {
 @pytest.mark.parametrize('name, given, size, ids', [
     ('walker', WALKER, 0.01 * 65.7, {0, 1, 2, 5, 7, 8}),
     ('lever', {'mechanisms': ['lever'], 'lever.type': 'slotted_lever'}, 270.0,
-     {0, 1, 2, 3, 4, 5, 8}), ('boom', BOOM, 3.2, {0, 1, 6, 7, 8})])
+     {0, 1, 2, 3, 4, 5, 8}), ('boom', ARM, 3.2, {0, 1, 6, 7, 8})])
 def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, given, size, ids):
     pose = [1.0, -2.0, 3.0, 0.4, -0.3, 2.5]
     node = graph.start(Kinematics, {

@@ -5,7 +5,6 @@
 
 from contextlib import suppress
 from importlib import import_module
-import os
 import re
 import signal
 import sys
@@ -122,11 +121,6 @@ def harness():
     return ros_harness
 
 
-def path(folder):
-    """Return an environment in which packages are imported from a folder first."""
-    return {'PYTHONPATH': os.pathsep.join([str(folder), os.environ.get('PYTHONPATH', '')])}
-
-
 @pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('way', WAYS)
 @pytest.mark.parametrize('name', ['kinematics', 'scene'])
@@ -137,7 +131,7 @@ def test_a_node_moves_without_machine_code_and_says_why_once(harness, tmp_path, 
     # Only the legs of a walker use machine code.
     walker = tmp_path / 'walker.yaml'
     walker.write_text('/**: {ros__parameters: {mechanisms: [jansen], jansen.leg_pairs: 2}}')
-    process = harness.Process(name, walker, env=path(tmp_path))
+    process = harness.Process(name, walker, first=tmp_path)
     try:
         with harness.Graph(process.domain) as graph:
             # One message before anybody listens.
@@ -170,7 +164,7 @@ def test_a_node_moves_without_machine_code_and_says_why_once(harness, tmp_path, 
 def test_a_node_that_cannot_do_without_ends_in_one_sentence(
         harness, tmp_path, package, name, way):
     write(tmp_path, package, way)
-    process = harness.Process(name, SCENE, env=path(tmp_path))
+    process = harness.Process(name, SCENE, first=tmp_path)
     code, printed = process.end()
     said = [line for line in printed.splitlines() if '[FATAL]' in line]
     assert code == 1 and 'Traceback' not in printed, printed
@@ -181,7 +175,7 @@ def test_a_node_that_cannot_do_without_ends_in_one_sentence(
 @pytest.mark.parametrize('name', ['crank_driver', 'kinematics'])
 def test_other_nodes_start_without_the_interfaces(harness, tmp_path, name):
     write(tmp_path, 'linkage_interfaces', 'missing')
-    process = harness.Process(name, SCENE, env=path(tmp_path))
+    process = harness.Process(name, SCENE, first=tmp_path)
     assert 'ready: ' in process.line()
     process.interrupt(signal.SIGINT)
     assert process.end()[0] == 0

@@ -26,7 +26,6 @@ from rcl_interfaces.msg import (
 )
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from rclpy.parameter_client import AsyncParameterClient
 from ros_harness import Graph
 from sensor_msgs.msg import JointState
 
@@ -53,9 +52,7 @@ class Client:
     """The parameter services of a node, called from outside."""
 
     def __init__(self, graph, node):
-        self._graph, self.node = graph, node
-        self.services = AsyncParameterClient(graph.node, node.get_fully_qualified_name())
-        graph.until(self.services.services_are_ready)
+        self._graph, self.node, self.services = graph, node, graph.parameters(node)
 
     def call(self, service, given):
         """Return the response of a service."""

@@ -9,7 +9,7 @@ import pickle
 from linkage_ros import mechanisms, scene
 import numpy as np
 import pytest
-from scenes import EXAMPLES
+from scenes import BOOM, EXAMPLES
 
 FIVE = np.array([-3.0, 0.0, 0.4, 1.3, 1e6])
 CRANK = mechanisms.create('custom', tracer='A', r=1.2, joints=(
@@ -20,8 +20,7 @@ LINKAGES = {
     'another branch': mechanisms.create('water_drop', branches=dict.fromkeys(
         mechanisms.design('water_drop').branches, -1)),
     'many at once': mechanisms.create('four_bar', a=np.linspace(0.5, 1.0, 5)),
-    'a cylinder': mechanisms.create('custom', joints=(
-        'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right'))}
+    'a cylinder': mechanisms.create('custom', joints=BOOM)}
 WAYS = {'copy': copy, 'deepcopy': deepcopy, **{
     f'protocol {protocol}': lambda linkage, protocol=protocol: pickle.loads(
         pickle.dumps(linkage, protocol)) for protocol in range(pickle.HIGHEST_PROTOCOL + 1)}}

@@ -26,6 +26,7 @@ import numpy as np
 from PIL import Image
 import pytest
 from scenes import alone, ROOT
+from truth.working_modes import lever_of
 
 CONFIG = ROOT / 'config'
 TABLE = [line.split() for line in (ROOT / 'pictures' / 'pictures.txt').read_text().splitlines()
@@ -269,8 +270,7 @@ def test_the_angle_is_printed_and_that_of_a_slotted_lever_with_its_ratio():
     assert texts_of(picture) == ['θ = 45.0°']
     picture = picture_of(mechanism('slotted_lever'))
     picture.show(50.0 / 360.0)
-    lever = math.degrees(math.atan2(80 * math.sin(math.radians(50)),
-                                    80 * math.cos(math.radians(50)) + 150))
+    lever = math.degrees(lever_of(math.radians(50.0)))
     assert texts_of(picture)[:3] == ['θ = 50.0°', f'φ = {lever:.1f}°', f'φ/θ = {lever / 50:.3f}']
     picture.show(310.0 / 360.0)
     assert texts_of(picture)[:2] == ['θ = −50.0°', f'φ = −{lever:.1f}°']

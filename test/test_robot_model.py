@@ -11,7 +11,6 @@ from xml.etree import ElementTree
 from hypothesis import given, settings, strategies as st
 from linkage_ros import scene
 from linkage_ros.robot_model import bodies, mjcf, robot, rviz, sdf, urdf
-from linkage_ros.robot_model.bodies import assembled
 from linkage_ros.robot_model.cli import main
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
 import numpy as np
@@ -129,11 +128,13 @@ def test_three_formats_show_what_the_scene_has(name):
     one = simulated(name)
     width = WIDTHS.get(name)
     robot = bodies.robot([one], 'world', width)
-    built, width = assembled(robot, DENSITY), width or bodies.size(one) / 40
+    built = bodies.robot([one], 'world', width, DENSITY)
+    width = width or bodies.size(one) / 40
     starts = np.array([np.clip(drive.start, *drive.sweep or (-math.inf, math.inf))
                        for drive in one.inputs.values()])
-    places, moved = posed(one, starts)[1], built.parts[0]
-    frames = {body: turned(*one.pose) @ frame for body, frame in moved.frames.items()}
+    places = posed(one, starts)[1]
+    frames = {body: turned(*one.pose) @ frame for body, frame in built.frames.items()
+              if body != 'world'}
     texts = urdf.write(robot), mjcf.write(built), sdf.write(built)
     # People read it: a line for each element.
     assert all(text.count('\n') >= text.count('/>') + text.count('</') - 1 for text in texts)
@@ -145,7 +146,7 @@ def test_three_formats_show_what_the_scene_has(name):
     for found in tree, loops, gazebo:
         check_seen(found, {name: wanted.get(name, []) for name in found})
     # Bodies in the slots of yokes are of simulators alone.
-    assert tree.keys() == robot.parts[0].frames.keys() and frames.keys() == loops.keys()
+    assert tree.keys() == robot.frames.keys() - {'world'} and frames.keys() == loops.keys()
     assert frames.keys() == gazebo.keys()
     limits = ElementTree.fromstring(texts[0]).iter('limit')
     assert {(each.get('effort'), each.get('velocity')) for each in limits} <= {('0', '0')}
@@ -178,7 +179,7 @@ def check_mjcf(one, root, starts, places, weight):
 @pytest.mark.parametrize('name', ['five-bar with a gear', 'Cardan gears'])
 def test_geared_joints_follow_as_they_are_published(name):
     one = simulated(name)
-    follows = model([one]).parts[0].follows
+    follows = model([one]).follows
     assert len(follows) == len(one.linkage.geared) * len(one.assembly().legs)
     for thetas in np.random.default_rng(1).uniform(-3.0, 3.0, (4, len(one.inputs))):
         found, _ = posed(one, thetas)
@@ -188,8 +189,7 @@ def test_geared_joints_follow_as_they_are_published(name):
 
 
 def test_gazebo_has_a_plugin_for_each_cut_and_each_motor():
-    root, = ElementTree.fromstring(sdf.write(assembled(bodies.robot(
-        [simulated('five_bar')], 'world'))))
+    root, = ElementTree.fromstring(sdf.write(model([simulated('five_bar')])))
     found = [(plugin.get('filename'), plugin.get('name').rpartition('::')[2],
               {part.tag: part.text for part in plugin}) for plugin in root.findall('plugin')]
     controller = ('gz-sim-joint-position-controller-system', 'JointPositionController')
@@ -246,7 +246,7 @@ def test_what_has_no_length_is_not_drawn():
     # At its shortest the cylinder has no length, and so has its barrel.
     lines = ['P ground 0 0', 'O ground 1 0', 'B cylinder P O 1 right']
     one = alone(lines, cylinder__start=1.0)
-    pieces = [piece for pieces in model([one]).parts[0].pieces.values() for piece in pieces]
+    pieces = [piece for pieces in model([one]).pieces.values() for piece in pieces]
     assert {(piece.shape, piece.length > 0.0) for piece in pieces} == {
         ('sphere', False), ('cylinder', True)}
 
@@ -276,7 +276,7 @@ def test_the_command_prints_what_its_options_ask_for(tmp_path, capsys):
             ([str(file), '--mechanism', 'b', 'a'], [several['b'], several['a']], 'base', None,
              [])):
         robot = bodies.robot(mechanisms, frame, width)
-        built = assembled(robot, 7800.0 if density else 2700.0)
+        built = bodies.robot(mechanisms, frame, width, 7800.0 if density else 2700.0)
         for more, text in (([], urdf.write(robot)), (['--format', 'urdf'], urdf.write(robot)),
                            (['--format', 'sdf', *density], sdf.write(built)),
                            (['--format', 'mjcf', *density], mjcf.write(built))):

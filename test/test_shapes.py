@@ -11,10 +11,8 @@ from linkage_ros.robot_model import shapes
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD
 import numpy as np
 import pytest
-from scenes import alone
+from scenes import alone, BOOM, ENGINE
 
-ENGINE = ('O ground 0 0', 'G ground 0 -20', 'A crank O 40', 'B slider A 120 G 0.5 out',
-          'P rigid A B 50 90 left')
 MOVING = ('O ground 0 0', 'Q ground 1.6 0', 'A crank O 0.5', 'B dyad A Q 1.8 1 left',
           'D ground 0.8 1.2', 'S slider D 0.7 A along B out', 'T block S 0.1 0.2')
 CASSIE = ('O ground 0 0', 'F crank O 0.4', 'K rigid O F 0.07 0.35 right', 'A crank K 0.05 zero F',
@@ -93,9 +91,6 @@ def test_a_cylinder_is_barrel_and_rod_and_a_block_has_a_guide(name, kinds):
     for end in 'joint', 'tip':
         hidden = {getattr(shape.slide, end) for shape in found}
         assert shapes.drawn(one, set(one.linkage.points) - hidden) == []
-
-
-BOOM = 'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right'
 
 
 @pytest.mark.parametrize('sweep, barrel', [

@@ -9,7 +9,6 @@ from xml.etree import ElementTree
 from linkage_ros import scene
 from linkage_ros.robot_files import cli as from_robot, readers
 from linkage_ros.robot_model import bodies, mjcf, sdf
-from linkage_ros.robot_model.bodies import assembled
 import numpy as np
 import pytest
 from robots import MuJoCo, of_text, published
@@ -43,8 +42,8 @@ def some_scenes(*quick):
         for path in EXAMPLES if path.parent.name == 'config']
 
 
-def model(mechanisms, frame_id='world', **given):
-    return assembled(bodies.robot(mechanisms, frame_id), **given)
+def model(mechanisms, frame_id='world', density=bodies.DENSITY):
+    return bodies.robot(mechanisms, frame_id, density=density)
 
 
 class Simulation(MuJoCo):
@@ -115,9 +114,8 @@ def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
     given, said, still = from_robot.described(robot)
     assert not any(line.startswith('Left out') for line in said)
     # An SDF has its zeros where it starts.
-    joints = [joint for part in built.parts for joint in part.joints]
-    zeros = {joint.name: joint.start if form is sdf else 0.0 for joint in joints}
-    turns = {joint.name: joint.kind == 'hinge' for joint in joints}
+    zeros = {joint.name: joint.start if form is sdf else 0.0 for joint in built.joints}
+    turns = {joint.name: joint.kind == 'hinge' for joint in built.joints}
     # Open chains, too, are joints of the whole robot.
     rest, _ = from_robot.others(robot, scene.read(given).mechanisms, still)
     mechanisms = scene.read({**given, **rest}).mechanisms.values()
@@ -144,7 +142,7 @@ def test_bodies_weigh_in_an_sdf_what_mujoco_finds_their_shapes_to_weigh(name):
     robot = Simulation(mjcf.write(built))
     links = {link.get('name'): link.find('inertial')
              for link in ElementTree.fromstring(sdf.write(built)).iter('link')}
-    for body in built.parts[0].bodies():
+    for body in built.bodies():
         there, link = robot.model.body(body.name), links[body.name]
         if link is None:
             # Nothing is seen of it.

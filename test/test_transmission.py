@@ -24,7 +24,7 @@ from linkage_ros.c_code.axes import actuators, joints
 from linkage_ros.c_code.package import package
 import numpy as np
 import pytest
-from scenes import alone, ROOT
+from scenes import alone, BOOM, DRAG, LIFT, ROOT, SLOT
 from test_rods import G1
 
 COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
@@ -42,11 +42,10 @@ SCENE = {
     'leg.type': 'five_bar', 'leg.crank.start': 1.9, 'leg.crank2.start': 1.24,
     'leg.crank.ratio': 0.1, 'leg.crank2.offset': -0.2,
     'leg.loads': ['P=3 -20', 'AP=0.5', 'CP=-0.7'],
-    'boom.type': 'custom', 'boom.scale': 2.0, 'boom.joints': [
-        'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C rigid O B 2 1.4 left'],
+    'boom.type': 'custom', 'boom.scale': 2.0,
+    'boom.joints': [*BOOM, 'C rigid O B 2 1.4 left'],
     'boom.cylinder.ratio': 0.001, 'boom.loads': ['C=0 -100'],
-    'lift.type': 'custom', 'lift.joints': [
-        'O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left'],
+    'lift.type': 'custom', 'lift.joints': LIFT,
     'lift.crank.measures': 'QB', 'lift.crank.ratio': -2.0, 'lift.crank.start': 0.5,
     'lift.crank.sweep': [0.2, 2.2],
     'rocker.type': 'four_bar', 'rocker.crank.start': 1.0, 'rocker.loads': ['P=1 2'],
@@ -66,8 +65,6 @@ SCENE = {
     'int.joint_names': ['QB=while/1:x']}
 GEARED = ['O ground 0 0', 'Q ground 1.49 -0.6', 'A crank O 0.427',
           'D crank Q 0.27 geared crank -2 0', 'B dyad A D 2.661 2.4 left']
-DRAG = ['O ground 0 0', 'Q ground 0.3 0', 'A crank O 1', 'B dyad A Q 0.9 1.1 left']
-SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 out 0.08']
 
 
 def states(mechanism, count, seed=1):
@@ -122,7 +119,6 @@ def test_what_is_not_assembled_is_out_of_reach_whatever_is_commanded(tmp_path):
     assert own[0] < low - 0.1 and own[-1] > high + 0.1
 
 
-LIFT = ['O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left']
 READING = mechanisms.create('custom', joints=LIFT).joint_angles(0.5)['QB'] - 0.1
 CHOICES = [
     # A geared joint counts turns both ways, and so does an encoder on it.

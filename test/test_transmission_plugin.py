@@ -22,6 +22,7 @@ from linkage_ros import scene
 from linkage_ros.c_code.package import package
 import numpy as np
 import pytest
+from scenes import DRAG
 import test_transmission
 
 pytestmark = [
@@ -36,7 +37,7 @@ SCENE = {
     'knee.crank.sweep': [-0.45, 0.7],
     'knee.joints': ['O ground 0 0', 'Q ground 0 -0.25', 'A crank O 0.045',
                     'B dyad A Q 0.25 0.036 left'],
-    'drag.type': 'custom', 'drag.joints': test_transmission.DRAG,
+    'drag.type': 'custom', 'drag.joints': DRAG,
     **{key: value for key, value in test_transmission.SCENE.items()
        if key.partition('.')[0] in ('lever', 'leg', 'lift') and key != 'lever.loads'}}
 OTHER = {'mechanisms': ['rocker'], 'rocker.type': 'four_bar', 'rocker.crank.start': 1.0}

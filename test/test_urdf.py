@@ -12,7 +12,7 @@ from linkage_ros.robot_model import urdf
 import numpy as np
 import pytest
 from robots import LIBRARIES, Pinocchio, rotation, Yourdfpy
-from scenes import alone
+from scenes import alone, BOOM, ENGINE
 from truth.cases import CASES
 
 TOLERANCE = 1e-12
@@ -21,14 +21,11 @@ SLIDES = {'slide', 'block', 'cylinder', 'left0_block', 'left1_block', 'right0_bl
 POSE = [0.3, -0.2, 0.92, math.pi / 2.0, 0.4, -1.1]
 GRIPPER = ['O ground 0 0', 'Q ground 0.08 0', 'A crank O 0.03', 'B dyad A Q 0.07 0.05 left',
            'P rigid A B 0.04 0.06 right', 'T rigid B Q 0.07 0.09 left']
-ENGINE = ['O ground 0 0', 'G ground 0 -20', 'A crank O 40', 'B slider A 120 G 0.5 out',
-          'P rigid A B 50 90 left']
 FIVE_BAR = ['O ground 0 0', 'Q ground 0.118 0', 'A crank O 0.09', 'C crank Q 0.08 up',
             'P dyad A C 0.1 0.09 left', 'G ground 0 0.2', 'S slider P 0.3 G 0.2 out']
 GEARED = ['O ground 0 0', 'Q ground 0.3 0', 'A crank O 0.1', 'B crank Q 0.08', 'D ground 0.3 0.2',
           'E crank D 0.05 geared crank2 -0.5 0.2', 'P dyad A B 0.25 0.22 left']
-BOOM = ['O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right', 'C line O B 1.6',
-        'E rigid O B 0.6 0.7 left', 'F cylinder E B 0.4 left']
+ON_BOOM = [*BOOM, 'C line O B 1.6', 'E rigid O B 0.6 0.7 left', 'F cylinder E B 0.4 left']
 SWINGING_BLOCK = ['O ground 0 0', 'Q ground 2 0', 'A crank O 1', 'P slot A Q 0 out 4',
                   'B slider A 3 Q along O out']
 
@@ -51,8 +48,8 @@ MACHINES = {
         'crank=-m_crank+0.3', 'left0_block=-m_left0_block+0.7', 'right1_block=m_right1_block-2',
         'right0_AB=-m_right0_AB', 'left1_AB=m_left1_AB+2.5']),
     'swinging block on the ground': lambda: mechanism(SWINGING_BLOCK),
-    'boom': lambda: mechanism(BOOM[:4], scale=2.0),
-    'boom and arm': lambda: mechanism(BOOM, scale=2.0),
+    'boom': lambda: mechanism(ON_BOOM[:4], scale=2.0),
+    'boom and arm': lambda: mechanism(ON_BOOM, scale=2.0),
     'five-bar with a gear': lambda: mechanism(
         GEARED, scale=1.0, crank2__sweep=[-6.0, 1.0],
         joint_names=['crank2=-m_crank2+1.0', 'crank3=-m_crank3-0.4']),

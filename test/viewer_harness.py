@@ -6,7 +6,6 @@
 import contextlib
 import itertools
 import json
-import math
 from pathlib import Path
 import resource
 import threading
@@ -24,6 +23,8 @@ import numpy as np
 import pytest
 import rclpy
 from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.task import Future
+from ros_harness import InvalidHandle
 from scenes import ROOT
 from visualization_msgs.msg import MarkerArray
 
@@ -49,12 +50,17 @@ class Show(contextlib.ExitStack):
         self.names = scene.read(parameters).mechanisms if parameters else ()
         self.viewer = graph.start(Viewer, {'port': 0})
         self.nodes = [graph.start(kind, parameters, **kwargs) for kind in kinds]
-        self._over = threading.Event()
-        self._thread = threading.Thread(
-            target=graph.until, args=(self._over.is_set, math.inf), daemon=True)
-        self._thread.start()
-        self.callback(self._thread.join)
-        self.callback(self._over.set)
+        self._over = Future()
+        thread = threading.Thread(target=self._work, daemon=True)
+        thread.start()
+        self.callback(thread.join)
+        self.callback(self._over.set_result, None)
+
+    def _work(self):
+        while not self._over.done():
+            # Another thread ends a node while this one waits for it.
+            with contextlib.suppress(InvalidHandle):
+                self.graph.executor.spin_until_future_complete(self._over)
 
     @property
     def url(self):

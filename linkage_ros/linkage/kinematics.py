@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from .formulas import formulas_of, LinkPoint, Points
 from .geometry.spatial import IN_SINGLE
-from .inputs import FASTEST, Input, MAX_PERIOD, MOST_TURNS, spread
+from .inputs import FASTEST, Input, MAX_PERIOD, MOST_TURNS, PART, spread
 from .text import joint_lines
 from .text.arguments import checked_dimensions, numbers
 from .text.design import Design
@@ -267,9 +267,10 @@ class Kinematics:
             return self._with_stroke(input_)
         ratios = self._ratios(by)
         input_ = input_._replace(speed=max(1.0, *map(abs, ratios)))
-        most = input_.step * MAX_PERIOD ** (1.0 / len(self.structure.built.inputs))
+        most, part = (input_.step * turns ** (1.0 / len(self.structure.built.inputs))
+                      for turns in (MAX_PERIOD, PART))
         period = self._period(by, ratios, most)
-        turns = period if period <= max(most, 1.0) else max(2.0, 2.0 * round(0.5 * most))
+        turns = period if period <= max(most, 1.0) else max(2.0, 2.0 * round(0.5 * part))
         return input_._replace(low=-math.pi * turns, high=math.pi * turns, period=period)
 
     def _with_stroke(self, input_: Input) -> Input:

@@ -28,8 +28,8 @@ PATHS, POSES, MIN_POSES = 12, 240, 200
 MISFIT = 10.0
 # A mechanism whose joints are farther off in the file's pose [rad, or of the size] is another.
 OTHER = 1e-3
-# Stiffness next to a change point, as a part of the largest.
-CHANGE = 0.25
+# Loops that are less stiff, of their size, are next to a change point.
+CHANGE = 0.03
 
 
 class Difference(ValueError):
@@ -40,8 +40,8 @@ class Imported(NamedTuple):
     """
     A mechanism's name, its parameters and its report.
 
-    Also the joints that move it, its sources or what follows them, the misfit of the file, of the
-    size, and hinges of balls that may stay where they are.
+    Also the joints that move it, its sources or what follows them, and the misfit of the file, of
+    the size.
     """
 
     name: str
@@ -49,7 +49,6 @@ class Imported(NamedTuple):
     reports: List[str]
     driven: Sequence[str]
     slack: float = 0.0
-    still: Sequence[str] = ()
 
 
 def name_beside(others: Sequence[Imported], name: str) -> str:
@@ -249,9 +248,9 @@ class _Loops:
             motors = {name: walk.joints[name][path, [step]] for name in self._motors}
             fixed = component.is_of([*motors])
             new = component.closed(component.moved_to(poses[-1], motors), fixed, 40)
-            stiffness = component.stiffness(np.concatenate([*poses, new]), fixed)
-            if not (np.max(np.abs(component.errors(new)[0] - self._misfit)) < self._allowed
-                    and np.min(stiffness) > CHANGE * np.max(stiffness)):
+            ways = max(len(component.free_ways(pose[0], fixed, CHANGE)) for pose in (*poses, new))
+            if ways > component.nullity(fixed) or not np.max(
+                    np.abs(component.errors(new)[0] - self._misfit)) < self._allowed:
                 return
         raise Difference(self._at({name: values[path, step] for name, values in
                                    walk.joints.items()}) + (

@@ -85,7 +85,8 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]
     closed = closing.closed(robot)
     robot, reports = closed.robot, closed.report
     imported: List[check.Imported] = []
-    for group in loops.groups(robot):
+    groups = loops.groups(robot)
+    for group in groups:
         fault = next((closed.faults[joint.name] for joint in group.joints
                       if joint.name in closed.faults), None)
         joints = group.joints
@@ -106,11 +107,13 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]
             bodies = dict.fromkeys(body for joint in joints for body in joint.bodies)
             reports.append(f'Left out: {listed(bodies, 200)}: '
                            f'{in_space * bool(group.why)}{why}.')
-    return _checked(robot, imported, reports)
+    balls = [[hinge.name for hinge, _ in joint.chain] for group in groups
+             for joint in group.joints]
+    return _checked(robot, balls, imported, reports)
 
 
-def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str]
-             ) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
+def _checked(robot: Robot, balls: Sequence[Sequence[str]], imported: Sequence[check.Imported],
+             reports: List[str]) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
     """Return what is described, without mechanisms that differ from the robot."""
     if not imported:
         raise cli.RequestError(' '.join(reports) or 'no joint of this robot closes a loop')
@@ -118,14 +121,15 @@ def _checked(robot: Robot, imported: Sequence[check.Imported], reports: List[str
     for made in imported:
         parameters.update(made.parameters)
     mechanisms = scene.read(parameters).mechanisms
-    stay = {name for made in imported for name in made.still}
-    still = {name: value for name, value in robot.positions.items()
-             if name in stay - check.published(mechanisms)}
+    known = check.published(mechanisms)
+    # Of a ball of which some hinges turn the others stay.
+    still = {name: robot.positions[name] for ball in balls if known.intersection(ball)
+             for name in ball if name not in known}
     rest, lost = others(robot, mechanisms, still)
     mechanisms = scene.read({**parameters, **rest}).mechanisms
     checks, wrong = check.compared(robot, mechanisms, imported)
     if wrong:
-        return _checked(robot, [made for made in imported if made.name not in wrong], [
+        return _checked(robot, balls, [made for made in imported if made.name not in wrong], [
             *reports, *(f'Left out: {name}: {WRONG}: {why}.' for name, why in wrong.items())])
     reports = [*reports, *(report for made in imported for report in made.reports), *checks]
     if lost:

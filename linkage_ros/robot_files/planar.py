@@ -42,13 +42,9 @@ class Drawing(Dyads):
         The pose of its plane on the ground.
     joints : list of Joint
         Joints whose places are complex [m], and so are the axes of slides; the axis of a hinge is
-        1 or -1.
+        1 or -1. Of a ball in the plane it is the hinge that turns.
     gap, lean : float
         The distance that cannot be closed [m], and the inclination of axes [rad].
-    measured : list of Joint
-        Hinges and slides with a position, those of balls in the plane included.
-    still : list of str
-        The other hinges of these balls.
     drives : list of Source
         The inputs.
     driven : list of Joint
@@ -108,28 +104,23 @@ class Drawing(Dyads):
         seen = np.linalg.inv(base @ self.frame)
         self.joints: List[Joint] = []
         self.gap = 0.0
+        up = hinges[0].axis
+        stiff = {body for joint in group.joints for body in joint.bodies
+                 if len(joint.hinges) == 2 and not loops.pins(joint, up)}
         for joint in group.joints:
+            # A rod turns in the plane about one hinge of the ball at its end; the others stay,
+            # unless its other end needs them.
+            pins = [(hinge, sign) for hinge, sign in joint.chain if hinge in loops.pins(joint, up)]
+            if pins and not stiff & {*joint.bodies}:
+                (hinge, sign), *_ = pins
+                joint = replace(joint, name=hinge.name, kind=HINGE, position=hinge.position,
+                                axes=(sign * hinge.axis,) * 2)
             first, second = (complex(*(seen @ [*place, 1.0])[:2]) for place in joint.places)
             axis, slides = seen[:3, :3] @ joint.axis, joint.kind == SLIDE
             along = complex(*axis[:2]) / np.hypot(*axis[:2]) if slides else float(np.sign(axis[2]))
             self.joints.append(replace(joint, places=(first, second), axes=[along] * 2))
             apart = second - first
             self.gap = max(self.gap, abs((apart / along).imag if slides else apart))
-        self.measured = [joint for joint in self.joints if joint.position is not None]
-        self.still: List[str] = []
-        up = hinges[0].axis
-        stiff = {body for joint in self.joints for body in joint.bodies
-                 if len(joint.hinges) == 2 and not loops.pins(joint, up)}
-        for joint in self.joints:
-            # A rod turns in the plane about one hinge of the ball at its end; the others stay,
-            # unless its other end needs them.
-            pins = [(hinge, sign) for hinge, sign in joint.chain if hinge in loops.pins(joint, up)]
-            if pins and not stiff & {*joint.bodies}:
-                (hinge, sign), *_ = pins
-                self.measured.append(replace(
-                    joint, name=hinge.name, kind=HINGE, position=hinge.position,
-                    axes=[sign * float(np.sign(hinge.axis @ up))] * 2))
-                self.still += [other.name for other, _ in joint.chain if other is not hinge]
 
     def error(self, lines: Sequence[str], name: str) -> float:
         """Return how far lines have a joint from where the file has it [m]."""
@@ -244,7 +235,7 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
         reports.append(f'Warning: the file is not exact: axes lean by {drawing.lean:.2g} rad, and '
                        f'loops stay open by {drawing.gap:.2g} m; so is what is published.')
     driven = [joint.name for joint in drawing.driven]
-    return check.Imported(name, parameters, reports, driven, slack, drawing.still)
+    return check.Imported(name, parameters, reports, driven, slack)
 
 
 def _sweep(drive: check.Source, limits: Tuple[float, float], settings: scene.InputSettings
@@ -306,9 +297,9 @@ def _why(drawing: Drawing) -> str:
 def _joints(drawing: Drawing) -> List[Tuple[str, float, str, float]]:
     """Return the link, the sign, the name and the position of each joint that links measure."""
     measured = []
-    for joint in drawing.measured:
+    for joint in drawing.joints:
         with suppress(ValueError):
-            if joint not in drawing.driven:
+            if joint.position is not None and joint not in drawing.driven:
                 measured.append((joint, *drawing.measured_by(joint)))
     links = {link.name: link for link in mechanisms.create('custom', joints=drawing.lines).links}
     joints = []

@@ -15,7 +15,6 @@ from . import sdf, urdf
 from .elements import parse
 from ..cli import RequestError
 from ..optional import needs
-from ..robot_model import bodies
 from ..robot_model.robot import posed, Robot
 from ..robot_model.urdf import write
 
@@ -54,9 +53,9 @@ def description(path: str, robot: Robot) -> str:
     return Path(path).read_text() if parse(path).tag == 'robot' else write(drawn(robot))
 
 
-def drawn(robot: Robot) -> bodies.Model:
-    """Return the tree of a robot as a model that is written, its joints at zero."""
-    return bodies.Model('robot', robot.root, [posed(robot, dict.fromkeys(robot.positions, 0.0))])
+def drawn(robot: Robot) -> Robot:
+    """Return a robot as it is written, its joints at zero."""
+    return posed(robot, dict.fromkeys(robot.positions, 0.0))
 
 
 @contextmanager

@@ -52,8 +52,6 @@ class Rods:
         self._ends: Dict[str, str] = {}
         self.rods: List[str] = []
         self.drives: List[check.Source] = []
-        # Third hinges of balls, which stay.
-        self.still: List[str] = []
         self._names: Set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
         rods = {body: held for body, held in _on_bodies(group.joints).items()
                 if body != ground and [joint.kind for joint in held] == [BALL, BALL]}
@@ -147,7 +145,6 @@ class Rods:
                 link = self._link(replace(hinge, limits=None), link, place, axis)
                 self._rod(f'{hinge.name}_mark', self._end(other, body),
                           f'{link} {self._text(place + mark)}', way - mark)
-            self.still += [hinge.name for hinge in chain if hinge not in (first, second)]
             return
 
     def _cylinder(self, half: Joint, balls: Sequence[Joint]) -> None:
@@ -209,7 +206,7 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
     mechanism = scene.read({'mechanisms': [name], **parameters}).mechanisms[name]
     for drive, (low, high) in zip(mechanism.inputs.values(), _sweeps(mechanism, limits)):
         parameters[f'{name}.{drive.input.name}.sweep'] = [float(short(low)), float(short(high))]
-    return check.Imported(name, parameters, reports, sources, still=made.still)
+    return check.Imported(name, parameters, reports, sources)
 
 
 def _sweeps(mechanism: scene.SceneMechanism, limits: Mapping[str, Tuple[float, float]]

@@ -83,8 +83,7 @@ class _Model:
         scope = where if is_model else where.rpartition('::')[0]
         if name == 'world':
             return name
-        full = scope if name == '__model__' else f'{scope}::{name}'.lstrip(':')
-        full = full[:-len('::__model__')] if full.endswith('::__model__') else full
+        full = f'{scope}::{name}'.removesuffix('::__model__').lstrip(':')
         if full not in self._parts:
             raise RequestError(f'{where or "the model"} names {name!r}, which is not there')
         return full

@@ -207,9 +207,7 @@ class Component:
         if not slopes:
             return error, np.zeros(0)
         parents = frames[:, self._parents]
-        turned, twists = parents[..., :3, :3].swapaxes(2, 3), (parents @ self._twists)[..., :3, :]
-        twists[..., :3] = twists[..., :3] @ turned
-        twists[..., 3:] -= twists[..., :3] @ parents[..., :3, 3:]
+        twists = (parents @ self._twists @ np.linalg.inv(parents))[..., :3, :]
         rates = seen.reshape(len(seen), -1, 4) @ twists.reshape(len(seen), -1, 4).swapaxes(1, 2)
         rates = rates.reshape(len(seen), *self._signs.shape, 3) * self._signs[..., None]
         slope = rates.sum(axis=2).swapaxes(2, 3)
@@ -311,12 +309,6 @@ class Component:
         """Return the degrees of freedom that the loops leave, in a random open pose."""
         pose = np.random.default_rng(2).uniform(-0.3, 0.3, len(fixed)) * self.unit
         return len(self.free_ways(pose, fixed))
-
-    def stiffness(self, poses: np.ndarray, fixed: np.ndarray) -> np.ndarray:
-        """Return the product of singular values of the loops in each pose: 0 at a dead point."""
-        slope = self.errors(poses, True)[1][:, :, ~fixed] / self.size
-        count = np.sum(~fixed) - self.nullity(fixed)
-        return np.prod(np.linalg.svd(slope, compute_uv=False)[:, :count], axis=1)
 
     def loose(self, pose: np.ndarray, motors: Sequence[str], least: float = DEAD_POINT
               ) -> Tuple[List[str], np.ndarray]:

@@ -20,10 +20,10 @@ Legs of a walker have their prefix before link and point, and one crank for all 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 import math
-from typing import Any, Dict, Iterable, Iterator, List, Optional, Sequence
+from typing import Any, Dict, Iterable, Iterator, Optional, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -32,7 +32,7 @@ from . import shapes
 from .robot import HINGE, posed, Robot, SLIDE
 from .shapes import BALL, BOX, CYLINDER, Piece, Place, weight
 from .. import palette
-from ..linkage import Arc, extremes, GROUND, Leg, Link, Mechanism
+from ..linkage import Arc, extremes, GROUND, Leg, Link
 from ..scene import SceneError, SceneMechanism
 from ..scene.motion import Motion
 from ..words import listed
@@ -56,30 +56,10 @@ DENSITY = 2700.0
 SLACK = 1e-6
 
 
-@dataclass
-class Model:
-    """
-    Robots below a root link: what all formats are written from.
-
-    Attributes
-    ----------
-    parts : list of Robot
-        That of each mechanism, or that of a file.
-    density : float
-        Of all bodies [kg/m^3], for a simulation.
-
-    """
-
-    name: str
-    root: str
-    parts: List[Robot]
-    density: float = 0.0
-
-
 def robot(mechanisms: Iterable[SceneMechanism], frame_id: str,
-          width: Optional[float] = None) -> Model:
+          width: Optional[float] = None, density: float = 0.0) -> Robot:
     """
-    Return mechanisms as one robot model.
+    Return mechanisms as one robot.
 
     Parameters
     ----------
@@ -89,27 +69,34 @@ def robot(mechanisms: Iterable[SceneMechanism], frame_id: str,
         The root link: the frame of the poses of mechanisms without their own frame.
     width : float, optional
         Thickness of bars [m], with all else in proportion; None: 1/40 of the longest bar.
+    density : float, optional
+        That of a robot for simulators [kg/m^3], with closed loops, masses, gears and motors. All
+        inputs are at their starts, so that loops are closed at the beginning of a simulation.
 
     Raises
     ------
     SceneError
-        If the links would not form a tree, or the longest bar is out of range.
+        If the links would not form a tree, the longest bar is out of range, or a robot for
+        simulators has no pose.
 
     """
-    return merged([Model(mechanism.name, base, [_Tree(mechanism, base, width).robot])
-                   for mechanism in mechanisms for base in [mechanism.frame_id or frame_id]])
+    trees = [(mechanism, _Tree(mechanism, mechanism.frame_id or frame_id, width).robot)
+             for mechanism in mechanisms]
+    made = merged([_started(*tree, density) if density else tree[1] for tree in trees])
+    return replace(made, density=density)
 
 
-def merged(models: Sequence[Model]) -> Model:
+def merged(robots: Sequence[Robot]) -> Robot:
     """
-    Return robot models as one; raise SceneError if they do not form a tree.
+    Return robots of mechanisms as one; raise SceneError if they do not form a tree.
 
     They must have the same root link, or the root of one must be a link of another.
     """
-    parts = [part for model in models for part in model.parts]
-    below = {link: part.base for part in parts for link in part.frames}
-    # From the base of each part the bases below it, up to the last.
-    lines = {part.base: [part.base] for part in parts}
+    links = [(link, robot.root) for robot in robots for link in (
+        *robot.grounds, *(joint.bodies[1] for joint in robot.joints))]
+    below = dict(links)
+    # From each root the roots below it, up to the last.
+    lines = {robot.root: [robot.root] for robot in robots}
     for line in lines.values():
         while len(line) <= len(lines) and line[-1] in below:
             line.append(below[line[-1]])
@@ -117,17 +104,22 @@ def merged(models: Sequence[Model]) -> Model:
     if more or root in below:
         raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
                          f'link of another one of them, not {listed(bases, 120)}')
-    roots = [part.root for part in parts]
-    joints = [joint for part in parts for joint in part.joints]
-    for tag, names in (('link', [root, *roots, *(joint.bodies[1] for joint in joints)]),
-                       ('joint', [*map('{}_fixed'.format, roots),
-                                  *(joint.name for joint in joints)])):
+    made = Robot(root, {root: np.eye(4)}, name='linkages' if len(robots) > 1 else robots[0].name)
+    for robot in sorted(robots, key=lambda robot: len(lines[robot.root])):
+        made.frames.update({link: frame for link, frame in robot.frames.items()
+                            if link != robot.root})
+        made.joints += robot.joints
+        made.driven += robot.driven
+        for key in ('follows', 'pieces', 'meets', 'servos', 'grounds'):
+            getattr(made, key).update(getattr(robot, key))
+    for tag, names in (('link', [root, *(link for link, _ in links)]),
+                       ('joint', [*map('{}_fixed'.format, made.grounds),
+                                  *(joint.name for joint in made.joints)])):
         (name, count), = Counter(names).most_common(1)
         if count > 1:
-            raise SceneError(f'{listed(f"{model.name}.joints" for model in models)} must have '
+            raise SceneError(f'{listed(f"{robot.name}.joints" for robot in robots)} must have '
                              f'other names: the robot model would have two {tag}s {name}')
-    return Model('linkages' if len(models) > 1 else models[0].name, root,
-                 sorted(parts, key=lambda part: len(lines[part.base])))
+    return made
 
 
 def size(mechanism: SceneMechanism) -> float:
@@ -152,15 +144,10 @@ class _Tree:
         self._mechanism, legs = mechanism, mechanism.assembly().legs
         self._shapes = shapes.shapes(mechanism)
         self._frames = {GROUND: shapes.ground_frame(mechanism.linkage), **mechanism.linkage.frames}
-        self._travels = {
-            name: (mechanism.scale_of(name) * low, mechanism.scale_of(name) * high)
-            for name, (low, high) in travels(mechanism.linkage, mechanism.reach).items()}
-        # The crank of several legs is limited by all of them.
-        if len(legs) == 1:
-            self._travels.update(_input_travels(mechanism))
+        self._travels = travels(mechanism)
         ground = self._body('', GROUND)
-        self.robot = Robot(ground, {ground: np.eye(4)}, pieces={ground: []}, base=base,
-                           pose=mechanism.pose, mechanism=mechanism)
+        self.robot = Robot(base, {base: np.eye(4), ground: np.eye(4)}, pieces={ground: []},
+                           grounds={ground: (base, mechanism.pose)}, name=mechanism.name)
         self._shared = mechanism.linkage.links[0] if len(legs) > 1 else None
         if self._shared:
             self._hang('', 1.0, self._shared)
@@ -239,66 +226,39 @@ class _Tree:
         return (side * x, y) if name == GROUND else (x, side * y)
 
 
-def _input_travels(mechanism: SceneMechanism) -> Dict[str, Arc]:
-    """Return the outermost ends of each input's reach that is no full rotation."""
+def travels(mechanism: SceneMechanism) -> Dict[str, Arc]:
+    """
+    Return the travel of each joint: lower and upper end of its value [rad or m].
+
+    That of an input is its reach; a full rotation and the crank of several legs, which all of them
+    limit, have none. That of another joint is wider by SLACK; one that turns past +-pi has none.
+    With several inputs, whose reach depends on each other, no other joint has one.
+    """
+    linkage, reach, scale = mechanism.linkage, mechanism.reach, mechanism.scale_of
     ends: Dict[str, Arc] = {}
+    has_one_leg = mechanism.leg_pairs == 1 and not mechanism.mirrored
     for name, settings in mechanism.inputs.items():
-        if settings.sweep and not settings.input.is_whole(settings.reach):
+        if has_one_leg and settings.sweep and not settings.input.is_whole(settings.reach):
             low, high = np.min(settings.reach), np.max(settings.reach)
             # A crank's angle is in the turn of its sweep.
             turns = math.tau * ((settings.sweep[1] - low) // math.tau) * settings.input.turns
             ends[name] = float(low + turns), float(high + turns)
+    others = [name for name in linkage.joints if name not in mechanism.inputs]
+    if len(mechanism.inputs) == 1 and others:
+        found = linkage.cache.get_or_make(('travels', *reach), lambda: np.array([[extremes(
+            lambda theta, name=name: linkage.joint_angles(theta, [name])[name], *arc,
+            linkage.is_angle(name)) for arc in reach] for name in others]))
+        for name, lows, highs in zip(others, *found[..., 0].transpose(2, 0, 1)):
+            slack = SLACK if linkage.is_angle(name) else SLACK * float(linkage.longest)
+            low, high = float(lows.min()) - slack, float(highs.max()) + slack
+            if not linkage.is_angle(name) or -math.pi < low < high <= math.pi:
+                ends[name] = scale(name) * low, scale(name) * high
     return ends
 
 
-def travels(linkage: Mechanism, reach: Sequence[Arc]) -> Dict[str, Arc]:
-    """
-    Return the travel of each joint except the inputs.
-
-    Parameters
-    ----------
-    linkage : Mechanism
-        The linkage.
-    reach : sequence of (float, float)
-        Arcs of its input [rad or m].
-
-    Returns
-    -------
-    dict
-        For joints the bounds (lo, hi) of their values in `joint_angles` [rad; a slide: m], wider
-        by SLACK; none for a joint that turns past +-pi. With several inputs, whose reach depends
-        on each other, it is empty.
-
-    """
-    inputs = {input_.name for input_ in linkage.inputs}
-    kinds = {link.name: link.kind for link in linkage.links if link.name not in inputs}
-    if len(inputs) > 1 or not kinds:
-        return {}
-    turning = np.array([kind != 'prismatic' for kind in kinds.values()])
-    ends = linkage.cache.get_or_make(('travels', *reach), lambda: np.array([[extremes(
-        lambda theta, name=name: linkage.joint_angles(theta, [name])[name], *arc, turns)
-        for name, turns in zip(kinds, turning)] for arc in reach]))
-    slack = np.where(turning, SLACK, SLACK * float(linkage.longest))
-    lows, highs = ends[:, :, 0, 0].min(axis=0) - slack, ends[:, :, 1, 0].max(axis=0) + slack
-    return {name: (low, high) for name, turns, low, high in zip(
-        kinds, turning, lows.tolist(), highs.tolist())
-        if not turns or -math.pi < low < high <= math.pi}
-
-
-def assembled(model: Model, density: float = DENSITY) -> Model:
-    """
-    Return a robot model for simulators, with closed loops, masses, gears and motors.
-
-    All inputs are at their starts, so that every loop is closed at the beginning of a simulation;
-    raises SceneError if there is no pose.
-    """
-    return replace(model, density=density, parts=[
-        _started(part, density) for part in model.parts])
-
-
-def _started(part: Robot, density: float) -> Robot:
+def _started(mechanism: SceneMechanism, part: Robot, density: float) -> Robot:
     """Return the robot of a mechanism at the start of its inputs, with motors and gears."""
-    mechanism, joints = part.mechanism, part.mechanism.joints
+    joints = mechanism.joints
     assembly, linkage, inputs = mechanism.assembly(), mechanism.linkage, mechanism.inputs
     values = {name: Motion.of(settings).at(0)[0] for name, settings in inputs.items()}
     starts, solution = [*values.values()], assembly.solution((), assembly.joints)

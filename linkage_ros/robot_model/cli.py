@@ -6,7 +6,7 @@
 from typing import Optional, Sequence
 
 from . import bodies, mjcf, sdf, urdf
-from .bodies import assembled, DENSITY
+from .bodies import DENSITY
 from .. import cli, scene
 
 NAME = 'urdf'
@@ -41,8 +41,7 @@ def show(args: Optional[Sequence[str]], given_scene: Optional[scene.Scene] = Non
     shown = given_scene or (scene.load(options.scene) if options.scene else scene.read({}))
     if options.format == 'urdf' and options.density:
         raise cli.RequestError('--density is for sdf and mjcf only: the URDF has no masses')
+    density = 0.0 if options.format == 'urdf' else options.density or DENSITY
     model = bodies.robot(cli.chosen(shown.mechanisms, options.mechanism), shown.frame_id,
-                         options.width)
-    if options.format != 'urdf':
-        model = assembled(model, options.density or DENSITY)
+                         options.width, density)
     print({'urdf': urdf, 'sdf': sdf, 'mjcf': mjcf}[options.format].write(model))

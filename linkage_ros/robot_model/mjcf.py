@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from xml.etree.ElementTree import Element, indent, tostring
 
-from .bodies import add, COLOURS, Model
+from .bodies import add, COLOURS
 from .robot import Body, HINGE, Joint, Robot
 from .shapes import BALL, BOX, CYLINDER
 
@@ -27,33 +27,30 @@ YIELD, STRENGTH = 1e-3, 10.0
 GRAVITY = 9.81
 
 
-def write(model: Model) -> str:
-    """Return a robot model, its loops closed, as MJCF."""
-    step = STEP * math.sqrt(min([1.0, *(
-        arm for robot in model.parts for _, arm in robot.servos.values())]))
-    root = Element('mujoco', model=model.name)
+def write(robot: Robot) -> str:
+    """Return a robot, its loops closed, as MJCF."""
+    step = STEP * math.sqrt(min([1.0, *(arm for _, arm in robot.servos.values())]))
+    root = Element('mujoco', model=robot.name)
     add(root, 'compiler', angle='radian', eulerseq='XYZ')
     add(root, 'option', timestep=step, integrator='implicitfast')
     usual = add(root, 'default')
-    add(usual, 'geom', contype='0', conaffinity='0', density=model.density)
+    add(usual, 'geom', contype='0', conaffinity='0', density=robot.density)
     add(usual, 'equality', solref=(2.0 * step, 1.0), solimp='0.9999 0.9999 1')
-    elements = {model.root: add(root, 'worldbody')}
+    elements = {robot.root: add(root, 'worldbody')}
     equality, actuator = add(root, 'equality'), add(root, 'actuator')
-    starts = []
-    for robot in model.parts:
-        bodies = {body.name: body for body in robot.bodies()}
-        for body in bodies.values():
-            elements[body.name] = _add_body(elements[body.parent], body, robot)
-        joints = {joint.name: joint for joint in robot.joints}
-        for cut, met in robot.meets.items():
-            add(equality, 'connect', name=cut, body1=bodies[met].parent, body2=bodies[cut].parent,
-                anchor=bodies[met].pose[:3])
-        for name in robot.follows:
-            other, ratio, offset = robot.changes(name)
-            add(equality, 'joint', joint1=name, joint2=other, polycoef=(offset, ratio, 0, 0, 0))
-        for name in robot.driven:
-            _add_motor(actuator, joints[name], robot)
-            starts.append(robot.positions[name])
+    bodies = {body.name: body for body in robot.bodies()}
+    for body in bodies.values():
+        elements[body.name] = _add_body(elements[body.parent], body, robot)
+    joints = {joint.name: joint for joint in robot.joints}
+    for cut, met in robot.meets.items():
+        add(equality, 'connect', name=cut, body1=bodies[met].parent, body2=bodies[cut].parent,
+            anchor=bodies[met].pose[:3])
+    for name in robot.follows:
+        other, ratio, offset = robot.changes(name)
+        add(equality, 'joint', joint1=name, joint2=other, polycoef=(offset, ratio, 0, 0, 0))
+    for name in robot.driven:
+        _add_motor(actuator, joints[name], robot)
+    starts = [robot.positions[name] for name in robot.driven]
     add(add(root, 'keyframe'), 'key', name='start', ctrl=starts)
     indent(root)
     return tostring(root, encoding='unicode')

@@ -179,10 +179,13 @@ class Robot:
         For each body that was cut off a closed loop the other one, whose origin is in its own.
     servos : dict
         The mass [kg] and the arm [m] that a driven joint moves.
-    base : str
-        The link of another robot on which the root stands, in a `pose`; '' if it stands on none.
-    mechanism : SceneMechanism
-        What it is the robot of, if it is of a scene.
+    grounds : dict
+        The link on which each body without a joint stands, and its pose there; the frames of what
+        it carries are relative to it.
+    name : str
+        Its name in a model.
+    density : float
+        Of all bodies [kg/m^3], for a simulation.
 
     """
 
@@ -195,9 +198,9 @@ class Robot:
     pieces: dict[str, list[Piece]] = field(default_factory=dict)
     meets: dict[str, str] = field(default_factory=dict)
     servos: dict[str, tuple[float, float]] = field(default_factory=dict)
-    base: str = ''
-    pose: Sequence[float] = ()
-    mechanism: Any = None
+    grounds: dict[str, tuple[str, Sequence[float]]] = field(default_factory=dict)
+    name: str = 'robot'
+    density: float = 0.0
 
     def hang(self, name: str, parent: str, place: Sequence[float], kind: str = FIXED,
              axis: Sequence[float] = (0.0, 0.0, 1.0),
@@ -210,12 +213,13 @@ class Robot:
             (frame[:3, :3],) * 2))
 
     def bodies(self) -> Iterator[Body]:
-        """Yield the bodies, parents first, the root if it has a base; joints are at origins."""
-        if self.base:
-            yield Body(self.root, self.base, self.pose)
+        """Yield the bodies except the root, parents first; joints are at origins."""
         span = np.abs([frame[:3, 3] for frame in self.frames.values()]).max()
         for name, (base, joint) in self.spanning_tree()[0].items():
             frame, seen = self.frames[name], self.frames[base]
+            if name in self.grounds:
+                yield Body(name, *self.grounds[name])
+                continue
             if joint.kind in (HINGE, SLIDE) and joint.position is not None:
                 home = at(joint.place(name), frame[:3, :3])
                 is_apart = np.abs(home - frame).max() > 1e-12 * span

@@ -18,34 +18,30 @@ from xml.etree.ElementTree import Element, indent, tostring
 
 import numpy as np
 
-from .bodies import add, COLOURS, Model
+from .bodies import add, COLOURS
 from .robot import Body, HINGE, Joint, Robot, SLIDE
 from .shapes import weight
 
 
-def write(model: Model) -> str:
-    """Return a robot model, its loops closed, as SDF."""
+def write(robot: Robot) -> str:
+    """Return a robot, its loops closed, as SDF."""
     # Gazebo Classic reads versions up to 1.7, which have no mimic.
-    has_mimic = any(robot.follows for robot in model.parts)
-    root = Element('sdf', version='1.11' if has_mimic else '1.7')
-    made = add(root, 'model', name=model.name)
-    for robot in model.parts:
-        parents = {}
-        for body in robot.bodies():
-            parents[body.name] = body.parent
-            if body.name in robot.meets:
-                hinge = Joint(f'{body.name}_hinge', HINGE, (body.parent, body.name), (), ())
-                body = body._replace(joint=hinge, axis=(0.0, 0.0, 1.0))
-            _add_body(made, model, robot, body)
-        for cut, met in robot.meets.items():
-            _add_joint(made, f'{cut}_closed', 'fixed', parents[met], cut)
-            _add_plugin(made, 'detachable-joint', 'DetachableJoint', parent_link=parents[met],
-                        child_model='__model__', child_link=cut)
+    root = Element('sdf', version='1.11' if robot.follows else '1.7')
+    made, parents = add(root, 'model', name=robot.name), {}
+    for body in robot.bodies():
+        parents[body.name] = body.parent
+        if body.name in robot.meets:
+            hinge = Joint(f'{body.name}_hinge', HINGE, (body.parent, body.name), (), ())
+            body = body._replace(joint=hinge, axis=(0.0, 0.0, 1.0))
+        _add_body(made, robot, body)
+    for cut, met in robot.meets.items():
+        _add_joint(made, f'{cut}_closed', 'fixed', parents[met], cut)
+        _add_plugin(made, 'detachable-joint', 'DetachableJoint', parent_link=parents[met],
+                    child_model='__model__', child_link=cut)
     _add_plugin(made, 'joint-state-publisher', 'JointStatePublisher')
-    for robot in model.parts:
-        for name in robot.driven:
-            _add_plugin(made, 'joint-position-controller', 'JointPositionController',
-                        joint_name=name, use_velocity_commands='true')
+    for name in robot.driven:
+        _add_plugin(made, 'joint-position-controller', 'JointPositionController',
+                    joint_name=name, use_velocity_commands='true')
     indent(root)
     return tostring(root, encoding='unicode')
 
@@ -66,14 +62,14 @@ def _add_joint(made: Element, name: str, kind: str, parent: str, child: str) -> 
     return _fill(add(made, 'joint', name=name, type=kind), parent=parent, child=child)
 
 
-def _add_body(made: Element, model: Model, robot: Robot, body: Body) -> None:
+def _add_body(made: Element, robot: Robot, body: Body) -> None:
     """Add a body and its joint, whose positions begin at 0."""
-    base, parent = (('__model__', 'world') if body.parent == model.root else
+    base, parent = (('__model__', 'world') if body.parent == robot.root else
                     (body.parent, body.parent))
     link = add(made, 'link', name=body.name)
     add(link, 'pose', body.pose, relative_to=base)
     if pieces := robot.pieces.get(body.name):
-        mass, centre, moments = weight(pieces, model.density)
+        mass, centre, moments = weight(pieces, robot.density)
         inertial = _fill(add(link, 'inertial'), pose=(*centre, 0.0, 0.0, 0.0, 0.0), mass=mass)
         _fill(add(inertial, 'inertia'), **dict(zip(('ixx', 'iyy', 'izz', 'ixy'), moments)))
     for i, piece in enumerate(pieces or ()):

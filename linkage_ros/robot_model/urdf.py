@@ -18,8 +18,8 @@ from xml.etree.ElementTree import Element, indent, tostring
 import numpy as np
 
 from . import bodies
-from .bodies import add, COLOURS, Model
-from .robot import Body, HINGE
+from .bodies import add, COLOURS
+from .robot import Body, HINGE, Robot
 from .shapes import Piece
 from ..scene import SceneMechanism
 
@@ -32,15 +32,14 @@ def describe(mechanisms: Iterable[SceneMechanism], frame_id: str) -> str:
     return write(bodies.robot(mechanisms, frame_id))
 
 
-def write(model: Model) -> str:
+def write(robot: Robot) -> str:
     """Return a robot model as URDF."""
-    root = Element('robot', name=model.name)
+    root = Element('robot', name=robot.name)
     for colour, rgba in COLOURS.items():
         add(add(root, 'material', name=colour), 'color', rgba=rgba)
-    add(root, 'link', name=model.root)
-    for robot in model.parts:
-        for body in robot.bodies():
-            _add_link(root, body, robot.pieces.get(body.name, ()))
+    add(root, 'link', name=robot.root)
+    for body in robot.bodies():
+        _add_link(root, body, robot.pieces.get(body.name, ()))
     indent(root)
     return tostring(root, encoding='unicode')
 

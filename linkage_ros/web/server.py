@@ -17,7 +17,7 @@ from string import Template
 from threading import Thread
 from typing import Any, Callable
 
-from aiohttp import web, WSCloseCode
+from aiohttp import web, WSCloseCode, WSMsgType
 
 from .feed import Feed
 from .scene_view import Answer, SceneView
@@ -144,7 +144,8 @@ class Server:
 
     async def _connect(self, request: web.Request) -> Any:
         socket_ = web.WebSocketResponse(
-            timeout=MAX_CLOSE_S, max_msg_size=MAX_BYTES, heartbeat=20.0, compress=False)
+            timeout=MAX_CLOSE_S, max_msg_size=MAX_BYTES, heartbeat=20.0, compress=False,
+            autoping=False)
         await socket_.prepare(request)
         client = Client(self._view, socket_)
         self._clients.add(client)
@@ -220,10 +221,13 @@ class Client:
 
     async def _receive(self) -> None:
         async for message in self._socket:
-            if message.data == DRAWN:
+            if message.type == WSMsgType.PING:
+                # What aiohttp sends by itself waits forever for the browser to read it.
+                await asyncio.wait_for(self._socket.pong(message.data), MAX_READ_S)
+            elif message.data == DRAWN:
                 self._ready = True
                 self._news.set()
-            else:
+            elif message.type != WSMsgType.PONG:
                 await self._requests.put(message.data)
             # Other tasks get their turn, however many messages arrive.
             await asyncio.sleep(0)

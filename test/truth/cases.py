@@ -10,12 +10,23 @@ A case is a table: its lines and its dimensions.
 import cmath
 import math
 
+from scenes import example
+
 from .random_linkages import Design
 
 
 def case(lines, dimensions):
     """Return the `Design` of a table of lines, one a joint."""
     return Design(tuple(line.strip() for line in lines.strip().splitlines()), dimensions, {})
+
+
+def shipped(name):
+    """Return the `Design` of the one mechanism of an example."""
+    given = example(name)
+    key, = given['mechanisms']
+    start = f'{key}.dimensions.'
+    return Design(given[f'{key}.joints'], {name.removeprefix(start): value for name, value
+                                           in given.items() if name.startswith(start)}, {})
 
 
 # An excavator's idler stands so far from the ground bar when its piston is at zero [rad].
@@ -68,18 +79,7 @@ CASES = {
         B dyad A F r f right""",
         {'l': abs(FOOT), 'k': abs(CRANK), 'g': abs(FOOT - CRANK), 'a': 0.055, 'r': 0.35012,
          'f': math.hypot(0.05512, 0.006)}),
-    'scissor lift': case("""
-        O ground 0 0
-        X ground a 0
-        F carriage O along X 0.2*a 1.9*a
-        M dyad O F a a left
-        T line O M 2*a
-        U line F M 2*a
-        N dyad U T a a left
-        V line T N 2*a
-        E slider V h O 90deg out
-        L block E 0 -w""",
-        {'a': 1.0, 'h': 0.1, 'w': 1.5}),
+    'scissor lift': shipped('scissor_lift'),
     'Scotch yoke': case("""
         O ground 0 0
         X ground r 0
@@ -114,18 +114,7 @@ CASES = {
         C yoke Q O along A
         B block C 0 r""",
         {'e': 0.01, 'r': 0.04}),
-    'rack steering': case("""
-        G ground 0 0
-        H ground t 0
-        Q ground t/2 -y
-        K ground -t/2 -y
-        R carriage G along H w-s w+s
-        L block R -2*w 0
-        A dyad R Q b a right
-        B dyad L K b a left
-        C rigid Q A e f left
-        D rigid K B e f right""",
-        {'t': 1.3, 'y': 0.05, 'w': 0.35, 's': 0.08, 'b': 0.26, 'a': 0.15, 'e': 0.1, 'f': 0.2}),
+    'rack steering': shipped('rack_steering'),
     'antiparallelogram': case("""
         O ground 0 0
         Q ground g 0

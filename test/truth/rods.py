@@ -54,11 +54,12 @@ def cross(x, y):
 
 
 def turned(point, origin, axis, angle):
-    """Return a point turned about an axis of any length, after Rodrigues."""
-    length = gmpy2.sqrt(dot(axis, axis))
+    """Return a point turned about an axis of any length, after Rodrigues, in digits or floats."""
+    length = dot(axis, axis) ** 0.5
     axis = [x / length for x in axis]
     arm = [x - o for x, o in zip(point, origin)]
-    c, s, along = gmpy2.cos(angle), gmpy2.sin(angle), dot(axis, arm)
+    do = gmpy2 if isinstance(angle, mpfr) else np
+    c, s, along = do.cos(angle), do.sin(angle), dot(axis, arm)
     return [o + x * c + y * s + a * along * (1 - c)
             for o, x, y, a in zip(origin, arm, cross(axis, arm), axis)]
 
@@ -194,40 +195,21 @@ def random_ankle(rng, plausible=True):
                  [vector(0.005, (rng.uniform(0.03, 0.06), y, -0.02)) for y in (side, -side)])
 
 
-def rotated(points, axis, angle):
-    """Return points (..., 3) turned about an axis through the origin, by angles (...)."""
-    axis = np.asarray(axis, float) / np.linalg.norm(axis)
-    c, s = (np.asarray(f(angle))[..., None] for f in (np.cos, np.sin))
-    points = np.asarray(points, float)
-    return points * c + np.cross(axis, points) * s + axis * (points @ axis)[..., None] * (1.0 - c)
-
-
-def foot_point(ankle, which, pitch, roll):
-    """Return where an end on the foot is at both angles, in float64."""
-    second, first = np.array(ankle.second), np.array(ankle.first)
-    point = rotated(np.array(ankle.ends[which]) - second, ankle.second_axis, roll) + second
-    return rotated(point - first, ankle.first_axis, pitch) + first
-
-
-def crank_pin(ankle, which, value):
-    """Return where the pivot of a rod is at a motor's angle, in float64."""
-    motor = np.array(ankle.motors[which])
-    if ankle.motor_axes[which] is None:
-        return np.broadcast_to(ankle.pivots[which], (*np.shape(value), 3))
-    return rotated(np.array(ankle.pivots[which]) - motor, ankle.motor_axes[which], value) + motor
-
-
-def rod_length(ankle, which, value):
-    """Return how long a rod is: as drawn, or as its cylinder is."""
-    if ankle.motor_axes[which] is None:
-        return value
-    return ankle.lengths[which]
+def gap(ankle, which, value, pitch, roll):
+    """Return by how much half the squared length of a rod is off, in digits or floats."""
+    pivot, length = ankle.pivots[which], value
+    # A cylinder is as long as its input is.
+    if ankle.motor_axes[which] is not None:
+        pivot = turned(pivot, ankle.motors[which], ankle.motor_axes[which], value)
+        length = ankle.lengths[which]
+    end = turned(ankle.ends[which], ankle.second, ankle.second_axis, roll)
+    rod = [x - y for x, y in zip(pivot, turned(end, ankle.first, ankle.first_axis, pitch))]
+    return (dot(rod, rod) - length ** 2) / 2
 
 
 def gaps(ankle, motors, pitch, roll):
-    """Return by how much the halves of both squared lengths are off, in float64."""
-    return [0.5 * (((crank_pin(ankle, i, value) - foot_point(ankle, i, pitch, roll)) ** 2).sum(-1)
-                   - rod_length(ankle, i, value) ** 2) for i, value in enumerate(motors)]
+    """Return the gaps of both rods."""
+    return [gap(ankle, which, value, pitch, roll) for which, value in enumerate(motors)]
 
 
 def assemblies(ankle, motors):
@@ -288,21 +270,6 @@ def _distinct(pitch, roll):
     return pitch, roll
 
 
-def exact_gaps(ankle, motors, pitch, roll):
-    """Return what `gaps` does, in digits."""
-    found = []
-    for i, value in enumerate(motors):
-        pivot, end = ankle.pivots[i], ankle.ends[i]
-        length = value
-        if ankle.motor_axes[i] is not None:
-            length = ankle.lengths[i]
-            pivot = turned(pivot, ankle.motors[i], ankle.motor_axes[i], value)
-        end = turned(end, ankle.second, ankle.second_axis, roll)
-        rod = [x - y for x, y in zip(pivot, turned(end, ankle.first, ankle.first_axis, pitch))]
-        found.append((dot(rod, rod) - length ** 2) / 2)
-    return found
-
-
 def pose_error(ankle, motors, pitch, roll):
     """Return both angles' errors, and what half a last digit of each number does to them."""
     vectors = [None if vector is None else list(map(mpfr, vector)) for vector in (
@@ -314,8 +281,8 @@ def pose_error(ankle, motors, pitch, roll):
 
     def gaps_of(vectors, p, r):
         pairs = [vectors[i:i + 2] for i in range(4, 12, 2)]
-        return exact_gaps(Ankle(*vectors[:4], *pairs, [x and x[0] for x in vectors[12:14]]),
-                          [x for x, in vectors[14:]], p, r)
+        return gaps(Ankle(*vectors[:4], *pairs, [x and x[0] for x in vectors[12:14]]),
+                    [x for x, in vectors[14:]], p, r)
 
     for _ in range(4):
         columns = slopes(partial(gaps_of, vectors), (p, r), mpfr(STEP))
@@ -390,8 +357,7 @@ def random_rods(rng, count):
     kind = rng.integers(4, size=count)
     close = hinge + along * any_of(1) + (end - hinge) * 10.0 ** rng.uniform(-12, 0, (count, 1))
     end[kind == 3] = close[kind == 3]
-    foot = np.array([rotated(p - m, a, v) + m for p, m, a, v in zip(
-        pivot, motor, other, value)]) - hinge
+    foot = np.array([turned(*each) for each in zip(pivot, motor, other, value)]) - hinge
     up = ((foot - end + hinge) * along).sum(axis=1)
     w, rho = (np.linalg.norm(np.cross(along, x), axis=1) for x in (foot, end - hinge))
     low, high = np.hypot(up, w - rho), np.hypot(up, w + rho)
@@ -411,16 +377,14 @@ def random_rods(rng, count):
 
 def motor_values(ankle, which, pitch, roll):
     """Return a motor's values for poses, one array for each side of its crank, in float64."""
-    end = foot_point(ankle, which, pitch, roll)
+    zero, quarter, half = (gap(ankle, which, value, pitch, roll)
+                           for value in (0.0, 0.5 * np.pi, np.pi))
     if ankle.motor_axes[which] is None:
-        return [np.linalg.norm(end - ankle.pivots[which], axis=-1)]
-    zero, quarter, half = (crank_pin(ankle, which, x) for x in (0.0, 0.5 * np.pi, np.pi))
-    centre = 0.5 * (zero + half)
-    a, b = ((end - centre) @ (x - centre) for x in (zero, quarter))
-    c = 0.5 * (((end - centre) ** 2).sum(-1) + ((zero - centre) ** 2).sum()
-               - ankle.lengths[which] ** 2)
+        return [np.sqrt(2.0 * zero)]
+    c = 0.5 * (zero + half)
+    a, b = zero - c, quarter - c
     with np.errstate(invalid='ignore'):
-        off = np.arccos(c / np.hypot(a, b))
+        off = np.arccos(-c / np.hypot(a, b))
     return [np.arctan2(b, a) + side * off for side in (1, -1)]
 
 

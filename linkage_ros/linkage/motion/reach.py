@@ -12,7 +12,7 @@ for the whole arc. At each end the linkage can still be assembled.
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Iterable, List, Tuple
+from typing import Any, Callable, Iterable, List, Sequence, Tuple
 
 import numpy as np
 
@@ -68,7 +68,7 @@ def _reach(linkage: Kinematics, others: Tuple[float, ...]) -> List[Arc]:
                  for end in _limits(margins, lo, hi)]
     arcs = reachable_arcs(ends, assembled, input_)
     if not input_.is_whole(arcs):
-        arcs = [_trimmed(assembled, *arc) for arc in arcs]
+        arcs = _trimmed(assembled, arcs)
     return [(lo * step, hi * step) for lo, hi in arcs if lo < hi]
 
 
@@ -131,14 +131,13 @@ def _touches(margins: Callable, theta: np.ndarray, values: np.ndarray) -> np.nda
     return np.clip(np.hstack([found, found - steps, found + steps]).ravel(), theta[0], theta[-1])
 
 
-def _trimmed(assembled: Callable, lo: float, hi: float) -> Arc:
-    """Return an arc shortened to ends at which the linkage can be assembled."""
-    ends = np.array([lo, hi])
+def _trimmed(assembled: Callable, arcs: Sequence[Arc]) -> List[Arc]:
+    """Return arcs shortened to ends at which the linkage can be assembled."""
+    ends = np.reshape(arcs, (-1, 2))
+    inside = np.broadcast_to(ends @ [[1.0 - INSIDE], [INSIDE]], ends.shape)
     beyond = ~assembled(ends)
-    middle = np.full(np.count_nonzero(beyond), lo + INSIDE * (hi - lo))
-    ends[beyond] = refined(assembled, middle, ends[beyond])[0]
-    low, high = ends.tolist()
-    return low, high
+    ends[beyond] = refined(assembled, inside[beyond], ends[beyond])[0]
+    return [(low, high) for low, high in ends.tolist()]
 
 
 def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
