@@ -90,10 +90,13 @@ docs: .venv-docs/.installed ## Build the documentation to docs/_build/html/; a b
 	@cd docs && COLUMNS=80 NO_COLOR=1 $(docs_python) -m sphinx -q -W --keep-going -b html . _build/html
 	@echo 'Documentation: docs/_build/html/index.html'
 
+# What else is installed for pytest, such as colcon's repetitions, only takes its time.
+pytest = PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 PYTEST_PLUGINS=xdist.plugin,slipcover.pytest_plugin \
+  ROS_PYTHON_CHECK_FIELDS=1 python $(measuring) -m pytest -n 2 --dist worksteal
+
 .PHONY: test
 test: ready ## Run the tests, but for the nightly ones
-	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python $(measuring) -m pytest -n 2 --dist worksteal \
-	  -m 'not nightly'
+	@$(in_ros) $(pytest) -m 'not nightly'
 
 .PHONY: coverage
 coverage: measuring := -m slipcover --source linkage_ros --json --out $(build)/coverage.json
@@ -104,12 +107,11 @@ coverage: test ## Run them a tenth slower, and fail where they run too few lines
 .PHONY: nodes
 nodes: ready ## Run the tests of the nodes alone; with PLAIN=1 where llvmlite is not installed
 	@$(if $(PLAIN),! python -c 'import llvmlite' 2>/dev/null)
-	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m 'not nightly' \
-	  $$(grep -lE 'ros_harness|\(graph' test/test_*.py)
+	@$(in_ros) $(pytest) -m 'not nightly' $$(grep -lE 'ros_harness|\(graph' test/test_*.py)
 
 .PHONY: nightly
 nightly: ready ## Run the nightly tests: sweeps and long ways
-	@$(in_ros) ROS_PYTHON_CHECK_FIELDS=1 python -m pytest -n 2 --dist worksteal -m nightly
+	@$(in_ros) $(pytest) -m nightly
 
 # Some minutes to an hour a room, and some minutes once for a state of the checkout.
 .PHONY: mutants

@@ -24,6 +24,8 @@ import pytest
 gc.disable()
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+# Matrices are small: numpy's threads would only wait for each other, busily.
+os.environ['OPENBLAS_NUM_THREADS'] = '1'
 # A failure prints how to repeat it; a run depends on no earlier one.
 settings.register_profile('repeatable', database=None, print_blob=True, deadline=None)
 settings.load_profile('repeatable')

@@ -23,11 +23,6 @@ class Domain:
     """
     A domain that is held until it is released, or until this process ends.
 
-    Parameters
-    ----------
-    numbers : iterator, optional
-        What is tried, in turn.
-
     Attributes
     ----------
     id : int
@@ -40,8 +35,8 @@ class Domain:
 
     """
 
-    def __init__(self, numbers=candidates):
-        for self.id in islice(numbers, DOMAINS):
+    def __init__(self):
+        for self.id in islice(candidates, DOMAINS):
             self._lock = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
             try:
                 self._lock.bind(('', FIRST_LOCK + self.id))

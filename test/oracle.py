@@ -434,7 +434,7 @@ class Bench:
             except Exception as error:
                 # A node that raises ends.
                 raise AssertionError(f'{type(error).__name__}: {error}; at step {number}, {act} '
-                                     f'{shortened(arguments)}') from error
+                                     f'{arguments!r:.600}') from error
 
     def _subscribe(self, topic, kind, qos):
         return Listener(self._graph.node.create_subscription(
@@ -556,7 +556,7 @@ class Bench:
         met = self._until(complete)
         shown, listener.arrived[:] = self._shown(topic, listener, content), []
         assert met, (f'{topic}: {shown} messages arrived, drawn are {sorted(listener.drawn)}, '
-                     f'instead of {shortened(content)}')
+                     f'instead of {content!r:.600}')
         assert count in (None, shown), topic
 
     def _shown(self, topic, listener, content):
@@ -633,7 +633,7 @@ class Bench:
                 listener.arrived.clear()
                 return self._is_latched(topic, self._said[topic])
 
-            assert self._until(complete), f'{topic}: {shortened(self._said[topic])}'
+            assert self._until(complete), f'{topic}: {self._said[topic]!r:.600}'
 
     def _is_latched(self, topic, message):
         name, _, kind = topic.rpartition('/')
@@ -647,12 +647,6 @@ class Bench:
         return ([[p.x, p.y] for p in message.points] == curve
                 and message.type == (Marker.LINE_LIST if mirrored else Marker.LINE_STRIP)
                 and message.header.frame_id == self.model.frames[name])
-
-
-def shortened(thing, most=600):
-    """Return a text that is not too long."""
-    text = repr(thing)
-    return text if len(text) <= most else text[:most] + '...'
 
 
 # --- histories -------------------------------------------------------------------------------

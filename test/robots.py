@@ -163,6 +163,13 @@ def rotation(angles):
     return turned
 
 
+def turned(x, y, z, *angles):
+    """Return a pose as a matrix: about the fixed axes x, y and z in turn."""
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = rotation(angles), (x, y, z)
+    return made
+
+
 def in_frame(pose, point):
     """Return a marker's point [m] in the marker's frame, turned by the quaternion of its pose."""
     q, p = pose.orientation, np.array([point.x, point.y, point.z])

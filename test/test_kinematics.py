@@ -8,6 +8,7 @@ import struct
 from types import SimpleNamespace
 import warnings
 
+from geometry_msgs.msg import Point
 from linkage_ros import mechanisms, palette
 from linkage_ros.nodes import kinematics, log
 from linkage_ros.nodes.kinematics import Kinematics
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 from rclpy.logging import LoggingSeverity
 from rclpy.serialization import serialize_message
+from robots import in_frame, rotation
 from ros_harness import hastened
 from scenes import BOOM, example
 from sensor_msgs.msg import JointState
@@ -97,9 +99,7 @@ def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, g
     mechanism, = node.scene.mechanisms.values()
     push = graph.crank([drive.source for drive in mechanism.inputs.values()])
     markers = push([0.3] if len(ids) > 5 else [2.0, 1.1], drawn).markers
-    (cr, cp, cy), (sr, sp, sy) = np.cos(pose[3:]), np.sin(pose[3:])
-    # The third column of the rotation about x, then y, then z.
-    up = np.array([cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr])
+    ahead, _, up = rotation(pose[3:]).T
     if 2 in ids:
         markers = [*markers, graph.until(locus.copy)[-1]]
     assert {marker.id for marker in markers} == ids and len(markers) == len(ids)
@@ -108,21 +108,18 @@ def test_every_marker_looks_as_the_table_says_and_is_in_its_layer(graph, name, g
         if (name, marker.id) == ('walker', 2):
             # Both curves of mirrored legs, as a list of lines.
             type_ = Marker.LINE_LIST
-        p, q, scale, rgba = (marker.pose.position, marker.pose.orientation, marker.scale,
-                             marker.color)
+        p, scale, rgba = marker.pose.position, marker.scale, marker.color
         whole = part in (None, 20)
         width = size / part if part else 1.0
         assert (marker.ns, marker.type, marker.action, marker.header.frame_id) == (
             name, type_, Marker.ADD, 'robot/floor')
-        assert [p.x, p.y, p.z] == pytest.approx(list(pose[:3] + layer * size / 250.0 * up))
+        place = pose[:3] + layer * size / 250.0 * up
+        assert [p.x, p.y, p.z] == pytest.approx(list(place))
+        for point, way in ((Point(x=1.0), ahead), (Point(z=1.0), up)):
+            assert in_frame(marker.pose, point) == pytest.approx(place + way)
         assert [scale.x, scale.y, scale.z] == pytest.approx([width] + [width * whole] * 2)
         assert [rgba.r, rgba.g, rgba.b, rgba.a] == pytest.approx(
             [*palette.rgb(getattr(palette, colour)), 1.0], abs=1e-7)
-        # The first and the third column, of the quaternion.
-        assert 2.0 * np.array([
-            0.5 - q.y ** 2 - q.z ** 2, q.x * q.y + q.w * q.z, q.x * q.z - q.w * q.y,
-            q.x * q.z + q.w * q.y, q.y * q.z - q.w * q.x,
-            0.5 - q.x ** 2 - q.y ** 2]) == pytest.approx([cy * cp, sy * cp, -sp, *up])
         face = palette.rgb(palette.PLATE if marker.id == 7 else getattr(palette, colour))
         assert [pytest.approx([*face, 1.0], abs=1e-7)] * len(marker.colors) == [
             [one.r, one.g, one.b, one.a] for one in marker.colors]

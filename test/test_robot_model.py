@@ -15,7 +15,7 @@ from linkage_ros.robot_model.cli import main
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD, shapes
 import numpy as np
 import pytest
-from robots import rotation
+from robots import turned
 from scenes import alone
 from test_simulators import model, simulated, some_quick
 from test_urdf import ARM, in_space, MACHINES, OWN, posed
@@ -25,13 +25,6 @@ QUICK = ('jansen', 'slotted_lever', 'engine with zeros elsewhere', 'five_bar',
 GREY, BLUE, ORANGE = ([round(part / 255, 3) for part in colour] + [1.0] for colour in (
     (0x8a, 0x8a, 0x8a), (0x00, 0x81, 0xc9), (0xc8, 0x78, 0x00)))
 DENSITY, WIDTHS = 1234.5, {'boom and arm': 0.06, 'slotted_lever': 0.01}
-
-
-def turned(x, y, z, *angles):
-    """Return a pose as a matrix: about the fixed axes x, y and z in turn."""
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = rotation(angles), (x, y, z)
-    return made
 
 
 def numbers(text):
@@ -224,7 +217,10 @@ LONG = 'm.scale and m.dimensions must make the longest bar from 1e-30 to 1e+30 m
     ({**LEGS, 'leg.joint_names': ['BC=leg_O_fixed']}, TWO.format('joints leg_O_fixed')),
     ({'frame_id': 'm_crank_link'}, BASES.format('m_crank_link')),
     *(({**ARM, 'hand.frame_id': hand, 'arm.frame_id': arm}, BASES.format(f'{hand}, {arm}'))
-      for hand, arm in (('thigh', 'shin'), ('thigh', 'world'), ('arm_AB_link', 'hand_AB_link')))])
+      for hand, arm in (('thigh', 'shin'), ('thigh', 'world'), ('arm_AB_link', 'hand_AB_link'))),
+    ({**ARM, 'mechanisms': ['m', 'hand', 'arm'], 'm.type': 'four_bar',
+      'hand.frame_id': 'arm_B', 'arm.frame_id': 'hand_B'},
+     BASES.format('world, arm_B, hand_B'))])
 def test_what_makes_no_model_is_refused(given, complaint):
     one = {'mechanisms': ['m'], 'm.type': 'four_bar'}
     found = scene.read({**(one if 'mechanisms' not in given else {}), **given})

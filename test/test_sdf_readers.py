@@ -15,22 +15,14 @@ from xml.sax.saxutils import quoteattr
 from linkage_ros.robot_files import readers
 import numpy as np
 import pytest
-from robots import words
+from robots import turned, words
 
 VERSIONS = '1.4', '1.5', '1.6', '1.7', '1.9', '1.11'
 
 
-def rotation(rng):
-    """Return a random rotation matrix."""
-    q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-    return q * np.linalg.det(q)
-
-
 def frame(rng):
     """Return a random pose."""
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = rotation(rng), rng.normal(size=3)
-    return made
+    return turned(*rng.normal(size=3), *rng.uniform(-math.pi, math.pi, 3))
 
 
 def euler(turned):

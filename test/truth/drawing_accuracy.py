@@ -371,15 +371,7 @@ class Measure:
         return self._drawn(move.numbers, move.ways[i].motion.at(move.given, time), joints)
 
     def _poses(self, drawn):
-        found = []
-        for out in self.poses:
-            if out.what == 'point':
-                found.append(drawn.points[out.name])
-            elif out.what == 'slide':
-                found.append(drawn.slides[out.parts[0][0]])
-            else:
-                found.append(turned_bar(out, drawn) * mpc(0, -1) ** out.quarters)
-        return found
+        return [true_value(out, drawn) for out in self.poses]
 
     def _distance(self, i, old, new):
         if i < len(self.poses) and self.poses[i].what == 'angle':
@@ -418,11 +410,16 @@ class Truth(NamedTuple):
     slack: dict
 
 
-def turned_bar(output, drawn):
-    """Return the bar of an angle, turned back by the bar from which that is counted."""
+def true_value(output, drawn):
+    """Return an output of a drawing: of an angle its bar, turned back by where that is counted."""
+    if output.what == 'point':
+        return drawn.points[output.name]
+    if output.what == 'slide':
+        return drawn.slides[output.parts[0][0]]
     bars = [drawn.lines[bar[0]] if len(bar) == 1 else drawn.points[bar[1]] - drawn.points[bar[0]]
             for bar in output.parts]
-    return bars[0] * bars[1].conjugate() if bars[1:] else bars[0]
+    turned = bars[0] * bars[1].conjugate() if bars[1:] else bars[0]
+    return turned * mpc(0, -1) ** output.quarters
 
 
 def _state(gap, slack):

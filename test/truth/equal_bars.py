@@ -12,7 +12,7 @@ import numpy as np
 
 from . import drawing_accuracy
 from .drawing import DIGITS, draw, precisely
-from .drawing_accuracy import error_of, turned_bar
+from .drawing_accuracy import error_of, true_value
 from .linkage_checks import checked, spots
 
 # How far from a value its sides are; limits that differ by less are equal; arms below it vanish.
@@ -58,12 +58,8 @@ def limits(subject, value: float) -> Limits:
 
 
 def _pose(out, drawn):
-    if out.what == 'point':
-        return drawn.points[out.name]
-    if out.what == 'slide':
-        return mpc(drawn.slides[out.parts[0][0]])
-    bar = turned_bar(out, drawn)
-    return bar * mpc(0, -1) ** out.quarters / (abs(bar) or 1)
+    value = mpc(true_value(out, drawn))
+    return value / (abs(value) or 1) if out.what == 'angle' else value
 
 
 @checked
