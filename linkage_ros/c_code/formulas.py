@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import Dict, Iterator, List, Sequence, Tuple
+from typing import Dict, Iterable, Iterator, List, Mapping, Sequence, Tuple
 
 from .code import Code
 from .names import comment, distinct, field
@@ -74,6 +74,11 @@ class Formulas:
     def function(self) -> str:
         """Return the function for all fields and their rates."""
         structure, groups = self._linkage.structure, [*self._groups()]
+        by = dict(zip(self.by, self._mechanism.scales))
+        poses = [(f'/* {comment(about)} */', self._assigned(
+            outputs, {'p': 1.0}, map(structure.output, outputs))) for about, outputs in groups]
+        rates = [(f'/* Rates of {comment(about)} */', self._assigned(
+            outputs, by, structure.parts(((), (), tuple(outputs))))) for about, outputs in groups]
         limits = [limit for limit in structure.built.limits if limit.margin.varies]
         if len(self.by) == 1 and self._linkage.inputs[0].is_whole(self._linkage.reach()):
             # It can be assembled at any input, whatever rounding says.
@@ -87,11 +92,8 @@ class Formulas:
             '    {by_pointers})'.format(**self.names),
             [self._code.times(each, 1.0 / scale)
              for each, scale in zip(self._parameters, self._mechanism.scales)],
-            [*((f'/* {comment(about)} */', self._positions(outputs)) for about, outputs in groups),
-             ('', {f'const {self._code.number} valid': valid}),
-             ('if (!has_rates) {\n    return isfinite(valid);\n}', {}),
-             *((f'/* Rates of {comment(about)} */', self._rates(outputs))
-               for about, outputs in groups)],
+            [*poses, ('', {f'const {self._code.number} valid': valid}),
+             ('if (!has_rates) {\n    return isfinite(valid);\n}', {}), *rates],
             'return isfinite(valid);')
 
     def _groups(self) -> Iterator[Tuple[str, List[str]]]:
@@ -112,15 +114,10 @@ class Formulas:
             if outputs:
                 yield about, outputs
 
-    def _positions(self, outputs: Sequence[str]) -> Dict[str, Real]:
-        """Return outputs, by their places in C."""
-        structure = self._linkage.structure
-        return {f'p->{self.fields[output]}': structure.output(output) * self._mechanism.scale_of(
-            output) for output in outputs}
-
-    def _rates(self, outputs: Sequence[str]) -> Dict[str, Real]:
-        """Return the rates of outputs by each input, by their places in C."""
-        rates = self._linkage.structure.parts(((), (), tuple(outputs)))
-        return {f'{by}->{self.fields[output]}': rate * (self._mechanism.scale_of(output) / unit)
-                for ((by, unit), output), rate in zip(
-                    product(zip(self.by, self._mechanism.scales), outputs), rates)}
+    def _assigned(self, outputs: Sequence[str], structs: Mapping[str, float],
+                  values: Iterable[Real]) -> Dict[str, Real]:
+        """Return values of outputs in structs, each by a unit, by their places in C."""
+        scale_of = self._mechanism.scale_of
+        return {f'{struct}->{self.fields[output]}': value * (scale_of(output) / unit)
+                for ((struct, unit), output), value in zip(
+                    product(structs.items(), outputs), values)}
