@@ -425,11 +425,15 @@ def test_the_twelve_legs_of_a_strandbeest_come_back_from_its_sdf(tmp_path, capsy
         of_text(tmp_path / 'legs.sdf', capsys.readouterr().out))
 
 
-@pytest.mark.parametrize('ends, ref, limits', [
-    ('-0.4 0.5', 0.0, ' within -0.4 0.5'), ('-0.2 0.7', 0.2, ' within -0.4 0.5'),
-    ('-4 4', 0.0, '')])
-def test_a_cylinder_in_space_turns_a_foot(tmp_path, ends, ref, limits):
-    file = written(tmp_path, 'cylinder.xml', ('range="-0.4 0.5"', f'ref="{ref}" range="{ends}"'))
+@pytest.mark.parametrize('ends, ref, limits, ram, sign', [
+    ('-0.4 0.5', 0.0, ' within -0.4 0.5', '', 1.0),
+    ('-0.2 0.7', 0.2, ' within -0.4 0.5', '', 1.0), ('-4 4', 0.0, '', '', 1.0),
+    # It is longer where its position is less.
+    ('-0.4 0.5', 0.0, ' within -0.4 0.5', ' range="0.1 0.45"', -1.0)])
+def test_a_cylinder_in_space_turns_a_foot(tmp_path, ends, ref, limits, ram, sign):
+    way = ' '.join(str(sign * x) for x in (0.1, -0.4, 1.1))
+    file = written(tmp_path, 'cylinder.xml', ('range="-0.4 0.5"', f'ref="{ref}" range="{ends}"'),
+                   ('axis="0.1 -0.4 1.1"', f'axis="{way}"{ram}'))
     code, out, err = printed(file)
     assert code == 0 and 'in 240 poses of the robot, ram from ' in err and 'Left out' not in err
     assert f'- pitch hinge ground at 0 0 0.1 axis 0 1 0{limits} - ram' in ' '.join(out.split())
@@ -439,9 +443,12 @@ def test_a_cylinder_in_space_turns_a_foot(tmp_path, ends, ref, limits):
     pivot, base, eye = np.array([[0.0, 0.0, 0.1], [-0.6, 0.3, -0.8], [-0.5, -0.1, 0.2]])
     start = np.linalg.norm(pivot + eye - base)
     assert drive.start == pytest.approx(start)
+    if ram:
+        low, high = sorted(start + sign * (end - 0.3) for end in (0.1, 0.45))
+        assert low <= drive.ends[0] < drive.ends[1] == pytest.approx(high)
     for angle in np.linspace(-0.39, 0.49, 9):
         length = np.linalg.norm(pivot + rotation((0.0, angle, 0.0)) @ eye - base)
-        ram = 0.3 + length - start
+        ram = 0.3 + sign * (length - start)
         assert published(mechanism, ram=ram) == pytest.approx(
             {'pitch': angle + ref, 'ram': ram}, abs=1e-9)
 

@@ -217,7 +217,10 @@ LONG = 'm.scale and m.dimensions must make the longest bar from 1e-30 to 1e+30 m
     ({**LEGS, 'leg.joint_names': ['BC=leg_O_fixed']}, TWO.format('joints leg_O_fixed')),
     ({'frame_id': 'm_crank_link'}, BASES.format('m_crank_link')),
     *(({**ARM, 'hand.frame_id': hand, 'arm.frame_id': arm}, BASES.format(f'{hand}, {arm}'))
-      for hand, arm in (('thigh', 'shin'), ('thigh', 'world'), ('arm_AB_link', 'hand_AB_link')))])
+      for hand, arm in (('thigh', 'shin'), ('thigh', 'world'), ('arm_AB_link', 'hand_AB_link'))),
+    ({**ARM, 'mechanisms': ['m', 'hand', 'arm'], 'm.type': 'four_bar',
+      'hand.frame_id': 'arm_B', 'arm.frame_id': 'hand_B'},
+     BASES.format('world, arm_B, hand_B'))])
 def test_what_makes_no_model_is_refused(given, complaint):
     one = {'mechanisms': ['m'], 'm.type': 'four_bar'}
     found = scene.read({**(one if 'mechanisms' not in given else {}), **given})

@@ -26,8 +26,8 @@ def check_read(robot, form, folder):
     # The pose of the ground that carries each body.
     frames, stands = ({robot.root: np.eye(4)} for _ in range(2))
     for body, (base, _) in robot.spanning_tree()[0].items():
-        base, place = robot.grounds.get(body, (base, None))
-        stands[body] = frames[base] @ turned(*place) if place else stands[base]
+        stands[body] = stands[base] if body not in robot.stands else \
+            frames[base] @ turned(*robot.stands[body])
         frames[body] = stands[body] @ robot.frames[body]
     assert read.root == root and {*frames} - {robot.root} <= read.frames.keys()
     size = max(1e-3, *(np.abs(frame[:3, 3]).max() for frame in frames.values()))

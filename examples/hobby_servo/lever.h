@@ -406,18 +406,17 @@ static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_rea
         if (q[i] != inside) {
             const lkr_real slack = LKR_BEYOND * input->size;
             const lkr_real turn = q[i] < inside ? input->turn[side] : -input->turn[side];
-            lkr_real beyond = LKR_MATH(fabs)(q[i] - inside);
-            if (beyond > slack && lkr_beyond(input, q[i] + turn) < beyond) {
+            if (lkr_beyond(input, q[i]) > slack
+                && lkr_beyond(input, q[i] + turn) < lkr_beyond(input, q[i])) {
                 q[i] += turn;
-                beyond = lkr_beyond(input, q[i]);
             }
             if (side == LKR_JOINTS) {
-                if (beyond > slack) {
+                if (lkr_beyond(input, q[i]) > slack) {
                     return INFINITY;
                 }
                 q[i] = lkr_clamped(q[i], input->low, input->high);
             }
-            away += 10 * beyond * input->scale;
+            away += 10 * lkr_beyond(input, q[i]) * input->scale;
         }
         away += LKR_MATH(fabs)(q[i] - near[i]) * input->scale;
     }

@@ -3,20 +3,15 @@
 
 """The actuators and the commanded joints of a mechanism, one of each for every input."""
 
+from itertools import permutations
 import math
 from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
-import numpy as np
-
-from ..linkage import GROUND, Link, loaded_links, spread
+from ..linkage import GROUND, Link, loaded_links
 from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion
 from ..words import listed
-
-# Size of a Jacobian below which outputs do not determine the inputs, and the poses in
-# which it is looked at.
-DEPENDENT, SPREAD = 1e-9, 200
 
 
 class Axis(NamedTuple):
@@ -177,13 +172,7 @@ def _chain(mechanism: SceneMechanism) -> List[str]:
 
 
 def _tell(mechanism: SceneMechanism, outputs: Sequence[str]) -> bool:
-    """Return whether outputs determine the inputs in any of many poses."""
-    linkage = mechanism.linkage
-    rates = np.reshape(linkage.posed((), (), tuple(outputs)).over(*spread(
-        linkage.inputs, SPREAD)), (len(linkage.inputs), len(outputs), -1))
-    if not np.isfinite(rates).all(axis=(0, 1)).any():
-        return True
-    sizes = np.array([1.0 if linkage.is_angle(each) else linkage.longest for each in outputs])
-    units = np.array([each.size for each in linkage.inputs])
-    scaled = np.moveaxis(np.nan_to_num(rates * units[:, None, None] / sizes[:, None]), -1, 0)
-    return len(outputs) in np.linalg.matrix_rank(scaled, DEPENDENT)
+    """Return whether each output may depend on another one of the inputs."""
+    moves = mechanism.linkage.moves
+    return any(all(map(moves, outputs, inputs)) for inputs in permutations(
+        range(len(mechanism.inputs)), len(outputs)))

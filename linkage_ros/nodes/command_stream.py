@@ -176,7 +176,7 @@ class CommandStream:
                  speeds: Optional[Sequence[float]]) -> Optional[ActuatorCommand]:
         """Return the command for a target or, out of reach, the last valid one, if any."""
         name, seed = target.mechanism.name, self._seed(target)
-        last, is_quick = self._last.get(name), len(seed) == 1 or target.request.is_closed
+        last, is_quick = self._last.get(name), target.request.inverse.is_quick
         # Only the first command, which continues no other, may jump; it is not searched.
         command = target.command(positions, speeds, seed, jumps=not last and is_quick)
         if command.is_valid:

@@ -107,8 +107,8 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]
             bodies = dict.fromkeys(body for joint in joints for body in joint.bodies)
             reports.append(f'Left out: {listed(bodies, 200)}: '
                            f'{in_space * bool(group.why)}{why}.')
-    balls = [[hinge.name for hinge, _ in joint.chain] for group in groups
-             for joint in group.joints]
+    balls = [[hinge.name for hinge in joint.hinges if hinge.position is not None]
+             for group in groups for joint in group.joints]
     return _checked(robot, balls, imported, reports)
 
 

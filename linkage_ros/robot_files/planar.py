@@ -110,7 +110,7 @@ class Drawing(Dyads):
         for joint in group.joints:
             # A rod turns in the plane about one hinge of the ball at its end; the others stay,
             # unless its other end needs them.
-            pins = [(hinge, sign) for hinge, sign in joint.chain if hinge in loops.pins(joint, up)]
+            pins = [(hinge, sign) for hinge, sign in joint.parts if hinge in loops.pins(joint, up)]
             if pins and not stiff & {*joint.bodies}:
                 (hinge, sign), *_ = pins
                 joint = replace(joint, name=hinge.name, kind=HINGE, position=hinge.position,

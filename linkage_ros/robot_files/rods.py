@@ -124,10 +124,10 @@ class Rods:
     def _universal(self, body: str, held: Sequence[Joint]) -> None:
         """Add two hinges of a ball at an end of a rod, if it has some; a third one stays."""
         for ball, other in held, held[::-1]:
-            base, place = ball.other(body), ball.place(body)
-            chain = [hinge for hinge, _ in ball.chain]
+            base, place, chain = ball.other(body), ball.place(body), ball.hinges
             # A third hinge stays, unless the other end needs it.
-            if not 2 <= len(chain) <= 2 + (len(other.hinges) != 2):
+            if not 2 <= len(chain) <= 2 + (len(other.hinges) != 2) or None in [
+                    hinge.position for hinge in chain]:
                 continue
             (first, second), way = (chain if ball.bodies[1] == body else chain[::-1])[:2], (
                 other.place(body) - place)
@@ -155,8 +155,8 @@ class Rods:
         name = self._named(half.name)
         self.rods.append(f'{name} cylinder ' + ' '.join(
             self._end(ball, body) for ball, body in zip(balls, half.bodies)))
-        length = float(np.linalg.norm(way))
-        self.drives.append(check.Source(name, half.name, 1.0, length - half.start, length))
+        length, sign = float(np.linalg.norm(way)), float(np.sign(half.axis @ way))
+        self.drives.append(check.Source(name, half.name, sign, length - sign * half.start, length))
 
     def lines(self, limits: Mapping[str, Tuple[float, float]] = {}) -> List[str]:
         """Return the lines, with limits for some other than the file's."""
@@ -213,8 +213,8 @@ def _sweeps(mechanism: scene.SceneMechanism, limits: Mapping[str, Tuple[float, f
             ) -> List[List[float]]:
     """Return the ends of the inputs: limits, made smaller until every pose in them exists."""
     drives = mechanism.inputs.values()
-    low, high = np.array([np.add(limits.get(drive.source, (-math.inf, math.inf)), drive.offset)
-                          for drive in drives]).T
+    low, high = np.sort([np.multiply(limits.get(drive.source, (-math.inf, math.inf)), drive.ratio)
+                         + drive.offset for drive in drives]).T
     start = np.clip([drive.start for drive in drives], low, high)
     size = np.array([2.5 if drive.input.turns else 0.5 * drive.start for drive in drives])
     for share in _SMALLER ** np.arange(_TRIES):

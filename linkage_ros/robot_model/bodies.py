@@ -29,7 +29,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from . import shapes
-from .robot import HINGE, posed, Robot, SLIDE
+from .robot import FREE, HINGE, posed, Robot, SLIDE
 from .shapes import BALL, BOX, CYLINDER, Piece, Place, weight
 from .. import palette
 from ..linkage import Arc, extremes, GROUND, Leg, Link
@@ -92,29 +92,24 @@ def merged(robots: Sequence[Robot]) -> Robot:
 
     They must have the same root link, or the root of one must be a link of another.
     """
-    links = [(link, robot.root) for robot in robots for link in (
-        *robot.grounds, *(joint.bodies[1] for joint in robot.joints))]
-    below = dict(links)
-    # From each root the roots below it, up to the last.
-    lines = {robot.root: [robot.root] for robot in robots}
-    for line in lines.values():
-        while len(line) <= len(lines) and line[-1] in below:
-            line.append(below[line[-1]])
-    root, *more = bases = dict.fromkeys(line[-1] for line in lines.values())
-    if more or root in below:
-        raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
-                         f'link of another one of them, not {listed(bases, 120)}')
-    made = Robot(root, {root: np.eye(4)}, name='linkages' if len(robots) > 1 else robots[0].name)
-    for robot in sorted(robots, key=lambda robot: len(lines[robot.root])):
+    joints = [joint for robot in robots for joint in robot.joints]
+    links = [joint.bodies[1] for joint in joints]
+    roots = dict.fromkeys(robot.root for robot in robots)
+    root, *more = [name for name in roots if name not in links] or roots
+    made = Robot(root, {root: np.eye(4)}, joints,
+                 name='linkages' if len(robots) > 1 else robots[0].name)
+    for robot in robots:
         made.frames.update({link: frame for link, frame in robot.frames.items()
                             if link != robot.root})
-        made.joints += robot.joints
         made.driven += robot.driven
-        for key in ('follows', 'pieces', 'meets', 'servos', 'grounds'):
+        for key in ('follows', 'pieces', 'meets', 'servos', 'stands'):
             getattr(made, key).update(getattr(robot, key))
-    for tag, names in (('link', [root, *(link for link, _ in links)]),
-                       ('joint', [*map('{}_fixed'.format, made.grounds),
-                                  *(joint.name for joint in made.joints)])):
+    # What hangs on itself, joined to the rest by nothing, is free in the tree.
+    if more or root in links or FREE in [
+            joint.kind for _, joint in made.spanning_tree()[0].values()]:
+        raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
+                         f'link of another one of them, not {listed(roots, 120)}')
+    for tag, names in (('link', [root, *links]), ('joint', [joint.name for joint in joints])):
         (name, count), = Counter(names).most_common(1)
         if count > 1:
             raise SceneError(f'{listed(f"{robot.name}.joints" for robot in robots)} must have '
@@ -146,8 +141,9 @@ class _Tree:
         self._frames = {GROUND: shapes.ground_frame(mechanism.linkage), **mechanism.linkage.frames}
         self._travels = travels(mechanism)
         ground = self._body('', GROUND)
-        self.robot = Robot(base, {base: np.eye(4), ground: np.eye(4)}, pieces={ground: []},
-                           grounds={ground: (base, mechanism.pose)}, name=mechanism.name)
+        self.robot = Robot(base, {base: np.eye(4)}, pieces={ground: []},
+                           stands={ground: mechanism.pose}, name=mechanism.name)
+        self.robot.hang(ground, base, 6 * (0.0,))
         self._shared = mechanism.linkage.links[0] if len(legs) > 1 else None
         if self._shared:
             self._hang('', 1.0, self._shared)
@@ -270,9 +266,7 @@ def _started(mechanism: SceneMechanism, part: Robot, density: float) -> Robot:
         raise SceneError(f'{keys} must be where {mechanism.name} can be assembled, not at '
                          f'{", ".join(f"{start:g}" for start in starts)}')
     positions = {joints[name].name: joints[name].of(value) for name, value in values.items()}
-    robot = replace(part, pieces={**part.pieces}, meets={**part.meets},
-                    driven=[], servos={}, follows={})
-    robot = posed(robot, {name: positions[name] for name in robot.positions})
+    robot = posed(part, {name: positions[name] for name in part.positions})
     _add_slots(mechanism, robot)
     mass = sum(weight(pieces, density)[0] for pieces in robot.pieces.values() if pieces)
     tips = {link.name: link.tip for link in linkage.links}

@@ -138,11 +138,6 @@ class Joint:
         return self.limits or (-math.inf, math.inf)
 
     @property
-    def chain(self) -> Sequence[tuple[Joint, float]]:
-        """Return the hinges of a ball and their signs, if all have positions."""
-        return () if any(hinge.position is None for hinge, _ in self.parts) else self.parts
-
-    @property
     def hinges(self) -> list[Joint]:
         """Return the hinges of a ball that is made of some, else the joint itself."""
         return [hinge for hinge, _ in self.parts] or [self]
@@ -179,9 +174,8 @@ class Robot:
         For each body that was cut off a closed loop the other one, whose origin is in its own.
     servos : dict
         The mass [kg] and the arm [m] that a driven joint moves.
-    grounds : dict
-        The link on which each body without a joint stands, and its pose there; the frames of what
-        it carries are relative to it.
+    stands : dict
+        The pose of each ground on its link; the frames of what it carries are relative to it.
     name : str
         Its name in a model.
     density : float
@@ -198,7 +192,7 @@ class Robot:
     pieces: dict[str, list[Piece]] = field(default_factory=dict)
     meets: dict[str, str] = field(default_factory=dict)
     servos: dict[str, tuple[float, float]] = field(default_factory=dict)
-    grounds: dict[str, tuple[str, Sequence[float]]] = field(default_factory=dict)
+    stands: dict[str, Sequence[float]] = field(default_factory=dict)
     name: str = 'robot'
     density: float = 0.0
 
@@ -217,9 +211,6 @@ class Robot:
         span = np.abs([frame[:3, 3] for frame in self.frames.values()]).max()
         for name, (base, joint) in self.spanning_tree()[0].items():
             frame, seen = self.frames[name], self.frames[base]
-            if name in self.grounds:
-                yield Body(name, *self.grounds[name])
-                continue
             if joint.kind in (HINGE, SLIDE) and joint.position is not None:
                 home = at(joint.place(name), frame[:3, :3])
                 is_apart = np.abs(home - frame).max() > 1e-12 * span
@@ -229,7 +220,7 @@ class Robot:
                 if not is_apart:
                     continue
                 base, seen = f'{name}/joint', home
-            yield Body(name, base, _seen(seen, frame, span))
+            yield Body(name, base, self.stands.get(name) or _seen(seen, frame, span))
 
     def cut_loops(self) -> Robot:
         """

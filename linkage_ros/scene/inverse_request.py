@@ -79,7 +79,7 @@ class InverseRequest:
     def __init__(self, mechanism: SceneMechanism, outputs: Sequence[str]):
         self._mechanism, self._settings = mechanism, list(mechanism.inputs.values())
         self.outputs = [output or LEVER for output in outputs]
-        self._inverse = mechanism.linkage.inverse(tuple(self.outputs))
+        self.inverse = mechanism.linkage.inverse(tuple(self.outputs))
         self.units = [settings.input.unit for settings in self._settings]
         self._units, self._scales = [*map(mechanism.scale_of, self.outputs)], mechanism.scales
         self._actuators = [settings.actuator for settings in self._settings]
@@ -87,11 +87,6 @@ class InverseRequest:
         self._rate_units = [unit / scale * ratio
                             for scale, (ratio, _) in zip(self._scales, self._actuators)
                             for unit in self._units]
-
-    @property
-    def is_closed(self) -> bool:
-        """Whether the answers are closed forms, so that none is searched."""
-        return self._inverse.is_quick
 
     def inputs_of(self, positions: Sequence[Any]) -> list[Any]:
         """Return the inputs [rad or m] at their actuators' positions."""
@@ -124,7 +119,7 @@ class InverseRequest:
         """
         is_path = isinstance(values[0], np.ndarray) and (
             seed is None or np.size(seed[0]) != np.size(values[0]))
-        solve = self._inverse.path if is_path else self._inverse.nearest
+        solve = self.inverse.path if is_path else self.inverse.nearest
         inputs, rates = solve(
             divided(values, self._units),
             None if seed is None else divided(self.inputs_of(seed), self._scales),
@@ -170,7 +165,7 @@ class InverseRequest:
         They are sorted by their distance from the inputs `seed` [rad or m], by default the start.
         """
         seed = [settings.start for settings in self._settings] if seed is None else seed
-        answers = self._inside(self._inverse.all(
+        answers = self._inside(self.inverse.all(
             divided(values, self._units), divided(seed, self._scales)))
         sizes = [settings.input.size for settings in self._settings]
         return sorted(answers, key=lambda answer: math.dist(
@@ -188,7 +183,7 @@ class InverseRequest:
             return 'a value must be finite'
         middles = [0.5 * sum(settings.ends or (2.0 * settings.start,))
                    for settings in self._settings]
-        answers = self._inverse.all(
+        answers = self.inverse.all(
             divided(values, self._units), divided(middles, self._scales))
         what = f'{listed(self.outputs)} at ' * (len(values) > 1) + listed(
             f'{value:.6g}' for value in values)

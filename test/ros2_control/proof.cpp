@@ -87,7 +87,7 @@ Pose pose(const double (&q)[n])
 {
   Pose made{};
   double zero[n] = {};
-  made.good = model.at(q, &made.point) != 0;
+  made.good = model.at(q, 1, &made.point) != 0;
   for (int side = 0; side < 2; ++side) {
     made.good = made.good && lkr_solve(&model, side, &made.point, 0, 1e-2, zero) != 0;
   }

@@ -227,26 +227,6 @@ class Inverse:
             solutions.shape[1], *rows[0].shape, len(solutions))
         return solutions[:self._n], solutions[self._n:]
 
-    def _all(self, values: Row, seed: Row = ()) -> List[Row]:
-        """Return all solutions in order, those in the turns around `seed` if these are many."""
-        return self._in_turns(values, seed, Inverse._solved)
-
-    def _in_turns(self, values: Row, seed: Row, solve: Callable) -> List[Row]:
-        """
-        Return solve(inverse, values, seed) for the inverse in the turns around a seed.
-
-        Of an input with very many turns, an inverse has the solutions of those around zero.
-        """
-        turns = [input_.whole_turns(x) for input_, x in zip(self.inputs, seed)]
-        if not any(turns):
-            return solve(self, values, seed)
-        offsets = {input_.name: math.tau * count for input_, count in zip(self.inputs, turns)}
-        rows = solve(
-            inverse_of(self.linkage.turned(*turns), self.outputs),
-            tuple([x - offsets.get(name, 0.0) for name, x in zip(self.outputs, values)]),
-            tuple(map(sub, seed, offsets.values())))
-        return [(*map(add, row, offsets.values()), *row[self._n:]) for row in rows]
-
     def _solved(self, values: Row, _: Row = ()) -> List[Row]:
         """Return all solutions in order, none for values that are not finite."""
         if not all(map(math.isfinite, values)):
@@ -260,6 +240,22 @@ class Inverse:
         """Return the solution that is continuous from a seed, if there is one."""
         row = follow(self.problem, self.problem.reduced(values), seed, self._source)
         return [row] if row else []
+
+    def _all(self, values: Row, seed: Row = (), solve: Callable = _solved) -> List[Row]:
+        """
+        Return all solutions in order, or the one continuous from `seed` with `_continued`.
+
+        Of an input with very many turns, an inverse has those in the turns around `seed`.
+        """
+        turns = [input_.whole_turns(x) for input_, x in zip(self.inputs, seed)]
+        if not any(turns):
+            return solve(self, values, seed)
+        offsets = {input_.name: math.tau * count for input_, count in zip(self.inputs, turns)}
+        rows = solve(
+            inverse_of(self.linkage.turned(*turns), self.outputs),
+            tuple([x - offsets.get(name, 0.0) for name, x in zip(self.outputs, values)]),
+            tuple(map(sub, seed, offsets.values())))
+        return [(*map(add, row, offsets.values()), *row[self._n:]) for row in rows]
 
     def _all_arrays(self, values: np.ndarray, seed: Any = ()) -> np.ndarray:
         """
@@ -413,8 +409,7 @@ class Inverse:
             leaves the reach.
 
         """
-        rows = self._in_turns(self._numbers(values), self._numbers(near, 'near'),
-                              Inverse._continued)
+        rows = self._all(self._numbers(values), self._numbers(near, 'near'), Inverse._continued)
         row, = rows or [(math.nan,) * (self._n + self._n ** 2)]
         return row[:self._n], row[self._n:]
 

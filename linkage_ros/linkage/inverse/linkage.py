@@ -152,9 +152,7 @@ def decompose(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
     pose = _pose(linkage)
     if pose is None:
         return None
-    absolute = any(PAIR.fullmatch(name) or name[-2:] in ('.x', '.y') for name in outputs)
-    grounds = (GROUND,) if absolute else (GROUND, *(link.name for link in linkage.links))
-    for ground in grounds:
+    for ground in (GROUND, *(link.name for link in linkage.links)):
         try:
             return _of_sketch(outputs, _Sketch(linkage, outputs, ground, pose))
         except ValueError:

@@ -180,10 +180,10 @@ class Segments:
 
     @property
     def arcs(self) -> List[Arc]:
-        """Return the reach without jumps, cut at them."""
+        """Return the reach without jumps, cut at them [rad or m]."""
         joined: List[Arc] = []
         for theta, *_ in self.all:
-            low, high = float(theta[0]), float(theta[-1])
+            low, high = (theta[[0, -1]] * self._unit).tolist()
             joined.append((joined.pop()[0], high) if joined and low == joined[-1][1] else (
                 low, high))
         return joined
@@ -327,12 +327,11 @@ def extremes_of(linkage: Kinematics, output: str, arcs: Optional[Sequence[Arc]],
     """Implement `Mechanism.extremes`."""
     linkage.check_output(output)
     pose, is_angle = linkage.compiled('output', output), linkage.is_angle(output)
-    size = linkage.inputs[0].step
-    parts = reach_of(linkage, tuple(others)) if arcs is None else arcs
-    if arcs is None and (segments := segments_of(linkage, output, others)).jumps:
-        parts = [(low * size, high * size) for low, high in segments.arcs]
+    if arcs is None:
+        segments = segments_of(linkage, output, others)
+        arcs = segments.arcs if segments.jumps else reach_of(linkage, tuple(others))
     return [tuple(extremes(lambda value: pose.searched(value, *others)[0], low, high, is_angle))
-            for low, high in parts]
+            for low, high in arcs]
 
 
 def _cut(arcs: Sequence[Arc], marks: Any) -> Iterator[Arc]:

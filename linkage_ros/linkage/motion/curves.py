@@ -19,8 +19,6 @@ from ..tolerances import LEAST
 
 # Even samples of a whole turn; halvings of a distance after which few of its digits are left.
 TURN_SAMPLES, HALVINGS = 360, 48
-# Peaks of a curve that are refined for its extremes.
-REFINED_PEAKS = 4
 # Fractions at which a bracket is divided; an odd number of them, so that one is its middle.
 CUTS = np.arange(1, 16) / 16
 
@@ -120,8 +118,7 @@ def extremes(curve: Callable, lo: float, hi: float, is_angle: bool = False
     for sign in (-1.0, 1.0):
         height = np.where(known, sign * value, -np.inf)
         beside = np.pad(height, 1, constant_values=-np.inf)
-        peaks = np.flatnonzero((height >= beside[:-2]) & (height >= beside[2:]))
-        best = peaks[np.argsort(-height[peaks])[:REFINED_PEAKS]]
+        best = np.flatnonzero((height >= beside[:-2]) & (height >= beside[2:]))
         top = value[best, None]
 
         def depth(x: np.ndarray, sign: float = sign, top: np.ndarray = top) -> np.ndarray:
