@@ -11,8 +11,10 @@ from linkage_ros.scene.writing import without_defaults
 ROOT = Path(__file__).parents[1]
 EXAMPLES = [*sorted((ROOT / 'config').glob('*.yaml')), *sorted((ROOT / 'examples').glob('*.yaml'))]
 
-# A cylinder below a boom, an engine that is out of line, a four-bar with a rocker, one that is
-# dragged round, and a slotted lever.
+# A toe whose crank is on a moving link, a cylinder below a boom, an engine that is out of line, a
+# four-bar with a rocker, one that is dragged round, and a slotted lever.
+CASSIE = ['O ground 0 0', 'F crank O 0.4', 'K rigid O F 0.07 0.35 right', 'A crank K 0.05 zero F',
+          'B dyad A F 0.35 0.06 right']
 BOOM = ['O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O 1.1 right']
 ENGINE = ['O ground 0 0', 'G ground 0 -20', 'A crank O 40', 'B slider A 120 G 0.5 out',
           'P rigid A B 50 90 left']

@@ -170,8 +170,7 @@ def test_dead_points_are_where_a_dyad_stretches_or_folds(kind, numbers, expected
 
 @pytest.mark.parametrize('name', CASES)
 def test_at_a_dead_point_a_transmission_angle_is_flat(name):
-    joints, numbers, _ = CASES[name]
-    linkage = mechanisms.create('custom', joints=joints, **numbers)
+    linkage = CASES[name].linkage()
     held = [0.5 * (input_.low + input_.high) for input_ in linkage.inputs[1:]]
     for value in linkage.dead_points(*held):
         angles = linkage.transmission_angles([value, *held] if held else value).values()

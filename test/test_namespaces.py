@@ -35,7 +35,7 @@ def linkage(kind):
     if kind in files:
         return scene.load(files[kind]).mechanisms[kind].linkage
     if kind in CASES:
-        return mechanisms.create('custom', joints=CASES[kind].joints, **CASES[kind].dimensions)
+        return CASES[kind].linkage()
     return mechanisms.create(kind)
 
 

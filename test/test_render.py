@@ -25,7 +25,7 @@ from matplotlib.colors import to_rgb
 import numpy as np
 from PIL import Image
 import pytest
-from scenes import alone, ROOT
+from scenes import alone, CASSIE, ROOT
 from truth.working_modes import lever_of
 
 CONFIG = ROOT / 'config'
@@ -172,10 +172,7 @@ def test_the_pairs_of_a_walker_pale_from_the_first_to_the_last(tmp_path):
 
 
 def test_a_crank_on_a_moving_link_draws_no_circle():
-    toe = mechanism('custom', joints=(
-        'O ground 0 0', 'F crank O 0.4', 'K rigid O F 0.07 0.35 right', 'A crank K 0.05 zero F',
-        'B dyad A F 0.35 0.06 right'))
-    made = picture_of(toe, trace='none')
+    made = picture_of(mechanism('custom', joints=CASSIE), trace='none')
     circle, = (line.get_xydata() @ (1, 1j) for line in made.figure.axes[0].lines
                if line.get_linestyle() == '--')
     assert np.abs(circle) == pytest.approx(0.4, abs=1e-12)

@@ -11,7 +11,7 @@ import re
 import time
 from xml.etree import ElementTree
 
-from linkage_ros import mechanisms, scene
+from linkage_ros import scene
 from linkage_ros.cli import RequestError
 from linkage_ros.linkage import theta_of
 from linkage_ros.robot_files import check, cli, closing, loops, readers
@@ -678,8 +678,7 @@ def random_linkage(seed, without=()):
     rng = np.random.default_rng(seed)
     design = random_linkages.design(rng, without=without)
     try:
-        linkage = mechanisms.create('custom', joints=design.joints, branches=design.branches,
-                                    **design.dimensions)
+        linkage = design.linkage()
     except ValueError:
         return None
     for _ in range(30 if 1e-3 < linkage.longest < 1e3 else 0):

@@ -44,14 +44,19 @@ def test_without_parameters_the_scene_is_the_catalogue():
     assert scene.read({'use_sim_time': True}).parameters == scene.read({}).parameters
 
 
+def rewritten(before, folder):
+    """Return the values with which a scene is written, and the scene that is read of them."""
+    kept, file = writing.without_defaults(before), folder / 'again.yaml'
+    file.write_text(writing.in_yaml(kept))
+    return kept, scene.load(str(file))
+
+
 @pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('file', EXAMPLES)
 def test_a_scene_is_written_as_the_few_values_that_tell_it(file, tmp_path):
     before = scene.load(str(file))
-    kept = writing.without_defaults(before)
-    again = tmp_path / 'again.yaml'
-    again.write_text(writing.in_yaml(kept))
-    assert scene.load(str(again)).parameters == before.parameters
+    kept, again = rewritten(before, tmp_path)
+    assert again.parameters == before.parameters
     usual = [p.name for p in before.parameters if p.name in kept and p.value == p.default]
     assert all('.dimensions.' in name or name.rpartition('.')[2] in ('mechanisms', 'type', 'scale')
                for name in usual)
@@ -62,18 +67,14 @@ def test_names_that_ros_takes_for_values_are_written_as_texts_and_empty_lists_no
         f'{name}.type': 'klann' for name in ('y', 'nan', 'Inf', 'on')},
         'y.frame_id': '08', 'nan.frame_id': '0x1F', 'nan.crank.source': '1_0'})
     assert 'loads' not in writing.in_yaml({'y.joint_names': [], 'y.loads': (), 'rate': 1.0})
-    again = tmp_path / 'again.yaml'
-    again.write_text(writing.in_yaml(writing.without_defaults(before)))
-    assert scene.load(str(again)).parameters == before.parameters
+    assert rewritten(before, tmp_path)[1].parameters == before.parameters
 
 
 @pytest.mark.parametrize('name', ['my thigh', 'Hüfte', 'toe 1/2 "left" <a&b>', "o'k: #3", '大腿',
                                   100 * 'w'])
 def test_a_frame_is_called_as_links_of_robots_are(tmp_path, name):
     before = scene.read({'mechanisms': ['jansen'], 'frame_id': name, 'jansen.frame_id': name})
-    again = tmp_path / 'again.yaml'
-    again.write_text(writing.in_yaml(writing.without_defaults(before)))
-    found = scene.load(str(again))
+    _, found = rewritten(before, tmp_path)
     assert (found.frame_id, found.mechanisms['jansen'].frame_id) == (name, name)
     root = ElementTree.fromstring(urdf.describe(found.mechanisms.values(), name))
     assert root.find('joint/parent').get('link') == root.find('link').get('name') == name

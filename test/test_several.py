@@ -34,8 +34,7 @@ def agree(linkage, outputs, values, expected, sure=1e-3):
 
 def made(name):
     """Return a collected case and its numbers."""
-    joints, numbers, _ = CASES[name]
-    return mechanisms.create('custom', joints=joints, **numbers), numbers
+    return CASES[name].linkage(), CASES[name].dimensions
 
 
 @pytest.mark.nightly

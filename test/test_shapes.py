@@ -11,12 +11,10 @@ from linkage_ros.robot_model import shapes
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD
 import numpy as np
 import pytest
-from scenes import alone, BOOM, ENGINE
+from scenes import alone, BOOM, CASSIE, ENGINE
 
 MOVING = ('O ground 0 0', 'Q ground 1.6 0', 'A crank O 0.5', 'B dyad A Q 1.8 1 left',
           'D ground 0.8 1.2', 'S slider D 0.7 A along B out', 'T block S 0.1 0.2')
-CASSIE = ('O ground 0 0', 'F crank O 0.4', 'K rigid O F 0.07 0.35 right', 'A crank K 0.05 zero F',
-          'B dyad A F 0.35 0.06 right')
 FLAT = 'O ground 0 0', 'A crank O 1', 'P rigid O A 0.5 0.5 left'
 RACK = ('O ground 0 0', 'H ground 1 0.5', 'S carriage O along H 0.1 0.9', 'A ground 0.2 0.7',
         'B dyad S A 0.6 0.5 left', 'm mirrored O H')

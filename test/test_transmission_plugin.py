@@ -48,8 +48,6 @@ ACTUATORS, JOINTS = ({name: axes[side] for name, axes in AXES.items()} for side 
 KINDS = 'position', 'velocity', 'effort'
 NAN = math.nan
 OK, OUT_OF_REACH, SINGULAR, NOT_KNOWN = 0, 1, 2, 4
-COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
-    not shutil.which(name), reason=f'{name} is not installed')) for name in ('g++', 'clang++')]
 
 
 class Refused(Exception):
@@ -389,7 +387,7 @@ def test_why_values_are_held_is_logged_once_per_reason(plugins, capfd):
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize('compiler', COMPILERS)
+@pytest.mark.parametrize('compiler', test_transmission.COMPILERS)
 def test_a_status_is_reached_where_nothing_else_is_visible(tmp_path, compiler):
     # Optimized, as a user compiles it, gcc warns of more.
     plugins = Plugins(tmp_path, compiler, '-O2', '-fvisibility=hidden')

@@ -14,7 +14,6 @@ import math
 from typing import NamedTuple
 import warnings
 
-from linkage_ros import mechanisms
 import numpy as np
 
 from . import drawing_accuracy, inverse_judge, random_linkages
@@ -47,8 +46,7 @@ class Subject:
         self.design, self.rng = design, rng
         # What has been measured.
         self.rows = []
-        self.mechanism = mechanisms.create('custom', joints=design.joints,
-                                           branches=design.branches, **design.dimensions)
+        self.mechanism = design.linkage()
         self.linkage = Linkage(design.joints, design.dimensions, design.branches)
         self.inputs = self.mechanism.inputs
         self.turns = self.inputs[0].turns
@@ -157,9 +155,7 @@ def assembled(seeds):
         rng = np.random.default_rng(seed)
         drawn = random_linkages.design(rng)
         with suppress(ValueError):
-            linkage = mechanisms.create(
-                'custom', joints=drawn.joints, branches=drawn.branches, **drawn.dimensions)
-            yield seed, linkage, rng
+            yield seed, drawn.linkage(), rng
 
 
 def checked(check):

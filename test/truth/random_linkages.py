@@ -62,6 +62,11 @@ class Design(NamedTuple):
     dimensions: dict
     branches: dict
 
+    def linkage(self):
+        """Return it as the library has it."""
+        return mechanisms.create('custom', joints=self.joints, branches=self.branches,
+                                 **self.dimensions)
+
     def __str__(self):
         lines = ', '.join(map(repr, self.joints))
         given = ''.join(f', {name}={number!r}' for name, number in self.dimensions.items())
@@ -144,7 +149,7 @@ def holds(rng, joints, dimensions):
     if flat or held.sum() < 3 or np.sum(held & apart) < 0.9 * held.sum():
         return False
     with suppress(ValueError):
-        return bool(mechanisms.create('custom', joints=joints, **dimensions))
+        return bool(Design(joints, dimensions, {}).linkage())
     return False
 
 
