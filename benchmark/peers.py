@@ -18,7 +18,7 @@ from pathlib import Path
 import platform
 import subprocess
 import tempfile
-from typing import Callable, NamedTuple, Optional
+from typing import Callable, NamedTuple
 
 from gmpy2 import mpfr
 from linkage_ros import mechanisms
@@ -42,8 +42,8 @@ class Method(NamedTuple):
     """One way to solve one linkage."""
 
     name: str
-    one: Optional[Callable]
-    many: Optional[Callable]
+    one: Callable | None
+    many: Callable | None
     rows: Callable = np.asarray
     follows: bool = False
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from functools import update_wrapper
 from threading import RLock
-from typing import Any, Callable, cast, Dict, Hashable, Optional, TypeVar
+from typing import Any, Callable, cast, Hashable, TypeVar
 from weakref import WeakValueDictionary
 
 Function = TypeVar('Function', bound=Callable)
@@ -29,7 +29,7 @@ SIZE = 128
 _MISSING = object()
 
 
-class Cache(Dict[Any, Any]):
+class Cache(dict[Any, Any]):
     """
     A dictionary that makes missing values, and drops its oldest entry if it grows too large.
 
@@ -48,7 +48,7 @@ class Cache(Dict[Any, Any]):
 
     """
 
-    def __init__(self, make: Optional[Callable] = None, size: int = SIZE, shared: bool = False):
+    def __init__(self, make: Callable | None = None, size: int = SIZE, shared: bool = False):
         super().__init__()
         self._make, self._size = make, size
         # A finalizer may look up a value while the same thread stores one.

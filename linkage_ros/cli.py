@@ -8,7 +8,7 @@ import math
 import os
 import re
 import sys
-from typing import Any, Callable, List, Mapping, NoReturn, Optional, Sequence
+from typing import Any, Callable, Mapping, NoReturn, Sequence
 
 from .scene import SceneError, SceneMechanism
 from .words import meant, RequestError, sentence, suggestion
@@ -37,7 +37,7 @@ def add_scene(parser: argparse.ArgumentParser, **scene: Any) -> None:
                         help='only these mechanisms of the scene')
 
 
-def run(name: str, work: Callable, args: Optional[Sequence[str]]) -> int:
+def run(name: str, work: Callable, args: Sequence[str] | None) -> int:
     """
     Run a command; return the exit code.
 
@@ -82,7 +82,7 @@ def _beside(error: OSError) -> str:
     return meant(name, os.listdir(folder or '.'))
 
 
-def chosen(mechanisms: Mapping[str, SceneMechanism], names: Sequence[str]) -> List[SceneMechanism]:
+def chosen(mechanisms: Mapping[str, SceneMechanism], names: Sequence[str]) -> list[SceneMechanism]:
     """Return the named mechanisms, or all; raise RequestError for an unknown name."""
     for name in names:
         if name not in mechanisms:

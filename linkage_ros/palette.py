@@ -3,7 +3,6 @@
 
 """The colours of markers, pictures, robot models and the viewer's page."""
 
-from typing import Tuple
 
 # Colours that colour-blind people tell apart (Okabe and Ito, "Color Universal Design").
 BLUE, ORANGE, GREEN, VERMILION = '#0072b2', '#e69f00', '#009e73', '#d55e00'
@@ -24,6 +23,6 @@ FLOOR = '#b5a27c'
 REFUSED = '#a84300'
 
 
-def rgb(colour: str) -> Tuple[float, ...]:
+def rgb(colour: str) -> tuple[float, ...]:
     """Return red, green and blue, each from 0 to 1, in three digits."""
     return tuple(round(int(colour[i:i + 2], 16) / 255, 3) for i in (1, 3, 5))

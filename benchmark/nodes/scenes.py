@@ -4,7 +4,7 @@
 """The scenes that are measured, and the crank messages that turn them."""
 
 from pathlib import Path
-from typing import NamedTuple, Tuple
+from typing import NamedTuple
 
 from linkage_ros import scene
 from linkage_ros.scene.motion import Motion
@@ -38,7 +38,7 @@ class Topic(NamedTuple):
     joints: bool
 
 
-def topics(name: str) -> Tuple[Topic, ...]:
+def topics(name: str) -> tuple[Topic, ...]:
     """Return the topics of a scene."""
     return tuple(Topic(f'{mechanism}/{what}', what == 'joint_states')
                  for mechanism in SCENES[name]['mechanisms']

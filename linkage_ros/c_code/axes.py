@@ -5,7 +5,7 @@
 
 from itertools import permutations
 import math
-from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Iterator, NamedTuple, Sequence
 
 from ..linkage import GROUND, Link, loaded_links
 from ..scene import SceneMechanism
@@ -32,7 +32,7 @@ class Axis(NamedTuple):
     turn: float
     wraps: bool
     role: str
-    input: Optional[int]
+    input: int | None
     ratio: float
     shift: float
 
@@ -52,7 +52,7 @@ def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float =
                 abs(factor) * math.tau * turns, wraps and turns, output, counted, *gear)
 
 
-def actuators(mechanism: SceneMechanism) -> List[Axis]:
+def actuators(mechanism: SceneMechanism) -> list[Axis]:
     """Return the axes of the sources of a mechanism's inputs."""
     return invertible(mechanism, [
         axis(mechanism, settings.measures or name, settings.source, 1.0 / settings.ratio,
@@ -60,7 +60,7 @@ def actuators(mechanism: SceneMechanism) -> List[Axis]:
         for name, settings in mechanism.inputs.items()])
 
 
-def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
+def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> list[Axis]:
     """
     Return the joints that a controller commands, as many as there are inputs.
 
@@ -86,7 +86,7 @@ def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> List[Axis]:
     return invertible(mechanism, [_joint(mechanism, output) for output in outputs])
 
 
-def passive(mechanism: SceneMechanism, commanded: Sequence[Axis]) -> List[Axis]:
+def passive(mechanism: SceneMechanism, commanded: Sequence[Axis]) -> list[Axis]:
     """Return the joints of the first leg's links that are not commanded."""
     outputs = [each.output for each in commanded]
     return [_joint(mechanism, link.name) for link in mechanism.linkage.links
@@ -99,7 +99,7 @@ def _joint(mechanism: SceneMechanism, output: str) -> Axis:
     return axis(mechanism, output, joint.name, joint.sign, joint.offset, joint.wraps)
 
 
-def output_of(mechanism: SceneMechanism, name: str) -> Optional[str]:
+def output_of(mechanism: SceneMechanism, name: str) -> str | None:
     """Return the output with a name in the scene, or None."""
     for link in mechanism.linkage.joints:
         joint = mechanism.joints.get(_key(mechanism, link))
@@ -109,7 +109,7 @@ def output_of(mechanism: SceneMechanism, name: str) -> Optional[str]:
     return output if output != name and mechanism.linkage.has_output(output) else None
 
 
-def invertible(mechanism: SceneMechanism, axes: List[Axis]) -> List[Axis]:
+def invertible(mechanism: SceneMechanism, axes: list[Axis]) -> list[Axis]:
     """Return axes; raise ValueError if positions of them do not give the inputs for certain."""
     linkage, names = mechanism.linkage, [each.output for each in axes]
     what = f'{listed(names)} of {mechanism.name}'
@@ -127,7 +127,7 @@ def invertible(mechanism: SceneMechanism, axes: List[Axis]) -> List[Axis]:
     return axes
 
 
-def loads(mechanism: SceneMechanism) -> Iterator[Tuple[str, float]]:
+def loads(mechanism: SceneMechanism) -> Iterator[tuple[str, float]]:
     """Yield outputs on which the scene's loads work, with their factors."""
     for name, load in mechanism.loads.items():
         if isinstance(load, float):
@@ -137,7 +137,7 @@ def loads(mechanism: SceneMechanism) -> Iterator[Tuple[str, float]]:
                         for direction, part in zip(mechanism.linkage.axes, load))
 
 
-def start(mechanism: SceneMechanism) -> List[float]:
+def start(mechanism: SceneMechanism) -> list[float]:
     """Return the starts of the inputs."""
     return [Motion.of(settings).at(0)[0] for settings in mechanism.inputs.values()]
 
@@ -147,11 +147,11 @@ def _key(mechanism: SceneMechanism, link: str) -> str:
     return link if link in mechanism.inputs else next(iter(mechanism.assembly().legs)) + link
 
 
-def _chain(mechanism: SceneMechanism) -> List[str]:
+def _chain(mechanism: SceneMechanism) -> list[str]:
     """Return a chain of links that determines the inputs."""
     links = mechanism.linkage.links
     barrels = {link.parent for link in links if link.name in mechanism.inputs}
-    chosen: List[str] = []
+    chosen: list[str] = []
 
     def rank(link: Link) -> tuple:
         key = _key(mechanism, link.name)

@@ -3,7 +3,7 @@
 
 """Command that prints the mechanisms of a scene as C; it needs no ROS."""
 
-from typing import List, Optional, Sequence, Tuple
+from typing import Sequence
 
 from . import header
 from .axes import output_of
@@ -14,12 +14,12 @@ from ..words import suggestion
 NAME = 'c_code'
 
 
-def main(args: Optional[List[str]] = None) -> int:
+def main(args: list[str] | None = None) -> int:
     """Print C99; return the exit code."""
     return cli.run(NAME, show, args)
 
 
-def show(args: Optional[List[str]]) -> None:
+def show(args: list[str] | None) -> None:
     """Print the headers that a command line requests."""
     options = arguments().parse_args(args)
     mechanisms = cli.chosen(scene.load(options.scene).mechanisms, options.mechanism)
@@ -31,7 +31,7 @@ def show(args: Optional[List[str]]) -> None:
 
 
 def with_joints(mechanisms: Sequence[SceneMechanism], names: Sequence[str]
-                ) -> List[Tuple[SceneMechanism, List[str]]]:
+                ) -> list[tuple[SceneMechanism, list[str]]]:
     """Return each mechanism with its joints among those named."""
     chosen = [(mechanism, [name for name in names if output_of(mechanism, name)])
               for mechanism in mechanisms]

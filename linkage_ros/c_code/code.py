@@ -9,7 +9,7 @@ import math
 import re
 import sys
 from textwrap import wrap
-from typing import Any, Dict, Iterable, List, Mapping, Sequence, Tuple
+from typing import Any, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -81,7 +81,7 @@ class Code:
         return bare(code) if factor == 1.0 else f'{self.literal(factor)} * {code}'
 
     def function(self, head: str, arguments: Sequence[str],
-                 blocks: Sequence[Tuple[str, Mapping[str, Real]]], last: str,
+                 blocks: Sequence[tuple[str, Mapping[str, Real]]], last: str,
                  replaced: Mapping[Real, Real] = {}) -> str:
         """
         Return a C function, from the code of its arguments; see `Program`.
@@ -92,7 +92,7 @@ class Code:
         results = tolerant(substituted(
             [x for _, assigned in blocks for x in assigned.values()], replaced), self._rounding)
         program = Program(results, len(arguments))
-        exact: Dict[Real, Any] = {}
+        exact: dict[Real, Any] = {}
         program.bind(self.linkage.dimensions, exact)
         # What lengths decide, such as which bars are equal, is decided in double precision.
         known = {x: self._rounding.get(x.value, value) for x, value in exact.items()
@@ -110,7 +110,7 @@ class Code:
             body += [f'{place} = {bare(code)};' for place, code in zip(assigned, codes)]
             statements, numbers, codes = statements[len(ready):], numbers[n:], codes[n:]
         # How constants follow from lengths, as text where that is short.
-        formulas: Dict[Real, str] = {}
+        formulas: dict[Real, str] = {}
         for x in pose.variant.steps:
             parts, text = [formulas[y] for y in x.operands], str(x.args[0])
             if x.op == 'where':
@@ -140,7 +140,7 @@ def bare(code: str) -> str:
     return code[1:-1] if code.startswith('(') else code
 
 
-def indented(lines: Iterable[str]) -> List[str]:
+def indented(lines: Iterable[str]) -> list[str]:
     """Return lines of a function's body, broken if they are long."""
     return [part for line in lines for part in wrap(
         f'    {line}', LINE - 1, subsequent_indent='        ', break_long_words=False,

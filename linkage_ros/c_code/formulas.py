@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import Dict, Iterable, Iterator, List, Mapping, Sequence, Tuple
+from typing import Iterable, Iterator, Mapping, Sequence
 
 from .code import Code
 from .names import comment, distinct, field
@@ -96,7 +96,7 @@ class Formulas:
              ('if (!has_rates) {\n    return isfinite(valid);\n}', {}), *rates],
             'return isfinite(valid);')
 
-    def _groups(self) -> Iterator[Tuple[str, List[str]]]:
+    def _groups(self) -> Iterator[tuple[str, list[str]]]:
         """Yield the joint lines, with the outputs that each adds."""
         lines = [line.text for line in self._linkage.design.lines]
         if self._mechanism.in_space:
@@ -115,7 +115,7 @@ class Formulas:
                 yield about, outputs
 
     def _assigned(self, outputs: Sequence[str], structs: Mapping[str, float],
-                  values: Iterable[Real]) -> Dict[str, Real]:
+                  values: Iterable[Real]) -> dict[str, Real]:
         """Return values of outputs in structs, each by a unit, by their places in C."""
         scale_of = self._mechanism.scale_of
         return {f'{struct}->{self.fields[output]}': value * (scale_of(output) / unit)

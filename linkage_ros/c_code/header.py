@@ -10,7 +10,7 @@ library's sine, cosine and arctangent. What all mechanisms have in common is `li
 
 from __future__ import annotations
 
-from typing import Any, Dict, Iterator, List, NamedTuple, Sequence
+from typing import Any, Iterator, NamedTuple, Sequence
 
 from .axes import actuators, Axis, axis, invertible, joints, loads
 from .code import Code, indented
@@ -69,7 +69,7 @@ def printed(requests: Sequence[Request], single: bool = False) -> str:
     return '\n'.join(headers(requests, single, [template('linkage.h').rstrip(), *later]))
 
 
-def headers(requests: Sequence[Request], single: bool, common: Sequence[str]) -> List[str]:
+def headers(requests: Sequence[Request], single: bool, common: Sequence[str]) -> list[str]:
     """Return the headers of mechanisms in one program, each with a text of `common`."""
     values = [_values(request, single) for request in requests]
     sizes = {size: max(each[f'own_{size}'] for each in values) for size in (
@@ -78,7 +78,7 @@ def headers(requests: Sequence[Request], single: bool, common: Sequence[str]) ->
             for each, text in zip(values, common)]
 
 
-def _values(request: Request, single: bool) -> Dict[str, Any]:
+def _values(request: Request, single: bool) -> dict[str, Any]:
     """Return the values of the template of a header."""
     mechanism, linkage = request.mechanism, request.mechanism.linkage
     name, code = mechanism.name, Code(linkage, single)
@@ -106,7 +106,7 @@ def _values(request: Request, single: bool) -> Dict[str, Any]:
         'model': '\n'.join([*tables.functions, *parts])}
 
 
-def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> Dict[str, List[Axis]]:
+def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> dict[str, list[Axis]]:
     """Return the axes of each inverse, by the end of its names."""
     outputs, n = [*map(plain_text, texts)], len(mechanism.inputs)
     for output in outputs:

@@ -5,7 +5,7 @@
 
 from importlib.resources import files
 import re
-from typing import Iterable, List, Mapping
+from typing import Iterable, Mapping
 
 from ..linkage import Mechanism
 
@@ -27,16 +27,16 @@ def filled(template: str, values: Mapping[str, object]) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def distinct(names: Iterable[str]) -> List[str]:
+def distinct(names: Iterable[str]) -> list[str]:
     """Return names, with a number after those that are there already."""
-    made: List[str] = []
+    made: list[str] = []
     for name in names:
         made.append(next(text for text in (name, *(f'{name}_{i}' for i in range(2, 1000)))
                          if text not in made))
     return made
 
 
-def constants(names: Iterable[str]) -> List[str]:
+def constants(names: Iterable[str]) -> list[str]:
     """Return names as ends of upper-case C constants, each distinct."""
     return distinct(re.sub(r'[^A-Z0-9]+', '_', name.upper()).strip('_') or 'UNNAMED'
                     for name in names)

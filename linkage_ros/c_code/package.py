@@ -5,7 +5,7 @@
 
 from pathlib import Path
 import re
-from typing import Dict, Mapping, Sequence, Tuple
+from typing import Mapping, Sequence
 from xml.sax.saxutils import escape, quoteattr
 
 from . import header
@@ -17,8 +17,8 @@ from ..scene import SceneMechanism
 PACKAGE = re.compile(r'(?=.{2,64}$)[a-z](_?[a-z0-9])*', re.ASCII)
 
 
-def package(name: str, scene: str, mechanisms: Sequence[Tuple[SceneMechanism, Sequence[str]]]
-            ) -> Dict[Path, str]:
+def package(name: str, scene: str, mechanisms: Sequence[tuple[SceneMechanism, Sequence[str]]]
+            ) -> dict[Path, str]:
     """
     Return the files of a package, by their path in it.
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from itertools import product
 import math
-from typing import Dict, Iterator, List, Mapping, Sequence, Tuple
+from typing import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -55,11 +55,11 @@ class Tables:
     def __init__(self, mechanism: SceneMechanism, code: Code, formulas: Formulas):
         self.mechanism, self.linkage, self._code, self._formulas = (
             mechanism, mechanism.linkage, code, formulas)
-        self.functions: List[str] = []
-        self._names: Dict[tuple, str] = {}
+        self.functions: list[str] = []
+        self._names: dict[tuple, str] = {}
         self.solutions = 1
 
-    def text(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], tag: str = '',
+    def text(self, sides: tuple[Sequence[Axis], Sequence[Axis]], tag: str = '',
              passive: Sequence[Axis] = ()) -> str:
         """
         Return the function for a pose, and the table.
@@ -80,7 +80,7 @@ class Tables:
             'inputs': row(self._inputs(sides, has_sweeps=not tag)),
             'start': row(start(self.mechanism))})
 
-    def _at(self, sides: Tuple[Sequence[Axis], Sequence[Axis]], commanded: int) -> Iterator[str]:
+    def _at(self, sides: tuple[Sequence[Axis], Sequence[Axis]], commanded: int) -> Iterator[str]:
         """Yield the statements for values, rates by each input, and loads."""
         code, formulas, scale_of = self._code, self._formulas, self.mechanism.scale_of
         for side, axes in enumerate(sides):
@@ -107,7 +107,7 @@ class Tables:
 
     # --- tables ---
 
-    def _inputs(self, sides: Sequence[Sequence[Axis]], has_sweeps: bool) -> Iterator[Tuple]:
+    def _inputs(self, sides: Sequence[Sequence[Axis]], has_sweeps: bool) -> Iterator[tuple]:
         """Yield the rows of the inputs, as `lkr_input` has them."""
         counted = [{each.input for each in axes} for axes in sides]
         for i, settings in enumerate(self.mechanism.inputs.values()):
@@ -149,7 +149,7 @@ class Tables:
             code = f'({code} - {literal(axis.offset)})'
         return code if axis.factor == 1.0 else f'{code} / {literal(axis.factor)}'
 
-    def _series(self, name: str, axis: Axis) -> Tuple[int, str]:
+    def _series(self, name: str, axis: Axis) -> tuple[int, str]:
         """Return the most inputs of an output, and the function for them by series."""
         code, monotone = self._code, self.linkage.monotone(axis.output)
         found = series(self.linkage, axis.output, monotone, code.single, *self.mechanism.scales)
@@ -166,7 +166,7 @@ class Tables:
             f'    return lkr_series({len(rows)}, piece, {given}, q);', '}'])
 
     def _closed(self, name: str, axes: Sequence[Axis], counted: Mapping[int, Real],
-                closed: InverseLinkage) -> Tuple[int, str]:
+                closed: InverseLinkage) -> tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
         # If an input has a period of several turns, each turn has its own pose.
         turns = [*product(*((0.0,) if i in counted else own
@@ -183,8 +183,8 @@ class Tables:
             f'is none:{lines}\n', solutions, closed.arguments)
 
     def _function(self, name: str, axes: Sequence[Axis], about: str,
-                  solutions: Sequence[Tuple[str, Mapping[int, Real]]],
-                  replaced: Mapping[Real, Real] = {}) -> Tuple[int, str]:
+                  solutions: Sequence[tuple[str, Mapping[int, Real]]],
+                  replaced: Mapping[Real, Real] = {}) -> tuple[int, str]:
         """Return the number of solutions, each a line above it and inputs, and the function."""
         number, scales = self._code.number, self.mechanism.scales
         return len(solutions), self._code.function(

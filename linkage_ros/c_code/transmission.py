@@ -5,7 +5,7 @@
 
 from pathlib import Path
 import sys
-from typing import List, Optional, Sequence, Tuple
+from typing import Sequence
 
 from . import limits
 from .cli import parser, with_joints
@@ -16,12 +16,12 @@ from ..scene import SceneMechanism
 NAME = 'transmission'
 
 
-def main(args: Optional[List[str]] = None) -> int:
+def main(args: list[str] | None = None) -> int:
     """Write the package; return the exit code."""
     return cli.run(NAME, write, args)
 
 
-def write(args: Optional[List[str]]) -> None:
+def write(args: list[str] | None) -> None:
     """Write the package or print the limits that a command line requests."""
     options = arguments().parse_args(args)
     chosen = cli.chosen(scene.load(options.scene).mechanisms, options.mechanism)
@@ -36,7 +36,7 @@ def write(args: Optional[List[str]]) -> None:
 
 
 def write_package(folder: str, scene_file: str,
-                  mechanisms: Sequence[Tuple[SceneMechanism, Sequence[str]]]) -> None:
+                  mechanisms: Sequence[tuple[SceneMechanism, Sequence[str]]]) -> None:
     """Write the package of mechanisms with their commanded joints."""
     out = Path(folder).absolute()
     if not PACKAGE.fullmatch(out.name):

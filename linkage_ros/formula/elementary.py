@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from functools import reduce
 import math
-from typing import Sequence, Tuple
+from typing import Sequence
 
 from .expression import Real, real, where
 
@@ -42,7 +42,7 @@ REST_OF_PI = 1.2246467991473532e-16
 LEAST_HALVED, MOST_ADDED = 2.0 ** -1000, 2.0 ** 1000
 
 
-def sine_and_cosine(x: Real) -> Tuple[Real, Real, Real]:
+def sine_and_cosine(x: Real) -> tuple[Real, Real, Real]:
     """Return sin x and cos x, and whether they are valid."""
     quarters = _rounded(x * PER_QUARTER)
     angle, rest = _reduced(x, quarters)
@@ -60,7 +60,7 @@ def _rounded(x: Real) -> Real:
     return (x + WHOLE) - WHOLE
 
 
-def _reduced(x: Real, quarters: Real) -> Tuple[Real, Real]:
+def _reduced(x: Real, quarters: Real) -> tuple[Real, Real]:
     """Return x minus quarter turns to twice the precision, as a sum of two numbers."""
     high, middle, low = (quarters * part for part in QUARTER)
     first = x - high
@@ -95,7 +95,7 @@ def _signed(x: Real, positive: Real) -> Real:
     return where(positive, x, -x)
 
 
-def arctangent(y: Real, x: Real) -> Tuple[Real, Real]:
+def arctangent(y: Real, x: Real) -> tuple[Real, Real]:
     """Return the angle of (x, y), and whether it is valid."""
     height, width = abs(y), abs(x)
     steep = width < height

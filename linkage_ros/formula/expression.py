@@ -19,13 +19,9 @@ from typing import (
     Callable,
     Iterable,
     Iterator,
-    List,
     Mapping,
     NamedTuple,
-    Optional,
     Sequence,
-    Tuple,
-    Union,
 )
 
 from .operations import OPERATIONS, WITHOUT_RATE
@@ -43,8 +39,8 @@ class Real:
 
     __slots__ = ('op', 'args', 'operands', 'varies', 'positive', 'rate')
 
-    def __init__(self, op: str, args: tuple, varies: Optional[bool] = None,
-                 positive: bool = False, rate: Optional[Rate] = None):
+    def __init__(self, op: str, args: tuple, varies: bool | None = None,
+                 positive: bool = False, rate: Rate | None = None):
         self.op = op
         self.args = args
         self.operands = () if op in _LEAVES else args
@@ -53,7 +49,7 @@ class Real:
         self.rate = rate
 
     @property
-    def value(self) -> Optional[float]:
+    def value(self) -> float | None:
         """Return the number of a constant leaf, None for anything else."""
         return self.args[0] if self.op == 'constant' else None
 
@@ -140,7 +136,7 @@ class Real:
         return real(other) / self
 
 
-Number = Union[Real, float, int]
+Number = Real | float | int
 
 _LEAVES = frozenset({'constant', 'dimension', 'argument'})
 
@@ -231,12 +227,12 @@ def exact_sum(*terms: Number) -> Real:
     return reduce(operator.add, parts, real(0.0))
 
 
-def sum_and_error(first: Real, second: Real) -> Tuple[Real, Real]:
+def sum_and_error(first: Real, second: Real) -> tuple[Real, Real]:
     """Return the rounded sum of two terms, and its exact rounding error."""
     return first + second, operation('sum_error', first, second)
 
 
-def _distilled(terms: List[Real]) -> List[Real]:
+def _distilled(terms: list[Real]) -> list[Real]:
     """Return the rounding error of each addition of a sum, and last the sum."""
     total, *rest = terms
     errors = []
@@ -279,7 +275,7 @@ class Complex:
     def __init__(self, x: Number, y: Number):
         self.x = real(x)
         self.y = real(y)
-        self.spin: Optional[Rate] = None
+        self.spin: Rate | None = None
 
     def __add__(self, other: Complex) -> Complex:
         return Complex(self.x + other.x, self.y + other.y)
@@ -292,7 +288,7 @@ class Complex:
         opposite.spin = self.spin
         return opposite
 
-    def __mul__(self, other: Union[Complex, Number]) -> Complex:
+    def __mul__(self, other: Complex | Number) -> Complex:
         if isinstance(other, Complex):
             return Complex(self.x * other.x - self.y * other.y,
                            self.x * other.y + self.y * other.x)
@@ -372,7 +368,7 @@ def derivative(node: Real, rates: dict[int, Number], known: dict) -> Real:
     return known[node]
 
 
-def substituted(outputs: Sequence[Real], replaced: Mapping[Any, Real]) -> List[Real]:
+def substituted(outputs: Sequence[Real], replaced: Mapping[Any, Real]) -> list[Real]:
     """
     Return expressions with expressions for their arguments, and without geometric rates.
 
@@ -392,7 +388,7 @@ def substituted(outputs: Sequence[Real], replaced: Mapping[Any, Real]) -> List[R
 class Rate(NamedTuple):
     """A geometric rate: a formula of the rates of some expressions."""
 
-    of: Tuple[Real, ...]
+    of: tuple[Real, ...]
     formula: Callable
 
 

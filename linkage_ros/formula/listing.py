@@ -10,7 +10,7 @@ What depends on dimensions alone is a constant of the list.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Callable, Dict, List, Mapping, Sequence, Tuple
+from typing import Any, Callable, Mapping, Sequence
 
 from .expression import Real, unknown
 
@@ -31,10 +31,10 @@ class Listing:
     """The operations of outputs, each once, in an order of evaluation."""
 
     def __init__(self, outputs: Sequence[Real], decided: Mapping[Real, bool]):
-        self.entries: List[Tuple[Real, tuple]] = []
+        self.entries: list[tuple[Real, tuple]] = []
         self._decided = decided
-        self._numbers: Dict[tuple, int] = {}
-        self._known: Dict[Real, int] = {}
+        self._numbers: dict[tuple, int] = {}
+        self._known: dict[Real, int] = {}
         for x in unknown(outputs, self._needed, self._known):
             self._known[x] = self._enter(x)
         self.outputs = [self._known[x] for x in outputs]
@@ -59,9 +59,9 @@ class Listing:
             self.entries.append((node, args))
         return self._numbers[key]
 
-    def _count_uses(self) -> Dict[int, int]:
+    def _count_uses(self) -> dict[int, int]:
         """Return the number of uses of each value, in an order of evaluation."""
-        uses: Dict[int, int] = {}
+        uses: dict[int, int] = {}
         waiting = list(self.outputs)
         while waiting:
             number = waiting.pop()
@@ -77,7 +77,7 @@ class Listing:
                 for number in self._uses if number not in self.constants
                 ], self.constants, self.outputs
 
-    def statements(self, dialect: Dialect) -> Tuple[List[Tuple[str, str]], List[str]]:
+    def statements(self, dialect: Dialect) -> tuple[list[tuple[str, str]], list[str]]:
         """Return the assignments as (name, code) and the code of each output."""
         # Operands that a template repeats are evaluated before.
         repeating = {name: [i for i in range(2) if code.count(f'{{{i}}}') > 1]
@@ -85,7 +85,7 @@ class Listing:
         repeated = {args[i] for node, args in map(self.entries.__getitem__, self._uses)
                     for i in repeating.get(node.op, ())}
         leaves = {'constant': dialect.number, 'argument': 'x{}'.format}
-        text: Dict[int, str] = {}
+        text: dict[int, str] = {}
         depth = dict.fromkeys(self._uses, 0)
         lines = []
         for number, uses in self._uses.items():

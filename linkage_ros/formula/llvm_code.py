@@ -16,7 +16,7 @@ from contextlib import contextmanager
 import ctypes
 from functools import partial
 import os
-from typing import Callable, Dict, Iterator, List, Sequence, Tuple
+from typing import Callable, Iterator, Sequence
 
 import llvmlite
 from llvmlite import binding as llvm, ir
@@ -62,7 +62,7 @@ def compiled(module: ir.Module) -> llvm.ExecutionEngine:
 class Builder(ir.IRBuilder):
     """Appends operations on numbers, or on vectors of them, to the code of a function."""
 
-    def operations(self) -> Dict[str, Callable]:
+    def operations(self) -> dict[str, Callable]:
         """Return the code generators of operations, by name."""
         return {name: partial(row.llvm, self) for name, row in OPERATIONS.items()}
 
@@ -203,7 +203,7 @@ def _in_all_lanes(builder: Builder, kind: ir.Type, number: ir.Value) -> ir.Value
         ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES))
 
 
-def _operators(builder: Builder) -> Dict[str, Callable]:
+def _operators(builder: Builder) -> dict[str, Callable]:
     """Return the code generators of operations on eight poses."""
     spell = builder.operations()
     turned = _approximated(builder, spell, sine_and_cosine, (spell['sin'], spell['cos']))
@@ -221,13 +221,13 @@ def _by_lane(builder: Builder, name: str, *operands: ir.Value) -> ir.Value:
     return result
 
 
-def _approximated(builder: Builder, spell: Dict[str, Callable], approximation: Callable,
+def _approximated(builder: Builder, spell: dict[str, Callable], approximation: Callable,
                   library: Sequence[Callable]) -> Callable:
     """Return a code generator: `elementary`, or the C library where that is not valid."""
     @cached()
-    def appended(*operands: ir.Value) -> List[ir.Value]:
+    def appended(*operands: ir.Value) -> list[ir.Value]:
         operations, outputs = _listed(approximation, len(operands))
-        known: Dict[int, ir.Value] = {}
+        known: dict[int, ir.Value] = {}
         _append(operations, known, spell, VECTOR, lambda index: operands[index])
         *near, holds = (known[number] for number in outputs)
         whole, before = builder.bitcast(holds, ir.IntType(LANES)), builder.block
@@ -245,7 +245,7 @@ def _approximated(builder: Builder, spell: Dict[str, Callable], approximation: C
 
 
 @cached()
-def _listed(approximation: Callable, arguments: int) -> Tuple[Sequence, Sequence[int]]:
+def _listed(approximation: Callable, arguments: int) -> tuple[Sequence, Sequence[int]]:
     outputs = approximation(*map(argument, range(arguments)))
     operations, _, numbers = Listing(outputs, {}).operations()
     return operations, numbers

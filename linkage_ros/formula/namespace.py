@@ -19,7 +19,7 @@ from __future__ import annotations
 from functools import reduce
 import math
 from operator import or_
-from typing import Any, Callable, Dict, List, Sequence, Tuple
+from typing import Any, Callable, Sequence
 
 from .expression import argument, operation, Real, substituted, unknown, where
 from .listing import Dialect
@@ -28,13 +28,13 @@ from ..words import listed
 
 
 def array_function(outputs: Sequence[Real], arguments: int, xp: Any, dimensions: dict,
-                   single: Dict[float, float]) -> Callable:
+                   single: dict[float, float]) -> Callable:
     """
     Return outputs as a function of arrays of a namespace, which returns a tuple of arrays.
 
     `single` are the numbers that take the place of others in single precision.
     """
-    def code(dtype: Any, numbers: Dict[float, float]) -> Callable:
+    def code(dtype: Any, numbers: dict[float, float]) -> Callable:
         names = {name: _of_floats_too(name, xp, dtype) for name in (
             'sin', 'cos', 'sqrt', 'absolute', 'rint', 'where', 'atan2')}
         dialect = Dialect(ARRAYS.templates, {**ARRAYS.names, **names}, lambda value: repr(
@@ -47,7 +47,7 @@ def array_function(outputs: Sequence[Real], arguments: int, xp: Any, dimensions:
     codes = (xp.float64, code(xp.float64, {})), (xp.float32, code(xp.float32, single))
     broadcast = getattr(xp, 'broadcast_arrays', None) or xp.broadcast_tensors
 
-    def function(*arrays: Any) -> Tuple[Any, ...]:
+    def function(*arrays: Any) -> tuple[Any, ...]:
         for dtype, pose in codes:
             if [getattr(x, 'dtype', None) == dtype for x in arrays] == arguments * [True]:
                 return pose(*broadcast(*arrays))
@@ -75,12 +75,12 @@ class Finite:
     """Expressions without NaN, each with the conditions of its validity."""
 
     def __init__(self) -> None:
-        self._known: Dict[Real, Tuple[Real, int]] = {}
-        self._bits: Dict[Real, int] = {}
+        self._known: dict[Real, tuple[Real, int]] = {}
+        self._bits: dict[Real, int] = {}
         # Of no conditions all hold, for arrays of any kind.
         self._combined = {0: abs(_finite(argument(0))) < math.inf}
 
-    def outputs(self, expressions: Sequence[Real]) -> List[Real]:
+    def outputs(self, expressions: Sequence[Real]) -> list[Real]:
         """Return expressions with the same values, which become NaN at the end only."""
         for x in unknown(expressions, lambda x: x.operands if x.varies else (), self._known):
             self._known[x] = self._value(
@@ -88,7 +88,7 @@ class Finite:
         return [where(self._all(needs), value, math.nan)
                 for value, needs in map(self._known.__getitem__, expressions)]
 
-    def _value(self, x: Real, operands: Sequence[Tuple[Real, int]]) -> Tuple[Real, int]:
+    def _value(self, x: Real, operands: Sequence[tuple[Real, int]]) -> tuple[Real, int]:
         values = [value for value, _ in operands]
         needs = reduce(or_, [conditions for _, conditions in operands], 0)
         if x.op == 'argument':

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import operator
-from typing import Any, Callable, NamedTuple, Optional, Tuple
+from typing import Any, Callable, NamedTuple
 
 import numpy as np
 
@@ -37,8 +37,8 @@ class Operation(NamedTuple):
     llvm: Callable
     c: str
     rate: Any = None
-    folded: Optional[Callable] = None
-    positive: Tuple[int, ...] = ()
+    folded: Callable | None = None
+    positive: tuple[int, ...] = ()
 
     @property
     def array(self) -> str:
@@ -83,7 +83,7 @@ def _valid_where_in_llvm(b: Any, x: Any, margin: Any, tolerance: Any) -> Any:
 
 def _constants(function: Callable) -> Callable:
     """Return a folding rule that evaluates a function of constants."""
-    def folded(*operands: Any) -> Optional[float]:
+    def folded(*operands: Any) -> float | None:
         for x in operands:
             if x.op != 'constant':
                 return None

@@ -18,7 +18,7 @@ from itertools import chain
 import math
 from operator import attrgetter
 import re
-from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Callable, Iterable, Mapping, Sequence
 import warnings
 
 import numpy as np
@@ -79,9 +79,9 @@ def evaluate_in_order(nodes: Iterable[Real], dimensions: Mapping, known: dict) -
                     dimensions[value] if node.op == 'dimension' else value, float)[()]
 
 
-def in_order(nodes: Iterable[Real], needed: Callable = _OPERANDS) -> List[Real]:
+def in_order(nodes: Iterable[Real], needed: Callable = _OPERANDS) -> list[Real]:
     """Return expressions and what they need, each once, in an order of evaluation."""
-    known: Dict[Real, None] = {}
+    known: dict[Real, None] = {}
     for x in unknown(nodes, needed, known):
         known[x] = None
     return list(known)
@@ -99,7 +99,7 @@ def tolerant(outputs: Sequence[Real], single: Mapping[float, float]) -> Sequence
                                  if x.value and x.value not in single}) if single else outputs
 
 
-def _with_releases(lines: Sequence[Tuple[str, str]], outputs: Sequence[str]) -> List[str]:
+def _with_releases(lines: Sequence[tuple[str, str]], outputs: Sequence[str]) -> list[str]:
     """Drop each array after its last use, so that the next one reuses its cached memory."""
     reads = [set(_NAMED.findall(code)) for _, code in lines]
     last = {name: index for index, names in enumerate(reads) for name in names}
@@ -182,7 +182,7 @@ class Program:
     """
 
     def __init__(self, outputs: Sequence[Real], arguments: int = 1,
-                 replaced: Optional[Mapping[Real, Real]] = None):
+                 replaced: Mapping[Real, Real] | None = None):
         self._outputs = tuple(substituted(outputs, replaced) if replaced else outputs)
         self._arguments = arguments
         self._conditions = _conditions(self._outputs)
@@ -240,8 +240,8 @@ class CompiledFunction:
         """Return the function of arrays in a dialect of `ARRAYS`, which returns a tuple."""
         return _python(self.variant.listing, dialect, self.variant.arguments)(*self.constants)
 
-    def statements(self, dialect: Dialect) -> Tuple[Dict[str, float], List[Tuple[str, str]],
-                                                    List[str]]:
+    def statements(self, dialect: Dialect) -> tuple[dict[str, float], list[tuple[str, str]],
+                                                    list[str]]:
         """Return constants by name, assignments (name, code) and the code of each output."""
         listing = self.variant.listing
         constants = dict(zip((f'k{n}' for n in listing.constants), self.constants))
@@ -325,8 +325,8 @@ class Batch:
 
     def __init__(self, loop: Future, constants: np.ndarray, arguments: int, rows: np.ndarray):
         self.arguments = np.zeros((arguments, len(rows)))
-        self._loop: Optional[Future] = loop
-        self._run: Optional[Callable] = None
+        self._loop: Future | None = loop
+        self._run: Callable | None = None
         self._constants, self._rows = constants, rows
         self._solved = np.empty(rows.shape[::-1])
 

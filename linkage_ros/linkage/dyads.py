@@ -21,20 +21,15 @@ import math
 from typing import (
     Any,
     Callable,
-    Dict,
     Iterator,
-    List,
     NamedTuple,
-    Optional,
     Sequence,
-    Tuple,
-    Union,
 )
 
 from .geometry.builder import bar_name
 from .tolerances import ROUNDING
 
-Pin = Tuple[str, complex]
+Pin = tuple[str, complex]
 
 
 class Slide(NamedTuple):
@@ -44,9 +39,9 @@ class Slide(NamedTuple):
     The slide is zero where the two points coincide. `joint` is the caller's identifier.
     """
 
-    bodies: Tuple[str, str]
-    origins: Tuple[complex, complex]
-    axes: Tuple[complex, complex]
+    bodies: tuple[str, str]
+    origins: tuple[complex, complex]
+    axes: tuple[complex, complex]
     joint: Any = None
 
 
@@ -57,14 +52,14 @@ class Hinge(NamedTuple):
     The angle of the second body relative to the first is sign * position + zero [rad].
     """
 
-    bodies: Tuple[str, str]
-    places: Tuple[complex, complex]
+    bodies: tuple[str, str]
+    places: tuple[complex, complex]
     sign: float
     zero: float
     joint: Any = None
 
 
-Motor = Union[Hinge, Slide]
+Motor = Hinge | Slide
 
 
 class Part(NamedTuple):
@@ -122,14 +117,14 @@ class Dyads:
 
     """
 
-    def __init__(self, ground: str, bodies: Sequence[str], pins: Sequence[Dict[str, complex]],
+    def __init__(self, ground: str, bodies: Sequence[str], pins: Sequence[dict[str, complex]],
                  slides: Sequence[Slide], motors: Sequence[Motor], size: float, near: float):
-        self.lines: List[str] = []
-        self.on: Dict[str, Dict[str, complex]] = {body: {} for body in bodies}
-        self.parts: Dict[str, Part] = {}
+        self.lines: list[str] = []
+        self.on: dict[str, dict[str, complex]] = {body: {} for body in bodies}
+        self.parts: dict[str, Part] = {}
         self.ground, self.size, self.near, self.farthest = ground, size, near, size
         # The body with which each joint was placed: other bodies turn relative to it.
-        self.placed_on: Dict[str, str] = {}
+        self.placed_on: dict[str, str] = {}
         self.pins, self.slides, self.motors = list(pins), list(slides), list(motors)
 
     def take_apart(self) -> None:
@@ -156,7 +151,7 @@ class Dyads:
         return joint.bodies[way] in self.parts and joint.bodies[1 - way] not in self.parts
 
     @property
-    def left(self) -> List[str]:
+    def left(self) -> list[str]:
         """Return the bodies that are not placed."""
         return [body for body in self.on if body not in self.parts]
 
@@ -168,7 +163,7 @@ class Dyads:
         """Return a direction on a body, in the coordinates of the pose."""
         return along
 
-    def drive(self, word: str, joint: Any, ratio: float, offset: float) -> Tuple[str, str]:
+    def drive(self, word: str, joint: Any, ratio: float, offset: float) -> tuple[str, str]:
         """
         Record an input whose value is ratio * position + offset of a joint.
 
@@ -176,7 +171,7 @@ class Dyads:
         """
         raise NotImplementedError
 
-    def quarters(self, start: float) -> Optional[int]:
+    def quarters(self, start: float) -> int | None:
         """Return an angle [rad] as 0 to 3 quarter turns; None if the line has the angle itself."""
         return None
 
@@ -184,7 +179,7 @@ class Dyads:
         """Return the approximate position of a joint's motor."""
         return 0.0
 
-    def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
+    def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> str | None:
         """Return a more specific line than `dyad` for two bars, or None."""
         return None
 
@@ -213,7 +208,7 @@ class Dyads:
         self.lines.append(f'{name} {line}')
         return name
 
-    def joint_at(self, body: str, place: complex) -> Optional[str]:
+    def joint_at(self, body: str, place: complex) -> str | None:
         """Return the joint at a place on a body, or None."""
         return next((name for name, at in self.on[body].items()
                      if abs(at - place) < self.near), None)
@@ -255,7 +250,7 @@ class Dyads:
             body, self.on[body][name] + self.size * self.parts[body].along)
 
     def line(self, body: str, place: complex, axis: complex, but: str = ''
-             ) -> Tuple[Pin, str, complex]:
+             ) -> tuple[Pin, str, complex]:
         """Return the joint at a place on a body, one further along an axis, and the direction."""
         origin, at = self.fixed(body, place)
         along = [(name, end) for name, end in self.on[body].items()
@@ -281,7 +276,7 @@ class Dyads:
         on = self.on[body]
         return self.place(body, Part(link or bar_name(joint, tip), joint, on[tip] - on[joint]))
 
-    def rods(self, body: str) -> Iterator[Tuple[str, Dict[str, complex]]]:
+    def rods(self, body: str) -> Iterator[tuple[str, dict[str, complex]]]:
         """Yield unplaced bodies that have a joint and share an unplaced pin with a body."""
         return ((rod, pin) for pin in self.pins if body in pin for rod in pin
                 if rod != body and rod not in self.parts and self.on[rod]

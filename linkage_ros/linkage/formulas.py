@@ -12,7 +12,7 @@ from __future__ import annotations
 from functools import cached_property
 from itertools import chain, cycle
 import re
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
+from typing import Any, Callable, Mapping, NamedTuple
 
 from .geometry.builder import Builder
 from .geometry.planar import Arm, Limit, valid_within
@@ -35,7 +35,7 @@ from ..formula.expression import (
 )
 from ..formula.program import in_order, Program
 
-Names = Tuple[str, ...]
+Names = tuple[str, ...]
 # Outputs of two joints: their distance, and the direction from the first to the second.
 PAIR = re.compile(r'(?:distance|angle)\(([A-Za-z]\w*),([A-Za-z]\w*)\)')
 
@@ -63,7 +63,7 @@ class LinkPoint(NamedTuple):
 
 
 # Joints by name, and points of links.
-Points = Tuple[Union[str, LinkPoint], ...]
+Points = tuple[str | LinkPoint, ...]
 
 
 class LinkageFormulas:
@@ -78,7 +78,7 @@ class LinkageFormulas:
         self.branches = dict(branches)
         self._programs, self._moving = Cache(), Cache()
         # Derivatives by each input, which several programs need.
-        self._derivatives: Dict[int, Dict[Real, Real]] = {}
+        self._derivatives: dict[int, dict[Real, Real]] = {}
         self._outputs: Mapping[str, Callable] = {
             'points': self._points, 'velocities': self._velocities, 'angles': self._angles,
             'rates': self._rates, 'parts': self.parts, 'closures': self._closures,
@@ -90,7 +90,7 @@ class LinkageFormulas:
             'joint accelerations': self._joint_accelerations}
 
     @cached_property
-    def constants(self) -> List[Real]:
+    def constants(self) -> list[Real]:
         """Return what any mechanism needs of its dimensions, in an order of evaluation."""
         return in_order([
             *(part for limit in self.built.limits if limit.ends
@@ -110,19 +110,19 @@ class LinkageFormulas:
         return self._programs.get_or_make(
             (points, joints, moving), lambda: self._legs(points, joints, moving))
 
-    def _points(self, names: Points) -> List[Real]:
+    def _points(self, names: Points) -> list[Real]:
         return [part for place in map(self._place, names)
                 for part in (place if isinstance(place, Vector) else (place.x, place.y))]
 
-    def _place(self, point: Union[str, LinkPoint]) -> Union[Complex, Vector]:
+    def _place(self, point: str | LinkPoint) -> Complex | Vector:
         """Return the place of a joint, or of a link's point whose coordinates are dimensions."""
         if isinstance(point, str):
             return self.built.points[point].place
         return self.built.spot(point.link, Complex(*(
             dimension(name, positive=False) for name in point[1:])))
 
-    def _velocities(self, names: Names, by: int = 0) -> List[Real]:
-        known: Dict[Real, Real] = {}
+    def _velocities(self, names: Names, by: int = 0) -> list[Real]:
+        known: dict[Real, Real] = {}
         return [self._rate_where_valid(derivative(part, {by: 1.0}, known), part)
                 for part in self._points(names)]
 
@@ -131,7 +131,7 @@ class LinkageFormulas:
         alone = len(self.built.inputs) == 1 and rate.value is None
         return rate if alone or not value.varies else valid_where(rate, abs(value))
 
-    def _angles(self, names: Names) -> List[Real]:
+    def _angles(self, names: Names) -> list[Real]:
         return [self.output(name) for name in names]
 
     def output(self, name: str) -> Real:
@@ -145,18 +145,18 @@ class LinkageFormulas:
             return arctangent(arm.vector.y, arm.vector.x)
         return square_root(arm.square)
 
-    def _arm(self, name: str) -> Optional[Arm]:
+    def _arm(self, name: str) -> Arm | None:
         """Return the arm of a distance or an angle; None for another name."""
         pair = PAIR.fullmatch(name)
         return self.built.arm(*pair.groups()) if pair else None
 
-    def parts(self, names: Tuple[Names, ...]) -> List[Real]:
+    def parts(self, names: tuple[Names, ...]) -> list[Real]:
         """Return coordinates of points, joint angles, and joint rates by each input."""
         points, joints, rates = names
         turning = [self._rates(rates, by) for by in range(len(self.built.inputs))]
         return [*self._points(points), *self._angles(joints), *chain.from_iterable(turning)]
 
-    def checked(self, names: Names) -> List[Real]:
+    def checked(self, names: Names) -> list[Real]:
         """Return outputs and their rates by each input, NaN unless all joints are assembled."""
         limits = [limit for limit in self.built.limits if limit.margin.varies]
         return [*(valid_within(value, limits) for value in self._angles(names)),
@@ -186,32 +186,32 @@ class LinkageFormulas:
     def _slides(self, name: str) -> bool:
         return any(x.name == name and x.kind == 'prismatic' for x in self.built.links)
 
-    def _rates(self, names: Names, by: int = 0) -> List[Real]:
+    def _rates(self, names: Names, by: int = 0) -> list[Real]:
         known = self._derivatives.setdefault(by, {})
         return [self._rate_where_valid(rate, self.output(name))
                 for name, rate in zip(names, self._turning(names, {by: 1.0}, known))]
 
-    def _point_accelerations(self, names: Names) -> List[Real]:
-        known: Dict[Real, Real] = {}
+    def _point_accelerations(self, names: Names) -> list[Real]:
+        known: dict[Real, Real] = {}
         speeds = self._speeds()
         return self._changing([derivative(part, speeds, known) for part in self._points(names)])
 
-    def _joint_accelerations(self, names: Names) -> List[Real]:
+    def _joint_accelerations(self, names: Names) -> list[Real]:
         return self._changing(self._turning(names, self._speeds(), {}))
 
-    def _speeds(self) -> Dict[int, Number]:
+    def _speeds(self) -> dict[int, Number]:
         n = len(self.built.inputs)
         return {i: argument(n + i) for i in range(n)}
 
-    def _changing(self, rates: List[Real]) -> List[Real]:
+    def _changing(self, rates: list[Real]) -> list[Real]:
         """Differentiate rates by time; speeds are arguments that change, too."""
         n = len(self.built.inputs)
-        known: Dict[Real, Real] = {}
-        moving: Dict[int, Number] = {i: argument(n + i) for i in range(2 * n)}
+        known: dict[Real, Real] = {}
+        moving: dict[int, Number] = {i: argument(n + i) for i in range(2 * n)}
         return [derivative(rate, moving, known) for rate in rates]
 
-    def _turning(self, names: Names, speeds: Dict[int, Number], known: Dict[Real, Real]
-                 ) -> List[Real]:
+    def _turning(self, names: Names, speeds: dict[int, Number], known: dict[Real, Real]
+                 ) -> list[Real]:
         """Return the speeds of outputs at speeds of the inputs; `known` are other derivatives."""
         def d(expression: Real) -> Real:
             return derivative(expression, speeds, known)
@@ -235,18 +235,18 @@ class LinkageFormulas:
         return [rate(name) for name in names]
 
     @property
-    def closures(self) -> List[Limit]:
+    def closures(self) -> list[Limit]:
         """Return quantities that vanish where a dyad, slot, slider or kite stretches or folds."""
         return [limit for limit in (*self.built.limits, *self.built.folds)
                 if limit.margin.varies and limit not in self.built.ways]
 
-    def _closures(self, _: Names) -> List[Real]:
+    def _closures(self, _: Names) -> list[Real]:
         """Return each closure and its rate by the first input."""
         known = self._derivatives.setdefault(0, {})
         return [part for limit in self.closures
                 for part in (limit.margin, derivative(limit.margin, {0: 1.0}, known))]
 
-    def _output(self, name: str) -> List[Real]:
+    def _output(self, name: str) -> list[Real]:
         """Return an output, as `input_for` names it, and its rate by the first input."""
         return [self.output(name), *self._rates((name,))]
 
@@ -272,7 +272,7 @@ class LinkageFormulas:
 
 def _vanishes(rate: Real) -> bool:
     """Return whether an expression is zero wherever it has a value."""
-    zero: Dict[Real, bool] = {}
+    zero: dict[Real, bool] = {}
     some = {'multiply': any, 'add': all, 'subtract': all}
     for x in unknown([rate], lambda x: x.operands, zero):
         parts = [zero[part] for part in x.operands]
@@ -286,6 +286,6 @@ def _vanishes(rate: Real) -> bool:
 
 
 @cached(32, shared=True)
-def formulas_of(design: Design, branches: Tuple[Tuple[str, int], ...]) -> LinkageFormulas:
+def formulas_of(design: Design, branches: tuple[tuple[str, int], ...]) -> LinkageFormulas:
     """Return the cached structure of a design with its branches."""
     return LinkageFormulas(design, dict(branches))

@@ -10,13 +10,13 @@ This module alone handles the periodicity of angles.
 from __future__ import annotations
 
 import math
-from typing import Any, Iterable, Iterator, List, NamedTuple, Sequence, Tuple
+from typing import Any, Iterable, Iterator, NamedTuple, Sequence
 
 import numpy as np
 
 from .tolerances import LEAST, ONE, ROUNDING
 
-Arc = Tuple[float, float]
+Arc = tuple[float, float]
 
 ANGLE, LENGTH = 'angle', 'length'
 
@@ -154,9 +154,9 @@ class Input(NamedTuple):
             if start < end:
                 yield start, end
 
-    def distinct(self, values: Iterable[float]) -> List[float]:
+    def distinct(self, values: Iterable[float]) -> list[float]:
         """Return values in order, wrapped, one of those that differ by rounding."""
-        found: List[float] = []
+        found: list[float] = []
         for x in sorted(float(self.wrapped(0.0 if abs(x) < LEAST else x)) for x in values):
             if not found or x - found[-1] > ONE:
                 found.append(x)
@@ -164,7 +164,7 @@ class Input(NamedTuple):
             found.pop()
         return found
 
-    def between(self, ends: Iterable[float]) -> List[Arc]:
+    def between(self, ends: Iterable[float]) -> list[Arc]:
         """Return the arcs between values, in order; the last of a turn ends where it began."""
         marks = self.distinct(ends if self.wraps else (
             end for end in (self.low, *ends, self.high) if self.low <= end <= self.high))
@@ -181,7 +181,7 @@ def theta_of(values: Any) -> Any:
     return values if len(values) > 1 else values[0]
 
 
-def spread(inputs: Sequence[Input], count: int) -> List[np.ndarray]:
+def spread(inputs: Sequence[Input], count: int) -> list[np.ndarray]:
     """Return values of each input (count,): poses that fill their ranges evenly."""
     # Multiples of square roots of primes, without their whole parts.
     parts = np.outer(np.sqrt([2, 3, 5, 7, 11, 13, 17, 19][:len(inputs)]),

@@ -10,7 +10,7 @@ from fractions import Fraction
 from functools import cached_property
 import math
 from types import MappingProxyType
-from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple, TypeVar, Union
+from typing import Any, Callable, Mapping, Sequence, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,8 +37,8 @@ COMPARED = 66
 
 Own = TypeVar('Own', bound='Kinematics')
 # One input, or a sequence of several; each a number or an array [rad or m].
-Inputs = Union[ArrayLike, Sequence[ArrayLike]]
-Names = Optional[Sequence[str]]
+Inputs = ArrayLike | Sequence[ArrayLike]
+Names = Sequence[str] | None
 
 
 def _hashable(names: Any) -> Any:
@@ -106,7 +106,7 @@ class Kinematics:
             input_.high - input_.low for input_ in self.inputs])
 
     @property
-    def coordinates(self) -> Tuple[str, ...]:
+    def coordinates(self) -> tuple[str, ...]:
         """Return the outputs that are coordinates of joints, such as 'A.x'."""
         return tuple(f'{name}.{axis}' for name in self.points for axis in self.axes)
 
@@ -164,7 +164,7 @@ class Kinematics:
         made.check()
         return made
 
-    def driven_by(self: Own, *outputs: str, branches: Optional[Mapping[str, int]] = None) -> Own:
+    def driven_by(self: Own, *outputs: str, branches: Mapping[str, int] | None = None) -> Own:
         """
         Return a linkage in space with other joints as its inputs.
 
@@ -219,7 +219,7 @@ class Kinematics:
         """
         return self.inputs[self._checked_by(by)].period
 
-    def _ratios(self, by: int) -> List[float]:
+    def _ratios(self, by: int) -> list[float]:
         """Return the turns of each driven link per turn of an input."""
         each = [np.ravel(self.value(derivative(value, {by: 1.0}, {})))
                 for _, value in self.structure.built.driven.values()]
@@ -244,7 +244,7 @@ class Kinematics:
         return any(np.ndim(tolerance + start + end) == 0 and min(abs(start), abs(end)) <= tolerance
                    for tolerance, start, end in values)
 
-    def repeats(self, by: int, turns: float, kind: str, outputs: Tuple[str, ...], high: float,
+    def repeats(self, by: int, turns: float, kind: str, outputs: tuple[str, ...], high: float,
                 middles: ArrayLike = ()) -> bool:
         """
         Return whether outputs are the same so many turns of an input later, from -high to high.
@@ -366,12 +366,12 @@ class Kinematics:
         """Return the code behind `function`."""
         return self.compiled('parts', self._requested(points, joints, rates))
 
-    def _requested(self, *names: Any) -> Tuple[Tuple[str, ...], ...]:
+    def _requested(self, *names: Any) -> tuple[tuple[str, ...], ...]:
         """Return names of points, joints and rates."""
         return tuple(self._names(kind, _hashable(requested))
                      for kind, requested in zip(('points', 'angles', 'rates'), names))
 
-    def legs(self, points: Points, joints: Tuple[str, ...], moving: Tuple[str, ...]
+    def legs(self, points: Points, joints: tuple[str, ...], moving: tuple[str, ...]
              ) -> CompiledFunction:
         """
         Return the function that solves a leg like this one.
@@ -426,14 +426,14 @@ class Kinematics:
                 f'angle(A,B) of two joints, {listed(named)}'
                 + (f'; did you mean {own}?' if output in self.points else meant(output, named)))
 
-    def gear(self, name: str, by: int = 0) -> Tuple[float, float]:
+    def gear(self, name: str, by: int = 0) -> tuple[float, float]:
         """Return ratio and offset [rad or m] by which an input drives a link, anywhere."""
         _, value = self.structure.built.driven[name]
         program = Program([derivative(value, {by: 1.0}, {}), value], len(self.inputs))
         ratio, offset = self.bind(program).at(*[0.0] * len(self.inputs))
         return ratio, offset
 
-    def geared_to(self, by: int) -> List[str]:
+    def geared_to(self, by: int) -> list[str]:
         """Return the links that one of the inputs drives by gears."""
         return [name for name in self.geared if self.moves(name, by)]
 
@@ -479,16 +479,16 @@ class Kinematics:
         return int(by)
 
     def _ready(self, kind: str, requested: Any, *by: int
-               ) -> Tuple[Tuple[str, ...], CompiledFunction]:
+               ) -> tuple[tuple[str, ...], CompiledFunction]:
         """Return the requested names and the function that computes them."""
-        def make() -> Tuple[Tuple[str, ...], CompiledFunction]:
+        def make() -> tuple[tuple[str, ...], CompiledFunction]:
             names = self._names(kind, requested)
             return names, self.compiled(kind, names, *by)
 
         requested = _hashable(requested)
         return self._poses.get_or_make((kind, requested, *by), make)
 
-    def _names(self, kind: str, requested: Any) -> Tuple[str, ...]:
+    def _names(self, kind: str, requested: Any) -> tuple[str, ...]:
         what, allowed = ('point', self.points) if kind in OF_POINTS else ('joint', self.joints)
         if kind == 'transmissions':
             what, allowed = 'transmission angle at', tuple(self.structure.built.transmissions)

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -89,7 +89,7 @@ class Mechanism(Kinematics):
 
     # --- the inverse ---
 
-    def inverse(self, outputs: Union[str, Sequence[str]]) -> Inverse:
+    def inverse(self, outputs: str | Sequence[str]) -> Inverse:
         """
         Return the inverse of as many outputs as there are inputs; see `has_output`.
 
@@ -99,7 +99,7 @@ class Mechanism(Kinematics):
         """
         return inverse_of(self, outputs)
 
-    def input_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
+    def input_for(self, output: str, value: ArrayLike, near: ArrayLike | None = None,
                   others: Sequence[float] = ()) -> Any:
         """
         Return the values of the first input for given values of an output.
@@ -122,7 +122,7 @@ class Mechanism(Kinematics):
         found = inverse.all(wanted)
         return np.array([answer.inputs[0] for answer in found] or [math.nan])
 
-    def _fixed(self, others: Any) -> Tuple[float, ...]:
+    def _fixed(self, others: Any) -> tuple[float, ...]:
         """Return the values of all inputs but the first; raise ValueError if they are not that."""
         values = numbers('others', others)
         if values.shape != (len(self.inputs) - 1,):
@@ -130,8 +130,8 @@ class Mechanism(Kinematics):
                              f'except the first are needed, got {quoted(values.tolist())}')
         return tuple(values.tolist())
 
-    def servo_for(self, output: str, value: ArrayLike, near: Optional[ArrayLike] = None,
-                  ends: Optional[Tuple[float, float]] = None) -> Sequence:
+    def servo_for(self, output: str, value: ArrayLike, near: ArrayLike | None = None,
+                  ends: tuple[float, float] | None = None) -> Sequence:
         """
         Return one value of the input for a value of an output, and d output / d input there.
 
@@ -143,7 +143,7 @@ class Mechanism(Kinematics):
             (value,), None if near is None else (near,), None if ends is None else (ends,))
         return found, rate
 
-    def follow(self, output: str, value: float, near: float) -> Tuple[float, float]:
+    def follow(self, output: str, value: float, near: float) -> tuple[float, float]:
         """
         Return the input for a value of an output, continuous from another input.
 
@@ -154,7 +154,7 @@ class Mechanism(Kinematics):
         return found, rate
 
     def inputs_for(self, outputs: Sequence[str], values: ArrayLike,
-                   near: Optional[ArrayLike] = None) -> List[Solution]:
+                   near: ArrayLike | None = None) -> list[Solution]:
         """Return all values of the inputs for values of the outputs; see `Inverse.all`."""
         return self.inverse(outputs).all(values, near)
 
@@ -187,7 +187,7 @@ class Mechanism(Kinematics):
         away = [self.inputs[0].apart(theta, dead) for dead in self.dead_points(*others)]
         return np.min([np.full(np.shape(theta), np.inf), *away], axis=0)[()]
 
-    def extremes(self, output: str, arcs: Optional[Sequence[Arc]] = None,
+    def extremes(self, output: str, arcs: Sequence[Arc] | None = None,
                  others: Sequence[float] = ()) -> list:
         """
         Return the extremes of an output on arcs of the first input, by default its reach.

@@ -17,7 +17,7 @@ The catalogue: mechanisms by the names that users type.
 from importlib import import_module
 import pkgutil
 from types import MappingProxyType, ModuleType
-from typing import Iterable, Mapping, Optional, Sequence
+from typing import Iterable, Mapping, Sequence
 
 from numpy.typing import ArrayLike
 
@@ -35,7 +35,7 @@ TYPES: Mapping[str, ModuleType] = MappingProxyType({
         module.name for module in pkgutil.iter_modules(__path__) if module.name != 'custom')))})
 
 
-def design(type_: str, /, joints: Optional[Sequence[str]] = None, tracer: Optional[str] = None,
+def design(type_: str, /, joints: Sequence[str] | None = None, tracer: str | None = None,
            dimensions: Iterable[str] = ()) -> Design:
     """
     Return the design of a type: its dimensions, joints, branches and tracer.
@@ -67,8 +67,8 @@ def defaults(type_: str, /) -> dict:
     return dict(TYPES[type_].DESIGN.dimensions)
 
 
-def create(type_: str, /, *, branches: Optional[Mapping[str, int]] = None,
-           joints: Optional[Sequence[str]] = None, tracer: Optional[str] = None,
+def create(type_: str, /, *, branches: Mapping[str, int] | None = None,
+           joints: Sequence[str] | None = None, tracer: str | None = None,
            **dimensions: ArrayLike) -> Mechanism:
     """
     Create a mechanism.

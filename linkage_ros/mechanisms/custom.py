@@ -5,7 +5,7 @@
 
 from collections.abc import Mapping, Set
 from itertools import islice
-from typing import Any, Iterable, Optional, Tuple
+from typing import Any, Iterable
 
 from ..cache import cached
 from ..linkage import Design, joint_lines, rod_lines
@@ -17,8 +17,8 @@ WORDS = {'custom': joint_lines, 'rods': rod_lines}
 
 
 @cached(64, shared=True)
-def design(type_: str, joints: Tuple[str, ...], tracer: Optional[str],
-           names: Tuple[str, ...]) -> Design:
+def design(type_: str, joints: tuple[str, ...], tracer: str | None,
+           names: tuple[str, ...]) -> Design:
     """
     Return the design of joint lines.
 
@@ -48,7 +48,7 @@ def design(type_: str, joints: Tuple[str, ...], tracer: Optional[str],
                   words is rod_lines, is_written=True)
 
 
-def checked_design(type_: str, joints: Optional[Iterable[str]], tracer: Optional[str],
+def checked_design(type_: str, joints: Iterable[str] | None, tracer: str | None,
                    dimensions: Iterable[str]) -> Design:
     """Return the design of a user's arguments; raise ValueError if they are invalid."""
     if tracer is not None and not isinstance(tracer, str):
@@ -64,7 +64,7 @@ def checked_design(type_: str, joints: Optional[Iterable[str]], tracer: Optional
     return design(type_, lines, plain_text(tracer), names)
 
 
-def checked_lines(joints: Any) -> Tuple[str, ...]:
+def checked_lines(joints: Any) -> tuple[str, ...]:
     """Return the joints as a tuple of lines; raise ValueError if they are not lines."""
     try:
         # A set has no order, and of a mapping only the keys would be read.

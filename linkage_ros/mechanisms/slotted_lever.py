@@ -15,7 +15,7 @@ same triangle: a e^(i theta) = e^(i phi) (W + i (e + b sin phi)), W^2 = a^2 - (e
 """
 
 import math
-from typing import Any, Optional, Sequence
+from typing import Any, Sequence
 
 from numpy.typing import ArrayLike
 
@@ -33,7 +33,7 @@ DESIGN = Design('slotted_lever', {'a': 80.0, 'b': 150.0, 'e': 0.0}, tracer='L',
 class Mechanism(linkage.Mechanism):
     """A slotted lever: also solved from the lever angle."""
 
-    def servo_angle(self, lever_angle: ArrayLike, near: Optional[ArrayLike] = None) -> Any:
+    def servo_angle(self, lever_angle: ArrayLike, near: ArrayLike | None = None) -> Any:
         """
         Return the crank angle for a lever angle.
 
@@ -55,7 +55,7 @@ class Mechanism(linkage.Mechanism):
         """
         return self.servo_for('lever', lever_angle, near)[0]
 
-    def servo(self, lever_angle: ArrayLike, near: Optional[ArrayLike] = None) -> Sequence:
+    def servo(self, lever_angle: ArrayLike, near: ArrayLike | None = None) -> Sequence:
         """Return the result of `servo_angle`, and d lever / d servo there."""
         return self.servo_for('lever', lever_angle, near)
 

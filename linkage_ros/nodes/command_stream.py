@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Sequence
+from typing import Any, Callable, Iterable, Mapping, NamedTuple, Sequence
 
 from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
@@ -43,7 +43,7 @@ class Target(NamedTuple):
         return [f'{self.mechanism.name}_{settings.input.name}' if settings.measures
                 else settings.source for settings in self.mechanism.inputs.values()]
 
-    def command(self, positions: Sequence[float], speeds: Optional[Sequence[float]],
+    def command(self, positions: Sequence[float], speeds: Sequence[float] | None,
                 seed: Sequence[float], jumps: bool) -> ActuatorCommand:
         """Solve for the positions and speeds in a message; see `InverseRequest.command`."""
         return self.request.command(
@@ -104,7 +104,7 @@ class CommandStream:
         self._mechanisms = mechanisms
         self._reader.forget()
 
-    def _output(self, named: str) -> Optional[tuple[SceneMechanism, str, JointName]]:
+    def _output(self, named: str) -> tuple[SceneMechanism, str, JointName] | None:
         """Return the mechanism, output and published name for a name in messages, or None."""
         for mechanism in self._mechanisms.values():
             joints = {name.name: (joint, name) for joint, name in mechanism.joints.items()}
@@ -173,7 +173,7 @@ class CommandStream:
         return self._present(target.mechanism)
 
     def _command(self, target: Target, positions: Sequence[float],
-                 speeds: Optional[Sequence[float]]) -> Optional[ActuatorCommand]:
+                 speeds: Sequence[float] | None) -> ActuatorCommand | None:
         """Return the command for a target or, out of reach, the last valid one, if any."""
         name, seed = target.mechanism.name, self._seed(target)
         last, is_quick = self._last.get(name), target.request.inverse.is_quick
@@ -226,7 +226,7 @@ class CommandStream:
         self._logger.error(f'wanted_trajectory is refused: {error}')
 
     def _solve(self, message: JointTrajectory, targets: Sequence[Target],
-               seeds: list[Sequence[float]], jumps: list[bool]) -> Optional[Callable[[], None]]:
+               seeds: list[Sequence[float]], jumps: list[bool]) -> Callable[[], None] | None:
         """Solve a trajectory; return a function to publish it, or None if it is dropped."""
         solved = JointTrajectory(header=message.header, joint_names=[
             name for target in targets for name in target.actuators])

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from time import monotonic_ns, time_ns
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
@@ -34,10 +34,10 @@ class CrankDriver(scene_node.SceneNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__(scene.DRIVER, **kwargs)
-        self._motions: Dict[Tuple[str, str], Motion] = {}
-        self._settings: Dict[Tuple[str, str], scene.InputSettings] = {}
-        self._sent: List[Tuple[Tuple[str, str], scene.InputSettings]] = []
-        self._now: Optional[int] = None
+        self._motions: dict[tuple[str, str], Motion] = {}
+        self._settings: dict[tuple[str, str], scene.InputSettings] = {}
+        self._sent: list[tuple[tuple[str, str], scene.InputSettings]] = []
+        self._now: int | None = None
         self._steady = 0
         self._publisher = TrackedPublisher(self, JointState, 'crank_states', 10)
         sources = list(dict.fromkeys(
@@ -103,8 +103,8 @@ class CrankDriver(scene_node.SceneNode):
             for publish, data in self._message.patched(pack_time(now), positions + speeds):
                 publish(data)
 
-    def _position(self, key: Tuple[str, str], settings: scene.InputSettings,
-                  now: int) -> Tuple[float, float]:
+    def _position(self, key: tuple[str, str], settings: scene.InputSettings,
+                  now: int) -> tuple[float, float]:
         """Return position [rad or m] and speed [rad/s or m/s] of an input's source joint."""
         return self.scene.mechanisms[key[0]].to_source(settings, *self._motions[key].at(now))
 

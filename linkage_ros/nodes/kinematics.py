@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from functools import partial
 import time
-from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Sequence, Tuple
+from typing import Any, Callable, Iterable, NamedTuple, Sequence
 
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
@@ -39,7 +39,7 @@ class InputSource(NamedTuple):
 
 
 # The inputs that a sender's messages set, and the mechanisms that they move.
-Routes = Tuple[List[InputSource], List[MechanismTopics]]
+Routes = tuple[list[InputSource], list[MechanismTopics]]
 
 
 class Kinematics(scene_node.SceneNode):
@@ -48,11 +48,11 @@ class Kinematics(scene_node.SceneNode):
     task = 'moves {mechanisms}'
 
     def __init__(self, **kwargs: Any):
-        self._mechanisms: Dict[str, MechanismTopics] = {}
-        self._models: Dict[str, MechanismModel] = {}
+        self._mechanisms: dict[str, MechanismTopics] = {}
+        self._models: dict[str, MechanismModel] = {}
         super().__init__(scene.KINEMATICS, **kwargs)
         # Mechanism and index of the inputs, by their source joint.
-        self._inputs: Dict[str, List[Tuple[str, int]]] = {}
+        self._inputs: dict[str, list[tuple[str, int]]] = {}
         for name, mechanism in self.scene.mechanisms.items():
             for i, settings in enumerate(mechanism.inputs.values()):
                 self._inputs.setdefault(settings.source, []).append((name, i))
@@ -101,7 +101,7 @@ class Kinematics(scene_node.SceneNode):
             mechanism, mechanism.frame_id or new.frame_id, new.frame_prefix, in_scene)
             for name, mechanism in new.mechanisms.items()}
 
-    def adopt(self, models: Dict[str, MechanismModel]) -> None:
+    def adopt(self, models: dict[str, MechanismModel]) -> None:
         """Replace the models of the mechanisms, and publish those that have changed."""
         changed = [self._mechanisms[name] for name, model in models.items()
                    if model is not self._models.get(name)]
@@ -121,7 +121,7 @@ class Kinematics(scene_node.SceneNode):
         """Build a mechanism's latched messages; return a function to publish them."""
         return partial(topics.publish_latched, *model.latched())
 
-    def _robot(self, models: Dict[str, MechanismModel]) -> Callable[[], None]:
+    def _robot(self, models: dict[str, MechanismModel]) -> Callable[[], None]:
         """Build the scene's robot model; return a function to publish it."""
         # With `only_named`, the joints belong to a robot model that is published elsewhere.
         robots = [model.robot for model in models.values()

@@ -9,7 +9,7 @@ from functools import wraps
 import math
 import time
 import traceback
-from typing import Any, Callable, Dict, Hashable, Iterable, List, Set
+from typing import Any, Callable, Hashable, Iterable
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
@@ -27,7 +27,7 @@ class Throttle:
 
     def __init__(self, logger: Any):
         self._logger = logger
-        self._logged: Dict[Any, float] = {}
+        self._logged: dict[Any, float] = {}
 
     def warn(self, subject: Any, text: Callable[[], str]) -> None:
         """Log the result of `text`, unless the subject was logged within the last `seconds`."""
@@ -46,9 +46,9 @@ class Once:
     def __init__(self, most: int):
         self._most = most
         # Hashes, because names may be long.
-        self._logged: Set[int] = set()
+        self._logged: set[int] = set()
 
-    def new(self, subjects: Iterable[Hashable]) -> List[Any]:
+    def new(self, subjects: Iterable[Hashable]) -> list[Any]:
         """Return the subjects that no call has returned before; none after `most` subjects."""
         if len(self._logged) >= self._most:
             return []

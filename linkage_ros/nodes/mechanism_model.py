@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import cached_property, partial
 from itertools import combinations
 import math
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, NamedTuple, Sequence
 
 import numpy as np
 from rclpy.serialization import serialize_message
@@ -37,7 +37,7 @@ class AssemblyState(NamedTuple):
 
     solution: Solution
     # A byte for each leg, 1 if it is assembled; None if all legs are.
-    assembled: Optional[bytes]
+    assembled: bytes | None
     # Whether there are velocities, and efforts, and all of them are finite.
     has_velocities: bool
     has_efforts: bool
@@ -92,7 +92,7 @@ class MechanismModel:
         """Return the builder of its marker messages."""
         return messages.Markers(*self._drawn)
 
-    def latched(self) -> Tuple[str, Optional[bytes]]:
+    def latched(self) -> tuple[str, bytes | None]:
         """Return the URDF, '' for a spatial linkage; the serialised locus, None without one."""
         drawn, size = self._drawn[:3], self._drawn[3]
         curve = self.assembly.locus(self.mechanism.tracer)
@@ -100,7 +100,7 @@ class MechanismModel:
                 serialize_message(messages.locus(*drawn, curve, size, self.mechanism.mirrored))
                 if len(curve) > 1 else None)
 
-    def _regular(self, wanted: Tuple[bool, bool, bool]) -> AssemblyState:
+    def _regular(self, wanted: tuple[bool, bool, bool]) -> AssemblyState:
         joints, markers, moving = wanted
         # With several inputs, only the joint angles show whether the linkage is assembled.
         joints = joints or len(self.inputs) > 1
@@ -112,7 +112,7 @@ class MechanismModel:
                              solution.parts['efforts'].size > 0)
 
     def solve(self, regular: AssemblyState, inputs: Sequence[float],
-              speeds: Sequence[Optional[float]]) -> AssemblyState:
+              speeds: Sequence[float | None]) -> AssemblyState:
         """
         Fill the solution of a regular state with published values; return their state.
 
@@ -147,7 +147,7 @@ class MechanismModel:
             regular.has_velocities and bool(np.isfinite(rates).all()),
             regular.has_efforts and bool(np.isfinite(parts['efforts']).all()))
 
-    def _conversion(self, layout: np.dtype) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _conversion(self, layout: np.dtype) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return factors and offsets of published values, and the indices of angles to wrap."""
         places = positions, *_ = self._places(layout)
         factors, offsets = np.ones(layout.itemsize // 8), np.zeros(layout.itemsize // 8)
@@ -156,7 +156,7 @@ class MechanismModel:
         offsets[positions] = self._offsets[:len(positions)]
         return factors, offsets, positions[self._wrapped[:len(positions)]]
 
-    def _places(self, layout: np.dtype) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _places(self, layout: np.dtype) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the indices of the joints' positions, velocities and efforts in a solution."""
         parts: Any = np.arange(layout.itemsize // 8, dtype=float).view(layout)[0]
         places = (np.append(parts['inputs'], parts['rows']['angles']),
@@ -164,7 +164,7 @@ class MechanismModel:
         positions, velocities, efforts = (part.astype(int) for part in places)
         return positions, velocities, efforts
 
-    def _patched_messages(self, key: Tuple[AssemblyState, Tuple[Any, Any]]) -> PatchedMessages:
+    def _patched_messages(self, key: tuple[AssemblyState, tuple[Any, Any]]) -> PatchedMessages:
         state, topics = key
         builders = self.joint_message, self.marker_message
         return PatchedMessages(
@@ -178,7 +178,7 @@ class MechanismModel:
             stamp, names.tolist(), positions, velocities if state.has_velocities else (),
             efforts if state.has_efforts else ())
 
-    def joints(self, state: AssemblyState, values: np.ndarray) -> List[np.ndarray]:
+    def joints(self, state: AssemblyState, values: np.ndarray) -> list[np.ndarray]:
         """Return published joints: names, positions, velocities (empty if unsolved), efforts."""
         n, count, legs = len(self.inputs), len(state.solution.rows), state.legs()
         chosen = self._published.copy()
@@ -199,7 +199,7 @@ class MechanismModel:
         return self.marker_array.message(stamp, places, sorted(grounded))
 
 
-def _shown(mechanism: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
+def _shown(mechanism: scene.SceneMechanism) -> tuple[Sequence, dict[int, list]]:
     """Return the markers' points and, by marker id, the point indices of each line or plate."""
     linkage, names = mechanism.linkage, mechanism.points
     cranks = shapes.cranks(linkage)
@@ -209,7 +209,7 @@ def _shown(mechanism: scene.SceneMechanism) -> Tuple[Sequence, Dict[int, list]]:
     # The edges of a plate are not drawn as bars, too: the message is smaller.
     edges = {frozenset(edge) for plate in plates for edge in combinations(plate, 2)}
     bars = [bar for bar in linkage.bars if bar not in cranks and frozenset(bar) not in edges]
-    pieces: Dict[int, list] = {
+    pieces: dict[int, list] = {
         messages.LINKS_ID: [*bars, *linkage.cylinders],
         messages.JOINTS_ID: [(name,) for name in names],
         messages.GUIDES_ID: [], messages.BODIES_ID: [], messages.CRANKS_ID: cranks,

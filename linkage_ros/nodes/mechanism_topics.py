@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from typing import AbstractSet, Any, List, Optional, Sequence, Tuple
+from typing import AbstractSet, Any, Sequence
 
 import numpy as np
 from rclpy.duration import Duration
@@ -51,18 +51,18 @@ class MechanismTopics:
         self._locus = node.create_publisher(Marker, f'{name}/locus', LATCHED)
         self._description = node.create_publisher(String, f'{name}/robot_description', LATCHED)
         self._throttle = Throttle(node.get_logger().get_child(name))
-        self.inputs: List[Any] = [None] * len(mechanism.inputs)
-        self.speeds: List[Optional[float]] = [None] * len(mechanism.inputs)
+        self.inputs: list[Any] = [None] * len(mechanism.inputs)
+        self.speeds: list[float | None] = [None] * len(mechanism.inputs)
         self.stamp = NEVER
-        self.state: Optional[AssemblyState] = None
+        self.state: AssemblyState | None = None
         # The last position of a source joint, and the last input that it gave.
         self._position = math.nan
-        self._seed: Optional[float] = None
+        self._seed: float | None = None
         # Ids of the displayed markers, and the last robot model.
         self._displayed: AbstractSet[int] = frozenset()
         self._described = ''
 
-    def receive(self, i: int, position: float, speed: Optional[float]) -> None:
+    def receive(self, i: int, position: float, speed: float | None) -> None:
         """Set input `i` by the position of its source joint and, if known, its speed."""
         model = self.model
         value, self.speeds[i] = model.mechanism.from_source(
@@ -80,7 +80,7 @@ class MechanismTopics:
                 self.stamp, state.solution.values)
         return ()
 
-    def solved(self, in_scene: bool) -> Optional[AssemblyState]:
+    def solved(self, in_scene: bool) -> AssemblyState | None:
         """
         Return the state at the present inputs; None without assembled legs.
 
@@ -93,7 +93,7 @@ class MechanismTopics:
             state = self._solve(regular)
         return state if state.any_assembled else None
 
-    def _subscribed(self) -> Tuple[Any, Any]:
+    def _subscribed(self) -> tuple[Any, Any]:
         """Return the publishers of joint states and markers, None where nobody subscribes."""
         return self._joint_states.subscribed, self._markers.subscribed
 
@@ -136,7 +136,7 @@ class MechanismTopics:
         self.model, self.state = model, None
         self._delete(self._displayed - model.marker_ids)
 
-    def publish_latched(self, description: str, locus: Optional[bytes]) -> None:
+    def publish_latched(self, description: str, locus: bytes | None) -> None:
         """Publish the robot model if it has changed; publish the locus, or delete it if None."""
         if description != self._described:
             self._described = description

@@ -15,7 +15,7 @@ from __future__ import annotations
 from contextlib import suppress
 import re
 from struct import error as StructError, Struct
-from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, NamedTuple, Sequence
 
 from builtin_interfaces.msg import Time
 import numpy as np
@@ -45,9 +45,9 @@ MAX_SENDERS = 256
 _STAMP, _COUNT = Struct('<iI'), Struct('<I')
 
 # A packed stamp (bytes), then floats.
-Numbers = Tuple[Any, ...]
+Numbers = tuple[Any, ...]
 # A function of a publisher, and the serialised message that it publishes.
-Outgoing = Tuple[Callable[[bytes], None], bytes]
+Outgoing = tuple[Callable[[bytes], None], bytes]
 
 
 def pack(stamp: Time) -> bytes:
@@ -138,14 +138,14 @@ class Reader:
 
     def __init__(self, interpret: Callable[[JointState], Any]):
         self._interpret = interpret
-        self._senders: List[Sender] = []
-        self._last: Optional[Sender] = None
+        self._senders: list[Sender] = []
+        self._last: Sender | None = None
 
     def forget(self) -> None:
         """Forget all senders, so that their messages are interpreted anew."""
         self._senders, self._last = [], None
 
-    def read(self, data: bytes) -> Tuple[Any, Numbers]:
+    def read(self, data: bytes) -> tuple[Any, Numbers]:
         """
         Return the routes and the numbers of a serialised message.
 
@@ -158,7 +158,7 @@ class Reader:
                 (sender for sender in self._senders if sender.has_sent(data)), None)
         return (last.routes, last.unpack(data)) if last else self._learn(data)
 
-    def _learn(self, data: bytes) -> Tuple[Any, Numbers]:
+    def _learn(self, data: bytes) -> tuple[Any, Numbers]:
         message = deserialized(data, JointState)
         routes = self._interpret(message)
         numbers = pack(message.header.stamp), *message.position, *message.velocity
@@ -174,7 +174,7 @@ class Reader:
         return routes, numbers
 
 
-def _layout(data: bytes) -> Tuple[int, Callable[[bytes], Numbers]]:
+def _layout(data: bytes) -> tuple[int, Callable[[bytes], Numbers]]:
     """
     Return where the constant bytes and the numbers of a serialised JointState are.
 
@@ -217,7 +217,7 @@ class PatchedMessages:
     and an array (count,), whose values it only copies.
     """
 
-    def __init__(self, parts: Sequence[Tuple[Callable, Callable]], count: int):
+    def __init__(self, parts: Sequence[tuple[Callable, Callable]], count: int):
         # In messages of a stamp and values that no others have, these mark their places.
         marks = (MARKED_VALUE + np.arange(count)).view(float)
         self._bytes, places = bytearray(), []
@@ -241,7 +241,7 @@ class PatchedMessages:
         self._sources = np.where((0 <= indices) & (indices < count), indices,
                                  np.arange(count, len(self._table)))
 
-    def patched(self, stamp: bytes, values: Any) -> List[Outgoing]:
+    def patched(self, stamp: bytes, values: Any) -> list[Outgoing]:
         """Return the messages with a packed stamp and values (count,), and what publishes each."""
         self._values[:] = values
         self._table.take(self._sources, None, self._numbers, 'clip')

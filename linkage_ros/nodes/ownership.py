@@ -12,7 +12,7 @@ changed. A late subscriber receives the last full announcement and those after i
 
 from __future__ import annotations
 
-from typing import Any, Dict, Iterable, Mapping, Sequence, Set
+from typing import Any, Iterable, Mapping, Sequence
 
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import parameter_value_to_python
@@ -56,8 +56,8 @@ class Follower:
         self._parameters, self._owner = parameters, ''
         self._throttle = Throttle(node.get_logger())
         # The mechanisms whose values are adopted, and values that are not adopted yet.
-        self._mechanisms: Set[str] = set()
-        self._waiting: Dict[str, Any] = {}
+        self._mechanisms: set[str] = set()
+        self._waiting: dict[str, Any] = {}
         node.create_subscription(
             ParameterEvent, TOPIC, node.guarded(TOPIC, self._receive), LATCHED)
 

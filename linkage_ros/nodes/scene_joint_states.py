@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, Iterable, Sequence, Tuple
+from typing import Any, Iterable, Sequence
 
 import numpy as np
 from sensor_msgs.msg import JointState
@@ -19,7 +19,7 @@ from .publishers import LATCHED, TrackedPublisher
 from ..cache import Cache
 
 # The model and the state of each mechanism in a message.
-Parts = Tuple[Tuple[MechanismModel, AssemblyState], ...]
+Parts = tuple[tuple[MechanismModel, AssemblyState], ...]
 
 
 class SceneJointStates:

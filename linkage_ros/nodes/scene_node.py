@@ -10,7 +10,7 @@ from functools import partial
 import gc
 import sys
 import types
-from typing import Any, Callable, Generator, Iterable, List, Mapping, Optional
+from typing import Any, Callable, Generator, Iterable, Mapping
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
@@ -73,7 +73,7 @@ class SceneNode(Node):
         incidents = Incidents(self.get_logger(), lambda: not self.context.ok())
         self.guarded, self.report = incidents.guarded, incidents.report
         self.worker = Worker(self, incidents.guarded)
-        self._announcer: Optional[Announcer] = None
+        self._announcer: Announcer | None = None
         # Numbers of requests to set parameters: answered, and waiting.
         self._answered = self._waiting = 0
         self._parameters_of_scene = SceneParameters(self, name, self.check, self._pass_scene)
@@ -121,7 +121,7 @@ class SceneNode(Node):
         """Use the result of `prepare` from now on. It delays messages: be fast."""
 
     def declare_parameters(self, namespace: str, parameters: Any, ignore_override: bool = False
-                           ) -> List[Parameter]:
+                           ) -> list[Parameter]:
         """Declare parameters as rclpy does, and allow empty lists in a parameter file."""
         for _, *value, descriptor in (entry for entry in parameters if len(entry) > 2):
             descriptor.dynamic_typing = descriptor.dynamic_typing or value == [None]
@@ -244,7 +244,7 @@ def run(node_classes: Iterable[Callable[[], Node]], name: str, args: Any = None,
     for messages before there is a node.
     """
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    nodes: List[Node] = []
+    nodes: list[Node] = []
     with ShutdownHandler() as shutdown:
         try:
             rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
@@ -282,7 +282,7 @@ def run(node_classes: Iterable[Callable[[], Node]], name: str, args: Any = None,
     return 0
 
 
-def _spin(executor: Any, nodes: List[Node], shutdown: ShutdownHandler, name: str) -> None:
+def _spin(executor: Any, nodes: list[Node], shutdown: ShutdownHandler, name: str) -> None:
     incidents = Incidents(get_logger(name), lambda: not rclpy.ok())
     try:
         for node in nodes:

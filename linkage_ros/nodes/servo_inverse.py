@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from array import array
 import math
-from typing import Any, Callable, Dict, List, Mapping, Sequence, Tuple
+from typing import Any, Callable, Mapping, Sequence
 
 import numpy as np
 from sensor_msgs.msg import JointState
@@ -42,7 +42,7 @@ class ServoInverse(scene_node.SceneNode):
         super().__init__(scene.INVERSE, **kwargs)
         self._requests = Cache(self._request)
         self._sources: frozenset = frozenset()
-        self._positions: Dict[str, float] = {}
+        self._positions: dict[str, float] = {}
         subscribe(self, 'crank_states', self._interpret, self._receive)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
         self.create_service(InputsFor, 'inputs_for', self.answer_inputs_for)
@@ -72,7 +72,7 @@ class ServoInverse(scene_node.SceneNode):
         return self._filled(lambda: solve_inputs_for(
             self._with_several_inputs(request.mechanism), request, response), response)
 
-    def _request(self, key: Tuple[str, str]) -> InverseRequest:
+    def _request(self, key: tuple[str, str]) -> InverseRequest:
         (name, output), mechanisms = key, self.scene.mechanisms
         levers = {} if output not in ('', LEVER) else {
             name: mechanism for name, mechanism in mechanisms.items()
@@ -98,12 +98,12 @@ class ServoInverse(scene_node.SceneNode):
             response.message = elided(str(problem), MESSAGE)
         return response
 
-    def _interpret(self, message: JointState) -> List[Tuple[str, int]]:
+    def _interpret(self, message: JointState) -> list[tuple[str, int]]:
         """Return the scene's sources in a message, and the indices of their positions."""
         return [(name, index) for index, name in enumerate(
             message.name[:len(message.position)], 1) if name in self._sources]
 
-    def _receive(self, routes: List[Tuple[str, int]], _: bytes, numbers: Sequence[Any]) -> None:
+    def _receive(self, routes: list[tuple[str, int]], _: bytes, numbers: Sequence[Any]) -> None:
         self._positions.update((name, numbers[index]) for name, index in routes)
 
 

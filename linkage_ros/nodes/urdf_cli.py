@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import sys
-from typing import List, Optional
 
 import rclpy
 from rclpy.utilities import remove_ros_args
@@ -16,12 +15,12 @@ from .. import cli, scene
 from ..robot_model.cli import NAME, show
 
 
-def main(args: Optional[List[str]] = None) -> int:
+def main(args: list[str] | None = None) -> int:
     """Print the URDF of a scene; return the exit code. `args` are by default sys.argv[1:]."""
     return cli.run(NAME, _show, sys.argv[1:] if args is None else args)
 
 
-def _show(args: List[str]) -> None:
+def _show(args: list[str]) -> None:
     if '--ros-args' not in args:
         show(args, None)
         return
@@ -31,7 +30,7 @@ def _show(args: List[str]) -> None:
         raise cli.RequestError(f'the arguments for ROS are wrong: {error}') from None
 
 
-def _scene(args: List[str]) -> scene.Scene:
+def _scene(args: list[str]) -> scene.Scene:
     """Read the scene from the parameters in the arguments for ROS."""
     rclpy.init(args=args)
     try:

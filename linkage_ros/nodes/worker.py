@@ -8,13 +8,13 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import suppress
 from threading import Lock
-from typing import Any, Callable, Dict, Optional
+from typing import Any, Callable
 
 # Longest wait for the worker when a node ends [s].
 TIMEOUT_S = 0.1
 
 # A job runs in the worker's thread; the function that it returns runs on rclpy's executor.
-Job = Callable[[], Optional[Callable[[], None]]]
+Job = Callable[[], Callable[[], None] | None]
 
 
 class Worker:
@@ -31,7 +31,7 @@ class Worker:
         self._node, self._guarded = node, guarded
         self._thread = ThreadPoolExecutor(1, 'linkage_ros worker')
         self._lock, self._is_busy, self.has_ended = Lock(), False, False
-        self._jobs: Dict[str, Job] = {}
+        self._jobs: dict[str, Job] = {}
 
     def queue(self, kind: str, job: Job, is_next: bool = False) -> None:
         """Queue a job; it replaces a job of the same kind that has not begun."""

@@ -8,7 +8,7 @@ A turn is a full rotation of a crank, or one period of an oscillating input.
 """
 
 import math
-from typing import NamedTuple, Tuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,7 @@ class Configuration(NamedTuple):
     """Turns since the start, inputs [rad or m], and joints [m] (legs, joints, 2)."""
 
     turns: float
-    inputs: Tuple[float, ...]
+    inputs: tuple[float, ...]
     places: np.ndarray
 
 

@@ -12,7 +12,7 @@ has. Loops that share joints are checked together, with all that the scene publi
 from __future__ import annotations
 
 import math
-from typing import Any, Dict, List, Mapping, NamedTuple, Sequence, Set, Tuple
+from typing import Any, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
@@ -45,8 +45,8 @@ class Imported(NamedTuple):
     """
 
     name: str
-    parameters: Dict[str, Any]
-    reports: List[str]
+    parameters: dict[str, Any]
+    reports: list[str]
     driven: Sequence[str]
     slack: float = 0.0
 
@@ -67,7 +67,7 @@ class Source(NamedTuple):
 
 
 def parameters(mechanism: str, kind: str, lines: Sequence[str], drives: Sequence[Source],
-               joints: Sequence[Tuple[str, float, str, float]], **more: Any) -> Dict[str, Any]:
+               joints: Sequence[tuple[str, float, str, float]], **more: Any) -> dict[str, Any]:
     """Return a mechanism's; of joints the link, the sign, the robot's name and the position."""
     values = {'type': kind, 'joints': [*lines], **more}
     for drive in drives:
@@ -90,21 +90,21 @@ class Walk(NamedTuple):
     step. `good` tells where the loops are closed on all of the way.
     """
 
-    joints: Dict[str, np.ndarray]
+    joints: dict[str, np.ndarray]
     gaps: np.ndarray
-    poses: List[np.ndarray]
+    poses: list[np.ndarray]
     good: np.ndarray
 
 
 def compared(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
-             imported: Sequence[Imported]) -> Tuple[List[str], Dict[str, str]]:
+             imported: Sequence[Imported]) -> tuple[list[str], dict[str, str]]:
     """
     Put what a scene publishes into the loops of its robot, which is in a closed pose.
 
     Return the report on loops that stay closed, and for each mechanism of others the reason.
     """
-    reports: List[str] = []
-    wrong: Dict[str, str] = {}
+    reports: list[str] = []
+    wrong: dict[str, str] = {}
     for component in components(robot):
         parts = [made for made in imported if {*made.driven} & component.positions.keys()]
         if parts:
@@ -115,7 +115,7 @@ def compared(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
     return reports, wrong
 
 
-def published(mechanisms: Mapping[str, scene.SceneMechanism]) -> Set[str]:
+def published(mechanisms: Mapping[str, scene.SceneMechanism]) -> set[str]:
     """Return the joints that a scene publishes or reads."""
     every = mechanisms.values()
     return {drive.source for mechanism in every for drive in mechanism.inputs.values()} | {
@@ -135,7 +135,7 @@ class _Loops:
         # Where each source starts, and between which positions it moves.
         self._start = {drive.source: robot.positions[drive.source]
                        for mechanism in self._mechanisms for drive in mechanism.inputs.values()}
-        self._ends: Dict[str, Tuple[float, float]] = {}
+        self._ends: dict[str, tuple[float, float]] = {}
         for drive in (drive for made in parts for drive in mechanisms[made.name].inputs.values()):
             around = math.pi if drive.input.turns else 0.5 * component.size
             low, high = drive.ends or (drive.start - around, drive.start + around)
@@ -173,7 +173,7 @@ class _Loops:
             if off > OTHER + self._slack:
                 raise Difference(f'{self._at(self._start)} {name} is off by {off:.2g}')
 
-    def _walk_to(self, targets: np.ndarray) -> Tuple[Walk, str]:
+    def _walk_to(self, targets: np.ndarray) -> tuple[Walk, str]:
         """
         Return a walk of the sources to targets, a row each, and why it ends before, if it does.
 
@@ -221,7 +221,7 @@ class _Loops:
         return Walk({**sources, **joints}, gaps, poses,
                     np.logical_and.accumulate(gaps <= self._allowed, axis=1))
 
-    def _positions(self, sources: Mapping[str, np.ndarray]) -> Dict[str, np.ndarray]:
+    def _positions(self, sources: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Return positions of the loops' joints along paths."""
         positions = {**sources, **{name: ratio * sources[source] + offset
                                    for name, (source, ratio, offset) in self._motors.items()}}

@@ -9,7 +9,7 @@ from contextlib import suppress
 import math
 import shlex
 import sys
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Mapping, Sequence
 
 import numpy as np
 
@@ -30,12 +30,12 @@ _FAULTS = ArithmeticError, ValueError
 READING = 'joint_names: QB=-knee+0.6 is to be read as knee = 0.6 - angle of QB.'
 
 
-def main(args: Optional[List[str]] = None) -> int:
+def main(args: list[str] | None = None) -> int:
     """Print a scene file; return the exit code."""
     return cli.run(NAME, show, args)
 
 
-def show(args: Optional[List[str]]) -> None:
+def show(args: list[str] | None) -> None:
     """Print what a command line asks for."""
     parser = cli.Parser(NAME, description='Print the scene of the planar closed loops in a '
                         'robot: MJCF, SDF or URDF.')
@@ -76,7 +76,7 @@ def _launch(parsed: Any, still: Mapping[str, float]) -> str:
         f'{name}:={shlex.quote(text)}' for name, text in arguments.items() if text)
 
 
-def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
+def described(robot: Robot) -> tuple[dict[str, Any], list[str], dict[str, float]]:
     """
     Return the parameters of a robot's scene, and the report on omissions and checks.
 
@@ -84,7 +84,7 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]
     """
     closed = closing.closed(robot)
     robot, reports = closed.robot, closed.report
-    imported: List[check.Imported] = []
+    imported: list[check.Imported] = []
     groups = loops.groups(robot)
     for group in groups:
         fault = next((closed.faults[joint.name] for joint in group.joints
@@ -113,11 +113,11 @@ def described(robot: Robot) -> Tuple[Dict[str, Any], List[str], Dict[str, float]
 
 
 def _checked(robot: Robot, balls: Sequence[Sequence[str]], imported: Sequence[check.Imported],
-             reports: List[str]) -> Tuple[Dict[str, Any], List[str], Dict[str, float]]:
+             reports: list[str]) -> tuple[dict[str, Any], list[str], dict[str, float]]:
     """Return what is described, without mechanisms that differ from the robot."""
     if not imported:
         raise cli.RequestError(' '.join(reports) or 'no joint of this robot closes a loop')
-    parameters: Dict[str, Any] = {'mechanisms': [made.name for made in imported]}
+    parameters: dict[str, Any] = {'mechanisms': [made.name for made in imported]}
     for made in imported:
         parameters.update(made.parameters)
     mechanisms = scene.read(parameters).mechanisms
@@ -142,7 +142,7 @@ def _checked(robot: Robot, balls: Sequence[Sequence[str]], imported: Sequence[ch
 
 
 def others(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
-           held: Mapping[str, float]) -> Tuple[Dict[str, Any], List[str]]:
+           held: Mapping[str, float]) -> tuple[dict[str, Any], list[str]]:
     """
     Return the parameters that add a mechanism of all joints that a scene does not publish.
 
@@ -154,7 +154,7 @@ def others(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
     known = check.published(mechanisms)
     passive = {joint.name for component in components(closing.held(robot, held))
                for joint in component.joints}.difference(known, held, robot.driven)
-    cranks: Dict[str, check.Source] = {}
+    cranks: dict[str, check.Source] = {}
     lost = []
     for name in [name for name in robot.positions if name not in known]:
         source, ratio, offset = (name, 1.0, 0.0) if name in held else robot.source(name)
@@ -179,7 +179,7 @@ def not_published(names: Sequence[str]) -> str:
             'determines. What they carry has no transform.')
 
 
-def positions(texts: Sequence[str]) -> Dict[str, float]:
+def positions(texts: Sequence[str]) -> dict[str, float]:
     """Parse texts such as JOINT=VALUE; raise RequestError for an invalid one."""
     values = {}
     for text in texts:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 import math
 import shlex
-from typing import Dict, Iterable, List, Mapping, NamedTuple, Sequence, Tuple
+from typing import Iterable, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
@@ -56,12 +56,12 @@ class Closed(NamedTuple):
     """
 
     robot: Robot
-    report: List[str]
-    faults: Dict[str, ValueError]
+    report: list[str]
+    faults: dict[str, ValueError]
 
 
 # Two closed poses of which one has to be chosen: a text, and positions to type for each.
-Question = Tuple[str, Mapping[str, str], Mapping[str, str]]
+Question = tuple[str, Mapping[str, str], Mapping[str, str]]
 
 
 def closed(robot: Robot, seed: int = 0) -> Closed:
@@ -94,8 +94,8 @@ def _closed(robot: Robot, seed: int) -> Closed:
                           for name in robot.positions.keys() & robot.follows
                           for source, ratio, offset in [robot.source(name)]})
     made = Closed(robot, [], {})
-    moves: Dict[str, np.ndarray] = {}
-    positions: Dict[str, float] = {}
+    moves: dict[str, np.ndarray] = {}
+    positions: dict[str, float] = {}
     for component in components(robot):
         motors, followers = ([name for name in component.positions if name in names]
                              for names in (robot.driven, robot.follows))
@@ -112,13 +112,13 @@ def _closed(robot: Robot, seed: int) -> Closed:
     return made._replace(robot=displaced(robot, moves, positions))
 
 
-def _added(*options: Tuple[str, Iterable[str]]) -> str:
+def _added(*options: tuple[str, Iterable[str]]) -> str:
     """Return which option to paste, by word and values; a word follows each, and no stop."""
     return 'add ' + ' or '.join(
         f'--{word} {shlex.join(values)}' for word, values in options) + ' to the command'
 
 
-def _check_driven(component: Component, pose: np.ndarray, motors: List[str], followers: List[str]
+def _check_driven(component: Component, pose: np.ndarray, motors: list[str], followers: list[str]
                   ) -> None:
     """Raise ValueError if loops cannot move; NotDriven if their motors do not determine a pose."""
     if not component.loose(pose, [], LEANING)[0]:
@@ -158,7 +158,7 @@ def _choice(questions: Sequence[Question], why: str) -> ValueError:
 
 
 def _question(component: Component, poses: np.ndarray, which: np.ndarray,
-              motors: Sequence[str] = ()) -> List[Question]:
+              motors: Sequence[str] = ()) -> list[Question]:
     """Return the choice of two poses by the joint that differs most, if they are different."""
     # Of joints that differ alike the first.
     apart = np.round(np.abs(component.away(poses[0] - poses[1])) * which, 4)
@@ -172,7 +172,7 @@ def _question(component: Component, poses: np.ndarray, which: np.ndarray,
     return [(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', side, other)]
 
 
-def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], least: float
+def _check_unfolded(component: Component, pose: np.ndarray, motors: list[str], least: float
                     ) -> None:
     """Raise ValueError at a dead point, which a linkage can leave in two ways."""
     if not motors:
@@ -183,7 +183,7 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], l
         sizes = np.linalg.norm(motions, axis=0)
         motors = [max(component.named, key=lambda name: sizes[component.named[name]])]
     fixed = component.is_of(motors)
-    questions: List[Question] = []
+    questions: list[Question] = []
     steps = sorted((pose + ahead * component.unit * fixed for ahead in (ASIDE, -ASIDE)),
                    key=lambda step: not component.within(step[None], fixed)[0])
     for which, rows in component.independent(fixed):
@@ -208,8 +208,8 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: List[str], l
         raise _choice(questions, 'bars lie in line where the file has them, and it moves on')
 
 
-def nearest(component: Component, motors: List[str], followers: List[str], seed: int
-            ) -> Tuple[np.ndarray, str]:
+def nearest(component: Component, motors: list[str], followers: list[str], seed: int
+            ) -> tuple[np.ndarray, str]:
     """
     Return the closed pose that is nearest to the file's, and a report if motors had to move.
 

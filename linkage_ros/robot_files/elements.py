@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, Iterable, Optional, Sequence, Tuple, Union
+from typing import Any, Iterable, Sequence
 import xml.etree.ElementTree as ElementTree
 from xml.parsers import expat
 
@@ -37,9 +37,9 @@ def parse(path: str) -> Element:
     return root
 
 
-def once(parts: Iterable[Tuple[str, Element]]) -> Dict[str, Element]:
+def once(parts: Iterable[tuple[str, Element]]) -> dict[str, Element]:
     """Return parts by name; raise RequestError if two have the same name."""
-    named: Dict[str, Element] = {}
+    named: dict[str, Element] = {}
     for name, part in parts:
         if named.setdefault(name, part) is not part:
             raise RequestError(f'there are two of <{part.tag}> for {name!r}, which may have one')
@@ -57,7 +57,7 @@ def text(part: Element, tag: str, otherwise: str = '') -> str:
     return (part.findtext(tag) or otherwise).strip()
 
 
-def numbers(values: Union[str, Sequence[Any]], count: int = 3) -> np.ndarray:
+def numbers(values: str | Sequence[Any], count: int = 3) -> np.ndarray:
     """Return the numbers of a text or a list; raise ValueError if they are not `count`."""
     array = np.array(values.split() if isinstance(values, str) else values, float)
     if array.shape != (count,) or not np.all(np.abs(array) < MAX_NUMBER):
@@ -73,7 +73,7 @@ def weld(robot: Robot, plugins: Iterable[Element]) -> None:
             robot.join(f'{parent}={child}', FIXED, (parent, child), robot.frames[parent])
 
 
-def origin(part: Optional[Element]) -> np.ndarray:
+def origin(part: Element | None) -> np.ndarray:
     """Return the pose in the attributes xyz and rpy of an element, if there is one."""
     if part is None:
         return np.eye(4)

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import List, NamedTuple, Sequence, Tuple
+from typing import NamedTuple, Sequence
 
 import numpy as np
 
@@ -21,12 +21,12 @@ class Group(NamedTuple):
     """Loops that share bars: ground, joints, why not planar, and planar parts."""
 
     ground: str
-    joints: List[Joint]
+    joints: list[Joint]
     why: str
-    parts: List['Group']
+    parts: list['Group']
 
 
-def groups(robot: Robot) -> List[Group]:
+def groups(robot: Robot) -> list[Group]:
     """Return the loops of a robot, with their planar parts; bodies fixed to others are one."""
     # Whatever closes a loop joins bodies as all others do.
     robot = replace(robot, joints=[replace(joint, is_cut=False) for joint in robot.joints])
@@ -47,9 +47,9 @@ def groups(robot: Robot) -> List[Group]:
             for group in _groups(robot, _with_balls(robot))]
 
 
-def _parts(robot: Robot, group: Group) -> List[Group]:
+def _parts(robot: Robot, group: Group) -> list[Group]:
     """Return the planar parts of loops that are not planar as a whole."""
-    parts: List[Group] = []
+    parts: list[Group] = []
     left = group.joints
     for joint in group.joints:
         if joint.kind == HINGE and joint in left:
@@ -60,7 +60,7 @@ def _parts(robot: Robot, group: Group) -> List[Group]:
     return parts
 
 
-def _groups(robot: Robot, joints: List[Joint]) -> List[Group]:
+def _groups(robot: Robot, joints: list[Joint]) -> list[Group]:
     """Return the loops of some joints, those that share bars together."""
     tree, cuts = replace(robot, joints=joints).spanning_tree()
     groups = []
@@ -77,7 +77,7 @@ def _groups(robot: Robot, joints: List[Joint]) -> List[Group]:
     return groups
 
 
-def _with_balls(robot: Robot) -> List[Joint]:
+def _with_balls(robot: Robot) -> list[Joint]:
     """Return the joints with a ball in place of two or three hinges that cross in a point."""
     joints = robot.joints
     for body in reversed(robot.frames):
@@ -97,14 +97,14 @@ def _with_balls(robot: Robot) -> List[Joint]:
     return joints
 
 
-def _chain(joint: Joint, start: str) -> Sequence[Tuple[Joint, float]]:
+def _chain(joint: Joint, start: str) -> Sequence[tuple[Joint, float]]:
     """Return the hinges of a joint from one of its bodies to the other, with their signs."""
     parts = joint.parts or [(joint, 1.0)]
     return parts if joint.bodies[0] == start else [(hinge, -sign) for hinge, sign in parts[::-1]]
 
 
 def check_planar(ground: str, joints: Sequence[Joint], drives: Sequence[str] = ()
-                 ) -> Tuple[List[Joint], float]:
+                 ) -> tuple[list[Joint], float]:
     """Return the hinges, and by how much axes lean [rad]; raise ValueError if not planar."""
     hinges = sorted((joint for joint in joints if joint.kind == HINGE),
                     key=lambda joint: (joint.name not in drives, ground not in joint.bodies))
@@ -124,7 +124,7 @@ def check_planar(ground: str, joints: Sequence[Joint], drives: Sequence[str] = (
     return hinges, largest
 
 
-def pins(joint: Joint, normal: np.ndarray) -> List[Joint]:
+def pins(joint: Joint, normal: np.ndarray) -> list[Joint]:
     """Return the hinges of a joint that turn in a plane."""
     return [hinge for hinge in joint.hinges
             if hinge.kind == HINGE and lean(hinge, normal) < ASKEW]

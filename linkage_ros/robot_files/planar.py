@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 import math
-from typing import Dict, List, Optional, Sequence, Tuple
+from typing import Sequence
 
 import numpy as np
 
@@ -60,7 +60,7 @@ class Drawing(Dyads):
     def __init__(self, robot: Robot, group: loops.Group, drives: Sequence[str]):
         self._robot = robot
         self._flatten(group, drives)
-        self.drives: List[check.Source] = []
+        self.drives: list[check.Source] = []
         self.driven = [joint for joint in self.joints if joint.name in drives]
         places = [place for joint in self.joints for place in joint.places]
         size = max(abs(place - other) for place in places for other in places)
@@ -70,7 +70,7 @@ class Drawing(Dyads):
             raise ValueError(f'its loops cannot be closed: they stay open by {self.gap:.3g} m, '
                              f'more than {OPEN:g} of their size')
         near = size * min(max(ROUNDING, 10.0 * self.gap / size), 1e-6)
-        pins: List[Dict[str, complex]] = []
+        pins: list[dict[str, complex]] = []
         for joint in self.joints:
             pin = dict(zip(joint.bodies, joint.places))
             same = [other for other in pins if any(
@@ -102,7 +102,7 @@ class Drawing(Dyads):
         origin = next((joint for joint in hinges if ground in joint.bodies), hinges[0])
         self.frame = at(base[:3, :3].T @ (origin.places[0] - base[:3, 3]), turned)
         seen = np.linalg.inv(base @ self.frame)
-        self.joints: List[Joint] = []
+        self.joints: list[Joint] = []
         self.gap = 0.0
         up = hinges[0].axis
         stiff = {body for joint in group.joints for body in joint.bodies
@@ -128,7 +128,7 @@ class Drawing(Dyads):
         place = linkage.solve(theta_of([drive.value for drive in self.drives]), name)[name]
         return max(abs(complex(*place) - on[name]) for on in self.on.values() if name in on)
 
-    def measured_by(self, joint: Joint) -> Tuple[str, float, float]:
+    def measured_by(self, joint: Joint) -> tuple[str, float, float]:
         """
         Return the link whose angle is a joint's position, with sign and position.
 
@@ -152,7 +152,7 @@ class Drawing(Dyads):
             link, along = self._measuring(pin, base, body)
         return link, joint.motion(body), phase(along / self.parts[base].along)
 
-    def _measuring(self, pin: str, base: str, body: str) -> Tuple[str, complex]:
+    def _measuring(self, pin: str, base: str, body: str) -> tuple[str, complex]:
         """Add a bar that turns on one body as another does; return its link and direction."""
         (other, end), start = self.other(body, pin), self.on[body][pin]
         along = end - start
@@ -169,7 +169,7 @@ class Drawing(Dyads):
         name = self.name(self.on[base][foot] + along, body, line)
         return bar_name(foot, name), along
 
-    def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> Tuple[str, str]:
+    def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> tuple[str, str]:
         """Add an input, as `Dyads` requires; inputs of one source are geared to the first."""
         source, factor, start = self._robot.source(joint.name)
         ratio, offset, number = ratio * factor, offset + ratio * start, self.number(word)
@@ -188,7 +188,7 @@ class Drawing(Dyads):
         """Return the position of a joint's motor in the file."""
         return joint.start
 
-    def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> Optional[str]:
+    def special_line(self, place: complex, other: complex, one: Pin, two: Pin) -> str | None:
         """Return the start of a line for bars that mirror others, and so pass dead points."""
         (first, start), (second, end) = one, two
         for corner, there in [pin for body in self.parts for pin in self.on[body].items()]:
@@ -238,8 +238,8 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
     return check.Imported(name, parameters, reports, driven, slack)
 
 
-def _sweep(drive: check.Source, limits: Tuple[float, float], settings: scene.InputSettings
-           ) -> List[float]:
+def _sweep(drive: check.Source, limits: tuple[float, float], settings: scene.InputSettings
+           ) -> list[float]:
     """Return the limits of an input within its reach; raise ValueError if it has no such ends."""
     low, high = (float(short(drive.ratio * end + drive.offset, 1e-15))
                  for end in limits[::1 if drive.ratio > 0.0 else -1])
@@ -258,7 +258,7 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
     """Return the lines of loops, with the inputs that place the most bodies."""
     names = [joint.name for joint in group.joints if joint.position is not None]
     motors = [name for name in names if name in robot.driven]
-    tries: List[Tuple[Sequence[str], str]] = [(motors, group.ground), ([
+    tries: list[tuple[Sequence[str], str]] = [(motors, group.ground), ([
         name for name in names if name in motors or name in robot.follows], group.ground)]
     if not robot.driven:
         tries += ((pair, group.ground) for count in (1, 2)[:1 + (len(names) <= MAX_PAIRED)]
@@ -266,7 +266,7 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
     # Angles between bodies are the same in the frame of a body that a motor moves.
     tries += ((motors, body) for joint in group.joints if joint.name in motors
               for body in joint.bodies if body != group.ground)
-    drawings: List[Drawing] = []
+    drawings: list[Drawing] = []
     for drives, ground in tries:
         drawings.append(Drawing(robot, group._replace(ground=ground), drives))
         if not drawings[-1].left:
@@ -294,7 +294,7 @@ def _why(drawing: Drawing) -> str:
             'bars (an Assur group of class III or higher)')
 
 
-def _joints(drawing: Drawing) -> List[Tuple[str, float, str, float]]:
+def _joints(drawing: Drawing) -> list[tuple[str, float, str, float]]:
     """Return the link, the sign, the name and the position of each joint that links measure."""
     measured = []
     for joint in drawing.joints:

@@ -9,7 +9,7 @@ from collections import Counter
 from contextlib import contextmanager
 from graphlib import CycleError
 from pathlib import Path
-from typing import Any, Iterator, Mapping, Optional
+from typing import Any, Iterator, Mapping
 
 from . import sdf, urdf
 from .elements import parse
@@ -19,7 +19,7 @@ from ..robot_model.robot import Robot
 from ..robot_model.urdf import write
 
 
-def read(path: str, loops: Optional[str] = None) -> Robot:
+def read(path: str, loops: str | None = None) -> Robot:
     """Return the robot in a file; raise RequestError if there is none."""
     root = parse(path)
     if root.tag not in ('mujoco', 'sdf', 'robot'):

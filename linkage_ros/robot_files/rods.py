@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 import math
-from typing import Dict, List, Mapping, Sequence, Set, Tuple
+from typing import Mapping, Sequence
 
 import numpy as np
 
@@ -48,11 +48,11 @@ class Rods:
         self._seen = np.linalg.inv(robot.frames[ground])
         self._driven = {*robot.driven}
         # The joint of each link, and its end of a line: its parent, its place and its axis.
-        self.links: Dict[str, Joint] = {}
-        self._ends: Dict[str, str] = {}
-        self.rods: List[str] = []
-        self.drives: List[check.Source] = []
-        self._names: Set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
+        self.links: dict[str, Joint] = {}
+        self._ends: dict[str, str] = {}
+        self.rods: list[str] = []
+        self.drives: list[check.Source] = []
+        self._names: set[str] = {*FORMS, 'ground', 'at', 'axis', 'within', 'length'}
         rods = {body: held for body, held in _on_bodies(group.joints).items()
                 if body != ground and [joint.kind for joint in held] == [BALL, BALL]}
         joints = [hinge for joint in group.joints for hinge in (
@@ -158,7 +158,7 @@ class Rods:
         length, sign = float(np.linalg.norm(way)), float(np.sign(half.axis @ way))
         self.drives.append(check.Source(name, half.name, sign, length - sign * half.start, length))
 
-    def lines(self, limits: Mapping[str, Tuple[float, float]] = {}) -> List[str]:
+    def lines(self, limits: Mapping[str, tuple[float, float]] = {}) -> list[str]:
         """Return the lines, with limits for some other than the file's."""
         lines, motors = [], {drive.name for drive in self.drives}
         for name, joint in self.links.items():
@@ -174,7 +174,7 @@ class Rods:
         return lines + self.rods
 
 
-def _on_bodies(joints: Sequence[Joint]) -> Dict[str, List[Joint]]:
+def _on_bodies(joints: Sequence[Joint]) -> dict[str, list[Joint]]:
     return {body: [joint for joint in joints if body in joint.bodies]
             for joint in joints for body in joint.bodies}
 
@@ -209,8 +209,8 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
     return check.Imported(name, parameters, reports, sources)
 
 
-def _sweeps(mechanism: scene.SceneMechanism, limits: Mapping[str, Tuple[float, float]]
-            ) -> List[List[float]]:
+def _sweeps(mechanism: scene.SceneMechanism, limits: Mapping[str, tuple[float, float]]
+            ) -> list[list[float]]:
     """Return the ends of the inputs: limits, made smaller until every pose in them exists."""
     drives = mechanism.inputs.values()
     low, high = np.sort([np.multiply(limits.get(drive.source, (-math.inf, math.inf)), drive.ratio)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 import math
-from typing import Dict, Iterable, Iterator, Optional, Tuple
+from typing import Iterable, Iterator
 
 import numpy as np
 
@@ -36,7 +36,7 @@ def join(robot: Robot, joints: Iterable[Element]) -> None:
         model.join(robot, name, joint, model.ends(name, joint))
 
 
-def _parts(model: Element, name: str) -> Iterator[Tuple[str, Element]]:
+def _parts(model: Element, name: str) -> Iterator[tuple[str, Element]]:
     """Yield the parts of a model and of the models in it, with their full names."""
     yield name, model
     for part in model:
@@ -53,7 +53,7 @@ def _parts(model: Element, name: str) -> Iterator[Tuple[str, Element]]:
 class _Model:
     """Frames of a model's parts; a name is relative to the model in which it stands."""
 
-    def __init__(self, parts: Dict[str, Element], is_old: bool, known: Dict[str, np.ndarray]):
+    def __init__(self, parts: dict[str, Element], is_old: bool, known: dict[str, np.ndarray]):
         self._parts, self._known = parts, known
         self._axes_in_model = '1' if is_old else ''
         self.frame = lru_cache(None)(self._frame)
@@ -88,7 +88,7 @@ class _Model:
             raise RequestError(f'{where or "the model"} names {name!r}, which is not there')
         return full
 
-    def ends(self, name: str, joint: Element) -> Tuple[str, str]:
+    def ends(self, name: str, joint: Element) -> tuple[str, str]:
         """Return the links that a joint joins."""
         return (self.body(self.named(name, text(joint, 'parent'))),
                 self.body(self.named(name, text(joint, 'child'))))
@@ -118,8 +118,8 @@ class _Model:
                                'which is not read: give it a pose of its own')
         return made
 
-    def join(self, robot: Robot, name: str, part: Element, ends: Tuple[str, str],
-             position: Optional[float] = None) -> None:
+    def join(self, robot: Robot, name: str, part: Element, ends: tuple[str, str],
+             position: float | None = None) -> None:
         """Add a joint to a robot."""
         second = part.find('axis2')
         robot.join(name, part.get('type', ''), ends, self.frame(name),
@@ -134,7 +134,7 @@ class _Model:
             robot.follow(name, self.named(name, mimic.get('joint', '')), ratio,
                          offset - ratio * start)
 
-    def _axis(self, name: str, axis: Optional[Element]) -> np.ndarray:
+    def _axis(self, name: str, axis: Element | None) -> np.ndarray:
         """Return an axis as the joint's frame has it."""
         if axis is None:
             return np.array([0.0, 0.0, 1.0])
@@ -146,7 +146,7 @@ class _Model:
         return way
 
 
-def _pose(part: Optional[Element]) -> np.ndarray:
+def _pose(part: Element | None) -> np.ndarray:
     text = (part.text or '').strip() if part is not None else ''
     if part is None or not text:
         return np.eye(4)

@@ -13,7 +13,7 @@ Poses are arrays of the screws' positions, relative to the file, a row a pose [r
 from __future__ import annotations
 
 import math
-from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Sequence, Set, Tuple
+from typing import Any, Iterator, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
@@ -57,12 +57,12 @@ class Screw(NamedTuple):
     body: str
 
 
-def loops_of(tree: Mapping[str, Tuple[str, Joint]], cuts: Sequence[Joint]
-           ) -> List[Tuple[Set[str], List[Joint]]]:
+def loops_of(tree: Mapping[str, tuple[str, Joint]], cuts: Sequence[Joint]
+           ) -> list[tuple[set[str], list[Joint]]]:
     """Return bodies and cuts of the loops of a tree; loops that share joints are together."""
-    groups: List[Tuple[Set[str], List[Joint]]] = []
+    groups: list[tuple[set[str], list[Joint]]] = []
     for cut in cuts:
-        cycle: Set[str] = set()
+        cycle: set[str] = set()
         for body in cut.bodies:
             while body in tree:
                 cycle ^= {body}
@@ -105,7 +105,7 @@ class Component:
 
     """
 
-    def __init__(self, robot: Robot, tree: Dict[str, Tuple[str, Joint]], bodies: Set[str],
+    def __init__(self, robot: Robot, tree: dict[str, tuple[str, Joint]], bodies: set[str],
                  cuts: Sequence[Joint]):
         edges = {tree[body][1] for body in bodies} | {*cuts}
         self.joints = [joint for joint in robot.joints if joint in edges]
@@ -113,7 +113,7 @@ class Component:
                           if joint.position is not None}
         places = np.array([place for joint in self.joints for place in joint.places])
         self.size = float(np.max(np.linalg.norm(places - places[0], axis=1))) or 1.0
-        self._screws: List[Screw] = []
+        self._screws: list[Screw] = []
         # The last screw that moves each body.
         last = {robot.root: -1}
         for body, (base, joint) in tree.items():
@@ -144,7 +144,7 @@ class Component:
         self.start = np.zeros((1, len(self._screws)))
         self._set_equations(cuts, last, above)
 
-    def _motions(self, joint: Joint, body: str) -> List[Tuple[str, np.ndarray]]:
+    def _motions(self, joint: Joint, body: str) -> list[tuple[str, np.ndarray]]:
         """Return kind and axis of the screws of a joint; far from a ball's singular poses."""
         if joint.kind in (HINGE, SLIDE):
             return [(joint.kind, joint.motion(body))]
@@ -199,7 +199,7 @@ class Component:
             np.matmul(frames[:, parent], moved[:, i], out=frames[:, i])
         return frames
 
-    def errors(self, poses: np.ndarray, slopes: bool = False) -> Tuple[np.ndarray, np.ndarray]:
+    def errors(self, poses: np.ndarray, slopes: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals of the loops in each pose [m], and their derivatives by screws."""
         frames = self._frames(poses)
         seen = (frames[:, self._ends] @ self._points[..., None])[..., 0]
@@ -245,7 +245,7 @@ class Component:
         """Return the largest residual in each pose, of all or of some rows, as a part of size."""
         return np.max(np.abs(self.errors(poses)[0][:, rows]), axis=1, initial=0.0) / self.size
 
-    def independent(self, fixed: np.ndarray) -> List[Tuple[np.ndarray, np.ndarray]]:
+    def independent(self, fixed: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return screws and residuals of loops that share no joint but those that are fixed."""
         moved = np.any(self._signs.sum(axis=1, keepdims=True), axis=1) & ~fixed
         near = (moved @ moved.T) | np.all(self._ends[:, None] == self._ends, axis=2)
@@ -263,23 +263,23 @@ class Component:
         return inside
 
     def chosen(self, motions: np.ndarray, names: Sequence[str], first: Sequence[str] = ()
-               ) -> List[str]:
+               ) -> list[str]:
         """Return joints that tell where all is; ways to move have a column for each screw."""
-        basis: List[str] = []
+        basis: list[str] = []
         for name in sorted(names, key=lambda name: name not in first):
             if np.linalg.matrix_rank(motions[:, self.is_of([*basis, name])], 1e-6) > len(basis):
                 basis.append(name)
         return basis
 
-    def texts(self, pose: np.ndarray, which: Any) -> Dict[str, str]:
+    def texts(self, pose: np.ndarray, which: Any) -> dict[str, str]:
         """Return the positions of some screws with names in a pose."""
         positions = self.read(pose[None])
         return {name: f'{round(float(positions[name][0]), 6) + 0.0:.5g}'
                 for name, i in self.named.items() if which[i]}
 
-    def moves(self, pose: np.ndarray) -> Dict[str, np.ndarray]:
+    def moves(self, pose: np.ndarray) -> dict[str, np.ndarray]:
         """Return the displacement of each body on its parent in a pose."""
-        moved: Dict[str, np.ndarray] = {}
+        moved: dict[str, np.ndarray] = {}
         for screw, step in zip(self._screws, exponentials(self._twists, pose, self._slides)):
             moved[screw.body] = moved.get(screw.body, np.eye(4)) @ step
         return moved
@@ -311,13 +311,13 @@ class Component:
         return len(self.free_ways(pose, fixed))
 
     def loose(self, pose: np.ndarray, motors: Sequence[str], least: float = DEAD_POINT
-              ) -> Tuple[List[str], np.ndarray]:
+              ) -> tuple[list[str], np.ndarray]:
         """Return the joints that move while motors do not, and the ways in which they do."""
         # The spin of a rod on balls does not count.
         motions = self.free_ways(pose, self.is_of(motors), least) * ~self._in_balls
         return [name for name, i in self.named.items() if is_free(motions)[i]], motions
 
-    def read(self, poses: np.ndarray) -> Dict[str, np.ndarray]:
+    def read(self, poses: np.ndarray) -> dict[str, np.ndarray]:
         """Return the positions of named joints [rad or m], within half a turn of the file's."""
         positions = self._starts + np.where(self._slides, poses, wrapped(poses))
         return {name: positions[:, i] for name, i in self.named.items()}

@@ -23,7 +23,7 @@ from collections import Counter
 from dataclasses import replace
 from itertools import product
 import math
-from typing import Any, Dict, Iterable, Iterator, Optional, Sequence
+from typing import Any, Iterable, Iterator, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -57,7 +57,7 @@ SLACK = 1e-6
 
 
 def robot(mechanisms: Iterable[SceneMechanism], frame_id: str,
-          width: Optional[float] = None, density: float = 0.0) -> Robot:
+          width: float | None = None, density: float = 0.0) -> Robot:
     """
     Return mechanisms as one robot.
 
@@ -131,7 +131,7 @@ def size(mechanism: SceneMechanism) -> float:
 class _Tree:
     """The bodies of a mechanism: ground, the root, crank and legs, in `robot`."""
 
-    def __init__(self, mechanism: SceneMechanism, base: str, width: Optional[float]):
+    def __init__(self, mechanism: SceneMechanism, base: str, width: float | None):
         mechanism.check_planar()
         length = size(mechanism)
         self._length = length if width is None else width / WIDTH
@@ -217,7 +217,7 @@ class _Tree:
         return (side * x, y) if name == GROUND else (x, side * y)
 
 
-def travels(mechanism: SceneMechanism) -> Dict[str, Arc]:
+def travels(mechanism: SceneMechanism) -> dict[str, Arc]:
     """
     Return the travel of each joint: lower and upper end of its value [rad or m].
 
@@ -226,7 +226,7 @@ def travels(mechanism: SceneMechanism) -> Dict[str, Arc]:
     With several inputs, whose reach depends on each other, no other joint has one.
     """
     linkage, reach, scale = mechanism.linkage, mechanism.reach, mechanism.scale_of
-    ends: Dict[str, Arc] = {}
+    ends: dict[str, Arc] = {}
     has_one_leg = mechanism.leg_pairs == 1 and not mechanism.mirrored
     for name, settings in mechanism.inputs.items():
         if has_one_leg and settings.sweep and not settings.input.is_whole(settings.reach):

@@ -3,7 +3,7 @@
 
 """Command that prints the robot model of a scene's mechanisms; it needs no ROS."""
 
-from typing import Optional, Sequence
+from typing import Sequence
 
 from . import bodies, mjcf, sdf, urdf
 from .bodies import DENSITY
@@ -12,12 +12,12 @@ from .. import cli, scene
 NAME = 'urdf'
 
 
-def main(args: Optional[Sequence[str]] = None) -> int:
+def main(args: Sequence[str] | None = None) -> int:
     """Print a robot model; return the exit code."""
     return cli.run(NAME, show, args)
 
 
-def show(args: Optional[Sequence[str]], given_scene: Optional[scene.Scene] = None) -> None:
+def show(args: Sequence[str] | None, given_scene: scene.Scene | None = None) -> None:
     """Print the model that a command line requests, of its scene or of the one from ROS."""
     parser = cli.Parser(
         NAME, description='Print the robot model of a scene.',

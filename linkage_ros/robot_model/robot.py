@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 import math
 import re
-from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Optional, Sequence
+from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
@@ -103,8 +103,8 @@ class Joint:
     bodies: tuple[str, str]
     places: Any
     axes: Any
-    position: Optional[float] = None
-    limits: Optional[tuple[float, float]] = None
+    position: float | None = None
+    limits: tuple[float, float] | None = None
     no_limits: str = ''
     turns: Any = (np.eye(3), np.eye(3))
     is_cut: bool = False
@@ -198,7 +198,7 @@ class Robot:
 
     def hang(self, name: str, parent: str, place: Sequence[float], kind: str = FIXED,
              axis: Sequence[float] = (0.0, 0.0, 1.0),
-             limits: Optional[tuple[float, float]] = None, joint: str = '',
+             limits: tuple[float, float] | None = None, joint: str = '',
              position: float = 0.0) -> None:
         """Add a body on another one, at x, y, z [m], roll, pitch, yaw [rad], and its joint."""
         frame = self.frames[name] = self.frames[parent] @ pose(*place)
@@ -267,8 +267,8 @@ class Robot:
         return tree, [joint for joint in self.joints if joint not in inside]
 
     def join(self, name: str, kind: str, bodies: tuple[str, str], frame: np.ndarray,
-             axis: Any = (0.0, 0.0, 1.0), other: Optional[np.ndarray] = None,
-             position: Optional[float] = None,
+             axis: Any = (0.0, 0.0, 1.0), other: np.ndarray | None = None,
+             position: float | None = None,
              limits: Sequence[Any] = (-math.inf, math.inf), second: Any = None) -> None:
         """
         Add a joint by its frame on the first body, and on the second where it closes a loop.
@@ -350,8 +350,7 @@ class Robot:
         """Return the joint that another depends on, or itself, with ratio and offset."""
         return self.sources(name)[-1]
 
-    def limits(self, joints: Iterable[Joint]
-               ) -> tuple[dict[str, tuple[float, float]], list[str]]:
+    def limits(self, joints: Iterable[Joint]) -> tuple[dict[str, tuple[float, float]], list[str]]:
         """
         Return the limits of each source, and a report on those that do not count.
 
@@ -380,7 +379,7 @@ class Body(NamedTuple):
     name: str
     parent: str
     pose: Sequence[float]
-    joint: Optional[Joint] = None
+    joint: Joint | None = None
     axis: Sequence[float] = ()
 
 
@@ -393,8 +392,7 @@ def _seen(base: np.ndarray, frame: np.ndarray, span: float) -> list[float]:
             *(round(angle, 15) for angle in (roll, pitch, yaw))]
 
 
-def _limits(limits: Sequence[Any], is_continuous: bool
-            ) -> tuple[Optional[tuple[float, float]], str]:
+def _limits(limits: Sequence[Any], is_continuous: bool) -> tuple[tuple[float, float] | None, str]:
     """Return the limits that count, None without any, and those that do not, with the reason."""
     low, high = (math.copysign(math.inf, end) if abs(end) >= MAX_NUMBER else end
                  for end in map(float, limits))

@@ -13,7 +13,7 @@ from __future__ import annotations
 import cmath
 from itertools import combinations
 import math
-from typing import Any, Collection, Dict, List, NamedTuple, Sequence, Tuple
+from typing import Any, Collection, NamedTuple, Sequence
 
 import numpy as np
 
@@ -34,7 +34,7 @@ MIN_AREA = 1e-9
 SAMPLES = 361
 # Names of visible shapes in all formats.
 CYLINDER, BOX, BALL = 'cylinder', 'box', 'sphere'
-Place = Tuple[float, float]
+Place = tuple[float, float]
 
 
 class Shape(NamedTuple):
@@ -51,14 +51,14 @@ class Shape(NamedTuple):
         return self.start.link == GROUND
 
 
-def ground_frame(linkage: Mechanism) -> Dict[str, Tuple[float, ...]]:
+def ground_frame(linkage: Mechanism) -> dict[str, tuple[float, ...]]:
     """Return the places of the joints on the ground [m]."""
     return linkage.cache.get_or_make('ground', lambda: {
         name: tuple(place.ravel().tolist()) for name, place in linkage.solve(
             [0.0] * len(linkage.inputs), linkage.grounded).items()})
 
 
-def shapes(mechanism: SceneMechanism) -> List[Shape]:
+def shapes(mechanism: SceneMechanism) -> list[Shape]:
     """Return the sliding parts, guides first; parts that no pose was found for are omitted."""
     linkage = mechanism.linkage
     slides = [link for link in linkage.links if link.kind == 'prismatic']
@@ -99,13 +99,13 @@ def input_values(mechanism: SceneMechanism) -> Any:
     return theta_of(np.meshgrid(*values))
 
 
-def drawn(mechanism: SceneMechanism, names: Collection[str]) -> List[Shape]:
+def drawn(mechanism: SceneMechanism, names: Collection[str]) -> list[Shape]:
     """Return the shapes to draw between these joints; rods are drawn as bars."""
     return [shape for shape in shapes(mechanism)
             if shape.kind != ROD and {shape.slide.joint, shape.slide.tip} <= set(names)]
 
 
-def cranks(linkage: Mechanism) -> List[Tuple[str, str]]:
+def cranks(linkage: Mechanism) -> list[tuple[str, str]]:
     """Return the bars that inputs turn, from centre to pin."""
     in_space = len(linkage.axes) > 2
     names = [input_.name for input_ in linkage.inputs if input_.turns or in_space]
@@ -117,7 +117,7 @@ def cranks(linkage: Mechanism) -> List[Tuple[str, str]]:
     return [(link.joint, link.tip) for link in links]
 
 
-def plates(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, str, str]]:
+def plates(linkage: Mechanism, names: Collection[str]) -> list[tuple[str, str, str]]:
     """Return triples of joints whose bars form a triangle of one link."""
     bars = set(map(frozenset, linkage.bars))
     return [corners for frame in linkage.frames.values()
@@ -127,7 +127,7 @@ def plates(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, str, s
             > 2.0 * MIN_AREA * linkage.longest ** 2]
 
 
-def marks(linkage: Mechanism, names: Collection[str]) -> List[Tuple[str, LinkPoint, LinkPoint]]:
+def marks(linkage: Mechanism, names: Collection[str]) -> list[tuple[str, LinkPoint, LinkPoint]]:
     """Return the triangle below each of these joints that is on the ground."""
     height = MARK * linkage.longest
     width = HALF_MARK * height
@@ -151,14 +151,14 @@ class Piece(NamedTuple):
         return math.dist(self.start, self.end)
 
     @property
-    def pose(self) -> Tuple[float, ...]:
+    def pose(self) -> tuple[float, ...]:
         """Its middle x, y, z [m], roll, pitch, yaw [rad]; pitch lays a cylinder's z along x."""
         (x, y), (u, v) = self.start, self.end
         return (0.5 * (x + u), 0.5 * (y + v), 0.0, 0.0,
                 0.5 * math.pi if self.shape == CYLINDER else 0.0, math.atan2(v - y, u - x))
 
     @property
-    def sizes(self) -> Dict[str, Tuple[float, ...]]:
+    def sizes(self) -> dict[str, tuple[float, ...]]:
         """Its sizes [m], by their names in URDF and SDF."""
         if self.shape == BOX:
             return {'size': (self.length, self.thickness, self.thickness)}
@@ -166,7 +166,7 @@ class Piece(NamedTuple):
         return {'radius': (self.thickness,), **length}
 
     @property
-    def solid(self) -> Tuple[float, float, float]:
+    def solid(self) -> tuple[float, float, float]:
         """Its volume [m^3], and squares of radii of gyration about and across it [m^2]."""
         thick, long = self.thickness ** 2, self.length ** 2 / 12.0
         return {CYLINDER: (math.pi * thick * self.length, 0.5 * thick, 0.25 * thick + long),
@@ -175,7 +175,7 @@ class Piece(NamedTuple):
                 }[self.shape]
 
 
-def weight(pieces: Sequence[Piece], density: float) -> Tuple[float, List[float], List[float]]:
+def weight(pieces: Sequence[Piece], density: float) -> tuple[float, list[float], list[float]]:
     """
     Return the common weight of one or more pieces of a density [kg/m^3].
 

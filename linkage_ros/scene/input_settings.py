@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 import math
-from typing import Any, Iterable, Optional
+from typing import Any, Iterable
 
 from .parameters import DRIVER, Field, SceneError, Values
 from ..linkage import Arc, Input, Mechanism
@@ -88,8 +88,8 @@ class InputSettings:
     speed: float
     default_speed: float
     start: float
-    sweep: Optional[Arc]
-    ends: Optional[Arc]
+    sweep: Arc | None
+    ends: Arc | None
     source: str
     ratio: float
     offset: float

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import operator
-from typing import Any, Iterable, Mapping, NamedTuple, Optional, Sequence
+from typing import Any, Iterable, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
@@ -98,7 +98,7 @@ class InverseRequest:
         return [(value - offset) / ratio
                 for (ratio, offset), value in zip(self._actuators, inputs)]
 
-    def positions(self, values: Sequence[Any], seed: Optional[Sequence[Any]] = None
+    def positions(self, values: Sequence[Any], seed: Sequence[Any] | None = None
                   ) -> tuple[list[Any], list[Any]]:
         """
         Return actuators' positions for values of the outputs, and the rates there.
@@ -127,7 +127,7 @@ class InverseRequest:
         return (self.positions_of(map(operator.mul, inputs, self._scales)),
                 [*map(operator.mul, rates, self._rate_units)])
 
-    def command(self, values: Sequence[float], speeds: Optional[Sequence[float]],
+    def command(self, values: Sequence[float], speeds: Sequence[float] | None,
                 seed: Sequence[float], jumps: bool = False) -> ActuatorCommand:
         """
         Return the command for values of the outputs and their speeds.
@@ -157,7 +157,7 @@ class InverseRequest:
         except np.linalg.LinAlgError:
             return n * [math.inf if any(speeds) else 0.0]
 
-    def answers(self, values: Sequence[float], seed: Optional[Sequence[float]] = None
+    def answers(self, values: Sequence[float], seed: Sequence[float] | None = None
                 ) -> list[tuple[list[float], Solution]]:
         """
         Return all answers to one value of each output: inputs [rad or m], and the linkage's own.

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from typing import Any, Mapping, NamedTuple, Optional
+from typing import Any, Mapping, NamedTuple
 
 import numpy as np
 
@@ -44,7 +44,7 @@ class JointName(NamedTuple):
         value = self.sign * position + self.offset
         return value - math.tau * np.round(value / math.tau) if self.wraps else value
 
-    def travel(self, ends: tuple[float, float]) -> Optional[tuple[float, float]]:
+    def travel(self, ends: tuple[float, float]) -> tuple[float, float] | None:
         """Return limits of the published value from those of the position; None if it wraps."""
         low, high = sorted(self._replace(wraps=False).of(end) for end in ends)
         turns = math.tau * round(0.5 * (low + high) / math.tau) if self.wraps else 0.0

@@ -11,7 +11,7 @@ leg at pi - (theta - 2 pi j/N), on the same crank pin.
 from contextlib import suppress
 import math
 from struct import Struct
-from typing import Any, List, Optional, Sequence, Union
+from typing import Any, Sequence
 
 import numpy as np
 
@@ -55,7 +55,7 @@ class Solution:
         solved: Any = Struct(f'{self.rows.size + inputs + speeds}d')
         self._pack_driven, self._pack_solved = driven.pack_into, solved.pack_into
         self._legs = legs
-        self._batch: Optional[Batch] = None
+        self._batch: Batch | None = None
         if len(legs) > 1:
             with suppress(ImportError):
                 self._batch = function.batch(self.rows)
@@ -73,7 +73,7 @@ class Solution:
             self._pack_driven(self.values, self.rows.nbytes, *driven)
             # `vdot` overflows without the warning of `dot`.
             return math.isfinite(sum(driven)) and math.isfinite(np.vdot(self.rows, self.rows))
-        numbers: List[float] = []
+        numbers: list[float] = []
         for leg in self._legs:
             numbers += self._function(*arguments, *leg)
         numbers += driven
@@ -92,7 +92,7 @@ class Assembly:
     """
 
     def __init__(self, linkage: Mechanism, leg_pairs: int = 1, mirrored: bool = False,
-                 scale: float = 1.0, reach: Optional[Sequence] = None):
+                 scale: float = 1.0, reach: Sequence | None = None):
         sides = [('left', 0.0, 1.0), ('right', math.pi, -1.0)][:1 + mirrored]
         self.legs = {f'{side}{j}_': Leg(math.tau * j / leg_pairs, start, sign, scale)
                      for j in range(leg_pairs) for side, start, sign in sides}
@@ -106,8 +106,8 @@ class Assembly:
         self.is_limited = len(inputs) == 1 and not linkage.inputs[0].is_whole(self.reach)
         self._scale = scale
 
-    def solution(self, points: Sequence[Union[str, LinkPoint]] = (), joints: Sequence[str] = (),
-                 rates: Optional[Sequence[str]] = None, efforts: int = 0) -> Solution:
+    def solution(self, points: Sequence[str | LinkPoint] = (), joints: Sequence[str] = (),
+                 rates: Sequence[str] | None = None, efforts: int = 0) -> Solution:
         """
         Return a solver of all legs for points, joint angles and rates.
 
@@ -119,7 +119,7 @@ class Assembly:
         return Solution([*self.legs.values()], self.linkage.legs(
             tuple(points), tuple(joints), rates), inputs, sizes, speeds, efforts)
 
-    def within_reach(self, value: float) -> List[bool]:
+    def within_reach(self, value: float) -> list[bool]:
         """Return which legs can be assembled at a value [rad or m] of the input, by its reach."""
         first = self.linkage.inputs[0]
         value = value if first.turns else value / self._scale

@@ -6,13 +6,13 @@
 from __future__ import annotations
 
 import re
-from typing import Iterable, Tuple, Union
+from typing import Iterable
 
 from .parameters import read_lines, SceneError
 from ..linkage import Mechanism
 
 # A moment [N m], or a force [N]: x, y and, in a spatial linkage, z.
-Load = Union[float, Tuple[float, ...]]
+Load = float | tuple[float, ...]
 
 _FIGURE = r'[+-]?(?:\d{1,99}\.?\d{0,99}|\.\d{1,99})(?:[eE][+-]?\d\d?)?'
 _LINE = re.compile(rf'(\w+)=({_FIGURE}(?: +{_FIGURE}){{0,2}})', re.ASCII)

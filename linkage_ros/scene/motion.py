@@ -11,7 +11,6 @@ Only the result is rounded, so that errors do not accumulate.
 from __future__ import annotations
 
 import math
-from typing import Optional
 
 from . import InputSettings
 from ..linkage import Arc
@@ -51,7 +50,7 @@ class Motion:
 
     """
 
-    def __init__(self, speed: float, sweep: Optional[Arc] = None, start: float = 0.0,
+    def __init__(self, speed: float, sweep: Arc | None = None, start: float = 0.0,
                  since: int = 0, turns: bool = True, period: int = 1):
         self._speed = speed
         self._rate, self._forward = _steps(speed, per=10 ** 9), -1 if speed < 0 else 1
@@ -98,7 +97,7 @@ class Motion:
         return cls(settings.speed, settings.sweep, settings.start, since, settings.input.turns,
                    int(min(settings.input.period, MAX_PERIOD)))
 
-    def changed(self, speed: float, sweep: Optional[Arc], now: int) -> Motion:
+    def changed(self, speed: float, sweep: Arc | None, now: int) -> Motion:
         """Return a motion with this speed and sweep from this one's value at `now` [ns]."""
         motion = Motion(speed, sweep, since=now, turns=self._turns, period=self._round // TURN)
         phase = self._phase_at(now)

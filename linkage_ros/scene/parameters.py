@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import math
 import re
 import sys
-from typing import Any, Callable, Collection, Iterable, Mapping, NamedTuple, Optional, Sequence
+from typing import Any, Callable, Collection, Iterable, Mapping, NamedTuple, Sequence
 
 from ..cache import cached
 from ..words import elided, listed, meant, MESSAGE, quoted, suggestion
@@ -84,12 +84,12 @@ class Field:
 
     kind: str
     meaning: str
-    low: Optional[float] = None
-    high: Optional[float] = None
+    low: float | None = None
+    high: float | None = None
     default: Any = None
     positive: bool = False
     rule: str = ''
-    holds: Optional[Callable[[Any], bool]] = None
+    holds: Callable[[Any], bool] | None = None
     choices: tuple[str, ...] = ()
     pattern: re.Pattern = TEXT
     readers: tuple[str, ...] = ALL

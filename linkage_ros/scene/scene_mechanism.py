@@ -10,7 +10,7 @@ from functools import cached_property
 from itertools import product
 import math
 import re
-from typing import Any, Mapping, Optional, Sequence
+from typing import Any, Mapping, Sequence
 
 from .input_settings import InputSettings, read_settings
 from .joint_names import JointName, read_joint_names
@@ -162,13 +162,13 @@ class SceneMechanism:
                 for (least, low), (greatest, high) in self.linkage.extremes(output, arcs)]
 
     @cached_property
-    def ends(self) -> list[Optional[Arc]]:
+    def ends(self) -> list[Arc | None]:
         """Return the sweeps that a user has set, before scale, and None for other inputs."""
         return [settings.ends and (settings.ends[0] / scale, settings.ends[1] / scale)
                 for settings, scale in zip(self.inputs.values(), self.scales)]
 
-    def from_source(self, settings: InputSettings, position: float, speed: Optional[float],
-                    seed: Optional[float]) -> tuple[float, Optional[float]]:
+    def from_source(self, settings: InputSettings, position: float, speed: float | None,
+                    seed: float | None) -> tuple[float, float | None]:
         """
         Return an input and its speed, from those of its source joint [rad or m, per second].
 
@@ -217,7 +217,7 @@ def divided(values: Sequence[Any], units: Sequence[float]) -> list[Any]:
 
 
 def read_mechanism(name: str, entries: Mapping[str, Any],
-                   before: Optional[SceneMechanism] = None) -> SceneMechanism:
+                   before: SceneMechanism | None = None) -> SceneMechanism:
     """Read a mechanism from its values by full parameter name, other values as `before`."""
     values = Values(entries, f'{name}.', before.parameters if before else ())
     take = values.take

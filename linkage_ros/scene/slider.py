@@ -10,7 +10,6 @@ No ROS is needed.
 from __future__ import annotations
 
 import math
-from typing import Optional
 
 import numpy as np
 
@@ -28,7 +27,7 @@ MAX_END = 1e300
 ANGLES, FEW_ANGLES = 91, 13
 
 
-def ends(mechanism: SceneMechanism, parameter: Parameter) -> Optional[Arc]:
+def ends(mechanism: SceneMechanism, parameter: Parameter) -> Arc | None:
     """Return the ends of the slider of a mechanism's parameter; None if it has no slider."""
     field, value = parameter.field, parameter.value
     if field.low is not None and field.high is not None:
@@ -52,7 +51,7 @@ def ends(mechanism: SceneMechanism, parameter: Parameter) -> Optional[Arc]:
 
 
 @cached(16)
-def _dimension_ends(linkage: Mechanism, key: str, positive: bool, required: Optional[Arc]) -> Arc:
+def _dimension_ends(linkage: Mechanism, key: str, positive: bool, required: Arc | None) -> Arc:
     """Return the slider's ends for a dimension: up to them, all tried can be assembled."""
     value = float(linkage.dimensions[key])
     size = abs(value) or float(linkage.longest)
@@ -65,7 +64,7 @@ def _dimension_ends(linkage: Mechanism, key: str, positive: bool, required: Opti
 
 
 def _are_assembled(linkage: Mechanism, key: str, values: np.ndarray,
-                   required: Optional[Arc]) -> np.ndarray:
+                   required: Arc | None) -> np.ndarray:
     """
     Return for each value of a dimension whether the linkage can be assembled, (values,).
 

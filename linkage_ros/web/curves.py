@@ -4,7 +4,7 @@
 """Curves of outputs over a turn or a stroke, for the page, and as a table."""
 
 import io
-from typing import Any, Optional, Sequence
+from typing import Any, Sequence
 
 import numpy as np
 
@@ -88,7 +88,7 @@ class Sweep:
 
 @np.errstate(invalid='ignore')
 def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSITION,
-          output: Optional[str] = None) -> dict[str, Any]:
+          output: str | None = None) -> dict[str, Any]:
     """
     Return one of KINDS over the first input: x and y in `units`, y None where it has none.
 

@@ -4,7 +4,7 @@
 """Markers for the page: the newest message of a topic, as a frame that the page reads."""
 
 import json
-from typing import Any, Callable, Optional
+from typing import Any, Callable
 
 import numpy as np
 from visualization_msgs.msg import Marker
@@ -43,9 +43,9 @@ class Feed:
 
     def __init__(self, key: str, topic: str, type_: type,
                  warn: Callable[[str, str], None]) -> None:
-        self.newest: Optional[bytes] = None
+        self.newest: bytes | None = None
         self._key, self._topic, self._type, self._warn = key, topic, type_, warn
-        self._converted: Optional[bytes] = None
+        self._converted: bytes | None = None
         self._frame = b''
 
     def frame(self) -> bytes:

@@ -5,7 +5,7 @@
 
 from itertools import combinations
 import math
-from typing import Any, Mapping, Optional, Sequence
+from typing import Any, Mapping, Sequence
 
 import numpy as np
 
@@ -29,7 +29,7 @@ ROUNDING = 1e-12
 
 # A request's inputs, and what is reached if they do not meet it exactly: name of the input or
 # output, its `arcs` and their `unit`.
-Reached = tuple[list[float], Optional[dict[str, Any]]]
+Reached = tuple[list[float], dict[str, Any] | None]
 
 
 def shown(value: Any) -> Any:

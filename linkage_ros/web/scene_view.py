@@ -11,7 +11,7 @@ from contextlib import suppress
 from functools import partial
 from itertools import starmap
 import math
-from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence
+from typing import Any, Callable, Mapping, NamedTuple, Sequence
 
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import SetParametersAtomically
@@ -99,7 +99,7 @@ class SceneView:
         self._scenes: dict[str, scene.Scene] = {}
         self._speeds: dict[str, dict[str, float]] = defaultdict(dict)
         self._news = asyncio.Event()
-        self._watching: Optional[asyncio.Task[None]] = None
+        self._watching: asyncio.Task[None] | None = None
         # Subscriptions and clients of services by name, feeds of markers by topic.
         self._entities: dict[str, Any] = {}
         self._feeds: dict[str, Feed] = {}
@@ -144,7 +144,7 @@ class SceneView:
                 raise SceneError(response.result.reason or f'{node} gives no reason')
         return {}
 
-    async def pose(self, key: str, want: Optional[Mapping[str, Any]] = None,
+    async def pose(self, key: str, want: Mapping[str, Any] | None = None,
                    arrows: str = '') -> Answer:
         """
         Describe a mechanism's pose; with a request, move it there first and hold it.

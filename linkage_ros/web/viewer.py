@@ -4,7 +4,7 @@
 """Node that serves a page with the running scene and sliders to change it."""
 
 from errno import EADDRINUSE
-from typing import Any, Optional
+from typing import Any
 
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from rclpy.exceptions import ParameterException
@@ -71,7 +71,7 @@ class Viewer(Node):
             return server(SceneView(self), host, 0)
 
 
-def main(args: Optional[list[str]] = None) -> int:
+def main(args: list[str] | None = None) -> int:
     """Run the node; return the exit code."""
     return scene_node.run([Viewer], VIEWER, args)
 

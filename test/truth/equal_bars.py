@@ -5,7 +5,7 @@
 
 from functools import partial
 import math
-from typing import NamedTuple, Optional
+from typing import NamedTuple
 
 from gmpy2 import mpc, mpfr
 import numpy as np
@@ -32,8 +32,8 @@ class Limits(NamedTuple):
     `vanishing` are the joints whose lines are drawn on an arm that vanishes at the value.
     """
 
-    before: Optional[list]
-    after: Optional[list]
+    before: list | None
+    after: list | None
     vanishing: frozenset
 
     def agree(self, i, size):

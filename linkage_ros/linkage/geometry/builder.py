@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import takewhile
 from math import pi
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Mapping, NamedTuple, Sequence
 
 from . import planar
 from ..inputs import ANGLE, Input, LENGTH
@@ -84,7 +84,7 @@ class Point:
     place: Any
     link: str
     magnitude: Real
-    crank: Optional[planar.Crank] = None
+    crank: planar.Crank | None = None
 
 
 class _Vector(NamedTuple):
@@ -96,42 +96,42 @@ class _Vector(NamedTuple):
 class Builder:
     """The joints, links and limits of a linkage, as expressions of its dimensions and inputs."""
 
-    def __init__(self, turned: Optional[Mapping[str, Any]] = None) -> None:
+    def __init__(self, turned: Mapping[str, Any] | None = None) -> None:
         # Whole turns from which inputs are counted.
         self._turned = {**(turned or {})}
-        self.points: Dict[str, Point] = {}
-        self.links: List[Link] = []
-        self.bars: List[Bar] = []
-        self.limits: List[planar.Limit] = []
-        self.frames: Dict[str, Dict[str, Complex]] = {}
-        self.joint_values: Dict[str, Real] = {}
-        self.transmissions: Dict[str, Real] = {}
-        self.folds: List[planar.Limit] = []
+        self.points: dict[str, Point] = {}
+        self.links: list[Link] = []
+        self.bars: list[Bar] = []
+        self.limits: list[planar.Limit] = []
+        self.frames: dict[str, dict[str, Complex]] = {}
+        self.joint_values: dict[str, Real] = {}
+        self.transmissions: dict[str, Real] = {}
+        self.folds: list[planar.Limit] = []
         # Limits other than dead points: the ends of strokes.
-        self.ways: List[planar.Limit] = []
-        self.inputs: List[Input] = []
-        self.arguments: List[Real] = []
-        self.cylinders: List[Tuple[str, str]] = []
-        self.yokes: Dict[str, str] = {}
+        self.ways: list[planar.Limit] = []
+        self.inputs: list[Input] = []
+        self.arguments: list[Real] = []
+        self.cylinders: list[tuple[str, str]] = []
+        self.yokes: dict[str, str] = {}
         # The ground joints of the lines that what is added is mirrored in, one after the other.
-        self.mirrors: Tuple[Tuple[str, ...], ...] = ()
+        self.mirrors: tuple[tuple[str, ...], ...] = ()
         # What dimensions must make positive: the line that is drawn, an amount, the problem.
         self.drawn: Any = None
-        self.demands: List[Tuple[Any, Real, str]] = []
+        self.demands: list[tuple[Any, Real, str]] = []
         # In space: links that must have one pose at most.
         self.axes = 'xy'
-        self.windows: List[Any] = []
-        self._vectors: Dict[Tuple[str, str], _Vector] = {}
+        self.windows: list[Any] = []
+        self._vectors: dict[tuple[str, str], _Vector] = {}
         # Each link's bar, or the direction in which it slides or points.
-        self.directions: Dict[str, _Vector] = {}
-        self.driven: Dict[str, Tuple[Input, Real]] = {}
+        self.directions: dict[str, _Vector] = {}
+        self.driven: dict[str, tuple[Input, Real]] = {}
 
     def require(self, amount: Real, problem: str, line: Any = None) -> None:
         """Refuse a line, the one drawn, for dimensions with which an amount is not above zero."""
         self.demands.append((line or self.drawn, amount, problem))
 
     @property
-    def grounded(self) -> Tuple[str, ...]:
+    def grounded(self) -> tuple[str, ...]:
         """Return the joints on the ground."""
         return tuple(name for name, point in self.points.items() if point.link == GROUND)
 
@@ -141,7 +141,7 @@ class Builder:
         self.points[name] = Point(place, GROUND, abs(place.x) + abs(place.y))
 
     def crank(self, name: str, centre: str, length: Real, up: bool = False,
-              zero: Optional[str] = None, geared: Optional[Gear] = None,
+              zero: str | None = None, geared: Gear | None = None,
               called: str = '') -> None:
         """Turn a crank [m] about a joint; its zero is +x, or +y if `up`, or towards a joint."""
         link = called or self._numbered('crank')
@@ -166,7 +166,7 @@ class Builder:
             self.points[name].crank = crank
 
     def cylinder(self, name: str, base: str, pivot: str, bar: Real, side: float,
-                 geared: Optional[Gear] = None, called: str = '') -> None:
+                 geared: Gear | None = None, called: str = '') -> None:
         """Join a bar [m] from a pivot and a cylinder from a base, left of base -> pivot."""
         shortest, longest = self._stroke(base, pivot, bar)
         word = called or self._numbered('cylinder')
@@ -181,7 +181,7 @@ class Builder:
         self.cylinders.append((base, name))
 
     def carriage(self, name: str, origin: str, towards: str, low: Real, high: Real,
-                 geared: Optional[Gear] = None, called: str = '') -> None:
+                 geared: Gear | None = None, called: str = '') -> None:
         """Drive a joint along the line from a joint towards another of one link, low to high."""
         word = called or self._numbered('carriage')
         place = self.drive(Input(word, LENGTH, low, high), geared)
@@ -220,7 +220,7 @@ class Builder:
         self._place(name, joint, arm, link, offset.length())
         self.frames[link][name] = self.frames[link][joint] + offset
 
-    def drive(self, input_: Input, geared: Optional[Gear]) -> Real:
+    def drive(self, input_: Input, geared: Gear | None) -> Real:
         """Return the expression of an input [rad or m]: a new one, or a geared one."""
         if not input_.turns:
             self.require(real(input_.high - input_.low), f'the lower end of the {input_.name} '
@@ -245,7 +245,7 @@ class Builder:
         self.driven[input_.name] = input_, value
         return value
 
-    def _direction(self, origin: str, towards: str) -> Tuple[str, Complex, Real]:
+    def _direction(self, origin: str, towards: str) -> tuple[str, Complex, Real]:
         """Return the link of two joints, the direction between them, and its angle on the link."""
         side = self._side(origin, towards)
         along = side.vector.direction()
@@ -255,7 +255,7 @@ class Builder:
             seen = frame[towards] - frame[origin]
         return side.link, along, arctangent(seen.y, seen.x)
 
-    def _stroke(self, base: str, pivot: str, bar: Real) -> Tuple[Real, Real]:
+    def _stroke(self, base: str, pivot: str, bar: Real) -> tuple[Real, Real]:
         """Return the shortest and longest cylinder that a bar to a pivot allows."""
         if side := self._constant(base, pivot):
             return abs(side.length - bar), side.length + bar
@@ -356,7 +356,7 @@ class Builder:
         self._pair(name, first, second, planar.Dyad(from_first, from_second, ()), to_first,
                    to_second, place)
 
-    def inversor(self, names: Tuple[str, str, str], pole: str, pin: str, long: Real,
+    def inversor(self, names: tuple[str, str, str], pole: str, pin: str, long: Real,
                  short: Real) -> None:
         """Add a Peaucellier cell: the joint right of pole -> pin, the corner, the left joint."""
         right, corner, left = names
@@ -382,7 +382,7 @@ class Builder:
         self._slide(self._numbered('slide'), lever, pivot, pin, slide, along)
         self.frames[self.links[-1].name][pin] = Complex(0.0, offset)
 
-    def slider(self, name: str, pin: str, rod: Real, origin: str, direction: Union[Real, str],
+    def slider(self, name: str, pin: str, rod: Real, origin: str, direction: Real | str,
                side: float) -> None:
         """
         Join a rod [m] from a joint to a block on a line through another.
@@ -418,7 +418,7 @@ class Builder:
             return side
         raise ConstructionError(f'{first} and {second} are not joints of one moving link')
 
-    def _constant(self, first: str, second: str) -> Optional[_Vector]:
+    def _constant(self, first: str, second: str) -> _Vector | None:
         """Return the vector between two joints; None if they are of two links."""
         ends = self.points[first], self.points[second]
         if ends[0].link == ends[1].link == GROUND:
@@ -486,7 +486,7 @@ class Builder:
         return self.points[second].place - self.points[first].place
 
     def _pair(self, name: str, first: str, second: str, found: planar.Dyad, to_first: Real,
-              to_second: Real, place: Optional[Complex] = None) -> None:
+              to_second: Real, place: Complex | None = None) -> None:
         """Join the two bars of a dyad: the joint belongs to the first, the second is cut there."""
         link = self._add_link(first, name, found.first, to_first)
         self._place(name, first, found.first, link, to_first, place)
@@ -494,9 +494,9 @@ class Builder:
         self._bar(second, name, found.second, to_second, link)
         self.transmissions[name] = planar.transmission(found)
 
-    def _add_link(self, joint: str, tip: str, bar: Complex, length: Optional[Real],
-                  name: Optional[str] = None, parent: Optional[str] = None,
-                  start: Optional[Real] = None) -> str:
+    def _add_link(self, joint: str, tip: str, bar: Complex, length: Real | None,
+                  name: str | None = None, parent: str | None = None,
+                  start: Real | None = None) -> str:
         """
         Add a link that turns about a joint, and return its name.
 
@@ -520,14 +520,13 @@ class Builder:
         return name
 
     def _place(self, name: str, start: str, vector: Complex, link: str, length: Real,
-               place: Optional[Complex] = None) -> None:
+               place: Complex | None = None) -> None:
         """Place a joint at the end of a bar from another, or where it is known to be."""
         origin = self.points[start]
         self.points[name] = Point(place or origin.place + vector, link, origin.magnitude + length)
         self._bar(start, name, vector, length, link)
 
-    def _bar(self, first: str, second: str, vector: Complex, length: Number,
-             link: str) -> None:
+    def _bar(self, first: str, second: str, vector: Complex, length: Number, link: str) -> None:
         length = real(length)
         self.bars.append(Bar(first, second, length))
         self.require(length, f'the bar {first}-{second} must be longer than zero')

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import reduce
-from typing import Iterable, NamedTuple, Optional, Sequence, Tuple
+from typing import Iterable, NamedTuple, Sequence
 
 from ..tolerances import TOLERANCE
 from ...formula.expression import (
@@ -107,8 +107,8 @@ class Limit(NamedTuple):
 
     margin: Real
     tolerance: Real
-    smooth: Optional[Real] = None
-    ends: Optional[CrankEnds] = None
+    smooth: Real | None = None
+    ends: CrankEnds | None = None
 
     def root(self) -> Real:
         """Return the root of the margin."""
@@ -126,11 +126,11 @@ class Arm:
     """The arm between two moving points; a given length is constant."""
 
     # None if it is not constant.
-    length: Optional[Real] = None
+    length: Real | None = None
     _is_smooth = False
 
     def __init__(self, foot: Complex, vector: Complex, magnitude: Real,
-                 length: Optional[Real] = None):
+                 length: Real | None = None):
         self.foot = foot
         self.vector = vector
         # A constant would have a value even where the points cannot be assembled.
@@ -158,7 +158,7 @@ class Arm:
         """Return by how much a bar of a dyad is longer than the other [m]; see `CrankArm`."""
         return first - second
 
-    def stroke(self, first: Real, second: Real, size: Real) -> Tuple[Limit, Limit]:
+    def stroke(self, first: Real, second: Real, size: Real) -> tuple[Limit, Limit]:
         """Return `within` of their sum and `beyond` of their difference; first varies."""
         length = self.length
         if length is None:
@@ -206,8 +206,7 @@ class CrankArm(Arm):
     its h is never zero, and its limits have smooth roots.
     """
 
-    def __init__(self, ground: Complex, crank: Crank, reverse: bool = False,
-                 smooth: bool = False):
+    def __init__(self, ground: Complex, crank: Crank, reverse: bool = False, smooth: bool = False):
         line = crank.centre - ground
         g, m = line.length(), crank.length
         along = line.direction()
@@ -272,7 +271,7 @@ class CrankArm(Arm):
         beyond = where(0.0 <= self._turn.y, behind, -behind)
         return where(-TOLERANCE <= self._turn.x, ahead, beyond)
 
-def _half_angle(theta: Real, turn: Complex) -> Tuple[Real, Real]:
+def _half_angle(theta: Real, turn: Complex) -> tuple[Real, Real]:
     """Return sine and cosine of (theta + arg turn) / 2 for a unit vector turn."""
     s, h = sine(0.5 * theta), cosine(0.5 * theta)
     if turn.y.value == 0.0 and turn.x.value == 1.0:
@@ -290,7 +289,7 @@ class Dyad(NamedTuple):
 
     first: Complex
     second: Complex
-    limits: Tuple[Limit, ...]
+    limits: tuple[Limit, ...]
 
 
 def dyad(arm: Arm, first: Real, second: Real, side: float) -> Dyad:
@@ -393,8 +392,7 @@ def triangle(base: Real, first: Real, second: Real, side: float) -> Complex:
     return Complex(0.5 + squares_apart(first, second) / twice, near * far / twice * side)
 
 
-def mirror(arm: Arm, image: Complex, offset: Real, ends: Sequence[Complex]
-           ) -> Tuple[Complex, ...]:
+def mirror(arm: Arm, image: Complex, offset: Real, ends: Sequence[Complex]) -> tuple[Complex, ...]:
     """
     Return the mirror image of a point in the line of an arm, and the bars from both ends to it.
 
@@ -442,7 +440,7 @@ def transmission(found: Dyad) -> Real:
     return 2.0 * arctangent(beyond.root(), within.root())
 
 
-def inversor(arm: Arm, long: Real, short: Real) -> Tuple[Dyad, Dyad, Complex]:
+def inversor(arm: Arm, long: Real, short: Real) -> tuple[Dyad, Dyad, Complex]:
     """
     Return the Peaucellier-Lipkin cell with bars long [m] from the pole and a rhombus of short [m].
 
@@ -458,7 +456,7 @@ def inversor(arm: Arm, long: Real, short: Real) -> Tuple[Dyad, Dyad, Complex]:
         valid_within(part, right.limits) for part in (inverse.x, inverse.y)))
 
 
-def slot(arm: Arm, offset: Real, half: float) -> Tuple[Complex, Real, Limit]:
+def slot(arm: Arm, offset: Real, half: float) -> tuple[Complex, Real, Limit]:
     """
     Return the lever about the arm's foot whose slot, `offset` [m] to its left, takes the pin.
 
@@ -484,7 +482,7 @@ class Rail:
         self.height, self.foot = cross(along, pin - origin), dot(along, pin - origin)
         self._magnitude = magnitude
 
-    def limits(self, rod: Real) -> Tuple[Limit, ...]:
+    def limits(self, rod: Real) -> tuple[Limit, ...]:
         """Return the margins whose product is rod^2 - height^2."""
         margin = (rod - self.height) * (rod + self.height)
         return (Limit(margin, TOLERANCE * rod * (rod + self._magnitude)),)
@@ -507,7 +505,7 @@ class CrankRail(Rail):
         self._centre = cross(along, crank.centre - origin)
         self._turn = (crank.zero * along.conjugate()).turned()
 
-    def limits(self, rod: Real) -> Tuple[Limit, ...]:
+    def limits(self, rod: Real) -> tuple[Limit, ...]:
         """Return the margins whose product is rod^2 - height^2."""
         m, centre, (s, h) = self._crank.length, self._centre, _half_angle(
             self._crank.angle, self._turn)
@@ -528,8 +526,7 @@ class CrankRail(Rail):
             start, end, arctangent(self._turn.y, self._turn.x), self._crank.angle))
 
 
-def slider(rail: Rail, rod: Real, side: float
-           ) -> Tuple[Complex, Real, Tuple[Limit, ...], Real]:
+def slider(rail: Rail, rod: Real, side: float) -> tuple[Complex, Real, tuple[Limit, ...], Real]:
     """
     Return the RRP dyad: a rod [m] from a pin to a block on a line.
 

@@ -21,7 +21,7 @@ Sources: Chace, "Vector analysis of linkages", J. Eng. Ind. 85 (1963); Hartenber
 
 from __future__ import annotations
 
-from typing import Any, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, NamedTuple, Sequence
 
 from .planar import LEAST_SQUARE, Limit, TINY
 from ..tolerances import TOLERANCE
@@ -137,7 +137,7 @@ class Pivot(NamedTuple):
     """A point on its path; without a turn it is the path's centre."""
 
     path: Circle
-    turn: Optional[Turn] = None
+    turn: Turn | None = None
 
     @property
     def place(self) -> Vector:
@@ -192,7 +192,7 @@ def rated_turn(y: Real, x: Real, cos: Real, sin: Real, rate: Rate) -> Turn:
 
 
 def rod_on_hinge(hinge: Hinge, pivot: Pivot, end: Vector, length: Real, side: Real,
-                 magnitude: Real) -> Tuple[Turn, Limit, Limit, Real]:
+                 magnitude: Real) -> tuple[Turn, Limit, Limit, Real]:
     """
     Return the turn of a hinge with which a rod fits, its limits, and the transmission angle [rad].
 
@@ -231,7 +231,7 @@ def rod_on_hinge(hinge: Hinge, pivot: Pivot, end: Vector, length: Real, side: Re
 
 
 def rod_on_slide(axis: Vector, pivot: Vector, end: Vector, length: Real, side: Real,
-                 magnitude: Real) -> Tuple[Real, Limit]:
+                 magnitude: Real) -> tuple[Real, Limit]:
     """Slide along an axis, a unit vector, so that a rod fits; see `rod_on_hinge`."""
     foot = pivot.minus(end)
     ahead, off = foot.dot(axis), axis.cross(foot).length()
@@ -275,7 +275,7 @@ class Frame(NamedTuple):
     """
 
     origin: Vector
-    axes: Tuple[Vector, Vector, Vector]
+    axes: tuple[Vector, Vector, Vector]
 
     @staticmethod
     def of(first: Hinge, second: Hinge) -> Frame:
@@ -301,7 +301,7 @@ class Row(NamedTuple):
 
 
 # Cosine and sine of both angles.
-HingeAngles = Tuple[Scalar, Scalar, Scalar, Scalar]
+HingeAngles = tuple[Scalar, Scalar, Scalar, Scalar]
 
 
 def row(pivot: Vector, end: Circle, pose: HingeAngles) -> Row:
@@ -317,15 +317,15 @@ def gap(rod: Vector, length: Scalar) -> Scalar:
     return 0.5 * (rod.dot(rod) - length * length)
 
 
-def newton_step(rods: Sequence[Tuple[Vector, Circle, Scalar]],
-                pose: HingeAngles) -> Tuple[HingeAngles, Scalar]:
+def newton_step(rods: Sequence[tuple[Vector, Circle, Scalar]],
+                pose: HingeAngles) -> tuple[HingeAngles, Scalar]:
     """Return the pose after a Newton step towards the fit of two rods, and the step [rad]."""
     rows = [row(pivot, end, pose) for pivot, end, _ in rods]
     d1, d2 = _solution(rows, [-gap(each.rod, rod[2]) for each, rod in zip(rows, rods)])
     return (*_stepped(*pose[:2], d1), *_stepped(*pose[2:], d2)), abs(d1) + abs(d2)
 
 
-def two_rods(rods: Sequence[Rod], home: Sequence[Real]) -> Tuple[Turn, Turn, Limit]:
+def two_rods(rods: Sequence[Rod], home: Sequence[Real]) -> tuple[Turn, Turn, Limit]:
     """
     Return the turns of two hinges in a row with which two rods fit, by steps from home [rad].
 
@@ -336,9 +336,9 @@ def two_rods(rods: Sequence[Rod], home: Sequence[Real]) -> Tuple[Turn, Turn, Lim
     pose: HingeAngles = cosine(home[0]), sine(home[0]), cosine(home[1]), sine(home[1])
     for _ in range(STEPS):
         pose, step = newton_step(bars, pose)
-    final: List[Row] = []
+    final: list[Row] = []
 
-    def rates(*given: Real) -> Tuple[Real, Real]:
+    def rates(*given: Real) -> tuple[Real, Real]:
         if not final:
             pose = first.cosine, first.sine, second.cosine, second.sine
             final.extend(row(pivot, end, pose) for pivot, end, _ in bars)
@@ -353,7 +353,7 @@ def two_rods(rods: Sequence[Rod], home: Sequence[Real]) -> Tuple[Turn, Turn, Lim
     return first, second, Limit(with_rate(LAST_STEP - step, formula=lambda: real(0.0)), real(0.0))
 
 
-def _solution(rows: Sequence[Row], changes: Sequence[Scalar]) -> Tuple[Scalar, Scalar]:
+def _solution(rows: Sequence[Row], changes: Sequence[Scalar]) -> tuple[Scalar, Scalar]:
     """Return the steps of both angles for these changes of half the rods' squared lengths."""
     (_, a, b), (_, c, d) = rows
     e, f = changes
@@ -361,7 +361,7 @@ def _solution(rows: Sequence[Row], changes: Sequence[Scalar]) -> Tuple[Scalar, S
     return (e * d - b * f) / det, (a * f - e * c) / det
 
 
-def _stepped(c: Scalar, s: Scalar, step: Scalar) -> Tuple[Scalar, Scalar]:
+def _stepped(c: Scalar, s: Scalar, step: Scalar) -> tuple[Scalar, Scalar]:
     """Return a cosine and a sine after a turn by 2 atan(step / 2), which is about the step."""
     square_ = 0.25 * (step * step)
     by = 1.0 / (1.0 + square_)
@@ -369,7 +369,7 @@ def _stepped(c: Scalar, s: Scalar, step: Scalar) -> Tuple[Scalar, Scalar]:
     return c * cos - s * sin, s * cos + c * sin
 
 
-def drawn_side(hinge: Hinge, pivot: Vector, end: Vector) -> Tuple[Real, Real]:
+def drawn_side(hinge: Hinge, pivot: Vector, end: Vector) -> tuple[Real, Real]:
     """
     Return a rod's side for `rod_on_hinge`, from both ends at angle zero.
 
@@ -380,7 +380,7 @@ def drawn_side(hinge: Hinge, pivot: Vector, end: Vector) -> Tuple[Real, Real]:
     return where(area < 0.0, -1.0, 1.0), abs(area) / (foot.length() * arm.length())
 
 
-def drawn_ahead(slide: Hinge, pivot: Vector, end: Vector) -> Tuple[Real, Real]:
+def drawn_ahead(slide: Hinge, pivot: Vector, end: Vector) -> tuple[Real, Real]:
     """Return a rod's side for `rod_on_slide`, and the cosine of its angle to the slide."""
     rod = end.minus(pivot)
     ahead = slide.axis.dot(rod)

@@ -22,7 +22,7 @@ there times half the box, and a bound of the second derivatives times half the s
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, NamedTuple, Sequence
 
 import numpy as np
 
@@ -78,7 +78,7 @@ class WindowRod(NamedTuple):
         along = 0.5 * (u.dot(u) + off.dot(off) - self.length ** 2)
         return np.arctan2(y, x) + self.side * np.arccos(along / np.sqrt(x * x + y * y))
 
-    def bar(self, motors: np.ndarray) -> Tuple[Vector, Circle, Any]:
+    def bar(self, motors: np.ndarray) -> tuple[Vector, Circle, Any]:
         """Return the place of the pivot, the path of the end and the length at motor values."""
         if self.is_on_crank:
             return self.pivot.at(np.cos(motors), np.sin(motors)), self.end, self.length
@@ -179,7 +179,7 @@ class Window:
         self.low, self.high = np.asarray(low, float), np.asarray(high, float)
         self.middle = 0.5 * (self.low + self.high)
 
-    def largest(self) -> Optional[Window]:
+    def largest(self) -> Window | None:
         """
         Return the largest rectangle of this shape that is found to be proved, if any.
 
@@ -200,7 +200,7 @@ class Window:
         """Return whether it has one pose at most, by proof, and Newton's method finds it."""
         return self._is_found() and not self.undecided(most)[0].size
 
-    def undecided(self, most: int = MOST_PAIRS) -> Tuple[np.ndarray, np.ndarray]:
+    def undecided(self, most: int = MOST_PAIRS) -> tuple[np.ndarray, np.ndarray]:
         """Return the middles (2, n) of pairs of boxes that may have two poses of some motors."""
         # A little beyond the edges.
         middle, half = self.middle[:, None], 0.5 * (self.high - self.low) + 2.0 * EDGE
@@ -236,7 +236,7 @@ class Window:
             apart = np.minimum(away, math.pi - away) > right.half + left.half + SINGULAR
         return ~(apart | np.isnan(shared[0].half) | np.isnan(shared[1].half))
 
-    def second_pose(self) -> Optional[Tuple[Tuple[float, float], Sequence[np.ndarray]]]:
+    def second_pose(self) -> tuple[tuple[float, float], Sequence[np.ndarray]] | None:
         """
         Return motors and two poses [rad] that they have, far from each other, if some are found.
 
@@ -277,7 +277,7 @@ class Window:
         return bool((np.abs(found - poses) < CONVERGED).all())
 
     @staticmethod
-    def _closed(bars: Sequence[Tuple[Vector, Circle, Any]], start: np.ndarray, steps: int
+    def _closed(bars: Sequence[tuple[Vector, Circle, Any]], start: np.ndarray, steps: int
                 ) -> np.ndarray:
         """Return poses after so many steps of Newton's method."""
         pose = _pose(start)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from itertools import chain, count, islice
 import math
-from typing import Any, List, Sequence
+from typing import Any, Sequence
 
 import numpy as np
 
@@ -34,7 +34,7 @@ Reals = Sequence[Real]
 
 
 def ranked(problem: InverseProblem, inputs: Reals, rates: Reals, seed: Reals = (),
-           ends: Sequence[Reals] = ()) -> List[Reals]:
+           ends: Sequence[Reals] = ()) -> list[Reals]:
     """
     Return by what a solution is compared with others, its inputs as chosen, and its rates.
 
@@ -55,7 +55,7 @@ def ranked(problem: InverseProblem, inputs: Reals, rates: Reals, seed: Reals = (
     return [order, places, rates]
 
 
-def better(solution: Sequence[Reals], best: Sequence[Reals]) -> List[Reals]:
+def better(solution: Sequence[Reals], best: Sequence[Reals]) -> list[Reals]:
     """Return the better one of two ranked solutions; numbers that differ by rounding are tied."""
     (order, places, _), (best_order, best_places, _) = solution, best
     *pairs, (first, second) = zip(order, best_order)

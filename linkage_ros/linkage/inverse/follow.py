@@ -19,7 +19,7 @@ Robotics and Automation 6 (1990).
 from __future__ import annotations
 
 import math
-from typing import Optional, Sequence
+from typing import Sequence
 
 import numpy as np
 
@@ -33,7 +33,7 @@ FAR = 0.1
 
 
 def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[float],
-           source: object) -> Optional[Row]:
+           source: object) -> Row | None:
     """Return the solution, with the whole turns of `seed`, and its rates; None if none."""
     start = problem.newton.at(*seed, *values)
     if not start[0] < math.inf:
@@ -48,7 +48,7 @@ def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[floa
 
 
 def _followed(problem: InverseProblem, values: Sequence[float], residuals: Sequence[float],
-              seed: Sequence[float], side: float, halvings: int) -> Optional[Row]:
+              seed: Sequence[float], side: float, halvings: int) -> Row | None:
     """Return the end of a motion of the outputs from `residuals` above values; None if none."""
     if solution := refine(problem, values, Candidate(tuple(seed)), FAR):
         inputs, rates = problem.nearest_equivalent(solution, seed), solution[problem.n:]

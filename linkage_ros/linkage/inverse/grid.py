@@ -13,7 +13,7 @@ Source: Nocedal and Wright, "Numerical Optimization", sec. 11.2.
 from __future__ import annotations
 
 import math
-from typing import Iterator, List, Optional, Sequence
+from typing import Iterator, Sequence
 
 import numpy as np
 
@@ -43,7 +43,7 @@ class Grid:
         self._held = {by: problem.outputs.index(input_.name)
                       for by, input_ in enumerate(self._inputs) if input_.name in problem.outputs}
         # With all others known, the first input is searched as if it were the only one.
-        self._sought: Optional[int] = None
+        self._sought: int | None = None
         if {*self._held} == {*range(1, problem.n)}:
             self._sought, = {*range(problem.n)} - {*self._held.values()}
             problem.linkage.check_output(problem.outputs[self._sought])
@@ -82,7 +82,7 @@ class Grid:
                 break
         return starts
 
-    def _across_folds(self, solutions: List[Row], values: Sequence[float]) -> np.ndarray:
+    def _across_folds(self, solutions: list[Row], values: Sequence[float]) -> np.ndarray:
         """
         Return starts on both sides of solutions, in the direction that changes outputs least.
 
@@ -113,7 +113,7 @@ class Grid:
                 f'{listed(outputs)} do not determine all inputs: too few of them move '
                 f'{listed([name for name, depends in zip(outputs, some) if depends])}')
 
-    def _descended(self, q: np.ndarray, values: Sequence[float]) -> List[Row]:
+    def _descended(self, q: np.ndarray, values: Sequence[float]) -> list[Row]:
         """Return the inputs next to solutions that steps of Newton's method reach."""
         n, parts, reached = self._problem.n, np.ones(len(q)), [q[:0]]
         solved = self._solved(q, values)

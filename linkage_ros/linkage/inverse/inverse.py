@@ -14,7 +14,7 @@ from __future__ import annotations
 from functools import cached_property
 import math
 from operator import add, sub
-from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Mapping, NamedTuple, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,7 +36,7 @@ from ...formula.namespace import array_function
 from ...formula.program import FEW_POSES
 from ...words import listed, plain_text, quoted
 
-Ends = Optional[Sequence[Optional[Tuple[float, float]]]]
+Ends = Sequence[tuple[float, float] | None] | None
 
 
 class Solution(NamedTuple):
@@ -52,7 +52,7 @@ class Solution(NamedTuple):
 
     """
 
-    inputs: Tuple[float, ...]
+    inputs: tuple[float, ...]
     inverse: Inverse
 
     def __repr__(self) -> str:
@@ -127,7 +127,7 @@ class Inverse:
 
     """
 
-    def __init__(self, linkage: Kinematics, outputs: Tuple[str, ...]):
+    def __init__(self, linkage: Kinematics, outputs: tuple[str, ...]):
         self.linkage, self.outputs, self._n = linkage, outputs, len(outputs)
         if len(outputs) != len(linkage.inputs):
             raise ValueError(f'{linkage.type} has {len(linkage.inputs)} inputs: as many outputs '
@@ -142,7 +142,7 @@ class Inverse:
             assert self._source  # raises ValueError for dependent outputs
 
     @cached_property
-    def closed(self) -> Optional[InverseLinkage]:
+    def closed(self) -> InverseLinkage | None:
         """Joint lines and assembly modes of the inverse linkage; None if there is none."""
         # An inverse linkage has each input in one period, or else in one turn.
         make = decompose if self.linkage.axes == 'xy' else rods.decompose
@@ -154,13 +154,13 @@ class Inverse:
         return self._n == 1 or self.closed is not None
 
     @cached_property
-    def _source(self) -> Union[Segments, Modes, Grid]:
+    def _source(self) -> Segments | Modes | Grid:
         """Return what yields candidates."""
         if self._n == 1:
             return segments_of(self.linkage, self.outputs[0], (), self.inputs[0])
         return Modes(self.problem, self.closed) if self.closed else Grid(self.problem)
 
-    def __reduce__(self) -> Tuple[Any, ...]:
+    def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the linkage and the outputs only."""
         return inverse_of, (self.linkage, self.outputs)
 
@@ -175,7 +175,7 @@ class Inverse:
 
     # --- all solutions ---
 
-    def all(self, values: ArrayLike, near: Optional[ArrayLike] = None) -> List[Solution]:
+    def all(self, values: ArrayLike, near: ArrayLike | None = None) -> list[Solution]:
         """
         Return all solutions for one value of each output.
 
@@ -210,7 +210,7 @@ class Inverse:
                     inputs, seed, self.problem.sizes)))
         return [Solution(inputs, self) for inputs in solutions]
 
-    def over(self, *values: ArrayLike) -> Tuple[np.ndarray, np.ndarray]:
+    def over(self, *values: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """
         Return all solutions for arrays of values [rad or m], one array for each output.
 
@@ -227,7 +227,7 @@ class Inverse:
             solutions.shape[1], *rows[0].shape, len(solutions))
         return solutions[:self._n], solutions[self._n:]
 
-    def _solved(self, values: Row, _: Row = ()) -> List[Row]:
+    def _solved(self, values: Row, _: Row = ()) -> list[Row]:
         """Return all solutions in order, none for values that are not finite."""
         if not all(map(math.isfinite, values)):
             return []
@@ -236,12 +236,12 @@ class Inverse:
         return distinct(problem, [row for candidate in self._source.candidates(values)
                                   if (row := refine(problem, values, candidate))])
 
-    def _continued(self, values: Row, seed: Row) -> List[Row]:
+    def _continued(self, values: Row, seed: Row) -> list[Row]:
         """Return the solution that is continuous from a seed, if there is one."""
         row = follow(self.problem, self.problem.reduced(values), seed, self._source)
         return [row] if row else []
 
-    def _all(self, values: Row, seed: Row = (), solve: Callable = _solved) -> List[Row]:
+    def _all(self, values: Row, seed: Row = (), solve: Callable = _solved) -> list[Row]:
         """
         Return all solutions in order, or the one continuous from `seed` with `_continued`.
 
@@ -291,20 +291,20 @@ class Inverse:
             raise ValueError(f'{name} must be finite, got {quoted([*row])}')
         return row
 
-    def _each(self, values: Any, name: str = 'values') -> Tuple[Any, ...]:
+    def _each(self, values: Any, name: str = 'values') -> tuple[Any, ...]:
         """Return a float or an array for each output; raise ValueError if they are not that."""
         if not isinstance(values, (list, tuple)):
             values = [values] if type(values) is float else np.atleast_1d(numbers(name, values))
         if len(values) != self._n:
             raise self._miscounted(values, name)
-        parts: List[Any] = [x if type(x) is float else numbers(name, x) for x in values]
+        parts: list[Any] = [x if type(x) is float else numbers(name, x) for x in values]
         return tuple([x if type(x) is float or x.ndim else x.item() for x in parts])
 
     def _miscounted(self, values: Any, name: str) -> ValueError:
         return ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
                           f'numbers, got {quoted(values)}')
 
-    def _limits(self, ends: Ends) -> Tuple[Tuple[float, ...], ...]:
+    def _limits(self, ends: Ends) -> tuple[tuple[float, ...], ...]:
         """Return the ends of each input as floats, () if it has none."""
         try:
             limits = tuple(() if pair is None else tuple(map(float, pair))
@@ -319,8 +319,8 @@ class Inverse:
 
     # --- one of the solutions ---
 
-    def nearest(self, values: Sequence[Any], near: Optional[Sequence[Any]] = None,
-                ends: Ends = None) -> Tuple[Any, Any]:
+    def nearest(self, values: Sequence[Any], near: Sequence[Any] | None = None,
+                ends: Ends = None) -> tuple[Any, Any]:
         """
         Return one solution.
 
@@ -360,8 +360,8 @@ class Inverse:
             self._all_arrays(flat[:n], flat[n:]), flat[n:], limits)]
         return tuple(chosen[:n]), tuple(chosen[n:])
 
-    def path(self, values: Sequence[ArrayLike], near: Optional[ArrayLike] = None,
-             ends: Ends = None) -> Tuple[Any, Any]:
+    def path(self, values: Sequence[ArrayLike], near: ArrayLike | None = None,
+             ends: Ends = None) -> tuple[Any, Any]:
         """
         Return solutions for successive values: each is the nearest to the one before.
 
@@ -389,7 +389,7 @@ class Inverse:
         chosen = self._choice.along(solutions, seed, limits)
         return tuple(chosen[:self._n]), tuple(chosen[self._n:])
 
-    def follow(self, values: ArrayLike, near: ArrayLike) -> Tuple[Row, Row]:
+    def follow(self, values: ArrayLike, near: ArrayLike) -> tuple[Row, Row]:
         """
         Return the solution that is continuous from given inputs.
 
@@ -456,7 +456,7 @@ class Inverse:
         return lambda *values: tuple(zip(*self._n * [iter(flat(*values))]))
 
 
-def inverse_of(linkage: Kinematics, outputs: Union[str, Sequence[str]]) -> Inverse:
+def inverse_of(linkage: Kinematics, outputs: str | Sequence[str]) -> Inverse:
     """Implement `Mechanism.inverse`."""
     try:
         found: Inverse = linkage.cache['inverse', outputs]

@@ -16,7 +16,7 @@ from __future__ import annotations
 import cmath
 from itertools import product
 import math
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple
+from typing import Any, Callable, NamedTuple
 
 import numpy as np
 
@@ -59,7 +59,7 @@ class Mode(NamedTuple):
     """
 
     linkage: LinkageFormulas
-    inputs: Tuple[Real, ...]
+    inputs: tuple[Real, ...]
 
 
 class InverseLinkage(NamedTuple):
@@ -85,14 +85,14 @@ class InverseLinkage(NamedTuple):
 
     """
 
-    lines: Tuple[str, ...]
-    drives: Dict[str, Tuple[str, float, float]]
-    branches: Tuple[str, ...]
-    modes: Tuple[Mode, ...]
-    turns: Tuple[Tuple[float, ...], ...]
-    arguments: Dict[Real, Real]
+    lines: tuple[str, ...]
+    drives: dict[str, tuple[str, float, float]]
+    branches: tuple[str, ...]
+    modes: tuple[Mode, ...]
+    turns: tuple[tuple[float, ...], ...]
+    arguments: dict[Real, Real]
 
-    def solutions(self) -> List[List[Real]]:
+    def solutions(self) -> list[list[Real]]:
         """Return the inputs in each mode and its turns, as expressions of the outputs."""
         return [substituted([value + turn for value, turn in zip(mode.inputs, turns)],
                             self.arguments)
@@ -142,12 +142,12 @@ class _Read(NamedTuple):
     and `turns` are the angles [rad] that may be added.
     """
 
-    joints: Tuple[str, ...]
+    joints: tuple[str, ...]
     value: Callable[[Any], Real]
-    turns: Tuple[float, ...]
+    turns: tuple[float, ...]
 
 
-def decompose(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
+def decompose(linkage: Kinematics, outputs: Names) -> InverseLinkage | None:
     """Return the inverse linkage for outputs, None where no closed form is known."""
     pose = _pose(linkage)
     if pose is None:
@@ -160,7 +160,7 @@ def decompose(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
     return None
 
 
-def _pose(linkage: Kinematics) -> Optional[Dict[str, float]]:
+def _pose(linkage: Kinematics) -> dict[str, float] | None:
     """Return all joint angles and coordinates in a generic pose, away from dead points."""
     names = (*linkage.joints, *(f'{point}.{axis}' for point in linkage.points for axis in 'xy'))
     rows = linkage.posed((), names).searched(*spread(linkage.inputs, TRIES))
@@ -181,7 +181,7 @@ class _Sketch(Dyads):
 
     """
 
-    def __init__(self, linkage: Kinematics, outputs: Names, ground: str, pose: Dict[str, float]):
+    def __init__(self, linkage: Kinematics, outputs: Names, ground: str, pose: dict[str, float]):
         self._linkage, self._outputs, self._pose = linkage, outputs, pose
         self._links = {link.name: link for link in linkage.links}
         # Each link in its own frame, whose x axis is its bar.
@@ -193,11 +193,11 @@ class _Sketch(Dyads):
             abs(place) for frame in self._frames.values() for place in frame.values()))
         super().__init__(ground, (), (), (), (), size, CLOSE * size)
         self.farthest = 4.0 * (sum(linkage.bar_lengths.values()) + size)
-        self.drives: List[Tuple[str, float, float]] = []
-        self._scaled: Dict[str, Tuple[float, float]] = {}
-        self._named: Dict[str, Dict[str, complex]] = {}
+        self.drives: list[tuple[str, float, float]] = []
+        self._scaled: dict[str, tuple[float, float]] = {}
+        self._named: dict[str, dict[str, complex]] = {}
         # The origin and the direction of each body in the pose.
-        self._at: Dict[str, Tuple[complex, complex]] = {GROUND: (0.0j, 1.0 + 0.0j)}
+        self._at: dict[str, tuple[complex, complex]] = {GROUND: (0.0j, 1.0 + 0.0j)}
         for body, frame in self._frames.items():
             for joint, place in frame.items():
                 self._named.setdefault(joint, {})[body] = place
@@ -251,7 +251,7 @@ class _Sketch(Dyads):
         """Put a joint on a line through the origin of a body; `turn` is the body's direction."""
         return Slide((base, self._pin(joint, body, turn)), (0.0j, 0.0j), (axis, axis), body)
 
-    def _add(self, output: str) -> List[str]:
+    def _add(self, output: str) -> list[str]:
         """Add bodies that measure an output other than a joint's value; return what they do."""
         if pair := PAIR.fullmatch(output):
             first, second = pair.groups()
@@ -303,7 +303,7 @@ class _Sketch(Dyads):
         """Return a length with all its digits."""
         return repr(float(value) + 0.0)
 
-    def quarters(self, start: float) -> Optional[int]:
+    def quarters(self, start: float) -> int | None:
         """Return 0 to 3 quarter turns: an offset added to the angle would cost its last digits."""
         quarters = round(start / (0.5 * math.pi))
         return quarters % 4 if abs(start - 0.5 * math.pi * quarters) < 2.0 * TOLERANCE else None
@@ -317,7 +317,7 @@ class _Sketch(Dyads):
         return next(name for name in (f'{letter}{number or ""}' for number in range(1000)
                                       for letter in 'XYZUVW') if name not in taken)
 
-    def drive(self, word: str, joint: Any, ratio: float, offset: float) -> Tuple[str, str]:
+    def drive(self, word: str, joint: Any, ratio: float, offset: float) -> tuple[str, str]:
         """Record an input, which the next line drives."""
         part, start = self._scaled.get(joint, (1.0, 0.0))
         self.drives.append((joint, ratio / part, offset - ratio * start / part))
@@ -337,7 +337,7 @@ class _Sketch(Dyads):
         return _Read(joints, lambda built: ((output or value(built)) - offset) / ratio, tuple(
             turn * math.tau / abs(ratio) for turn in range(count)))
 
-    def _value(self, link: Link) -> Tuple[Tuple[str, ...], Callable]:
+    def _value(self, link: Link) -> tuple[tuple[str, ...], Callable]:
         """Return the joints that tell the position of a link on its parent, and its formula."""
         zero = cmath.rect(1.0, link.zero)
         if link.kind == 'revolute':
@@ -361,7 +361,7 @@ class _Sketch(Dyads):
             return dot(built.arm(origin, tip).vector, line)
         return (tip, origin, *ends), slide
 
-    def _direction(self, body: str, along: complex) -> Tuple[Tuple[str, ...], Callable]:
+    def _direction(self, body: str, along: complex) -> tuple[tuple[str, ...], Callable]:
         """Return the joints that tell the direction of a body, and the formula of that vector."""
         if body == self.ground:
             return (), lambda built: _constant(along)

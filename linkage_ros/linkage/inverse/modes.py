@@ -13,7 +13,7 @@ from __future__ import annotations
 from functools import reduce
 from itertools import chain
 import math
-from typing import Iterator, List, Optional, Sequence, Tuple
+from typing import Iterator, Sequence
 
 import numpy as np
 
@@ -31,7 +31,7 @@ OFF = 2.0 ** -20
 # What these constants are in single precision.
 SINGLE = {**IN_SINGLE, OFF: 2.0 ** -10, CLOSE: 2.0 ** -12}
 
-Reals = List[Real]
+Reals = list[Real]
 
 
 class Modes:
@@ -49,15 +49,14 @@ class Modes:
             if math.isfinite(sum(inputs)):
                 yield Candidate(inputs)
 
-    def candidate_arrays(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def candidate_arrays(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return numbers of modes, of values (outputs, m) that they have, and the inputs there."""
         modes = self._pose.over(*values).reshape(-1, *values.shape)
         numbers, places = np.nonzero(np.isfinite(modes).all(axis=1))
         return numbers, places, modes[numbers, :, places].T
 
 
-def modes_of(problem: InverseProblem, closed: Optional[InverseLinkage]
-             ) -> List[Tuple[Reals, Reals]]:
+def modes_of(problem: InverseProblem, closed: InverseLinkage | None) -> list[tuple[Reals, Reals]]:
     """
     Return the inputs in each assembly mode and its turns, NaN where it is no solution.
 
@@ -77,7 +76,7 @@ def modes_of(problem: InverseProblem, closed: Optional[InverseLinkage]
     return modes
 
 
-def chosen_of(problem: InverseProblem, closed: Optional[InverseLinkage], follows: bool) -> Reals:
+def chosen_of(problem: InverseProblem, closed: InverseLinkage | None, follows: bool) -> Reals:
     """Return the inputs of one mode; see `choice.ranked`. To follow, next to more arguments."""
     seed = [argument(problem.n + by) for by in range(problem.n * follows)]
     _, places, _ = reduce(lambda best, mode: better(mode, best), [

@@ -13,7 +13,7 @@ from __future__ import annotations
 from functools import cached_property, reduce
 from itertools import combinations
 import math
-from typing import Dict, NamedTuple, Sequence, Tuple
+from typing import NamedTuple, Sequence
 
 import numpy as np
 
@@ -33,7 +33,7 @@ ACCEPTED = 64.0 * 2.0 ** -53
 LONGEST_BAR = '[longest bar]'
 
 # The inputs of a solution, then the rates of all outputs by the first input, by the second etc.
-Row = Tuple[float, ...]
+Row = tuple[float, ...]
 
 
 class Candidate(NamedTuple):
@@ -67,7 +67,7 @@ class InverseProblem:
 
     """
 
-    def __init__(self, linkage: Kinematics, outputs: Tuple[str, ...]):
+    def __init__(self, linkage: Kinematics, outputs: tuple[str, ...]):
         self.linkage, self.outputs, self.n = linkage, outputs, len(outputs)
         if any(map(np.ndim, linkage.dimensions.values())):
             raise ValueError('the inverse is for one set of dimensions, not for arrays')
@@ -133,7 +133,7 @@ def nearest(x: Real, seed: Real, turn: float) -> Real:
 
 
 @cached(64, shared=True)
-def newton(structure: LinkageFormulas, outputs: Tuple[str, ...], periods: Sequence[float],
+def newton(structure: LinkageFormulas, outputs: tuple[str, ...], periods: Sequence[float],
            turns: Sequence[float]) -> Program:
     """
     Return the code for a step of Newton's method, from the inputs and values of the outputs.
@@ -176,7 +176,7 @@ def newton(structure: LinkageFormulas, outputs: Tuple[str, ...], periods: Sequen
 
 def _determinant(rows: Sequence[Sequence[Real]]) -> Real:
     """Return a determinant, expanded by rows from below; each minor is computed once."""
-    minors: Dict[Tuple[int, ...], Real] = {(): real(1.0)}
+    minors: dict[tuple[int, ...], Real] = {(): real(1.0)}
     for size, row in enumerate(reversed(rows), 1):
         minors = {columns: sum((
             (-1.0) ** place * row[column] * minors[columns[:place] + columns[place + 1:]]

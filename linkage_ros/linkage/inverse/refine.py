@@ -14,7 +14,7 @@ stays inside it.
 from __future__ import annotations
 
 import math
-from typing import Callable, Iterator, List, Optional, Sequence, Tuple
+from typing import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -28,7 +28,7 @@ BESIDE = 22
 
 
 def refine(problem: InverseProblem, values: Sequence[float], candidate: Candidate,
-           far: float = SINGULAR) -> Optional[Row]:
+           far: float = SINGULAR) -> Row | None:
     """
     Return the solution at a candidate, its inputs and rates; None if there is none.
 
@@ -94,9 +94,9 @@ def _are_one(problem: InverseProblem, solution: Row, other: Row) -> bool:
             for i, scale in enumerate(problem.scales)) for row in (solution, other))
 
 
-def distinct(problem: InverseProblem, solutions: Sequence[Row]) -> List[Row]:
+def distinct(problem: InverseProblem, solutions: Sequence[Row]) -> list[Row]:
     """Return solutions in order, one of those that are one."""
-    distinct: List[Row] = []
+    distinct: list[Row] = []
     for solution in sorted(solutions):
         if not any(_are_one(problem, solution, other) for other in distinct):
             distinct.append(solution)
@@ -104,8 +104,8 @@ def distinct(problem: InverseProblem, solutions: Sequence[Row]) -> List[Row]:
 
 
 def solve_arrays(problem: InverseProblem, values: np.ndarray,
-                 candidate_arrays: Callable[[np.ndarray], Tuple[np.ndarray, ...]]
-                 ) -> Tuple[np.ndarray, np.ndarray]:
+                 candidate_arrays: Callable[[np.ndarray], tuple[np.ndarray, ...]]
+                 ) -> tuple[np.ndarray, np.ndarray]:
     """
     Return all solutions for columns of values (outputs, m), and columns to be solved alone.
 

@@ -12,7 +12,6 @@ first is the one that is drawn.
 from __future__ import annotations
 
 from itertools import product
-from typing import Optional
 
 from .linkage import InverseLinkage, MAX_MODES, Mode
 from ..formulas import LinkageFormulas, Names
@@ -21,7 +20,7 @@ from ..text.rod_lines import turning_rods
 from ...formula.expression import argument, real, substituted
 
 
-def decompose(linkage: Kinematics, outputs: Names) -> Optional[InverseLinkage]:
+def decompose(linkage: Kinematics, outputs: Names) -> InverseLinkage | None:
     """Return the inverse of rods for outputs, None where no closed form is known."""
     try:
         design, n = linkage.driven_by(*outputs).design, len(outputs)

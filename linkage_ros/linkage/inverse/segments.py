@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 import math
-from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Iterator, NamedTuple, Sequence
 
 import numpy as np
 
@@ -78,7 +78,7 @@ class Segments:
         # Where a dyad is at a dead point, or nearly is.
         marks = normalized.distinct(
             x.value for x in analysis.near_zeros() if x.gap <= NEAR * x.size)
-        self.jumps: List[float] = []
+        self.jumps: list[float] = []
         # Next to an end of the reach there is a pose also when turns are added, and behind gears.
         farthest = math.pi if first.is_part else normalized.high
         offset = math.tau * abs(dict(linkage.design.turned).get(first.name, 0.0)) / self._unit
@@ -113,7 +113,7 @@ class Segments:
 
     # --- candidates ---
 
-    def candidates(self, values: Sequence[float]) -> List[Candidate]:
+    def candidates(self, values: Sequence[float]) -> list[Candidate]:
         """Return a candidate for each input that has the value."""
         found, period = [], self._period
         for segment in self._answers:
@@ -125,9 +125,9 @@ class Segments:
                 target += period
         return found
 
-    def candidate_arrays(self, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def candidate_arrays(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return numbers of brackets of a value, of values (1, m) that have them, and brackets."""
-        found: List[Tuple[np.ndarray, ...]] = []
+        found: list[tuple[np.ndarray, ...]] = []
         period, none = self._period, np.empty(0, int)
         for *samples, sign in self._answers:
             theta, value = map(np.array, samples)
@@ -144,7 +144,7 @@ class Segments:
         return np.concatenate(numbers), np.concatenate(places), np.hstack(brackets)
 
     def follow(self, value: float, residual: float, seed: float
-               ) -> Optional[Tuple[Candidate, Tuple[float]]]:
+               ) -> tuple[Candidate, tuple[float]] | None:
         """
         Return the candidate of a value on the segment of a seed or those that continue it.
 
@@ -179,9 +179,9 @@ class Segments:
     # --- for other uses ---
 
     @property
-    def arcs(self) -> List[Arc]:
+    def arcs(self) -> list[Arc]:
         """Return the reach without jumps, cut at them [rad or m]."""
-        joined: List[Arc] = []
+        joined: list[Arc] = []
         for theta, *_ in self.all:
             low, high = (theta[[0, -1]] * self._unit).tolist()
             joined.append((joined.pop()[0], high) if joined and low == joined[-1][1] else (
@@ -213,7 +213,7 @@ class Segments:
         return gap if self._period == math.inf else gap - self._period * np.round(
             gap / self._period)
 
-    def _runs(self, lo: float, hi: float) -> Iterator[Tuple]:
+    def _runs(self, lo: float, hi: float) -> Iterator[tuple]:
         """Yield samples as inputs, values and rates, cut where the output jumps."""
         theta = sampled(lo, hi)
         most = MAX_SAMPLES + 4 * len(theta)
@@ -235,7 +235,7 @@ class Segments:
                 yield (theta[run], np.unwrap(value[0, run], period=self._period) if self._period
                        < math.inf else value[0, run], rate[0, run])
 
-    def _divided(self, theta: np.ndarray, most: int) -> Tuple[np.ndarray, np.ndarray]:
+    def _divided(self, theta: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
         """Return samples that explain the output, and after which of them it jumps."""
         jumped = np.empty(0, int)
         value, rate = self._curve(theta)
@@ -262,7 +262,7 @@ class Segments:
             theta, value, rate = (np.concatenate(parts)[order] for parts in (
                 (theta, new), (value, found[0]), (rate, found[1])))
 
-    def _moves(self, runs: Sequence[Tuple]) -> bool:
+    def _moves(self, runs: Sequence[tuple]) -> bool:
         """Return whether the output differs from its median, over a tenth of the reach."""
         values = np.concatenate([value for _, value, _ in runs])
         widths = np.concatenate([np.gradient(theta) for theta, _, _ in runs])
@@ -303,7 +303,7 @@ class Segments:
         change = abs(self._difference(self._curve(beside)[0, 0] - sign * value[end]))
         return float(np.fmin(np.fmax(change, CLOSE * self._size), SINGULAR * self._size))
 
-    def _beyond(self, number: int, end: int) -> Optional[int]:
+    def _beyond(self, number: int, end: int) -> int | None:
         """Return the number of the segment on which the output goes on beyond an end, 0 or -1."""
         beyond = (number + (1 if end else -1)) % len(self.all)
         here, there = self.all[number], self.all[beyond]
@@ -315,14 +315,14 @@ class Segments:
 
 
 def segments_of(linkage: Kinematics, output: str, others: Sequence[float] = (),
-                first: Optional[Input] = None) -> Segments:
+                first: Input | None = None) -> Segments:
     """Return the segments of an output over the first input; see `Analysis`."""
     first = first or linkage.inputs[0]
     return linkage.cache.get_or_make(('segments', output, first.period, *others),
                                      lambda: Segments(linkage, output, others, first))
 
 
-def extremes_of(linkage: Kinematics, output: str, arcs: Optional[Sequence[Arc]],
+def extremes_of(linkage: Kinematics, output: str, arcs: Sequence[Arc] | None,
                 others: Sequence[float]) -> list:
     """Implement `Mechanism.extremes`."""
     linkage.check_output(output)

@@ -11,7 +11,7 @@ few dozen times for any number of results.
 from __future__ import annotations
 
 import math
-from typing import Callable, List, Tuple
+from typing import Callable
 
 import numpy as np
 
@@ -36,7 +36,7 @@ def ascending(values: np.ndarray) -> np.ndarray:
     return values[np.append(True, values[1:] > values[:-1])]
 
 
-def refined(test: Callable, lo: np.ndarray, hi: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+def refined(test: Callable, lo: np.ndarray, hi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     Return, for each bracket, the last angle that passes a test and the first that fails it.
 
@@ -102,7 +102,7 @@ def turning_points(values: np.ndarray, rates: np.ndarray, least: float) -> np.nd
 
 
 def extremes(curve: Callable, lo: float, hi: float, is_angle: bool = False
-             ) -> List[Tuple[float, float]]:
+             ) -> list[tuple[float, float]]:
     """
     Return the minimum of an output on an arc and its place, then the maximum and its place.
 

@@ -12,7 +12,7 @@ for the whole arc. At each end the linkage can still be assembled.
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Iterable, List, Sequence, Tuple
+from typing import Any, Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -29,12 +29,12 @@ INSIDE = 0.49
 MAX_ENDS = 100
 
 
-def reach_of(linkage: Kinematics, others: Tuple[float, ...] = ()) -> List[Arc]:
+def reach_of(linkage: Kinematics, others: tuple[float, ...] = ()) -> list[Arc]:
     """Implement `Mechanism.reach`."""
     return linkage.cache.get_or_make(('reach', *others), lambda: _reach(linkage, others))
 
 
-def over_first(linkage: Kinematics, kind: str, names: Any, others: Tuple[float, ...]) -> Callable:
+def over_first(linkage: Kinematics, kind: str, names: Any, others: tuple[float, ...]) -> Callable:
     """Return the function from values of the first input (n,), in its step, to numbers."""
     pose, step = linkage.compiled(kind, names), linkage.inputs[0].step
     if pose.shape:
@@ -43,7 +43,7 @@ def over_first(linkage: Kinematics, kind: str, names: Any, others: Tuple[float, 
     return lambda value: pose.searched(value * step, *others)
 
 
-def _reach(linkage: Kinematics, others: Tuple[float, ...]) -> List[Arc]:
+def _reach(linkage: Kinematics, others: tuple[float, ...]) -> list[Arc]:
     margins = over_first(linkage, 'margins', (), others)
     limits, step = linkage.structure.built.limits, linkage.inputs[0].step
     # From here on the input is in units of its step.
@@ -84,7 +84,7 @@ def _first_below(values: np.ndarray) -> np.ndarray:
     return np.vstack([satisfied, np.zeros(satisfied.shape[1:], bool)]).argmin(axis=0)
 
 
-def _limits(margins: Callable, lo: float, hi: float) -> List[float]:
+def _limits(margins: Callable, lo: float, hi: float) -> list[float]:
     """
     Return the values on an arc next to which the first violated limit changes.
 
@@ -131,7 +131,7 @@ def _touches(margins: Callable, theta: np.ndarray, values: np.ndarray) -> np.nda
     return np.clip(np.hstack([found, found - steps, found + steps]).ravel(), theta[0], theta[-1])
 
 
-def _trimmed(assembled: Callable, arcs: Sequence[Arc]) -> List[Arc]:
+def _trimmed(assembled: Callable, arcs: Sequence[Arc]) -> list[Arc]:
     """Return arcs shortened to ends at which the linkage can be assembled."""
     ends = np.reshape(arcs, (-1, 2))
     inside = np.broadcast_to(ends @ [[1.0 - INSIDE], [INSIDE]], ends.shape)
@@ -141,7 +141,7 @@ def _trimmed(assembled: Callable, arcs: Sequence[Arc]) -> List[Arc]:
 
 
 def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
-                   input_: Input = CRANK) -> List[Arc]:
+                   input_: Input = CRANK) -> list[Arc]:
     """
     Return the reachable arcs between values at which reachability may change.
 
@@ -151,7 +151,7 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
     reached = [arc for arc in parts if bool(reachable(arc[0] + INSIDE * (arc[1] - arc[0])))]
     if reached == parts:
         return [(input_.low, input_.high)]
-    found: List[Arc] = []
+    found: list[Arc] = []
     for lo, hi in reached:
         if found and lo == found[-1][1]:
             found[-1] = found[-1][0], hi
@@ -163,7 +163,7 @@ def reachable_arcs(ends: Iterable[float], reachable: Callable[[float], bool],
             else (lo, hi) for lo, hi in found]
 
 
-def _crank_ends(limit: Limit, value: Callable) -> List[float]:
+def _crank_ends(limit: Limit, value: Callable) -> list[float]:
     """Return the crank angles at which the margin of a crank arm vanishes."""
     assert limit.ends
     start, end, turn = map(value, limit.ends[:3])

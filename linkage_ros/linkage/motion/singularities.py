@@ -11,7 +11,7 @@ area of a kite or parallelogram.
 
 from __future__ import annotations
 
-from typing import Callable, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Iterator, NamedTuple, Sequence
 
 import numpy as np
 
@@ -26,7 +26,7 @@ NEAR = 1e-2
 # A closure whose size is below this multiple of its rounding is zero everywhere.
 FLAT = 256.0
 
-Places = Tuple[np.ndarray, ...]
+Places = tuple[np.ndarray, ...]
 
 
 class NearZero(NamedTuple):
@@ -66,13 +66,13 @@ class Analysis:
     """
 
     def __init__(self, linkage: Kinematics, others: Sequence[float] = (),
-                 first: Optional[Input] = None):
+                 first: Input | None = None):
         self._linkage, self._others = linkage, tuple(others)
         self._first = first or linkage.inputs[0]
 
     # From here on the first input is in units of its step.
 
-    def dead_points(self) -> List[float]:
+    def dead_points(self) -> list[float]:
         """Return the values of the input at which a dyad stretches or folds."""
         first = self._first.normalized()
         # Where a reach may only be cut off, a dead point is found as a touch.
@@ -82,7 +82,7 @@ class Analysis:
                    and all(first.apart(near.value, end) > CLOSE for end in ends)]
         return first.distinct([*ends, *touched])
 
-    def reach(self) -> List[Arc]:
+    def reach(self) -> list[Arc]:
         """Return the reach in arcs, none of them on both sides of an end of a turn."""
         size, first = self._first.step, self._first.normalized()
         arcs = [(lo / size, hi / size) for lo, hi in reach_of(self._linkage, self._others)]
@@ -101,7 +101,7 @@ class Analysis:
             return rows
         return curve
 
-    def near_zeros(self) -> List[NearZero]:
+    def near_zeros(self) -> list[NearZero]:
         """Return the inputs at which a dyad stretches or folds, or nearly does."""
         return self._linkage.cache.get_or_make(
             ('near zeros', self._first.period, *self._others), lambda: [

@@ -5,7 +5,7 @@
 
 from collections.abc import Mapping
 from numbers import Real
-from typing import Any, Optional
+from typing import Any
 
 import numpy as np
 
@@ -74,7 +74,7 @@ def numbers(name: str, value: Any) -> np.ndarray:
                          f'got {quoted(value)}') from None
 
 
-def checked_branches(design: Design, given: Optional[Mapping[str, int]]) -> dict:
+def checked_branches(design: Design, given: Mapping[str, int] | None) -> dict:
     """Return all assembly signs of a design; raise ValueError if one is invalid."""
     if given is not None and not isinstance(given, Mapping):
         raise ValueError(f'{design.name}: branches must be a mapping from joint to +1 or -1, '

@@ -13,7 +13,7 @@ from functools import reduce
 import math
 import operator
 import re
-from typing import Any, Callable, Dict, Iterable, List, Mapping, Union
+from typing import Any, Callable, Iterable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +23,7 @@ from ...formula.program import evaluate
 from ...words import quoted
 
 # A number, or the name of a dimension or an operation.
-Step = Union[float, str]
+Step = float | str
 
 # The largest number; the smallest is its inverse.
 LARGEST_NUMBER = 1e70
@@ -59,7 +59,7 @@ class Formula:
 
     def __init__(self, text: str):
         self.text = text
-        self._steps: List[Step] = []
+        self._steps: list[Step] = []
         tokens = _TOKEN.findall(text)
         self.words = {token: True for token in tokens if token[0].isalpha() and token[-1] != '('}
         self.names = tuple(word for word in self.words if word not in ARITHMETIC_WORDS)
@@ -79,7 +79,7 @@ class Formula:
 
     def expression(self, symbols: Mapping[str, Real]) -> Real:
         """Return it as an expression of dimensions."""
-        stack: List[Real] = []
+        stack: list[Real] = []
         for step in self._steps:
             count = _OPERANDS.get(step, 0)
             operands = stack[len(stack) - count:]
@@ -91,14 +91,14 @@ class Formula:
     def value(self, dimensions: Mapping[str, Any]) -> Any:
         """Return its value for dimensions, numbers or arrays; NaN where a part is not finite."""
         symbols = {name: dimension(name, positive=False) for name in self.names}
-        parts: Dict[Real, Any] = {}
+        parts: dict[Real, Any] = {}
         value = evaluate(self.expression(symbols), dimensions, parts)
         is_finite = reduce(np.logical_and, map(np.isfinite, parts.values()))
         return np.where(is_finite, value, np.nan)[()]
 
     def _parse(self, tokens: Iterable[str]) -> None:
         """Fill the steps; operators and parentheses wait until what they bind is complete."""
-        waiting: List[str] = []
+        waiting: list[str] = []
         begins = True
         for token in tokens:
             if begins:
@@ -130,7 +130,7 @@ class Formula:
             self._apply(waiting.pop())
 
     def _apply(self, step: str) -> None:
-        operands: List[Any] = self._steps[-_OPERANDS[step]:]
+        operands: list[Any] = self._steps[-_OPERANDS[step]:]
         if step == '/' and operands[1] == 0.0:
             self._add_constant(math.inf)
         if not all(isinstance(operand, float) for operand in operands):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, FrozenSet, List, Mapping, Tuple
+from typing import Any, Mapping
 
 from . import joint_lines, rod_lines
 
@@ -26,13 +26,13 @@ class Design:
 
     name: str
     dimensions: Mapping[str, float] = field(hash=False)
-    joints: Tuple[str, ...]
+    joints: tuple[str, ...]
     tracer: str
-    signed: FrozenSet[str] = frozenset()
+    signed: frozenset[str] = frozenset()
     in_space: bool = False
     is_written: bool = False
-    inputs: Tuple[str, ...] = ()
-    turned: Tuple[Tuple[str, float], ...] = ()
+    inputs: tuple[str, ...] = ()
+    turned: tuple[tuple[str, float], ...] = ()
 
     @property
     def words(self) -> Any:
@@ -40,7 +40,7 @@ class Design:
         return rod_lines if self.in_space else joint_lines
 
     @cached_property
-    def lines(self) -> List[joint_lines.Line]:
+    def lines(self) -> list[joint_lines.Line]:
         """Return the joints as constructions."""
         return self.words.parse(self.joints)
 

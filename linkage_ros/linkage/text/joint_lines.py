@@ -52,7 +52,7 @@ A gear's ratio is a number up to 1000. Poses repeat after as many turns as its d
 from __future__ import annotations
 
 import re
-from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Iterable, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
@@ -117,15 +117,15 @@ class Line(NamedTuple):
     """One construction: the joints it places, its word, and the word's arguments."""
 
     text: str
-    names: Tuple[str, ...]
+    names: tuple[str, ...]
     word: str
-    args: Tuple[str, ...]
-    arguments: Tuple[Argument, ...] = ()
+    args: tuple[str, ...]
+    arguments: tuple[Argument, ...] = ()
     # The ground joints of each mirror line in which it is an image, in order.
-    mirrors: Tuple[Tuple[str, ...], ...] = ()
+    mirrors: tuple[tuple[str, ...], ...] = ()
 
     @property
-    def depends_on(self) -> Tuple[str, ...]:
+    def depends_on(self) -> tuple[str, ...]:
         """Return the joints that it is constructed from."""
         return tuple(arg.text for arg in self.arguments if arg.kind in _JOINTS)
 
@@ -142,12 +142,12 @@ class Line(NamedTuple):
         return next((arg.text for arg in self.arguments if arg.kind == 'NAME'), '')
 
     @property
-    def sides(self) -> Tuple[str, ...]:
+    def sides(self) -> tuple[str, ...]:
         """Return the words for its branches of +1 and -1, if it has two."""
         return next((('left', 'right') if kind == 'left|right' else ('out', 'in')
                      for kind, _, _ in self.arguments if '|' in kind), ())
 
-    def numbers(self) -> Iterable[Tuple[str, Formula]]:
+    def numbers(self) -> Iterable[tuple[str, Formula]]:
         """Yield its numbers, each with its kind; raise ValueError for an invalid one."""
         for kind, text, _ in self.arguments:
             if kind in _NUMBERS:
@@ -177,9 +177,9 @@ def _hint(args: Iterable[str]) -> str:
     return ''
 
 
-def parse(texts: Iterable[str]) -> List[Line]:
+def parse(texts: Iterable[str]) -> list[Line]:
     """Return the lines of a linkage; raise ValueError that names an invalid line."""
-    lines: List[Line] = []
+    lines: list[Line] = []
     for text in texts:
         line = parsed(text)
         lines += _mirrored(lines, line) if line.word == 'mirrored' else [line]
@@ -187,10 +187,10 @@ def parse(texts: Iterable[str]) -> List[Line]:
     return lines
 
 
-def _mirrored(lines: List[Line], mirror: Line) -> List[Line]:
+def _mirrored(lines: list[Line], mirror: Line) -> list[Line]:
     """Return the images of lines in a mirror line; lines placed from it alone have none."""
     own = set(mirror.depends_on)
-    count: Dict[str, int] = {}
+    count: dict[str, int] = {}
     found = []
     for line in lines:
         count[line.word] = count.get(line.word, 0) + (not line.input_name)
@@ -227,7 +227,7 @@ def _image(word: str, arg: Argument, suffix: str) -> str:
     return f'{word} {text}'.strip()
 
 
-def parsed(text: str, forms: Mapping[str, Tuple[str, ...]] = FORMS) -> Line:
+def parsed(text: str, forms: Mapping[str, tuple[str, ...]] = FORMS) -> Line:
     """Return one line; raise ValueError if it has none of the forms."""
     if len(text) > _LONGEST:
         raise _error(text, f'a line has up to {_LONGEST} letters, this has {len(text)}')
@@ -266,7 +266,7 @@ def parsed(text: str, forms: Mapping[str, Tuple[str, ...]] = FORMS) -> Line:
     return line
 
 
-def _matched(form: str, args: Tuple[str, ...]) -> Optional[List[Argument]]:
+def _matched(form: str, args: tuple[str, ...]) -> list[Argument] | None:
     """Return a word's arguments according to a form; None if they do not match it."""
     required, *options = re.split(r' *\[|\] *\[', form.rstrip(']'))
     _, *kinds = required.split()
@@ -347,7 +347,7 @@ def branches(lines: Iterable[Line]) -> dict:
             for kind, arg, _ in line.arguments if '|' in kind}
 
 
-def points(lines: Iterable[Line]) -> List[str]:
+def points(lines: Iterable[Line]) -> list[str]:
     """Return the joints that lines place."""
     return [name for line in lines for name in line.names]
 
@@ -361,7 +361,7 @@ def check_name(name: str) -> None:
 
 def lengths(lines: Iterable[Line]) -> dict:
     """Return every dimension that the lines name, and whether it is used as a length."""
-    found: Dict[str, bool] = {}
+    found: dict[str, bool] = {}
     for line in lines:
         for kind, number in line.numbers():
             for name in number.names:
@@ -373,8 +373,8 @@ def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],
          signs: Mapping[str, int]) -> None:
     """Place the joints of a linkage, one line after the other."""
     for line in lines:
-        plain: List[Any] = []
-        options: Dict[str, List[Any]] = {}
+        plain: list[Any] = []
+        options: dict[str, list[Any]] = {}
         for arg in line.arguments:
             values = options.setdefault(arg.option, []) if arg.option else plain
             values.append(_value(line, arg, symbols, signs))
@@ -389,7 +389,7 @@ def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],
 
 
 def _value(line: Line, arg: Argument, symbols: Mapping[str, Real],
-           signs: Mapping[str, int]) -> Union[str, Real, float, bool]:
+           signs: Mapping[str, int]) -> str | Real | float | bool:
     """Return the value that a construction takes for an argument of its line."""
     if arg.kind in _NUMBERS:
         return formula(arg.text).expression(symbols)

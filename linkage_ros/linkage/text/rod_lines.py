@@ -30,14 +30,10 @@ import math
 from typing import (
     Any,
     Collection,
-    Dict,
     Iterable,
-    List,
     Mapping,
     NamedTuple,
-    Optional,
     Sequence,
-    Tuple,
 )
 
 import numpy as np
@@ -90,7 +86,7 @@ class WindowError(ValueError):
     `problem` says why; `limits` has the largest valid ones by hinge [rad], if any.
     """
 
-    def __init__(self, line: Line, problem: str, limits: Dict[str, Tuple[float, float]]):
+    def __init__(self, line: Line, problem: str, limits: dict[str, tuple[float, float]]):
         largest = ', '.join(f'{name} within {math.degrees(low):.4g}deg {math.degrees(high):.4g}deg'
                             for name, (low, high) in limits.items())
         # Not shortened: two poses are a proof.
@@ -103,10 +99,10 @@ class WindowError(ValueError):
 class TwoRodLink(NamedTuple):
     """A link on two hinges in a row and two rods: the data of its window, as expressions."""
 
-    lines: Tuple[Line, Line]
-    inputs: Tuple[str, ...]
-    limits: Tuple[Optional[Tuple[Real, ...]], ...]
-    rods: Tuple[WindowRod, ...]
+    lines: tuple[Line, Line]
+    inputs: tuple[str, ...]
+    limits: tuple[tuple[Real, ...] | None, ...]
+    rods: tuple[WindowRod, ...]
 
     def check(self) -> None:
         """Raise ValueError, with the largest window, unless one pose at most is proved."""
@@ -140,7 +136,7 @@ def _why_not(window: Window, inputs: Sequence[str], hinges: Sequence[str]) -> st
             'do not reach')
 
 
-def parse(texts: Iterable[str]) -> List[Line]:
+def parse(texts: Iterable[str]) -> list[Line]:
     """Return the lines of a linkage; raise ValueError that names an invalid line."""
     lines = [parsed(text, FORMS) for text in texts]
     if len(lines) > MOST_LINES:
@@ -150,7 +146,7 @@ def parse(texts: Iterable[str]) -> List[Line]:
     return lines
 
 
-def points(lines: Iterable[Line]) -> List[str]:
+def points(lines: Iterable[Line]) -> list[str]:
     """Return the points that lines place: an origin of each link, and both ends of each rod."""
     joints = [line.names[0] for line in lines if line.word in _JOINTS]
     return [*(f'{line.names[0]}_{link}' for line in lines if line.word in _RODS
@@ -169,7 +165,7 @@ def draw(builder: Builder, lines: Iterable[Line], symbols: Mapping[str, Real],
     _Drawing(builder, list(lines), symbols, signs, inputs).draw()
 
 
-def turning_rods(lines: List[Line], inputs: Collection[str]) -> List[str]:
+def turning_rods(lines: list[Line], inputs: Collection[str]) -> list[str]:
     """
     Return the rods that place one joint each, on either of two sides, for these inputs.
 
@@ -182,38 +178,38 @@ def turning_rods(lines: List[Line], inputs: Collection[str]) -> List[str]:
 
 
 # Rods, and the hinges or slide that they place together.
-Group = Tuple[Tuple[Line, ...], Tuple[str, ...]]
+Group = tuple[tuple[Line, ...], tuple[str, ...]]
 
 
 class _Assembly:
     """The tree of links, and the order in which rods place the joints that are not inputs."""
 
-    def __init__(self, lines: List[Line], inputs: Collection[str] = ()):
+    def __init__(self, lines: list[Line], inputs: Collection[str] = ()):
         self.lines = {line.names[0]: line for line in lines}
         self.inputs = tuple(inputs) or tuple(
             name for name, line in self.lines.items() if line.word in INPUTS)
         self.parents = {name: line.depends_on[0] for name, line in self.lines.items()
                         if line.word not in _RODS}
 
-    def chain(self, link: str) -> List[str]:
+    def chain(self, link: str) -> list[str]:
         """Return a link and the links that carry it, down to the ground."""
         found = [link]
         while found[-1] != GROUND:
             found.append(self.parents[found[-1]])
         return found
 
-    def between(self, first: str, second: str) -> List[str]:
+    def between(self, first: str, second: str) -> list[str]:
         """Return the links whose joints are between two links."""
         one, other = self.chain(first), self.chain(second)
         return [link for link in one if link not in other] + [
             link for link in other if link not in one]
 
-    def order(self) -> List[Group]:
+    def order(self) -> list[Group]:
         """Return the groups in the order of solution; raise ValueError if one has no solution."""
         unknown = {name for name, line in self.lines.items()
                    if line.word in _JOINTS and name not in self.inputs}
         left = [line for line in self.lines.values() if line.word in _RODS]
-        found: List[Group] = []
+        found: list[Group] = []
         while left:
             open_ = [(line, tuple(x for x in self.between(*line.depends_on) if x in unknown))
                      for line in left]
@@ -225,7 +221,7 @@ class _Assembly:
             raise self.lines[name].error(f'no rod places {name}')
         return found
 
-    def _next(self, left: List[Tuple[Line, Tuple[str, ...]]]) -> Group:
+    def _next(self, left: list[tuple[Line, tuple[str, ...]]]) -> Group:
         """Return the next group of rods, each given with the unplaced joints between its ends."""
         free = [line for line, _ in left
                 if line.word == 'cylinder' and line.names[0] not in self.inputs]
@@ -247,7 +243,7 @@ class _Assembly:
             f'{f", as for {listed(others)}" if others else ""}: one rod places one hinge or '
             'slide, and two rods place the same two hinges in a row')
 
-    def _in_a_row(self, links: Tuple[str, ...]) -> bool:
+    def _in_a_row(self, links: tuple[str, ...]) -> bool:
         second, first = links
         return self.parents[second] == first and all(
             self.lines[link].word in ('hinge', 'motor') for link in links)
@@ -256,10 +252,10 @@ class _Assembly:
 class _Joint:
     """A link on its joint, which is solved once it has a turn or a shift."""
 
-    def __init__(self, line: Line, numbers: List[Real]):
+    def __init__(self, line: Line, numbers: list[Real]):
         self.line, (self.parent,) = line, line.depends_on
-        self.turn: Optional[Turn] = None
-        self.shift: Optional[Real] = None
+        self.turn: Turn | None = None
+        self.shift: Real | None = None
         self.limits = numbers[6:]
         if numbers:
             self.hinge = Hinge(Vector(*numbers[:3]), Vector(*numbers[3:6]))
@@ -288,7 +284,7 @@ class _End(NamedTuple):
 class _Drawing:
     """Links and rods as expressions, placed in the order of solution."""
 
-    def __init__(self, builder: Builder, lines: List[Line], symbols: Mapping[str, Real],
+    def __init__(self, builder: Builder, lines: list[Line], symbols: Mapping[str, Real],
                  signs: Mapping[str, int], inputs: Collection[str]):
         self._builder, self._signs = builder, signs
         self._assembly = _Assembly(lines, inputs)
@@ -296,7 +292,7 @@ class _Drawing:
                                          line.arguments if arg.kind != 'LINK'] for line in lines}
         self._joints = {name: _Joint(self._assembly.lines[name], self._numbers[name])
                         for name in self._assembly.parents}
-        self._lengths: Dict[str, Real] = {}
+        self._lengths: dict[str, Real] = {}
         self._magnitude = sum((part for numbers in self._numbers.values() for part in map(
             abs, numbers[:3])), real(0.0))
 
@@ -350,7 +346,7 @@ class _Drawing:
         else:
             self._lengths[name] = value
 
-    def _ends(self, line: Line) -> Tuple[_End, _End]:
+    def _ends(self, line: Line) -> tuple[_End, _End]:
         first, second = line.depends_on
         numbers = self._numbers[line.names[0]]
         return _End(first, Vector(*numbers[:3])), _End(second, Vector(*numbers[3:6]))
@@ -380,11 +376,11 @@ class _Drawing:
         carries = moving[0] in self._assembly.chain(end.link)
         return Pivot(joint.hinge.circle(end.point), joint.turn if carries else joint.turn.back())
 
-    def _moving(self, link: str, other: str) -> List[str]:
+    def _moving(self, link: str, other: str) -> list[str]:
         return [name for name in self._assembly.between(link, other)
                 if self._joints[name].line.word != 'fixed']
 
-    def _beyond(self, line: Line, link: str) -> Tuple[_End, _End]:
+    def _beyond(self, line: Line, link: str) -> tuple[_End, _End]:
         """Return the end of a rod that a link carries, and the other."""
         first, second = self._ends(line)
         return (first, second) if link in self._assembly.chain(first.link) else (second, first)
@@ -415,7 +411,7 @@ class _Drawing:
             'neither side; draw the linkage in another pose', line)
         return side * self._signs.get(line.names[0], 1)
 
-    def _add_limits(self, joint: _Joint, value: Any) -> List[Limit]:
+    def _add_limits(self, joint: _Joint, value: Any) -> list[Limit]:
         """Add the limits of a joint to the linkage, and return them."""
         if not joint.limits:
             return []
@@ -424,7 +420,7 @@ class _Drawing:
         self._builder.limits += found
         return found
 
-    def _place_hinges(self, lines: Tuple[Line, ...], first: _Joint, second: _Joint) -> None:
+    def _place_hinges(self, lines: tuple[Line, ...], first: _Joint, second: _Joint) -> None:
         """Turn two hinges in a row so that two rods fit."""
         frame, link = Frame.of(first.hinge, second.hinge), second.line.names[0]
         self._builder.require(first.hinge.leaning(second.hinge) - _LEANING,
