@@ -21,7 +21,7 @@ from .problem import Candidate
 from ..inputs import Arc, Input
 from ..kinematics import Kinematics
 from ..motion.curves import CUTS, extremes, refined, sampled, turning_points
-from ..motion.reach import MAX_ENDS, reach_of
+from ..motion.reach import reach_of
 from ..motion.singularities import Analysis, NEAR
 from ..tolerances import CLOSE, LEAST, ONE, ROUNDING, SINGULAR, TOLERANCE
 
@@ -90,9 +90,7 @@ class Segments:
 
         arcs = [(inside(low, 1.0), inside(high, -1.0)) for low, high in arcs]
         runs = [run for arc in _cut(arcs, marks) for run in self._runs(*arc)]
-        length = sum(hi - lo for lo, hi in arcs)
-        if not runs or len(self.jumps) > MAX_ENDS * max(1.0, length / math.tau) \
-                or not self._moves(runs):
+        if not runs or not self._moves(runs):
             runs, self.jumps = [], []
         self.all = [segment for run in runs for segment in self._monotone(*run)]
         self.all.sort(key=lambda segment: float(segment.theta[0]))
