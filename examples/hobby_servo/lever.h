@@ -200,7 +200,7 @@ typedef struct {
     int inputs;
     /* The number of actuators, as many as inputs, and of joints: first as many that are commanded. */
     int count[2];
-    /* The pose at inputs, with rates and loads if wanted; returns 0 if it cannot be assembled. */
+    /* The pose at inputs, with rates and loads if has_rates; returns 0 if it cannot be assembled. */
     int (*at)(const lkr_real *q, int has_rates, lkr_point *p);
     /* All inputs that a side's positions may have, NaN where there is none; returns their number. */
     int (*solutions[2])(const lkr_real *position, lkr_real (*q)[LKR_MAX_INPUTS]);
@@ -611,7 +611,7 @@ typedef struct {
     float slide_slide;            /* [m] */
 } lever_pose;
 
-/* The pose; if wanted, its rates by crank. Returns 0 beyond a limit. */
+/* The pose; with has_rates, rates by crank. Returns 0 beyond a limit. */
 LKR_FORMULA int lever_formulas(float crank_, int has_rates, lever_pose *p,
     lever_pose *by_crank)
 {
@@ -746,7 +746,7 @@ static inline int lever_solutions_angle_lever(const float *position,
     return 2;
 }
 
-/* Positions, and rates if wanted, else 0, at inputs; returns 0 if it cannot be assembled. */
+/* Positions, and their rates if has_rates, else 0, at inputs; returns 0 if it cannot be assembled. */
 static inline int lever_at(const float *q, int has_rates, lkr_point *p)
 {
     lever_pose s, by_crank = LKR_ZERO;
@@ -769,7 +769,7 @@ static const lkr_model lever_model = {
     { { 1.0f, 1.0f, -INFINITY, INFINITY, { INFINITY, 6.2831855f } } }, { 0.0f }
 };
 
-/* Positions, and rates if wanted, else 0, at inputs; returns 0 if it cannot be assembled. */
+/* Positions, and their rates if has_rates, else 0, at inputs; returns 0 if it cannot be assembled. */
 static inline int lever_at_angle_lever(const float *q, int has_rates, lkr_point *p)
 {
     lever_pose s, by_crank = LKR_ZERO;

@@ -87,7 +87,7 @@ class Formulas:
         for limit in limits:
             valid = valid_where(valid, limit.margin, limit.tolerance)
         return self._code.function(
-            '/* The pose; if wanted, its rates by {inputs_named}. Returns 0 beyond a limit. */\n'
+            '/* The pose; with has_rates, rates by {inputs_named}. Returns 0 beyond a limit. */\n'
             'LKR_FORMULA int {name}_formulas({parameters}, int has_rates, {name}_pose *p,\n'
             '    {by_pointers})'.format(**self.names),
             [self._code.times(each, 1.0 / scale)

@@ -181,7 +181,7 @@ typedef struct {
     int inputs;
     /* The number of actuators, as many as inputs, and of joints: first as many that are commanded. */
     int count[2];
-    /* The pose at inputs, with rates and loads if wanted; returns 0 if it cannot be assembled. */
+    /* The pose at inputs, with rates and loads if has_rates; returns 0 if it cannot be assembled. */
     int (*at)(const lkr_real *q, int has_rates, lkr_point *p);
     /* All inputs that a side's positions may have, NaN where there is none; returns their number. */
     int (*solutions[2])(const lkr_real *position, lkr_real (*q)[LKR_MAX_INPUTS]);

@@ -32,7 +32,7 @@ def refine(problem: InverseProblem, values: Sequence[float], candidate: Candidat
     """
     Return the solution at a candidate, its inputs and rates; None if there is none.
 
-    A larger error than `far` [sizes] is that of another assembly mode.
+    Without a bracket, a larger error than `far` [sizes] is that of another assembly mode.
     """
     n, at, (inputs, low, high) = problem.n, problem.newton.at, candidate
     is_certain = low > -math.inf
