@@ -4,6 +4,7 @@
 """Names of a scene, with any characters, as C identifiers, comments and texts."""
 
 from importlib.resources import files
+from itertools import count
 import re
 from typing import Iterable, Mapping
 
@@ -29,11 +30,11 @@ def filled(template: str, values: Mapping[str, object]) -> str:
 
 def distinct(names: Iterable[str]) -> list[str]:
     """Return names, with a number after those that are there already."""
-    made: list[str] = []
+    made: dict[str, None] = {}
     for name in names:
-        made.append(next(text for text in (name, *(f'{name}_{i}' for i in range(2, 1000)))
-                         if text not in made))
-    return made
+        others = (f'{name}_{i}' for i in count(2))
+        made[name if name not in made else next(text for text in others if text not in made)] = None
+    return [*made]
 
 
 def constants(names: Iterable[str]) -> list[str]:
