@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 
 from linkage_ros import mechanisms, scene
 import pytest
-from robots import LIBRARIES
+from robots import Pinocchio
 from ros_harness import Process
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -223,7 +223,7 @@ def test_robots_of_each_format(reader):
 
 
 def test_coordinates_of_a_drawing(reader):
-    robot = LIBRARIES[0](reader.follow('how-to/cad-export'))
+    robot = Pinocchio(reader.follow('how-to/cad-export'))
     lid = scene.load('export.yaml').mechanisms['lid']
     angles = lid.linkage.joint_angles(lid.first.start)
     places = robot.places({f'lid_{name}': angle for name, angle in angles.items()},
