@@ -325,7 +325,7 @@ OPEN = {
 
 
 @pytest.mark.parametrize('seeds', [
-    [1, 2, 7], pytest.param(range(3, 20), marks=pytest.mark.nightly)], ids=['', 'more'])
+    [7], pytest.param(range(1, 20), marks=pytest.mark.nightly)], ids=['', 'more'])
 @pytest.mark.parametrize('name', OPEN)
 def test_no_answer_depends_on_the_starts_of_a_search(tmp_path, name, seeds):
     file, pose, question = OPEN[name]
@@ -375,11 +375,10 @@ def undecided(seed):
                          if kind == 2})
 
 
-@pytest.mark.parametrize('seeds', [
-    [3, 4, 10], pytest.param(range(120), marks=pytest.mark.nightly)], ids=['', 'more'])
-def test_a_line_that_is_pasted_leads_on(seeds):
+@pytest.mark.nightly
+def test_a_line_that_is_pasted_leads_on():
     pasted = 0
-    for robot in filter(None, map(undecided, seeds)):
+    for robot in filter(None, map(undecided, range(120))):
         lines, said = [], [answer(robot)]
         while offered := choices('\n'.join([*said[-1], ''])):
             lines.append(offered[-1])
@@ -387,7 +386,7 @@ def test_a_line_that_is_pasted_leads_on(seeds):
             assert said[-1] not in said[:-1], said
             pasted += 1
     # Some robots are decided at once, and some refused for good.
-    assert pasted >= max(3, len(seeds) // 10)
+    assert pasted >= 12
 
 
 def refusals():

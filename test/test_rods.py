@@ -234,7 +234,7 @@ def test_limits_with_a_second_or_a_singular_pose_are_refused(seed, count):
     assert check_windows(seed, count) > 0.3 * count
 
 
-@pytest.mark.nightly(all_but=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize('seed', [1, 2])
 def test_the_two_poses_of_refused_limits_are_two_poses(seed):
     rng, found = np.random.default_rng(seed), 0
