@@ -3,7 +3,7 @@
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * It can be assembled in [-3.14159, 3.14159] rad.
- * A call takes at most 10 poses.
+ * A call takes at most 11 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -114,10 +114,13 @@ static inline lkr_real lkr_clamped(lkr_real x, lkr_real low, lkr_real high)
 /* The whole turns nearest to x. */
 LKR_FORMULA lkr_real lkr_turns(lkr_real x, lkr_real turn)
 {
-    if (LKR_MATH(fabs)(x) <= turn / 2) {
+    const lkr_real twice = 2 * LKR_MATH(fabs)(x);
+    if (twice <= turn) {
         return 0;
     }
-    return turn * LKR_MATH(floor)(x / turn + (lkr_real)0.5);
+    /* A microcontroller divides slowly. */
+    return twice <= 3 * turn ? LKR_MATH(copysign)(turn, x)
+        : turn * LKR_MATH(floor)(x / turn + (lkr_real)0.5);
 }
 
 /* x within half a turn of 0. */
@@ -211,7 +214,7 @@ typedef struct {
 } lkr_model;
 
 /* A part of the reach in which an output only rises, or only falls: the middle of its values and how
-   far it goes from there; the inputs at its ends; the input as a series of Chebyshev polynomials of
+   far it goes from there; the inputs at its ends; the input as a power series of
    sqrt((value - middle) * scale + shift) - center, which is in [-1, 1]. */
 typedef struct {
     lkr_real middle, reach, low, high, scale, shift, center;
@@ -307,15 +310,10 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
                 gap * LKR_FROM_FLASH(part->scale) + LKR_FROM_FLASH(part->shift);
             const lkr_real x =
                 LKR_MATH(sqrt)(lkr_max(0, square)) - LKR_FROM_FLASH(part->center);
-            lkr_real sum = 0;
-            lkr_real before = 0;
-            /* Clenshaw's recurrence. */
-            for (i = LKR_TERMS - 1; i > 0; i--) {
-                const lkr_real next = 2 * x * sum - before + LKR_FROM_FLASH(part->term[i]);
-                before = sum;
-                sum = next;
+            lkr_real sum = LKR_FROM_FLASH(part->term[LKR_TERMS - 1]);
+            for (i = LKR_TERMS - 2; i >= 0; i--) {
+                sum = sum * x + LKR_FROM_FLASH(part->term[i]);
             }
-            sum = x * sum - before + LKR_FROM_FLASH(part->term[0]);
             q[solutions][0] =
                 lkr_clamped(sum, LKR_FROM_FLASH(part->low), LKR_FROM_FLASH(part->high));
             solutions++;
@@ -423,8 +421,8 @@ static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_rea
     return away;
 }
 
-/* From positions to the inputs q nearest to `from`, and their pose, see lkr_model.at; returns 0, and
-   leaves q alone, if there are none. */
+/* From positions to the inputs q nearest to `from`, and their pose, see lkr_model.at; returns 0,
+   and leaves q alone, if there are none. */
 static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *position,
     const lkr_real *from, int has_rates, lkr_real *q, lkr_point *p)
 {
@@ -451,7 +449,9 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
         }
         away[nearest] = INFINITY;
         found = lkr_refine(model, side, position, has_rates, x[nearest], p);
-        if (found == 1 || (found && lkr_bring(model, side, near, x[nearest]) < INFINITY)) {
+        /* Newton's method may leave a sweep: then the pose is that at its end. */
+        if (found == 1 || (found && lkr_bring(model, side, near, x[nearest]) < INFINITY
+                && model->at(x[nearest], has_rates, p))) {
             memcpy(q, x[nearest], size);
             return 1;
         }

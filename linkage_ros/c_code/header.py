@@ -22,7 +22,7 @@ from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
 # Poses of a solution of an inverse: the first, again with its rates, and LKR_MAX_STEPS of Newton's
-# method.
+# method. That of the answer may be computed again, at a sweep's end.
 POSES = 5
 
 
@@ -91,7 +91,7 @@ def _values(request: Request, single: bool) -> dict[str, Any]:
     parts = [tables.text(sides, '', request.passive)]
     for tag, axes in inverses.items():
         parts += [tables.text(([], axes), tag), _inverse(mechanism, axes, tag, code.number)]
-    about = [*_about(mechanism), f'A call takes at most {POSES * tables.solutions} poses.']
+    about = [*_about(mechanism), f'A call takes at most {POSES * tables.solutions + 1} poses.']
     whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
     return {
         'about': '\n'.join(f' * {line}' for line in about),
