@@ -3,7 +3,7 @@
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * It can be assembled in [-3.14159, 3.14159] rad.
- * A call takes at most 11 poses.
+ * A call takes at most 13 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -81,7 +81,7 @@ typedef double lkr_real;
 #define LKR_PURE static inline
 #endif
 
-/* A struct of zeros. */
+/* A struct of zeros; memset would keep it in memory. */
 #ifdef __cplusplus
 #define LKR_ZERO { }
 #else
@@ -345,14 +345,12 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
     int i, j, step;
     memcpy(x, q, sizeof x);
     for (step = 0; step <= LKR_MAX_STEPS; step++) {
-        lkr_point next;
         const lkr_real now =
-            model->at(x, has_rates, &next) ? lkr_gap(model, side, position, &next, gap) : INFINITY;
+            model->at(x, has_rates, p) ? lkr_gap(model, side, position, p, gap) : INFINITY;
         if (!(now < left)) {
             break;
         }
         left = now;
-        *p = next;
         memcpy(q, x, sizeof x);
         if (left <= LKR_ENOUGH || left <= lkr_rounding(model, q)) {
             return step ? 2 : 1;
@@ -367,7 +365,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
         }
     }
     /* At an end of the reach the rate is infinite, yet rounding is not. */
-    if (left > LKR_CLOSE * LKR_STEEPEST) {
+    if (left > LKR_CLOSE * LKR_STEEPEST || !model->at(q, 1, p)) {
         return 0;
     }
     /* What is left may be rounding: of the positions; of the inputs, where a position changes fast. */
@@ -746,7 +744,7 @@ static inline int lever_solutions_angle_lever(const float *position,
     return 2;
 }
 
-/* Positions, and their rates if has_rates, else 0, at inputs; returns 0 if it cannot be assembled. */
+/* Positions, and rates if has_rates, else 0, at inputs; returns 0 if it cannot be assembled. */
 static inline int lever_at(const float *q, int has_rates, lkr_point *p)
 {
     lever_pose s, by_crank = LKR_ZERO;
@@ -769,7 +767,7 @@ static const lkr_model lever_model = {
     { { 1.0f, 1.0f, -INFINITY, INFINITY, { INFINITY, 6.2831855f } } }, { 0.0f }
 };
 
-/* Positions, and their rates if has_rates, else 0, at inputs; returns 0 if it cannot be assembled. */
+/* Positions, and rates if has_rates, else 0, at inputs; returns 0 if it cannot be assembled. */
 static inline int lever_at_angle_lever(const float *q, int has_rates, lkr_point *p)
 {
     lever_pose s, by_crank = LKR_ZERO;
@@ -778,7 +776,6 @@ static inline int lever_at_angle_lever(const float *q, int has_rates, lkr_point 
     }
     p->position[1][0] = s.angle_lever;
     p->rate[1][0][0] = by_crank.angle_lever;
-    p->load[0] = 0.0f;
     return isfinite(p->position[1][0]);
 }
 

@@ -21,9 +21,9 @@ from ..linkage import Mechanism
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
-# Poses of a solution of an inverse: the first, again with its rates, and LKR_MAX_STEPS of Newton's
-# method. That of the answer may be computed again, at a sweep's end.
-POSES = 5
+# Poses of a solution of an inverse: the first, again with its rates, LKR_MAX_STEPS of Newton's
+# method, and the best of them again. That of the answer may be computed once more, at a sweep's end.
+POSES = 6
 
 
 class Request(NamedTuple):
@@ -98,7 +98,7 @@ def _values(request: Request, single: bool) -> dict[str, Any]:
         **formulas.names, 'N': prefix(name), 'float': int(single),
         'own_inputs': len(linkage.inputs), 'own_solutions': tables.solutions,
         'fields': formulas.struct(), 'pose': formulas.function(),
-        'whole': '\n'.join(indented([f'return isfinite({whole});'])),
+        'whole': indented([f'return isfinite({whole});']),
         'enums': '\n'.join(_enum(f'{prefix(name)}_{side}', axes) for side, axes in zip(
             ('ACTUATOR', 'JOINT'), sides)),
         'axes': comment('; '.join(f'{side}: {_with_units(linkage, axes)}' for side, axes in zip(

@@ -73,7 +73,7 @@ class Tables:
             'about': 'the inverse' if tag else 'the actuators and joints',
             'n': len(self.mechanism.scales), 'counts': ', '.join(str(len(axes)) for axes in rows),
             'names': ', '.join(map(self._solutions, sides)),
-            'at': '\n'.join(indented(self._at(rows, len(sides[1])))),
+            'at': indented(self._at(rows, len(sides[1]))),
             'axes': row(row((1.0 / each.size, each.turn or math.inf)
                             for each in axes) if axes else '{ { 0, 0 } }'
                            for axes in rows),
@@ -83,6 +83,7 @@ class Tables:
     def _at(self, sides: tuple[Sequence[Axis], Sequence[Axis]], commanded: int) -> Iterator[str]:
         """Yield the statements for values, rates by each input, and loads."""
         code, formulas, scale_of = self._code, self._formulas, self.mechanism.scale_of
+        needed = []
         for side, axes in enumerate(sides):
             for i, each in enumerate(axes):
                 field, factor = formulas.fields[each.output], each.factor / scale_of(each.output)
@@ -93,16 +94,13 @@ class Tables:
                 if each.wraps:
                     position = f'lkr_wrapped({position}, {code.literal(each.turn)})'
                 yield f'p->position[{side}][{i}] = {position};'
-                for j, rate in enumerate(rates):
-                    yield f'p->rate[{side}][{i}][{j}] = {rate};'
+                yield from (f'p->rate[{side}][{i}][{j}] = {rate};' for j, rate in enumerate(rates))
+                needed += [f'p->position[{side}][{i}]'] * (i < commanded)
         # An inverse alone needs no efforts.
-        powers = [*loads(self.mechanism)] if sides[0] else []
-        for j, by in enumerate(formulas.by):
+        for j, by in enumerate(formulas.by if sides[0] else ()):
             terms = [code.times(f'{by}.{formulas.fields[output]}', -load / scale_of(output))
-                     for output, load in powers]
+                     for output, load in loads(self.mechanism)]
             yield f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
-        needed = [f'p->position[{side}][{i}]' for side, axes in enumerate(sides)
-                  for i in range(min(len(axes), commanded))]
         yield f'return isfinite({" + ".join(needed)});'
 
     # --- tables ---
@@ -162,7 +160,7 @@ class Tables:
             f'static inline int {name}(const {code.number} *position,',
             f'    {code.number} (*q)[LKR_MAX_INPUTS])', '{',
             f'    static const lkr_piece piece[{len(rows)}] LKR_IN_FLASH = {{',
-            *indented(rows), '    };',
+            indented(rows), '    };',
             f'    return lkr_series({len(rows)}, piece, {given}, q);', '}'])
 
     def _closed(self, name: str, axes: Sequence[Axis], counted: Mapping[int, Real],

@@ -62,7 +62,7 @@ typedef double lkr_real;
 #define LKR_PURE static inline
 #endif
 
-/* A struct of zeros. */
+/* A struct of zeros; memset would keep it in memory. */
 #ifdef __cplusplus
 #define LKR_ZERO { }
 #else
@@ -326,14 +326,12 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
     int i, j, step;
     memcpy(x, q, sizeof x);
     for (step = 0; step <= LKR_MAX_STEPS; step++) {
-        lkr_point next;
         const lkr_real now =
-            model->at(x, has_rates, &next) ? lkr_gap(model, side, position, &next, gap) : INFINITY;
+            model->at(x, has_rates, p) ? lkr_gap(model, side, position, p, gap) : INFINITY;
         if (!(now < left)) {
             break;
         }
         left = now;
-        *p = next;
         memcpy(q, x, sizeof x);
         if (left <= LKR_ENOUGH || left <= lkr_rounding(model, q)) {
             return step ? 2 : 1;
@@ -348,7 +346,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
         }
     }
     /* At an end of the reach the rate is infinite, yet rounding is not. */
-    if (left > LKR_CLOSE * LKR_STEEPEST) {
+    if (left > LKR_CLOSE * LKR_STEEPEST || !model->at(q, 1, p)) {
         return 0;
     }
     /* What is left may be rounding: of the positions; of the inputs, where a position changes fast. */
