@@ -22,7 +22,7 @@ from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
 # Poses of a solution of an inverse: the first, again with its rates, LKR_MAX_STEPS of Newton's
-# method, and the best of them again. That of the answer may be computed once more, at a sweep's end.
+# method, and the best of them again. A sweep's end adds one to the answer's.
 POSES = 6
 
 

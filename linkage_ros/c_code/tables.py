@@ -10,7 +10,7 @@ exact Jacobians, efforts by their transposes, so that power is conserved.
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import compress, product
 import math
 from typing import Iterator, Mapping, Sequence
 
@@ -22,14 +22,11 @@ from .formulas import Formulas
 from .names import comment, distinct, filled, template
 from .series import series
 from ..formula.expression import argument, Real
-from ..formula.program import Program
-from ..linkage import InverseLinkage, Mode
+from ..linkage import InverseLinkage
 from ..scene import SceneMechanism
 
-# Samples of each part of the reach, for the assembly modes that are there.
+# Samples of each part of the reach, for the solutions that are there.
 SAMPLES = 256
-# Inputs that are no further apart are the same [rad, sizes].
-ALIKE = 1e-6
 
 
 class Tables:
@@ -174,7 +171,9 @@ class Tables:
             for joint in closed.branches), {
                 i: counted.get(i, value + turn)
                 for i, (value, turn) in enumerate(zip(mode.inputs, turned))})
-            for mode in self._modes_in_reach(axes[0].output, closed) for turned in turns]
+            for mode in closed.modes for turned in turns]
+        if len(axes) == 1:
+            solutions = [*compress(solutions, self._are_in_reach(axes[0].output))] or solutions
         lines = ''.join(f'\n     {comment(line)}' for line in closed.lines)
         return self._function(
             name, axes, 'The inputs in each assembly mode of the inverse linkage, NAN where there '
@@ -193,17 +192,11 @@ class Tables:
              for k, (above, inputs) in enumerate(solutions)],
             f'return {len(solutions)};', replaced)
 
-    def _modes_in_reach(self, output: str, closed: InverseLinkage) -> Sequence[Mode]:
-        """Return the assembly modes in which the linkage is anywhere in its reach, if known."""
-        linkage, modes, (first, *others) = self.linkage, closed.modes, self.linkage.inputs
-        if others:
-            return modes
-        # Where the inverse linkage has a dead point of its own, the mode changes.
+    def _are_in_reach(self, output: str) -> list[bool]:
+        """Return which solutions of a closed form the linkage has anywhere in its reach."""
+        # A solution of one part may go on in another, where it has a dead point of its own.
         steps = (np.arange(SAMPLES) + 0.382) / SAMPLES
-        low, high = linkage.monotone(output).T[:2, :, None]
-        inputs = (low + steps * (high - low)).ravel()
-        starts = linkage.bind(Program([mode.inputs[0] for mode in modes], 1, closed.arguments)
-                              ).over(linkage.posed((), (output,)).over(inputs)[0])
-        apart = first.apart(np.add.outer(closed.turns[0], starts), inputs)
-        is_there = (apart <= ALIKE * first.size).any(axis=(0, 2))
-        return [mode for mode, any_ in zip(modes, is_there) if any_] or modes
+        low, high = self.linkage.monotone(output).T[:2, :, None]
+        values = self.linkage.posed((), (output,)).over((low + steps * (high - low)).ravel())
+        return [bool(np.isfinite(inputs).any())
+                for inputs, in self.linkage.inverse((output,)).modes(np)(*values)]
