@@ -5,6 +5,7 @@
 
 from importlib.resources import files
 from itertools import count
+import json
 import re
 from typing import Iterable, Mapping
 
@@ -63,7 +64,6 @@ def comment(text: str) -> str:
 
 
 def literal(text: str) -> str:
-    """Return a text as a string literal of C."""
-    return '"' + ''.join(
-        chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?' else f'\\{byte:03o}'
-        for byte in text.encode('utf-8', 'replace')) + '"'
+    """Return a text as a string literal of C++: JSON's, without trigraphs."""
+    valid = text.encode('utf-8', 'replace').decode()
+    return json.dumps(valid, ensure_ascii=False).replace('?', r'\?')
