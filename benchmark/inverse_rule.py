@@ -8,7 +8,8 @@ How many solutions inverses lose and invent, judged by sampled and bisected pose
 
 The judge is `test/truth/inverse_judge.py`. All of the catalogue are asked, and random linkages:
 three outputs of each at ordinary poses, next to and at ends of the reach, at extremes and at dead
-points. With --document the table goes into docs/design/accuracy.md.
+points. Beside it is the CPU time of the first question of an inverse. With --document both go
+into docs/design/accuracy.md.
 """
 
 from collections import Counter
@@ -58,21 +59,32 @@ def several(linkage, names, rng):
     return Counter(), 0.0
 
 
+def first_question(linkage):
+    """Return the CPU time [ms] from making an inverse of a joint angle to its solutions."""
+    name = [name for name in linkage.joints if linkage.moves(name)][-1]
+    inputs = [0.7 * each.low + 0.3 * each.high for each in linkage.inputs]
+    value = linkage.joint_angles(inputs if inputs[1:] else inputs[0], [name])[name]
+    start = time.process_time()
+    linkage.inverse((name, *(each.name for each in linkage.inputs[1:]))).all(
+        [value if value == value else 0.0, *inputs[1:]])
+    return 1e3 * (time.process_time() - start)
+
+
 def measure(count, minutes):
-    """Return counts by what is asked and where, the worst error, and how many linkages."""
-    total, worst, used, start = Counter(), 0.0, 0, time.monotonic()
+    """Return counts by what is asked and where, the worst error, and first questions' times."""
+    total, worst, times, start = Counter(), 0.0, [], time.monotonic()
     for linkage, rng in linkages(count):
         if time.monotonic() - start > 60.0 * minutes:
             break
-        used += 1
         try:
+            times.append(first_question(linkage))
             for kind, (found, error) in judged(linkage, rng):
                 worst = max(worst, error)
                 total.update({(kind, *key): number for key, number in found.items()
                               if len(key) == 2})
         except ValueError as refused:
             assert 'do not determine' in str(refused) or 'does not move' in str(refused)
-    return total, worst, used
+    return total, worst, times
 
 
 def main():
@@ -81,14 +93,16 @@ def main():
     parser.add_argument('--linkages', type=int, default=2000, help='random linkages')
     parser.add_argument('--minutes', type=float, default=60.0, help='stop after these')
     options = parser.parse_args()
-    total, worst, used = measure(options.linkages, options.minutes)
+    total, worst, times = measure(options.linkages, options.minutes)
     places = dict.fromkeys(chain.from_iterable([key[:2]] for key in sorted(total)))
     text = document.table(('asked', *COLUMNS), [
         (f'{kind}, {where}', *(total[kind, where, what] for what in COLUMNS))
         for kind, where in places])
-    text += (f'\n\n{used} linkages. The largest error of a solution at an ordinary value is '
-             f"{worst:.2g} in units of the rule: half an ulp of the output's size, and half an "
-             'ulp of the input times the rate.')
+    median, most, slowest = np.percentile(times, [50.0, 99.0, 100.0])
+    text += (f'\n\n{len(times)} linkages. Their first questions take {median:.0f} ms in the '
+             f'median, {most:.0f} ms at the 99th percentile, {slowest:.0f} ms at most. The '
+             f'largest error of a solution at an ordinary value is {worst:.2g} in units of the '
+             "rule: half an ulp of the output's size and half an ulp of the input times the rate.")
     text += '\n\n' + document.machine()
     document.show(options, 'design/accuracy.md', text, 'measured: inverse')
 

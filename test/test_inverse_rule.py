@@ -48,6 +48,11 @@ SPECIAL = {
     'a period of two turns': (
         ['O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'D crank Q 2 geared crank 1/2 0',
          'B dyad A D 2.2 2 left'], {}, ['B.x', 'crank2', 'AB'], np.linspace(4.31, 8.26, 40)),
+    'an arm of rounding next to a dead point': (
+        ['A ground 0 0', 'B ground 1.834745 0', 'E ground 0 -1.834745',
+         'C crank A 1.834745000000002', 'D mirror A C B', 'G parallelogram B A D',
+         'H image B A E', 'M line G A 2*1.834745', 'P mirror A M H'],
+        {}, ['MP'], np.array([-1.2, -0.4, -0.05, 0.3])),
     'the last floats of a reach': (
         ['A ground 0.829145187382171 -2.2156474128625305',
          'B ground -2.2125892959295577 0.6633161499057368', 'C crank A 0.436499480176793',

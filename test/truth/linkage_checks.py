@@ -402,7 +402,9 @@ def _vanishing(subject):
         # What is zero all along, but for lengths that are nearly equal, tells no place.
         if not np.all(np.isfinite(row)) or np.median(np.abs(row)) < 1e-8:
             continue
-        changes = np.flatnonzero((row[:-1] < 0.0) != (row[1:] < 0.0))
+        # The signs of rounding, where lengths are equal but for 1e-12, tell no place either.
+        sure = np.abs(row) > 1e-12
+        changes = np.flatnonzero(((row[:-1] < 0.0) != (row[1:] < 0.0)) & sure[:-1] & sure[1:])
         for i in changes[held[changes] | held[changes + 1]][:20]:
             found.append(_crossing(subject, k, values[i], values[i + 1]))
         if k >= len(drawing.gaps):

@@ -249,9 +249,9 @@ class Segments:
                 # Two extremes may hide where the change is less than half of what rates say.
                 hidden = (slopes[0] * slopes[1] > 0.0) & (missed > 0.5 * np.abs(mean))
                 place = np.flatnonzero((missed > JUMP * size) | wide & hidden)
-            neighbours = np.nextafter(theta[place], theta[place + 1]) == theta[place + 1]
-            jumped = place[neighbours & (np.abs(change[place]) > JUMP * size)]
-            place = place[~neighbours]
+            narrow = width[place] <= ROUNDING
+            jumped = place[narrow & (np.abs(change[place]) > JUMP * size)]
+            place = place[~narrow]
             if not len(place) or len(theta) > most:
                 return theta, jumped
             new = (theta[place, None] + width[place, None] * CUTS).ravel()

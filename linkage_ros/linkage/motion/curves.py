@@ -72,16 +72,17 @@ def lowest(curve: Callable, lo: np.ndarray, hi: np.ndarray, steps: int = 10) -> 
 
 def near_misses(values: np.ndarray) -> np.ndarray:
     """
-    Return whether a pair of zeros may lie next to a sample, for all samples but the outer ones.
+    Return 1 or -1 where a pair of zeros may lie next to a sample, for all but the outer samples.
 
-    There a curve's distance from zero has a minimum that is small compared with its bend.
+    There a curve's distance from zero, times this sign, has a minimum that is small compared with
+    its bend. Elsewhere, and where the curve is straight, it is 0.
     """
     before, inner, after = values[..., :-2], values[..., 1:-1], values[..., 2:]
     with np.errstate(invalid='ignore'):
-        sign = np.sign(inner)
-        bent = sign * (before - 2.0 * inner + after)
-        return ((sign * before >= sign * inner) & (sign * after >= sign * inner)
-                & (sign * inner <= bent))
+        bend = before - 2.0 * inner + after
+        sign = np.sign(bend)
+        return np.where((sign * before >= sign * inner) & (sign * after >= sign * inner)
+                        & (0.0 <= sign * inner) & (sign * inner <= sign * bend), sign, 0.0)
 
 
 def turning_points(values: np.ndarray, rates: np.ndarray, least: float) -> np.ndarray:

@@ -117,8 +117,9 @@ def _touches(margins: Callable, theta: np.ndarray, values: np.ndarray) -> np.nda
     These get denser towards the nearest one: an arm that nearly vanishes there turns fast, and so
     do the bodies that it carries.
     """
-    row, place = np.nonzero(near_misses(values))
-    sign = np.sign(values[row, place + 1])[:, None]
+    signs = near_misses(values)
+    row, place = np.nonzero(signs)
+    sign = signs[row, place, None]
     chosen = np.arange(len(row))
 
     def distance(angles: np.ndarray) -> np.ndarray:
