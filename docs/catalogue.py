@@ -131,8 +131,8 @@ def index() -> str:
 
 {table([''] * SHOWN, rows)}
 
-Each is a few [constructions](constructions.md). In the same words you can write any other planar linkage of dyads: type `custom`,
-in [a scene](../tutorial.md) or in Python.
+Each is a few [constructions](constructions.md). Any other planar linkage of dyads is written in
+the same words: type `custom`, in [a scene](../tutorial.md) or in Python.
 
 ```{{toctree}}
 :hidden:

@@ -66,9 +66,9 @@ class Target(NamedTuple):
         # The reason is about the linkage's outputs, without signs and offsets of the names.
         wanted, outputs = ([f'{value:.6g}' for value in numbers] for numbers in (
             [positions[index] for index in self.indices], values))
-        meaning = listed(f'{name} at {value}' for name, value in zip(self.request.outputs, outputs))
-        return (f'{self.named} cannot be {", ".join(wanted)}'
-                + f' ({meaning})' * (outputs != wanted) + f': {reason}')
+        meaning = '' if outputs == wanted else ' ({})'.format(listed(
+            map('{} at {}'.format, self.request.outputs, outputs)))
+        return f'{self.named} cannot be {", ".join(wanted)}{meaning}: {reason}'
 
     def _values(self, positions: Sequence[float]) -> list[float]:
         return [name.sign * (positions[index] - name.offset)
