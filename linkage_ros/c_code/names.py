@@ -4,7 +4,7 @@
 """Names of a scene, with any characters, as C identifiers, comments and texts."""
 
 from importlib.resources import files
-from itertools import count
+from itertools import chain, count
 import json
 import re
 from typing import Iterable, Mapping
@@ -33,8 +33,8 @@ def distinct(names: Iterable[str]) -> list[str]:
     """Return names, with a number after those that are there already."""
     made: dict[str, None] = {}
     for name in names:
-        others = (f'{name}_{i}' for i in count(2))
-        made[name if name not in made else next(text for text in others if text not in made)] = None
+        texts = chain([name], (f'{name}_{i}' for i in count(2)))
+        made[next(text for text in texts if text not in made)] = None
     return [*made]
 
 
