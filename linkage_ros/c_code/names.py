@@ -5,6 +5,7 @@
 
 from importlib.resources import files
 from itertools import chain, count
+import json
 import re
 from typing import Iterable, Mapping
 
@@ -32,8 +33,8 @@ def distinct(names: Iterable[str]) -> list[str]:
     """Return names, with a number after those that are there already."""
     made: dict[str, None] = {}
     for name in names:
-        others = (f'{name}_{i}' for i in count(2))
-        made[next(text for text in chain([name], others) if text not in made)] = None
+        texts = chain([name], (f'{name}_{i}' for i in count(2)))
+        made[next(text for text in texts if text not in made)] = None
     return [*made]
 
 
@@ -63,7 +64,6 @@ def comment(text: str) -> str:
 
 
 def literal(text: str) -> str:
-    """Return a text as a string literal of C."""
-    return '"' + ''.join(
-        chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?' else f'\\{byte:03o}'
-        for byte in text.encode('utf-8', 'replace')) + '"'
+    """Return a text as a string literal of C++: JSON's, without trigraphs."""
+    valid = text.encode('utf-8', 'replace').decode()
+    return json.dumps(valid, ensure_ascii=False).replace('?', r'\?')
