@@ -270,7 +270,6 @@ JOINT, MOTOR = 'joint_handle\tknee_QB', 'actuator_handle\tknee_motor'
     ('knee', [], {'joints': {'knee_QB': 'banana'}}, "role 'banana', is none of"),
     ('leg', [], {'actuators': {'a': 'crank2', 'b': 'crank'}}, ''),
     ('leg', [], {'actuators': {'a': 'crank', 'b': 'crank'}}, "'b', role 'crank', is"),
-    ('knee', [], {'joints': {}}, "joint 'knee_QB' is missing"),
     ('knee', ['joint\tother\tQB\t1\t0'], {}, "'knee_QB', role 'QB', is none of"),
     # What ros2_control adds to hardware of type "actuator".
     ('knee', ['actuator_handle\tactuator1\tposition\t0'],
@@ -284,13 +283,10 @@ JOINT, MOTOR = 'joint_handle\tknee_QB', 'actuator_handle\tknee_motor'
     ('knee', [f'{JOINT}\tposition\t5'], {},
      "joint 'knee_QB' has several handles for position"),
     ('knee', [f'{JOINT}\ttorque\t5'], {}, "joint 'knee_QB' has several handles for effort"),
-    ('leg', ['actuator_handle\tleg_crank2\tforce\t5'], {}, "'leg_crank2' has several handles"),
     ('knee', [f'{JOINT}\ttemperature\t5'], {}, ''),
     ('knee', [f'{JOINT}\tvelocity\t0'], {}, 'need a handle for velocity'),
     ('knee', [f'{MOTOR}\teffort\t0'], {'kinds': ['position']}, 'need a handle for effort'),
     ('knee', [], {'kinds': ['effort']}, 'need a handle for position'),
-    ('leg', [f'joint_handle\t{each}\tvelocity\t0' for each in JOINTS['leg']], {},
-     'need a handle for velocity'),
     # A handle without a value is none.
     ('knee', [f'{JOINT}\tvelocity\t', f'{MOTOR}\tvelocity\t0'], {},
      'need a handle for velocity'),
