@@ -132,7 +132,7 @@ class Code:
                  for name in sorted(declared, key=lambda name: name.startswith('k'))]
         lines += [f'const {self.number} x{i} = {code};' if f'x{i}' in used else f'(void){code};'
                   for i, code in enumerate(arguments) if f'x{i}' in used or code.isidentifier()]
-        return '\n'.join([head, '{', *indented(lines + text.split('\n')), '}', ''])
+        return '\n'.join([head, '{', indented(lines + text.split('\n')), '}', ''])
 
 
 def bare(code: str) -> str:
@@ -140,8 +140,8 @@ def bare(code: str) -> str:
     return code[1:-1] if code.startswith('(') else code
 
 
-def indented(lines: Iterable[str]) -> list[str]:
-    """Return lines of a function's body, broken if they are long."""
-    return [part for line in lines for part in wrap(
+def indented(lines: Iterable[str]) -> str:
+    """Return the lines of a function's body, broken if they are long."""
+    return '\n'.join(part for line in lines for part in wrap(
         f'    {line}', LINE - 1, subsequent_indent='        ', break_long_words=False,
-        break_on_hyphens=False)]
+        break_on_hyphens=False))

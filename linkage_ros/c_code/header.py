@@ -21,9 +21,9 @@ from ..linkage import Mechanism
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
-# Poses of a solution of an inverse: the first, again with its rates, and LKR_MAX_STEPS of Newton's
-# method.
-POSES = 5
+# Poses of a solution of an inverse: the first, again with its rates, LKR_MAX_STEPS of Newton's
+# method, and the best of them again. A sweep's end adds one to the answer's.
+POSES = 6
 
 
 class Request(NamedTuple):
@@ -91,14 +91,14 @@ def _values(request: Request, single: bool) -> dict[str, Any]:
     parts = [tables.text(sides, '', request.passive)]
     for tag, axes in inverses.items():
         parts += [tables.text(([], axes), tag), _inverse(mechanism, axes, tag, code.number)]
-    about = [*_about(mechanism), f'A call takes at most {POSES * tables.solutions} poses.']
+    about = [*_about(mechanism), f'A call takes at most {POSES * tables.solutions + 1} poses.']
     whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
     return {
         'about': '\n'.join(f' * {line}' for line in about),
         **formulas.names, 'N': prefix(name), 'float': int(single),
         'own_inputs': len(linkage.inputs), 'own_solutions': tables.solutions,
         'fields': formulas.struct(), 'pose': formulas.function(),
-        'whole': '\n'.join(indented([f'return isfinite({whole});'])),
+        'whole': indented([f'return isfinite({whole});']),
         'enums': '\n'.join(_enum(f'{prefix(name)}_{side}', axes) for side, axes in zip(
             ('ACTUATOR', 'JOINT'), sides)),
         'axes': comment('; '.join(f'{side}: {_with_units(linkage, axes)}' for side, axes in zip(
