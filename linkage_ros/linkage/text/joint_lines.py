@@ -6,16 +6,16 @@ Linkages as text: one line per joint, in the order in which the joints are place
 
 The page "Joint lines" of the documentation explains words and numbers; FORMS has the arguments.
 
-A dyad stays on its side of first -> second as long as it can be assembled, but for change points:
-a dyad between a ground joint and a crank pin stretches or folds just as the crank passes the
-ground line, as the longest and the shortest of the four bars are together as long as the other
-two. There the dyad continues smoothly and changes sides, so a parallelogram stays a
+A dyad stays on its side of first -> second as long as it can be assembled, except at a change
+point. A dyad between a ground joint and a crank pin has one if the longest and the shortest of
+the four bars are together as long as the other two: it stretches or folds just as the crank
+passes the ground line. There it continues smoothly and changes sides, so a parallelogram stays a
 parallelogram; `left` or `right` in its line is the side at a crank angle of a quarter turn. The
-block of a slider on a crank pin continues smoothly, too, where its rod is square to the line;
-`out` or `in` is then the side where the pin is farthest along the line. A linkage with one change
-point in a turn repeats only after two turns, so its crank angle counts beyond a turn. Where an
-arm has no length, what stands on it has the limit from both sides if they agree, as at a change
-point; else it is NaN.
+block of a slider on a crank pin has one where its rod is square to the line, and continues
+smoothly, too; `out` or `in` is then the side where the pin is farthest along the line. A linkage
+with one change point in a turn repeats only after two turns, so its crank angle counts beyond a
+turn. Where an arm has no length, what stands on it has the limit from both sides if they agree,
+as at a change point; else it is NaN.
 """
 
 from __future__ import annotations
