@@ -111,11 +111,11 @@ def guides(axes, mechanism, cycle, unit):
 def straight(curve):
     """Return two points of a curve that is a straight line, else None."""
     curve = curve[np.isfinite(curve).all(axis=1)]
-    if not len(curve):
+    if len(curve) < 2:
         return None
     middle = curve.mean(axis=0)
-    _, sizes, directions = np.linalg.svd(curve - middle, full_matrices=False)
-    return (middle, middle + sizes[0] * directions[0]) if sizes[1] <= MAX_BEND * sizes[0] > 0.0 else None
+    _, (length, width), directions = np.linalg.svd(curve - middle, full_matrices=False)
+    return (middle, middle + length * directions[0]) if width <= MAX_BEND * length > 0.0 else None
 
 
 class Legs:
