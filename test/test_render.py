@@ -220,10 +220,19 @@ def test_a_foot_stands_on_the_lowest_part_of_its_curve():
     assert np.ptp(standing[:, 0]) > 0.7 * np.ptp(curve[:, 0])
 
 
-def test_a_curve_of_several_inputs_is_drawn_if_it_closes():
-    for speed, is_drawn in ((2.0, True), (math.pi, False)):
-        five_bar = mechanism('five_bar', crank2__speed=speed)
-        assert bool(len(Cycle(five_bar).locus(five_bar))) == is_drawn
+def test_a_scribble_is_not_drawn():
+    five_bar = mechanism('five_bar', crank2__speed=math.pi)
+    assert not len(Cycle(five_bar).locus(five_bar)) and picture_of(five_bar, trace='stance')
+
+
+def test_a_curve_ends_where_a_motion_leaves_the_reach():
+    five_bar = mechanism('five_bar', crank2__speed=2.0)
+    curve = Cycle(five_bar).locus(five_bar)
+    assert 0 < np.isnan(curve).sum() < curve.size
+    assert layers.straight(curve) is None and picture_of(five_bar, trace='stance')
+    assert np.nanmin(layers.standing(curve)[:, 1]) == np.nanmin(curve[:, 1])
+    # A line is one at any scale.
+    assert picture_of(mechanism('peaucellier', scale=1e27))
 
 
 def test_any_motion_is_drawn_in_place_of_the_solved_one():
