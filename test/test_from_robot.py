@@ -371,10 +371,11 @@ def undecided(seed):
                          if kind == 2})
 
 
-@pytest.mark.nightly
-def test_a_line_that_is_pasted_leads_on():
+@pytest.mark.parametrize('seeds', [
+    [3, 4, 10], pytest.param(range(120), marks=pytest.mark.nightly)], ids=['', 'more'])
+def test_a_line_that_is_pasted_leads_on(seeds):
     pasted = 0
-    for robot in filter(None, map(undecided, range(120))):
+    for robot in filter(None, map(undecided, seeds)):
         lines, said = [], [answer(robot)]
         while offered := choices('\n'.join([*said[-1], ''])):
             lines.append(offered[-1])
@@ -382,7 +383,7 @@ def test_a_line_that_is_pasted_leads_on():
             assert said[-1] not in said[:-1], said
             pasted += 1
     # Some robots are decided at once, and some refused for good.
-    assert pasted >= 12
+    assert pasted >= max(3, len(seeds) // 10)
 
 
 def refusals():
