@@ -131,8 +131,8 @@ def index() -> str:
 
 {table([''] * SHOWN, rows)}
 
-They are put together from a few [constructions](constructions.md). In the same words any other
-planar linkage can be written down, in a scene or in Python: type `custom`.
+Each is a few [constructions](constructions.md). Any other planar linkage of dyads is written in
+the same words: type `custom`, in [a scene](../tutorial.md) or in Python.
 
 ```{{toctree}}
 :hidden:

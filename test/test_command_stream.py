@@ -109,7 +109,7 @@ def test_what_cannot_be_had_is_held_and_said(stream, capfd):
                (flap(2.6), r'outside crank.sweep \[-1.5, 1.5\]'), (math.inf, ''), (-1e300, ''))
     for value, _ in reasons:
         assert stream.want(['flap'], [value], [0.1])['servo'] == (good[0], 0.0)
-    assert 'flap cannot be -2: lever reaches' in capfd.readouterr().err
+    assert 'flap cannot be -2 (lever at 2.1): lever reaches' in capfd.readouterr().err
     assert stream.want(['flap'], [flap(0.9)])['servo'] == (pytest.approx(0.9, abs=1e-13),)
 
 
@@ -278,7 +278,8 @@ def test_a_trajectory_becomes_that_of_the_actuators(graph, plan):
 
 
 REFUSED = [
-    (['flap'], [([0.0], []), ([4.0], [])], r'point 1: flap cannot be 4: lever reaches \[.*'),
+    (['flap'], [([0.0], []), ([4.0], [])],
+     r'point 1: flap cannot be 4 \(lever at -3.9\): lever reaches \[.*'),
     (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions, and as many velocities or '
      'none, not 2 and 0'),
     (['flap'], [([0.0], [1.0, 2.0])], 'point 0 must have 1 positions, and as many velocities or '

@@ -103,6 +103,20 @@ def test_a_new_dimension_keeps_the_crank_in_its_new_reach(graph):
     assert driver.at(3 * SECOND) == (0.25, 0.0)
 
 
+def test_a_new_dimension_makes_the_crank_turn_twice_before_poses_repeat(graph):
+    # With c = 1.5 the longest and the shortest bar are as long as the other two.
+    bars = {'mechanisms': ['bars'], 'bars.type': 'custom', 'bars.dimensions.c': 1.6,
+            'use_sim_time': True, 'bars.joints': [
+                'O ground 0 0', 'Q ground 3 0', 'A crank O 1', 'B dyad A Q 2.5 c left']}
+    driver = Driver(graph, bars)
+    assert driver.at(SECOND) == (0.0, 1.0) and driver.at(3 * SECOND) == (2.0, 1.0)
+    graph.change(driver.node, bars, bars__dimensions__c=1.5)
+    for now, angle in (6, 5.0), (9, 8.0), (15, approx(14.0 - 2.0 * math.tau, abs=1e-12)):
+        assert driver.at(now * SECOND) == (angle, 1.0)
+    graph.change(driver.node, bars, bars__dimensions__c=1.6)
+    assert driver.at(22 * SECOND)[0] == approx(21.0 % math.tau, abs=1e-12)
+
+
 def test_a_rate_of_0_sends_nothing_until_it_is_changed(graph):
     driver = Driver(graph, {**DROP, 'rate': 0.0})
     timer = next(timer for timer in driver.node.timers if timer.clock == driver.node.get_clock())

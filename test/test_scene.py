@@ -427,7 +427,7 @@ def test_a_sweep_shorter_than_a_step_stands_still(low, high):
     motion = Motion(1.0, (low, high), 0.3)
     for now in (0, 1, 10 ** 18):
         assert low <= motion.at(now)[0] <= high or motion.at(now)[0] == 0.0
-        assert motion.changed(-1.0, (low, high), now).at(now)[0] == motion.at(now)[0]
+        assert motion.changed(-1.0, (low, high), 1, now).at(now)[0] == motion.at(now)[0]
 
 
 @pytest.mark.parametrize('sweep', [None, (-0.5, 0.25)])
@@ -436,16 +436,16 @@ def test_a_change_of_speed_makes_no_jump(sweep, speed):
     motion = Motion(1.0, sweep, 0.1)
     for now in range(0, 10 ** 10, 10 ** 9 // 3):
         angle, velocity = motion.at(now)
-        after, turned = motion.changed(speed, sweep, now).at(now)
+        after, turned = motion.changed(speed, sweep, 1, now).at(now)
         assert after == angle and turned == velocity * speed
 
 
 def test_a_change_of_sweep_goes_on_the_same_way():
     motion = Motion(1.0, (-0.5, 0.25), 0.1)
     for now in range(10 ** 8, 10 ** 10, 10 ** 9 // 3):
-        wider = motion.changed(1.0, (-0.75, 0.5), now)
+        wider = motion.changed(1.0, (-0.75, 0.5), 1, now)
         assert wider.at(now) == pytest.approx(motion.at(now), abs=1e-15)
-        assert motion.changed(1.0, None, now).at(now)[0] == pytest.approx(
+        assert motion.changed(1.0, None, 1, now).at(now)[0] == pytest.approx(
             motion.at(now)[0] % math.tau)
 
 

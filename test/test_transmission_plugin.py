@@ -5,8 +5,9 @@
 """
 Transmissions as a hardware component has them: loaded from a library, configured and called.
 
-The component is `test/ros2_control/component.cpp`, compiled with the header of one package and
-used with the plugins of two. ros2_control itself is a stand-in; the log is that of ROS.
+The component is `test/ros2_control/component.cpp`, compiled into the library of one package with
+the header of the other, and used with the plugins of both. ros2_control itself is a stand-in; the
+log is that of ROS.
 """
 
 from contextlib import nullcontext
@@ -58,16 +59,10 @@ class Plugins:
     """The compiled packages of both scenes, and the component that loads them."""
 
     def __init__(self, folder, compiler='g++', *flags):
-        self.mechanisms, self.libraries, compiling = {}, {}, []
-        made, host = folder / 'robot_transmissions', folder / 'component.so'
-
-        def compile_(source, library, *more):
-            if not library.exists():
-                compiling.append(subprocess.Popen([
-                    compiler, *PLUGIN, *flags, '-shared', '-fPIC', '-I', made / 'include', source,
-                    '-o', library, *more]))
-
-        for name, parameters in (('robot_transmissions', SCENE), ('other_transmissions', OTHER)):
+        self.mechanisms, self.libraries = {}, {}
+        for name, parameters, *more in (
+                ('robot_transmissions', SCENE),
+                ('other_transmissions', OTHER, '-include', STAND_IN / 'component.cpp', '-ldl')):
             mechanisms = scene.read(parameters).mechanisms
             library = folder / f'lib{name}.so'
             for path, text in package(name, 'robot.yaml', [
@@ -75,12 +70,14 @@ class Plugins:
                     for each, mechanism in mechanisms.items()]).items():
                 (folder / name / path).parent.mkdir(parents=True, exist_ok=True)
                 (folder / name / path).write_text(text, encoding='utf-8')
-            compile_(folder / name / 'src' / 'plugins.cpp', library, *ROS)
+            if not library.exists():
+                subprocess.run([
+                    compiler, *PLUGIN, *flags, '-shared', '-fPIC', '-I',
+                    folder / 'robot_transmissions' / 'include',
+                    folder / name / 'src' / 'plugins.cpp', '-o', library, *ROS, *more], check=True)
             self.mechanisms.update(mechanisms)
             self.libraries.update(dict.fromkeys(mechanisms, (library, f'{name}_plugins')))
-        compile_(STAND_IN / 'component.cpp', host, '-ldl')
-        assert [process.wait() for process in compiling] == [0] * len(compiling)
-        self.host = ctypes.CDLL(str(host))
+        self.host = ctypes.CDLL(str(library))
         self.host.component_made.restype = ctypes.c_void_p
         self.host.component_problem.restype = ctypes.c_char_p
 

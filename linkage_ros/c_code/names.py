@@ -4,6 +4,7 @@
 """Names of a scene, with any characters, as C identifiers, comments and texts."""
 
 from importlib.resources import files
+from itertools import chain, count
 import json
 import re
 from typing import Iterable, Mapping
@@ -30,11 +31,11 @@ def filled(template: str, values: Mapping[str, object]) -> str:
 
 def distinct(names: Iterable[str]) -> list[str]:
     """Return names, with a number after those that are there already."""
-    made: list[str] = []
+    made: dict[str, None] = {}
     for name in names:
-        made.append(next(text for text in (name, *(f'{name}_{i}' for i in range(2, 1000)))
-                         if text not in made))
-    return made
+        texts = chain([name], (f'{name}_{i}' for i in count(2)))
+        made[next(text for text in texts if text not in made)] = None
+    return [*made]
 
 
 def constants(names: Iterable[str]) -> list[str]:

@@ -63,9 +63,10 @@ class CrankDriver(scene_node.SceneNode):
             old = self._settings.get(key)
             if old is None or old.start != settings.start:
                 self._motions[key] = Motion.of(settings, now)
-            elif (old.speed, old.sweep) != (settings.speed, settings.sweep):
+            elif old != settings:
+                # A dimension may change the period.
                 self._motions[key] = self._motions[key].changed(
-                    settings.speed, settings.sweep, now)
+                    settings.speed, settings.sweep, settings.input.period, now)
         self._settings = all_settings
         # If several inputs have one source joint, it moves as the last of them.
         sent = {settings.source: (key, settings) for key, settings in all_settings.items()}

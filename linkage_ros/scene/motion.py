@@ -10,6 +10,7 @@ Only the result is rounded, so that errors do not accumulate.
 
 from __future__ import annotations
 
+from copy import copy
 import math
 
 from . import InputSettings
@@ -45,17 +46,17 @@ class Motion:
         Time of the start [ns].
     turns : bool
         Whether the input is an angle, so that `start` may be off by whole turns.
-    period : int
-        Turns after which the value of a full rotation returns to 0.
+    period : float
+        Turns after which the value of a full rotation returns to 0, at most MAX_PERIOD.
 
     """
 
     def __init__(self, speed: float, sweep: Arc | None = None, start: float = 0.0,
-                 since: int = 0, turns: bool = True, period: int = 1):
+                 since: int = 0, turns: bool = True, period: float = 1):
         self._speed = speed
         self._rate, self._forward = _steps(speed, per=10 ** 9), -1 if speed < 0 else 1
         self._sweep = sweep
-        self._turns, self._round = turns, period * TURN
+        self._turns, self._round = turns, int(min(period, MAX_PERIOD)) * TURN
         self._low, high = (0, self._round) if sweep is None else map(_steps, sweep)
         self._width, self._end = high - self._low, high / STEPS
         self._period = self._round if sweep is None else 2 * self._width or 1
@@ -95,13 +96,13 @@ class Motion:
     def of(cls, settings: InputSettings, since: int = 0) -> Motion:
         """Return the motion of an input, which is at its `start` at the time `since` [ns]."""
         return cls(settings.speed, settings.sweep, settings.start, since, settings.input.turns,
-                   int(min(settings.input.period, MAX_PERIOD)))
+                   settings.input.period)
 
-    def changed(self, speed: float, sweep: Arc | None, now: int) -> Motion:
-        """Return a motion with this speed and sweep from this one's value at `now` [ns]."""
-        motion = Motion(speed, sweep, since=now, turns=self._turns, period=self._round // TURN)
+    def changed(self, speed: float, sweep: Arc | None, period: float, now: int) -> Motion:
+        """Return a motion with other settings from this one's value at `now` [ns]."""
+        motion = Motion(speed, sweep, since=now, turns=self._turns, period=period)
         phase = self._phase_at(now)
-        if sweep == self._sweep:
+        if (sweep, motion._round) == (self._sweep, self._round):
             motion._phase = phase
             return motion
         travelled, ahead = self._fold(phase)
@@ -111,8 +112,8 @@ class Motion:
 
     def moved(self, before: int, now: int) -> Motion:
         """Return this motion shifted in time: its value at `before` [ns] becomes that at `now`."""
-        motion = self.changed(self._speed, self._sweep, before)
-        motion._since = now
+        motion = copy(self)
+        motion._since += now - before
         return motion
 
     def _phase_at(self, now: int) -> int:
