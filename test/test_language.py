@@ -10,7 +10,6 @@ import re
 
 from effort import few_calls
 from linkage_ros import mechanisms, scene
-from linkage_ros.linkage import joint_lines
 import numpy as np
 import pytest
 from truth.hostile_texts import mutations, NUMBERS, TEXTS
@@ -267,11 +266,6 @@ def test_what_create_takes_is_no_dimension(name):
 def test_any_other_name_is_for_a_dimension():
     for name in ('lambda', 'type_', 'inf', 'nan', 'e', 'x', 'None', 'a' * 64, 'maximum', 'pi2'):
         assert made(f'P ground {name} 0', **{name: 2.5}).solve(0.0)['P'][0] == 2.5
-
-
-def test_every_construction_says_what_follows_it_in_the_module_s_text():
-    for word in joint_lines.FORMS:
-        assert re.search(rf'^    [A-Z][A-Z ]* {word} ', joint_lines.__doc__, re.MULTILINE), word
 
 
 def test_a_dimension_is_positive_only_where_it_is_the_length_of_a_bar():
