@@ -237,8 +237,16 @@ def test_a_cylinder_is_drawn_from_base_to_rod_and_a_scribble_is_not():
     assert len(Cycle(arm).locus(arm)) > 1
     five_bar = mechanism('five_bar', crank2__speed=math.pi)
     assert not len(Cycle(five_bar).locus(five_bar)) and picture_of(five_bar, trace='stance')
+
+
+def test_a_curve_ends_where_a_motion_leaves_the_reach():
     five_bar = mechanism('five_bar', crank2__speed=2.0)
-    assert len(Cycle(five_bar).locus(five_bar)) > 1
+    curve = Cycle(five_bar).locus(five_bar)
+    assert 0 < np.isnan(curve).sum() < curve.size
+    assert layers.straight(curve) is None and picture_of(five_bar, trace='stance')
+    assert np.nanmin(layers.standing(curve)[:, 1]) == np.nanmin(curve[:, 1])
+    # A line is one at any scale.
+    assert picture_of(mechanism('peaucellier', scale=1e27))
 
 
 def test_any_motion_is_drawn_in_place_of_the_solved_one():

@@ -116,6 +116,7 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({'jansen.branches.C': 2}, 'jansen.branches.C must be .* -1 to 1, not 2'),
     ({'jansen.branches.C': 1.0}, 'jansen.branches.C must be a whole number'),
     ({'jansen.leg_pairs': 0}, 'jansen.leg_pairs must be a whole number from 1 to 50,'),
+    ({'jansen.leg_pairs': 10 ** 400}, 'jansen.leg_pairs must be a whole number from 1 to'),
     ({'jansen.crank.start': 13.0}, 'jansen.crank.start must be .* from -12.5664 to 12.5664,'),
     ({'water_drop.leg_pairs': 2}, 'water_drop.leg_pairs must be 1 and mirrored false: only'),
     ({'water_drop.mirrored': True}, 'water_drop.leg_pairs must be 1 and mirrored false: only'),
