@@ -91,6 +91,7 @@ REFUSED = [
     ('four_bar.urdf', [('"wrist" type="revolute"', '"wrist" type="screw"')],
      'from_robot: Left out: base_link, crank, coupler, rocker: not planar: wrist is a joint of '
      'type screw; as rods in space: wrist close loops that have more than rods in them.\n'),
+    ('four_bar.urdf', [('"wrist" type="revolute"', '"wrist"')], 'wrist is a joint of type none'),
     ('four_bar.urdf', SPHERES, 'not planar: no hinge says in which plane; '),
     ('four_bar.urdf', [('xyz="0.3 0 0"', 'xyz="0 0 0"'), ('xyz="0 0 0.2"', 'xyz="0 0 0"')],
      'all its joints are at one place'),
