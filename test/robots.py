@@ -5,7 +5,7 @@
 
 from contextlib import redirect_stderr, redirect_stdout
 from functools import lru_cache
-from io import StringIO
+from io import BytesIO, StringIO
 import math
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -84,6 +84,24 @@ def published(mechanism, **motors):
                          for link, called in mechanism.joints.items() if called.published}}
 
 
+class Yourdfpy:
+    """A robot of yourdfpy, in Python."""
+
+    def __init__(self, text):
+        library = pytest.importorskip('yourdfpy')
+        self.robot = library.URDF.load(BytesIO(text.encode()), load_meshes=False)
+        self.joints = self.robot.actuated_joint_names
+
+    def places(self, positions, names):
+        """Return where frames are [m], by name, at joint positions."""
+        self.robot.update_cfg({name: float(value) for name, value in positions.items()})
+        return {name: self.seen_from(None, name) for name in names}
+
+    def seen_from(self, base, name):
+        """Return where a frame is now, in another [m]."""
+        return self.robot.get_transform(name, base)[:3, 3]
+
+
 class Pinocchio:
     """A robot of Pinocchio, in C++, read by the parser of ROS."""
 
@@ -93,16 +111,17 @@ class Pinocchio:
         self._data = self._model.createData()
         self.joints = list(self._model.names)[1:]
 
-    def places(self, positions, names, base='universe'):
-        """Return where frames are in another [m], by name, at joint positions."""
+    def places(self, positions, names):
+        """Return where frames are [m], by name, at joint positions."""
         q = self._library.neutral(self._model)
         for name, value in positions.items():
             joint = self._model.joints[self._model.getJointId(name)]
             ends = [value] if joint.nq == 1 else [math.cos(value), math.sin(value)]
             q[joint.idx_q:joint.idx_q + joint.nq] = ends
         self._library.framesForwardKinematics(self._model, self._data, q)
-        base, *frames = (self._data.oMf[self._model.getFrameId(name)] for name in (base, *names))
-        return {name: base.actInv(frame).translation for name, frame in zip(names, frames)}
+        link = self._library.FrameType.BODY
+        return {name: self._data.oMf[self._model.getFrameId(name, link)].translation.copy()
+                for name in names}
 
 
 class MuJoCo:
@@ -157,3 +176,6 @@ def in_frame(pose, point):
     axis = np.array([q.x, q.y, q.z])
     turned = p + 2.0 * np.cross(axis, np.cross(axis, p) + q.w * p)
     return turned + [pose.position.x, pose.position.y, pose.position.z]
+
+
+LIBRARIES = [Yourdfpy, Pinocchio]

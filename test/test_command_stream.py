@@ -96,8 +96,11 @@ def test_outputs_of_several_mechanisms_in_one_message(stream, graph):
 
 def test_the_first_command_is_next_to_where_the_crank_is(stream, graph):
     cranks = graph.publisher(JointState, 'crank_states')
-    for _ in range(3):
-        cranks.publish(JointState(name=['bar_crank'], position=[-2.0]))
+    # As before a controller knows a position.
+    for position in (-2.0, -2.0, math.nan):
+        cranks.publish(JointState(name=['bar_crank'], position=[position]))
+    for servo in (0.0, 0.1, 0.2):
+        stream.want(['flap'], [flap(servo)])
     four_bar = mechanisms.create('four_bar')
     rocker = float(four_bar.joint_angles(-1.9)['QB'])
     assert stream.want(['bar_QB'], [rocker])['bar_crank'] == (pytest.approx(-1.9, abs=1e-9),)

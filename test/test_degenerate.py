@@ -4,6 +4,7 @@
 """Linkages whose bars are alike, whose arms vanish, whose strokes are short, or that end."""
 
 import math
+import tracemalloc
 
 from effort import few_calls
 from linkage_ros import mechanisms
@@ -32,6 +33,23 @@ def test_a_long_chain_is_no_matter_of_recursion():
     ahead, behind = (chain.solve(0.5 + step, ('B119',))['B119'] for step in (1e-7, -1e-7))
     np.testing.assert_allclose(velocity['B119'], (ahead - behind) / 2e-7, rtol=1e-5)
     assert chain.reach() == [(-math.pi, math.pi)]
+
+
+@pytest.mark.nightly
+def test_what_is_asked_again_and_again_does_not_pile_up():
+    five_bar = mechanisms.create('five_bar')
+
+    def ask(first, last):
+        for other in np.linspace(first, last, 60).tolist():
+            five_bar.input_for('P.y', 40.0, others=(other,))
+        return tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        before, after = ask(0.9, 1.0), ask(0.9001, 1.0001)
+    finally:
+        tracemalloc.stop()
+    assert after - before < 500_000
 
 
 def test_a_kite_that_always_lies_flat_has_no_dead_points_of_its_own():

@@ -14,7 +14,7 @@ from linkage_ros.nodes.crank_driver import CrankDriver
 from linkage_ros.nodes.kinematics import Kinematics
 import numpy as np
 import pytest
-from robots import in_frame, Pinocchio
+from robots import in_frame, LIBRARIES, Pinocchio
 from ros_harness import Graph
 from scenes import ROOT
 from sensor_msgs.msg import JointState
@@ -73,8 +73,10 @@ def told():
         return found
 
 
-def test_the_loops_of_the_urdf_are_closed_at_every_pose(told):
-    robot = Pinocchio(URDF)
+@pytest.mark.nightly(all_but=1)
+@pytest.mark.parametrize('library', LIBRARIES)
+def test_the_loops_of_the_urdf_are_closed_at_every_pose(told, library):
+    robot = library(URDF)
     for state in told:
         if len(state) == len(robot.joints):
             places = robot.places(state, [frame for loop in LOOPS for frame in loop])
@@ -106,13 +108,14 @@ def test_gears_have_their_ratios_and_a_partial_message_moves_its_motor_alone(tol
     ('abduction', 'abduction_motor', 'torso'), ('knee', 'knee_motor', 'thigh')])
 def test_markers_stay_on_the_link_that_the_loop_stands_on_wherever_it_is(
         graph, name, motor, base):
-    robot, urdf = Robot(graph), Pinocchio(URDF)
+    robot, urdf = Robot(graph), LIBRARIES[0](URDF)
     drawn = graph.listen(MarkerArray, f'{name}/markers')
     for at in (-4.0, 4.0):
         robot.turn(('abduction_motor', 'hip_motor'), [at, at])
         robot.turn(('knee_motor',), [at])
         *_, pin = (spheres := graph.crank([motor], 'joint_states')([at], drawn).markers[1]).points
-        wanted, = urdf.places(robot.joints, [f'{name}_pin'], base).values()
+        urdf.places(robot.joints, [])
+        wanted = urdf.seen_from(base, f'{name}_pin')
         assert spheres.header.frame_id == base
         assert in_frame(spheres.pose, pin) == pytest.approx(wanted, abs=1e-12)
 

@@ -4,12 +4,14 @@
 """Facts of a robot's file, each as it is read, printed or refused."""
 
 import ast
+from dataclasses import replace
 import math
 from pathlib import Path
 import re
 import shlex
 
 from linkage_ros import mechanisms, scene
+from linkage_ros.cli import RequestError
 from linkage_ros.robot_files import cli, closing, readers
 from linkage_ros.robot_model.cli import main as robot_model
 from linkage_ros.robot_model.robot import posed
@@ -27,7 +29,7 @@ from robots import (
     words,
     written,
 )
-from test_robot_files import CUT, loops_of, robot_of
+from test_robot_files import CUT, loops_of, random_robot, robot_of
 import yaml
 
 FAULTS = yaml.safe_load((ROBOTS / 'faults.yaml').read_text())
@@ -89,6 +91,7 @@ REFUSED = [
     ('four_bar.urdf', [('"wrist" type="revolute"', '"wrist" type="screw"')],
      'from_robot: Left out: base_link, crank, coupler, rocker: not planar: wrist is a joint of '
      'type screw; as rods in space: wrist close loops that have more than rods in them.\n'),
+    ('four_bar.urdf', [('"wrist" type="revolute"', '"wrist"')], 'wrist is a joint of type none'),
     ('four_bar.urdf', SPHERES, 'not planar: no hinge says in which plane; '),
     ('four_bar.urdf', [('xyz="0.3 0 0"', 'xyz="0 0 0"'), ('xyz="0 0 0.2"', 'xyz="0 0 0"')],
      'all its joints are at one place'),
@@ -340,6 +343,48 @@ def test_no_answer_depends_on_the_starts_of_a_search(tmp_path, name, seeds):
     assert all(question in why for why in faults) and bool(faults) == bool(question)
     for seed in seeds:
         assert answer(seed) == (faults, report, pytest.approx(positions, abs=1e-6))
+
+
+def answer(robot, *lines):
+    """Return what is said of a robot with lines that were pasted, as the command reads them."""
+    more = {'--driven': robot.driven, '--pose': [], '--hold': []}
+    for option, *values in lines:
+        more[option] = values if option == '--driven' else more[option] + values
+    robot = posed(replace(robot, driven=more['--driven']), cli.positions(more['--pose']))
+    try:
+        return '', *cli.described(closing.held(robot, cli.positions(more['--hold'])))[1]
+    except RequestError as error:
+        return str(error),
+
+
+def undecided(seed):
+    """Return a random robot with a motor too few or too many, or with its loops open, or None."""
+    made, rng = random_robot(seed), np.random.default_rng(seed)
+    if made is None:
+        return None
+    robot, kind = made[2], rng.integers(3)
+    names = [name for name in robot.positions if not name.startswith('cut')]
+    if kind == 0:
+        robot.driven = robot.driven[1:] + names[:not robot.driven[1:]]
+    if kind == 1:
+        robot.driven = [*dict.fromkeys([*robot.driven, *rng.permutation(names)[:1]])]
+    return posed(robot, {name: float(rng.uniform(-1.5, 1.5)) for name in names
+                         if kind == 2})
+
+
+@pytest.mark.parametrize('seeds', [
+    [3, 4, 10], pytest.param(range(120), marks=pytest.mark.nightly)], ids=['', 'more'])
+def test_a_line_that_is_pasted_leads_on(seeds):
+    pasted = 0
+    for robot in filter(None, map(undecided, seeds)):
+        lines, said = [], [answer(robot)]
+        while offered := choices('\n'.join([*said[-1], ''])):
+            lines.append(offered[-1])
+            said.append(answer(robot, *lines))
+            assert said[-1] not in said[:-1], said
+            pasted += 1
+    # Some robots are decided at once, and some refused for good.
+    assert pasted >= max(3, len(seeds) // 10)
 
 
 def refusals():

@@ -5,11 +5,12 @@
 
 import numpy as np
 import pytest
-from robots import MuJoCo, of_text, words
+from robots import MuJoCo, of_text, Pinocchio, words
 
 pytest.importorskip('mujoco', reason='MJCF is read by MuJoCo: pip install mujoco')
 
 from linkage_ros.robot_files import readers  # noqa: E402
+from linkage_ros.robot_model.urdf import write  # noqa: E402
 
 NAMES = ['a b', 'joint-1', '3', 'Hüfte', 'x&quot;y', "o'k", 'l&#10;e', *'fghimnopq']
 
@@ -54,6 +55,27 @@ class Tree:
                 f'<geom size="0.1"/><site name="{name}" pos="{self._vector()}" '
                 f'euler="{self._vector(50)}"/>'
                 f'{"".join(self._body(depth + 1) for _ in range(rng.integers(3 - depth)))}</body>')
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_a_tree_of_mujoco_is_the_same_tree_as_urdf(tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    tree = Tree(rng)
+    file = of_text(tmp_path / 'tree.xml', tree.text)
+    robot = readers.read(str(file))
+    there = MuJoCo(tree.text)
+    data = there.data
+    for i, body in enumerate(tree.bodies):
+        assert robot.frames[body][:3, 3] == pytest.approx(data.xpos[i + 1], abs=1e-13)
+        assert robot.frames[body][:3, :3].ravel() == pytest.approx(data.xmat[i + 1], abs=1e-13)
+    names = there.joints
+    assert robot.positions == {name: data.joint(name).qpos[0] for name in names}
+    assert robot.driven == [*names[::2], names[1]]
+    positions = dict(zip(names, rng.normal(size=len(names)).tolist()))
+    found = Pinocchio(write(robot)).places(positions, tree.bodies)
+    there.place(positions)
+    for i, place in enumerate(data.xpos[1:]):
+        assert found[tree.bodies[i]] == pytest.approx(place, abs=1e-13)
 
 
 TIES = {

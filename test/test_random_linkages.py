@@ -134,15 +134,15 @@ def test_the_catalogue_with_hard_dimensions_holds(kind, seed, count):
 
 
 # Linkages that broke the rule once, and where.
-AWAY = [side * 10.0 ** power for side in (-1.0, 1.0) for power in range(-15, 0, 4)]
+AWAY = [side * 10.0 ** power for side in (-1.0, 1.0) for power in range(-15, 0, 2)]
 MENDED = {
     **{f'a dyad past the change points of {bars}': ((
         'O ground 0 0', f'Q ground {ground} 0', 'A crank O 1', f'B dyad A Q {bars} {side}'),
-        (-8.0, -3.1, 0.01, 3.2, 10.0))
+        (-8.0, -3.2, -3.1, -0.01, 0.01, 3.1, 3.2, 4.0, 10.0))
        for ground, bars, side in ((4, '2 3', 'left'), (3, '3 1', 'right'), (3, '1 3', 'left'))},
     'a block past a change point': ((
         'O ground 0 0', 'A crank O 1 up', 'B slider A 1 O 30deg out'),
-        (-9.0, -2.2, 1.1, 4.1, 7.0)),
+        (-9.0, -2.2, -2.0, 1.0, 1.1, 4.1, 4.3, 7.0)),
     'crossed bars next to the flat pose': ((
         'A ground 0 0', 'C ground 0 -0.4', 'D crank A 1.9', 'H antiparallelogram A D C'),
         [0.5 * math.pi + away for away in AWAY]),
@@ -151,7 +151,7 @@ MENDED = {
         [0.5 * math.pi + away for away in AWAY]),
     'a kite on a ground line that is short beside the crank': ((
         'O ground 0 0', 'Q ground -0.072 0', 'A crank O 1.871 up', 'B mirror O Q A'),
-        np.linspace(0.5, 0.7, 4)),
+        np.linspace(0.5, 0.7, 10)),
     'a cell of bars that differ by rounding': ((
         'O ground 0 0', 'P ground -1.2 0', 'A crank O 1.2', 'B C D inversor P A 0.5 0.5-1.7e-15'),
         [math.pi + away for away in AWAY]),
@@ -161,7 +161,7 @@ MENDED = {
     'a block on a short bar of a kite': ((
         'A ground 0 0', 'B ground -0.098 0', 'C ground -0.295 0', 'D crank C 1.796 up',
         'E dyad D B 1.202 0.926 left', 'F mirror B C E', 'H slider D 0.7 F along C in'),
-        np.linspace(2.6, 2.7, 4)),
+        np.linspace(2.6, 2.7, 10)),
     'an antiparallelogram on a short diagonal of another': ((
         'A ground 0 0', 'C ground 0 -0.44801715381715446', 'D crank A 0.5078326030776525',
         'E antiparallelogram A D C', 'F antiparallelogram D A E'), (-0.3768893363289174,)),

@@ -158,6 +158,28 @@ def test_hinges_of_which_the_first_is_along_a_rod_are_not_published(tmp_path):
     check_rods(ankle, *imported(file))
 
 
+def test_of_a_rod_on_three_hinges_and_two_the_three_do_not_stay(tmp_path):
+    # Three hinges at one end and two at the other all move: none of the three stays.
+    ankle = turning(1)
+    written = mjcf(ankle, NEAR, [np.eye(3)] * 2)
+    for i, end in enumerate(ankle.ends):
+        first = np.cross(np.subtract(end, ankle.pivots[i]), [1.0, 0.2, 0.1])
+        second = np.cross(np.subtract(end, ankle.pivots[i]), first)
+        pins = ''.join(f'<joint name="eye {i} {k}" axis="{text(axis)}"/>'
+                       for k, axis in enumerate((first, second)))
+        site = f'<site name="pin {i}" pos="{less(end, ankle.second)}"/>'
+        tie = f'<connect site1="eye {i}" site2="pin {i}"/>'
+        assert site in written and tie in written
+        written = written.replace(site, f'<body name="eye {i}" pos="{less(end, ankle.second)}">'
+                                  f'{pins}{LIGHT}</body>').replace(
+            tie, f'<weld body1="rod {i}" body2="eye {i}"/>')
+    _, out, err = printed(of_text(tmp_path / 'robot.xml', written))
+    assert 'in 240 poses' in err and 'Left out' not in err
+    assert 'Not published: pin 0 0, pin 0 1, pin 0 2, pin 1 0, pin 1 1, pin 1 2: ' in err
+    assert all(f'="eye {i} {k}"' in out for i in (0, 1) for k in (0, 1))
+    assert '="pin' not in out and 'hold:=' not in out
+
+
 def limited(folder, seed, limits, **motors):
     """Return the inputs of an ankle, by source, whose motors have limits."""
     written = mjcf(turning(seed), limits)

@@ -1,18 +1,22 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Linkages with masses and closed loops, as MuJoCo has them."""
+"""Linkages with masses and closed loops, as MuJoCo has them, and read back from SDF and MJCF."""
 
 import math
 from xml.etree import ElementTree
 
 from linkage_ros import scene
+from linkage_ros.robot_files import cli as from_robot, readers
 from linkage_ros.robot_model import bodies, mjcf, sdf
 import numpy as np
 import pytest
-from robots import MuJoCo
+from robots import MuJoCo, of_text, published
 from scenes import EXAMPLES
-from test_urdf import drives, in_space, MACHINES, OWN
+from test_urdf import drives, in_space, MACHINES, OWN, posed
+
+# On the way to a change point: the side seen at the start is not the one behind it.
+FOLDS = {'water_drop'}
 
 
 def simulated(name):
@@ -94,6 +98,42 @@ def test_servos_drive_the_linkage_through_the_poses_of_solve(file):
     for one in scene.load(str(file)).mechanisms.values():
         robot = Simulation(mjcf.write(model([one])))
         assert max(follow(one, robot, 2.0)) < 2e-3 * bodies.size(one)
+
+
+@pytest.mark.nightly(all_but=2)
+@pytest.mark.parametrize('form', [sdf, mjcf], ids=['sdf', 'mjcf'])
+@pytest.mark.parametrize('name', some_quick(
+    sorted({*MACHINES, 'excavator', 'parallelogram arm', 'scissor lift', 'rack steering',
+            'Scotch yoke', 'trammel of Archimedes', 'geared five-bar'} - FOLDS),
+    ('jansen', 'boom and arm', 'boxer engine', 'Scotch yoke', 'five-bar with a gear')))
+def test_a_linkage_comes_back_from_its_simulator_s_file(tmp_path, form, name):
+    one = simulated(name)
+    built = model([one])
+    file = of_text(tmp_path / 'robot.xml', form.write(built))
+    robot = readers.read(str(file))
+    given, said, still = from_robot.described(robot)
+    assert not any(line.startswith('Left out') for line in said)
+    # An SDF has its zeros where it starts.
+    zeros = {joint.name: joint.start if form is sdf else 0.0 for joint in built.joints}
+    turns = {joint.name: joint.kind == 'hinge' for joint in built.joints}
+    # Open chains, too, are joints of the whole robot.
+    rest, _ = from_robot.others(robot, scene.read(given).mechanisms, still)
+    mechanisms = scene.read({**given, **rest}).mechanisms.values()
+    # A file has 15 digits: exactly at an end of the reach its linkage may not be assembled.
+    ends = np.ravel(one.first.reach) if len(one.inputs) == 1 else ()
+    for thetas in drives(one, 9):
+        if thetas[0] in ends:
+            continue
+        wanted = {name: value - zeros[name] for name, value in posed(one, thetas)[0].items()}
+        found = {}
+        for each in mechanisms:
+            found.update(published(each, **{
+                drive.source: wanted[drive.source] for drive in each.inputs.values()}))
+        for joint, value in wanted.items():
+            apart = found[joint] - value
+            apart = math.remainder(apart, math.tau) if turns[joint] else apart
+            # At a dead point half of the digits of an angle are in its sine.
+            assert apart == pytest.approx(0.0, abs=1e-7), (joint, thetas)
 
 
 @pytest.mark.parametrize('name', ['engine', 'boom and arm'])

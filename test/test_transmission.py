@@ -16,7 +16,7 @@ import subprocess
 import sys
 from xml.etree import ElementTree
 
-from c_libraries import expected, loaded, outputs, prove, shared, STAND_IN
+from c_libraries import counted, expected, loaded, outputs, prove, shared, STAND_IN
 from c_memories import compiled, memories, Memory, UNWRITTEN
 from linkage_ros import mechanisms, scene
 from linkage_ros.c_code import header, transmission
@@ -182,6 +182,22 @@ def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
         status, (found, *_) = Memory(library, made[i]).send(side, [position])
         assert status & 1 == (expected_ is None)
         assert status or found[0] == pytest.approx(expected_, rel=1e-12, abs=1e-10)
+
+
+def test_a_new_position_takes_one_pose(mechanisms, tmp_path):
+    """Actuators count inputs, and these joints have closed forms."""
+    chosen = [mechanisms[name] for name in ('leg', 'boom', 'beast', 'rocker', 'sled')]
+    library = loaded(tmp_path, counted(memories([*map(header.Request, chosen)])))
+    for mechanism in chosen:
+        memory = Memory(library, mechanism)
+        first, second, *_ = states(mechanism, 4)
+        for inputs in (first, second, first):
+            actuator, _, joint, _ = expected(mechanism, inputs)
+            library.poses_taken()
+            assert memory.send(0, actuator)[0] & 1 == 0 and library.poses_taken() == 1
+            memory.send(0, expected(mechanism, second if inputs is first else first)[0])
+            library.poses_taken()
+            assert memory.send(1, joint)[0] & 1 == 0 and library.poses_taken() == 1
 
 
 @pytest.mark.parametrize('single, step, beyond', [(False, 1e-12, 1e-11), (True, 2e-5, 5e-5)])

@@ -11,7 +11,7 @@ from linkage_ros import mechanisms
 from linkage_ros.robot_model import urdf
 import numpy as np
 import pytest
-from robots import Pinocchio, rotation
+from robots import LIBRARIES, Pinocchio, rotation, Yourdfpy
 from scenes import alone, BOOM, ENGINE
 from truth.cases import CASES
 
@@ -109,13 +109,15 @@ def limits(one):
 
 
 @pytest.mark.nightly(all_but=8)
-@pytest.mark.parametrize('name, count', [
-    *((name, 6) for name in (*MACHINES, *OWN)),
-    *(pytest.param(name, 41, marks=pytest.mark.nightly) for name in MACHINES)])
-def test_every_joint_is_met_and_every_loop_is_closed(name, count):
+@pytest.mark.parametrize('name, library, count', [
+    *((name, Pinocchio, 6) for name in (*MACHINES, *OWN)),
+    *((name, Yourdfpy, 6) for name in ('jansen', 'slotted_lever', 'boxer engine')),
+    *(pytest.param(name, library, 41, marks=pytest.mark.nightly)
+      for name in MACHINES for library in LIBRARIES)])
+def test_every_joint_is_met_and_every_loop_is_closed(name, library, count):
     one = {**MACHINES, **OWN}[name]()
     text = description(one)
-    robot = Pinocchio(text)
+    robot = library(text)
     frames = [link for link in links(text) if not re.search('_link$|^world$', link)]
     near = TOLERANCE * one.scale * one.linkage.longest
     for thetas in drives(one, count):
@@ -180,6 +182,10 @@ def test_a_crank_that_cannot_turn_ends_with_its_reach():
 
 def test_a_crank_of_several_legs_has_no_ends():
     assert limits(mechanism('peaucellier', mirrored=True))['crank'] is None
+
+
+def test_the_model_is_valid():
+    assert Yourdfpy(description(mechanism('jansen', leg_pairs=3))).robot.validate()
 
 
 def test_the_points_that_are_drawn_as_markers_make_no_difference():

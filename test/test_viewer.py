@@ -224,6 +224,8 @@ def test_an_input_is_where_the_last_message_says(graph, show):
     until(lambda: after(1.5) == 1.5)
     after(math.nan)
     assert after(math.inf) == 1.5
+    publisher.publish(JointState(name=['leg_crank', 'nobody'], position=[1.6, 1.0]))
+    until(lambda: crank() == 1.6)
     # A start moves an input only if it is another than before.
     for start in (2.0, math.nextafter(2.0, 0.0)):
         assert crank(output='crank', value=2.0) == 2.0

@@ -242,6 +242,23 @@ def test_a_joint_moved_by_several_inputs_goes_where_it_is_wanted_within_their_en
     assert tip(far)[0] > max(tip(corner)[0] for corner in itertools.product(*within)) - 1e-6
 
 
+@pytest.mark.nightly
+def test_hardly_any_pose_of_a_grid_is_nearer_to_where_several_inputs_move_a_joint():
+    digger, _ = mechanism_of('excavator', **DOUBLE)
+    within = [drive.ends for drive in digger.inputs.values()]
+    (low, high), rng = np.transpose(within), np.random.default_rng(1)
+    grid = np.stack(np.meshgrid(*np.linspace(low, high, 41).T)).reshape(3, -1)
+    reached = tip_of(digger, [*grid])
+    worse = 0
+    for want in np.nanmean(reached, axis=0) + rng.normal(size=(60, 2)) * 8.0:
+        start = rng.uniform(low, high).tolist()
+        found, _ = poses.reached(digger, start, {'joint': 'T', 'place': want.tolist()})
+        nearest = np.nanmin(np.hypot(*(reached - want).T))
+        worse += math.dist(tip_of(digger, found), want) > nearest + 0.02
+    assert worse < 8
+
+
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('type_, joint, arcs', [
     ('jansen', 'G', [(-math.pi, math.pi)]), ('jansen', 'C', [(0.5, 2.0)]),
     ('peaucellier', 'C', None), ('water_drop', 'P', [(-1.0, 0.25)])])
