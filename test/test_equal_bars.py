@@ -33,19 +33,19 @@ def hold(design):
     assert not found or not found[0], found[0][0]
 
 
-@pytest.mark.nightly(all_but=5)
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('word, size', [*itertools.product(FOLDED, SIZES)])
 def test_what_stands_on_an_arm_of_no_length_has_the_limit(word, size):
     hold(folded(word, size))
 
 
-@pytest.mark.nightly(all_but=3)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('seed', range(300))
 def test_random_linkages_of_equal_bars_have_limits_and_nothing_infinite(seed):
     hold(random_linkages.equal_bars(np.random.default_rng(seed)))
 
 
-@pytest.mark.nightly(all_but=2)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('kind', mechanisms.TYPES)
 def test_the_catalogue_with_pairwise_equal_bars_has_limits_and_nothing_infinite(kind):
     own = mechanisms.create(kind)

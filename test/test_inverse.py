@@ -35,7 +35,7 @@ def inside(linkage, rng, count):
     return np.array([rng.uniform(*arcs[rng.integers(len(arcs))]) for _ in range(count)])
 
 
-@pytest.mark.nightly(all_but=4)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('kind', KINDS)
 @pytest.mark.parametrize('values', [2, 40], ids=['floats', 'arrays'])
 def test_every_answer_is_right_to_the_last_digits(kind, values):

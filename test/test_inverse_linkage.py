@@ -152,6 +152,7 @@ def test_the_rate_next_to_an_end_is_not_that_of_a_mode_that_ends_there():
     assert rates[0] == pytest.approx(float(cell.joint_rates(at, ('DC',))['DC']), rel=0.05)
 
 
+@pytest.mark.nightly(all_but=6)
 @pytest.mark.parametrize('limited', [False, True])
 @pytest.mark.parametrize('kind, outputs', [
     ('four_bar', ('QB',)), ('jansen', ('G.x',)), ('slotted_lever', ('lever',)),

@@ -227,6 +227,7 @@ def test_in_single_precision_solutions_next_to_a_dead_point_are_there():
     np.testing.assert_allclose(found, cranks, atol=1e-3)
 
 
+@pytest.mark.nightly(all_but=4)
 @pytest.mark.parametrize('kind', INVERSES)
 def test_all_modes_are_all_solutions(kind, strict):
     values, _ = questions(kind, 40)

@@ -49,7 +49,7 @@ def answers(linkage):
     return b''.join(map(bits, values))
 
 
-@pytest.mark.nightly(all_but=15)
+@pytest.mark.nightly(all_but=10)
 @pytest.mark.parametrize('way', WAYS)
 @pytest.mark.parametrize('name', LINKAGES)
 def test_a_copy_answers_the_same(name, way):

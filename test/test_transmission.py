@@ -248,6 +248,7 @@ def test_a_singular_pose_is_said(library, mechanisms):
     assert status == 2 and velocity == 0.0
 
 
+@pytest.mark.nightly(all_but=5)
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_nothing_that_comes_in_gets_out_as_no_number(library, mechanisms, name):
     mechanism, rng = mechanisms[name], np.random.default_rng(4)
