@@ -29,7 +29,7 @@ ROS = next(([f'-isystem{include}', f'-L{prefix}/lib', '-lrcutils', f'-Wl,-rpath,
             for include in (f'{prefix}/include/rcutils', f'{prefix}/include')
             if Path(include, 'rcutils', 'logging_macros.h').is_file()), [])
 COMPILER = shutil.which('cc') or shutil.which('gcc')
-SANITIZED = ('-g', '-O1', '-fsanitize=address,undefined', '-fno-sanitize-recover=all')
+SANITIZED = ('-g', '-O0', '-fsanitize=address,undefined', '-fno-sanitize-recover=all')
 STRICT = ('-Wall', '-Wextra', '-Wpedantic', '-Wconversion', '-Wshadow', '-Werror')
 # For what is written for ros2_control.
 PLUGIN = ('-std=c++17', *STRICT, '-isystem', STAND_IN / 'include', *ROS)

@@ -441,13 +441,15 @@ def test_joint_limits_are_those_of_all_poses(capsys, path):
 
 
 def test_joint_limits_can_be_commanded(capsys, tmp_path):
-    for path in ('examples/leg.yaml', 'config/slotted_lever.yaml'):
-        limits = limits_of(capsys, ROOT / path)
-        for name, mechanism in scene.load(ROOT / path).mechanisms.items():
-            (tmp_path / name).mkdir()
-            library, (joint,) = compiled(tmp_path / name, [mechanism]), joints(mechanism)
-            assert [Memory(library, mechanism).send(1, [end])[0] & 1
-                    for end in limits[joint.name]] == [0, 0]
+    limits, mechanisms = {}, []
+    for path in (ROOT / 'examples' / 'leg.yaml', ROOT / 'config' / 'slotted_lever.yaml'):
+        limits |= limits_of(capsys, path)
+        mechanisms += scene.load(path).mechanisms.values()
+    library = compiled(tmp_path, mechanisms)
+    for mechanism in mechanisms:
+        joint, = joints(mechanism)
+        assert [Memory(library, mechanism).send(1, [end])[0] & 1
+                for end in limits[joint.name]] == [0, 0]
 
 
 @pytest.mark.parametrize('name, more, limits', [
