@@ -4,6 +4,7 @@
 """Linkages as C: compiled without a warning, and solved to the same numbers as in Python."""
 
 import ctypes
+from functools import cache
 import math
 import re
 import shutil
@@ -32,10 +33,12 @@ SCENE = {
     # It has a reach in two parts.
     'cam.type': 'custom', 'cam.joints': [
         'O ground 0 0', 'Q ground 2 0', 'A crank O 1.0', 'B dyad A Q 0.4 1.8 left']}
+# Outputs with an inverse, and linkages that have them in the library of poses, too.
 OUTPUTS = {'slotted_lever': ('lever', 'A.x'), 'four_bar': ('QB', 'distance(O,B)'),
            'jansen': ('G.x', 'angle(A,G)'), 'whitworth': ('lever', 'block'),
            'peaucellier': ('PB', 'BC'), 'slider_crank': ('block',),
            'boom': ('B.x', 'angle(O,B)')}
+POSED = {name: OUTPUTS[name] for name in ('slotted_lever', 'four_bar', 'boom')}
 CALLER = """
 int {name}_posed(const {number} *q, {name}_pose *p)
 {{
@@ -49,7 +52,7 @@ def fields(mechanism):
     """Return the outputs that are the fields of a mechanism's pose in C."""
     linkage = mechanism.linkage
     return list(dict.fromkeys([*(f'{joint}.{axis}' for joint in linkage.points for axis in 'xy'),
-                               *linkage.joints, *OUTPUTS.get(mechanism.name, ())]))
+                               *linkage.joints, *POSED.get(mechanism.name, ())]))
 
 
 def compiled(folder, mechanisms, single=False):
@@ -57,7 +60,7 @@ def compiled(folder, mechanisms, single=False):
     text = ''
     for mechanism in mechanisms:
         counted = range(len(mechanism.inputs))
-        text += header.written(mechanism, OUTPUTS.get(mechanism.name, ()), single) + CALLER.format(
+        text += header.written(mechanism, POSED.get(mechanism.name, ()), single) + CALLER.format(
             name=mechanism.name, number='float' if single else 'double',
             given=', '.join(f'q[{k}]' for k in counted),
             places=', '.join(f'p + {k + 1}' for k in counted))
@@ -278,9 +281,9 @@ def test_a_scene_file_is_printed_as_c(capsys):
     assert printed.count('\n#define LINKAGE_ROS_LINKAGE_H\n') == 1
 
 
-@pytest.fixture(scope='module')
-def named(tmp_path_factory):
-    """Return a folder of C files of linkages with any names and loads: double.c and float.c."""
+@cache
+def named(number):
+    """Return the headers of linkages with any names and loads."""
     base, bars = ['O ground 0 0', 'Q ground 1 0'], [
         'A crank O 0.3', 'B dyad A Q 1 0.6 left', 'C rigid A B 0.6 0.6 left']
     lines = {
@@ -298,30 +301,27 @@ def named(tmp_path_factory):
                   f'{name}.loads': loads.get(name, [])}
     outputs = {'Arm': ['Arm_Tip', 'angle(Arm,Tip)', 'Arm_Tip'], 'm0': ['q'], 'm1': ['A.x'],
                'l0': ['QB'], 'l1': ['B.y'], 'l2': ['C.x']}
-    folder = tmp_path_factory.mktemp('names')
-    for number in ('double', 'float'):
-        text = header.printed([header.Request(mechanism, outputs.get(name, ())) for name, mechanism
-                               in scene.read(given).mechanisms.items()], number == 'float')
-        assert 'Arm_crank_for_angle_Arm_Tip_2(' in text and 'slide_x_2;' in text
-        # A compiler does not warn of what a header that is included does not use.
-        (folder / f'{number}.h').write_text(text)
-        (folder / f'{number}.c').write_text(
-            f'#include "{number}.h"\nint main(void) {{ return 0; }}\n')
-    return folder
+    text = header.printed([header.Request(mechanism, outputs.get(name, ())) for name, mechanism
+                           in scene.read(given).mechanisms.items()], number == 'float')
+    assert 'Arm_crank_for_angle_Arm_Tip_2(' in text and 'slide_x_2;' in text
+    return text
 
 
-@pytest.mark.nightly(all_but=4)
-@pytest.mark.parametrize('number', ['double', 'float'])
+@pytest.mark.parametrize('number', [
+    'double', pytest.param('float', marks=pytest.mark.nightly)])
 @pytest.mark.parametrize('compiler, language', [pytest.param(
     compiler, language, marks=pytest.mark.skipif(
         not shutil.which(compiler), reason=f'{compiler} is not installed'))
     for compiler, language in (('gcc', 'c99'), ('g++', 'c++17'), ('clang', 'c99'),
                                ('clang++', 'c++17'), ('tcc', 'c99'))])
-def test_names_and_loads_compile_without_a_warning(named, tmp_path, number, compiler, language):
+def test_names_and_loads_compile_without_a_warning(tmp_path, number, compiler, language):
+    # A compiler does not warn of what a header that is included does not use.
+    (tmp_path / 'names.h').write_text(named(number))
+    (tmp_path / 'code.c').write_text('#include "names.h"\nint main(void) { return 0; }\n')
     ended = subprocess.run([
         compiler, *(['-c', '-o', tmp_path / 'code.o'] if compiler == 'tcc' else [
             '-fsyntax-only', '-x', language.rstrip('179')]),
-        f'-std={language}', *STRICT, named / f'{number}.c'], capture_output=True, text=True)
+        f'-std={language}', *STRICT, tmp_path / 'code.c'], capture_output=True, text=True)
     assert not ended.returncode, ended.stderr[:2000]
 
 

@@ -183,6 +183,7 @@ def test_a_crank_of_several_legs_has_no_ends():
     assert limits(mechanism('peaucellier', mirrored=True))['crank'] is None
 
 
+@pytest.mark.nightly
 def test_the_model_is_valid():
     assert Yourdfpy(description(mechanism('jansen', leg_pairs=3))).robot.validate()
 
