@@ -237,17 +237,20 @@ def constructions(design):
 
 
 def construction_page() -> str:
-    """Return the page of the constructions: the words for them, and their formulas."""
-    _, *rules = doc_blocks(joint_lines.__doc__)
+    """Return the page of the constructions: how they pass change points, and their formulas."""
+    _, _, change_points = doc_blocks(joint_lines.__doc__)
     intro = '\n\n'.join(doc_blocks(planar.__doc__))
     sections = '\n\n'.join(f'### {word}\n\n' + '\n\n'.join(doc_blocks(function.__doc__))
                            for word, function in FORMULAS.items())
     return f"""\
 # Constructions
 
-A linkage is written down joint by joint, one line each:
+[Joint lines](../which-word.md) explains the words.
 
-{chr(10).join(block + chr(10) for block in rules)}
+## Change points
+
+{change_points}
+
 ## Formulas
 
 {intro}

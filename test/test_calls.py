@@ -5,6 +5,7 @@
 
 from enum import Enum
 import math
+import sys
 
 from effort import calls
 from linkage_ros import mechanisms, scene
@@ -149,6 +150,11 @@ def test_a_path_starts_next_to_an_input_of_zero(bars):
     for near in (math.nan, math.inf):
         with pytest.raises(ValueError, match='near must be finite'):
             inverse.path([np.array([value])], near)
+
+
+def test_nothing_leads_to_a_value_whose_distance_is_infinite():
+    drop = mechanisms.create('water_drop')
+    assert math.isnan(drop.inverse('P.x').follow([sys.float_info.max], [0.3])[0][0])
 
 
 # --- what is printed ---

@@ -190,6 +190,19 @@ def test_what_a_follower_refused_is_followed_with_the_value_that_it_waits_for(gr
     assert (of(service, e), of(service, b)) == (700.0, 170.0)
 
 
+@pytest.mark.parametrize('pairs, allowing, allowed', [
+    (2, {'leg__leg_pairs': 1, 'leg__mirrored': False}, {'leg__loads': ['G=0 -9.81']}),
+    (1, {'leg__only_named': True}, {'drop__joint_names': ['AB=leg_BC']})])
+def test_what_another_value_has_made_valid_is_followed(graph, pairs, allowing, allowed):
+    legs = {'mechanisms': ['leg', 'drop'], 'leg.type': 'jansen', 'leg.leg_pairs': pairs,
+            'drop.type': 'water_drop'}
+    service, owner = (graph.start(kind, legs) for kind in (ServoInverse, Kinematics))
+    assert not graph.set(owner, **allowed).successful
+    for values in allowing, allowed, {'leg__scale': 0.5}:
+        assert graph.set(owner, **values).successful
+    graph.until(lambda: of(service, 'leg.scale') == 0.5)
+
+
 def test_a_second_node_of_the_same_name_is_noticed_once(graph, warned):
     timers = [hastened(graph.start(CrankDriver, LEVER, namespace=namespace),
                        scene_node.NAMESAKE_CHECK_PERIOD_S) for namespace in ('', 'other', '')]

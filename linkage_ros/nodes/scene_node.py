@@ -60,7 +60,8 @@ class SceneNode(Node):
     A subclass overrides `check`, `prepare` and `adopt`, and calls `begin` last in its constructor.
     A change of parameters is validated and answered at once; a worker thread prepares the changed
     scene, then the node adopts it. If further changes arrive meanwhile, only the newest scene is
-    prepared. Raises SceneError if the initial parameters are invalid.
+    prepared. Raises SceneError if the initial parameters are invalid. Its executor must have one
+    thread.
     """
 
     # What the node does, for its first log message.

@@ -84,8 +84,8 @@ class Trace:
 
 def standing(curve):
     """Return a foot's curve (n, 2), NaN where the foot is not on the ground."""
-    height = curve[:, 1] - curve[:, 1].min()
-    return np.where(height[:, None] <= STANCE_HEIGHT * height.max(), curve, np.nan)
+    height = curve[:, 1] - np.fmin.reduce(curve[:, 1])
+    return np.where(height[:, None] <= STANCE_HEIGHT * np.fmax.reduce(height), curve, np.nan)
 
 
 def guides(axes, mechanism, cycle, unit):
@@ -110,11 +110,12 @@ def guides(axes, mechanism, cycle, unit):
 
 def straight(curve):
     """Return two points of a curve that is a straight line, else None."""
-    if not len(curve):
+    curve = curve[np.isfinite(curve).all(axis=1)]
+    if len(curve) < 2:
         return None
     middle = curve.mean(axis=0)
-    _, sizes, directions = np.linalg.svd(curve - middle, full_matrices=False)
-    return (middle, middle + directions[0]) if sizes[1] <= MAX_BEND * sizes[0] > 0.0 else None
+    _, (length, width), directions = np.linalg.svd(curve - middle, full_matrices=False)
+    return (middle, middle + length * directions[0]) if width <= MAX_BEND * length > 0.0 else None
 
 
 class Legs:

@@ -152,7 +152,7 @@ class Field:
             return False
         if self.low is None or self.high is None:
             return True
-        return self.low <= value <= self.high or any(
+        return self.low <= value <= self.high or isinstance(value, float) and any(
             math.isclose(value, end, rel_tol=RANGE_TOLERANCE) for end in (self.low, self.high))
 
 

@@ -45,10 +45,11 @@ DIMENSION = Field('double', 'Dimension {0} of the {1}, before scale [{unit}].', 
 BRANCH = Field('integer', 'Assembly sign {0} of the {1}; 0: the default.', -1, 1,
                group='branches')
 SCALE = Field('double', 'Factor of every length.', default=1.0, positive=True)
+# The inverse uses no legs and no `only_named`, but loads and names are valid or not by them.
 LEG_PAIRS = Field('integer', 'Legs on one side of the crank, evenly spread over its turn.', 1, 50,
-                  default=1, readers=(KINEMATICS,))
+                  default=1, readers=(KINEMATICS, INVERSE))
 MIRRORED = Field('bool', 'Whether each leg has a mirror image on the other side; '
-                 'default: with more than one pair.', readers=(KINEMATICS,))
+                 'default: with more than one pair.', readers=(KINEMATICS, INVERSE))
 POINTS = Field('string_array', 'Joints that markers display.', readers=(KINEMATICS,),
                holds=is_distinct, rule='each once')
 POSE = Field('double_array', "Pose of the linkage's plane in frame_id: "
@@ -65,7 +66,7 @@ JOINT_NAMES = Field(
     default=(), readers=(KINEMATICS, INVERSE),
     rule="such as 'BC=left_shin', or 'EF=-left_ankle+0.35' for 0.35 minus its position")
 ONLY_NAMED = Field('bool', 'Whether only the joints in joint_names are published.', default=False,
-                   readers=(KINEMATICS,))
+                   readers=(KINEMATICS, INVERSE))
 LOADS = Field('string_array', "Loads that the inputs balance, in the linkage's plane.",
               default=(), readers=(KINEMATICS, INVERSE),
               rule="such as 'C=0 -9.81', a force [N] at a joint, or 'EF=2.5', a moment [N m]")

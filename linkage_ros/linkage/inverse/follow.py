@@ -36,9 +36,9 @@ def follow(problem: InverseProblem, values: Sequence[float], seed: Sequence[floa
            source: object) -> Row | None:
     """Return the solution, with the whole turns of `seed`, and its rates; None if none."""
     start = problem.newton.at(*seed, *values)
-    if not start[0] < math.inf:
-        return None
     residuals = [residual * scale for residual, scale in zip(start[2:], problem.scales)]
+    if not all(map(math.isfinite, (start[0], *residuals))):
+        return None
     if not isinstance(source, Segments):
         side = _side(start[-problem.n ** 2:])
         return _followed(problem, values, residuals, seed, side, HALVINGS) if side else None

@@ -15,7 +15,7 @@ Linkages in space as text: hinges with axes anywhere, and rods with ball ends.
 Each line except those of rods and cylinders adds a link to an earlier link or to the `ground`. All
 points [m] and axes are those of one drawing, in the frame of the ground. In that drawing every
 angle and slide is zero; they are positive about and along the axis. A rod is as long as drawn
-unless it ends in `length LENGTH`. Numbers are written as in `linkage.joint_lines`.
+unless it ends in `length LENGTH`. Numbers are written as in joint lines.
 
 Rods place the joints that are not driven, in any order that is possible. One rod places one hinge
 or slide, on the side on which the rod is drawn. Two rods place two hinges in a row, which both
