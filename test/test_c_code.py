@@ -310,13 +310,13 @@ def named(tmp_path_factory):
     return folder
 
 
-@pytest.mark.nightly(all_but=5)
+@pytest.mark.nightly(all_but=4)
+@pytest.mark.parametrize('number', ['double', 'float'])
 @pytest.mark.parametrize('compiler, language', [pytest.param(
     compiler, language, marks=pytest.mark.skipif(
         not shutil.which(compiler), reason=f'{compiler} is not installed'))
     for compiler, language in (('gcc', 'c99'), ('g++', 'c++17'), ('clang', 'c99'),
                                ('clang++', 'c++17'), ('tcc', 'c99'))])
-@pytest.mark.parametrize('number', ['double', 'float'])
 def test_names_and_loads_compile_without_a_warning(named, tmp_path, number, compiler, language):
     ended = subprocess.run([
         compiler, *(['-c', '-o', tmp_path / 'code.o'] if compiler == 'tcc' else [

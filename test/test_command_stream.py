@@ -96,8 +96,11 @@ def test_outputs_of_several_mechanisms_in_one_message(stream, graph):
 
 def test_the_first_command_is_next_to_where_the_crank_is(stream, graph):
     cranks = graph.publisher(JointState, 'crank_states')
-    for _ in range(3):
-        cranks.publish(JointState(name=['bar_crank'], position=[-2.0]))
+    # As before a controller knows a position.
+    for position in (-2.0, -2.0, math.nan):
+        cranks.publish(JointState(name=['bar_crank'], position=[position]))
+    for servo in (0.0, 0.1, 0.2):
+        stream.want(['flap'], [flap(servo)])
     four_bar = mechanisms.create('four_bar')
     rocker = float(four_bar.joint_angles(-1.9)['QB'])
     assert stream.want(['bar_QB'], [rocker])['bar_crank'] == (pytest.approx(-1.9, abs=1e-9),)
@@ -282,8 +285,6 @@ REFUSED = [
      r'point 1: flap cannot be 4 \(lever at -3.9\): lever reaches \[.*'),
     (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions, and as many velocities or '
      'none, not 2 and 0'),
-    (['flap'], [([0.0], [1.0, 2.0])], 'point 0 must have 1 positions, and as many velocities or '
-     'none, not 1 and 2'),
     (['flap', 'wing'], [([0.0, 0.0], [])], 'no output is called wing; an output is called '
      '<mechanism>_<link>, <mechanism>_<joint>.x, or as joint_names has it'),
     (['flap', 'lever_A.x'], [([0.0, 0.0], [])],
@@ -291,12 +292,10 @@ REFUSED = [
     (['flap', 'flap'], [([0.0, 0.0], [])], 'joint_names has a name twice'),
     ([], [([], [])], 'joint_names is empty: name at least one output'),
     (['flap'], [([0.0], [math.nan])], 'point 0: a velocity must be finite'),
-    (['flap'], [([0.0], [1.0]), ([0.1], [math.inf])], 'point 1: a velocity must be finite'),
     (['flap'], [([0.1 - math.asin(80.0 / 150.0)], [0.0]), ([0.1], [])] * 2,
      'point 0: flap cannot be .*'),
     (['bar_A.x'], [([40.0], [0.1])],
      'point 0: the motion of bar_A.x reverses there; its speed must be zero'),
-    (['bar_A.x'], [([1e3], [])], 'point 0: bar_A.x cannot be 1000: .*'),
     (['flap'], [([math.nan], [])], 'point 0: flap cannot be nan: a value must be finite'),
     (['flap'], [([0.1], [])] * 10_001, 'it has 10001 points; send up to 10000'),
     *((['flap'], [([0.1], [], time) for time in times], reason) for times, reason in (

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import sys
 from textwrap import wrap
@@ -52,17 +51,13 @@ class Code:
         self.number, suffix = ('float', 'f') if single else ('double', '')
         # Tolerances have the rounding of the type.
         self._rounding: Mapping[Any, float] = IN_SINGLE if single else {}
-        templates = {operation: row.c.replace('{f}', suffix).replace('{name}', 'lkr')
-                     for operation, row in OPERATIONS.items()} | {'atan2': 'lkr_angle({}, {})'}
         self._dialect = Dialect({
-            operation: code if code.startswith('(') else _Call(code)
-            for operation, code in templates.items()}, {}, lambda value:
+            operation: row.c if row.c.startswith('(') else _Call(row.c.replace('{f}', suffix))
+            for operation, row in OPERATIONS.items()}, {}, lambda value:
                 self.literal(self._rounding.get(value, value)))
 
     def literal(self, value: float) -> str:
         """Return a number in C."""
-        if math.isnan(value):
-            return 'LKR_NAN'
         if abs(value) > (3.4e38 if self.single else sys.float_info.max):
             return '-INFINITY' if value < 0.0 else 'INFINITY'
         if not self.single:

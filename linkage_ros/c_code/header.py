@@ -10,12 +10,13 @@ library's sine, cosine and arctangent. What all mechanisms have in common is `li
 
 from __future__ import annotations
 
+import re
 from typing import Any, Iterator, NamedTuple, Sequence
 
 from .axes import actuators, Axis, axis, invertible, joints, loads
 from .code import Code, indented
 from .formulas import Formulas
-from .names import comment, constants, distinct, field, filled, prefix, template
+from .names import comment, distinct, field, filled, prefix, template
 from .tables import Tables
 from ..linkage import Mechanism
 from ..scene import SceneMechanism
@@ -150,8 +151,10 @@ def _about(mechanism: SceneMechanism) -> Iterator[str]:
 
 
 def _enum(start: str, axes: Sequence[Axis]) -> str:
-    return 'enum { ' + ', '.join(f'{start}_{name} = {i}' for i, name in enumerate(
-        constants(each.name for each in axes))) + ' };'
+    """Return the constants of axes, whose names may have any characters."""
+    ends = distinct(re.sub(r'[^A-Z0-9]+', '_', each.name.upper()).strip('_') or 'UNNAMED'
+                    for each in axes)
+    return f'enum {{ {", ".join(f"{start}_{end} = {i}" for i, end in enumerate(ends))} }};'
 
 
 def _with_units(linkage: Mechanism, axes: Sequence[Axis]) -> str:

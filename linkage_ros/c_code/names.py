@@ -38,12 +38,6 @@ def distinct(names: Iterable[str]) -> list[str]:
     return [*made]
 
 
-def constants(names: Iterable[str]) -> list[str]:
-    """Return names as ends of upper-case C constants, each distinct."""
-    return distinct(re.sub(r'[^A-Z0-9]+', '_', name.upper()).strip('_') or 'UNNAMED'
-                    for name in names)
-
-
 def prefix(name: str) -> str:
     """Return the prefix of a mechanism's constants: different for arm, Arm and ARM."""
     return name.upper() if name.islower() else f'{name}_' if name.isupper() else name

@@ -104,7 +104,8 @@ class ServoInverse(scene_node.SceneNode):
             message.name[:len(message.position)], 1) if name in self._sources]
 
     def _receive(self, routes: list[tuple[str, int]], _: bytes, numbers: Sequence[Any]) -> None:
-        self._positions.update((name, numbers[index]) for name, index in routes)
+        self._positions.update((name, numbers[index]) for name, index in routes
+                               if math.isfinite(numbers[index]))
 
 
 def solve(inverse: InverseRequest, request: Any, response: Any) -> None:

@@ -103,7 +103,9 @@ class SceneView:
         # Subscriptions and clients of services by name, feeds of markers by topic.
         self._entities: dict[str, Any] = {}
         self._feeds: dict[str, Feed] = {}
-        # The last position by topic, then by joint, from the executor's thread.
+        # The source joints of all mechanisms; the last position by topic, then by source joint,
+        # from the executor's thread.
+        self._sources: set[str] = set()
         self._positions: dict[str, dict[str, float]] = defaultdict(dict)
 
     def add(self, client: Any) -> None:
@@ -331,7 +333,9 @@ class SceneView:
             # What a node announces may be no scene.
             with suppress(SceneError):
                 nodes = self._read(owner)
-                for name in self._scenes[owner].mechanisms:
+                for name, mechanism in self._scenes[owner].mechanisms.items():
+                    self._sources.update(
+                        settings.source for settings in mechanism.inputs.values())
                     key = f'{_space(owner)}/{name}'
                     self._mechanisms[key] = ShownMechanism(key, name, owner, sources, nodes)
                     wanted.update(dict.fromkeys(sources, self._follow))
@@ -382,7 +386,7 @@ class SceneView:
         def store(message: JointState) -> None:
             self._positions[topic].update(
                 (name, position) for name, position in zip(message.name, message.position)
-                if math.isfinite(position))
+                if name in self._sources and math.isfinite(position))
 
         return self._node.create_subscription(JointState, topic, store, NEWEST)
 
