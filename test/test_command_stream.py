@@ -131,6 +131,14 @@ def test_two_outputs_of_one_input_and_a_name_of_nobody_are_said(stream, capfd):
     assert 'no output is called boom' in said
 
 
+def test_two_outputs_of_one_motor_are_said_and_the_first_is_commanded(graph, capfd):
+    stream = Stream(graph, {**LEVER, 'bar.crank.source': 'servo'})
+    stream.want(['flap', 'bar_QB'], [flap(0.7), 1.2])
+    command = stream.commands[-1]
+    assert command.name == ['servo'] and command.position[0] == pytest.approx(0.7, abs=1e-13)
+    assert 'flap and bar_QB are moved by one motor, servo: name one' in capfd.readouterr().err
+
+
 def test_of_a_name_twice_the_last_counts_as_in_crank_states(stream):
     assert stream.want(['flap', 'bar_QB', 'flap'], [flap(0.2), 1.2, flap(0.7)])['servo'] == (
         pytest.approx(0.7, abs=1e-13),)

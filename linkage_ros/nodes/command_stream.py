@@ -141,9 +141,14 @@ class CommandStream:
                     raise ValueError(f'{name} has {n} inputs: name {n} of its outputs, not '
                                      f'{called}')
                 indices, joints, published = zip(*outputs[:n])
-                targets.append(Target(
+                target = Target(
                     ' and '.join(elided(names[index]) for index in indices), mechanism,
-                    InverseRequest(mechanism, joints), indices, published))
+                    InverseRequest(mechanism, joints), indices, published)
+                for other in targets:
+                    if shared := {*target.actuators} & {*other.actuators}:
+                        raise ValueError(f'{other.named} and {called} are moved by one motor, '
+                                         f'{listed(sorted(shared))}: name one of them')
+                targets.append(target)
             except ValueError as error:
                 reasons.append(str(error))
         return targets, reasons
