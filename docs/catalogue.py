@@ -131,8 +131,8 @@ def index() -> str:
 
 {table([''] * SHOWN, rows)}
 
-They are put together from a few [constructions](constructions.md). In the same words any other
-planar linkage can be written down, in a scene or in Python: type `custom`.
+Each is a few [constructions](constructions.md). Any other planar linkage of dyads is written in
+the same words: type `custom`, in [a scene](../tutorial.md) or in Python.
 
 ```{{toctree}}
 :hidden:
@@ -237,17 +237,20 @@ def constructions(design):
 
 
 def construction_page() -> str:
-    """Return the page of the constructions: the words for them, and their formulas."""
-    _, *rules = doc_blocks(joint_lines.__doc__)
+    """Return the page of the constructions: how they pass change points, and their formulas."""
+    _, _, change_points = doc_blocks(joint_lines.__doc__)
     intro = '\n\n'.join(doc_blocks(planar.__doc__))
     sections = '\n\n'.join(f'### {word}\n\n' + '\n\n'.join(doc_blocks(function.__doc__))
                            for word, function in FORMULAS.items())
     return f"""\
 # Constructions
 
-A linkage is written down joint by joint, one line each:
+[Joint lines](../which-word.md) explains the words.
 
-{chr(10).join(block + chr(10) for block in rules)}
+## Change points
+
+{change_points}
+
 ## Formulas
 
 {intro}

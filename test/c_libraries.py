@@ -6,6 +6,7 @@
 from contextlib import contextmanager
 import ctypes
 import fcntl
+from functools import partial
 import os
 from pathlib import Path
 import re
@@ -69,33 +70,38 @@ int poses_taken(void) {{ int before = taken; taken = 0; return before; }}
 """
 
 
-def inverter(folder, mechanism, *outputs):
+def inverters(folder, asked):
     """
-    Return the inverse of a mechanism in C: values and near inputs -> inputs or None, and poses.
+    Return the inverses of mechanisms in C: values and near inputs -> inputs or None, and poses.
 
-    It checks that no more poses are computed than the header says.
+    `asked` has a mechanism and outputs for each. They check that no more poses are computed than
+    the header says.
     """
-    text, n = header.written(mechanism, outputs), len(outputs)
-    name, = re.findall(r'int (\w+_for_\w+)', text)
-    most = int(re.search(r'call takes at most (\d+) poses', text)[1])
-    given = 'value, near' if n > 1 else '*value, *near'
-    library = loaded(folder, f"""{counted(text)}
-int inverted(const double *value, const double *near, double *inputs)
+    texts, callers, called = [], [], []
+    for mechanism, outputs in asked:
+        texts.append(header.written(mechanism, outputs))
+        name, = re.findall(r'int (\w+_for_\w+)', texts[-1])
+        given = 'value, near' if len(outputs) > 1 else '*value, *near'
+        called.append((mechanism.name, len(outputs), int(re.search(
+            r'call takes at most (\d+) poses', texts[-1])[1])))
+        callers.append(f"""
+int {mechanism.name}_inverted(const double *value, const double *near, double *inputs)
 {{
     return {name}({given}, inputs);
 }}
 """)
+    library = loaded(folder, counted(''.join(texts)) + ''.join(callers))
 
-    def invert(value, near):
+    def invert(name, n, most, value, near):
         made = (ctypes.c_double * n)(*[UNWRITTEN] * n)
-        is_there = library.inverted(*((ctypes.c_double * n)(*np.ravel(each))
-                                      for each in (value, near)), made)
+        is_there = library[f'{name}_inverted'](*((ctypes.c_double * n)(*np.ravel(each))
+                                                 for each in (value, near)), made)
         assert is_there or {*made} == {UNWRITTEN}
         taken = library.poses_taken()
         assert taken <= most
         return (made[:] if n > 1 else made[0]) if is_there else None, taken
 
-    return invert
+    return [partial(invert, *each) for each in called]
 
 
 def outputs(mechanism, inputs, names, by=None):

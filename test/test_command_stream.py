@@ -112,7 +112,7 @@ def test_what_cannot_be_had_is_held_and_said(stream, capfd):
                (flap(2.6), r'outside crank.sweep \[-1.5, 1.5\]'), (math.inf, ''), (-1e300, ''))
     for value, _ in reasons:
         assert stream.want(['flap'], [value], [0.1])['servo'] == (good[0], 0.0)
-    assert 'flap cannot be -2: lever reaches' in capfd.readouterr().err
+    assert 'flap cannot be -2 (lever at 2.1): lever reaches' in capfd.readouterr().err
     assert stream.want(['flap'], [flap(0.9)])['servo'] == (pytest.approx(0.9, abs=1e-13),)
 
 
@@ -289,11 +289,10 @@ def test_a_trajectory_becomes_that_of_the_actuators(graph, plan):
 
 
 REFUSED = [
-    (['flap'], [([0.0], []), ([4.0], [])], r'point 1: flap cannot be 4: lever reaches \[.*'),
+    (['flap'], [([0.0], []), ([4.0], [])],
+     r'point 1: flap cannot be 4 \(lever at -3.9\): lever reaches \[.*'),
     (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions, and as many velocities or '
      'none, not 2 and 0'),
-    (['flap'], [([0.0], [1.0, 2.0])], 'point 0 must have 1 positions, and as many velocities or '
-     'none, not 1 and 2'),
     (['flap', 'wing'], [([0.0, 0.0], [])], 'no output is called wing; an output is called '
      '<mechanism>_<link>, <mechanism>_<joint>.x, or as joint_names has it'),
     (['flap', 'lever_A.x'], [([0.0, 0.0], [])],
@@ -301,12 +300,10 @@ REFUSED = [
     (['flap', 'flap'], [([0.0, 0.0], [])], 'joint_names has a name twice'),
     ([], [([], [])], 'joint_names is empty: name at least one output'),
     (['flap'], [([0.0], [math.nan])], 'point 0: a velocity must be finite'),
-    (['flap'], [([0.0], [1.0]), ([0.1], [math.inf])], 'point 1: a velocity must be finite'),
     (['flap'], [([0.1 - math.asin(80.0 / 150.0)], [0.0]), ([0.1], [])] * 2,
      'point 0: flap cannot be .*'),
     (['bar_A.x'], [([40.0], [0.1])],
      'point 0: the motion of bar_A.x reverses there; its speed must be zero'),
-    (['bar_A.x'], [([1e3], [])], 'point 0: bar_A.x cannot be 1000: .*'),
     (['flap'], [([math.nan], [])], 'point 0: flap cannot be nan: a value must be finite'),
     (['flap'], [([0.1], [])] * 10_001, 'it has 10001 points; send up to 10000'),
     *((['flap'], [([0.1], [], time) for time in times], reason) for times, reason in (

@@ -145,6 +145,7 @@ def cranks(memory, case, output, value):
     return [math.nan if status & 1 else float(crank), python]
 
 
+@pytest.mark.nightly(all_but=1)
 @NUMBERS
 def test_the_ends_of_sweeps_can_be_commanded(tmp_path, number):
     """Next to an extreme of an output, its rounding moves the input far."""
@@ -172,6 +173,7 @@ def test_the_ends_of_sweeps_can_be_commanded(tmp_path, number):
             assert np.isnan(cranks(memory, case, output, beyond)).all()
 
 
+@pytest.mark.nightly(all_but=2)
 @NUMBERS
 @pytest.mark.parametrize('fault, output, count', FAULTS)
 def test_linkages_that_had_a_fault(tmp_path, number, fault, output, count):

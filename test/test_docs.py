@@ -154,12 +154,9 @@ def test_the_page_of_a_mechanism_has_all_of_it(catalogue, type_):
     exec(compile(re.findall(r'```python\n(.*?)```', page, re.DOTALL)[0], type_, 'exec'), {})
 
 
-def test_the_page_of_constructions_has_every_word(catalogue):
+def test_the_page_of_constructions_has_every_formula(catalogue):
     page = catalogue.construction_page()
-    for word in joint_lines.FORMS:
-        assert re.search(rf'^[A-Z][A-Z ]* {word} ', page, re.MULTILINE), word
     assert set(re.findall(r'^### (\w+)', page, re.MULTILINE)) == set(catalogue.FORMULAS)
-    assert '`sqrt(a)`' in page
 
 
 def test_text_of_a_docstring_becomes_markdown(catalogue):

@@ -51,7 +51,6 @@ PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], independ
      'a URDF\n'),
     ('four_bar.urdf', ['--pose', 'motor'], f"'motor'{POSES}"),
     ('four_bar.urdf', ['--pose', 'elbow=0', 'motor=a'], f"'motor=a'{POSES}"),
-    ('four_bar.urdf', ['--hold', '=1'], f"'=1'{POSES}"),
     ('four_bar.urdf', ['--hold', 'motor=1e9'], f"'motor=1e9'{POSES}"),
     ('four_bar.urdf', ['--hold', 'motr=1'], "there is no joint 'motr'; allowed: motor, elbow, "
      'shoulder; did you mean motor?\n'),
@@ -92,6 +91,7 @@ REFUSED = [
     ('four_bar.urdf', [('"wrist" type="revolute"', '"wrist" type="screw"')],
      'from_robot: Left out: base_link, crank, coupler, rocker: not planar: wrist is a joint of '
      'type screw; as rods in space: wrist close loops that have more than rods in them.\n'),
+    ('four_bar.urdf', [('"wrist" type="revolute"', '"wrist"')], 'wrist is a joint of type none'),
     ('four_bar.urdf', SPHERES, 'not planar: no hinge says in which plane; '),
     ('four_bar.urdf', [('xyz="0.3 0 0"', 'xyz="0 0 0"'), ('xyz="0 0 0.2"', 'xyz="0 0 0"')],
      'all its joints are at one place'),
@@ -99,9 +99,6 @@ REFUSED = [
                        '<weld name="wrist" body1="coupler" body2="rocker"/>')], HELD),
     ('four_bar.xml', [('<worldbody>', '<include file="floor.xml"/><worldbody>')],
      "four_bar.xml cannot be read: XML Error: Error opening file 'floor.xml'"),
-    ('four_bar.xml', [('<worldbody>', '<extension><plugin plugin="mujoco.none"/></extension>'
-                       '<worldbody>')],
-     'four_bar.xml cannot be read: XML Error: plugin mujoco.none not found'),
     ('four_bar.urdf', [], 'motor, shoulder drive it, and hold each other, as 1 of them tell where '
      'all is: add --driven motor to the command', '--driven', 'motor', 'shoulder'),
     ('four_bar.sdf', [], f'{HELD}.\n', '--hold', 'joint_A=0'),
@@ -325,7 +322,7 @@ OPEN = {
 
 
 @pytest.mark.parametrize('seeds', [
-    [1, 2, 7], pytest.param(range(3, 20), marks=pytest.mark.nightly)], ids=['', 'more'])
+    [7], pytest.param(range(1, 20), marks=pytest.mark.nightly)], ids=['', 'more'])
 @pytest.mark.parametrize('name', OPEN)
 def test_no_answer_depends_on_the_starts_of_a_search(tmp_path, name, seeds):
     file, pose, question = OPEN[name]

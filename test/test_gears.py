@@ -83,18 +83,6 @@ def test_a_fast_gear_loses_no_answer(ratio):
     assert found == pytest.approx(expected, abs=1e-12)
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize('ratio', ['7', '60.5', '180', '1000', '1/80', '0.31'])
-def test_as_many_answers_as_brute_force_finds(ratio):
-    found = two(ratio)
-    turns = found.period()
-    theta = np.linspace(-math.pi * turns, math.pi * turns, int(
-        2000 * turns * max(1.0, abs(found.gear('crank2')[0]))) + 1)
-    gap = found.solve(theta, ('E',))['E'][:, 0] - 8.0321
-    inside = np.isfinite(gap[1:] * gap[:-1])
-    assert np.sum(inside & (gap[1:] * gap[:-1] <= 0.0)) == len(found.input_for('E.x', 8.0321))
-
-
 BOTH = 'D crank Q 0.7 geared crank {} 0.3; B dyad A D 1.1 1.2 left'
 ONE = 'D crank O 0.7 geared crank {} 0.3; B dyad D Q 0.9 1.2 left'
 

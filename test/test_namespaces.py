@@ -93,7 +93,7 @@ def test_the_standard_is_enough_and_gives_the_bits_of_numpy(kind, strict):
     assert np.array_equal(home, rows, equal_nan=True) and np.isfinite(rows).any()
 
 
-@pytest.mark.nightly(all_but=4)
+@pytest.mark.nightly(all_but=2)
 @pytest.mark.parametrize('kind', KINDS)
 def test_nothing_on_the_way_is_nan(kind):
     given = inputs(kind, FEW)
@@ -174,8 +174,9 @@ def answers(kind, values, near):
     return found, np.reshape([each.size for each in inverse.inputs], (-1, 1))
 
 
-@pytest.mark.parametrize('follows', [True, False])
+@pytest.mark.nightly(all_but=6)
 @pytest.mark.parametrize('kind', INVERSES)
+@pytest.mark.parametrize('follows', [True, False])
 def test_the_inverse_chooses_as_the_library_does(kind, follows, strict):
     values, near = questions(kind, FEW)
     rows, sizes = answers(kind, values, near if follows else None)
@@ -189,7 +190,7 @@ def test_the_inverse_chooses_as_the_library_does(kind, follows, strict):
     assert np.isfinite(rows).any()
 
 
-@pytest.mark.nightly(all_but=3)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('kind', ['geared', 'Scotch yoke', 'Oldham coupling', *(
     kind for kind in mechanisms.TYPES if kind not in ('jansen', 'five_bar'))])
 def test_every_output_has_the_library_s_choice(kind):

@@ -117,7 +117,7 @@ def c_library(tmp_path_factory):
                 operands[0] = f'({operands[0]} < 0)'
             elif name in ('root', 'valid_where'):
                 operands[-1] = f'fabs{f}({operands[-1]})'
-            code = row.c.replace('{f}', f).replace('{name}', 'lkr').format(*operands)
+            code = row.c.replace('{f}', f).format(*operands)
             text.append(f'void do_{name}(long size, const {kind} **x, {kind} *out) '
                         f'{{ long n; for (n = 0; n < size; n++) out[n] = {code}; }}')
         libraries[kind] = loaded(tmp_path_factory.mktemp('operations'), '\n'.join(text))

@@ -80,10 +80,10 @@ def test_every_marker_is_seen_on_the_page_and_on_the_grey_of_rviz(background):
 
 UNPUBLISHABLE = [
     # A frame or a joint of the model has the name.
-    *(({'frame_id': f'jansen_{name}'}, 'frame_id') for name in ('ground_link', 'A', 'C_cut')),
+    ({'frame_id': 'jansen_C_cut'}, 'frame_id'),
     ({'jansen.joint_names': ['EF=jansen_ground_link_fixed']}, 'two joints'),
-    *(({'jansen.scale': scale}, 'jansen.scale') for scale in (1e308, 1e29, 1e-36, 5e-324)),
-    *(({'jansen.pose': [far, 0.0, 0.0, 0.0, 0.0, 0.0]}, 'jansen.pose') for far in (1e308, -1e31))]
+    ({'jansen.scale': 1e308}, 'jansen.scale'), ({'jansen.scale': 5e-324}, 'jansen.scale'),
+    ({'jansen.pose': [-1e31, 0.0, 0.0, 0.0, 0.0, 0.0]}, 'jansen.pose')]
 
 
 def test_what_cannot_be_published_is_refused_and_what_was_there_goes_on(graph):

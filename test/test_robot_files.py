@@ -534,8 +534,7 @@ def test_urdf_plus_names_the_joints_that_are_not_driven(tmp_path):
 
 
 @pytest.mark.parametrize('joints, pose', [
-    *((joints, '') for joints in ('', 'B', 'D', 'BD', 'BC', 'BCD')), *(('', pose) for pose in (
-        'A=0.4', 'D=-0.5', 'A=0.4 B=-0.4 C=0.4', 'A=0.4 B=-0.4 D=0.4'))])
+    ('', ''), ('D', ''), ('BCD', ''), ('', 'D=-0.5'), ('', 'A=0.4 B=-0.4 D=0.4')])
 def test_a_parallelogram_stays_one_on_universal_joints_and_in_any_pose(tmp_path, joints, pose):
     text = (ROBOTS / 'four_bar.sdf').read_text()
     for name in joints:
@@ -738,9 +737,9 @@ def leaning(robot, lean, seed):
 
 
 @pytest.mark.parametrize('seeds, lean', [
-    ([0, 1, 36, 65, 419], 0.0), ([17, 35], 1e-5),
-    pytest.param(range(2, 120), 0.0, marks=pytest.mark.nightly),
-    pytest.param(range(36, 74), 1e-5, marks=pytest.mark.nightly)])
+    ([1, 36, 419], 0.0), ([17], 1e-5),
+    pytest.param(range(120), 0.0, marks=pytest.mark.nightly),
+    pytest.param(range(35, 74), 1e-5, marks=pytest.mark.nightly)])
 def test_random_linkages_come_back_from_robots(seeds, lean):
     moved = 0
     for seed in seeds:

@@ -327,10 +327,9 @@ def test_rviz_s_camera_sees_all_of_a_scene_square_to_the_first_plane(angles, pit
         solution = one.assembly().solution(one.linkage.points)
         for theta in np.linspace(*ends, 51):
             solution.solve([theta])
-            for x, y in solution.rows.reshape(-1, 2):
-                # A mirrored walker is shown with both of its sides in all poses.
-                places += [in_space(one.pose, place) for place in (
-                    [(x, y), (-x, y)] if one.mirrored else [(x, y)])]
+            # A mirrored walker is shown with both of its sides in all poses.
+            for side in (1.0, -1.0)[:1 + one.mirrored]:
+                places += [*in_space(one.pose, solution.rows.reshape(-1, 2) * (side, 1.0))]
     low, high = np.min(places, axis=0), np.max(places, axis=0)
     focus, radius = (low + high) / 2, math.dist(low, high) / 2
     assert [view['Focal Point'][axis] for axis in 'XYZ'] == pytest.approx(focus, abs=0.02 * radius)

@@ -234,7 +234,16 @@ def test_limits_with_a_second_or_a_singular_pose_are_refused(seed, count):
     assert check_windows(seed, count) > 0.3 * count
 
 
-@pytest.mark.nightly(all_but=1)
+def test_a_scene_refuses_too_wide_limits_with_the_widest_that_it_allows():
+    def limited(*limits):
+        return [*(re.sub('within .*', text, line) for line, text in zip(G1, limits)), *G1[2:]]
+
+    with pytest.raises(ValueError, match='a second pose') as error:
+        alone('rods', joints=limited('within -100deg 100deg', 'within -80deg 80deg'))
+    alone('rods', joints=limited(*re.findall(r'within \S+deg \S+deg(?=[,;])', str(error.value))))
+
+
+@pytest.mark.nightly
 @pytest.mark.parametrize('seed', [1, 2])
 def test_the_two_poses_of_refused_limits_are_two_poses(seed):
     rng, found = np.random.default_rng(seed), 0

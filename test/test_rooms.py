@@ -44,11 +44,12 @@ def room(module):
 @cache
 def imports(module):
     """Return what a module imports, at once or later, as full names: whether inside `needs`."""
-    guarded = {each for node in ast.walk(parsed(module)) if isinstance(node, ast.With)
+    nodes = [*ast.walk(parsed(module))]
+    guarded = {each for node in nodes if isinstance(node, ast.With)
                and ast.unparse(node.items[0].context_expr).startswith('needs(')
                for each in ast.walk(node)}
     here, found = ['linkage_ros', *module.relative_to(PACKAGE).parent.parts], {}
-    for node in ast.walk(parsed(module)):
+    for node in nodes:
         if isinstance(node, (ast.Import, ast.ImportFrom)):
             level = getattr(node, 'level', 0)
             base = [*(here[:len(here) - level + 1] if level else []),

@@ -89,7 +89,7 @@ def follow(one, robot, seconds):
     for _ in robot.run(seconds, lambda time: [*inputs(time)]):
         solution.solve([float(robot.data.joint(one.joints[name].name).qpos[0])
                         for name in one.inputs])
-        places = [in_space(one.pose, place) for place in solution.rows.reshape(-1, 2)]
+        places = in_space(one.pose, solution.rows.reshape(-1, 2))
         yield np.abs(np.array(places) - [*robot.places(names).values()]).max()
 
 

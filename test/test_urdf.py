@@ -86,9 +86,9 @@ def posed(one, thetas):
             for joint, called in one.joints.items()}, places
 
 
-def in_space(pose, place):
-    """Return a place in the plane [m] turned by roll, pitch and yaw in turn, and shifted."""
-    return rotation(pose[3:]) @ (*place, 0.0) + pose[:3]
+def in_space(pose, places):
+    """Return places in the plane [m] turned by roll, pitch and yaw in turn, and shifted."""
+    return np.asarray(places) @ rotation(pose[3:])[:, :2].T + pose[:3]
 
 
 def description(one):

@@ -3,7 +3,7 @@
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * It can be assembled in [-3.14159, 3.14159] rad.
- * A call takes at most 10 poses.
+ * A call takes at most 13 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -81,7 +81,7 @@ typedef double lkr_real;
 #define LKR_PURE static inline
 #endif
 
-/* A struct of zeros. */
+/* A struct of zeros; memset would keep it in memory. */
 #ifdef __cplusplus
 #define LKR_ZERO { }
 #else
@@ -114,10 +114,13 @@ static inline lkr_real lkr_clamped(lkr_real x, lkr_real low, lkr_real high)
 /* The whole turns nearest to x. */
 LKR_FORMULA lkr_real lkr_turns(lkr_real x, lkr_real turn)
 {
-    if (LKR_MATH(fabs)(x) <= turn / 2) {
+    const lkr_real twice = 2 * LKR_MATH(fabs)(x);
+    if (twice <= turn) {
         return 0;
     }
-    return turn * LKR_MATH(floor)(x / turn + (lkr_real)0.5);
+    /* A microcontroller divides slowly. */
+    return twice <= 3 * turn ? LKR_MATH(copysign)(turn, x)
+        : turn * LKR_MATH(floor)(x / turn + (lkr_real)0.5);
 }
 
 /* x within half a turn of 0. */
@@ -211,7 +214,7 @@ typedef struct {
 } lkr_model;
 
 /* A part of the reach in which an output only rises, or only falls: the middle of its values and how
-   far it goes from there; the inputs at its ends; the input as a series of Chebyshev polynomials of
+   far it goes from there; the inputs at its ends; the input as a power series of
    sqrt((value - middle) * scale + shift) - center, which is in [-1, 1]. */
 typedef struct {
     lkr_real middle, reach, low, high, scale, shift, center;
@@ -307,15 +310,10 @@ static inline int lkr_series(int count, const lkr_piece *piece, lkr_real size, l
                 gap * LKR_FROM_FLASH(part->scale) + LKR_FROM_FLASH(part->shift);
             const lkr_real x =
                 LKR_MATH(sqrt)(lkr_max(0, square)) - LKR_FROM_FLASH(part->center);
-            lkr_real sum = 0;
-            lkr_real before = 0;
-            /* Clenshaw's recurrence. */
-            for (i = LKR_TERMS - 1; i > 0; i--) {
-                const lkr_real next = 2 * x * sum - before + LKR_FROM_FLASH(part->term[i]);
-                before = sum;
-                sum = next;
+            lkr_real sum = LKR_FROM_FLASH(part->term[LKR_TERMS - 1]);
+            for (i = LKR_TERMS - 2; i >= 0; i--) {
+                sum = sum * x + LKR_FROM_FLASH(part->term[i]);
             }
-            sum = x * sum - before + LKR_FROM_FLASH(part->term[0]);
             q[solutions][0] =
                 lkr_clamped(sum, LKR_FROM_FLASH(part->low), LKR_FROM_FLASH(part->high));
             solutions++;
@@ -347,14 +345,12 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
     int i, j, step;
     memcpy(x, q, sizeof x);
     for (step = 0; step <= LKR_MAX_STEPS; step++) {
-        lkr_point next;
         const lkr_real now =
-            model->at(x, has_rates, &next) ? lkr_gap(model, side, position, &next, gap) : INFINITY;
+            model->at(x, has_rates, p) ? lkr_gap(model, side, position, p, gap) : INFINITY;
         if (!(now < left)) {
             break;
         }
         left = now;
-        *p = next;
         memcpy(q, x, sizeof x);
         if (left <= LKR_ENOUGH || left <= lkr_rounding(model, q)) {
             return step ? 2 : 1;
@@ -369,7 +365,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
         }
     }
     /* At an end of the reach the rate is infinite, yet rounding is not. */
-    if (left > LKR_CLOSE * LKR_STEEPEST) {
+    if (left > LKR_CLOSE * LKR_STEEPEST || !model->at(q, 1, p)) {
         return 0;
     }
     /* What is left may be rounding: of the positions; of the inputs, where a position changes fast. */
@@ -423,8 +419,8 @@ static inline lkr_real lkr_bring(const lkr_model *model, int side, const lkr_rea
     return away;
 }
 
-/* From positions to the inputs q nearest to `from`, and their pose, see lkr_model.at; returns 0, and
-   leaves q alone, if there are none. */
+/* From positions to the inputs q nearest to `from`, and their pose, see lkr_model.at; returns 0,
+   and leaves q alone, if there are none. */
 static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *position,
     const lkr_real *from, int has_rates, lkr_real *q, lkr_point *p)
 {
@@ -451,7 +447,9 @@ static inline int lkr_inverse(const lkr_model *model, int side, const lkr_real *
         }
         away[nearest] = INFINITY;
         found = lkr_refine(model, side, position, has_rates, x[nearest], p);
-        if (found == 1 || (found && lkr_bring(model, side, near, x[nearest]) < INFINITY)) {
+        /* Newton's method may leave a sweep: then the pose is that at its end. */
+        if (found == 1 || (found && lkr_bring(model, side, near, x[nearest]) < INFINITY
+                && model->at(x[nearest], has_rates, p))) {
             memcpy(q, x[nearest], size);
             return 1;
         }
@@ -746,7 +744,7 @@ static inline int lever_solutions_angle_lever(const float *position,
     return 2;
 }
 
-/* Positions, and their rates if has_rates, else 0, at inputs; returns 0 if it cannot be assembled. */
+/* Positions, and rates if has_rates, else 0, at inputs; returns 0 if it cannot be assembled. */
 static inline int lever_at(const float *q, int has_rates, lkr_point *p)
 {
     lever_pose s, by_crank = LKR_ZERO;
@@ -769,7 +767,7 @@ static const lkr_model lever_model = {
     { { 1.0f, 1.0f, -INFINITY, INFINITY, { INFINITY, 6.2831855f } } }, { 0.0f }
 };
 
-/* Positions, and their rates if has_rates, else 0, at inputs; returns 0 if it cannot be assembled. */
+/* Positions, and rates if has_rates, else 0, at inputs; returns 0 if it cannot be assembled. */
 static inline int lever_at_angle_lever(const float *q, int has_rates, lkr_point *p)
 {
     lever_pose s, by_crank = LKR_ZERO;
@@ -778,7 +776,6 @@ static inline int lever_at_angle_lever(const float *q, int has_rates, lkr_point 
     }
     p->position[1][0] = s.angle_lever;
     p->rate[1][0][0] = by_crank.angle_lever;
-    p->load[0] = 0.0f;
     return isfinite(p->position[1][0]);
 }
 

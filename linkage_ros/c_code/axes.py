@@ -43,10 +43,9 @@ def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float =
     linkage = mechanism.linkage
     is_angle = linkage.is_angle(output)
     factor *= mechanism.scale_of(output)
-    counted, *gear = next((
-        (i, *((1.0, 0.0) if output == input_.name else linkage.gear(output, i)))
-        for i, input_ in enumerate(linkage.inputs)
-        if output in (input_.name, *linkage.geared_to(i))), (None, 1.0, 0.0))
+    counted = next((i for i, input_ in enumerate(linkage.inputs)
+                    if output in (input_.name, *linkage.geared_to(i))), None)
+    gear = (1.0, 0.0) if counted is None else linkage.gear(output, counted)
     turns = is_angle and counted is None
     return Axis(name, output, factor, offset, abs(factor) * (1.0 if is_angle else linkage.longest),
                 abs(factor) * math.tau * turns, wraps and turns, output, counted, *gear)

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import sys
 from textwrap import wrap
@@ -52,17 +51,13 @@ class Code:
         self.number, suffix = ('float', 'f') if single else ('double', '')
         # Tolerances have the rounding of the type.
         self._rounding: Mapping[Any, float] = IN_SINGLE if single else {}
-        templates = {operation: row.c.replace('{f}', suffix).replace('{name}', 'lkr')
-                     for operation, row in OPERATIONS.items()} | {'atan2': 'lkr_angle({}, {})'}
         self._dialect = Dialect({
-            operation: code if code.startswith('(') else _Call(code)
-            for operation, code in templates.items()}, {}, lambda value:
+            operation: row.c if row.c.startswith('(') else _Call(row.c.replace('{f}', suffix))
+            for operation, row in OPERATIONS.items()}, {}, lambda value:
                 self.literal(self._rounding.get(value, value)))
 
     def literal(self, value: float) -> str:
         """Return a number in C."""
-        if math.isnan(value):
-            return 'LKR_NAN'
         if abs(value) > (3.4e38 if self.single else sys.float_info.max):
             return '-INFINITY' if value < 0.0 else 'INFINITY'
         if not self.single:
@@ -132,7 +127,7 @@ class Code:
                  for name in sorted(declared, key=lambda name: name.startswith('k'))]
         lines += [f'const {self.number} x{i} = {code};' if f'x{i}' in used else f'(void){code};'
                   for i, code in enumerate(arguments) if f'x{i}' in used or code.isidentifier()]
-        return '\n'.join([head, '{', *indented(lines + text.split('\n')), '}', ''])
+        return '\n'.join([head, '{', indented(lines + text.split('\n')), '}', ''])
 
 
 def bare(code: str) -> str:
@@ -140,8 +135,8 @@ def bare(code: str) -> str:
     return code[1:-1] if code.startswith('(') else code
 
 
-def indented(lines: Iterable[str]) -> list[str]:
-    """Return lines of a function's body, broken if they are long."""
-    return [part for line in lines for part in wrap(
+def indented(lines: Iterable[str]) -> str:
+    """Return the lines of a function's body, broken if they are long."""
+    return '\n'.join(part for line in lines for part in wrap(
         f'    {line}', LINE - 1, subsequent_indent='        ', break_long_words=False,
-        break_on_hyphens=False)]
+        break_on_hyphens=False))

@@ -10,7 +10,7 @@ from typing import Iterable, Iterator, Mapping, Sequence
 
 from .code import Code
 from .names import comment, distinct, field
-from ..formula.expression import Real, real, valid_where
+from ..formula.expression import Real, real
 from ..scene import SceneMechanism
 
 
@@ -79,13 +79,10 @@ class Formulas:
             outputs, {'p': 1.0}, map(structure.output, outputs))) for about, outputs in groups]
         rates = [(f'/* Rates of {comment(about)} */', self._assigned(
             outputs, by, structure.parts(((), (), tuple(outputs))))) for about, outputs in groups]
-        limits = [limit for limit in structure.built.limits if limit.margin.varies]
-        if len(self.by) == 1 and self._linkage.inputs[0].is_whole(self._linkage.reach()):
-            # It can be assembled at any input, whatever rounding says.
-            limits = []
         valid = real(0.0)
-        for limit in limits:
-            valid = valid_where(valid, limit.margin, limit.tolerance)
+        # If it can be assembled at any input, rounding does not matter.
+        if len(self.by) > 1 or not self._linkage.inputs[0].is_whole(self._linkage.reach()):
+            valid = structure.where_assembled(valid)
         return self._code.function(
             '/* The pose; with has_rates, rates by {inputs_named}. Returns 0 beyond a limit. */\n'
             'LKR_FORMULA int {name}_formulas({parameters}, int has_rates, {name}_pose *p,\n'

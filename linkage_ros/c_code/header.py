@@ -10,20 +10,21 @@ library's sine, cosine and arctangent. What all mechanisms have in common is `li
 
 from __future__ import annotations
 
+import re
 from typing import Any, Iterator, NamedTuple, Sequence
 
 from .axes import actuators, Axis, axis, invertible, joints, loads
 from .code import Code, indented
 from .formulas import Formulas
-from .names import comment, constants, distinct, field, filled, prefix, template
+from .names import comment, distinct, field, filled, prefix, template
 from .tables import Tables
 from ..linkage import Mechanism
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
-# Poses of a solution of an inverse: the first, again with its rates, and LKR_MAX_STEPS of Newton's
-# method.
-POSES = 5
+# Poses of a solution of an inverse: the first, again with its rates, LKR_MAX_STEPS of Newton's
+# method, and the best of them again. A sweep's end adds one to the answer's.
+POSES = 6
 
 
 class Request(NamedTuple):
@@ -91,14 +92,14 @@ def _values(request: Request, single: bool) -> dict[str, Any]:
     parts = [tables.text(sides, '', request.passive)]
     for tag, axes in inverses.items():
         parts += [tables.text(([], axes), tag), _inverse(mechanism, axes, tag, code.number)]
-    about = [*_about(mechanism), f'A call takes at most {POSES * tables.solutions} poses.']
+    about = [*_about(mechanism), f'A call takes at most {POSES * tables.solutions + 1} poses.']
     whole = ' + '.join(f'p->{each}' for each in formulas.fields.values())
     return {
         'about': '\n'.join(f' * {line}' for line in about),
         **formulas.names, 'N': prefix(name), 'float': int(single),
         'own_inputs': len(linkage.inputs), 'own_solutions': tables.solutions,
         'fields': formulas.struct(), 'pose': formulas.function(),
-        'whole': '\n'.join(indented([f'return isfinite({whole});'])),
+        'whole': indented([f'return isfinite({whole});']),
         'enums': '\n'.join(_enum(f'{prefix(name)}_{side}', axes) for side, axes in zip(
             ('ACTUATOR', 'JOINT'), sides)),
         'axes': comment('; '.join(f'{side}: {_with_units(linkage, axes)}' for side, axes in zip(
@@ -150,8 +151,10 @@ def _about(mechanism: SceneMechanism) -> Iterator[str]:
 
 
 def _enum(start: str, axes: Sequence[Axis]) -> str:
-    return 'enum { ' + ', '.join(f'{start}_{name} = {i}' for i, name in enumerate(
-        constants(each.name for each in axes))) + ' };'
+    """Return the constants of axes, whose names may have any characters."""
+    ends = distinct(re.sub(r'[^A-Z0-9]+', '_', each.name.upper()).strip('_') or 'UNNAMED'
+                    for each in axes)
+    return f'enum {{ {", ".join(f"{start}_{end} = {i}" for i, end in enumerate(ends))} }};'
 
 
 def _with_units(linkage: Mechanism, axes: Sequence[Axis]) -> str:

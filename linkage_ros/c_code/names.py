@@ -4,6 +4,8 @@
 """Names of a scene, with any characters, as C identifiers, comments and texts."""
 
 from importlib.resources import files
+from itertools import chain, count
+import json
 import re
 from typing import Iterable, Mapping
 
@@ -29,17 +31,11 @@ def filled(template: str, values: Mapping[str, object]) -> str:
 
 def distinct(names: Iterable[str]) -> list[str]:
     """Return names, with a number after those that are there already."""
-    made: list[str] = []
+    made: dict[str, None] = {}
     for name in names:
-        made.append(next(text for text in (name, *(f'{name}_{i}' for i in range(2, 1000)))
-                         if text not in made))
-    return made
-
-
-def constants(names: Iterable[str]) -> list[str]:
-    """Return names as ends of upper-case C constants, each distinct."""
-    return distinct(re.sub(r'[^A-Z0-9]+', '_', name.upper()).strip('_') or 'UNNAMED'
-                    for name in names)
+        texts = chain([name], (f'{name}_{i}' for i in count(2)))
+        made[next(text for text in texts if text not in made)] = None
+    return [*made]
 
 
 def prefix(name: str) -> str:
@@ -62,7 +58,6 @@ def comment(text: str) -> str:
 
 
 def literal(text: str) -> str:
-    """Return a text as a string literal of C."""
-    return '"' + ''.join(
-        chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?' else f'\\{byte:03o}'
-        for byte in text.encode('utf-8', 'replace')) + '"'
+    """Return a text as a string literal of C++: JSON's, without trigraphs."""
+    valid = text.encode('utf-8', 'replace').decode()
+    return json.dumps(valid, ensure_ascii=False).replace('?', r'\?')

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Inverses without a closed form, as series of Chebyshev polynomials in parts of the reach."""
+"""Inverses without a closed form, as power series in parts of the reach."""
 
 import math
 
 import numpy as np
-from numpy.polynomial import chebyshev
+from numpy.polynomial import chebyshev, polynomial
 
 from ..linkage import Mechanism
 
@@ -40,6 +40,9 @@ def series(linkage: Mechanism, output: str, parts: np.ndarray, single: bool,
     is_angle, terms = linkage.is_angle(output), TERMS[single]
     size = 1.0 if is_angle else linkage.longest
     nodes = chebyshev.chebpts1(terms)
+    # From coefficients of Chebyshev polynomials to those of powers.
+    powers = np.column_stack([np.pad(chebyshev.cheb2poly(row), (0, terms - 1 - i))
+                              for i, row in enumerate(np.eye(terms))])
     # Ever denser towards both ends.
     checked = np.tanh(np.linspace(-18.0, 18.0, 129))
 
@@ -74,9 +77,9 @@ def series(linkage: Mechanism, output: str, parts: np.ndarray, single: bool,
         center, half = roots.mean(axis=1, keepdims=True), 0.5 * np.diff(roots)
         squares = roots ** 2
         bounds = np.sort(halved(squares, start, cut, end, change))
-        fitted = chebyshev.chebfit(nodes, halved(
+        fitted = powers @ chebyshev.chebfit(nodes, halved(
             (center + half * nodes) ** 2, start, cut, end, change).T, terms - 1)
-        inputs = chebyshev.chebval(checked, fitted).clip(
+        inputs = polynomial.polyval(checked, fitted).clip(
             np.minimum(start, cut), np.maximum(start, cut))
         found = passed(inputs, end, change)
         missed, digit = (np.abs(others - found).max(axis=1, keepdims=True) for others in (

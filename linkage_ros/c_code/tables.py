@@ -10,7 +10,7 @@ exact Jacobians, efforts by their transposes, so that power is conserved.
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import compress, product
 import math
 from typing import Iterator, Mapping, Sequence
 
@@ -22,14 +22,11 @@ from .formulas import Formulas
 from .names import comment, distinct, filled, template
 from .series import series
 from ..formula.expression import argument, Real
-from ..formula.program import Program
-from ..linkage import InverseLinkage, Mode
+from ..linkage import InverseLinkage
 from ..scene import SceneMechanism
 
-# Samples of each part of the reach, for the assembly modes that are there.
+# Samples of each part of the reach, for the solutions that are there.
 SAMPLES = 256
-# Inputs that are no further apart are the same [rad, sizes].
-ALIKE = 1e-6
 
 
 class Tables:
@@ -73,7 +70,7 @@ class Tables:
             'about': 'the inverse' if tag else 'the actuators and joints',
             'n': len(self.mechanism.scales), 'counts': ', '.join(str(len(axes)) for axes in rows),
             'names': ', '.join(map(self._solutions, sides)),
-            'at': '\n'.join(indented(self._at(rows, len(sides[1])))),
+            'at': indented(self._at(rows, len(sides[1]))),
             'axes': row(row((1.0 / each.size, each.turn or math.inf)
                             for each in axes) if axes else '{ { 0, 0 } }'
                            for axes in rows),
@@ -83,6 +80,7 @@ class Tables:
     def _at(self, sides: tuple[Sequence[Axis], Sequence[Axis]], commanded: int) -> Iterator[str]:
         """Yield the statements for values, rates by each input, and loads."""
         code, formulas, scale_of = self._code, self._formulas, self.mechanism.scale_of
+        needed = []
         for side, axes in enumerate(sides):
             for i, each in enumerate(axes):
                 field, factor = formulas.fields[each.output], each.factor / scale_of(each.output)
@@ -93,16 +91,13 @@ class Tables:
                 if each.wraps:
                     position = f'lkr_wrapped({position}, {code.literal(each.turn)})'
                 yield f'p->position[{side}][{i}] = {position};'
-                for j, rate in enumerate(rates):
-                    yield f'p->rate[{side}][{i}][{j}] = {rate};'
+                yield from (f'p->rate[{side}][{i}][{j}] = {rate};' for j, rate in enumerate(rates))
+                needed += [f'p->position[{side}][{i}]'] * (i < commanded)
         # An inverse alone needs no efforts.
-        powers = [*loads(self.mechanism)] if sides[0] else []
-        for j, by in enumerate(formulas.by):
+        for j, by in enumerate(formulas.by if sides[0] else ()):
             terms = [code.times(f'{by}.{formulas.fields[output]}', -load / scale_of(output))
-                     for output, load in powers]
+                     for output, load in loads(self.mechanism)]
             yield f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
-        needed = [f'p->position[{side}][{i}]' for side, axes in enumerate(sides)
-                  for i in range(min(len(axes), commanded))]
         yield f'return isfinite({" + ".join(needed)});'
 
     # --- tables ---
@@ -162,7 +157,7 @@ class Tables:
             f'static inline int {name}(const {code.number} *position,',
             f'    {code.number} (*q)[LKR_MAX_INPUTS])', '{',
             f'    static const lkr_piece piece[{len(rows)}] LKR_IN_FLASH = {{',
-            *indented(rows), '    };',
+            indented(rows), '    };',
             f'    return lkr_series({len(rows)}, piece, {given}, q);', '}'])
 
     def _closed(self, name: str, axes: Sequence[Axis], counted: Mapping[int, Real],
@@ -176,7 +171,9 @@ class Tables:
             for joint in closed.branches), {
                 i: counted.get(i, value + turn)
                 for i, (value, turn) in enumerate(zip(mode.inputs, turned))})
-            for mode in self._modes_in_reach(axes[0].output, closed) for turned in turns]
+            for mode in closed.modes for turned in turns]
+        if len(axes) == 1:
+            solutions = [*compress(solutions, self._are_in_reach(axes[0].output))] or solutions
         lines = ''.join(f'\n     {comment(line)}' for line in closed.lines)
         return self._function(
             name, axes, 'The inputs in each assembly mode of the inverse linkage, NAN where there '
@@ -195,17 +192,11 @@ class Tables:
              for k, (above, inputs) in enumerate(solutions)],
             f'return {len(solutions)};', replaced)
 
-    def _modes_in_reach(self, output: str, closed: InverseLinkage) -> Sequence[Mode]:
-        """Return the assembly modes in which the linkage is anywhere in its reach, if known."""
-        linkage, modes, (first, *others) = self.linkage, closed.modes, self.linkage.inputs
-        if others:
-            return modes
-        # Where the inverse linkage has a dead point of its own, the mode changes.
+    def _are_in_reach(self, output: str) -> list[bool]:
+        """Return which solutions of a closed form the linkage has anywhere in its reach."""
+        # A solution of one part may go on in another, where it has a dead point of its own.
         steps = (np.arange(SAMPLES) + 0.382) / SAMPLES
-        low, high = linkage.monotone(output).T[:2, :, None]
-        inputs = (low + steps * (high - low)).ravel()
-        starts = linkage.bind(Program([mode.inputs[0] for mode in modes], 1, closed.arguments)
-                              ).over(linkage.posed((), (output,)).over(inputs)[0])
-        apart = first.apart(np.add.outer(closed.turns[0], starts), inputs)
-        is_there = (apart <= ALIKE * first.size).any(axis=(0, 2))
-        return [mode for mode, any_ in zip(modes, is_there) if any_] or modes
+        low, high = self.linkage.monotone(output).T[:2, :, None]
+        values = self.linkage.posed((), (output,)).over((low + steps * (high - low)).ravel())
+        return [bool(np.isfinite(inputs).any())
+                for inputs, in self.linkage.inverse((output,)).modes(np)(*values)]

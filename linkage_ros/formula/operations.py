@@ -23,8 +23,8 @@ class Operation(NamedTuple):
 
     `python` is its code on floats, with its operands in braces, which may raise where IEEE 754 has
     inf or nan; `numpy` does the same on arrays. `llvm` appends it to a function, from a
-    `llvm_code.Builder` and its operands, numbers or vectors. `c` is C99: {f} is the suffix of
-    functions for a type of numbers, {name} the mechanism's name; if it equals `python`, it is an
+    `llvm_code.Builder` and its operands, numbers or vectors. `c` is C99 with the functions of
+    `c_code`: {f} is the suffix of functions for a type of numbers; if it equals `python`, it is an
     operator, for arrays too. `rate` returns the derivative, from `expression.operation`, the
     expression and the rates of its operands; None: piecewise constant. `folded` returns the
     result if it needs no evaluation, else None. The result is positive if the operands with the
@@ -128,7 +128,7 @@ OPERATIONS = {row.name: row for row in (
     Operation('cos', 'cos({})', np.cos, lambda b, x: b.call_by_name('llvm.cos', x), 'cos{f}({})',
               lambda do, n, dx: -(do('sin', *n.args) * dx), _constants(math.cos)),
     Operation('atan2', 'atan2({}, {})', np.arctan2, lambda b, y, x: b.call_by_name('atan2', y, x),
-              'atan2{f}({}, {})', _angle_rule),
+              'lkr_angle({}, {})', _angle_rule),
     # To the nearest integer, halves to the even one.
     Operation('rint', 'copysign({0} - remainder({0}, 1.0), {0})', np.rint,
               lambda b, x: b.call_by_name('llvm.rint', x), 'rint{f}({})'),
@@ -143,10 +143,10 @@ OPERATIONS = {row.name: row for row in (
               (1, 2)),
     # The root of x; zero for x from -tolerance to 0, NaN below.
     Operation('root', '(sqrt({0}) if {0} > 0.0 else 0.0 if {0} >= -{1} else nan)', _root,
-              _root_in_llvm, '{name}_root({}, {})', lambda do, n, dx, _: dx / (2.0 * n)),
+              _root_in_llvm, 'lkr_root({}, {})', lambda do, n, dx, _: dx / (2.0 * n)),
     # A value where a margin is at least -tolerance, else NaN.
     Operation('valid_where', '({0} if {1} >= -{2} else nan)', _valid_where, _valid_where_in_llvm,
-              '{name}_valid_where({}, {}, {})',
+              'lkr_valid_where({}, {}, {})',
               lambda do, n, dx, *_: do('valid_where', dx, *n.args[1:])),
 )}
 # Piecewise constant operations.

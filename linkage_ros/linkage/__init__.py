@@ -8,7 +8,7 @@ from .formulas import Leg, LinkPoint
 from .geometry.builder import GROUND, Link
 from .geometry.spatial import IN_SINGLE
 from .inputs import Arc, Input, spread, theta_of
-from .inverse import Answer, Inverse, InverseLinkage, Mode, Solution
+from .inverse import Answer, Inverse, InverseLinkage, Solution
 from .mechanism import Mechanism
 from .motion.curves import ascending, extremes, sampled
 from .motion.reach import reachable_arcs
@@ -23,6 +23,6 @@ from .tolerances import CLOSE, ROUNDING, TOLERANCE
 __all__ = ['Answer', 'Arc', 'ascending', 'bar_name', 'checked_branches', 'checked_dimensions',
            'CLOSE', 'Design', 'Dyads', 'extremes', 'FORMS', 'Formula',
            'GROUND', 'Hinge', 'IN_SINGLE', 'Input', 'Inverse', 'InverseLinkage', 'joint_lines',
-           'Leg', 'Link', 'LinkPoint', 'loaded_links', 'Mechanism', 'Mode', 'Pin',
+           'Leg', 'Link', 'LinkPoint', 'loaded_links', 'Mechanism', 'Pin',
            'reachable_arcs', 'rod_lines', 'ROUNDING', 'sampled', 'short', 'Slide', 'Solution',
            'spread', 'theta_of', 'TOLERANCE', 'WindowError']

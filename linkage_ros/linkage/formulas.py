@@ -158,9 +158,12 @@ class LinkageFormulas:
 
     def checked(self, names: Names) -> list[Real]:
         """Return outputs and their rates by each input, NaN unless all joints are assembled."""
-        limits = [limit for limit in self.built.limits if limit.margin.varies]
-        return [*(valid_within(value, limits) for value in self._angles(names)),
-                *self.parts(((), (), names))]
+        return [*map(self.where_assembled, self._angles(names)), *self.parts(((), (), names))]
+
+    def where_assembled(self, value: Real) -> Real:
+        """Return a value where all joints are assembled, NaN elsewhere."""
+        return valid_within(value, [
+            limit for limit in self.built.limits if limit.margin.varies])
 
     def _legs(self, points: Points, joints: Names, moving: Names) -> Program:
         inputs = self.built.inputs

@@ -80,8 +80,8 @@ def create(type_: str, /, *, branches: Mapping[str, int] | None = None,
     branches : mapping, optional
         Assembly signs, +1 or -1, by joint. Default: those of the catalogue or of the joint lines.
     joints : sequence of str, optional
-        One line per joint: for type 'custom' as `linkage.joint_lines` describes, for type 'rods'
-        as `linkage.rod_lines` does.
+        One line per joint: for type 'custom' as the page "Joint lines" of the documentation
+        describes, for type 'rods' as "Rods in space" does.
     tracer : str, optional
         For type 'custom' or 'rods': the joint whose curve is the locus. Default: the last.
     **dimensions : float or array-like
@@ -95,8 +95,8 @@ def create(type_: str, /, *, branches: Mapping[str, int] | None = None,
     Raises
     ------
     ValueError
-        For an unknown type, dimension or branch, a dimension that is not a finite positive
-        number, and an invalid line; the text names what is allowed.
+        For an unknown type, dimension or branch, a dimension that is out of range, and an invalid
+        line; the text names what is allowed.
 
     """
     chosen = design(type_, joints, tracer, dimensions)

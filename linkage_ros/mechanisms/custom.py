@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Linkages written by users as joint lines; see `linkage.joint_lines` for the words."""
+"""Linkages written by users as joint lines."""
 
 from collections.abc import Mapping, Set
 from itertools import islice

@@ -60,10 +60,15 @@ class Target(NamedTuple):
 
     def reason(self, positions: Sequence[float], is_searched: bool) -> str:
         """Explain why the positions in a message are out of reach; some reasons are searched."""
-        values = ', '.join(f'{positions[index]:.6g}' for index in self.indices)
-        reason = self.request.reason(*self._values(positions)) if is_searched else (
+        values = self._values(positions)
+        reason = self.request.reason(*values) if is_searched else (
             'no motion leads there from the last inputs; the service inputs_for searches for all')
-        return f'{self.named} cannot be {values}: {reason}'
+        # The reason is about the linkage's outputs, without signs and offsets of the names.
+        wanted, outputs = ([f'{value:.6g}' for value in numbers] for numbers in (
+            [positions[index] for index in self.indices], values))
+        meaning = '' if outputs == wanted else ' ({})'.format(listed(
+            map('{} at {}'.format, self.request.outputs, outputs)))
+        return f'{self.named} cannot be {", ".join(wanted)}{meaning}: {reason}'
 
     def _values(self, positions: Sequence[float]) -> list[float]:
         return [name.sign * (positions[index] - name.offset)

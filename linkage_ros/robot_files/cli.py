@@ -37,8 +37,8 @@ def main(args: list[str] | None = None) -> int:
 
 def show(args: list[str] | None) -> None:
     """Print what a command line asks for."""
-    parser = cli.Parser(NAME, description='Print the scene of the planar closed loops in a '
-                        'robot: MJCF, SDF or URDF.')
+    parser = cli.Parser(NAME, description='Print the scene of the closed loops in a robot: '
+                        'MJCF, SDF or URDF.')
     parser.add_argument('file', metavar='FILE', help='the robot')
     parser.add_argument('--loops', metavar='FILE', help='YAML with the loop joints of a URDF')
     parser.add_argument('--driven', metavar='JOINT', nargs='+', help='joints that motors move '

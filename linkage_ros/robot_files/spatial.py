@@ -207,7 +207,9 @@ class Component:
         if not slopes:
             return error, np.zeros(0)
         parents = frames[:, self._parents]
-        twists = (parents @ self._twists @ np.linalg.inv(parents))[..., :3, :]
+        turns, places = parents[..., :3, :3], parents[..., :3, 3:]
+        spins = turns @ self._twists[:, :3, :3] @ turns.swapaxes(2, 3)
+        twists = np.concatenate([spins, turns @ self._twists[:, :3, 3:] - spins @ places], axis=3)
         rates = seen.reshape(len(seen), -1, 4) @ twists.reshape(len(seen), -1, 4).swapaxes(1, 2)
         rates = rates.reshape(len(seen), *self._signs.shape, 3) * self._signs[..., None]
         slope = rates.sum(axis=2).swapaxes(2, 3)

@@ -279,7 +279,7 @@ class Robot:
             if body not in self.frames:
                 raise RequestError(f'joint {name} is on {body!r}, which is no link')
         ends, no_limits = _limits(limits, kind.lower() == 'continuous')
-        kind = KINDS.get(kind.lower(), kind.lower())
+        kind = KINDS.get(kind.lower(), kind.lower() or 'none')
         frames = frame, frame if other is None else other
         directions = axis, axis if second is None else second
         turns, places = zip(*((matrix[:3, :3], matrix[:3, 3]) for matrix in frames))

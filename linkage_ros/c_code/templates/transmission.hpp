@@ -101,13 +101,16 @@ template <class Handle>
 class Handles
 {
 public:
+  /// The number of needed handles for each quantity.
+  std::array<std::size_t, 3> count{};
+
   template <class Infos>
   void find(
     const std::string & what, const std::vector<Axis> & axes, std::size_t needed,
     const Infos & infos, const std::vector<Handle> & given)
   {
     using transmission_interface::Exception;
-    needed_ = needed;
+    count = {};
     channels_.clear();
     std::string allowed;
     for (std::size_t i = 0; i < needed; ++i) {
@@ -156,19 +159,10 @@ public:
         const double factor = kind == 2 ? 1.0 / owns[i].factor : owns[i].factor;
         for (const auto & handle : found) {
           channels_.push_back({handle, kind, i, factor, kind == 0 ? owns[i].offset : 0.0});
+          count[kind] += i < needed;
         }
       }
     }
-  }
-
-  /// The number of needed handles for an interface.
-  std::size_t count(std::size_t kind) const
-  {
-    std::size_t sum = 0;
-    for (const auto & channel : channels_) {
-      sum += channel.kind == kind && channel.axis < needed_;
-    }
-    return sum;
   }
 
   /// Read values; those without a handle are 0.
@@ -206,7 +200,6 @@ private:
   static constexpr bool is_actuator =
     std::is_same_v<Handle, transmission_interface::ActuatorHandle>;
 
-  std::size_t needed_ = 0;
   std::vector<Channel> channels_;
 };
 
@@ -231,7 +224,7 @@ public:
     actuators_.find("actuator", linkage_.actuators, num_joints(), info_.actuators, actuator_handles);
     joints_.find("joint", linkage_.joints, num_joints(), info_.joints, joint_handles);
     for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
-      const auto count = actuators_.count(kind) + joints_.count(kind);
+      const auto count = actuators_.count[kind] + joints_.count[kind];
       if (count != 2 * num_joints() && (count != 0 || kind == 0)) {
         refuse("all its actuators and joints need a handle for " + interfaces[kind][0] +
           (kind ? ", or none of them" : ": velocities and efforts depend on the pose"));
@@ -267,7 +260,7 @@ private:
       std::fill_n(kind, LKR_MAX_JOINTS, LKR_NAN);
     }
     status_ = lkr_transmit(&linkage_.model, &memory_, side, &values, &result);
-    if (joints_.count(1) + joints_.count(2) == 0) {
+    if (joints_.count[1] + joints_.count[2] == 0) {
       status_ &= ~SINGULAR;
     }
     log_.note(status_, side == LKR_JOINTS);

@@ -4,11 +4,11 @@
 """The inverse of a linkage: candidates, refined, distinct, and one chosen or followed."""
 
 from .inverse import Inverse, inverse_of, Solution
-from .linkage import InverseLinkage, Mode
+from .linkage import InverseLinkage
 from .segments import extremes_of, Segments, segments_of
 
 # The former name of a solution; deprecated.
 Answer = Solution
 
-__all__ = ['Answer', 'extremes_of', 'Inverse', 'inverse_of', 'InverseLinkage', 'Mode',
+__all__ = ['Answer', 'extremes_of', 'Inverse', 'inverse_of', 'InverseLinkage',
            'Segments', 'segments_of', 'Solution']

@@ -4,49 +4,18 @@
 """
 Linkages as text: one line per joint, in the order in which the joints are placed.
 
-    O ground 0 0              a joint fixed to the ground at x y
-    A crank O m [up]          on the crank circle of radius m about O, zero to the right [or up]
-    B crank A m zero C        the same about any joint, zero towards C of the same link
-    B cylinder P O r left     joined to O by a bar r and to P by a cylinder, left of P -> O
-    S carriage G along H 0 b  driven along the line G -> H of one link, from 0 to b behind G
-    B dyad A Q b c left       joined to A by a bar b and to Q by a bar c, left of A -> Q
-    P rigid A B d e right     corner of a rigid triangle on bar AB, d from A, e from B
-    P line A B d              on the line of bar AB, d from A; negative: on the other side of A
-    B mirror O A C            mirror image of O in the line AC: the far corner of a kite
-    C parallelogram B A D     corner opposite B of a parallelogram on the bars BA and BD
-    Q image P O H             ground joint at the mirror image of P in the ground's line O -> H
-    M mirrored O H            mirror image of all lines above in O -> H: AM is the image of A
-    B C D inversor P A a b    Peaucellier cell from pole P to pin A: long bars a, rhombus b
-    L slot Q A e out d        tip, d from Q, of a lever about Q; A in its slot, e to its left
-    S slider A r G p out      block on a line through G in direction p [rad], on a rod r from A
-    S slider A r G along H out    the same on the line G -> H of any link
-    Y yoke A G along H        block on the line G -> H whose slot, square to it, A runs in
-    T block S x y             on the block of S, x ahead of it and y to its left
-    C antiparallelogram B A D     corner opposite B of a parallelogram whose long bars cross
+The page "Joint lines" of the documentation explains words and numbers; FORMS has the arguments.
 
-Each driven joint is an input, called `crank`, `crank2`, `cylinder` and so on, or as its line says:
-
-    B cylinder P O r left called boom
-
-The name of a joint or dimension is a letter, followed by letters, digits and underscores. `left`
-and `right` are as seen along the first two joints; `out` is the half of a slot on the tip's side,
-or the block ahead of the pin; `in` the other. A number is a length [m], an angle [rad], a
-dimension's name, or arithmetic on them without spaces: + - * / and parentheses, `max(a,b)`,
-`sqrt(a)`, `pi`, and for angles degrees: `30deg` or `(a+b)deg`. It is zero or between 1e-70 and
-1e70; an angle beyond a turn is written with `deg` or `pi`. A dimension that is the length of a bar
-must be positive; other dimensions may be zero or negative.
-
-A dyad stays on its side of first -> second as long as it can be assembled. The exception is a
-change point: a dyad between a ground joint and a crank pin stretches or folds just as the crank
-passes the ground line (the longest and shortest of the four bars together are as long as the other
-two). There it continues smoothly and changes sides: a parallelogram stays a parallelogram. Its
-line then has the side at a crank angle of a quarter turn. The block of a slider on a crank pin
-continues smoothly, too, where the rod is square to the line; `out` and `in` are then as they are
-where the pin is farthest along the line. A linkage with one change point in a turn repeats only
-after two turns: its crank angle counts beyond a turn. Where an arm has no length, what stands on
-it has the limit from both sides if they agree, as at a change point, and else no place.
-
-A gear's ratio is a number up to 1000. Poses repeat after as many turns as its denominator says.
+A dyad stays on its side of first -> second as long as it can be assembled, except at a change
+point. A dyad between a ground joint and a crank pin has one if the longest and the shortest of
+the four bars are together as long as the other two: it stretches or folds just as the crank
+passes the ground line. There it continues smoothly and changes sides, so a parallelogram stays a
+parallelogram; `left` or `right` in its line is the side at a crank angle of a quarter turn. The
+block of a slider on a crank pin has one where its rod is square to the line, and continues
+smoothly, too; `out` or `in` is then the side where the pin is farthest along the line. A linkage
+with one change point in a turn repeats only after two turns, so its crank angle counts beyond a
+turn. Where an arm has no length, what stands on it has the limit from both sides if they agree,
+as at a change point; else it is NaN.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ Linkages in space as text: hinges with axes anywhere, and rods with ball ends.
 Each line except those of rods and cylinders adds a link to an earlier link or to the `ground`. All
 points [m] and axes are those of one drawing, in the frame of the ground. In that drawing every
 angle and slide is zero; they are positive about and along the axis. A rod is as long as drawn
-unless it ends in `length LENGTH`. Numbers are written as in `linkage.joint_lines`.
+unless it ends in `length LENGTH`. Numbers are written as in joint lines.
 
 Rods place the joints that are not driven, in any order that is possible. One rod places one hinge
 or slide, on the side on which the rod is drawn. Two rods place two hinges in a row, which both
@@ -83,17 +83,20 @@ class WindowError(ValueError):
     """
     Missing or too wide limits.
 
-    `problem` says why; `limits` has the largest valid ones by hinge [rad], if any.
+    `problem` says why, with two poses if they are known; `limits` has the largest valid ones by
+    hinge [rad], if any.
     """
 
-    def __init__(self, line: Line, problem: str, limits: dict[str, tuple[float, float]]):
+    def __init__(self, line: Line, problem: str, poses: str,
+                 limits: dict[str, tuple[float, float]]):
         largest = ', '.join(f'{name} within {math.degrees(low):.4g}deg {math.degrees(high):.4g}deg'
                             for name, (low, high) in limits.items())
-        # Not shortened: two poses are a proof.
+        # Not shortened: two poses are a proof. The remedy is first, as a scene shortens the text.
         super().__init__(f'{line.error("")}{problem}; ' + (
             f'the largest proved to have one at most: {largest}' if limits else
-            'no limits about their middle are proved to have one at most'))
-        self.problem, self.limits = problem, limits
+            'no limits about their middle are proved to have one at most')
+            + (f'; {poses}' if poses else ''))
+        self.problem, self.limits = f'{problem}: {poses}' if poses else problem, limits
 
 
 class TwoRodLink(NamedTuple):
@@ -118,22 +121,22 @@ class TwoRodLink(NamedTuple):
             return
         largest, names = window.largest(), [line.names[0] for line in self.lines]
         raise WindowError(
-            self.lines[1], _why_not(window, self.inputs, names) if limited
-            else 'both hinges need limits',
+            self.lines[1], *_why_not(window, self.inputs, names) if limited
+            else ('both hinges need limits', ''),
             dict(zip(names, zip(largest.low.tolist(), largest.high.tolist()))) if largest else {})
 
 
-def _why_not(window: Window, inputs: Sequence[str], hinges: Sequence[str]) -> str:
-    """Return why limits are not proved: two poses if there are some."""
+def _why_not(window: Window, inputs: Sequence[str], hinges: Sequence[str]) -> tuple[str, str]:
+    """Return why limits are not proved, and two poses if there are some."""
     def at(names: Sequence[str], values: Iterable[float]) -> str:
         return ', '.join(f'{name} at {value:.6g}' for name, value in zip(names, values))
 
     if two := window.second_pose():
         motors, poses = two
-        return (f'there is a second pose in these limits: with {at(inputs, motors)}, '
-                + ' as well as '.join(at(hinges, pose) for pose in poses))
+        return 'there is a second pose in these limits', f'with {at(inputs, motors)}, ' + (
+            ' as well as '.join(at(hinges, pose) for pose in poses))
     return ("there may be a second pose in these limits, or one that the steps of Newton's method "
-            'do not reach')
+            'do not reach', '')
 
 
 def parse(texts: Iterable[str]) -> list[Line]:
