@@ -93,10 +93,10 @@ class Yourdfpy:
         self.robot = library.URDF.load(BytesIO(text.encode()), load_meshes=False)
         self.joints = self.robot.actuated_joint_names
 
-    def places(self, positions, names):
-        """Return where frames are [m], by name, at joint positions."""
+    def places(self, positions, names, base=None):
+        """Return where frames are in another [m], by name, at joint positions."""
         self.robot.update_cfg({name: float(value) for name, value in positions.items()})
-        return {name: self.robot.get_transform(name)[:3, 3] for name in names}
+        return {name: self.robot.get_transform(name, base)[:3, 3] for name in names}
 
 
 class Pinocchio:

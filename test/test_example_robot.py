@@ -14,7 +14,7 @@ from linkage_ros.nodes.crank_driver import CrankDriver
 from linkage_ros.nodes.kinematics import Kinematics
 import numpy as np
 import pytest
-from robots import in_frame, LIBRARIES, Pinocchio
+from robots import FIRST, in_frame, LIBRARIES, Pinocchio
 from ros_harness import Graph
 from scenes import ROOT
 from sensor_msgs.msg import JointState
@@ -107,7 +107,7 @@ def test_gears_have_their_ratios_and_a_partial_message_moves_its_motor_alone(tol
     ('abduction', 'abduction_motor', 'torso'), ('knee', 'knee_motor', 'thigh')])
 def test_markers_stay_on_the_link_that_the_loop_stands_on_wherever_it_is(
         graph, name, motor, base):
-    robot, urdf = Robot(graph), Pinocchio(URDF)
+    robot, urdf = Robot(graph), FIRST(URDF)
     drawn = graph.listen(MarkerArray, f'{name}/markers')
     for at in (-4.0, 4.0):
         robot.turn(('abduction_motor', 'hip_motor'), [at, at])
