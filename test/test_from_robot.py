@@ -237,6 +237,22 @@ def test_joints_that_no_mechanism_publishes_are_one_of_cranks(tmp_path):
     assert cli.others(robot, scene.read(cli.described(robot)[0]).mechanisms, {}) == ({}, [])
 
 
+def test_others_start_where_they_are_after_many_turns_and_far_along_a_rail(tmp_path):
+    robot = readers.read(str(of_text(tmp_path / 'robot.urdf', """<robot name="r">
+      <link name="a"/><link name="b"/><link name="c"/><link name="d"/>
+      <joint name="rail" type="prismatic"><parent link="a"/><child link="b"/></joint>
+      <joint name="wheel" type="continuous"><parent link="b"/><child link="c"/></joint>
+      <joint name="belt" type="continuous"><parent link="c"/><child link="d"/>
+        <mimic joint="wheel" multiplier="-2" offset="0.5"/></joint></robot>""")))
+    given, _ = cli.others(posed(robot, {'rail': -15.0, 'wheel': 200.0}), {}, {})
+    mechanism = scene.read(given).mechanisms['others']
+    inputs, joints = mechanism.inputs.values(), mechanism.joints.values()
+    assert [(drive.start - drive.offset) / drive.ratio for drive in inputs] == [
+        -15.0, 200.0, 200.0]
+    assert [called.of(drive.start) for drive, called in zip(inputs, joints)
+            if called.published] == [0.5 - 2.0 * 200.0]
+
+
 MOTOR = """<robot name="r"><link name="base"/><link name="crank"/>
   <joint name="motor" type="continuous"><parent link="base"/><child link="crank"/>
     <axis xyz="0 1 0"/></joint>{}
@@ -313,6 +329,27 @@ def test_what_is_not_driven_is_imported_with_the_line_that_is_printed(tmp_path, 
         assert 'Checked: mot_front' in said(file, *loops, *more)
 
 
+NAMED = re.compile(r'(name|link|joint)="(?!base|hip")(\w+)"')
+
+
+def doubled(folder, text, root):
+    """Return the file of a robot that has its loops twice, on one root link."""
+    head, link, loops = text.replace('</robot>', '').partition(root)
+    return of_text(folder / 'two.urdf', ''.join(
+        [head, link, loops, NAMED.sub(r'\1="\2_b"', loops), '</robot>']))
+
+
+def test_lines_that_are_printed_of_two_loops_are_pasted_one_after_the_other(tmp_path):
+    file = doubled(tmp_path, legs(1), '<link name="base"/>')
+    (one, _), (two, _) = zip(*[iter(choices(refused(file)))] * 2)
+    assert 'Left out' not in said(file, *one, *two)
+    file = doubled(tmp_path, (ROBOTS / 'five_bar.urdf').read_text(), '<link name="hip"/>')
+    loops = loops_of(tmp_path, 'name_mot: [mot_front, mot_front_b]',
+                     'front_foot, back_foot], [front_foot_b, back_foot_b', '3d, 3d')
+    for lines in zip(*zip(*[iter(choices(refused(file, *loops)))] * 2)):
+        assert 'Left out' not in said(file, *loops, *sum(lines, []))
+
+
 OPEN = {
     'a foot in two poses': ('foot.urdf', {}, 'pitch=-2.77 as with pitch=2.38'),
     'a foot in one': ('foot.urdf', {'pitch': 2.0}, ''),
@@ -347,10 +384,11 @@ def test_no_answer_depends_on_the_starts_of_a_search(tmp_path, name, seeds):
 
 def answer(robot, *lines):
     """Return what is said of a robot with lines that were pasted, as the command reads them."""
-    more = {'--driven': robot.driven, '--pose': [], '--hold': []}
+    more = {'--driven': [], '--pose': [], '--hold': []}
     for option, *values in lines:
-        more[option] = values if option == '--driven' else more[option] + values
-    robot = posed(replace(robot, driven=more['--driven']), cli.positions(more['--pose']))
+        more[option] += values
+    robot = posed(replace(robot, driven=more['--driven'] or robot.driven),
+                  cli.positions(more['--pose']))
     try:
         return '', *cli.described(closing.held(robot, cli.positions(more['--hold'])))[1]
     except RequestError as error:

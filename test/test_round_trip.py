@@ -7,6 +7,7 @@ from contextlib import suppress
 from functools import cache
 
 from linkage_ros import scene
+from linkage_ros.linkage import theta_of
 from linkage_ros.robot_files import readers
 from linkage_ros.robot_model import bodies, mjcf, sdf, urdf
 from linkage_ros.robot_model.robot import posed
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 from robots import of_text, ROBOTS, turned
 from scenes import EXAMPLES
-from test_robot_files import random_linkage
+from test_robot_files import moves, random_linkage
 from test_urdf import ARM
 
 FORMATS = {'urdf': urdf.write, 'sdf': sdf.write, 'mjcf': mjcf.write}
@@ -149,6 +150,21 @@ def test_random_robots_come_back(tmp_path, seeds, form):
     assert len(mechanisms) > len(seeds) // 2
     for mechanism in mechanisms:
         check_read(prepared([mechanism], form), form, tmp_path)
+
+
+@pytest.mark.parametrize('form', ['sdf', 'mjcf'])
+@pytest.mark.parametrize('seeds', [
+    [7015], pytest.param(range(7000, 7040), marks=pytest.mark.nightly)])
+def test_what_is_written_and_imported_moves_as_the_linkage(tmp_path, seeds, form):
+    # In that of 7015 several bodies turn about each pin.
+    moved = 0
+    for mechanism in filter(None, map(random_mechanism, seeds)):
+        file = of_text(tmp_path / 'robot.xml', FORMATS[form](prepared([mechanism], form)))
+        values = [each.start for each in mechanism.inputs.values()]
+        steps = 0.01 * np.random.default_rng(0).normal(size=(5, len(values)))
+        moved += moves(mechanism.linkage, theta_of(values), readers.read(str(file)), steps,
+                       before_names='m_')
+    assert moved > len(seeds) // 2
 
 
 @pytest.mark.parametrize('file', ['four_bar.urdf', 'boom.urdf', 'palletiser.urdf',

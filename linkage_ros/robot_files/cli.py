@@ -41,12 +41,14 @@ def show(args: list[str] | None) -> None:
                         'MJCF, SDF or URDF.')
     parser.add_argument('file', metavar='FILE', help='the robot')
     parser.add_argument('--loops', metavar='FILE', help='YAML with the loop joints of a URDF')
-    parser.add_argument('--driven', metavar='JOINT', nargs='+', help='joints that motors move '
-                        '(default: those of the file, else any that determine the others)')
+    # Each loop that is refused prints its own options to be added.
+    parser.add_argument('--driven', metavar='JOINT', nargs='+', action='extend',
+                        help='joints that motors move (default: those of the file, else any that '
+                             'determine the others)')
     for option, meaning in (('pose', 'position of a joint in the pose that determines sides'),
                             ('hold', 'position at which a joint is fixed')):
-        parser.add_argument(f'--{option}', metavar='JOINT=VALUE', nargs='+', default=[],
-                            help=f'{meaning} [rad or m]; several may follow')
+        parser.add_argument(f'--{option}', metavar='JOINT=VALUE', nargs='+', action='extend',
+                            default=[], help=f'{meaning} [rad or m]; several may follow')
     arguments = parser.parse_args(args)
     with np.errstate(all='ignore'):
         robot = readers.read(arguments.file, arguments.loops)
@@ -155,21 +157,24 @@ def others(robot: Robot, mechanisms: Mapping[str, scene.SceneMechanism],
     passive = {joint.name for component in components(closing.held(robot, held))
                for joint in component.joints}.difference(known, held, robot.driven)
     cranks: dict[str, check.Source] = {}
-    lost = []
+    zeros, lost = {}, []
     for name in [name for name in robot.positions if name not in known]:
         source, ratio, offset = (name, 1.0, 0.0) if name in held else robot.source(name)
         if source in passive:
             lost.append(name)
             continue
-        cranks[name] = check.Source(
-            f'crank{len(cranks) + 1 if cranks else ""}', source, ratio, offset,
-            ratio * held.get(source, robot.positions[source]) + offset)
+        value = ratio * held.get(source, robot.positions[source]) + offset
+        # A wheel after many turns, or a long rail: inputs start near zero.
+        zeros[name] = zero = value if abs(value) > math.tau else 0.0
+        cranks[name] = check.Source(f'crank{len(cranks) + 1 if cranks else ""}', source, ratio,
+                                    offset - zero, value - zero)
     if not cranks:
         return {}, lost
     lines = ['A ground 0 0', *(f'B{i} crank A 1' for i in range(1, len(cranks) + 1))]
     return {'mechanisms': [*mechanisms, OTHERS], **check.parameters(
         OTHERS, 'custom', lines, [*cranks.values()],
-        [(crank.name, 1.0, name, 0.0) for name, crank in cranks.items() if crank.source != name],
+        [(crank.name, 1.0, name, zeros[name]) for name, crank in cranks.items()
+         if crank.source != name],
         **{f'{crank.name}.speed': 0.0 for crank in cranks.values()})}, lost
 
 

@@ -167,6 +167,8 @@ class Drawing(Dyads):
                 or self.fixed(base, self.on[base][pin] + corner)[0]
             line = f'parallelogram {pin} {foot} {other}'
         name = self.name(self.on[base][foot] + along, body, line)
+        # Its link turns as the body does, but is another: nothing is placed on it.
+        del self.on[body][name]
         return bar_name(foot, name), along
 
     def drive(self, word: str, joint: Joint, ratio: float, offset: float) -> tuple[str, str]:
