@@ -184,6 +184,17 @@ def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
         assert status or found[0] == pytest.approx(expected_, rel=1e-12, abs=1e-10)
 
 
+def test_a_command_leads_back_into_the_sweep(tmp_path):
+    mechanism = alone(SLOT, **{'crank.start': 0.5, 'crank.sweep': [0.2, 0.8]})
+    memory = Memory(compiled(tmp_path, [mechanism], 'm_A.y'), mechanism)
+    for measured in (3.0, 20.0, -300.0):
+        assert memory.send(0, [measured])[0] == 0
+        # It is where it may not be commanded to be, not even to stay.
+        assert memory.send(1, [0.02 * math.cos(measured)])[0] == 1
+        status, (crank, *_) = memory.send(1, [0.02 * math.cos(0.6)])
+        assert (status, crank) == (0, pytest.approx(0.6, abs=1e-10))
+
+
 def test_a_new_position_takes_one_pose(mechanisms, tmp_path):
     """Actuators count inputs, and these joints have closed forms."""
     chosen = [mechanisms[name] for name in ('leg', 'boom', 'beast', 'rocker', 'sled')]
