@@ -251,6 +251,8 @@ def test_a_singular_pose_is_said(library, mechanisms):
     status, (position, velocity, _) = memory.send(1, expected(mechanism, [dead])[2], [1.0], [1.0])
     # Where it is already it stays, whatever rounding says.
     assert status == 2 and velocity == 0.0 and position == pytest.approx(dead, abs=1e-12)
+    # Out of reach its velocity is zero, and none would be infinite.
+    assert memory.send(1, expected(mechanism, [dead])[2] - 0.1, [1.0])[0] == 1
     # So is a velocity that is more than a number can be.
     boom = Memory(library, mechanisms['boom'])
     own = expected(mechanisms['boom'], states(mechanisms['boom'], 1)[0])[2]
