@@ -261,6 +261,20 @@ def test_a_singular_pose_is_said(library, mechanisms):
     assert status == 2 and velocity == 0.0
 
 
+def test_joints_come_in_any_order(tmp_path):
+    mechanism = alone('five_bar', **{'crank.start': 1.9, 'crank2.start': 1.24})
+    memory = Memory(compiled(tmp_path, [mechanism], 'm_crank2', 'm_AP'), mechanism)
+    _, _, joint, turning = expected(mechanism, [1.9, 1.24], ('crank2', 'AP'))
+    status, (position, velocity, _) = memory.send(1, joint, turning @ [1.0, 2.0])
+    assert status == 0
+    np.testing.assert_allclose([position, velocity], [[1.9, 1.24], [1.0, 2.0]], rtol=1e-9)
+
+
+def test_before_a_position_is_known_nothing_is_commanded(library, mechanisms):
+    status, found = Memory(library, mechanisms['rocker']).send(1, [math.nan], [1.0], [1.0])
+    assert status == 4 and (found == UNWRITTEN).all()
+
+
 @pytest.mark.parametrize('name', SCENE['mechanisms'])
 def test_nothing_that_comes_in_gets_out_as_no_number(library, mechanisms, name):
     mechanism, rng = mechanisms[name], np.random.default_rng(4)
