@@ -184,6 +184,17 @@ def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
         assert status or found[0] == pytest.approx(expected_, rel=1e-12, abs=1e-10)
 
 
+def test_a_command_leads_back_into_the_sweep(tmp_path):
+    mechanism = alone(SLOT, **{'crank.start': 0.5, 'crank.sweep': [0.2, 0.8]})
+    memory = Memory(compiled(tmp_path, [mechanism], 'm_A.y'), mechanism)
+    for measured in (3.0, 20.0, -300.0):
+        assert memory.send(0, [measured])[0] == 0
+        # It is where it may not be commanded to be, not even to stay.
+        assert memory.send(1, [0.02 * math.cos(measured)])[0] == 1
+        status, (crank, *_) = memory.send(1, [0.02 * math.cos(0.6)])
+        assert (status, crank) == (0, pytest.approx(0.6, abs=1e-10))
+
+
 def test_a_new_position_takes_one_pose(mechanisms, tmp_path):
     """Actuators count inputs, and these joints have closed forms."""
     chosen = [mechanisms[name] for name in ('leg', 'boom', 'beast', 'rocker', 'sled')]
@@ -240,12 +251,28 @@ def test_a_singular_pose_is_said(library, mechanisms):
     status, (position, velocity, _) = memory.send(1, expected(mechanism, [dead])[2], [1.0], [1.0])
     # Where it is already it stays, whatever rounding says.
     assert status == 2 and velocity == 0.0 and position == pytest.approx(dead, abs=1e-12)
+    # Out of reach its velocity is zero, and none would be infinite.
+    assert memory.send(1, expected(mechanism, [dead])[2] - 0.1, [1.0])[0] == 1
     # So is a velocity that is more than a number can be.
     boom = Memory(library, mechanisms['boom'])
     own = expected(mechanisms['boom'], states(mechanisms['boom'], 1)[0])[2]
     assert boom.send(1, own, [1.0])[0] == 0
     status, (_, velocity, _) = boom.send(1, own, [1e308])
     assert status == 2 and velocity == 0.0
+
+
+def test_a_joint_need_not_depend_on_the_first_input(tmp_path):
+    mechanism = alone('five_bar', **{'crank.start': 1.9, 'crank2.start': 1.24})
+    memory = Memory(compiled(tmp_path, [mechanism], 'm_crank2', 'm_CP'), mechanism)
+    _, _, joint, turning = expected(mechanism, [1.9, 1.24], ('crank2', 'CP'))
+    status, (position, velocity, _) = memory.send(1, joint, turning @ [1.0, 2.0])
+    assert status == 0
+    np.testing.assert_allclose([position, velocity], [[1.9, 1.24], [1.0, 2.0]], rtol=1e-9)
+
+
+def test_before_a_position_is_known_nothing_is_commanded(library, mechanisms):
+    status, found = Memory(library, mechanisms['rocker']).send(1, [math.nan], [1.0], [1.0])
+    assert status == 4 and (found == UNWRITTEN).all()
 
 
 @pytest.mark.nightly(all_but=5)
