@@ -127,8 +127,16 @@ def test_before_the_first_good_command_there_is_none(stream, graph):
 def test_two_outputs_of_one_input_and_a_name_of_nobody_are_said(stream, capfd):
     assert stream.want(['flap', 'lever_A.x', 'boom'], [flap(0.2), 100.0, 1.0]).keys() == {'servo'}
     said = capfd.readouterr().err
-    assert 'flap and lever_A.x are moved by one input: name one of them' in said
+    assert 'flap and lever_A.x are moved by one actuator, servo: name one of them' in said
     assert 'no output is called boom' in said
+
+
+def test_two_outputs_of_one_motor_are_said_and_the_first_is_commanded(graph, capfd):
+    stream = Stream(graph, {**LEVER, 'bar.crank.source': 'servo'})
+    stream.want(['flap', 'bar_QB'], [flap(0.7), 1.2])
+    command = stream.commands[-1]
+    assert command.name == ['servo'] and command.position[0] == pytest.approx(0.7, abs=1e-13)
+    assert 'flap and bar_QB are moved by one actuator, servo: name' in capfd.readouterr().err
 
 
 def test_of_a_name_twice_the_last_counts_as_in_crank_states(stream):
@@ -288,7 +296,7 @@ REFUSED = [
     (['flap', 'wing'], [([0.0, 0.0], [])], 'no output is called wing; an output is called '
      '<mechanism>_<link>, <mechanism>_<joint>.x, or as joint_names has it'),
     (['flap', 'lever_A.x'], [([0.0, 0.0], [])],
-     'flap and lever_A.x are moved by one input: name one of them'),
+     'flap and lever_A.x are moved by one actuator, servo: name one of them'),
     (['flap', 'flap'], [([0.0, 0.0], [])], 'joint_names has a name twice'),
     ([], [([], [])], 'joint_names is empty: name at least one output'),
     (['flap'], [([0.0], [math.nan])], 'point 0: a velocity must be finite'),

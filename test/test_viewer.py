@@ -29,6 +29,7 @@ from rcl_interfaces.msg import (
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
+from test_reading import held
 from truth.working_modes import lever_of
 from viewer_harness import (
     framed,
@@ -224,8 +225,10 @@ def test_an_input_is_where_the_last_message_says(graph, show):
     until(lambda: after(1.5) == 1.5)
     after(math.nan)
     assert after(math.inf) == 1.5
-    publisher.publish(JointState(name=['leg_crank', 'nobody'], position=[1.6, 1.0]))
+    before, others = held(running.viewer), [f'joint{number}' for number in range(5000)]
+    publisher.publish(JointState(name=['leg_crank', *others], position=[1.6] * 5001))
     until(lambda: crank() == 1.6)
+    assert held(running.viewer) < before + len(others)
     # A start moves an input only if it is another than before.
     for start in (2.0, math.nextafter(2.0, 0.0)):
         assert crank(output='crank', value=2.0) == 2.0

@@ -125,30 +125,34 @@ class CommandStream:
 
         Of a repeated name the last counts.
         """
-        outputs_of: dict[str, list[tuple]] = {}
-        targets, unknown, reasons = [], [], []
+        groups: dict[tuple[str, int], list[tuple]] = {}
+        targets: list[Target] = []
+        unknown, reasons = [], []
         for named, index in dict(zip(names, range(len(names)))).items():
             if output := self._output(named):
-                outputs_of.setdefault(output[0].name, []).append((index, *output[1:]))
+                mechanism, *joint = output
+                # Only the outputs of several inputs are solved together.
+                group = index if len(mechanism.inputs) == 1 else -1
+                groups.setdefault((mechanism.name, group), []).append((index, *joint))
             else:
                 unknown.append(named)
         if unknown:
             reasons.append(f'no output is called {listed(unknown, 150)}; an output is called '
                            '<mechanism>_<link>, <mechanism>_<joint>.x, or as joint_names has it')
-        for name, outputs in outputs_of.items():
-            mechanism = self._mechanisms[name]
-            n = len(mechanism.inputs)
-            called = ' and '.join(elided(names[index]) for index, *_ in outputs)
+        for (name, _), outputs in groups.items():
+            mechanism, (indices, joints, published) = self._mechanisms[name], zip(*outputs)
+            n, called = len(mechanism.inputs), ' and '.join(elided(names[i]) for i in indices)
             try:
-                if len(outputs) > n == 1:
-                    reasons.append(f'{called} are moved by one input: name one of them')
-                elif len(outputs) != n:
+                if len(outputs) != n:
                     raise ValueError(f'{name} has {n} inputs: name {n} of its outputs, not '
                                      f'{called}')
-                indices, joints, published = zip(*outputs[:n])
-                targets.append(Target(
-                    ' and '.join(elided(names[index]) for index in indices), mechanism,
-                    InverseRequest(mechanism, joints), indices, published))
+                target = Target(called, mechanism, InverseRequest(mechanism, joints), indices,
+                                published)
+                for other in targets:
+                    if shared := {*target.actuators} & {*other.actuators}:
+                        raise ValueError(f'{other.named} and {called} are moved by one actuator, '
+                                         f'{listed(sorted(shared))}: name one of them')
+                targets.append(target)
             except ValueError as error:
                 reasons.append(str(error))
         return targets, reasons

@@ -40,9 +40,7 @@ class CrankDriver(scene_node.SceneNode):
         self._now: int | None = None
         self._steady = 0
         self._publisher = TrackedPublisher(self, JointState, 'crank_states', 10)
-        sources = list(dict.fromkeys(
-            settings.source for mechanism in self.scene.mechanisms.values()
-            for settings in mechanism.inputs.values()))
+        sources = list(self.scene.sources)
         n = len(sources)
         self._message = PatchedMessages(
             [(self._publisher.publish, lambda stamp, values: joint_states(

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import partial
 import time
 from typing import Any, Callable, Iterable, NamedTuple, Sequence
@@ -13,7 +14,7 @@ from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 
 from . import scene_node, shutdown
-from .log import MAX_NAMES, Once
+from .log import InvalidHandle, MAX_NAMES, Once, RCLError
 from .mechanism_model import MechanismModel
 from .mechanism_topics import MechanismTopics
 from .message_layout import NEVER, subscribe
@@ -51,11 +52,7 @@ class Kinematics(scene_node.SceneNode):
         self._mechanisms: dict[str, MechanismTopics] = {}
         self._models: dict[str, MechanismModel] = {}
         super().__init__(scene.KINEMATICS, **kwargs)
-        # Mechanism and index of the inputs, by their source joint.
-        self._inputs: dict[str, list[tuple[str, int]]] = {}
-        for name, mechanism in self.scene.mechanisms.items():
-            for i, settings in enumerate(mechanism.inputs.values()):
-                self._inputs.setdefault(settings.source, []).append((name, i))
+        self._inputs = self.scene.sources
         self._scene_joint_states = SceneJointStates(self, self._inputs)
         self._mechanisms.update((name, MechanismTopics(self, mechanism))
                                 for name, mechanism in self.scene.mechanisms.items())
@@ -133,11 +130,13 @@ class Kinematics(scene_node.SceneNode):
             self.get_logger().info(f'the whole scene has no robot_description: {error}', once=True)
         return partial(self._scene_joint_states.describe, text)
 
-    def delete_displayed(self) -> None:
-        """Delete all markers and loci."""
+    def destroy_node(self) -> None:
+        """Delete all markers and loci, then end."""
         deadline = time.monotonic() + DELETION_TIMEOUT_S
-        for topics in self._mechanisms.values():
-            topics.clear(deadline)
+        with suppress(RCLError, InvalidHandle):
+            for topics in self._mechanisms.values():
+                topics.clear(deadline)
+        super().destroy_node()
 
     def _receive(self, routes: Routes, stamp: bytes, numbers: Sequence[Any]) -> None:
         """Set the inputs by a message, and publish the mechanisms that it moves."""

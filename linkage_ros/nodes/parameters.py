@@ -33,10 +33,10 @@ class SceneParameters:
     """
     Reads a scene from a node's parameters; declares those that it owns, and validates changes.
 
-    The `node` is created with `automatically_declare_parameters_from_overrides`. `role`, one of
-    scenes.ALL, selects its parameters. `check(scene)` raises SceneError for a scene that the node
-    does not support. `changed()` is called after `scene` is replaced. Raises SceneError if the
-    node's initial values are invalid.
+    The `node` is created with `automatically_declare_parameters_from_overrides`. `role`, its name
+    in `Field.readers`, selects its parameters. `check(scene)` raises SceneError for a scene that
+    the node does not support. `changed()` is called after `scene` is replaced. Raises SceneError
+    if the node's initial values are invalid.
 
     Attributes
     ----------

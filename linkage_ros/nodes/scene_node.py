@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from functools import partial
 import gc
 import sys
@@ -23,7 +22,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args, try_shutdown
 
-from .log import Incidents, InvalidHandle, RCLError
+from .log import Incidents
 from .ownership import Announcer, Follower
 from .parameters import SceneParameters
 from .shutdown import ShutdownHandler
@@ -141,13 +140,8 @@ class SceneNode(Node):
         respond = partial(self._respond_in_turn if is_in_turn else self._respond, callback)
         return super().create_service(srv_type, srv_name, respond, **kwargs)
 
-    def delete_displayed(self) -> None:
-        """Delete the markers that the node has displayed; a subclass overrides it."""
-
     def destroy_node(self) -> None:
-        """Delete displayed markers, stop the worker, and destroy the node."""
-        with suppress(RCLError, InvalidHandle):
-            self.delete_displayed()
+        """Stop the worker, and destroy the node."""
         self.worker.end()
         super().destroy_node()
 

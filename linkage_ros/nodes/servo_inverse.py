@@ -41,7 +41,7 @@ class ServoInverse(scene_node.SceneNode):
             )
         super().__init__(scene.INVERSE, **kwargs)
         self._requests = Cache(self._request)
-        self._sources: frozenset = frozenset()
+        self._sources = self.scene.sources
         self._positions: dict[str, float] = {}
         subscribe(self, 'crank_states', self._interpret, self._receive)
         self.create_service(ServoInverseType, 'servo_inverse', self.answer)
@@ -59,8 +59,6 @@ class ServoInverse(scene_node.SceneNode):
         """Replace the scene for which requests are answered."""
         self._requests.clear()
         self._stream.adopt(new.mechanisms)
-        self._sources = frozenset(settings.source for mechanism in new.mechanisms.values()
-                                  for settings in mechanism.inputs.values())
 
     def answer(self, request: Any, response: Any) -> Any:
         """Answer a request of `servo_inverse`; the response names an error, if any."""

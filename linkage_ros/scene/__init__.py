@@ -62,6 +62,15 @@ class Scene:
         return (*self.general, *(parameter for mechanism in self.mechanisms.values()
                                  for parameter in mechanism.parameters))
 
+    @property
+    def sources(self) -> dict[str, list[tuple[str, int]]]:
+        """The inputs of each source joint: their mechanism's name and their index in it."""
+        found: dict[str, list[tuple[str, int]]] = {}
+        for name, mechanism in self.mechanisms.items():
+            for i, settings in enumerate(mechanism.inputs.values()):
+                found.setdefault(settings.source, []).append((name, i))
+        return found
+
     def changed_from(self, old: 'Scene') -> list[Parameter]:
         """Return the parameters whose values differ from an older scene of the same mechanisms."""
         # No change adds or removes a parameter.

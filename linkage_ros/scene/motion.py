@@ -101,11 +101,7 @@ class Motion:
     def changed(self, speed: float, sweep: Arc | None, period: float, now: int) -> Motion:
         """Return a motion with other settings from this one's value at `now` [ns]."""
         motion = Motion(speed, sweep, since=now, turns=self._turns, period=period)
-        phase = self._phase_at(now)
-        if (sweep, motion._round) == (self._sweep, self._round):
-            motion._phase = phase
-            return motion
-        travelled, ahead = self._fold(phase)
+        travelled, ahead = self._fold(self._phase_at(now))
         place = motion._place(self._low + travelled)
         motion._phase = place if ahead or sweep is None else -place
         return motion
@@ -124,17 +120,13 @@ class Motion:
         ahead = phase < self._width
         return (phase, ahead) if ahead else (2 * self._width - phase, ahead)
 
-    def _near(self, angle: int) -> int:
-        """Return how far an angle is above the low end, in the turn nearest to the sweep."""
+    def _place(self, angle: int) -> int:
+        """Return the phase at which the rising value is `angle`, or nearest to it."""
         place, turn = angle - self._low, self._round
         if self._sweep is None:
             return place % turn
         if self._turns and not 0 <= place <= self._width:
+            # In the turn nearest to the sweep.
             ahead = (turn - self._width) // 2
             place = (place + ahead) % turn - ahead
-        return place
-
-    def _place(self, angle: int) -> int:
-        """Return the phase at which the rising value is `angle`, or nearest to it."""
-        place = self._near(angle)
-        return place if self._sweep is None else min(max(place, 0), self._width)
+        return min(max(place, 0), self._width)

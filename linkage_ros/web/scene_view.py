@@ -333,9 +333,8 @@ class SceneView:
             # What a node announces may be no scene.
             with suppress(SceneError):
                 nodes = self._read(owner)
-                for name, mechanism in self._scenes[owner].mechanisms.items():
-                    self._sources.update(
-                        settings.source for settings in mechanism.inputs.values())
+                self._sources.update(self._scenes[owner].sources)
+                for name in self._scenes[owner].mechanisms:
                     key = f'{_space(owner)}/{name}'
                     self._mechanisms[key] = ShownMechanism(key, name, owner, sources, nodes)
                     wanted.update(dict.fromkeys(sources, self._follow))
