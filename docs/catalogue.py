@@ -192,7 +192,7 @@ As a scene, `{type_}.yaml`:
 
 ```console
 $ python -m linkage_ros.render {type_}.yaml --out {type_}.gif
-$ ros2 run linkage_ros kinematics --ros-args --params-file {type_}.yaml
+$ ros2 run linkage_ros scene --ros-args --params-file {type_}.yaml
 ```
 
 In Python:

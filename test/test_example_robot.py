@@ -73,7 +73,6 @@ def told():
         return found
 
 
-@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('library', LIBRARIES)
 def test_the_loops_of_the_urdf_are_closed_at_every_pose(told, library):
     robot = library(URDF)
@@ -108,14 +107,13 @@ def test_gears_have_their_ratios_and_a_partial_message_moves_its_motor_alone(tol
     ('abduction', 'abduction_motor', 'torso'), ('knee', 'knee_motor', 'thigh')])
 def test_markers_stay_on_the_link_that_the_loop_stands_on_wherever_it_is(
         graph, name, motor, base):
-    robot, urdf = Robot(graph), LIBRARIES[0](URDF)
+    robot, urdf = Robot(graph), Pinocchio(URDF)
     drawn = graph.listen(MarkerArray, f'{name}/markers')
     for at in (-4.0, 4.0):
         robot.turn(('abduction_motor', 'hip_motor'), [at, at])
         robot.turn(('knee_motor',), [at])
         *_, pin = (spheres := graph.crank([motor], 'joint_states')([at], drawn).markers[1]).points
-        urdf.places(robot.joints, [])
-        wanted = urdf.seen_from(base, f'{name}_pin')
+        wanted, = urdf.places(robot.joints, [f'{name}_pin'], base).values()
         assert spheres.header.frame_id == base
         assert in_frame(spheres.pose, pin) == pytest.approx(wanted, abs=1e-12)
 

@@ -121,7 +121,7 @@ def harness():
     return ros_harness
 
 
-@pytest.mark.nightly(all_but=2)
+@pytest.mark.nightly(all_but=1)
 @pytest.mark.parametrize('way', WAYS)
 @pytest.mark.parametrize('name', ['kinematics', 'scene'])
 def test_a_node_moves_without_machine_code_and_says_why_once(harness, tmp_path, name, way):

@@ -22,6 +22,7 @@ from robots import (
     LIBRARIES,
     MuJoCo,
     of_text,
+    Pinocchio,
     printed,
     published,
     refused,
@@ -80,15 +81,14 @@ def check_closed(robot, joints, loops):
         assert places[first] == pytest.approx(places[second], abs=2e-15)
 
 
-@pytest.mark.parametrize('file, library', [
-    (file, library) for file in FILES for library in (
-        [MuJoCo] if file.endswith('.xml') else LIBRARIES)])
+@pytest.mark.parametrize('library', LIBRARIES)
+@pytest.mark.parametrize('file', FILES)
 def test_published_joints_close_the_loops_of_a_file(file, library):
     more, motors, loops = FILES[file]
     found, path = imported(file, *more), str(ROBOTS / file)
     read = readers.read(path, *more[1:])
-    robot = library((ROBOTS / file).read_text() if library is MuJoCo
-                    else readers.description(path, read))
+    robot = MuJoCo((ROBOTS / file).read_text()) if file.endswith('.xml') else library(
+        readers.description(path, read))
     for part in np.linspace(0.0, 1.0, 15):
         joints, at = {}, {motor: low + part * (high - low)
                           for motor, (low, high) in motors.items()}
@@ -332,7 +332,7 @@ def test_a_five_bar_is_closed_by_what_moves_it(tmp_path, more, mimic, motors):
     mechanism, = imported(file, *loops)
     assert {drive.source for drive in mechanism.inputs.values()} == {
         *re.search(r'name_mot: \[(.*)\]', more)[1].split(', ')}
-    robot = LIBRARIES[1]((ROBOTS / 'five_bar.urdf').read_text())
+    robot = Pinocchio((ROBOTS / 'five_bar.urdf').read_text())
     for angle in np.linspace(-0.3, 0.3, 7):
         check_closed(robot, published(mechanism, **motors(angle)), FEET)
     rest, lost = cli.others(readers.read(str(file), str(loops[1])), {'m': mechanism}, {})
@@ -350,7 +350,7 @@ def test_a_ring_that_spins_on_a_pin_is_no_dead_point(tmp_path):
     mechanism, = imported(file, *loops)
     assert 'Left out: ring_a: held more than once by ring_a_pin, ring_b_pin.' in said(file, *loops)
     assert 'Not published: ring_a_pin, ring_b_pin: ' in said(file, *loops)
-    check_closed(LIBRARIES[1]((ROBOTS / 'five_bar.urdf').read_text()),
+    check_closed(Pinocchio((ROBOTS / 'five_bar.urdf').read_text()),
                  published(mechanism, mot_front=0.3, mot_back=0.1), FEET)
 
 
@@ -469,7 +469,7 @@ def test_bars_in_line_move_on_as_they_are_told(tmp_path, side):
         r'with \2=(.*): add --pose', refused(file, '--driven', 'motor', '--pose', *FLAT)).groups()
     mechanism, = imported(file, '--driven', 'motor', '--pose', *FLAT, motor,
                           f'{joint}={ends[side]}')
-    robot, elbows = LIBRARIES[1](file.read_text()), set()
+    robot, elbows = Pinocchio(file.read_text()), set()
     for angle in np.linspace(0.3, 1.2, 10):
         joints = published(mechanism, motor=angle)
         check_closed(robot, joints, [('wrist_a', 'wrist_b')])

@@ -114,7 +114,7 @@ def faults(robot, seed):
 
 
 @pytest.mark.parametrize('seeds', [
-    range(2, 4), pytest.param(range(4, 90), marks=pytest.mark.nightly)])
+    [7], pytest.param(range(100), marks=pytest.mark.nightly)])
 def test_every_fault_of_a_scene_is_found(seeds):
     tried = [fault for seed in seeds for fault in faults(planar(seed), seed)]
     assert not [fault for fault, found in tried if not found]

@@ -11,7 +11,7 @@ from linkage_ros import mechanisms
 from linkage_ros.robot_model import urdf
 import numpy as np
 import pytest
-from robots import LIBRARIES, Pinocchio, rotation, Yourdfpy
+from robots import FIRST, Pinocchio, rotation, Yourdfpy
 from scenes import alone, BOOM, ENGINE
 from truth.cases import CASES
 
@@ -110,10 +110,9 @@ def limits(one):
 
 @pytest.mark.nightly(all_but=8)
 @pytest.mark.parametrize('name, library, count', [
-    *((name, Pinocchio, 6) for name in (*MACHINES, *OWN)),
-    *((name, Yourdfpy, 6) for name in ('jansen', 'slotted_lever', 'boxer engine')),
+    *((name, FIRST, 6) for name in (*MACHINES, *OWN)),
     *(pytest.param(name, library, 41, marks=pytest.mark.nightly)
-      for name in MACHINES for library in LIBRARIES)])
+      for name in MACHINES for library in (Pinocchio, Yourdfpy))])
 def test_every_joint_is_met_and_every_loop_is_closed(name, library, count):
     one = {**MACHINES, **OWN}[name]()
     text = description(one)

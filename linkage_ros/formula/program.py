@@ -280,9 +280,8 @@ class CompiledFunction:
         return Batch(self.variant.loop, self._given, self.variant.arguments, rows)
 
     def _in_python(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
-        return self._one_by_one(given, size) if size < FEW_POSES else self._blocks(given, size)
-
-    def _one_by_one(self, given: Sequence[np.ndarray], size: int) -> np.ndarray:
+        if size >= FEW_POSES:
+            return self._blocks(given, size)
         poses = map(self.at, *(a.tolist() for a in given))
         outputs = self.variant.outputs
         return np.fromiter(chain.from_iterable(poses), float, size * outputs).reshape(

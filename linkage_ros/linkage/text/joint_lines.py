@@ -292,25 +292,20 @@ def check_order(lines: Sequence[Line], what: str = 'joint', placed: Sequence[str
                 known[name] = None
 
 
-def _check_number(line: Line, kind: str, number: Formula, dimensions: Mapping) -> None:
-    """Raise ValueError if a number is invalid for its kind, with dimensions or arrays of them."""
-    value = number.value(dimensions)
-    if not np.all(in_range(value)):
-        raise line.error(f'{quoted(number.text)} must be {IN_RANGE}')
-    if kind == 'LENGTH' and not np.all(value > 0.0):
-        raise line.error(f'a bar must be longer than zero, got {elided(number.text)}')
-    if kind == 'ANGLE' and np.any(np.abs(value) > _TURN) and not number.is_angle:
-        plain = number.text.lstrip('-').replace('.', '').isdigit()
-        degrees = f'{number.text}deg' if plain else f'({number.text})deg'
-        raise line.error(f'an angle is in rad, and {elided(number.text)} is more than a turn; '
-                         f'in degrees it is written {elided(degrees)}')
-
-
 def check_numbers(design: Any, dimensions: Mapping) -> None:
     """Raise ValueError that names the line of an invalid number, for dimensions or arrays."""
     for line in design.lines:
         for kind, number in line.numbers():
-            _check_number(line, kind, number, dimensions)
+            value, text = number.value(dimensions), number.text
+            if not np.all(in_range(value)):
+                raise line.error(f'{quoted(text)} must be {IN_RANGE}')
+            if kind == 'LENGTH' and not np.all(value > 0.0):
+                raise line.error(f'a bar must be longer than zero, got {elided(text)}')
+            if kind == 'ANGLE' and np.any(np.abs(value) > _TURN) and not number.is_angle:
+                plain = text.lstrip('-').replace('.', '').isdigit()
+                degrees = f'{text}deg' if plain else f'({text})deg'
+                raise line.error(f'an angle is in rad, and {elided(text)} is more than a turn; '
+                                 f'in degrees it is written {elided(degrees)}')
 
 
 def branches(lines: Iterable[Line]) -> dict:
