@@ -254,6 +254,13 @@ def test_a_sum_keeps_every_digit_however_much_cancels():
             assert found == math.fsum(terms)
 
 
+def test_a_sum_of_many_terms_costs_no_more_than_adding_them_up():
+    a, b = map(expression.dimension, 'ab')
+    node = expression.exact_sum(sum([a] * 500), -b, a)
+    assert len(program.in_order([node])) < 520
+    assert program.evaluate(node, {'a': 0.25, 'b': 125.0}, {}) == 0.25
+
+
 def test_a_sum_of_two_terms_costs_one_operation_and_zeros_cost_none():
     a, b = map(expression.dimension, 'ab')
     for terms in ((a, b), (a, 0.0, b)):

@@ -138,6 +138,8 @@ class Real:
 
 Number = Real | float | int
 
+# Of this many terms an exact sum takes some thousand operations, which grow with their square.
+MAX_SUMMANDS = 32
 _LEAVES = frozenset({'constant', 'dimension', 'argument'})
 
 
@@ -218,10 +220,12 @@ def exact_sum(*terms: Number) -> Real:
     """
     Return an accurate sum under any cancellation.
 
-    Terms that are sums are expanded. Source: Ogita, Rump and Oishi, "Accurate sum
-    and dot product", SIAM J. Sci. Comput. 26 (2005), algorithm SumK.
+    Terms that are sums are expanded into up to MAX_SUMMANDS. Source: Ogita, Rump and Oishi,
+    "Accurate sum and dot product", SIAM J. Sci. Comput. 26 (2005), algorithm SumK.
     """
     parts = [t for term in terms for t in _summands(real(term)) if t.value != 0.0]
+    if len(parts) > MAX_SUMMANDS:
+        parts = list(map(real, terms))
     for _ in parts[2:]:
         parts = _distilled(parts)
     return reduce(operator.add, parts, real(0.0))

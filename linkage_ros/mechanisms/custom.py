@@ -11,7 +11,6 @@ from ..cache import cached
 from ..linkage import Design, joint_lines, rod_lines
 from ..words import listed, meant, plain_text, quoted, suggestion
 
-MOST_LINES = 2000
 # The modules that read joint lines, by the type of the linkage.
 WORDS = {'custom': joint_lines, 'rods': rod_lines}
 
@@ -69,13 +68,13 @@ def checked_lines(joints: Any) -> tuple[str, ...]:
     try:
         # A set has no order, and of a mapping only the keys would be read.
         unfit = isinstance(joints, (str, bytes, Mapping, Set))
-        lines = () if unfit else tuple(islice(joints, MOST_LINES + 1))
+        lines = () if unfit else tuple(islice(joints, joint_lines.MOST_LINES + 1))
     except TypeError:
         lines = ()
     if not lines:
         raise ValueError(f'joints must be a list of lines, one per joint, got {quoted(joints)}')
-    if len(lines) > MOST_LINES:
-        raise ValueError(f'joints must be up to {MOST_LINES} lines, got more')
+    if len(lines) > joint_lines.MOST_LINES:
+        raise ValueError(f'joints must be up to {joint_lines.MOST_LINES} lines, got more')
     for number, line in enumerate(lines, 1):
         if not isinstance(line, str):
             raise ValueError(f'joints must be lines of text, but line {number} is {quoted(line)}')

@@ -66,6 +66,8 @@ _NAME = re.compile(r'[A-Za-z][A-Za-z0-9_]{0,63}')
 _RESERVED = (*ARITHMETIC_WORDS, 'joints', 'tracer', 'branches')
 # Reserved names of inputs: the ground, and groups of parameters.
 _RESERVED_INPUTS = 'ground', 'dimensions', 'branches'
+# Maximum number of lines, images in mirror lines included: each mirror line doubles them.
+MOST_LINES = 2000
 # Maximum number of letters of a line, and of an error message.
 _LONGEST, _LONGEST_ERROR = 10000, 240
 # A larger angle [rad] must be written with `deg` or `pi`: otherwise degrees were probably meant.
@@ -152,6 +154,8 @@ def parse(texts: Iterable[str]) -> list[Line]:
     for text in texts:
         line = parsed(text)
         lines += _mirrored(lines, line) if line.word == 'mirrored' else [line]
+        if len(lines) > MOST_LINES:
+            raise line.error(f'a linkage has up to {MOST_LINES} lines, images included')
     check_order(lines)
     return lines
 
