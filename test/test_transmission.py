@@ -253,12 +253,16 @@ def test_a_singular_pose_is_said(library, mechanisms):
     assert status == 2 and velocity == 0.0 and position == pytest.approx(dead, abs=1e-12)
     # Out of reach its velocity is zero, and none would be infinite.
     assert memory.send(1, expected(mechanism, [dead])[2] - 0.1, [1.0])[0] == 1
+    # Beside it nothing is infinite yet.
+    assert memory.send(0, [dead + 1e-4], [1.0], [2.0])[0] == 0
     # So is a velocity that is more than a number can be.
     boom = Memory(library, mechanisms['boom'])
     own = expected(mechanisms['boom'], states(mechanisms['boom'], 1)[0])[2]
     assert boom.send(1, own, [1.0])[0] == 0
     status, (_, velocity, _) = boom.send(1, own, [1e308])
     assert status == 2 and velocity == 0.0
+    # And so is an effort.
+    assert boom.send(1, own, [1.0], [1e308])[0] == 2
 
 
 def test_a_joint_need_not_depend_on_the_first_input(tmp_path):
@@ -270,9 +274,10 @@ def test_a_joint_need_not_depend_on_the_first_input(tmp_path):
     np.testing.assert_allclose([position, velocity], [[1.9, 1.24], [1.0, 2.0]], rtol=1e-9)
 
 
-def test_before_a_position_is_known_nothing_is_commanded(library, mechanisms):
-    status, found = Memory(library, mechanisms['rocker']).send(1, [math.nan], [1.0], [1.0])
-    assert status == 4 and (found == UNWRITTEN).all()
+@pytest.mark.parametrize('side, position, said', [(1, math.nan, 4), (1, 4.0, 5), (0, 1e9, 5)])
+def test_before_a_position_is_known_none_is_written(library, mechanisms, side, position, said):
+    status, found = Memory(library, mechanisms['boom']).send(side, [position], [1.0], [1.0])
+    assert status == said and (found[:3 if side else 1] == UNWRITTEN).all()
 
 
 @pytest.mark.nightly(all_but=5)
