@@ -368,7 +368,8 @@ def main():
         for mutant in mutants:
             files = tests(mutant, measurement)
             jobs.append((mutant, files, sum(measurement[file][0] for file in files)))
-        results, out = [], options.out / f'{room}{"-again" if options.again else ""}.json'
+        results, out = [], options.out / (
+            room.replace('/', '-') + '-again' * bool(options.again) + '.json')
         for result in in_copies(copies, tested, jobs):
             results.append(result)
             out.write_text(json.dumps(results, indent=1))
