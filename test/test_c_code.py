@@ -12,7 +12,7 @@ import subprocess
 
 from c_libraries import COMPILER, inverters, loaded, shared, STRICT
 from linkage_ros import mechanisms, scene
-from linkage_ros.c_code import cli, header
+from linkage_ros.c_code import cli, header, series
 import numpy as np
 import pytest
 from scenes import alone, BOOM, ROOT
@@ -238,6 +238,13 @@ def test_several_inputs_are_found_for_as_many_outputs(mechanisms, inverses):
 
 
 @pytest.mark.nightly
+def test_a_part_of_neighbouring_values_is_a_series_of_numbers():
+    linkage = mechanisms.create('jansen')
+    value = linkage.solve(1.0)['G'][0]
+    part = [1.0, 1.0 + 1e-9, value, np.nextafter(value, math.inf)]
+    assert np.isfinite(series.series(linkage, 'G.x', np.array([part]), False)).all()
+
+
 def test_a_series_of_too_many_pieces_is_refused():
     # It goes up and down a thousand times.
     with pytest.raises(ValueError, match='no inverse: .* a series of more than 10000 pieces'):

@@ -66,6 +66,8 @@ def series(linkage: Mechanism, output: str, parts: np.ndarray, single: bool,
     cut = halved(np.full_like(low, 0.5), low, high, first, last - first)
     halves = np.vstack([np.hstack([start, cut, end, 0.5 * (first + last) - end])
                         for start, end in ((low, first), (high, last))])
+    # Of neighbouring floats one is half way.
+    halves = halves[halves[:, 3] != 0.0]
     rows = np.empty((0, 7 + terms))
     # Between roots of the parts of a half's change: those that are too long are cut in two.
     own, roots = np.arange(len(halves)), np.tile([0.0, 1.0], (len(halves), 1))
