@@ -17,6 +17,7 @@ from itertools import chain
 import time
 
 from linkage_ros import mechanisms
+from linkage_ros.linkage import theta_of
 import numpy as np
 from truth import inverse_judge, linkage_checks
 
@@ -63,7 +64,7 @@ def first_question(linkage):
     """Return the CPU time [ms] from making an inverse of a joint angle to its solutions."""
     name = [name for name in linkage.joints if linkage.moves(name)][-1]
     inputs = [0.7 * each.low + 0.3 * each.high for each in linkage.inputs]
-    value = linkage.joint_angles(inputs if inputs[1:] else inputs[0], [name])[name]
+    value = linkage.joint_angles(theta_of(inputs), [name])[name]
     start = time.process_time()
     linkage.inverse((name, *(each.name for each in linkage.inputs[1:]))).all(
         [value if value == value else 0.0, *inputs[1:]])

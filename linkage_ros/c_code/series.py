@@ -66,7 +66,7 @@ def series(linkage: Mechanism, output: str, parts: np.ndarray, single: bool,
     cut = halved(np.full_like(low, 0.5), low, high, first, last - first)
     halves = np.vstack([np.hstack([start, cut, end, 0.5 * (first + last) - end])
                         for start, end in ((low, first), (high, last))])
-    # Of neighbouring floats one is half way.
+    # Half way between neighbouring floats is one of them: there the output does not change.
     halves = halves[halves[:, 3] != 0.0]
     rows = np.empty((0, 7 + terms))
     # Between roots of the parts of a half's change: those that are too long are cut in two.

@@ -64,11 +64,11 @@ class Target(NamedTuple):
         reason = self.request.reason(*values) if is_searched else (
             'no motion leads there from the last inputs; the service inputs_for searches for all')
         # The reason is about the linkage's outputs, without signs and offsets of the names.
-        wanted, outputs = ([f'{value:.6g}' for value in numbers] for numbers in (
+        commands, outputs = ([f'{value:.6g}' for value in numbers] for numbers in (
             [positions[index] for index in self.indices], values))
-        meaning = '' if outputs == wanted else ' ({})'.format(listed(
+        meaning = '' if outputs == commands else ' ({})'.format(listed(
             map('{} at {}'.format, self.request.outputs, outputs)))
-        return f'{self.named} cannot be {", ".join(wanted)}{meaning}: {reason}'
+        return f'{self.named} cannot be {", ".join(commands)}{meaning}: {reason}'
 
     def _values(self, positions: Sequence[float]) -> list[float]:
         return [name.sign * (positions[index] - name.offset)

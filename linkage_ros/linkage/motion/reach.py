@@ -24,8 +24,7 @@ from ..kinematics import Kinematics
 # Fraction at which an arc is tested: in the exact middle, an arm of a symmetric linkage may have
 # no length.
 INSIDE = 0.49
-# More ends a turn than these, or jumps of an output, are rounding, of the direction of an arm
-# without length.
+# More ends a turn than these are rounding, of the direction of an arm without length.
 MAX_ENDS = 100
 
 
