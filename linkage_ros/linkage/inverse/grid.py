@@ -117,7 +117,7 @@ class Grid:
         """Return the inputs next to solutions that steps of Newton's method reach."""
         n, parts, reached = self._problem.n, np.ones(len(q)), [q[:0]]
         solved = self._solved(q, values)
-        for _ in range(2 * HALVINGS):
+        for _ in range(HALVINGS):
             there = solved[1] <= ACCEPTED
             reached.append(q[there])
             going = ~there & (parts > SINGULAR) & np.isfinite(solved[2 + n:2 + 2 * n]).all(axis=0)
