@@ -74,6 +74,23 @@ def test_a_pose_is_answered_in_the_turn_in_which_it_is(ratio):
                 0.0, abs=1e-12 + 8.0 * size * math.ulp(theta))
 
 
+@pytest.mark.parametrize('turns', [0, 5, 7, -27])
+@pytest.mark.parametrize('more, outputs', [
+    ((), ('E.x', 'QB')), (('drive',), ('QB', 'drive')),
+    (('drive', 'shaft'), ('QB', 'drive', 'shaft'))])
+def test_a_branch_continues_through_change_points_in_any_turn(turns, more, outputs):
+    # Each crank passes through the other ground joint of its dyad, whose bars are equal.
+    found = mechanisms.create('custom', joints=[
+        'O ground 0 0', 'Q ground 1 0', 'R ground 5 0', 'S ground 6 0', 'A crank O 1',
+        'B dyad A Q 2.5 2.5 left', 'D crank R 1 geared crank -sqrt(2) 0', 'E dyad D S 2 2 left',
+        *(f'M{name} crank S 1 called {name}' for name in more)])
+    theta = [0.4 + math.tau * turns, *[0.3] * len(more)]
+    for chosen in [outputs] if more else [(name,) for name in outputs]:
+        values = list(found.joint_angles(theta if more else theta[0], chosen).values())
+        first, *_ = found.inverse(chosen).all(values, theta)
+        assert first.inputs == pytest.approx(theta, abs=1e-11)
+
+
 @pytest.mark.parametrize('ratio', [8, -180, pytest.param(999, marks=pytest.mark.nightly)])
 def test_a_fast_gear_loses_no_answer(ratio):
     found = motor(ratio).input_for('A.x', 0.3)

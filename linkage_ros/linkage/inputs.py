@@ -20,8 +20,8 @@ Arc = tuple[float, float]
 
 ANGLE, LENGTH = 'angle', 'length'
 
-# The longest period that is computed as a whole, and the part of a longer one [turns; fewer where
-# a geared link is fast]. Of several inputs they are the product, which is the cost.
+# The longest period that is computed as a whole, and the part of a longer one, a multiple of 4
+# [turns; fewer where a geared link is fast]. Of several inputs they are the product, the cost.
 MAX_PERIOD, PART = 100, 8
 # Greatest denominator of a gear ratio with a period, and greatest ratio.
 MOST_TURNS, FASTEST = 10 ** 6, 1000

@@ -187,7 +187,8 @@ class Kinematics:
         """
         Return the same linkage, each input counted from so many whole turns on.
 
-        Gears make it another one. Of an input whose period is very long, reach, dead points and
+        Gears make it another one, and so does an odd number for an input that passes one change
+        point a turn. Of an input whose period is very long, reach, dead points and
         inverse are those of the turns around zero, and so of any others.
         """
         counts = tuple((input_.name, float(count)) for input_, count in zip(self.inputs, turns))
@@ -270,7 +271,9 @@ class Kinematics:
         most, part = (input_.step * turns ** (1.0 / len(self.structure.built.inputs))
                       for turns in (MAX_PERIOD, PART))
         period = self._period(by, ratios, most)
-        turns = period if period <= max(most, 1.0) else max(2.0, 2.0 * round(0.5 * part))
+        # After an odd number of turns a branch is another one past a change point; half of a part,
+        # the distance of two, is an even number.
+        turns = period if period <= max(most, 1.0) else max(4.0, 4.0 * round(0.25 * part))
         return input_._replace(low=-math.pi * turns, high=math.pi * turns, period=period)
 
     def _with_stroke(self, input_: Input) -> Input:

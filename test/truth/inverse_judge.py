@@ -177,8 +177,10 @@ def judge(linkage, name, rng, count=6, others=()):
         expected = [at]
         if kind == 'ordinary':
             # Of a part of a period, a quarter on both sides of the seed is promised.
-            expected += [root for root in output.roots(value) if first.wraps or not first.turns
-                         or abs(root - at) <= 0.25 * (first.high - first.low)]
+            expected += [root for root in output.roots(value) if (
+                first.wraps or not first.turns
+                or abs(root - at) <= 0.25 * (first.high - first.low))
+                and output.ulp_changes(root) <= SINGULAR * output.size]
         close = (AT if kind == 'ordinary' else NEXT) * first.size
         for root in expected:
             gaps = [first.apart(root, x) for x in answers]
@@ -245,16 +247,16 @@ def judge_several(linkage, names, rng, count=6):
             found['ordinary', 'lost at', linkage, names, tuple(pose), ()] += 1
         for answer in answers:
             there = np.array(checked.at(*answer.inputs)[:len(names)])
-            if _differ(linkage, names, there - row, scales):
+            if _differ(inverse, there - row, scales):
                 found['ordinary', 'invented'] += 1
                 found['ordinary', 'invented at', linkage, names, tuple(pose), ()] += 1
     return found, worst
 
 
-def _differ(linkage, names, gaps, scales):
+def _differ(inverse, gaps, scales):
     """Return whether outputs differ, those that are inputs not only by whole periods."""
-    inputs = {input_.name: input_ for input_ in linkage.inputs}
+    inputs = {input_.name: input_ for input_ in inverse.inputs}
     return not all(
         (inputs[name].apart(gap, 0.0) if name in inputs else
-         abs(math.remainder(gap, math.tau)) if linkage.is_angle(name) else abs(gap)) < 1e-7 * scale
-        for name, gap, scale in zip(names, gaps, scales))
+         abs(math.remainder(gap, math.tau)) if inverse.linkage.is_angle(name) else abs(gap))
+        < 1e-7 * scale for name, gap, scale in zip(inverse.outputs, gaps, scales))

@@ -238,8 +238,9 @@ class Builder:
             value = geared.ratio * driving + geared.offset
             if geared.input in self._turned:
                 turns = geared.ratio * self._turned[geared.input]
-                # What is geared to this one counts from the whole turns that are left out here.
-                whole = nearest_integer(turns)
+                # What is geared to this one counts from the turns that are left out here: an even
+                # number, after which a branch is the same whatever change points it passes.
+                whole = 2.0 * nearest_integer(0.5 * turns)
                 self._turned[input_.name] = whole
                 value = value + 2.0 * pi * (turns - whole)
         self.driven[input_.name] = input_, value
