@@ -55,8 +55,8 @@ class MechanismTopics:
         self.speeds: list[float | None] = [None] * len(mechanism.inputs)
         self.stamp = NEVER
         self.state: AssemblyState | None = None
-        # The last position of a source joint, and the last input that it gave.
-        self._position = math.nan
+        # The last position and speed of each input's source joint; the last finite input.
+        self._received: dict[int, tuple[float, float | None]] = {}
         self._seed: float | None = None
         # Ids of the displayed markers, and the last robot model.
         self._displayed: AbstractSet[int] = frozenset()
@@ -67,7 +67,7 @@ class MechanismTopics:
         model = self.model
         value, self.speeds[i] = model.mechanism.from_source(
             model.inputs[i], position, speed, self._seed)
-        self.inputs[i], self._position = value, position
+        self.inputs[i], self._received[i] = value, (position, speed)
         self.state = None
         if math.isfinite(value):
             self._seed = value
@@ -132,8 +132,10 @@ class MechanismTopics:
         return model
 
     def adopt(self, model: MechanismModel) -> None:
-        """Replace the model, and delete those markers that the new model does not have."""
+        """Replace the model, read the inputs anew, and delete markers that it does not have."""
         self.model, self.state = model, None
+        for i, received in self._received.items():
+            self.receive(i, *received)
         self._delete(self._displayed - model.marker_ids)
 
     def publish_latched(self, description: str, locus: bytes | None) -> None:
@@ -165,7 +167,7 @@ class MechanismTopics:
         for settings, value in zip(inputs, self.inputs):
             if not math.isfinite(value):
                 measured = settings.measures and (
-                    f'{self._position:.6g}, out of reach of {settings.measures}')
+                    f'{self._received[0][0]:.6g}, out of reach of {settings.measures}')
                 return f'{failure}: {settings.source} is at {measured or value}'
         failure += ' at ' + ', '.join(
             f'{settings.input.quantity} {value:.6g} {settings.input.unit}'
