@@ -139,6 +139,18 @@ def test_two_outputs_of_one_motor_are_said_and_the_first_is_commanded(graph, cap
     assert 'flap and bar_QB are moved by one actuator, servo: name' in capfd.readouterr().err
 
 
+@pytest.mark.parametrize('given, output, named, sign', [
+    # The robot's name of a joint may be that of the linkage.
+    ({'type': 'slotted_lever', 'joint_names': ['lever=lever']}, 'lever', 'lever', 1.0),
+    ({'type': 'jansen', 'leg_pairs': 3}, 'BC', 'm_left0_BC', 1.0),
+    ({'type': 'jansen', 'leg_pairs': 3, 'joint_names': ['left0_BC=-shin']}, 'BC', 'shin', -1.0)])
+def test_an_output_is_called_as_it_is_published(graph, given, output, named, sign):
+    stream = Stream(graph, {'mechanisms': ['m'], 'm.crank.start': 0.7,
+                            **{f'm.{key}': value for key, value in given.items()}})
+    angle = float(mechanisms.create(given['type']).joint_angles(0.7)[output])
+    assert stream.want([named], [sign * angle]) == {'m_crank': (pytest.approx(0.7),)}
+
+
 def test_of_a_name_twice_the_last_counts_as_in_crank_states(stream):
     assert stream.want(['flap', 'bar_QB', 'flap'], [flap(0.2), 1.2, flap(0.7)])['servo'] == (
         pytest.approx(0.7, abs=1e-13),)

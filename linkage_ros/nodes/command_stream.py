@@ -112,11 +112,8 @@ class CommandStream:
     def _output(self, named: str) -> tuple[SceneMechanism, str, JointName] | None:
         """Return the mechanism, output and published name for a name in messages, or None."""
         for mechanism in self._mechanisms.values():
-            joints = {name.name: (joint, name) for joint, name in mechanism.joints.items()}
-            joint, name = joints.get(named) or (
-                named.removeprefix(f'{mechanism.name}_'), JointName(named))
-            if joint != named and mechanism.linkage.has_output(joint):
-                return mechanism, joint, name
+            if found := mechanism.output_named(named):
+                return mechanism, *found
         return None
 
     def _targets(self, names: Sequence[str]) -> tuple[list[Target], list[str]]:
