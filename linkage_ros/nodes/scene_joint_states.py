@@ -46,8 +46,8 @@ class SceneJointStates:
         self._description = ''
 
     def describe(self, urdf: str) -> None:
-        """Publish a robot model, unless it is empty or unchanged."""
-        if urdf not in ('', self._description):
+        """Publish a robot model unless it is unchanged; an empty text if there is none any more."""
+        if urdf != self._description:
             self._description = urdf
             self._descriptions.publish(String(data=urdf))
 
