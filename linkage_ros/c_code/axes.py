@@ -88,8 +88,7 @@ def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> list[Axis]:
 def passive(mechanism: SceneMechanism, commanded: Sequence[Axis]) -> list[Axis]:
     """Return the joints of the first leg's links that are not commanded."""
     outputs = [each.output for each in commanded]
-    return [_joint(mechanism, link.name) for link in mechanism.linkage.links
-            if link.name not in outputs]
+    return [_joint(mechanism, name) for name in mechanism.linkage.joints if name not in outputs]
 
 
 def _joint(mechanism: SceneMechanism, output: str) -> Axis:
@@ -139,7 +138,7 @@ def _chain(mechanism: SceneMechanism) -> list[str]:
 
     def rank(link: Link) -> tuple:
         key = mechanism.key(link.name)
-        joint = mechanism.joints.get(key, JointName(link.name))
+        joint = mechanism.joints[key]
         return (not joint.published, link.parent != (chosen[-1] if chosen else GROUND),
                 link.name in barrels, link.name in mechanism.inputs,
                 joint.name == f'{mechanism.name}_{key}')

@@ -174,9 +174,8 @@ class CommandStream:
 
     def _seed(self, target: Target) -> Sequence[float]:
         """Return the inputs to continue from: of the last command, else present, else starts."""
-        if last := self._last.get(target.mechanism.name):
-            return last.inputs
-        return self._present(target.mechanism)
+        last = self._last.get(target.mechanism.name)
+        return last.inputs if last else self._present(target.mechanism)
 
     def _command(self, target: Target, positions: Sequence[float],
                  speeds: Sequence[float] | None) -> ActuatorCommand | None:

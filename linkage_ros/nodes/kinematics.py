@@ -128,7 +128,7 @@ class Kinematics(scene_node.SceneNode):
             text = urdf.write(bodies.merged(robots)) if robots else ''
         except scene.SceneError as error:
             self.get_logger().info(f'the whole scene has no robot_description: {error}', once=True)
-        return partial(self._scene_joint_states.describe, text)
+        return partial(self._scene_joint_states.description.publish, text)
 
     def destroy_node(self) -> None:
         """Delete all markers and loci, then end."""
