@@ -43,11 +43,10 @@ SOURCE = Field('string', 'Source joint, whose position in messages gives the {0}
 MEASURES = Field('string', 'Output that the source joint measures; empty: the {0} itself.',
                  default='', read_only=True)
 RATIO = Field('double', 'Motion of the {0} per unit of its source joint [1].', default=1.0,
-              holds=lambda ratio: 1e-30 <= abs(ratio) <= 1e30,
-              rule='of a size from 1e-30 to 1e+30')
+              holds=lambda ratio: 1e-30 <= abs(ratio) <= 1e30, rule='of a size from 1e-30 to 1e30')
 OFFSET = Field('double', 'Value of the {0} when its source joint is at zero [{unit}].',
                default=0.0, unit='{1}', holds=lambda offset: abs(offset) <= 1e30,
-               rule='within 1e+30 of zero')
+               rule='within 1e30 of zero')
 
 
 @dataclass(frozen=True)
