@@ -53,8 +53,6 @@ class Target(NamedTuple):
 
     def efforts(self, command: ActuatorCommand) -> list[float]:
         """Return the static efforts of the actuators that balance the loads [N m or N]."""
-        if not self.mechanism.loads:
-            return [0.0] * len(command.inputs)
         return [settings.actuator[0] * effort for settings, effort in zip(
             self.mechanism.inputs.values(), self.mechanism.efforts(command.inputs))]
 
