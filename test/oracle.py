@@ -223,9 +223,11 @@ class Model:
                              for name in new.mechanisms}
         own = [robot for name, robot in robots.items() if not new.mechanisms[name].only_named]
         try:
-            self.description = urdf.write(bodies.merged(own)) if own else ''
+            whole = urdf.write(bodies.merged(own)) if own else ''
         except scene.SceneError:
-            self.description = ''
+            whole = ''
+        # What is latched stays where a change leaves no robot of one root.
+        self.description = whole or getattr(self, 'description', '')
         self.scene, self.frames = new, {name: new.frame_prefix + f for name, f in frames.items()}
         self.solvers = {name: Solver(mechanism) for name, mechanism in new.mechanisms.items()}
         for name in new.mechanisms:

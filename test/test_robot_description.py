@@ -69,17 +69,6 @@ def test_frames_of_another_robot_make_no_robot_of_the_scene(graph):
     assert not whole
 
 
-def test_a_robot_that_a_change_takes_away_is_taken_back(graph):
-    node = graph.start(Kinematics, {'mechanisms': ['arm', 'foot'], 'arm.type': 'four_bar',
-                                    'foot.type': 'four_bar'})
-    whole = graph.listen(String, 'robot_description', LATCHED)
-    assert graph.until(lambda: whole)[0].data
-    assert graph.set(node, foot__frame_id='shin').successful
-    assert graph.until(lambda: whole[1:])[0].data == ''
-    assert graph.set(node, foot__frame_id='world').successful
-    assert graph.until(lambda: whole[2:])[0].data == whole[0].data
-
-
 def test_whoever_comes_late_hears_the_description_once(graph):
     node = graph.start(Kinematics, {'mechanisms': ['jansen'], 'frame_id': 'base'})
     heard, whole = (graph.listen(String, topic, LATCHED)

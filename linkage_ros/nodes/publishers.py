@@ -17,14 +17,14 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class TextPublisher:
-    """A publisher of a latched text, which is empty at first, whenever it changes."""
+    """A publisher of a latched text whenever it changes."""
 
     def __init__(self, node: Node, name: str):
         self._publisher, self._text = node.create_publisher(String, name, LATCHED), ''
 
     def publish(self, text: str) -> None:
-        """Publish a text unless it is unchanged."""
-        if text != self._text:
+        """Publish a text, unless it is empty or unchanged."""
+        if text not in ('', self._text):
             self._text = text
             self._publisher.publish(String(data=text))
 

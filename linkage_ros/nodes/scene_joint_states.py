@@ -33,7 +33,7 @@ class SceneJointStates:
     joint_states : TrackedPublisher
         Its subscribers are those other than the node itself.
     description : TextPublisher
-        Of the URDF of the scene; empty if it has none.
+        Of the URDF of the scene.
 
     """
 
