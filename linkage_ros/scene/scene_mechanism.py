@@ -129,9 +129,8 @@ class SceneMechanism:
             joint = self.joints[self.key(link)]
             if joint.name == name:
                 return link, joint
-        own = f'{self.name}_'
-        is_there = name.startswith(own) and self.linkage.has_output(name[len(own):])
-        return (name[len(own):], JointName(name)) if is_there else None
+        before, _, output = name.partition(f'{self.name}_')
+        return None if before or not self.linkage.has_output(output) else (output, JointName(name))
 
     @cached_property
     def scales(self) -> list[float]:
