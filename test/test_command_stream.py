@@ -250,6 +250,18 @@ def test_of_several_inputs_no_command_outlives_a_change_of_the_geometry(graph, c
 SEARCHED = ['digger_H.x', 'digger_J.y', 'digger_distance(P,J)']
 
 
+def test_a_new_name_or_load_leaves_the_turns_that_were_commanded(graph):
+    cranks = {'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
+        'O ground 0 0', 'Q ground 5 0', 'A crank O 1', 'B crank Q 1']}
+    stream = Stream(graph, cranks)
+    both = ['m_crank', 'm_crank2']
+    for turned in (2.0, 4.0, 6.0, 8.0):
+        commands = stream.want(both, [turned, 0.5])
+    assert commands == {'m_crank': (pytest.approx(8.0),), 'm_crank2': (0.5,)}
+    graph.change(stream.node, cranks, m__loads=['A=0 -9.81'], m__joint_names=['crank=left'])
+    assert stream.want(['left', 'm_crank2'], [8.1, 0.5])['m_crank'] == (pytest.approx(8.1),)
+
+
 def test_without_a_closed_form_a_first_command_does_not_jump_and_no_message_waits_for_a_search(
         graph, capfd):
     stream = Stream(graph, SEVERAL)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from operator import attrgetter
 from typing import Any, Callable, Iterable, Mapping, NamedTuple, Sequence
 
 from rclpy.duration import Duration
@@ -102,8 +103,9 @@ class CommandStream:
     def adopt(self, mechanisms: Mapping[str, SceneMechanism]) -> None:
         """Replace the mechanisms."""
         # With several inputs, the changed geometry may have no pose that continues the last one.
+        geometry = attrgetter('linkage', 'scale', 'inputs')
         self._last = {name: last for name, last in self._last.items() if len(last.inputs) == 1
-                      or self._mechanisms[name] is mechanisms[name]}
+                      or geometry(self._mechanisms[name]) == geometry(mechanisms[name])}
         self._mechanisms = mechanisms
         self._reader.forget()
 
