@@ -95,7 +95,7 @@ def _started(context):
 
 
 def _scene_path(share, name):
-    path = Path(name)
+    path = Path(name).expanduser()
     if not path.suffix and not path.is_file():
         path = share / 'config' / f'{name}.yaml'
     if not path.is_file():

@@ -10,6 +10,7 @@ What the kinematics node has to publish after any history, worked out by the lib
   without a position is not said. Bytes that are no joint states are dropped.
 - A source says `ratio * position + offset`, of the input or of what it measures. At a measured
   value that cannot be no leg is assembled; the next one continues from the last that could be.
+  What a change makes of that counts for the last position that was said, too.
 - A speed is known while the last message of its input had a velocity for every name.
 - After a message each mechanism that it names is published, once all its inputs are known; then
   the joints of the scene, if any input was named. Nobody gets what he did not subscribe to before.
@@ -197,8 +198,9 @@ class State:
     values: list
     speeds: list
     stamp: tuple = (0, 0)
-    # The last input that a measured value gave.
+    # The last input that a measured value gave, and what each source has said last.
     near: float = None
+    said: dict = field(default_factory=dict)
 
 
 class Model:
@@ -251,9 +253,9 @@ class Model:
             self.stamp = at
         return set(moved)
 
-    def _source(self, state, mechanism, i, drive, position, speed):
-        value, speed = mechanism.from_source(drive, position, speed, state.near)
-        state.values[i], state.speeds[i] = value, speed
+    def _source(self, state, mechanism, i, drive, position, known):
+        value, speed = mechanism.from_source(drive, position, known, state.near)
+        state.values[i], state.speeds[i], state.said[i] = value, speed, (position, known)
         if math.isfinite(value):
             state.near = value
 
@@ -273,8 +275,13 @@ class Model:
         except scene.SceneError as error:
             return str(error), set()
         self._given = given
-        return '', {name for name, signature in self._signatures().items()
-                    if signature != before[name]}
+        changed = {name for name, signature in self._signatures().items()
+                   if signature != before[name]}
+        for name in changed:
+            mechanism, state = self.scene.mechanisms[name], self.states[name]
+            for i, said in state.said.items():
+                self._source(state, mechanism, i, [*mechanism.inputs.values()][i], *said)
+        return '', changed
 
     def _signatures(self):
         return {name: ([(p.name, p.value) for p in mechanism.parameters], self.frames[name])

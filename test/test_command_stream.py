@@ -139,6 +139,18 @@ def test_two_outputs_of_one_motor_are_said_and_the_first_is_commanded(graph, cap
     assert 'flap and bar_QB are moved by one actuator, servo: name' in capfd.readouterr().err
 
 
+@pytest.mark.parametrize('given, output, named, sign', [
+    # The robot's name of a joint may be that of the linkage.
+    ({'type': 'slotted_lever', 'joint_names': ['lever=lever']}, 'lever', 'lever', 1.0),
+    ({'type': 'jansen', 'leg_pairs': 3}, 'BC', 'm_left0_BC', 1.0),
+    ({'type': 'jansen', 'leg_pairs': 3, 'joint_names': ['left0_BC=-shin']}, 'BC', 'shin', -1.0)])
+def test_an_output_is_called_as_it_is_published(graph, given, output, named, sign):
+    stream = Stream(graph, {'mechanisms': ['m'], 'm.crank.start': 0.7,
+                            **{f'm.{key}': value for key, value in given.items()}})
+    angle = float(mechanisms.create(given['type']).joint_angles(0.7)[output])
+    assert stream.want([named], [sign * angle]) == {'m_crank': (pytest.approx(0.7),)}
+
+
 def test_of_a_name_twice_the_last_counts_as_in_crank_states(stream):
     assert stream.want(['flap', 'bar_QB', 'flap'], [flap(0.2), 1.2, flap(0.7)])['servo'] == (
         pytest.approx(0.7, abs=1e-13),)
@@ -236,6 +248,18 @@ def test_of_several_inputs_no_command_outlives_a_change_of_the_geometry(graph, c
 # --- trajectories ---
 
 SEARCHED = ['digger_H.x', 'digger_J.y', 'digger_distance(P,J)']
+
+
+def test_a_new_name_or_load_leaves_the_turns_that_were_commanded(graph):
+    cranks = {'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
+        'O ground 0 0', 'Q ground 5 0', 'A crank O 1', 'B crank Q 1']}
+    stream = Stream(graph, cranks)
+    both = ['m_crank', 'm_crank2']
+    for turned in (2.0, 4.0, 6.0, 8.0):
+        commands = stream.want(both, [turned, 0.5])
+    assert commands == {'m_crank': (pytest.approx(8.0),), 'm_crank2': (0.5,)}
+    graph.change(stream.node, cranks, m__loads=['A=0 -9.81'], m__joint_names=['crank=left'])
+    assert stream.want(['left', 'm_crank2'], [8.1, 0.5])['m_crank'] == (pytest.approx(8.1),)
 
 
 def test_without_a_closed_form_a_first_command_does_not_jump_and_no_message_waits_for_a_search(

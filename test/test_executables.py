@@ -129,3 +129,9 @@ def test_arguments_that_there_are_not_end_in_one_sentence(capfd, name, arguments
     main = import_module(module(name)).main
     assert main([name, *arguments]) == 1
     assert one_sentence(capfd.readouterr().err, said)
+
+
+def test_a_parameter_of_the_wrong_type_ends_the_viewer_in_one_sentence(capfd):
+    viewer = import_module(module('viewer'))
+    assert viewer.main(['viewer', '--ros-args', '-p', 'use_sim_time:=5']) == 1
+    assert one_sentence(capfd.readouterr().err, "'use_sim_time' to '5'")

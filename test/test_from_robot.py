@@ -56,7 +56,8 @@ PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], independ
      'shoulder; did you mean motor?\n'),
     ('four_bar.sdf', ['--driven', 'joint_a'], "there is no joint 'joint_a'; allowed: joint_A, "
      'joint_B, joint_C, joint_D; did you mean joint_A?\n'),
-    ('five_bar.urdf', [], 'no joint of this robot closes a loop\n'),
+    ('five_bar.urdf', [], 'no joint of this robot closes a loop; those '
+     'of a URDF are in a file of their own: --loops FILE\n'),
     *(('four_bar.urdf', ['--loops', text], why) for text, why in (
         ('{closed_loop: [{link_a: front', '/loops.yaml is no YAML: '),
         (PIN % 'parent_xzy', "/loops.yaml names 'parent_xyz', which is not there\n"),

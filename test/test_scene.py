@@ -336,7 +336,11 @@ def test_scenes_of_the_same_values_are_equal_however_they_are_written():
 
 
 @pytest.mark.parametrize('given, reason', [
-    ({'own.tilt.ratio': 0.0}, 'own.tilt.ratio must be a finite number, other than zero, not 0.0'),
+    ({'own.tilt.ratio': 0.0}, 'own.tilt.ratio must be a finite number, of a size from 1e-30 to '
+     '1e30, not 0.0'),
+    # With this, positions of the source were infinite.
+    ({'own.tilt.ratio': -1e-310}, 'of a size from 1e-30 to 1e30, not -1e-310'),
+    ({'own.tilt.ratio': 1e31}, 'of a size from 1e-30 to 1e30, not 1e+31'),
     ({'own.tilt.measures': 'OC'}, 'own.tilt.measures: only a linkage with one input '
      'can be solved for an output, and own has 2'),
     ({'own.cylinder.sweep': [0.4, 1.0]},

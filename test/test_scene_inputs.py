@@ -224,3 +224,15 @@ def test_a_value_out_of_reach_is_told_the_range_or_the_input_that_it_needs(
         values, = case.at([np.linspace(*ends, 20001)])
         found = re.search(r'\[(\S+), (\S+)\]', reason).groups()
         near([*map(float, found)], [float(f'{end:.6g}') for end in (values.min(), values.max())])
+
+
+@pytest.mark.parametrize('name, output', [
+    # The coordinate across its line, of which rounding is all that moves.
+    ('peaucellier', 'C.x'), ('slider_crank', 'B.y')])
+def test_an_output_that_stands_still_is_not_told_to_reach_the_wanted_value(name, output):
+    mechanism = alone(name)
+    value = float(mechanism.linkage.joint_angles(0.3, (output,))[output])
+    request = InverseRequest(mechanism, [output])
+    assert math.isnan(request.positions([value])[0][0])
+    assert request.reason(value) == (
+        f'{output} stands still, so that no value of it determines the input')

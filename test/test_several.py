@@ -166,6 +166,8 @@ def test_a_place_to_start_from_may_be_anything():
     for near in ((math.nan, 0.0), (math.inf, 0.0), (1e300, 0.0), (2.6, 0.3)):
         inputs, rates = linkage.inverse(('P.x', 'P.y')).follow((0.059, 0.16), near)
         assert np.isnan(inputs).all() and np.isnan(rates).all()
+    # Whose square is no float any more.
+    assert linkage.inputs_for(('P.x', 'P.y'), (0.059, 0.16), (0.0, 1e200))
     with pytest.raises(ValueError, match='near must be finite'):
         linkage.inputs_for(('P.x', 'P.y'), (0.059, 0.16), (math.inf, 0.0))
     with pytest.raises(ValueError, match='near must be as many numbers'):

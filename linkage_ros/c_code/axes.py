@@ -77,7 +77,7 @@ def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> list[Axis]:
         If one does not exist, they do not determine all inputs, or there is no inverse.
 
     """
-    outputs = [output for name in names if (output := output_of(mechanism, name))
+    outputs = [found[0] for name in names if (found := mechanism.output_named(name))
                ] if names else _chain(mechanism)
     if len({*outputs}) != len(mechanism.inputs):
         raise ValueError(f'{mechanism.name} has {len(mechanism.inputs)} inputs: as many of its '
@@ -88,24 +88,13 @@ def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> list[Axis]:
 def passive(mechanism: SceneMechanism, commanded: Sequence[Axis]) -> list[Axis]:
     """Return the joints of the first leg's links that are not commanded."""
     outputs = [each.output for each in commanded]
-    return [_joint(mechanism, link.name) for link in mechanism.linkage.links
-            if link.name not in outputs and _key(mechanism, link.name) in mechanism.joints]
+    return [_joint(mechanism, name) for name in mechanism.linkage.joints if name not in outputs]
 
 
 def _joint(mechanism: SceneMechanism, output: str) -> Axis:
     """Return the axis of an output, with the name, sign and offset of its joint."""
-    joint = mechanism.joints.get(_key(mechanism, output), JointName(f'{mechanism.name}_{output}'))
+    joint = mechanism.joints.get(mechanism.key(output), JointName(f'{mechanism.name}_{output}'))
     return axis(mechanism, output, joint.name, joint.sign, joint.offset, joint.wraps)
-
-
-def output_of(mechanism: SceneMechanism, name: str) -> str | None:
-    """Return the output with a name in the scene, or None."""
-    for link in mechanism.linkage.joints:
-        joint = mechanism.joints.get(_key(mechanism, link))
-        if joint and joint.name == name:
-            return link
-    output = name.removeprefix(f'{mechanism.name}_')
-    return output if output != name and mechanism.linkage.has_output(output) else None
 
 
 def invertible(mechanism: SceneMechanism, axes: list[Axis]) -> list[Axis]:
@@ -141,11 +130,6 @@ def start(mechanism: SceneMechanism) -> list[float]:
     return [Motion.of(settings).at(0)[0] for settings in mechanism.inputs.values()]
 
 
-def _key(mechanism: SceneMechanism, link: str) -> str:
-    """Return the key of a link of the first leg among the joints' names."""
-    return link if link in mechanism.inputs else next(iter(mechanism.assembly().legs)) + link
-
-
 def _chain(mechanism: SceneMechanism) -> list[str]:
     """Return a chain of links that determines the inputs."""
     links = mechanism.linkage.links
@@ -153,8 +137,8 @@ def _chain(mechanism: SceneMechanism) -> list[str]:
     chosen: list[str] = []
 
     def rank(link: Link) -> tuple:
-        key = _key(mechanism, link.name)
-        joint = mechanism.joints.get(key, JointName(link.name))
+        key = mechanism.key(link.name)
+        joint = mechanism.joints[key]
         return (not joint.published, link.parent != (chosen[-1] if chosen else GROUND),
                 link.name in barrels, link.name in mechanism.inputs,
                 joint.name == f'{mechanism.name}_{key}')

@@ -6,7 +6,6 @@
 from typing import Sequence
 
 from . import header
-from .axes import output_of
 from .. import cli, scene
 from ..scene import SceneMechanism
 from ..words import suggestion
@@ -33,7 +32,7 @@ def show(args: list[str] | None) -> None:
 def with_joints(mechanisms: Sequence[SceneMechanism], names: Sequence[str]
                 ) -> list[tuple[SceneMechanism, list[str]]]:
     """Return each mechanism with its joints among those named."""
-    chosen = [(mechanism, [name for name in names if output_of(mechanism, name)])
+    chosen = [(mechanism, [name for name in names if mechanism.output_named(name)])
               for mechanism in mechanisms]
     known = [joint.name for mechanism in mechanisms for joint in mechanism.joints.values()]
     for name in sorted({*names}.difference(*(joints for _, joints in chosen))):

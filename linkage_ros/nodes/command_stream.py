@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from operator import attrgetter
 from typing import Any, Callable, Iterable, Mapping, NamedTuple, Sequence
 
 from rclpy.duration import Duration
@@ -53,8 +54,6 @@ class Target(NamedTuple):
 
     def efforts(self, command: ActuatorCommand) -> list[float]:
         """Return the static efforts of the actuators that balance the loads [N m or N]."""
-        if not self.mechanism.loads:
-            return [0.0] * len(command.inputs)
         return [settings.actuator[0] * effort for settings, effort in zip(
             self.mechanism.inputs.values(), self.mechanism.efforts(command.inputs))]
 
@@ -104,19 +103,17 @@ class CommandStream:
     def adopt(self, mechanisms: Mapping[str, SceneMechanism]) -> None:
         """Replace the mechanisms."""
         # With several inputs, the changed geometry may have no pose that continues the last one.
+        geometry = attrgetter('linkage', 'scale', 'inputs')
         self._last = {name: last for name, last in self._last.items() if len(last.inputs) == 1
-                      or self._mechanisms[name] is mechanisms[name]}
+                      or geometry(self._mechanisms[name]) == geometry(mechanisms[name])}
         self._mechanisms = mechanisms
         self._reader.forget()
 
     def _output(self, named: str) -> tuple[SceneMechanism, str, JointName] | None:
         """Return the mechanism, output and published name for a name in messages, or None."""
         for mechanism in self._mechanisms.values():
-            joints = {name.name: (joint, name) for joint, name in mechanism.joints.items()}
-            joint, name = joints.get(named) or (
-                named.removeprefix(f'{mechanism.name}_'), JointName(named))
-            if joint != named and mechanism.linkage.has_output(joint):
-                return mechanism, joint, name
+            if found := mechanism.output_named(named):
+                return mechanism, *found
         return None
 
     def _targets(self, names: Sequence[str]) -> tuple[list[Target], list[str]]:
@@ -177,9 +174,8 @@ class CommandStream:
 
     def _seed(self, target: Target) -> Sequence[float]:
         """Return the inputs to continue from: of the last command, else present, else starts."""
-        if last := self._last.get(target.mechanism.name):
-            return last.inputs
-        return self._present(target.mechanism)
+        last = self._last.get(target.mechanism.name)
+        return last.inputs if last else self._present(target.mechanism)
 
     def _command(self, target: Target, positions: Sequence[float],
                  speeds: Sequence[float] | None) -> ActuatorCommand | None:

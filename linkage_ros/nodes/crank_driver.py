@@ -36,7 +36,7 @@ class CrankDriver(scene_node.SceneNode):
         super().__init__(scene.DRIVER, **kwargs)
         self._motions: dict[tuple[str, str], Motion] = {}
         self._settings: dict[tuple[str, str], scene.InputSettings] = {}
-        self._sent: list[tuple[tuple[str, str], scene.InputSettings]] = []
+        self._sent: dict[str, tuple[tuple[str, str], scene.InputSettings]] = {}
         self._now: int | None = None
         self._steady = 0
         self._publisher = TrackedPublisher(self, JointState, 'crank_states', 10)
@@ -67,8 +67,7 @@ class CrankDriver(scene_node.SceneNode):
                     settings.speed, settings.sweep, settings.input.period, now)
         self._settings = all_settings
         # If several inputs have one source joint, it moves as the last of them.
-        sent = {settings.source: (key, settings) for key, settings in all_settings.items()}
-        self._sent = list(sent.values())
+        self._sent = {settings.source: (key, settings) for key, settings in all_settings.items()}
         self._set_rate(new.rate)
 
     def _set_rate(self, rate: float) -> None:
@@ -98,7 +97,7 @@ class CrankDriver(scene_node.SceneNode):
     def _tick(self) -> None:
         now = self._follow_clock()
         if self._publisher.has_subscribers:
-            positions, speeds = zip(*[self._position(*sent, now) for sent in self._sent])
+            positions, speeds = zip(*[self._position(*sent, now) for sent in self._sent.values()])
             for publish, data in self._message.patched(pack_time(now), positions + speeds):
                 publish(data)
 

@@ -102,13 +102,12 @@ class Kinematics(scene_node.SceneNode):
         """Replace the models of the mechanisms, and publish those that have changed."""
         changed = [self._mechanisms[name] for name, model in models.items()
                    if model is not self._models.get(name)]
-        is_first, self._models = not self._models, models
+        self._models = models
         self._joint_names = frozenset(joint.name for model in models.values()
                                       for joint in model.mechanism.joints.values())
         for topics in changed:
             topics.adopt(models[topics.name])
-        if not is_first:
-            self._publish(changed)
+        self._publish(changed)
         for topics in changed:
             self.worker.queue(f'latched messages of {topics.name}',
                               partial(self._latched, topics, models[topics.name]))
@@ -128,7 +127,7 @@ class Kinematics(scene_node.SceneNode):
             text = urdf.write(bodies.merged(robots)) if robots else ''
         except scene.SceneError as error:
             self.get_logger().info(f'the whole scene has no robot_description: {error}', once=True)
-        return partial(self._scene_joint_states.describe, text)
+        return partial(self._scene_joint_states.description.publish, text)
 
     def destroy_node(self) -> None:
         """Delete all markers and loci, then end."""

@@ -12,14 +12,13 @@ from typing import AbstractSet, Any, Sequence
 import numpy as np
 from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from . import messages
 from .log import Throttle
 from .mechanism_model import AssemblyState, MechanismModel
 from .message_layout import NEVER, Outgoing
-from .publishers import LATCHED, TrackedPublisher
+from .publishers import LATCHED, TextPublisher, TrackedPublisher
 from .. import scene
 
 
@@ -49,25 +48,24 @@ class MechanismTopics:
         self._joint_states = TrackedPublisher(node, JointState, f'{name}/joint_states', 10)
         self._markers = TrackedPublisher(node, MarkerArray, f'{name}/markers', 1)
         self._locus = node.create_publisher(Marker, f'{name}/locus', LATCHED)
-        self._description = node.create_publisher(String, f'{name}/robot_description', LATCHED)
+        self._description = TextPublisher(node, f'{name}/robot_description')
         self._throttle = Throttle(node.get_logger().get_child(name))
         self.inputs: list[Any] = [None] * len(mechanism.inputs)
         self.speeds: list[float | None] = [None] * len(mechanism.inputs)
         self.stamp = NEVER
         self.state: AssemblyState | None = None
-        # The last position of a source joint, and the last input that it gave.
-        self._position = math.nan
+        # The last position and speed of each input's source joint; the last finite input.
+        self._received: dict[int, tuple[float, float | None]] = {}
         self._seed: float | None = None
-        # Ids of the displayed markers, and the last robot model.
+        # Ids of the displayed markers.
         self._displayed: AbstractSet[int] = frozenset()
-        self._described = ''
 
     def receive(self, i: int, position: float, speed: float | None) -> None:
         """Set input `i` by the position of its source joint and, if known, its speed."""
         model = self.model
         value, self.speeds[i] = model.mechanism.from_source(
             model.inputs[i], position, speed, self._seed)
-        self.inputs[i], self._position = value, position
+        self.inputs[i], self._received[i] = value, (position, speed)
         self.state = None
         if math.isfinite(value):
             self._seed = value
@@ -132,15 +130,15 @@ class MechanismTopics:
         return model
 
     def adopt(self, model: MechanismModel) -> None:
-        """Replace the model, and delete those markers that the new model does not have."""
+        """Replace the model, read the inputs anew, and delete markers that it does not have."""
         self.model, self.state = model, None
+        for i, received in self._received.items():
+            self.receive(i, *received)
         self._delete(self._displayed - model.marker_ids)
 
     def publish_latched(self, description: str, locus: bytes | None) -> None:
         """Publish the robot model if it has changed; publish the locus, or delete it if None."""
-        if description != self._described:
-            self._described = description
-            self._description.publish(String(data=description))
+        self._description.publish(description)
         self._locus.publish(locus or messages.deleted(self.name, messages.LOCUS_ID))
 
     def clear(self, deadline: float) -> None:
@@ -165,7 +163,7 @@ class MechanismTopics:
         for settings, value in zip(inputs, self.inputs):
             if not math.isfinite(value):
                 measured = settings.measures and (
-                    f'{self._position:.6g}, out of reach of {settings.measures}')
+                    f'{self._received[0][0]:.6g}, out of reach of {settings.measures}')
                 return f'{failure}: {settings.source} is at {measured or value}'
         failure += ' at ' + ', '.join(
             f'{settings.input.quantity} {value:.6g} {settings.input.unit}'

@@ -10,9 +10,23 @@ from typing import Any
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
 
 # Later subscribers receive the last message, too.
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class TextPublisher:
+    """A publisher of a latched text whenever it changes."""
+
+    def __init__(self, node: Node, name: str):
+        self._publisher, self._text = node.create_publisher(String, name, LATCHED), ''
+
+    def publish(self, text: str) -> None:
+        """Publish a text, unless it is empty or unchanged."""
+        if text not in ('', self._text):
+            self._text = text
+            self._publisher.publish(String(data=text))
 
 
 class TrackedPublisher:

@@ -10,12 +10,11 @@ from typing import Any, Iterable, Sequence
 
 import numpy as np
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
 
 from .mechanism_model import AssemblyState, MAX_MESSAGES, MechanismModel
 from .message_layout import Outgoing, PatchedMessages
 from .messages import joint_states
-from .publishers import LATCHED, TrackedPublisher
+from .publishers import TextPublisher, TrackedPublisher
 from ..cache import Cache
 
 # The model and the state of each mechanism in a message.
@@ -33,6 +32,8 @@ class SceneJointStates:
     ----------
     joint_states : TrackedPublisher
         Its subscribers are those other than the node itself.
+    description : TextPublisher
+        Of the URDF of the scene.
 
     """
 
@@ -40,16 +41,9 @@ class SceneJointStates:
         same = node.resolve_topic_name('joint_states') == node.resolve_topic_name('crank_states')
         # If the topics are the same, the node's own subscription does not count.
         self.joint_states = TrackedPublisher(node, JointState, 'joint_states', 10, int(same))
-        self._descriptions = node.create_publisher(String, 'robot_description', LATCHED)
+        self.description = TextPublisher(node, 'robot_description')
         self._omitted = frozenset(sources if same else ())
         self._patched = Cache(self._patched_messages, MAX_MESSAGES)
-        self._description = ''
-
-    def describe(self, urdf: str) -> None:
-        """Publish a robot model, unless it is empty or unchanged."""
-        if urdf not in ('', self._description):
-            self._description = urdf
-            self._descriptions.publish(String(data=urdf))
 
     def outgoing(self, stamp: bytes, parts: Parts) -> Sequence[Outgoing]:
         """Return the message to publish, the joints of assembled mechanisms; none without any."""

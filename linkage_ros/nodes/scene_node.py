@@ -15,6 +15,7 @@ from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 import rclpy
 from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -265,7 +266,7 @@ def run(node_classes: Iterable[Callable[[], Node]], name: str, args: Any = None,
             _spin(executor_class(), nodes, shutdown, name)
         except ExternalShutdownException:
             pass
-        except (scenes.SceneError, ImportError) as error:
+        except (scenes.SceneError, ImportError, ParameterException) as error:
             return _failed(name, error)
         finally:
             gc.enable()

@@ -17,7 +17,8 @@ from ..optional import needs
 from ..words import suggestion
 
 IMAGES, VIDEOS = ('.png', '.svg'), ('.gif', '.mp4')
-FPS, MAX_GIF_FPS, MAX_FPS = 25.0, 50.0, 240.0
+# A GIF shows a picture for 655 s at most.
+FPS, MIN_FPS, MAX_GIF_FPS, MAX_FPS = 25.0, 0.002, 50.0, 240.0
 MIN_SIDE, MAX_SIDE = 64, 8192
 MAX_FRAMES, MAX_COLOURS = 10000, 255
 
@@ -54,6 +55,8 @@ def parsed(args):
     if ending == '.gif' and (arguments.fps or FPS) > MAX_GIF_FPS:
         raise RequestError(
             f'--fps must be at most {MAX_GIF_FPS:g} for .gif, not {arguments.fps:g}')
+    if arguments.data in (arguments.out, Path(arguments.scene)):
+        raise RequestError('--data must be another file than SCENE and --out')
     for file in filter(None, (arguments.out, arguments.data)):
         if not file.absolute().parent.is_dir():
             raise RequestError(f'{file} cannot be written: there is no folder {file.parent}')
@@ -190,7 +193,7 @@ OPTIONS = {
               'pi/2 or 90deg (default: where it starts, as all others)'),
     'turns': (VIDEOS, 'N', within(float, 0.001, 1000.0), "turns of the first mechanism's crank, "
               'or periods of its oscillation (default: 1)'),
-    'fps': (VIDEOS, 'N', within(float, 0.001, MAX_FPS), f'frames per second (default: {FPS:g})'),
+    'fps': (VIDEOS, 'N', within(float, MIN_FPS, MAX_FPS), f'frames per second (default: {FPS:g})'),
     'frames': (VIDEOS, 'N', within(int, 1, MAX_FRAMES),
                "frames in all (default: in real time, by the crank's speed)"),
     'loop': (('.gif',), 'N', within(int, 0, 65536),

@@ -118,7 +118,8 @@ def _checked(robot: Robot, balls: Sequence[Sequence[str]], imported: Sequence[ch
              reports: list[str]) -> tuple[dict[str, Any], list[str], dict[str, float]]:
     """Return what is described, without mechanisms that differ from the robot."""
     if not imported:
-        raise cli.RequestError(' '.join(reports) or 'no joint of this robot closes a loop')
+        raise cli.RequestError(' '.join(reports) or 'no joint of this robot closes a loop; those '
+                               'of a URDF are in a file of their own: --loops FILE')
     parameters: dict[str, Any] = {'mechanisms': [made.name for made in imported]}
     for made in imported:
         parameters.update(made.parameters)
@@ -189,10 +190,9 @@ def positions(texts: Sequence[str]) -> dict[str, float]:
     values = {}
     for text in texts:
         name, _, value = text.rpartition('=')
-        try:
+        values[name] = math.nan
+        with suppress(ValueError):
             values[name] = float(value)
-        except ValueError:
-            values[name] = math.nan
         if not name or not abs(values[name]) < MAX_NUMBER:
             raise cli.RequestError(f'{text!r} must be JOINT=VALUE, its value in rad or m')
     return values

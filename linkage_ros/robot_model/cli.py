@@ -36,9 +36,9 @@ def show(args: Sequence[str] | None, given_scene: scene.Scene | None = None) -> 
                         help='density of all bodies of sdf and mjcf '
                              f'(default: {DENSITY:g}, aluminium)')
     options = parser.parse_args(args)
-    if given_scene and options.scene:
+    if given_scene and options.scene is not None:
         raise cli.RequestError('give the scene either as SCENE or with --ros-args, not both')
-    shown = given_scene or (scene.load(options.scene) if options.scene else scene.read({}))
+    shown = given_scene or (scene.read({}) if options.scene is None else scene.load(options.scene))
     if options.format == 'urdf' and options.density:
         raise cli.RequestError('--density is for sdf and mjcf only: the URDF has no masses')
     density = 0.0 if options.format == 'urdf' else options.density or DENSITY

@@ -29,6 +29,11 @@ def is_sweep(ends: tuple[float, ...]) -> bool:
     return not ends or len(ends) == 2 and -FARTHEST <= ends[0] < ends[1] <= FARTHEST
 
 
+def is_ratio(ratio: float) -> bool:
+    """Return whether positions of a source, input divided by ratio, are finite numbers."""
+    return 1e-30 <= abs(ratio) <= 1e30
+
+
 SPEED = Field('double', 'Speed of the {0} [{unit}].', -MAX_SPEED, MAX_SPEED, readers=(DRIVER,),
               unit='{1}/s', group='speeds')
 START = Field('double', 'Initial value of the {0} [{unit}]; a new value moves it there.',
@@ -43,7 +48,7 @@ SOURCE = Field('string', 'Source joint, whose position in messages gives the {0}
 MEASURES = Field('string', 'Output that the source joint measures; empty: the {0} itself.',
                  default='', read_only=True)
 RATIO = Field('double', 'Motion of the {0} per unit of its source joint [1].', default=1.0,
-              holds=bool, rule='other than zero')
+              holds=is_ratio, rule='of a size from 1e-30 to 1e30')
 OFFSET = Field('double', 'Value of the {0} when its source joint is at zero [{unit}].',
                default=0.0, unit='{1}')
 

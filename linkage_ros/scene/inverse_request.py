@@ -200,6 +200,8 @@ class InverseRequest:
         if len(values) > 1:
             return f'{what} is outside the reach'
         output, = self.outputs
+        if not len(self._mechanism.linkage.monotone(output)):
+            return f'{output} stands still, so that no value of it determines the input'
         reached = in_words((low, high) for (low, _), (high, _) in self._mechanism.extremes(output))
         unit = 'rad' if self._mechanism.linkage.is_angle(output) else 'm'
         return f'{output} reaches {reached} {unit}' + f' in {sweeps}' * bool(limited)

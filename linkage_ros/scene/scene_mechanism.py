@@ -119,6 +119,19 @@ class SceneMechanism:
         """Return the factor from the linkage to the scene: the scale for a length, else 1."""
         return 1.0 if self.linkage.is_angle(output) else self.scale
 
+    def key(self, link: str) -> str:
+        """Return the key of a link of the first leg among the `joints`."""
+        return link if link in self.inputs else next(iter(self.assembly().legs)) + link
+
+    def output_named(self, name: str) -> tuple[str, JointName] | None:
+        """Return the output of the first leg with a name in messages, and its published name."""
+        for link in self.linkage.joints:
+            joint = self.joints[self.key(link)]
+            if joint.name == name:
+                return link, joint
+        before, _, output = name.partition(f'{self.name}_')
+        return None if before or not self.linkage.has_output(output) else (output, JointName(name))
+
     @cached_property
     def scales(self) -> list[float]:
         """Return the factor of each input from the linkage to the scene."""

@@ -206,8 +206,8 @@ class Inverse:
         if seed:
             solutions = sorted(
                 (self.problem.nearest_equivalent(inputs, seed) for inputs in solutions),
-                key=lambda inputs: sum(((x - y) / size) ** 2 for x, y, size in zip(
-                    inputs, seed, self.problem.sizes)))
+                key=lambda inputs: math.dist(np.divide(inputs, self.problem.sizes),
+                                             np.divide(seed, self.problem.sizes)))
         return [Solution(inputs, self) for inputs in solutions]
 
     def over(self, *values: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
