@@ -3,7 +3,7 @@
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * It can be assembled in [-3.14159, 3.14159] rad.
- * A call takes at most 13 poses.
+ * A call takes at most 11 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -333,6 +333,24 @@ static inline lkr_real lkr_rounding(const lkr_model *model, const lkr_real *q)
     return LKR_ROUNDING * most;
 }
 
+/* Whether what is left may be rounding: of the positions; of the inputs, where a position changes fast.
+   At an end of the reach the rate is infinite, yet rounding is not. */
+static inline int lkr_is_rounding(const lkr_model *model, int side, const lkr_real *position,
+    const lkr_real *q, const lkr_point *p, lkr_real left)
+{
+    lkr_real steepest = 1;
+    int i, j;
+    for (i = 0; i < model->inputs; i++) {
+        const lkr_real scale = model->axis[side][i].scale;
+        steepest = lkr_max(steepest, LKR_MATH(fabs)(position[i]) * scale);
+        for (j = 0; j < model->inputs; j++) {
+            steepest = lkr_max(steepest, LKR_MATH(fabs)(p->rate[side][i][j]) * scale
+                * lkr_max(model->input[j].size, LKR_MATH(fabs)(q[j])));
+        }
+    }
+    return left <= LKR_CLOSE * lkr_clamped(steepest, 1, LKR_STEEPEST);
+}
+
 /* From inputs q to those of positions next to them, and their pose, see lkr_model.at; returns 0 if
    there are none, 1 if they are q, else 2. */
 static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position,
@@ -341,8 +359,8 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
     lkr_real gap[LKR_MAX_INPUTS] = { 0 };
     lkr_real x[LKR_MAX_INPUTS];
     lkr_real left = LKR_OTHER;
-    lkr_real steepest = 1;
-    int i, j, step;
+    int is_rounding = 0;
+    int i, step;
     memcpy(x, q, sizeof x);
     for (step = 0; step <= LKR_MAX_STEPS; step++) {
         const lkr_real now =
@@ -356,6 +374,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
             return step ? 2 : 1;
         }
         has_rates = has_rates || model->at(q, 1, p);
+        is_rounding = lkr_is_rounding(model, side, position, q, p, left);
         memcpy(x, gap, sizeof x);
         if (!lkr_solve(model, side, p, 0, LKR_LEAST, x)) {
             break;
@@ -364,20 +383,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
             x[i] += q[i];
         }
     }
-    /* At an end of the reach the rate is infinite, yet rounding is not. */
-    if (left > LKR_CLOSE * LKR_STEEPEST || !model->at(q, 1, p)) {
-        return 0;
-    }
-    /* What is left may be rounding: of the positions; of the inputs, where a position changes fast. */
-    for (i = 0; i < model->inputs; i++) {
-        const lkr_real scale = model->axis[side][i].scale;
-        steepest = lkr_max(steepest, LKR_MATH(fabs)(position[i]) * scale);
-        for (j = 0; j < model->inputs; j++) {
-            steepest = lkr_max(steepest, LKR_MATH(fabs)(p->rate[side][i][j]) * scale
-                * lkr_max(model->input[j].size, LKR_MATH(fabs)(q[j])));
-        }
-    }
-    return left <= LKR_CLOSE * steepest ? 2 : 0;
+    return is_rounding ? 2 : 0;
 }
 
 /* How far x is beyond the sweep. */
