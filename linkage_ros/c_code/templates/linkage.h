@@ -50,8 +50,6 @@ typedef double lkr_real;
 /* Steps of Newton's method from a solution that rounding has moved. */
 #define LKR_MAX_STEPS 3
 #define LKR_NAN ((lkr_real)NAN)
-/* The end of a sweep without one: tcc knows no -INFINITY in a table. */
-#define LKR_FAR LKR_OF(DBL_MAX, FLT_MAX)
 /* A solution that misses by more than this belongs to another assembly [rad, sizes]. */
 #define LKR_OTHER ((lkr_real)0.01)
 
