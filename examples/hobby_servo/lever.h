@@ -69,6 +69,8 @@ typedef double lkr_real;
 /* Steps of Newton's method from a solution that rounding has moved. */
 #define LKR_MAX_STEPS 3
 #define LKR_NAN ((lkr_real)NAN)
+/* Where there is no sweep it ends in infinity; tcc has no -INFINITY in a table. */
+#define LKR_ENDLESS LKR_OF(2 * DBL_MAX, 2 * FLT_MAX)
 /* A solution that misses by more than this belongs to another assembly [rad, sizes]. */
 #define LKR_OTHER ((lkr_real)0.01)
 
@@ -770,7 +772,7 @@ static const lkr_model lever_model = {
     1, { 1, 1 }, lever_at, { lever_solutions_angle_crank, lever_solutions_angle_lever },
     /* The actuators, the joints, the inputs and their starts. */
     { { { 1.0f, INFINITY } }, { { 1.0f, 6.2831855f } } },
-    { { 1.0f, 1.0f, -INFINITY, INFINITY, { INFINITY, 6.2831855f } } }, { 0.0f }
+    { { 1.0f, 1.0f, -LKR_ENDLESS, LKR_ENDLESS, { INFINITY, 6.2831855f } } }, { 0.0f }
 };
 
 /* Positions, and rates if has_rates, else 0, at inputs; returns 0 if it cannot be assembled. */
@@ -790,7 +792,7 @@ static const lkr_model lever_model_angle_lever = {
     1, { 0, 1 }, lever_at_angle_lever, { 0, lever_solutions_angle_lever },
     /* The actuators, the joints, the inputs and their starts. */
     { { { 0, 0 } }, { { 1.0f, 6.2831855f } } },
-    { { 1.0f, 1.0f, -INFINITY, INFINITY, { 6.2831855f, 6.2831855f } } }, { 0.0f }
+    { { 1.0f, 1.0f, -LKR_ENDLESS, LKR_ENDLESS, { 6.2831855f, 6.2831855f } } }, { 0.0f }
 };
 
 /* The crank for lever [rad], nearest to `near`, whole turns included.

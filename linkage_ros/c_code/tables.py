@@ -111,7 +111,7 @@ class Tables:
             turns = [input_.turn if input_.wraps and i not in each else math.inf
                      for each in counted]
             size = self.mechanism.scales[i] * input_.size
-            yield size, 1.0 / size, *(sweep or (-math.inf, math.inf)), turns
+            yield size, 1.0 / size, *(sweep or ('-LKR_ENDLESS', 'LKR_ENDLESS')), turns
 
     # --- inverses ---
 

@@ -50,6 +50,8 @@ typedef double lkr_real;
 /* Steps of Newton's method from a solution that rounding has moved. */
 #define LKR_MAX_STEPS 3
 #define LKR_NAN ((lkr_real)NAN)
+/* Where there is no sweep it ends in infinity; tcc has no -INFINITY in a table. */
+#define LKR_ENDLESS LKR_OF(2 * DBL_MAX, 2 * FLT_MAX)
 /* A solution that misses by more than this belongs to another assembly [rad, sizes]. */
 #define LKR_OTHER ((lkr_real)0.01)
 
