@@ -169,8 +169,9 @@ class Tables:
         for (mode, turns), inputs in zip(product(closed.modes, product(*closed.turns)), found):
             # If an input has a period of several turns, each turn has its own pose.
             if not any(turns[i] for i in counted):
-                sides = ', '.join(f'{name} {"left" if mode.linkage.branches[name] > 0 else "right"}'
-                                  for name in closed.branches)
+                sides = ', '.join(
+                    f'{joint} {"left" if mode.linkage.branches[joint] > 0 else "right"}'
+                    for joint in closed.branches)
                 solutions.append((f'/* {sides} */' if sides and not any(turns) else '', {
                     i: counted.get(i, value) for i, value in enumerate(inputs)}))
         if len(axes) == 1:
