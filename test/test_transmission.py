@@ -186,10 +186,10 @@ def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
 
 def test_single_precision_reads_a_sensor_that_has_turned_for_long(tmp_path):
     """What is left is the rounding of what the sensor says."""
-    mechanism = alone(LIFT, **{'crank.measures': 'QB', 'crank.start': 0.5})
+    mechanism = alone(LIFT, **{'crank.measures': 'QB', 'crank.offset': 0.1, 'crank.start': 0.5})
     memory = Memory(compiled(tmp_path, [mechanism], single=True), mechanism, np.float32)
-    for reading in mechanism.linkage.joint_angles(np.linspace(0.3, 2.5, 40), ['QB'])['QB']:
-        assert [memory.send(0, [reading + turns * math.tau])[0] & 1
+    for angle in mechanism.linkage.joint_angles(np.linspace(0.3, 2.5, 40), ['QB'])['QB']:
+        assert [memory.send(0, [angle - 0.1 + turns * math.tau])[0] & 1
                 for turns in (0, -100, -3000)] == [0, 0, 0]
 
 
