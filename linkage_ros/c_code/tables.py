@@ -43,19 +43,15 @@ class Tables:
 
     Attributes
     ----------
-    functions : list of str
-        The functions for the solutions of inverses.
-    solutions : int
-        The most solutions of an inverse.
+    solutions : dict
+        The functions for the solutions of inverses: name, most solutions, text.
 
     """
 
     def __init__(self, mechanism: SceneMechanism, code: Code, formulas: Formulas):
         self.mechanism, self.linkage, self._code, self._formulas = (
             mechanism, mechanism.linkage, code, formulas)
-        self.functions: list[str] = []
-        self._names: dict[tuple, str] = {}
-        self.solutions = 1
+        self.solutions: dict[tuple, tuple[str, int, str]] = {}
 
     def text(self, sides: tuple[Sequence[Axis], Sequence[Axis]], tag: str = '',
              passive: Sequence[Axis] = ()) -> str:
@@ -122,22 +118,21 @@ class Tables:
             return '0'
         # Axes of the same outputs may have other signs and offsets.
         key = tuple((each.output, each.factor, each.offset) for each in axes)
-        if key not in self._names:
+        if key not in self.solutions:
             name = '_'.join([f'{self.mechanism.name}_solutions', *(
                 self._formulas.fields[output] for output in outputs)])
-            self._names[key] = name = distinct([*self._names.values(), name])[-1]
+            *_, name = distinct([*(each for each, *_ in self.solutions.values()), name])
             counted = {each.input: (argument(i) - shift) / ratio
                        for i, each in enumerate(axes) if each.input is not None
                        for ratio, shift in [self.linkage.gear(each.output, each.input)]}
             if len(counted) == len(axes):
-                count, function = self._function(name, axes, 'The inputs.', [('', counted)])
+                found = self._function(name, axes, 'The inputs.', [('', counted)])
             elif closed := self.linkage.inverse(outputs).closed:
-                count, function = self._closed(name, axes, counted, closed)
+                found = self._closed(name, axes, counted, closed)
             else:
-                count, function = self._series(name, *axes)
-            self.functions.append(function)
-            self.solutions = max(self.solutions, count)
-        return self._names[key]
+                found = self._series(name, *axes)
+            self.solutions[key] = name, *found
+        return self.solutions[key][0]
 
     def _value(self, i: int, axis: Axis) -> str:
         """Return the output, in its own units, of an axis at position i."""
