@@ -3,7 +3,7 @@
  * Lengths [m]: a = 0.02, b = 0.045, e = 0.
  * Input: crank [rad]. Angles [rad] count counterclockwise.
  * It can be assembled in [-3.14159, 3.14159] rad.
- * A call takes at most 11 poses.
+ * A call takes at most 7 poses.
  */
 #ifndef LEVER_LINKAGE_H
 #define LEVER_LINKAGE_H
@@ -66,8 +66,6 @@ typedef double lkr_real;
 #define LKR_STEEPEST LKR_OF(4e6, 1e3f)
 /* Terms of a series. */
 #define LKR_TERMS LKR_OF(20, 8)
-/* Steps of Newton's method from a solution that rounding has moved. */
-#define LKR_MAX_STEPS 3
 #define LKR_NAN ((lkr_real)NAN)
 /* Where there is no sweep it ends in infinity; tcc has no -INFINITY in a table. */
 #define LKR_ENDLESS LKR_OF(2 * DBL_MAX, 2 * FLT_MAX)
@@ -354,7 +352,8 @@ static inline int lkr_is_rounding(const lkr_model *model, int side, const lkr_re
 }
 
 /* From inputs q to those of positions next to them, and their pose, see lkr_model.at; returns 0 if
-   there are none, 1 if they are q, else 2. */
+   there are none, 1 if they are q, else 2. One step of Newton's method is enough: it squares
+   what is left, but next to an extreme, where what is left is rounding of the positions. */
 static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position,
     int has_rates, lkr_real *q, lkr_point *p)
 {
@@ -364,7 +363,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
     int is_rounding = 0;
     int i, step;
     memcpy(x, q, sizeof x);
-    for (step = 0; step <= LKR_MAX_STEPS; step++) {
+    for (step = 1; step <= 2; step++) {
         const lkr_real now =
             model->at(x, has_rates, p) ? lkr_gap(model, side, position, p, gap) : INFINITY;
         if (!(now < left)) {
@@ -373,7 +372,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
         left = now;
         memcpy(q, x, sizeof x);
         if (left <= LKR_ENOUGH || left <= lkr_rounding(model, q)) {
-            return step ? 2 : 1;
+            return step;
         }
         has_rates = has_rates || model->at(q, 1, p);
         is_rounding = lkr_is_rounding(model, side, position, q, p, left);

@@ -22,9 +22,9 @@ from ..linkage import Mechanism
 from ..scene import SceneMechanism
 from ..words import listed, plain_text
 
-# Poses of a solution of an inverse: the first, again with its rates, and LKR_MAX_STEPS of Newton's
+# Poses of a solution of an inverse: the first, again with its rates, and after a step of Newton's
 # method. A sweep's end adds one to the answer's.
-POSES = 5
+POSES = 3
 
 
 class Request(NamedTuple):
