@@ -33,9 +33,8 @@ typedef double lkr_real;
 #define LKR_OF(in_double, in_float) in_double
 #endif
 
-/* A Jacobian below this part of its size is singular: for velocities, and for Newton's method. */
+/* A Jacobian below this part of its size is singular. */
 #define LKR_SINGULAR LKR_OF(1e-6, 1e-3f)
-#define LKR_LEAST LKR_OF(1e-12, 1e-5f)
 /* A command may be so far beyond a sweep: half of all digits, which next to an extreme is rounding. */
 #define LKR_BEYOND LKR_OF(1e-6, 5e-4f)
 /* Rounding of inputs, and of a pose at them. */
@@ -231,7 +230,7 @@ static inline lkr_real lkr_gap(const lkr_model *model, int side, const lkr_real 
 /* Solve J x = b in place, b in x, with the rates J of a side's positions by the inputs, or with their
    transpose. Returns 0 where J is singular, all in sizes. */
 static inline int lkr_solve(const lkr_model *model, int side, const lkr_point *p, int is_transposed,
-    lkr_real least, lkr_real *x)
+    lkr_real *x)
 {
     /* A compiler knows this bound. */
     const int n = model->inputs < LKR_MAX_INPUTS ? model->inputs : LKR_MAX_INPUTS;
@@ -255,7 +254,7 @@ static inline int lkr_solve(const lkr_model *model, int side, const lkr_point *p
             best = LKR_MATH(fabs)(a[i][k]) > LKR_MATH(fabs)(a[best][k]) ? i : best;
         }
         pivot = a[best][k];
-        if (!(LKR_MATH(fabs)(pivot) > least * most)) {
+        if (!(LKR_MATH(fabs)(pivot) > LKR_SINGULAR * most)) {
             return 0;
         }
         for (j = k; j <= n; j++) {
@@ -358,7 +357,7 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
         has_rates = has_rates || model->at(q, 1, p);
         is_rounding = lkr_is_rounding(model, side, position, q, p, left);
         memcpy(x, gap, sizeof x);
-        if (!lkr_solve(model, side, p, 0, LKR_LEAST, x)) {
+        if (!lkr_solve(model, side, p, 0, x)) {
             break;
         }
         for (i = 0; i < model->inputs; i++) {
@@ -503,7 +502,7 @@ static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int
         return LKR_NOT_KNOWN;
     }
     memcpy(speed, velocity, sizeof speed);
-    if (!lkr_solve(model, side, p, 0, LKR_SINGULAR, speed)) {
+    if (!lkr_solve(model, side, p, 0, speed)) {
         return LKR_SINGULAR_POSE;
     }
     for (i = 0; i < model->count[1 - side]; i++) {
@@ -537,7 +536,7 @@ static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int si
             x[i] += p->rate[side][j][i] * effort[j];
         }
     }
-    if (!lkr_solve(model, 1 - side, p, 1, LKR_SINGULAR, x)) {
+    if (!lkr_solve(model, 1 - side, p, 1, x)) {
         return LKR_SINGULAR_POSE;
     }
     lkr_copy(n, x, other);
