@@ -184,6 +184,15 @@ def test_the_right_one_of_several_inputs_is_chosen(choosing, i):
         assert status or found[0] == pytest.approx(expected_, rel=1e-12, abs=1e-10)
 
 
+def test_single_precision_reads_a_sensor_that_has_turned_for_long(tmp_path):
+    """What is left is the rounding of what the sensor says."""
+    mechanism = alone(LIFT, **{'crank.measures': 'QB', 'crank.offset': 0.1, 'crank.start': 0.5})
+    memory = Memory(compiled(tmp_path, [mechanism], single=True), mechanism, np.float32)
+    for angle in mechanism.linkage.joint_angles(np.linspace(0.3, 2.5, 40), ['QB'])['QB']:
+        assert [memory.send(0, [angle - 0.1 + turns * math.tau])[0] & 1
+                for turns in (0, -100, -3000)] == [0, 0, 0]
+
+
 def test_a_command_leads_back_into_the_sweep(tmp_path):
     mechanism = alone(SLOT, **{'crank.start': 0.5, 'crank.sweep': [0.2, 0.8]})
     memory = Memory(compiled(tmp_path, [mechanism], 'm_A.y'), mechanism)

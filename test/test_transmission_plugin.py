@@ -358,6 +358,16 @@ def test_passive_joints_have_states_where_there_are_handles(plugins, name, renam
     assert np.array_equal(component.extra, before)
 
 
+def test_a_passive_joint_faster_than_a_number_can_be_stands_still(plugins):
+    """All that is commanded can be had."""
+    actuator, by, _, turning = expected(plugins.mechanisms['leg'], INPUTS['leg'][1])
+    component = plugins.component('leg', 'joint_handle\tleg_CP\tvelocity\t12', extra=[UNWRITTEN])
+    for speeds in ([0.3, 0.2], [0.0, 1.2e308]):
+        status, (_, velocity, _) = component.read(actuator, by @ speeds)
+        assert status == OK and velocity == pytest.approx(turning @ speeds)
+        assert (component.extra[0] == 0.0) == (speeds[1] > 1.0)
+
+
 def test_why_values_are_held_is_logged_once_per_reason(plugins, capfd):
     actuator, joint = poses(plugins.mechanisms['knee'], 0.3)
     # Neither what is not commanded nor what can be had is worth a word.

@@ -20,8 +20,8 @@ class Axis(NamedTuple):
 
     `output` is one of the linkage, in its own units. `size` and `turn` are the position's size and
     period; the period is 0 for inputs and geared links, which count turns. If it `wraps`, its
-    position is published within half a turn of zero. `role` is its name in the linkage. If the
-    output counts the input of number `input`, it is ratio * input + shift, all in own units.
+    position is published within half a turn of zero. `role` is its name in the linkage. `input` is
+    the number of the input that the output counts: it is that one, or geared to it.
     """
 
     name: str
@@ -33,8 +33,6 @@ class Axis(NamedTuple):
     wraps: bool
     role: str
     input: int | None
-    ratio: float
-    shift: float
 
 
 def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float = 1.0,
@@ -45,10 +43,9 @@ def axis(mechanism: SceneMechanism, output: str, name: str = '', factor: float =
     factor *= mechanism.scale_of(output)
     counted = next((i for i, input_ in enumerate(linkage.inputs)
                     if output in (input_.name, *linkage.geared_to(i))), None)
-    gear = (1.0, 0.0) if counted is None else linkage.gear(output, counted)
     turns = is_angle and counted is None
     return Axis(name, output, factor, offset, abs(factor) * (1.0 if is_angle else linkage.longest),
-                abs(factor) * math.tau * turns, wraps and turns, output, counted, *gear)
+                abs(factor) * math.tau * turns, wraps and turns, output, counted)
 
 
 def actuators(mechanism: SceneMechanism) -> list[Axis]:

@@ -13,7 +13,7 @@ from typing import Any, Iterable, Mapping, Sequence
 import numpy as np
 
 from .names import comment
-from ..formula.expression import Real, substituted
+from ..formula.expression import Real
 from ..formula.operations import OPERATIONS
 from ..formula.program import Dialect, Program, tolerant
 from ..linkage import IN_SINGLE, Mechanism
@@ -76,16 +76,15 @@ class Code:
         return bare(code) if factor == 1.0 else f'{self.literal(factor)} * {code}'
 
     def function(self, head: str, arguments: Sequence[str],
-                 blocks: Sequence[tuple[str, Mapping[str, Real]]], last: str,
-                 replaced: Mapping[Real, Real] = {}) -> str:
+                 blocks: Sequence[tuple[str, Mapping[str, Real]]], last: str) -> str:
         """
         Return a C function, from the code of its arguments; see `Program`.
 
         Each of its `blocks` is a line above it and the values that it assigns, by their places.
-        `last` is its last statement. Values take the place of `replaced` expressions.
+        `last` is its last statement.
         """
-        results = tolerant(substituted(
-            [x for _, assigned in blocks for x in assigned.values()], replaced), self._rounding)
+        results = tolerant(
+            [x for _, assigned in blocks for x in assigned.values()], self._rounding)
         program = Program(results, len(arguments))
         exact: dict[Real, Any] = {}
         program.bind(self.linkage.dimensions, exact)

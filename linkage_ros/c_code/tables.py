@@ -10,7 +10,7 @@ exact Jacobians, efforts by their transposes, so that power is conserved.
 
 from __future__ import annotations
 
-from itertools import compress, product
+from itertools import product
 import math
 from typing import Iterator, Mapping, Sequence
 
@@ -22,6 +22,7 @@ from .formulas import Formulas
 from .names import comment, distinct, filled, template
 from .series import series
 from ..formula.expression import argument, Real
+from ..formula.program import Program
 from ..linkage import InverseLinkage
 from ..scene import SceneMechanism
 
@@ -42,19 +43,15 @@ class Tables:
 
     Attributes
     ----------
-    functions : list of str
-        The functions for the solutions of inverses.
-    solutions : int
-        The most solutions of an inverse.
+    solutions : dict
+        The functions for the solutions of inverses: name, most solutions, text.
 
     """
 
     def __init__(self, mechanism: SceneMechanism, code: Code, formulas: Formulas):
         self.mechanism, self.linkage, self._code, self._formulas = (
             mechanism, mechanism.linkage, code, formulas)
-        self.functions: list[str] = []
-        self._names: dict[tuple, str] = {}
-        self.solutions = 1
+        self.solutions: dict[tuple, tuple[str, int, str]] = {}
 
     def text(self, sides: tuple[Sequence[Axis], Sequence[Axis]], tag: str = '',
              passive: Sequence[Axis] = ()) -> str:
@@ -110,7 +107,7 @@ class Tables:
             turns = [input_.turn if input_.wraps and i not in each else math.inf
                      for each in counted]
             size = self.mechanism.scales[i] * input_.size
-            yield size, 1.0 / size, *(sweep or (-math.inf, math.inf)), turns
+            yield size, 1.0 / size, *(sweep or ('-LKR_ENDLESS', 'LKR_ENDLESS')), turns
 
     # --- inverses ---
 
@@ -121,21 +118,21 @@ class Tables:
             return '0'
         # Axes of the same outputs may have other signs and offsets.
         key = tuple((each.output, each.factor, each.offset) for each in axes)
-        if key not in self._names:
+        if key not in self.solutions:
             name = '_'.join([f'{self.mechanism.name}_solutions', *(
                 self._formulas.fields[output] for output in outputs)])
-            self._names[key] = name = distinct([*self._names.values(), name])[-1]
-            counted = {each.input: (argument(i) - each.shift) / each.ratio
-                       for i, each in enumerate(axes) if each.input is not None}
+            *_, name = distinct([*(each for each, *_ in self.solutions.values()), name])
+            counted = {each.input: (argument(i) - shift) / ratio
+                       for i, each in enumerate(axes) if each.input is not None
+                       for ratio, shift in [self.linkage.gear(each.output, each.input)]}
             if len(counted) == len(axes):
-                count, function = self._function(name, axes, 'The inputs.', [('', counted)])
+                found = self._function(name, axes, 'The inputs.', [('', counted)])
             elif closed := self.linkage.inverse(outputs).closed:
-                count, function = self._closed(name, axes, counted, closed)
+                found = self._closed(name, axes, counted, closed)
             else:
-                count, function = self._series(name, *axes)
-            self.functions.append(function)
-            self.solutions = max(self.solutions, count)
-        return self._names[key]
+                found = self._series(name, *axes)
+            self.solutions[key] = name, *found
+        return self.solutions[key][0]
 
     def _value(self, i: int, axis: Axis) -> str:
         """Return the output, in its own units, of an axis at position i."""
@@ -163,25 +160,24 @@ class Tables:
     def _closed(self, name: str, axes: Sequence[Axis], counted: Mapping[int, Real],
                 closed: InverseLinkage) -> tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
-        # If an input has a period of several turns, each turn has its own pose.
-        turns = [*product(*((0.0,) if i in counted else own
-                            for i, own in enumerate(closed.turns)))]
-        solutions = [('' if any(turned) else '/* %s */' % ', '.join(
-            f'{joint} {"left" if mode.linkage.branches[joint] > 0 else "right"}'
-            for joint in closed.branches), {
-                i: counted.get(i, value + turn)
-                for i, (value, turn) in enumerate(zip(mode.inputs, turned))})
-            for mode in closed.modes for turned in turns]
+        found, solutions = closed.solutions(), []
+        for (mode, turns), inputs in zip(product(closed.modes, product(*closed.turns)), found):
+            # If an input has a period of several turns, each turn has its own pose.
+            if not any(turns[i] for i in counted):
+                sides = ', '.join(
+                    f'{joint} {"left" if mode.linkage.branches[joint] > 0 else "right"}'
+                    for joint in closed.branches)
+                solutions.append((f'/* {sides} */' if sides and not any(turns) else '', {
+                    i: counted.get(i, value) for i, value in enumerate(inputs)}))
         if len(axes) == 1:
-            solutions = [*compress(solutions, self._are_in_reach(axes[0].output))] or solutions
+            solutions = [solutions[k] for k in self._in_reach(axes[0].output, found)] or solutions
         lines = ''.join(f'\n     {comment(line)}' for line in closed.lines)
         return self._function(
             name, axes, 'The inputs in each assembly mode of the inverse linkage, NAN where there '
-            f'is none:{lines}\n', solutions, closed.arguments)
+            f'is none:{lines}\n', solutions)
 
     def _function(self, name: str, axes: Sequence[Axis], about: str,
-                  solutions: Sequence[tuple[str, Mapping[int, Real]]],
-                  replaced: Mapping[Real, Real] = {}) -> tuple[int, str]:
+                  solutions: Sequence[tuple[str, Mapping[int, Real]]]) -> tuple[int, str]:
         """Return the number of solutions, each a line above it and inputs, and the function."""
         number, scales = self._code.number, self.mechanism.scales
         return len(solutions), self._code.function(
@@ -190,13 +186,15 @@ class Tables:
             [self._value(i, each) for i, each in enumerate(axes)],
             [(above, {f'q[{k}][{i}]': value * scales[i] for i, value in inputs.items()})
              for k, (above, inputs) in enumerate(solutions)],
-            f'return {len(solutions)};', replaced)
+            f'return {len(solutions)};')
 
-    def _are_in_reach(self, output: str) -> list[bool]:
+    def _in_reach(self, output: str, solutions: list[list[Real]]) -> list[int]:
         """Return which solutions of a closed form the linkage has anywhere in its reach."""
         # A solution of one part may go on in another, where it has a dead point of its own.
-        steps = (np.arange(SAMPLES) + 0.382) / SAMPLES
-        low, high = self.linkage.monotone(output).T[:2, :, None]
-        values = self.linkage.posed((), (output,)).over((low + steps * (high - low)).ravel())
-        return [bool(np.isfinite(inputs).any())
-                for inputs, in self.linkage.inverse((output,)).modes(np)(*values)]
+        steps, linkage = (np.arange(SAMPLES) + 0.382) / SAMPLES, self.linkage
+        low, high = linkage.monotone(output).T[:2, :, None]
+        inputs = (low + steps * (high - low)).ravel()
+        found = linkage.bind(Program([x for x, in solutions])).over(
+            *linkage.posed((), (output,)).over(inputs))
+        apart = linkage.inputs[0].apart(found, inputs)
+        return sorted({*np.where(np.isfinite(apart), apart, math.inf).argmin(axis=0).tolist()})

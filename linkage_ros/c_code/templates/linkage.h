@@ -33,9 +33,8 @@ typedef double lkr_real;
 #define LKR_OF(in_double, in_float) in_double
 #endif
 
-/* A Jacobian below this part of its size is singular: for velocities, and for Newton's method. */
+/* A Jacobian below this part of its size is singular. */
 #define LKR_SINGULAR LKR_OF(1e-6, 1e-3f)
-#define LKR_LEAST LKR_OF(1e-12, 1e-5f)
 /* A command may be so far beyond a sweep: half of all digits, which next to an extreme is rounding. */
 #define LKR_BEYOND LKR_OF(1e-6, 5e-4f)
 /* Rounding of inputs, and of a pose at them. */
@@ -47,9 +46,9 @@ typedef double lkr_real;
 #define LKR_STEEPEST LKR_OF(4e6, 1e3f)
 /* Terms of a series. */
 #define LKR_TERMS LKR_OF(20, 8)
-/* Steps of Newton's method from a solution that rounding has moved. */
-#define LKR_MAX_STEPS 3
 #define LKR_NAN ((lkr_real)NAN)
+/* Where there is no sweep it ends in infinity; tcc has no -INFINITY in a table. */
+#define LKR_ENDLESS LKR_OF(2 * DBL_MAX, 2 * FLT_MAX)
 /* A solution that misses by more than this belongs to another assembly [rad, sizes]. */
 #define LKR_OTHER ((lkr_real)0.01)
 
@@ -231,7 +230,7 @@ static inline lkr_real lkr_gap(const lkr_model *model, int side, const lkr_real 
 /* Solve J x = b in place, b in x, with the rates J of a side's positions by the inputs, or with their
    transpose. Returns 0 where J is singular, all in sizes. */
 static inline int lkr_solve(const lkr_model *model, int side, const lkr_point *p, int is_transposed,
-    lkr_real least, lkr_real *x)
+    lkr_real *x)
 {
     /* A compiler knows this bound. */
     const int n = model->inputs < LKR_MAX_INPUTS ? model->inputs : LKR_MAX_INPUTS;
@@ -255,7 +254,7 @@ static inline int lkr_solve(const lkr_model *model, int side, const lkr_point *p
             best = LKR_MATH(fabs)(a[i][k]) > LKR_MATH(fabs)(a[best][k]) ? i : best;
         }
         pivot = a[best][k];
-        if (!(LKR_MATH(fabs)(pivot) > least * most)) {
+        if (!(LKR_MATH(fabs)(pivot) > LKR_SINGULAR * most)) {
             return 0;
         }
         for (j = k; j <= n; j++) {
@@ -314,42 +313,13 @@ static inline lkr_real lkr_rounding(const lkr_model *model, const lkr_real *q)
     return LKR_ROUNDING * most;
 }
 
-/* From inputs q to those of positions next to them, and their pose, see lkr_model.at; returns 0 if
-   there are none, 1 if they are q, else 2. */
-static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position,
-    int has_rates, lkr_real *q, lkr_point *p)
+/* Whether what is left may be rounding: of the positions; of the inputs, where a position changes fast.
+   At an end of the reach the rate is infinite, yet rounding is not. */
+static inline int lkr_is_rounding(const lkr_model *model, int side, const lkr_real *position,
+    const lkr_real *q, const lkr_point *p, lkr_real left)
 {
-    lkr_real gap[LKR_MAX_INPUTS] = { 0 };
-    lkr_real x[LKR_MAX_INPUTS];
-    lkr_real left = LKR_OTHER;
     lkr_real steepest = 1;
-    int i, j, step;
-    memcpy(x, q, sizeof x);
-    for (step = 0; step <= LKR_MAX_STEPS; step++) {
-        const lkr_real now =
-            model->at(x, has_rates, p) ? lkr_gap(model, side, position, p, gap) : INFINITY;
-        if (!(now < left)) {
-            break;
-        }
-        left = now;
-        memcpy(q, x, sizeof x);
-        if (left <= LKR_ENOUGH || left <= lkr_rounding(model, q)) {
-            return step ? 2 : 1;
-        }
-        has_rates = has_rates || model->at(q, 1, p);
-        memcpy(x, gap, sizeof x);
-        if (!lkr_solve(model, side, p, 0, LKR_LEAST, x)) {
-            break;
-        }
-        for (i = 0; i < model->inputs; i++) {
-            x[i] += q[i];
-        }
-    }
-    /* At an end of the reach the rate is infinite, yet rounding is not. */
-    if (left > LKR_CLOSE * LKR_STEEPEST || !model->at(q, 1, p)) {
-        return 0;
-    }
-    /* What is left may be rounding: of the positions; of the inputs, where a position changes fast. */
+    int i, j;
     for (i = 0; i < model->inputs; i++) {
         const lkr_real scale = model->axis[side][i].scale;
         steepest = lkr_max(steepest, LKR_MATH(fabs)(position[i]) * scale);
@@ -358,7 +328,43 @@ static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *p
                 * lkr_max(model->input[j].size, LKR_MATH(fabs)(q[j])));
         }
     }
-    return left <= LKR_CLOSE * steepest ? 2 : 0;
+    return left <= LKR_CLOSE * lkr_clamped(steepest, 1, LKR_STEEPEST);
+}
+
+/* From inputs q to those of positions next to them, and their pose, see lkr_model.at; returns 0 if
+   there are none, 1 if they are q, else 2. One step of Newton's method is enough: it squares
+   what is left, but next to an extreme, where what is left is rounding of the positions. */
+static inline int lkr_refine(const lkr_model *model, int side, const lkr_real *position,
+    int has_rates, lkr_real *q, lkr_point *p)
+{
+    lkr_real gap[LKR_MAX_INPUTS] = { 0 };
+    lkr_real x[LKR_MAX_INPUTS];
+    lkr_real left = LKR_OTHER;
+    int is_rounding = 0;
+    int i, step;
+    memcpy(x, q, sizeof x);
+    for (step = 1; step <= 2; step++) {
+        const lkr_real now =
+            model->at(x, has_rates, p) ? lkr_gap(model, side, position, p, gap) : INFINITY;
+        if (!(now < left)) {
+            break;
+        }
+        left = now;
+        memcpy(q, x, sizeof x);
+        if (left <= LKR_ENOUGH || left <= lkr_rounding(model, q)) {
+            return step;
+        }
+        has_rates = has_rates || model->at(q, 1, p);
+        is_rounding = lkr_is_rounding(model, side, position, q, p, left);
+        memcpy(x, gap, sizeof x);
+        if (!lkr_solve(model, side, p, 0, x)) {
+            break;
+        }
+        for (i = 0; i < model->inputs; i++) {
+            x[i] += q[i];
+        }
+    }
+    return is_rounding ? 2 : 0;
 }
 
 /* How far x is beyond the sweep. */
@@ -496,7 +502,7 @@ static inline int lkr_velocities(const lkr_model *model, const lkr_point *p, int
         return LKR_NOT_KNOWN;
     }
     memcpy(speed, velocity, sizeof speed);
-    if (!lkr_solve(model, side, p, 0, LKR_SINGULAR, speed)) {
+    if (!lkr_solve(model, side, p, 0, speed)) {
         return LKR_SINGULAR_POSE;
     }
     for (i = 0; i < model->count[1 - side]; i++) {
@@ -530,7 +536,7 @@ static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int si
             x[i] += p->rate[side][j][i] * effort[j];
         }
     }
-    if (!lkr_solve(model, 1 - side, p, 1, LKR_SINGULAR, x)) {
+    if (!lkr_solve(model, 1 - side, p, 1, x)) {
         return LKR_SINGULAR_POSE;
     }
     lkr_copy(n, x, other);

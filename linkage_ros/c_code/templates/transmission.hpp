@@ -14,7 +14,6 @@
 #include <memory>
 #include <string>
 #include <thread>
-#include <type_traits>
 #include <vector>
 
 #include "hardware_interface/hardware_info.hpp"
@@ -104,14 +103,16 @@ public:
   /// The number of needed handles for each quantity.
   std::array<std::size_t, 3> count{};
 
+  Handles() = default;
+
+  /// Find them by role or name; `what` they are is "actuator" or "joint".
   template <class Infos>
-  void find(
+  Handles(
     const std::string & what, const std::vector<Axis> & axes, std::size_t needed,
     const Infos & infos, const std::vector<Handle> & given)
   {
     using transmission_interface::Exception;
-    count = {};
-    channels_.clear();
+    const bool is_actuator = what == "actuator";
     std::string allowed;
     for (std::size_t i = 0; i < needed; ++i) {
       allowed += std::string(" '") + axes[i].name + "' (role '" + axes[i].role + "')";
@@ -197,9 +198,6 @@ private:
     double factor, offset;
   };
 
-  static constexpr bool is_actuator =
-    std::is_same_v<Handle, transmission_interface::ActuatorHandle>;
-
   std::vector<Channel> channels_;
 };
 
@@ -221,8 +219,9 @@ public:
       refuse("there is no parameter '" + info_.parameters.begin()->first +
         "': write the package again for other lengths");
     }
-    actuators_.find("actuator", linkage_.actuators, num_joints(), info_.actuators, actuator_handles);
-    joints_.find("joint", linkage_.joints, num_joints(), info_.joints, joint_handles);
+    actuators_ = {
+      "actuator", linkage_.actuators, num_joints(), info_.actuators, actuator_handles};
+    joints_ = {"joint", linkage_.joints, num_joints(), info_.joints, joint_handles};
     for (std::size_t kind = 0; kind < interfaces.size(); ++kind) {
       const auto count = actuators_.count[kind] + joints_.count[kind];
       if (count != 2 * num_joints() && (count != 0 || kind == 0)) {
