@@ -211,18 +211,12 @@ class Hand:
 
 BAD = {
     'a header alone': b'\0\1\0\0',
-    'padding that is not there': b'\0\1\0\3',
-    'one byte': b'\0',
-    'noise': np.random.default_rng(1).bytes(200),
     'cut off': serialize_message(JointState(name=['jansen_crank'], position=[1.0]))[:30],
-    'an unknown encoding': b'\7\7' + serialize_message(JointState(name=['jansen_crank']))[2:],
-    'names without end': b'\0\1\0\0' + bytes(8) + struct.pack('<IxxxxI', 1, 2 ** 32 - 1) * 4,
     'a name without end': (b'\0\1\0\0' + bytes(8)
                            + struct.pack('<IxxxxII', 1, 1, 2 ** 32 - 9) + bytes(40)),
 }
 
 
-@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('text', BAD.values(), ids=BAD)
 def test_bytes_that_are_no_joint_states_are_passed_over_with_one_warning(graph, text):
     hand = Hand(graph)
