@@ -430,8 +430,7 @@ def refusals():
     for name in ('closing', 'planar', 'loops', 'rods', 'check'):
         tree = ast.parse(Path(cli.__file__).with_name(f'{name}.py').read_text())
         for node in ast.walk(tree):
-            is_reason = isinstance(node, ast.FunctionDef) and node.name in (
-                '_why',)
+            is_reason = isinstance(node, ast.FunctionDef) and node.name == '_why'
             for part in ast.walk(node) if is_reason else [node]:
                 if isinstance(part, (ast.Raise, ast.Return) if is_reason else ast.Raise):
                     yield from (each.value.strip(' :;,') for each in ast.walk(part)

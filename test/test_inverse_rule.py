@@ -107,9 +107,7 @@ def counts(found, *kinds):
 @pytest.mark.parametrize('kind', [kind for kind in mechanisms.TYPES if kind != 'five_bar'])
 def test_of_the_catalogue_nothing_is_lost_or_invented(kind):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(5)
-    names = [name for name in (*linkage.joints, *(
-        f'{point}.{axis}' for point in linkage.points for axis in 'xy'))
-        if linkage.moves(name) and name != linkage.inputs[0].name]
+    names = linkage_checks.moved(linkage)
     for name in (*names[:2], *map(str, rng.choice(names, 2))):
         found, worst = inverse_judge.judge(linkage, name, rng)
         assert found and not counts(found, *inverse_judge.KINDS), (name, found)

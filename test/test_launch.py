@@ -149,6 +149,7 @@ def started(launch=LAUNCH, **arguments):
     """Return the nodes that a launch file starts."""
     from launch import LaunchContext
     from launch.actions import DeclareLaunchArgument, OpaqueFunction
+    from launch_ros.actions import Node
 
     context = LaunchContext()
     context.launch_configurations.update(arguments)
@@ -158,6 +159,8 @@ def started(launch=LAUNCH, **arguments):
             entity.execute(context)
         elif isinstance(entity, OpaqueFunction):
             nodes += entity.execute(context)
+        elif isinstance(entity, Node):
+            nodes += [entity] * (not entity.condition or entity.condition.evaluate(context))
     return nodes
 
 
@@ -197,6 +200,14 @@ def test_what_cannot_be_is_refused_with_what_is_allowed():
             ('use_sim_time', '', '"use_sim_time" .*"" is not valid')):
         with pytest.raises(RuntimeError, match=complaint):
             started(**{name: text})
+
+
+@needs_launch
+@pytest.mark.parametrize('simulated, drivers', [('true', ['crank_driver']), ('false', [])])
+def test_the_motors_of_the_example_are_simulated_where_that_is_wanted(simulated, drivers):
+    nodes = started(ROOT / 'examples' / 'leg.launch.py', simulated=simulated)
+    assert [node.node_executable for node in nodes] == [
+        'robot_state_publisher', 'kinematics', *drivers]
 
 
 ROBOT, ROBOTS = LAUNCH.with_name('robot.launch.py'), Path(__file__).with_name('robot_files')

@@ -19,6 +19,8 @@ SEEDS = [pytest.param(range(1), 25, id='few'),
          pytest.param(range(12, 60), 60, id='many', marks=pytest.mark.nightly)]
 
 
+# Nor does numpy warn, whatever the numbers are.
+@pytest.mark.filterwarnings('error::RuntimeWarning')
 @pytest.mark.parametrize('name', SCENES)
 @pytest.mark.parametrize('seeds, length', SEEDS)
 def test_whatever_happens_the_node_publishes_what_the_library_says(name, seeds, length):

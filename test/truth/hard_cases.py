@@ -14,13 +14,10 @@ import math
 from linkage_ros import mechanisms
 import numpy as np
 
-HOLY = {'a': 38.0, 'b': 41.5, 'c': 39.3, 'd': 40.1, 'e': 55.8, 'f': 39.4, 'g': 36.7, 'h': 65.7,
-        'i': 49.0, 'j': 50.0, 'k': 61.9, 'l': 7.8, 'm': 15.0}
-
 # The documents' own parameter sets, the other ones people know, and every change point.
 CATALOGUE = {
     'water_drop': [{'a': 1.0}, {'a': 0.1}, {'a': 0.7}],
-    'jansen': [HOLY],
+    'jansen': [mechanisms.defaults('jansen')],
     'peaucellier': [
         {'r': r, 'a': a, 'b': b} for r, a, b in (
             (3.0, 9.0, 4.0), (4.0, 9.0, 2.0), (2.0, 5.0, 3.0), (3.0, 6.0, 3.0), (3.0, 4.0, 2.0),
