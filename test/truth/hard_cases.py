@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Angles and dimensions that are hard on the catalogue, drawn from a seeded generator.
+Dimensions that are hard on the catalogue, drawn from a seeded generator.
 
-Three tenths of the random dimensions are nearly or exactly degenerate: a kite almost folded, a
-dyad that only just reaches, equal arms. Angles crowd around dead points and reach limits, down to
-1e-15 rad.
+Three tenths of the random ones are nearly or exactly degenerate: a kite almost folded, a dyad that
+only just reaches, equal arms.
 """
 
 import math
@@ -89,21 +88,3 @@ def lever_gap(lengths, lever, half):
     height = np.sqrt(np.maximum(a * a - offset * offset, 0.0))
     ahead = half * b * np.cos(lever) + height
     return np.minimum(a - np.abs(offset), ahead) / (a + b + abs(e))
-
-
-def angles(rng, count, limits=()):
-    """
-    Return crank angles: half of them anywhere, half close to 0, pi or the given limits [rad].
-
-    A tenth of them is moved by whole turns, up to 1e9.
-    """
-    spots = [0.0, math.pi, -math.pi, math.pi / 2, *limits]
-    found = []
-    for _ in range(count):
-        theta = float(rng.uniform(-math.pi, math.pi))
-        if rng.random() < 0.5:
-            theta = float(rng.choice(spots)) + tiny(rng)
-        if rng.random() < 0.1:
-            theta += 2 * math.pi * round(log_uniform(rng, 1.0, 1e9))
-        found.append(theta)
-    return np.array(found)
