@@ -282,8 +282,7 @@ class Model:
         loaded = any(self.scene.mechanisms[name].loads for name in poses) and all(
             effort is None or math.isfinite(effort)
             for name, pose in poses.items() for effort in self._efforts(name))
-        return stamp, (
-            names, positions, velocities if moving else [], efforts if loaded else [])
+        return stamp, (names, positions, velocities if moving else [], efforts if loaded else [])
 
     def _efforts(self, name):
         mechanism, state = self.scene.mechanisms[name], self.states[name]
@@ -638,8 +637,7 @@ class Generator:
                         for drive in mechanism.inputs.values()]
         self.topics = ['joint_states', *(f'{name}/{kind}' for name in self._scene.mechanisms
                                          for kind in ('joint_states', 'markers'))]
-        self._settable = [p for p in self._scene.parameters
-                          if scene.KINEMATICS in p.field.readers]
+        self._settable = [p for p in self._scene.parameters if scene.KINEMATICS in p.field.readers]
 
     def history(self, length):
         """Return some steps."""
@@ -819,8 +817,7 @@ def everything(parameters):
 
 def message(positions, velocities=(), sec=1):
     """Return the step that sends values by the names of their sources."""
-    sent = JointState(name=list(positions), position=list(positions.values()),
-                      velocity=velocities)
+    sent = JointState(name=list(positions), position=list(positions.values()), velocity=velocities)
     sent.header.stamp.sec = sec
     return 'send', serialize_message(sent)
 

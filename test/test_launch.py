@@ -178,8 +178,7 @@ def started(launch=LAUNCH, **arguments):
 def test_the_launch_file_starts_the_nodes_of_a_scene(arguments, besides, monkeypatch, tmp_path):
     monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
     nodes = ['crank_driver', 'kinematics', 'servo_inverse'] if 'apart' in arguments else ['scene']
-    assert [node.node_executable for node in started(**arguments)] == [
-        *besides, *nodes]
+    assert [node.node_executable for node in started(**arguments)] == [*besides, *nodes]
 
 
 @needs_launch
@@ -227,8 +226,7 @@ def robot_launched(tmp_path, monkeypatch, file, capsys, *more, **arguments):
 
 @needs_launch
 def test_a_whole_robot_is_launched_with_all_its_joints(tmp_path, monkeypatch, capsys):
-    scene_file, nodes = robot_launched(
-        tmp_path, monkeypatch, ROBOTS / 'wheel_leg.urdf', capsys)
+    scene_file, nodes = robot_launched(tmp_path, monkeypatch, ROBOTS / 'wheel_leg.urdf', capsys)
     assert [node.node_executable for node in nodes] == [
         'robot_state_publisher', 'kinematics', 'crank_driver']
     # No other mechanism is needed: motors are sources, and the others are published.

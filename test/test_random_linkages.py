@@ -14,12 +14,7 @@ import math
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
-from truth import (
-    drawing_accuracy,
-    hard_cases,
-    linkage_checks as checks,
-    random_linkages,
-)
+from truth import drawing_accuracy, hard_cases, linkage_checks as checks, random_linkages
 from truth.cases import CASES
 
 LONG, BATCH = 1000, 25
@@ -239,8 +234,7 @@ def test_reach_and_dead_points_that_were_missed_once(joints, held):
 # --- that the check is a check ------------------------------------------------------------------
 
 def test_the_measure_sees_a_flaw_in_the_last_digits_and_a_wrong_nan():
-    subject = checks.Subject(random_linkages.Design(MOVING, {}, {}),
-                             np.random.default_rng(9))
+    subject = checks.Subject(random_linkages.Design(MOVING, {}, {}), np.random.default_rng(9))
     given = np.array([[0.7, *subject.held]])
     found = drawing_accuracy.answers(subject.mechanism, given, subject.poses, True)
     measure = subject.measure()
@@ -252,6 +246,5 @@ def test_the_measure_sees_a_flaw_in_the_last_digits_and_a_wrong_nan():
     assert len(moving) > 10
     for output, value in ((output, found[output]) for output in moving):
         for flawed in (value * (1.0 + 1e-12) + 1e-12, np.full_like(value, np.nan)):
-            rows = drawing_accuracy.judge(measure, given, {**found, output: flawed}, True,
-                                          [truth])
+            rows = drawing_accuracy.judge(measure, given, {**found, output: flawed}, True, [truth])
             assert {row.output for row in drawing_accuracy.broken(rows)} == {output}

@@ -63,8 +63,7 @@ def check_joints(robot, stands, form, read, joints, roots, size):
                                      for body in joint.bodies)
         ground = stands[joint.bodies[1]]
         for place, way in zip(found.places, found.axes):
-            assert place == pytest.approx(
-                (ground @ [*joint.places[1], 1.0])[:3], abs=1e-12 * size)
+            assert place == pytest.approx((ground @ [*joint.places[1], 1.0])[:3], abs=1e-12 * size)
             assert way == pytest.approx(ground[:3, :3] @ joint.axes[0], abs=1e-12)
         assert found.position == pytest.approx(zeros[found.name], abs=1e-15)
         shift = zeros[found.name] - starts[found.name]

@@ -197,8 +197,7 @@ def test_only_mechanisms_that_are_given_something_else_are_read_again():
     after = scene.changed(
         before, {'jansen.dimensions.m': 14.9, 'peaucellier.scale': 0.1}).mechanisms
     assert {name for name in after if after[name] is not before.mechanisms[name]} == {'jansen'}
-    assert [p.name for p in scene.changed(before, {'rate': 9.0}).changed_from(before)] == [
-        'rate']
+    assert [p.name for p in scene.changed(before, {'rate': 9.0}).changed_from(before)] == ['rate']
 
 
 def test_a_crank_that_cannot_turn_swings_within_its_reach():

@@ -84,8 +84,7 @@ def test_a_cylinder_is_barrel_and_rod_and_a_block_has_a_guide(name, kinds):
     one = MACHINES[name]()
     found = shapes.shapes(one)
     assert [shape.kind for shape in found] == kinds
-    assert shapes.drawn(one, one.linkage.points) == [
-        shape for shape in found if shape.kind != ROD]
+    assert shapes.drawn(one, one.linkage.points) == [shape for shape in found if shape.kind != ROD]
     for end in 'joint', 'tip':
         hidden = {getattr(shape.slide, end) for shape in found}
         assert shapes.drawn(one, set(one.linkage.points) - hidden) == []

@@ -21,31 +21,20 @@ from linkage_ros.web.feed import Feed
 from linkage_ros.web.scene_view import LATCHED
 import numpy as np
 import pytest
-from rcl_interfaces.msg import (
-    Parameter as ParameterMessage,
-    ParameterEvent,
-    ParameterValue,
-)
+from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterEvent, ParameterValue
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from test_reading import held
 from truth.working_modes import lever_of
-from viewer_harness import (
-    framed,
-    LEG,
-    LEVER,
-    markers_of,
-    NODES,
-    Page,
-    parts,
-    RATE,
-    resident,
-    spoilt,
-    walker,
-)
+from viewer_harness import framed, LEG, LEVER, NODES, Page, parts, RATE, resident, spoilt, walker
 from visualization_msgs.msg import Marker, MarkerArray
 import yaml
+
+
+def markers_of(text):
+    """Return the markers of a message."""
+    return deserialize_message(text, MarkerArray).markers
 
 
 def test_every_setting_is_described_as_the_scene_has_it(page):
@@ -87,8 +76,7 @@ def test_a_slider_sets_the_node_that_owns_the_parameter_and_others_changes_are_s
 
 def test_announcements_that_make_no_sense_change_nothing(graph, show):
     page = show(LEVER).page()
-    publisher = graph.node.create_publisher(
-        ParameterEvent, ownership.TOPIC, ownership.LATCHED)
+    publisher = graph.node.create_publisher(ParameterEvent, ownership.TOPIC, ownership.LATCHED)
     odd = [ParameterMessage(name='lever.scale', value=ParameterValue(type=200)), *(
         Parameter(name, value=value).to_parameter_msg() for name, value in (
             ('lever.scale', 'wide'), ('mechanisms', [b'l']), ('', 1.0), ('lever.crank.speed', 3),

@@ -470,8 +470,7 @@ def moved(mechanism):
 def inverse(subject, count=2):
     """Ask which values of the first input give values that outputs have; `inverse_judge` tells."""
     for output in map(str, subject.rng.permutation(moved(subject.mechanism))[:count]):
-        found, _ = inverse_judge.judge(
-            subject.mechanism, output, subject.rng, 4, subject.held)
+        found, _ = inverse_judge.judge(subject.mechanism, output, subject.rng, 4, subject.held)
         for kind, what, *case in found:
             if (kind, what) in (('ordinary', 'lost at'), ('ordinary', 'invented at')):
                 yield f'inverse {what}', f'{output} at {case[2]!r}'

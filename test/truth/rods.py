@@ -368,8 +368,7 @@ def random_rods(rng, count):
     digits = edge * (1 + rng.integers(-4, 5, size=count) * 2.0 ** -52)
     length = np.select([kind == 1, kind == 2], [decades, digits], length)
     sided = np.einsum('ij,ij->i', along, np.cross(pivot - hinge, end - hinge))
-    seen = np.abs(sided) > 2e-6 * np.linalg.norm(
-        np.cross(along, pivot - hinge), axis=1) * rho
+    seen = np.abs(sided) > 2e-6 * np.linalg.norm(np.cross(along, pivot - hinge), axis=1) * rho
     kept = seen & (length > 0.0)
     return {name: part[kept] for name, part in zip(Rod._fields[:8], (
         motor, other, pivot, hinge, axis, end, length, value))}
