@@ -59,17 +59,6 @@ def wait_for_compilers():
             thread.join()
 
 
-def by_batch(linkage, thetas):
-    """Return the points that machine code finds, a row for each column of inputs."""
-    thetas = np.atleast_2d(thetas)
-    rows = np.empty((thetas.shape[1], 2 * len(linkage.points)))
-    batch = linkage.posed().batch(rows)
-    batch.arguments[:] = thetas
-    wait_for_compilers()
-    assert batch.solve()
-    return rows
-
-
 def test_nobody_waits_for_the_compiler(code):
     linkage = fresh('Waited')
     code.allowed.clear()
@@ -125,7 +114,9 @@ print('llvmlite' in sys.modules)"""], capture_output=True, text=True, check=True
 
 def test_it_is_compiled_once_for_all_mechanisms_of_a_type(code):
     for _ in range(3):
-        by_batch(fresh('Shared'), 0.3)
+        solution = Assembly(fresh('Shared'), 2).solution(('Shared',))
+        wait_for_compilers()
+        solution.solve([0.3])
     assert (code.made, code.ran) == (1, 3)
 
 

@@ -226,9 +226,7 @@ def test_changes_are_saved_undone_and_reset(start, tmp_path):
     seen.type('leg', 'g', '37.25')
     becomes(g=37.25)
     # The viewer is told of what was set a moment later.
-    until(lambda: {'name': 'dimensions.g', 'value': 37.25}.items() <= next(
-        setting for setting in running.page().mechanisms('/leg')['/leg']['settings']
-        if setting['name'] == 'dimensions.g').items())
+    running.page().setting('/leg', 'dimensions.g', 37.25)
     seen.downloads(tmp_path)
     seen.click(seen.button('scene file'))
     saved = tmp_path / 'leg.yaml'

@@ -48,9 +48,7 @@ class Client:
 
     def call(self, service, given):
         """Return the response of a service."""
-        future = getattr(self.services, service)(given)
-        self._graph.until(future.done, 60.0)
-        return future.result()
+        return self._graph.answer(lambda: getattr(self.services, service)(given))
 
     def set(self, *values):
         """Set name after name to a value in one request; return the results."""
