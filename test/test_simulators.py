@@ -41,8 +41,8 @@ def mechanisms(config):
     return scene.load(str(ROOT / 'config' / f'{config}.yaml')).mechanisms
 
 
-def model(mechanisms, frame_id='world', density=bodies.DENSITY):
-    return bodies.robot(mechanisms, frame_id, density=density)
+def model(mechanisms, density=bodies.DENSITY):
+    return bodies.robot(mechanisms, 'world', density=density)
 
 
 class Simulation(MuJoCo):

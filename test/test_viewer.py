@@ -329,13 +329,13 @@ def read(feed_):
     return [(head, [part.tolist() for part in points]) for head, points in framed(feed_.frame())]
 
 
-def feed_of_a_leg():
+@pytest.fixture
+def topic():
     """Return the feed of a leg's markers, which logs nothing."""
     return Feed('/leg', '/leg/markers', MarkerArray, lambda text, subject: None)
 
 
-def test_a_frame_has_the_markers_of_the_newest_message():
-    topic = feed_of_a_leg()
+def test_a_frame_has_the_markers_of_the_newest_message(topic):
     assert topic.frame() == b''
     for text in (walker(1), walker(2), walker(4, legs=1), walker(6, width=2.0),
                  walker(7, frame='\N{BLACK STAR}'), *2 * [walker(9) + bytes(3)]):
@@ -344,8 +344,7 @@ def test_a_frame_has_the_markers_of_the_newest_message():
         assert topic.frame() is topic.frame()
 
 
-def test_of_a_message_what_is_deleted_or_no_line_joint_or_triangle_is_not_drawn():
-    topic = feed_of_a_leg()
+def test_of_a_message_what_is_deleted_or_no_line_joint_or_triangle_is_not_drawn(topic):
     message = deserialize_message(walker(1), MarkerArray)
     bars, joints = message.markers
     message.markers = [
@@ -362,8 +361,7 @@ def test_of_a_message_what_is_deleted_or_no_line_joint_or_triangle_is_not_drawn(
 @pytest.mark.parametrize('type_, id_, kind', [
     (Marker.LINE_LIST, 0, 'lines'), (Marker.LINE_LIST, 2, 'locus'), (Marker.LINE_LIST, 3, 'slots'),
     (Marker.TRIANGLE_LIST, 7, 'plates'), (Marker.TRIANGLE_LIST, 8, 'triangles')])
-def test_lines_and_triangles_are_told_apart_by_their_ids(type_, id_, kind):
-    topic = feed_of_a_leg()
+def test_lines_and_triangles_are_told_apart_by_their_ids(topic, type_, id_, kind):
     topic.newest = serialize_message(MarkerArray(markers=[Marker(type=type_, id=id_)]))
     (head, _), = read(topic)
     assert head['markers'][0]['kind'] == kind
@@ -373,8 +371,7 @@ def test_lines_and_triangles_are_told_apart_by_their_ids(type_, id_, kind):
     b'', b'\0\1\0\0', b'\xff' * 64, walker(1)[:99], walker(1)[:4] + b'\xff' * 500, *(
         spoilt(part, number) for part in range(4) for number in (math.nan, -1e300))],
     ids=itertools.count())  # padding between fields is whatever was in memory
-def test_of_what_cannot_be_drawn_nothing_stays(text):
-    topic = feed_of_a_leg()
+def test_of_what_cannot_be_drawn_nothing_stays(topic, text):
     for topic.newest in (walker(0), text, walker(2)):
         for head, points in framed(topic.frame()):
             json.dumps(head, allow_nan=False)

@@ -387,12 +387,6 @@ def motor_values(ankle, which, pitch, roll):
     return [np.arctan2(b, a) + side * off for side in (1, -1)]
 
 
-def determinants(ankle, motors, pitch, roll):
-    """Return the determinant of the derivatives of `gaps` by both angles, in float64."""
-    (a, c), (b, d) = slopes(partial(gaps, ankle, motors), (pitch, roll), 1e-6)
-    return a * d - b * c
-
-
 def are_drawn(ankle, motors, pitch, roll):
     """Return whether all cranks are on their drawn sides, by difference quotients."""
     drawn_values = [0.0 if axis else length
@@ -423,7 +417,9 @@ def is_ambiguous(ankle, low, high, count=11):
         if not there.any():
             continue
         motors = [np.where(there, x, np.nan) for x in motors]
-        signs = np.sign(determinants(ankle, motors, pitch, roll)).reshape(count, count)
+        # Of the derivatives of the gaps by both angles.
+        (a, c), (b, d) = slopes(partial(gaps, ankle, motors), (pitch, roll), 1e-6)
+        signs = np.sign(a * d - b * c).reshape(count, count)
         if any((one * other < 0.0).any() for one, other in (
                 (signs[1:], signs[:-1]), (signs[:, 1:], signs[:, :-1]))):
             return True
