@@ -38,10 +38,8 @@ POSES, NEAR, SLACK = 300, {'double': 1e-9, 'float': 1e-6}, {'double': 1e-6, 'flo
 
 
 def read(name, joint_lines, names=(), **given):
-    """Return a mechanism of joint lines, with the names of its commanded joints, if there is C."""
-    request = header.Request(alone(joint_lines, name, **given), (), tuple(names))
-    assert header.printed([request])
-    return request
+    """Return a mechanism of joint lines, with the names of its commanded joints."""
+    return header.Request(alone(joint_lines, name, **given), (), tuple(names))
 
 
 def drawn(seeds):
@@ -55,6 +53,7 @@ def drawn(seeds):
             name = f'm{seed}_{i}'
             with suppress(scene.SceneError, ValueError):  # no pose, or not these outputs
                 case = read(name, design.joints, names[i] if i < len(names) else (), **given)
+                header.printed([case])
                 yield case
                 if not i:
                     linkage = case.mechanism.linkage

@@ -11,7 +11,7 @@ import pytest
 from truth import inverse_judge, linkage_checks
 
 FOUR_BAR_OUTPUTS = 'P.x', 'P.y', 'B.x', 'B.y', 'QB', 'AB'
-EVERYWHERE = np.linspace(-3.1, 3.1, 40)
+EVERYWHERE = np.linspace(-3.1, 3.1, 24)
 TIGHT = math.atan2(-0.8, 0.6)
 # Linkages for which a solution was lost or invented, by what is special: their type or joint
 # lines, numbers, outputs and inputs.
