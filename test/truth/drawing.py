@@ -190,12 +190,6 @@ def half_ulp(number):
     return mpfr(float(np.spacing(abs(float(number))))) / 2
 
 
-def literals(text):
-    """Return the numbers other than zero that are written in a text."""
-    return {match['number'] for match in _TOKEN.finditer(text)
-            if match['number'] and float(match['number'])}
-
-
 # --- drawing ------------------------------------------------------------------------------------
 
 class Passing(NamedTuple):
@@ -288,8 +282,9 @@ class Linkage:
 
     def literals(self):
         """Return the texts of numbers that are written in the lines."""
-        return sorted({found for line in self.lines for text in line.numbers
-                       for found in literals(text)})
+        numbers = {token['number'] for line in self.lines for text in line.numbers
+                   for token in _TOKEN.finditer(text)}
+        return sorted(text for text in numbers if text and float(text))
 
     def _driven(self):
         """Return for each input or geared line the name that its input has."""
