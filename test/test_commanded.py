@@ -151,7 +151,7 @@ def test_the_ends_of_sweeps_can_be_commanded(tmp_path, number):
     ends, cases = [], []
     for joint_lines, output in NEXT_TO_EXTREMES:
         (_, extreme), *_ = alone(joint_lines).linkage.extremes(output)[0]
-        for distance, inwards in product((0.0, 1e-6, 1e-4, 1e-2, 0.1), (-1.0, 1.0)):
+        for distance, inwards in product((0.0, 1e-6, 1e-4, 0.1), (-1.0, 1.0)):
             name, end = f'm{len(ends)}', extreme + inwards * distance
             sweep = sorted((end, end + 0.3 * inwards))
             ends.append((output, end, inwards, distance))

@@ -138,21 +138,21 @@ MANY = 200_000
 
 def angles(rng):
     """Return angles of every size, many of them next to multiples of a quarter turn."""
-    powers = 2.0 ** np.repeat(np.arange(-1074.0, 1024.0), 2)
-    multiples = np.pi / 2 * np.concatenate([np.arange(200), rng.integers(200, 2 ** 15, 2000)])
+    powers = 2.0 ** np.arange(-1074.0, 1024.0)
+    multiples = np.pi / 2 * np.concatenate([np.arange(200), rng.integers(200, 2 ** 15, 800)])
     edge = elementary.LARGEST_ANGLE
     close = [np.nextafter(multiples, sign * np.inf) for sign in (-1, 1)]
     sizes = np.concatenate([powers * rng.uniform(1.0, 2.0, powers.size), multiples, *close,
-                            np.pi / 4 * np.arange(1, 400, 2), rng.uniform(0.0, 4.0, 2000),
-                            rng.uniform(0.0, edge, 2000), np.nextafter(edge, [0.0, 1e9]), [edge]])
+                            np.pi / 4 * np.arange(1, 400, 2), rng.uniform(0.0, 4.0, 800),
+                            rng.uniform(0.0, edge, 800), np.nextafter(edge, [0.0, 1e9]), [edge]])
     sizes = sizes[np.isfinite(sizes)]
     return [sizes * rng.choice([-1.0, 1.0], sizes.size)]
 
 
 def sides(rng):
     """Return y and x of every size and ratio."""
-    sizes = 10.0 ** rng.uniform(-280.0, 280.0, 4000)
-    ratios = np.concatenate([10.0 ** rng.uniform(-20.0, 20.0, 4000), rng.uniform(0.4, 2.5, 4000)])
+    sizes = 10.0 ** rng.uniform(-280.0, 280.0, 2000)
+    ratios = np.concatenate([10.0 ** rng.uniform(-20.0, 20.0, 2000), rng.uniform(0.4, 2.5, 2000)])
     y = np.concatenate([sizes, sizes]) * rng.choice([-1.0, 1.0], ratios.size)
     return [y, y * ratios * rng.choice([-1.0, 1.0], ratios.size)]
 

@@ -14,7 +14,7 @@ import pytest
 from ros_harness import Graph
 
 # Of each scene a short history, 11 and 48; nightly all of them without llvmlite, too.
-SEEDS = [pytest.param(range(1), 25, id='few'),
+SEEDS = [pytest.param(range(1), 20, id='few'),
          pytest.param(range(1, 12), 60, id='some', marks=pytest.mark.nightly),
          pytest.param(range(12, 60), 60, id='many', marks=pytest.mark.nightly)]
 

@@ -213,8 +213,8 @@ def test_an_input_is_where_the_last_message_says(graph, show):
     until(lambda: after(1.5) == 1.5)
     after(math.nan)
     assert after(math.inf) == 1.5
-    before, others = held(running.viewer), [f'joint{number}' for number in range(5000)]
-    publisher.publish(JointState(name=['leg_crank', *others], position=[1.6] * 5001))
+    before, others = held(running.viewer), [f'joint{number}' for number in range(500)]
+    publisher.publish(JointState(name=['leg_crank', *others], position=[1.6] * 501))
     until(lambda: crank() == 1.6)
     assert held(running.viewer) < before + len(others)
     # A start moves an input only if it is another than before.
