@@ -109,7 +109,7 @@ def test_a_thousand_random_linkages_hold(batch):
     assert not found, report(found)
 
 
-@pytest.mark.nightly(all_but=5)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('name', LISTED)
 def test_a_listed_linkage_holds_what_any_must(name):
     found, _ = checks.problems(LISTED[name], np.random.default_rng(0))

@@ -102,7 +102,7 @@ def prepared(mechanisms, form, frame_id='world'):
     return bodies.robot(mechanisms, frame_id, density=0.0 if form == 'urdf' else bodies.DENSITY)
 
 
-@pytest.mark.nightly(all_but=9)
+@pytest.mark.nightly(all_but=6)
 @pytest.mark.parametrize('form', FORMATS)
 @pytest.mark.parametrize('config', EXAMPLES, ids=lambda config: config.stem)
 def test_robots_of_the_shipped_scenes_come_back(tmp_path, config, form):
@@ -143,7 +143,7 @@ def random_mechanism(seed):
 
 @pytest.mark.parametrize('form', FORMATS)
 @pytest.mark.parametrize('seeds', [
-    range(2, 4), pytest.param(range(4, 40), marks=pytest.mark.nightly)])
+    range(2, 3), pytest.param(range(3, 40), marks=pytest.mark.nightly)])
 def test_random_robots_come_back(tmp_path, seeds, form):
     mechanisms = [*filter(None, map(random_mechanism, seeds))]
     assert len(mechanisms) > len(seeds) // 2
