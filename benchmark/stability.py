@@ -59,7 +59,7 @@ def measured(kind, dimensions, rng, count, rates, label):
         return []
     ends = [] if arcs == [(-math.pi, math.pi)] else [end for arc in arcs for end in arc]
     measure = drawing_accuracy.strict(mechanism)
-    given = hard_cases.angles(rng, count, ends)[:, None]
+    given = random_linkages.given(rng, count, ends, mechanism.inputs)
     exact = [measure.at(row, rates) for row in given]
     found = {label: (drawing_accuracy.answers(mechanism, given, measure.poses, rates), rates)}
     if branches == usual and not (kind == 'slotted_lever' and dimensions['e']):

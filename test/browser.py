@@ -103,8 +103,7 @@ class Browser:
         self._session = aiohttp.ClientSession()
         async with self._session.get(f'http://127.0.0.1:{port}/json') as response:
             page = next(page for page in await response.json() if page['type'] == 'page')
-        self._socket = await self._session.ws_connect(
-            page['webSocketDebuggerUrl'], max_msg_size=0)
+        self._socket = await self._session.ws_connect(page['webSocketDebuggerUrl'], max_msg_size=0)
         self._reading = task(self._read())
         for domain in ('Page', 'Runtime', 'Log', 'Network'):
             await self._request(f'{domain}.enable')
@@ -193,8 +192,7 @@ class Browser:
         self._mouse('mousePressed', *places[0])
         for start, end in zip(places, places[1:]):
             for part in (0.25, 0.5, 0.75, 1.0):
-                self._mouse('mouseMoved', *(
-                    a + part * (b - a) for a, b in zip(start, end)))
+                self._mouse('mouseMoved', *(a + part * (b - a) for a, b in zip(start, end)))
         self._mouse('mouseReleased', *places[-1])
 
     def touch(self, *fingers):
@@ -219,8 +217,7 @@ class Browser:
     def press(self, key: str, shift: bool = False):
         """Press a key that writes nothing, with Shift or without."""
         for kind in ('keyDown', 'keyUp'):
-            self._do('Input.dispatchKeyEvent', type=kind, key=key, code=key,
-                           modifiers=8 * shift)
+            self._do('Input.dispatchKeyEvent', type=kind, key=key, code=key, modifiers=8 * shift)
 
     def downloads(self, folder: Path):
         """Let what is downloaded go to a folder."""

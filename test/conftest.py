@@ -74,7 +74,6 @@ def pytest_collection_modifyitems(items):
 
 def pytest_collection_finish():
     """Exclude imports and collected tests from garbage collection, and collect less often."""
-    gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
     gc.enable()

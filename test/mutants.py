@@ -196,8 +196,7 @@ def sample(room, count, seed):
     for path in sorted(folder.glob('*.py') if room == 'top' else (folder / room).rglob('*.py')):
         nodes = [*ast_nodes(get_ast(path.read_text()))]
         for operator in operators():
-            positions = (start for node in nodes
-                         for start, _ in operator.mutation_positions(node))
+            positions = (start for node in nodes for start, _ in operator.mutation_positions(node))
             for i, (line, _) in enumerate(positions):
                 lines[str(path.relative_to(ROOT)), line].append((operator, i))
     order = sorted(lines)
@@ -355,8 +354,7 @@ def main():
     parser.add_argument('--again', type=Path, help='a file of an earlier run: its survivors only')
     parser.add_argument('--out', type=Path, required=True, help='the folder of the results')
     options = parser.parse_args()
-    equivalent = {*map(key, (
-        ROOT / 'test' / 'equivalent_mutants.txt').read_text().split('\n\n'))}
+    equivalent = {*map(key, (ROOT / 'test' / 'equivalent_mutants.txt').read_text().split('\n\n'))}
     copies, measurement = prepare(options.out.absolute() / 'work')
     for room in options.room.split():
         chosen = [*filter(None, (

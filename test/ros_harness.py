@@ -70,8 +70,7 @@ class Graph:
     def start(self, node_class, parameters=None, **kwargs):
         """Start a node of this package with parameter values by name."""
         overrides = [Parameter(name, value=value) for name, value in (parameters or {}).items()]
-        node = self._add(node_class(
-            context=self.context, parameter_overrides=overrides, **kwargs))
+        node = self._add(node_class(context=self.context, parameter_overrides=overrides, **kwargs))
         if self._is_logged:
             self.until(lambda: node.count_subscribers('/rosout'))
         return node

@@ -25,8 +25,7 @@ SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 
 
 def example(name):
     """Return the parameters of an example."""
-    return without_defaults(scene.load(str(next(
-        path for path in EXAMPLES if path.stem == name))))
+    return without_defaults(scene.load(str(next(path for path in EXAMPLES if path.stem == name))))
 
 
 def alone(linkage, name='m', **settings):

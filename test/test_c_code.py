@@ -36,7 +36,7 @@ SCENE = {
 # Outputs with an inverse, and linkages that have them in the library of poses, too.
 OUTPUTS = {'slotted_lever': ('lever', 'A.x'), 'four_bar': ('QB', 'distance(O,B)'),
            'jansen': ('G.x', 'angle(A,G)'), 'whitworth': ('lever', 'block'),
-           'peaucellier': ('PB', 'BC'), 'slider_crank': ('block',),
+           'peaucellier': ('PB',), 'slider_crank': ('block',),
            'boom': ('B.x', 'angle(O,B)')}
 POSED = {name: OUTPUTS[name] for name in ('slotted_lever', 'four_bar', 'boom')}
 CALLER = """
@@ -165,11 +165,10 @@ INVERSES = [
     # The motor of a slow and of a fast gear goes on in its turn.
     *(([*MOTOR, f'A crank O 1 geared crank {ratio} 0'], 'A.x', {
         'inputs': [0.4, 83.0, 83.0 + 320.0 * math.pi], 'beside': [1e-3], 'close': 1e-10})
-      for ratio in ('1/80', '180')),
+      for ratio in ('1/80', '40')),
     *(({'type': kind, f'dimensions.{key}': factor * mechanisms.create(kind).dimensions[key]},
        output, {'parts': [*NEAR_ENDS, *(1.0 - NEAR_ENDS)], 'beside': [0.0, 0.1], 'close': 1e-7})
-      for kind, key, factor, output in (('jansen', 'k', 0.8, 'G.x'), ('jansen', 'e', 1.25, 'G.y'),
-                                        ('klann', 'i', 0.8, 'CF')))]
+      for kind, key, factor, output in (('jansen', 'k', 0.8, 'G.x'), ('klann', 'i', 0.8, 'CF')))]
 
 
 @pytest.fixture(scope='module')

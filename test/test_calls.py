@@ -217,14 +217,10 @@ def test_the_margin_of_a_pose_without_rates_is_zero():
 
 @pytest.mark.parametrize('given, problem', [
     ({'c': math.nan}, 'dimension c must be finite, got nan'),
-    ({'c': -math.inf}, 'dimension c must be finite, got -inf'),
-    ({'a': [1.0, math.nan]}, 'dimension a must be finite'),
     ({'c': 1e-31}, 'dimension c must lie between 1e-30 and 1e\\+30'),
     ({'b': 1e31}, 'dimension b must lie between'),
     ({'a': [1.0, 2.0], 'b': [1.0, 2.0, 3.0]}, r'shapes that broadcast, got a \(2,\), b \(3,\)'),
     ({'branches': {'B': True}}, 'branch B must be \\+1 or -1, got True'),
-    ({'branches': {'B': 1.5}}, 'branch B must be \\+1 or -1, got 1.5'),
-    ({'branches': ['B']}, 'branches must be a mapping'),
     ({'tracer': 'A'}, 'joints and tracer are for type custom or rods, not for slider_crank')])
 def test_wrong_dimensions_branches_and_tracers_are_named(given, problem):
     with pytest.raises(ValueError, match=problem):

@@ -38,10 +38,8 @@ POSES, NEAR, SLACK = 300, {'double': 1e-9, 'float': 1e-6}, {'double': 1e-6, 'flo
 
 
 def read(name, joint_lines, names=(), **given):
-    """Return a mechanism of joint lines, with the names of its commanded joints, if there is C."""
-    request = header.Request(alone(joint_lines, name, **given), (), tuple(names))
-    assert header.printed([request])
-    return request
+    """Return a mechanism of joint lines, with the names of its commanded joints."""
+    return header.Request(alone(joint_lines, name, **given), (), tuple(names))
 
 
 def drawn(seeds):
@@ -55,6 +53,7 @@ def drawn(seeds):
             name = f'm{seed}_{i}'
             with suppress(scene.SceneError, ValueError):  # no pose, or not these outputs
                 case = read(name, design.joints, names[i] if i < len(names) else (), **given)
+                header.printed([case])
                 yield case
                 if not i:
                     linkage = case.mechanism.linkage
@@ -152,7 +151,7 @@ def test_the_ends_of_sweeps_can_be_commanded(tmp_path, number):
     ends, cases = [], []
     for joint_lines, output in NEXT_TO_EXTREMES:
         (_, extreme), *_ = alone(joint_lines).linkage.extremes(output)[0]
-        for distance, inwards in product((0.0, 1e-6, 1e-4, 1e-2, 0.1), (-1.0, 1.0)):
+        for distance, inwards in product((0.0, 1e-6, 1e-4, 0.1), (-1.0, 1.0)):
             name, end = f'm{len(ends)}', extreme + inwards * distance
             sweep = sorted((end, end + 0.3 * inwards))
             ends.append((output, end, inwards, distance))

@@ -6,11 +6,13 @@
 import math
 
 from linkage_ros.nodes.crank_driver import CrankDriver
+from linkage_ros.nodes.scene_node import Executor
 import pytest
 from pytest import approx
 from rclpy.clock import ClockType
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter
+from ros_harness import Graph
 from sensor_msgs.msg import JointState
 
 SECOND = 10 ** 9
@@ -82,15 +84,24 @@ MOTIONS = {
 
 @pytest.mark.parametrize('parameters, steps', [(first, rest) for first, *rest in MOTIONS.values()],
                          ids=MOTIONS)
-def test_the_crank_moves_as_the_parameters_say(graph, parameters, steps):
-    driver = Driver(graph, parameters)
-    for step in steps:
-        if isinstance(step, dict):
-            assert driver.set(**step).successful
-        elif isinstance(step, int):
-            driver.back_to(step * SECOND)
-        else:
-            assert driver.at(round(step[0] * SECOND)) == step[1]
+def test_the_crank_moves_as_the_parameters_say(parameters, steps):
+    with Graph(executor=Executor) as graph:
+        driver = Driver(graph, parameters)
+        for step in steps:
+            if isinstance(step, dict):
+                assert driver.set(**step).successful
+            elif isinstance(step, int):
+                driver.back_to(step * SECOND)
+            else:
+                assert driver.at(round(step[0] * SECOND)) == step[1]
+
+
+def test_a_new_rate_acts_at_once():
+    with Graph(executor=Executor) as graph:
+        node = graph.start(CrankDriver, {'mechanisms': ['jansen'], 'rate': 0.01})
+        heard = graph.listen(JointState, 'crank_states')
+        assert graph.set(node, rate=50.0).successful
+        graph.until(lambda: len(heard) > 2)
 
 
 def test_a_new_dimension_keeps_the_crank_in_its_new_reach(graph):

@@ -3,9 +3,7 @@
 
 """The example robots: what arrives on `joint_states` closes the loops of their own URDFs."""
 
-from importlib.util import find_spec
 import math
-import runpy
 import subprocess
 import sys
 from xml.etree import ElementTree
@@ -125,20 +123,6 @@ def test_a_simulated_motor_says_what_the_real_one_would(graph):
     graph.until(lambda: {name for state in states for name in state.name} == set(JOINTS))
     for state in states:
         assert set(state.name) in (MOTORS, PASSIVE) and len(state.velocity) == len(state.name)
-
-
-@pytest.mark.skipif(not find_spec('launch_ros'), reason='launch_ros is not installed')
-@pytest.mark.parametrize('simulated, drivers', [('true', ['crank_driver']), ('false', [])])
-def test_the_motors_are_simulated_where_that_is_wanted(simulated, drivers):
-    from launch import LaunchContext
-    from launch_ros.actions import Node
-
-    context = LaunchContext()
-    context.launch_configurations['simulated'] = simulated
-    described = runpy.run_path(str(EXAMPLES / 'leg.launch.py'))['generate_launch_description']()
-    assert [node.node_executable for node in described.entities if isinstance(node, Node)
-            and (not node.condition or node.condition.evaluate(context))] == [
-                'robot_state_publisher', 'kinematics', *drivers]
 
 
 @pytest.mark.nightly

@@ -1,80 +1,23 @@
 # SPDX-FileCopyrightText: 2026 linkage_ros contributors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What nodes do on the executor that runs them: timers, simulated time, services, and its end."""
+"""The executor that runs the nodes: which one it is, and how it ends."""
 
-from contextlib import contextmanager
-import itertools
-import math
 from pathlib import Path
 import signal
 import subprocess
 import sys
 import textwrap
-from types import SimpleNamespace
 
 from linkage_ros.nodes import scene_node
 import pytest
 from rclpy.executors import SingleThreadedExecutor
-from ros_harness import Graph, Process
-from sensor_msgs.msg import JointState
 
 pytestmark = pytest.mark.nightly(all_but=0)
-
-SCENE = """
-    /**:
-      ros__parameters:
-        mechanisms: [slotted_lever, jansen]
-        jansen.crank.speed: 0.5
-    """
-
-
-@contextmanager
-def started(tmp_path, name, more=''):
-    """Start an executable with parameters, and a graph beside it; see that it ends quietly."""
-    path = tmp_path / 'scene.yaml'
-    path.write_text(textwrap.dedent(SCENE) + more)
-    with Process(name, path) as process:
-        with Graph(process.domain) as graph:
-            yield graph
-        process.interrupt(signal.SIGINT)
-        code, printed = process.end()
-        assert code == 0 and printed.count('\n') == 1 and ': ready: ' in printed
-
 
 def test_the_executor_that_waits_for_events_is_used_where_there_is_one():
     experimental = pytest.importorskip('rclpy.experimental')
     assert scene_node.Executor is experimental.EventsExecutor
-
-
-def test_timers_run_on_simulated_time_and_follow_it_back(tmp_path):
-    with started(tmp_path, 'crank_driver', '    use_sim_time: true\n    rate: 10.0\n') as graph:
-        heard = graph.listen(JointState, 'crank_states')
-        tick = graph.clock()
-
-        def past(seconds):
-            """Let the time run on from there until a message is of it."""
-            heard.clear()
-            steps = itertools.count()
-
-            def told():
-                tick(round((seconds + 0.01 * next(steps)) * 1e9))
-                return [m for m in heard if seconds <= _seconds(m) < seconds + 10.0]
-            return graph.until(told)[0]
-
-        first, later = past(10.0), past(30.0)
-        passed = _seconds(later) - _seconds(first)
-        assert later.position[1] - first.position[1] == pytest.approx(0.5 * passed % math.tau)
-        back = past(2.0)
-        assert 0.0 <= (back.position[1] - later.position[1]) % math.tau < 0.5 * 10.0
-
-
-def test_a_new_rate_acts_at_once(tmp_path):
-    with started(tmp_path, 'crank_driver', '    rate: 0.01\n') as graph:
-        heard = graph.listen(JointState, 'crank_states')
-        graph.until(lambda: graph.node.count_publishers('crank_states'))
-        assert graph.set(named('crank_driver'), rate=50.0).successful
-        graph.until(lambda: len(heard) > 2)
 
 
 def test_where_there_is_no_such_executor_the_plain_one_is_used():
@@ -150,12 +93,3 @@ def python(code):
     return subprocess.run(
         [sys.executable, '-c', textwrap.dedent(code)], cwd=Path(__file__).parents[1],
         capture_output=True, text=True, timeout=60)
-
-
-def named(name):
-    """Return what stands for a node in another process."""
-    return SimpleNamespace(get_fully_qualified_name=lambda: name)
-
-
-def _seconds(message):
-    return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec

@@ -154,8 +154,7 @@ def test_all_that_is_printed_of_a_robot():
     _, out, err = (each if isinstance(each, int) else re.sub(
         r'-?\d+\.\d+', lambda found: repr(round(float(found[0]), 7) + 0.0),
         re.sub(r'\b\de-1\d m', '0 m', each)) for each in printed('four_bar.xml'))
-    assert out == (ROBOTS / 'four_bar_scene.yaml').read_text().format(
-        file=ROBOTS / 'four_bar.xml')
+    assert out == (ROBOTS / 'four_bar_scene.yaml').read_text().format(file=ROBOTS / 'four_bar.xml')
     assert err == f'from_robot: {out.splitlines()[3][2:]}\n'
     _, out, _ = printed('boom.urdf', '--hold', 'swing=0.25')
     assert out.splitlines()[1].endswith(' scene:=SCENE.yaml hold:=swing=0.25')
@@ -407,8 +406,7 @@ def undecided(seed):
         robot.driven = robot.driven[1:] + names[:not robot.driven[1:]]
     if kind == 1:
         robot.driven = [*dict.fromkeys([*robot.driven, *rng.permutation(names)[:1]])]
-    return posed(robot, {name: float(rng.uniform(-1.5, 1.5)) for name in names
-                         if kind == 2})
+    return posed(robot, {name: float(rng.uniform(-1.5, 1.5)) for name in names if kind == 2})
 
 
 @pytest.mark.parametrize('seeds', [
@@ -431,8 +429,7 @@ def refusals():
     for name in ('closing', 'planar', 'loops', 'rods', 'check'):
         tree = ast.parse(Path(cli.__file__).with_name(f'{name}.py').read_text())
         for node in ast.walk(tree):
-            is_reason = isinstance(node, ast.FunctionDef) and node.name in (
-                '_why',)
+            is_reason = isinstance(node, ast.FunctionDef) and node.name == '_why'
             for part in ast.walk(node) if is_reason else [node]:
                 if isinstance(part, (ast.Raise, ast.Return) if is_reason else ast.Raise):
                     yield from (each.value.strip(' :;,') for each in ast.walk(part)

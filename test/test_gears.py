@@ -37,12 +37,6 @@ def two(ratio):
         f'D crank R 1 geared crank {ratio} 0.3', 'B dyad A Q 2.5 2 left', 'E dyad B D 9 8 left'])
 
 
-def limited(ratio, lines):
-    """Return two cranks that can be assembled in a part of the turns."""
-    return mechanisms.create('custom', joints=[
-        'O ground 0 0', 'Q ground 2 0', 'A crank O 1', *lines.format(ratio).split('; ')])
-
-
 @pytest.mark.parametrize('ratio, period', RATIOS.items())
 def test_there_is_one_period(ratio, period):
     found = motor(ratio)
@@ -109,7 +103,8 @@ ONE = 'D crank O 0.7 geared crank {} 0.3; B dyad D Q 0.9 1.2 left'
     *((ratio, ONE) for ratio in ('2', '-3', '0.5')), ('1/3', BOTH), ('0.31', BOTH), ('1/80', BOTH),
     pytest.param('1000', BOTH, marks=pytest.mark.nightly), ('sqrt(2)', BOTH), ('0.12345', BOTH)])
 def test_the_reach_is_where_it_can_be_assembled(ratio, lines):
-    found = limited(ratio, lines)
+    found = mechanisms.create('custom', joints=[
+        'O ground 0 0', 'Q ground 2 0', 'A crank O 1', *lines.format(ratio).split('; ')])
     first, = found.inputs
     theta = np.random.default_rng(0).uniform(first.low, first.high, 4001)
     whole = np.isfinite(found.solve(theta)['B']).all(axis=1)

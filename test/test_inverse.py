@@ -9,19 +9,12 @@ import gmpy2
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
+from truth import linkage_checks
 from truth.drawing import DIGITS, precisely
 from truth.drawing_accuracy import strict
 
 # Types with one input.
 KINDS = [kind for kind in mechanisms.TYPES if kind != 'five_bar']
-
-
-def outputs(linkage):
-    """Return the outputs that the crank moves."""
-    every = (*linkage.joints, *(f'{name}.{axis}' for name in linkage.points for axis in 'xy'))
-    theta = np.concatenate([np.linspace(*arc, 50) for arc in linkage.reach()])
-    return [output for output in every
-            if np.ptp(value_at(linkage, output, theta)) > 1e-9 * linkage.longest]
 
 
 def value_at(linkage, output, theta):
@@ -41,7 +34,7 @@ def inside(linkage, rng, count):
 def test_every_answer_is_right_to_the_last_digits(kind, values):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(1)
     measure, count = strict(linkage), 0
-    for output in outputs(linkage):
+    for output in linkage_checks.moved(linkage):
         wanted = value_at(linkage, output, inside(linkage, rng, values))
         for value, answers in [*zip(wanted.tolist(), linkage.input_for(output, wanted))][:6]:
             answers = answers[np.isfinite(answers)]

@@ -6,14 +6,12 @@
 import math
 import struct
 from types import SimpleNamespace
-import warnings
 
 from geometry_msgs.msg import Point
 from linkage_ros import mechanisms, palette
 from linkage_ros.nodes import kinematics, log
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.publishers import LATCHED
-import numpy as np
 import pytest
 from rclpy.logging import LoggingSeverity
 from rclpy.serialization import serialize_message
@@ -231,18 +229,12 @@ class Hand:
 
 BAD = {
     'a header alone': b'\0\1\0\0',
-    'padding that is not there': b'\0\1\0\3',
-    'one byte': b'\0',
-    'noise': np.random.default_rng(1).bytes(200),
     'cut off': serialize_message(JointState(name=['jansen_crank'], position=[1.0]))[:30],
-    'an unknown encoding': b'\7\7' + serialize_message(JointState(name=['jansen_crank']))[2:],
-    'names without end': b'\0\1\0\0' + bytes(8) + struct.pack('<IxxxxI', 1, 2 ** 32 - 1) * 4,
     'a name without end': (b'\0\1\0\0' + bytes(8)
                            + struct.pack('<IxxxxII', 1, 1, 2 ** 32 - 9) + bytes(40)),
 }
 
 
-@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('text', BAD.values(), ids=BAD)
 def test_bytes_that_are_no_joint_states_are_passed_over_with_one_warning(graph, text):
     hand = Hand(graph)
@@ -253,18 +245,6 @@ def test_bytes_that_are_no_joint_states_are_passed_over_with_one_warning(graph, 
         f'/crank_states: a message of {len(text)} bytes is ignored, since it is no JointState: ')
     assert hand.moved(['jansen_crank'], [0.5], [1.0]).velocity[0] == 1.0
     assert len(hand.warnings('no JointState')) == 1
-
-
-@pytest.mark.nightly(all_but=2)
-@pytest.mark.parametrize('speed', [1e200, 1e308, math.inf, math.nan, 5e-324])
-def test_any_speed_is_handled_without_a_warning_of_numpy(graph, speed):
-    hand = Hand(graph, 'm', {'mechanisms': ['m'], 'm.type': 'jansen', 'm.scale': 1e6,
-                             'm.leg_pairs': 2})
-    with warnings.catch_warnings():
-        warnings.simplefilter('error')
-        for theta in (0.5, 0.6, 1e200):
-            state = hand.moved(['m_crank'], [theta], [speed])
-            assert np.isfinite(state.velocity).all() and np.isfinite(state.position).all()
 
 
 def test_a_warning_is_repeated_when_its_time_is_over():

@@ -234,11 +234,6 @@ def test_lengths_that_grow_with_the_dimensions_are_right_at_any_size(unit):
         np.testing.assert_array_equal(scaled[joint], where * unit, joint)
 
 
-def test_numbers_of_dimensions_are_bounded():
-    with pytest.raises(ValueError, match=r"'g\*g\*g' must be 0 or between 1e-70 and 1e70"):
-        made('P ground g*g*g 0', **{name: length * 1e27 for name, length in LENGTHS.items()})
-
-
 @pytest.mark.parametrize('name', ['pi', 'max', 'sqrt', 'deg', '', ' ', 'g ', 'a.b', '_a', '2a',
                                   '\u03bb', '\uff47', 'a' * 65, 'a\n', 'a-b', '[m]'])
 def test_some_names_are_not_for_dimensions(name):
@@ -483,13 +478,12 @@ def test_an_input_cannot_have_any_name(line, reason):
 # --- images in a mirror line: every joint is where the mirror shows it ---
 
 # One of every construction, by two inputs; the mirror line O-H is askew and joints lie on it.
-ALL = ('O ground 0 0', 'H ground 1 2', 'K ground 1 0', 'Q ground 1.5 -0.3', 'A crank K 0.2',
-       'B dyad A Q 0.7 0.6 left', 'T rigid B Q 0.5 0.6 right', 'I line Q B 0.9',
-       'S slider B 0.9 Q 0.3 out', 'U block S 0.1 0.2', 'L slot Q A 0.05 out 1.0',
-       'E crank A 0.1 zero K', 'M mirror K A Q', 'P parallelogram Q B T',
-       'N antiparallelogram Q B I', 'R V W inversor Q A 1.5 0.6', 'G line K Q 0.3',
-       'F cylinder K G 0.4 left geared carriage 1 0', 'm mirrored O H')
-CARRIAGE = ('O ground 0 0', 'H ground 1 2', 'C carriage O along H 0.1 0.6')
+ALL = ('O ground 0 0', 'H ground 1 2', 'C carriage O along H 0.1 0.6', 'K ground 1 0',
+       'Q ground 1.5 -0.3', 'A crank K 0.2', 'B dyad A Q 0.7 0.6 left',
+       'T rigid B Q 0.5 0.6 right', 'I line Q B 0.9', 'S slider B 0.9 Q 0.3 out',
+       'U block S 0.1 0.2', 'L slot Q A 0.05 out 1.0', 'E crank A 0.1 zero K', 'M mirror K A Q',
+       'P parallelogram Q B T', 'N antiparallelogram Q B I', 'R V W inversor Q A 1.5 0.6',
+       'G line K Q 0.3', 'F cylinder K G 0.4 left geared carriage 1 0', 'm mirrored O H')
 
 
 def seen(places, first='O', second='H'):
@@ -502,7 +496,7 @@ def seen(places, first='O', second='H'):
 
 @pytest.mark.parametrize('up', ['', ' up'])
 def test_every_construction_has_its_image(up):
-    lines = [line + up if line == 'A crank K 0.2' else line for line in (*CARRIAGE, *ALL[2:])]
+    lines = [line + up if line == 'A crank K 0.2' else line for line in ALL]
     linkage = mechanisms.create('custom', joints=lines)
     assert [input_.name for input_ in linkage.inputs] == ['carriage', 'crank', 'crank2']
     count = 0
@@ -526,22 +520,17 @@ def test_an_image_may_be_mirrored_again():
     assert place['Axy'] == pytest.approx(-place['A'])
 
 
-def check_images(lines, inputs, **dimensions):
-    """Hold each joint of a linkage against where an askew mirror line shows it."""
-    linkage = mechanisms.create('custom', joints=(
-        *lines, 'y1 ground 0.3 0.1', 'y2 ground 0.5 0.9', 'm mirrored y1 y2'), **dimensions)
-    for values in inputs:
-        places, images = seen(linkage.solve(values[0] if len(values) == 1 else values), 'y1', 'y2')
-        near = 1e-14 * max(map(abs, places.values()))
-        assert all(abs(images[name] - place) < near for name, place in (
-            (name[:-1], place) for name, place in places.items() if name.endswith('m')))
-
-
 @pytest.mark.nightly(all_but=8)
 @pytest.mark.parametrize('zero', ['', ' up', ' zero Z'])
 @pytest.mark.parametrize('ground', ['0.6 0', '0 0.6', '-0.48 0.36', '0.36 -0.48', '-0.6 0'])
 @pytest.mark.parametrize('line', ['B dyad A Q 0.6 0.2 left', 'B dyad A Q 0.9 0.5 right',
                                   'B slider A 0.2 O 0.4 out', 'B slider A 0.2 O 90deg in'])
 def test_an_image_passes_change_points_as_what_it_shows_does(line, ground, zero):
-    check_images(('O ground 0 0', 'Z ground 0.1 -0.2', f'Q ground {ground}',
-                  f'A crank O 0.2{zero}', line), [[x] for x in np.linspace(-3.1, 3.1, 13)])
+    linkage = mechanisms.create('custom', joints=(
+        'O ground 0 0', 'Z ground 0.1 -0.2', f'Q ground {ground}', f'A crank O 0.2{zero}', line,
+        'y1 ground 0.3 0.1', 'y2 ground 0.5 0.9', 'm mirrored y1 y2'))
+    for crank in np.linspace(-3.1, 3.1, 13):
+        places, images = seen(linkage.solve(crank), 'y1', 'y2')
+        near = 1e-14 * max(map(abs, places.values()))
+        assert all(abs(images[name[:-1]] - place) < near for name, place in places.items()
+                   if name.endswith('m'))

@@ -149,6 +149,7 @@ def started(launch=LAUNCH, **arguments):
     """Return the nodes that a launch file starts."""
     from launch import LaunchContext
     from launch.actions import DeclareLaunchArgument, OpaqueFunction
+    from launch_ros.actions import Node
 
     context = LaunchContext()
     context.launch_configurations.update(arguments)
@@ -158,6 +159,8 @@ def started(launch=LAUNCH, **arguments):
             entity.execute(context)
         elif isinstance(entity, OpaqueFunction):
             nodes += entity.execute(context)
+        elif isinstance(entity, Node):
+            nodes += [entity] * (not entity.condition or entity.condition.evaluate(context))
     return nodes
 
 
@@ -175,8 +178,7 @@ def started(launch=LAUNCH, **arguments):
 def test_the_launch_file_starts_the_nodes_of_a_scene(arguments, besides, monkeypatch, tmp_path):
     monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
     nodes = ['crank_driver', 'kinematics', 'servo_inverse'] if 'apart' in arguments else ['scene']
-    assert [node.node_executable for node in started(**arguments)] == [
-        *besides, *nodes]
+    assert [node.node_executable for node in started(**arguments)] == [*besides, *nodes]
 
 
 @needs_launch
@@ -199,6 +201,14 @@ def test_what_cannot_be_is_refused_with_what_is_allowed():
             started(**{name: text})
 
 
+@needs_launch
+@pytest.mark.parametrize('simulated, drivers', [('true', ['crank_driver']), ('false', [])])
+def test_the_motors_of_the_example_are_simulated_where_that_is_wanted(simulated, drivers):
+    nodes = started(ROOT / 'examples' / 'leg.launch.py', simulated=simulated)
+    assert [node.node_executable for node in nodes] == [
+        'robot_state_publisher', 'kinematics', *drivers]
+
+
 ROBOT, ROBOTS = LAUNCH.with_name('robot.launch.py'), Path(__file__).with_name('robot_files')
 COUPLER = '<body name="right_coupler" pos="0 0.0315 -0.0041">'
 
@@ -216,8 +226,7 @@ def robot_launched(tmp_path, monkeypatch, file, capsys, *more, **arguments):
 
 @needs_launch
 def test_a_whole_robot_is_launched_with_all_its_joints(tmp_path, monkeypatch, capsys):
-    scene_file, nodes = robot_launched(
-        tmp_path, monkeypatch, ROBOTS / 'wheel_leg.urdf', capsys)
+    scene_file, nodes = robot_launched(tmp_path, monkeypatch, ROBOTS / 'wheel_leg.urdf', capsys)
     assert [node.node_executable for node in nodes] == [
         'robot_state_publisher', 'kinematics', 'crank_driver']
     # No other mechanism is needed: motors are sources, and the others are published.

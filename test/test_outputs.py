@@ -5,12 +5,11 @@
 
 import math
 
-from linkage_ros import mechanisms, scene
-import mpmath
+import gmpy2
+from linkage_ros import mechanisms
 import numpy as np
 import pytest
 
-ROCKER = {'mechanisms': ['bars'], 'bars.type': 'four_bar', 'bars.scale': 0.01}
 ASKED = [('jansen', 'distance(A,G)'), ('jansen', 'angle(C,G)'), ('four_bar', 'distance(O,B)'),
          ('four_bar', 'angle(B,A)'), ('slotted_lever', 'distance(Q,A)'), ('klann', 'angle(O,E)')]
 
@@ -46,17 +45,6 @@ def test_their_rates_are_differences(type_, output):
 
 # --- following a measured value ---
 
-def test_whole_turns_are_kept_and_what_cannot_be_is_not_a_number():
-    linkage = mechanisms.create('four_bar')
-    value = float(linkage.joint_angles(0.7)['QB'])
-    for turns in (-3, 0, 1, 100):
-        near, _ = linkage.follow('QB', value, 0.6 + turns * math.tau)
-        assert near == pytest.approx(0.7 + turns * math.tau)
-    for bad in (9.0, math.nan, math.inf, -math.inf):
-        outside = linkage.follow('distance(O,B)', bad * 100.0, 0.6)
-        assert all(map(math.isnan, outside))
-
-
 @pytest.mark.parametrize('turns', [-2e5, -1, 2, 1e5])
 def test_an_output_that_turns_all_round_takes_the_crank_along(turns):
     linkage = mechanisms.create('whitworth')
@@ -70,17 +58,11 @@ def test_an_output_that_turns_all_round_takes_the_crank_along(turns):
 @pytest.mark.parametrize('value', [1e6, -1e9, 1e15, 1e22, -1e300])
 def test_whole_turns_of_a_wanted_angle_cost_no_digits(value):
     linkage = mechanisms.create('whitworth')
-    with mpmath.workdps(400):
-        value_in_turn = float(mpmath.atan2(mpmath.sin(value), mpmath.cos(value)))
+    with gmpy2.context(precision=1400):
+        value_in_turn = float(gmpy2.atan2(*gmpy2.sin_cos(gmpy2.mpfr(value))))
     wanted, = linkage.input_for('angle(Q,L)', value_in_turn)
     assert linkage.input_for('angle(Q,L)', value) == pytest.approx(wanted, abs=1e-14)
     found, _ = linkage.follow('angle(Q,L)', value, wanted)
     assert found == pytest.approx(wanted, abs=1e-14)
 
 
-def test_a_measured_value_stays_inside_the_sweep_that_is_set():
-    swept = scene.read({**ROCKER, 'bars.crank.measures': 'QB', 'bars.crank.sweep': [0.5, 1.0]})
-    mechanism = swept.mechanisms['bars']
-    inside, outside = (float(mechanism.linkage.joint_angles(theta)['QB']) for theta in (0.8, 1.6))
-    assert mechanism.follow(['QB'], [inside], [0.6])[0][0] == pytest.approx(0.8)
-    assert math.isnan(mechanism.follow(['QB'], [outside], [0.6])[0][0])

@@ -11,11 +11,7 @@ from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.ownership import LATCHED, TOPIC
 from linkage_ros.nodes.servo_inverse import ServoInverse
 import pytest
-from rcl_interfaces.msg import (
-    Parameter as ParameterMessage,
-    ParameterEvent,
-    ParameterValue,
-)
+from rcl_interfaces.msg import Parameter as ParameterMessage, ParameterEvent, ParameterValue
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.parameter import Parameter
 from ros_harness import hastened

@@ -23,19 +23,7 @@ import pytest
 from scenes import example, ROOT
 from sensor_msgs.msg import JointState
 from truth.working_modes import lever_of
-from viewer_harness import (
-    BLUE,
-    coloured,
-    GREEN,
-    LEG,
-    LEVER,
-    needs_browser,
-    PURPLE,
-    RATE,
-    Seen,
-    spoilt,
-    walker,
-)
+from viewer_harness import coloured, LEG, LEVER, needs_browser, RATE, Seen, spoilt, walker
 from visualization_msgs.msg import MarkerArray
 
 pytestmark = needs_browser
@@ -74,7 +62,7 @@ def test_a_picture_of_what_is_far_off_is_drawn_and_left(start):
 
     def is_drawn():
         markers.publish(walker(1))
-        return len(coloured(seen.canvas(), *BLUE)) > 100
+        return len(coloured(seen.canvas(), 'bars')) > 100
 
     until(is_drawn)
     for far in (1e9, 1e17, 1e30, 3e38):
@@ -91,7 +79,7 @@ def test_the_picture_is_zoomed_shifted_and_turned_by_keys_and_mouse(start):
 
     def locus(middle=None, size=None):
         """Return the middle and the size of the locus, at rest and as it is wanted."""
-        first, second = [coloured(seen.canvas(), *GREEN) for _ in range(2)]
+        first, second = [coloured(seen.canvas(), 'locus') for _ in range(2)]
         if len(first) < 100 or not np.array_equal(first, second):
             return None
         place = first.mean(axis=0), np.ptp(first, axis=0)
@@ -123,7 +111,7 @@ def test_a_linkage_in_space_is_drawn_whole_and_says_what_the_page_does_not(start
 
     def is_whole():
         picture = seen.canvas()
-        places, size = coloured(picture, *BLUE), np.array(picture.shape[:2])
+        places, size = coloured(picture, 'bars'), np.array(picture.shape[:2])
         low, high = places.min(axis=0, initial=size[0]), places.max(axis=0, initial=0)
         return (low > 20).all() and (high < size - 20).all() and high[0] - low[0] > 0.5 * size[0]
 
@@ -213,7 +201,7 @@ def test_a_bar_and_its_slider_light_up(start):
     def where_lit():
         """Point at the slider of h until its bar is lit; return the middle of that."""
         seen.hover(f'{seen.row("leg", "h")}.querySelector("label")')
-        places = coloured(seen.canvas(), *PURPLE)
+        places = coloured(seen.canvas(), 'lit bars')
         return tuple(places.mean(axis=0)) if len(places) > 300 else None
 
     seen.output('leg', 'BC')
@@ -238,9 +226,7 @@ def test_changes_are_saved_undone_and_reset(start, tmp_path):
     seen.type('leg', 'g', '37.25')
     becomes(g=37.25)
     # The viewer is told of what was set a moment later.
-    until(lambda: {'name': 'dimensions.g', 'value': 37.25}.items() <= next(
-        setting for setting in running.page().mechanisms('/leg')['/leg']['settings']
-        if setting['name'] == 'dimensions.g').items())
+    running.page().setting('/leg', 'dimensions.g', 37.25)
     seen.downloads(tmp_path)
     seen.click(seen.button('scene file'))
     saved = tmp_path / 'leg.yaml'
@@ -405,7 +391,7 @@ def test_a_plot_follows_what_is_tuned_and_all_can_be_downloaded(start, tmp_path)
                      f"-114.6 °/s: from {low} to {high} mm/s.')")
 
     def feet_on_both_sides():
-        columns = coloured(picture := seen.canvas(), *GREEN)[:, 1]
+        columns = coloured(picture := seen.canvas(), 'locus')[:, 1]
         middle = picture.shape[1] / 2
         return (columns < middle - 20).sum() > 50 and (columns > middle + 20).sum() > 50
 
@@ -433,8 +419,7 @@ def test_a_plot_follows_what_is_tuned_and_all_can_be_downloaded(start, tmp_path)
     assert list(Image.open(files[1]).size) == seen.value('[picture.width, picture.height]')
     mechanism = scene.read({**given, 'leg.dimensions.m': 16.0, 'leg.crank.start':
                             running.value('leg.crank.start')}).mechanisms['leg']
-    assert (tmp_path / 'leg.csv').read_text() == curves.table(
-        mechanism, [mechanism.first.start])
+    assert (tmp_path / 'leg.csv').read_text() == curves.table(mechanism, [mechanism.first.start])
     assert (tmp_path / 'leg.urdf').read_text() == urdf.describe([mechanism], 'world')
     assert (tmp_path / 'leg.h').read_text() == header.written(mechanism)
 
@@ -551,7 +536,7 @@ def test_mechanisms_are_in_their_natural_order_and_those_of_one_name_told_apart(
 
     def are_beside():
         """Return whether two loci are seen beside each other: the frames are two."""
-        columns = np.unique(coloured(seen.canvas(), *GREEN)[:, 1])
+        columns = np.unique(coloured(seen.canvas(), 'locus')[:, 1])
         return len(columns) and (np.diff(columns) > 30).sum() == 1
 
     until(are_beside)

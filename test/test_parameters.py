@@ -15,15 +15,7 @@ from linkage_ros.nodes.crank_driver import CrankDriver
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.servo_inverse import ServoInverse
 import pytest
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    Parameter as ParameterMessage,
-    ParameterDescriptor,
-    ParameterEvent,
-    ParameterValue,
-    SetParametersResult,
-)
+from rcl_interfaces import msg
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from ros_harness import Graph
@@ -56,9 +48,7 @@ class Client:
 
     def call(self, service, given):
         """Return the response of a service."""
-        future = getattr(self.services, service)(given)
-        self._graph.until(future.done, 60.0)
-        return future.result()
+        return self._graph.answer(lambda: getattr(self.services, service)(given))
 
     def set(self, *values):
         """Set name after name to a value in one request; return the results."""
@@ -71,8 +61,8 @@ class Client:
 
 
 def _message(name, value):
-    if isinstance(value, ParameterMessage):
-        return ParameterMessage(name=name, value=value.value)
+    if isinstance(value, msg.Parameter):
+        return msg.Parameter(name=name, value=value.value)
     return Parameter(name, value=value).to_parameter_msg()
 
 
@@ -118,18 +108,18 @@ def test_every_parameter_is_described_as_the_scene_has_it(graph, kind):
             one.field.high is not None and (one.field.low, one.field.high))
         assert scene.plain(node.get_parameter(one.name).value) == one.value
         assert type_ == kind
-        assert about == ParameterDescriptor(
+        assert about == msg.ParameterDescriptor(
             name=one.name, type=kind, description=one.field.meaning, dynamic_typing=True,
             additional_constraints=one.field.allowed, read_only=one.field.read_only,
-            integer_range=[IntegerRange(from_value=ends[0], to_value=ends[1], step=1)]
+            integer_range=[msg.IntegerRange(from_value=ends[0], to_value=ends[1], step=1)]
             if ends and one.field.kind == 'integer' else [],
-            floating_point_range=[FloatingPointRange(from_value=ends[0], to_value=ends[1])]
+            floating_point_range=[msg.FloatingPointRange(from_value=ends[0], to_value=ends[1])]
             if ends and one.field.kind == 'double' else [])
 
 
 def test_names_and_types_that_there_are_not_are_refused(graph):
     client = Client(graph, graph.start(Kinematics, LEG))
-    odd = ParameterMessage(name='leg.scale', value=ParameterValue(type=200))
+    odd = msg.Parameter(name='leg.scale', value=msg.ParameterValue(type=200))
     results = client.call('set_parameters', [
         odd, *[_message(name, 1.0) for name in ('', 'leg', 'leg.', '.', 'nobody', 'x' * 10 ** 6)],
         _message('leg.crank.speed', 2.0), _message('leg.scale', 3.0)]).results
@@ -245,7 +235,7 @@ def test_a_change_is_answered_and_messages_are_handled_while_a_worker_prepares_i
 
 
 def test_of_a_hundred_changes_each_is_answered_and_the_newest_prepared_and_announced(graph):
-    announced = graph.listen(ParameterEvent, ownership.TOPIC, ownership.LATCHED)
+    announced = graph.listen(msg.ParameterEvent, ownership.TOPIC, ownership.LATCHED)
     node = graph.start(Slow, LEG)
     client = Client(graph, node)
     held_up(graph, client)
@@ -390,7 +380,7 @@ def test_what_was_refused_keeps_nothing_from_being_accepted(graph, refused):
 
 def test_what_others_have_to_say_about_a_parameter_counts(graph):
     node = graph.start(Slow, LEG)
-    node.add_on_set_parameters_callback(lambda parameters: SetParametersResult(
+    node.add_on_set_parameters_callback(lambda parameters: msg.SetParametersResult(
         successful=not any(p.name == 'leg.scale' for p in parameters), reason='not by me'))
     results = Client(graph, node).set(('leg.scale', 2.0), ('leg.points', ['G']))
     assert [(r.successful, r.reason) for r in results] == [(False, 'not by me')] * 2

@@ -32,15 +32,10 @@ def bits(value):
     return np.where(np.isnan(value), np.nan, value).tobytes()
 
 
-def inputs(linkage):
-    """Return values of the inputs, as a linkage takes them."""
-    several = [FIVE + shift for shift in range(len(linkage.inputs))]
-    return several if len(several) > 1 else FIVE
-
-
 def answers(linkage):
     """Return bits of what a linkage is asked for."""
-    theta = inputs(linkage)
+    several = [FIVE + shift for shift in range(len(linkage.inputs))]
+    theta = several if len(several) > 1 else FIVE
     values = [*linkage.solve(theta).values(), *linkage.joint_angles(theta).values(),
               *linkage.joint_rates(theta).values(), *linkage.velocity(theta).values()]
     if len(linkage.inputs) == 1 and not any(

@@ -14,12 +14,7 @@ import math
 from linkage_ros import mechanisms
 import numpy as np
 import pytest
-from truth import (
-    drawing_accuracy,
-    hard_cases,
-    linkage_checks as checks,
-    random_linkages,
-)
+from truth import drawing_accuracy, hard_cases, linkage_checks as checks, random_linkages
 from truth.cases import CASES
 
 LONG, BATCH = 1000, 25
@@ -114,7 +109,7 @@ def test_a_thousand_random_linkages_hold(batch):
     assert not found, report(found)
 
 
-@pytest.mark.nightly(all_but=5)
+@pytest.mark.nightly(all_but=3)
 @pytest.mark.parametrize('name', LISTED)
 def test_a_listed_linkage_holds_what_any_must(name):
     found, _ = checks.problems(LISTED[name], np.random.default_rng(0))
@@ -203,7 +198,7 @@ MENDED = {
 }
 
 
-@pytest.mark.nightly(all_but=11)
+@pytest.mark.nightly(all_but=6)
 @pytest.mark.parametrize('name', MENDED)
 def test_what_once_broke_the_rule_keeps_it(name):
     joints, values, *dimensions = MENDED[name]
@@ -239,8 +234,7 @@ def test_reach_and_dead_points_that_were_missed_once(joints, held):
 # --- that the check is a check ------------------------------------------------------------------
 
 def test_the_measure_sees_a_flaw_in_the_last_digits_and_a_wrong_nan():
-    subject = checks.Subject(random_linkages.Design(MOVING, {}, {}),
-                             np.random.default_rng(9))
+    subject = checks.Subject(random_linkages.Design(MOVING, {}, {}), np.random.default_rng(9))
     given = np.array([[0.7, *subject.held]])
     found = drawing_accuracy.answers(subject.mechanism, given, subject.poses, True)
     measure = subject.measure()
@@ -252,6 +246,5 @@ def test_the_measure_sees_a_flaw_in_the_last_digits_and_a_wrong_nan():
     assert len(moving) > 10
     for output, value in ((output, found[output]) for output in moving):
         for flawed in (value * (1.0 + 1e-12) + 1e-12, np.full_like(value, np.nan)):
-            rows = drawing_accuracy.judge(measure, given, {**found, output: flawed}, True,
-                                          [truth])
+            rows = drawing_accuracy.judge(measure, given, {**found, output: flawed}, True, [truth])
             assert {row.output for row in drawing_accuracy.broken(rows)} == {output}

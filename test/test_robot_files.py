@@ -209,6 +209,15 @@ def compared(robot, given, *motors):
     return ' '.join([*reports, *wrong.values()])
 
 
+def differing(robot, given, name, old, new, *motors):
+    """Return how a scene differs from its robot if its lines are others; as it is, it does not."""
+    assert compared(robot, given, *motors).startswith('Checked: ')
+    key = f'{name}.joint_names' if '=' in old else f'{name}.joints'
+    changed = [line.replace(old, new) for line in given[key]]
+    assert changed != given[key]
+    return compared(robot, {**given, key: changed}, *motors)
+
+
 def test_a_source_of_several_mechanisms_is_checked_where_all_of_them_move(four_bar):
     robot, given = four_bar
     zero = given['motor.crank.offset']
@@ -263,13 +272,7 @@ def test_a_scene_is_held_against_its_robot_over_the_range_of_its_motor(
     ('=elbow-1.570', '=elbow-1.572', 'elbow is off by 0.002$'),
     ('=elbow-1.57079632', '=elbow-1.57079633', 'its loops stand open by 3e-09 m$')])
 def test_a_mechanism_that_differs_from_its_robot_is_refused(four_bar, old, new, why):
-    robot, given = four_bar
-    assert compared(robot, given, 'motor').startswith('Checked: motor: in 240 poses')
-    key = 'motor.joint_names' if '=' in old else 'motor.joints'
-    changed = [line.replace(old, new) for line in given[key]]
-    assert changed != given[key]
-    given[key] = changed
-    assert re.match(f'with motor at .* {why}', compared(robot, given, 'motor'))
+    assert re.match(f'with motor at .* {why}', differing(*four_bar, 'motor', old, new, 'motor'))
 
 
 def test_hinges_that_cross_at_the_end_of_a_rod_are_a_ball(tmp_path):
@@ -750,7 +753,7 @@ def leaning(robot, lean, seed):
 
 
 @pytest.mark.parametrize('seeds, lean', [
-    ([1, 36, 419], 0.0), ([17], 1e-5),
+    ([36, 419], 0.0), ([17], 1e-5),
     pytest.param(range(120), 0.0, marks=pytest.mark.nightly),
     pytest.param(range(35, 74), 1e-5, marks=pytest.mark.nightly)])
 def test_random_linkages_come_back_from_robots(seeds, lean):

@@ -25,13 +25,6 @@ OWN = {'mechanisms': ['own'], 'own.type': 'custom'}
 YEAR = 365 * 86400 * 10 ** 9
 
 
-def places(assembly, theta, points):
-    """Return where the joints of all legs are, shape (legs, points, 2)."""
-    solution = assembly.solution(points)
-    solution.solve([theta])
-    return solution.rows.reshape(len(assembly.legs), -1, 2)
-
-
 def test_without_parameters_the_scene_is_the_catalogue():
     shown = scene.read({}).mechanisms
     assert list(shown) == ['water_drop', 'jansen', 'peaucellier', 'slotted_lever']
@@ -204,8 +197,7 @@ def test_only_mechanisms_that_are_given_something_else_are_read_again():
     after = scene.changed(
         before, {'jansen.dimensions.m': 14.9, 'peaucellier.scale': 0.1}).mechanisms
     assert {name for name in after if after[name] is not before.mechanisms[name]} == {'jansen'}
-    assert [p.name for p in scene.changed(before, {'rate': 9.0}).changed_from(before)] == [
-        'rate']
+    assert [p.name for p in scene.changed(before, {'rate': 9.0}).changed_from(before)] == ['rate']
 
 
 def test_a_crank_that_cannot_turn_swings_within_its_reach():
@@ -447,16 +439,6 @@ def test_a_change_of_sweep_goes_on_the_same_way():
         assert wider.at(now) == pytest.approx(motion.at(now), abs=1e-15)
         assert motion.changed(1.0, None, 1, now).at(now)[0] == pytest.approx(
             motion.at(now)[0] % math.tau)
-
-
-def test_the_legs_of_a_walker_are_one_leg_a_part_of_a_turn_behind_or_mirrored():
-    jansen = mechanisms.create('jansen')
-    one, walker = Assembly(jansen), Assembly(jansen, 3, True, scale=0.01)
-    for theta in np.linspace(-7.0, 7.0, 15):
-        for i, leg in enumerate(places(walker, theta, jansen.points)):
-            side, crank = 1 - i % 2 * 2, theta - math.tau * (i // 2) / 3
-            own, = places(one, crank if side > 0 else math.pi - crank, jansen.points)
-            assert leg == pytest.approx(0.01 * own * [side, 1.0], abs=1e-12)
 
 
 def test_an_end_of_the_reach_is_within_it_any_turn_and_nothing_beyond_is():

@@ -12,11 +12,12 @@ from linkage_ros.robot_model import bodies, mjcf, sdf
 import numpy as np
 import pytest
 from robots import MuJoCo, of_text, published
-from scenes import EXAMPLES
+from scenes import EXAMPLES, ROOT
 from test_urdf import drives, in_space, MACHINES, OWN, posed
 
 # On the way to a change point: the side seen at the start is not the one behind it.
 FOLDS = {'water_drop'}
+CONFIGS = [path.stem for path in EXAMPLES if path.parent.name == 'config']
 
 
 def simulated(name):
@@ -36,14 +37,12 @@ def some_quick(names, quick):
             for name in names]
 
 
-def some_scenes(*quick):
-    return [pytest.param(path, id=path.stem, marks=(
-        () if path.stem in quick else pytest.mark.nightly))
-        for path in EXAMPLES if path.parent.name == 'config']
+def mechanisms(config):
+    return scene.load(str(ROOT / 'config' / f'{config}.yaml')).mechanisms
 
 
-def model(mechanisms, frame_id='world', density=bodies.DENSITY):
-    return bodies.robot(mechanisms, frame_id, density=density)
+def model(mechanisms, density=bodies.DENSITY):
+    return bodies.robot(mechanisms, 'world', density=density)
 
 
 class Simulation(MuJoCo):
@@ -64,11 +63,10 @@ class Simulation(MuJoCo):
         assert not self.data.warning.number.any()
 
 
-@pytest.mark.parametrize('file', some_scenes('all', 'excavator'))
-def test_gravity_tears_no_scene(file):
-    found = scene.load(str(file))
-    robot = Simulation(mjcf.write(model(found.mechanisms.values(), found.frame_id)))
-    bar = min(map(bodies.size, found.mechanisms.values()))
+@pytest.mark.parametrize('config', some_quick(CONFIGS, ('all', 'excavator')))
+def test_gravity_tears_no_scene(config):
+    found = mechanisms(config).values()
+    robot, bar = Simulation(mjcf.write(model(found))), min(map(bodies.size, found))
     assert max(robot.open() for _ in robot.run(1.0)) < 1e-5 * bar
 
 
@@ -93,9 +91,9 @@ def follow(one, robot, seconds):
         yield np.abs(np.array(places) - [*robot.places(names).values()]).max()
 
 
-@pytest.mark.parametrize('file', some_scenes('jansen', 'rack_steering'))
-def test_servos_drive_the_linkage_through_the_poses_of_solve(file):
-    for one in scene.load(str(file)).mechanisms.values():
+@pytest.mark.parametrize('config', some_quick(CONFIGS, ('jansen', 'rack_steering')))
+def test_servos_drive_the_linkage_through_the_poses_of_solve(config):
+    for one in mechanisms(config).values():
         robot = Simulation(mjcf.write(model([one])))
         assert max(follow(one, robot, 2.0)) < 2e-3 * bodies.size(one)
 

@@ -24,8 +24,7 @@ ANY = st.one_of(st.text(max_size=200), st.text('ab\n\x00\u2028\ud800', max_size=
 @given(ANY, st.integers(10, 100))
 def test_an_elided_text_is_its_beginning_on_one_line(text, most):
     escaped = ''.join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-    assert elided(text, most) == (
-        escaped if len(escaped) <= most else escaped[:most - 3] + '...')
+    assert elided(text, most) == (escaped if len(escaped) <= most else escaped[:most - 3] + '...')
 
 
 @pytest.mark.parametrize('text, said', [

@@ -196,13 +196,14 @@ def framed(data):
     return frames
 
 
-# Of joints, of bars, of the locus, and of the bars that are pointed at.
-GREY, BLUE, GREEN, PURPLE = (138, 138, 138), (0, 129, 201), (0, 158, 115), (204, 121, 167)
+# Those that are lit are pointed at.
+COLOURS = {'joints': (138, 138, 138), 'bars': (0, 129, 201), 'locus': (0, 158, 115),
+           'lit bars': (204, 121, 167)}
 
 
-def coloured(picture, red, green, blue):
-    """Return the rows and columns of the pixels of a colour."""
-    return np.argwhere((abs(picture - (red, green, blue)) < 12).all(axis=2))
+def coloured(picture, what):
+    """Return the rows and columns of the pixels that have the colour of something."""
+    return np.argwhere((abs(picture - COLOURS[what]) < 12).all(axis=2))
 
 
 class Seen(browser.Browser):
@@ -301,14 +302,14 @@ class Seen(browser.Browser):
     def is_still(self):
         """Return whether the picture is drawn and stands still."""
         before = self.canvas()
-        return len(coloured(before, *GREEN)) > 100 and (self.canvas() == before).all()
+        return len(coloured(before, 'locus')) > 100 and (self.canvas() == before).all()
 
     def upright_lever(self):
         """Return where the tip and the pivot of a lever that stands upright are on the page."""
         self.value('names.checked && names.click()')
         until(self.is_still)
         # The numbers of the grid are left out: they are grey too.
-        rows, columns = coloured(self.canvas()[:-40, 80:], *GREY).T + [[0], [80]]
+        rows, columns = coloured(self.canvas()[:-40, 80:], 'joints').T + [[0], [80]]
         return ((float(columns[rows < rows.min() + 10].mean()), self.top + int(rows.min()) + 8),
                 (float(columns[rows > rows.max() - 10].mean()), self.top + int(rows.max()) - 8))
 
@@ -325,10 +326,6 @@ def walker(step, legs=2, frame='world', width=1.0):
 def parts(numbers):
     """Return the numbers of a message such as a Point, in order."""
     return [getattr(numbers, name) for name in numbers.get_fields_and_field_types()]
-
-
-def markers_of(text):
-    return deserialize_message(text, MarkerArray).markers
 
 
 def spoilt(part, number):

@@ -7,7 +7,7 @@ What the library is held to, worked out without it: for the tests and for the be
 =====================  ============================================================================
 drawing                any linkage, drawn from its joint lines in 96 digits or for many angles
 drawing_accuracy       how far an answer of any linkage may be from its drawing
-hard_cases             angles and dimensions that are hard on the catalogue
+hard_cases             dimensions that are hard on the catalogue
 random_linkages        random joint lines of every word, nearly degenerate ones, equal bars
 cases                  linkages that people have
 linkage_checks         everything that is asked of any linkage

@@ -17,6 +17,7 @@ passes the angle at which the dyad is stretched or folded, counted from a quarte
 import functools
 import math
 import re
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import gmpy2
@@ -51,74 +52,19 @@ def precisely(function):
     return in_digits
 
 
-class Digits:
-    """Arithmetic in many digits."""
-
-    point = staticmethod(mpc)
-    floor = staticmethod(gmpy2.floor)
-    least = staticmethod(min)
-
-    @staticmethod
-    def turned(angle):
-        """Return the unit vector at an angle."""
-        return mpc(gmpy2.cos(angle), gmpy2.sin(angle))
-
-    @staticmethod
-    def root(square):
-        """Return the root of a square, zero where it is negative."""
-        return gmpy2.sqrt(square) if square > 0 else mpfr(0)
-
-    @staticmethod
-    def direction(vector):
-        """Return the angle of a vector."""
-        return gmpy2.atan2(vector.imag, vector.real)
-
-    @staticmethod
-    def divided(x, y):
-        """Return a quotient; one by nothing is nothing."""
-        return x / y if y != 0 else x * 0
-
-    @staticmethod
-    def pi():
-        """Return half a turn."""
-        return gmpy2.const_pi()
-
-
-class Floats:
-    """Arithmetic on arrays of float64."""
-
-    floor = staticmethod(np.floor)
-    least = staticmethod(np.minimum)
-    direction = staticmethod(np.angle)
-
-    @staticmethod
-    def point(x, y=0.0):
-        """Return a point."""
-        return float(x) + 1j * float(y)
-
-    @staticmethod
-    def turned(angle):
-        """Return the unit vector at an angle."""
-        return np.exp(1j * np.asarray(angle))
-
-    @staticmethod
-    def root(square):
-        """Return the root of a square, zero where it is negative."""
-        return np.sqrt(np.maximum(square, 0.0))
-
-    @staticmethod
-    def divided(x, y):
-        """Return a quotient; one by nothing is not a number."""
-        with np.errstate(all='ignore'):
-            return np.divide(x, y)
-
-    @staticmethod
-    def pi():
-        """Return half a turn."""
-        return math.pi
-
-
-DIGITS, FLOATS = Digits(), Floats()
+# Arithmetic in many digits, and on arrays of float64. A root is zero where its square is negative;
+# a quotient by nothing is nothing in digits, and not a number in floats.
+DIGITS = SimpleNamespace(
+    pi=gmpy2.const_pi, floor=gmpy2.floor, least=min, point=mpc,
+    turned=lambda angle: mpc(gmpy2.cos(angle), gmpy2.sin(angle)),
+    direction=lambda vector: gmpy2.atan2(vector.imag, vector.real),
+    root=lambda square: gmpy2.sqrt(square) if square > 0 else mpfr(0),
+    divided=lambda x, y: x / y if y != 0 else x * 0)
+FLOATS = SimpleNamespace(
+    pi=lambda: math.pi, floor=np.floor, least=np.minimum, point=complex, direction=np.angle,
+    turned=lambda angle: np.exp(1j * np.asarray(angle)),
+    root=lambda square: np.sqrt(np.maximum(square, 0.0)),
+    divided=np.errstate(all='ignore')(lambda x, y: np.divide(x, y)))
 
 
 # --- reading ------------------------------------------------------------------------------------
@@ -244,12 +190,6 @@ def half_ulp(number):
     return mpfr(float(np.spacing(abs(float(number))))) / 2
 
 
-def literals(text):
-    """Return the numbers other than zero that are written in a text."""
-    return {match['number'] for match in _TOKEN.finditer(text)
-            if match['number'] and float(match['number'])}
-
-
 # --- drawing ------------------------------------------------------------------------------------
 
 class Passing(NamedTuple):
@@ -342,8 +282,9 @@ class Linkage:
 
     def literals(self):
         """Return the texts of numbers that are written in the lines."""
-        return sorted({found for line in self.lines for text in line.numbers
-                       for found in literals(text)})
+        numbers = {token['number'] for line in self.lines for text in line.numbers
+                   for token in _TOKEN.finditer(text)}
+        return sorted(text for text in numbers if text and float(text))
 
     def _driven(self):
         """Return for each input or geared line the name that its input has."""
@@ -538,8 +479,7 @@ class Linkage:
             b, c = self.numbers[i]
             size = b + c + ground + m
             gaps = ground + m - b - c, abs(ground - m) - abs(b - c)
-            turn = self._turn(self.numbers, line)
-            unsure = abs(gmpy2.sin(turn + gmpy2.const_pi() / 2)) < ROUNDING
+            unsure = abs(gmpy2.cos(self._turn(self.numbers, i))) < ROUNDING
         elif line.word == 'slider' and line.joints[0] in self.cranks \
                 and self.fixed.issuperset(line.joints[1:]):
             crank = self.placing(line.joints[0])
@@ -550,8 +490,7 @@ class Linkage:
             height = (away * line_of.conjugate()).imag
             size = rod + abs(away) + m
             gaps = rod + height - m, rod - height - m
-            turn = self._turn_on_line(self.numbers, crank, line_of)
-            unsure = gmpy2.const_pi() - abs(turn) < ROUNDING
+            unsure = gmpy2.const_pi() - abs(self._turn(self.numbers, i)) < ROUNDING
         else:
             return []
         stretched, folded = (_vanishes(gap, size) for gap in gaps)
@@ -562,15 +501,15 @@ class Linkage:
                         if s or f else mpfr(0))
                 for s in stretched for f in folded for side in (sides if s or f else [1])]
 
-    def _turn(self, numbers, line):
-        """Return the angle of the crank's zero from the ground line, foot to centre."""
-        foot, pin = self.arm_of_crank(line)
-        crank = self.placing(pin)
-        along = self._fixed(numbers, crank.joints[0]) - self._fixed(numbers, foot)
-        return DIGITS.direction(self._zero(numbers, crank) * along.conjugate())
-
-    def _turn_on_line(self, numbers, crank, line_of):
-        return DIGITS.direction(self._zero(numbers, crank) * line_of.conjugate())
+    def _turn(self, numbers, i):
+        """Return the angle of the crank's zero from the ground line, foot to centre, or a rail."""
+        line = self.lines[i]
+        if line.word == 'slider':
+            pin, along = line.joints[0], self._rail(numbers, i)
+        else:
+            foot, pin = self.arm_of_crank(line)
+            along = self._fixed(numbers, self.placing(pin).joints[0]) - self._fixed(numbers, foot)
+        return DIGITS.direction(self._zero(numbers, self.placing(pin)) * along.conjugate())
 
     def _zero(self, numbers, crank):
         """Return the direction from which a crank of the ground is counted."""
@@ -589,13 +528,7 @@ class Linkage:
 
     def turns(self, numbers, way):
         """Return the angles from which the passes of change points are counted."""
-        found = {}
-        for i in way:
-            line = self.lines[i]
-            found[i] = (self._turn(numbers, line) if line.word == 'dyad' else
-                        self._turn_on_line(numbers, self.placing(line.joints[0]),
-                                           self._rail(numbers, i)))
-        return found
+        return {i: self._turn(numbers, i) for i in way}
 
 
 def _vanishes(gap, size):
@@ -620,27 +553,15 @@ def _corner_of(do, p, radius_p, q, radius_q, side):
     across = arm.real * arm.real + arm.imag * arm.imag
     along = (across + (radius_p * radius_p - radius_q * radius_q)) / 2
     square = radius_p * radius_p * across - along * along
-    meeting = arm * along + _turned(do, arm) * (side * do.root(square))
+    meeting = arm * along + 1j * arm * (side * do.root(square))
     return p + do.divided(meeting, across), square
-
-
-def _corner(first, second, row, side):
-    return meet(DIGITS, first, row[0], second, row[1], side)[0]
-
-
-def _on_line(first, second, row, _):
-    return first + (second - first) / abs(second - first) * row[0]
 
 
 # The words for a point of a link, and where on the drawing of the link its numbers put it.
 LAID = {
-    'rigid': _corner,
-    'line': _on_line,
+    'rigid': lambda p, q, row, side: meet(DIGITS, p, row[0], q, row[1], side)[0],
+    'line': lambda p, q, row, _: p + (q - p) / abs(q - p) * row[0],
 }
-
-
-def _turned(do, vector):
-    return vector * do.point(0, 1)
 
 
 def draw(do, linkage, rows, values, way=None, turns=None, moved=None):
@@ -667,7 +588,7 @@ def draw(do, linkage, rows, values, way=None, turns=None, moved=None):
             bar = do.turned(driven[i]) * row[0]
             if line.zero:
                 bar = bar * _unit(do, at[1] - at[0])
-            points[name] = at[0] + (_turned(do, bar) if line.up else bar)
+            points[name] = at[0] + (1j * bar if line.up else bar)
         elif word == 'cylinder':
             slides[name] = length = driven[i]
             points[name], square = _corner_of(do, at[0], length, at[1], row[0], side)
@@ -692,7 +613,8 @@ def draw(do, linkage, rows, values, way=None, turns=None, moved=None):
         elif word == 'dyad':
             if i in way:
                 pin = linkage.arm_of_crank(line)[1]
-                side = side * _dyad_passes(do, way[i], angle_of[pin], turns[i])
+                side = side * _passes(
+                    do, way[i], angle_of[pin] + turns[i], do.pi() / 2 + turns[i], 0.0)
             points[name], gaps[name] = meet(do, at[0], row[0], at[1], row[1], side)
             arms[name] = abs(at[1] - at[0])
         elif word in LAID:
@@ -722,7 +644,8 @@ def draw(do, linkage, rows, values, way=None, turns=None, moved=None):
             lines[name] = (points[name] - at[0]) / row[1]
         else:
             if i in way:
-                side = side * _block_passes(do, way[i], angle_of[line.joints[0]], turns[i])
+                side = side * _passes(
+                    do, way[i], angle_of[line.joints[0]] + turns[i], 0.0, -do.pi() / 2)
             lines[name] = along = row[1] if len(row) > 1 else _unit(do, at[2] - at[1])
             seen = (at[0] - at[1]) * along.conjugate()
             square = row[0] * row[0] - seen.imag * seen.imag
@@ -756,32 +679,16 @@ def _slot(do, pivot, pin, row, side):
     radius = pin - pivot
     square = radius.real * radius.real + radius.imag * radius.imag
     slide = side * do.root(square - offset * offset)
-    lean = do.direction(do.point(0, 1) * offset + slide)
+    lean = do.direction(1j * offset + slide)
     lever = do.divided(radius, abs(radius)) * do.turned(-lean)
     return pivot + lever * length, square - offset * offset, slide, abs(radius)
 
 
-def _changes(do, count):
-    """Return -1 for an odd number of passes, 1 for an even one."""
-    return 1 - 2 * (count - 2 * do.floor(count / 2))
-
-
-def _dyad_passes(do, passing, theta, turn):
-    half, side = do.pi(), passing.side
-    now, then = theta + turn, half / 2 + turn
-    if passing.stretched:
-        side = side * _changes(do, do.floor(now / (2 * half)) - do.floor(then / (2 * half)))
-    if passing.folded:
-        side = side * _changes(do, do.floor((now - half) / (2 * half))
-                               - do.floor((then - half) / (2 * half)))
-    return side
-
-
-def _block_passes(do, passing, theta, turn):
-    half, side = do.pi(), passing.side
-    now = theta + turn
-    if passing.stretched:
-        side = side * _changes(do, do.floor((now + half / 2) / (2 * half)))
-    if passing.folded:
-        side = side * _changes(do, do.floor((now - half / 2) / (2 * half)) + 1)
+def _passes(do, passing, now, start, stretched):
+    """Return the side after the way of an angle from its start, given where it is stretched."""
+    side, turn = passing.side, 2 * do.pi()
+    for passed, at in ((passing.stretched, stretched), (passing.folded, stretched + do.pi())):
+        if passed:
+            count = do.floor((now - at) / turn) - do.floor((start - at) / turn)
+            side = side * (1 - 2 * (count - 2 * do.floor(count / 2)))
     return side

@@ -249,8 +249,7 @@ class Measure:
         now = self._drawn(self._nominal, given)
         grazed = self._undirected(now)
         if grazed:
-            given = [value + unit * mpfr(2) ** -NUDGE
-                     for value, unit in zip(given, self._units)]
+            given = [value + unit * mpfr(2) ** -NUDGE for value, unit in zip(given, self._units)]
             now = self._drawn(self._nominal, given)
         values = self._values(now, _Move(self._nominal, given, ways))
         closures, arms = {**now.gaps}, now.arms

@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Angles and dimensions that are hard on the catalogue, drawn from a seeded generator.
+Dimensions that are hard on the catalogue, drawn from a seeded generator.
 
-Three tenths of the random dimensions are nearly or exactly degenerate: a kite almost folded, a
-dyad that only just reaches, equal arms. Angles crowd around dead points and reach limits, down to
-1e-15 rad.
+Three tenths of the random ones are nearly or exactly degenerate: a kite almost folded, a dyad that
+only just reaches, equal arms.
 """
 
 import math
@@ -14,13 +13,10 @@ import math
 from linkage_ros import mechanisms
 import numpy as np
 
-HOLY = {'a': 38.0, 'b': 41.5, 'c': 39.3, 'd': 40.1, 'e': 55.8, 'f': 39.4, 'g': 36.7, 'h': 65.7,
-        'i': 49.0, 'j': 50.0, 'k': 61.9, 'l': 7.8, 'm': 15.0}
-
 # The documents' own parameter sets, the other ones people know, and every change point.
 CATALOGUE = {
     'water_drop': [{'a': 1.0}, {'a': 0.1}, {'a': 0.7}],
-    'jansen': [HOLY],
+    'jansen': [mechanisms.defaults('jansen')],
     'peaucellier': [
         {'r': r, 'a': a, 'b': b} for r, a, b in (
             (3.0, 9.0, 4.0), (4.0, 9.0, 2.0), (2.0, 5.0, 3.0), (3.0, 6.0, 3.0), (3.0, 4.0, 2.0),
@@ -92,21 +88,3 @@ def lever_gap(lengths, lever, half):
     height = np.sqrt(np.maximum(a * a - offset * offset, 0.0))
     ahead = half * b * np.cos(lever) + height
     return np.minimum(a - np.abs(offset), ahead) / (a + b + abs(e))
-
-
-def angles(rng, count, limits=()):
-    """
-    Return crank angles: half of them anywhere, half close to 0, pi or the given limits [rad].
-
-    A tenth of them is moved by whole turns, up to 1e9.
-    """
-    spots = [0.0, math.pi, -math.pi, math.pi / 2, *limits]
-    found = []
-    for _ in range(count):
-        theta = float(rng.uniform(-math.pi, math.pi))
-        if rng.random() < 0.5:
-            theta = float(rng.choice(spots)) + tiny(rng)
-        if rng.random() < 0.1:
-            theta += 2 * math.pi * round(log_uniform(rng, 1.0, 1e9))
-        found.append(theta)
-    return np.array(found)

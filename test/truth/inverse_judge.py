@@ -188,25 +188,27 @@ def judge(linkage, name, rng, count=6, others=()):
                     # Where the output hardly changes, its value does not tell the input.
                     gap < 1e-2 and output.away(output.at(np.linspace(root, x, 9)), value).max()
                     < 1e-11 * output.size for gap, x in zip(gaps, answers)):
-                found[kind, 'lost'] += 1
-                found[kind, 'lost at', linkage, name, at, others] += 1
+                _note(found, kind, 'lost', linkage, name, at, others)
                 break
         for k, x in enumerate(answers):
             error, reached, beside = _error(
                 output.held_at(solutions[k].inputs[1:]), first, x, value)
             beyond = 0.0 if kind == 'ordinary' else max(2.0 * ALLOWED * output.size, beside)
             if not error <= MOST and not output.away(reached, value) <= beyond:
-                found[kind, 'invented'] += 1
-                found[kind, 'invented at', linkage, name, at, others] += 1
+                _note(found, kind, 'invented', linkage, name, at, others)
             elif kind == 'ordinary':
                 worst = max(worst, error)
             # Two that are near are one if the output has its value between them, too.
             if any(first.apart(x, y) <= 1e-9 * first.size and output.away(
                     output.at(x + 0.5 * math.remainder(y - x, first.turn)), value)
                     <= MOST * 2.0 ** -53 * output.size for y in answers[:k]):
-                found[kind, 'duplicates'] += 1
-                found[kind, 'duplicates at', linkage, name, at, others] += 1
+                _note(found, kind, 'duplicates', linkage, name, at, others)
     return found, worst
+
+
+def _note(found, kind, what, *where):
+    """Count what is wrong, and where it was."""
+    found.update([(kind, what), (kind, f'{what} at', *where)])
 
 
 def _error(output, first, x, value):
@@ -226,8 +228,7 @@ def _error(output, first, x, value):
 
 def judge_several(linkage, names, rng, count=6):
     """Return what `judge` does for as many outputs as there are inputs, at ordinary poses."""
-    found, worst = Counter(), 0.0
-    inverse = linkage.inverse(names)
+    found, inverse = Counter(), linkage.inverse(names)
     sizes = [input_.size for input_ in linkage.inputs]
     scales = [1.0 if linkage.is_angle(name) else linkage.longest for name in names]
     poses = [[float(rng.uniform(input_.low, input_.high)) for input_ in linkage.inputs]
@@ -243,14 +244,12 @@ def judge_several(linkage, names, rng, count=6):
         if not any(max(input_.apart(x, y) / size for input_, x, y, size in zip(
                 inverse.inputs, answer.inputs, pose, sizes)) < 1e-9 / margin
                 for answer in answers):
-            found['ordinary', 'lost'] += 1
-            found['ordinary', 'lost at', linkage, names, tuple(pose), ()] += 1
+            _note(found, 'ordinary', 'lost', linkage, names, tuple(pose), ())
         for answer in answers:
             there = np.array(checked.at(*answer.inputs)[:len(names)])
             if _differ(inverse, there - row, scales):
-                found['ordinary', 'invented'] += 1
-                found['ordinary', 'invented at', linkage, names, tuple(pose), ()] += 1
-    return found, worst
+                _note(found, 'ordinary', 'invented', linkage, names, tuple(pose), ())
+    return found, 0.0
 
 
 def _differ(inverse, gaps, scales):

@@ -458,7 +458,7 @@ def _on_reach(subject, value):
 
 # --- the inverse --------------------------------------------------------------------------------
 
-def _moved(mechanism):
+def moved(mechanism):
     """Return the joint angles, slides and coordinates that move, but for the inputs."""
     driven = [input_.name for input_ in mechanism.inputs]
     return [name for name in (*mechanism.joints, *(
@@ -469,9 +469,8 @@ def _moved(mechanism):
 @checked
 def inverse(subject, count=2):
     """Ask which values of the first input give values that outputs have; `inverse_judge` tells."""
-    for output in map(str, subject.rng.permutation(_moved(subject.mechanism))[:count]):
-        found, _ = inverse_judge.judge(
-            subject.mechanism, output, subject.rng, 4, subject.held)
+    for output in map(str, subject.rng.permutation(moved(subject.mechanism))[:count]):
+        found, _ = inverse_judge.judge(subject.mechanism, output, subject.rng, 4, subject.held)
         for kind, what, *case in found:
             if (kind, what) in (('ordinary', 'lost at'), ('ordinary', 'invented at')):
                 yield f'inverse {what}', f'{output} at {case[2]!r}'
@@ -481,7 +480,7 @@ def inverse(subject, count=2):
 def followed(subject):
     """Follow an output to a value beside that of a pose: what is answered has the value."""
     mechanism, rng = subject.mechanism, subject.rng
-    for output in map(str, rng.permutation(_moved(mechanism))[:1]):
+    for output in map(str, rng.permutation(moved(mechanism))[:1]):
         names = (output, *(input_.name for input_ in mechanism.inputs[1:]))
         scale = 1.0 if mechanism.is_angle(output) else mechanism.longest
 

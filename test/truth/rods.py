@@ -368,8 +368,7 @@ def random_rods(rng, count):
     digits = edge * (1 + rng.integers(-4, 5, size=count) * 2.0 ** -52)
     length = np.select([kind == 1, kind == 2], [decades, digits], length)
     sided = np.einsum('ij,ij->i', along, np.cross(pivot - hinge, end - hinge))
-    seen = np.abs(sided) > 2e-6 * np.linalg.norm(
-        np.cross(along, pivot - hinge), axis=1) * rho
+    seen = np.abs(sided) > 2e-6 * np.linalg.norm(np.cross(along, pivot - hinge), axis=1) * rho
     kept = seen & (length > 0.0)
     return {name: part[kept] for name, part in zip(Rod._fields[:8], (
         motor, other, pivot, hinge, axis, end, length, value))}
@@ -386,12 +385,6 @@ def motor_values(ankle, which, pitch, roll):
     with np.errstate(invalid='ignore'):
         off = np.arccos(-c / np.hypot(a, b))
     return [np.arctan2(b, a) + side * off for side in (1, -1)]
-
-
-def determinants(ankle, motors, pitch, roll):
-    """Return the determinant of the derivatives of `gaps` by both angles, in float64."""
-    (a, c), (b, d) = slopes(partial(gaps, ankle, motors), (pitch, roll), 1e-6)
-    return a * d - b * c
 
 
 def are_drawn(ankle, motors, pitch, roll):
@@ -424,7 +417,9 @@ def is_ambiguous(ankle, low, high, count=11):
         if not there.any():
             continue
         motors = [np.where(there, x, np.nan) for x in motors]
-        signs = np.sign(determinants(ankle, motors, pitch, roll)).reshape(count, count)
+        # Of the derivatives of the gaps by both angles.
+        (a, c), (b, d) = slopes(partial(gaps, ankle, motors), (pitch, roll), 1e-6)
+        signs = np.sign(a * d - b * c).reshape(count, count)
         if any((one * other < 0.0).any() for one, other in (
                 (signs[1:], signs[:-1]), (signs[:, 1:], signs[:, :-1]))):
             return True
