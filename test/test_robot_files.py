@@ -744,8 +744,10 @@ def leaning(robot, lean, seed):
     """Return a robot whose axes lean at random by so much [rad], as those of rounded files."""
     rng = np.random.default_rng(seed)
     for joint in robot.joints:
-        axis = joint.axes[0] + lean * rng.uniform(-1.0, 1.0, 3) * (joint.kind == 'hinge')
-        joint.axes = (axis / np.linalg.norm(axis),) * 2
+        way = lean * rng.uniform(-1.0, 1.0, 3)
+        if joint.kind == 'hinge':
+            axis = joint.axes[0] + way
+            joint.axes = (axis / np.linalg.norm(axis),) * 2
     return robot
 
 

@@ -13,7 +13,7 @@ from typing import Iterable, Mapping, NamedTuple, Sequence
 import numpy as np
 
 from .spatial import ASKEW, Component, components, DEAD_POINT, is_free
-from ..robot_model.robot import displaced, FIXED, NotDriven, posed, Robot
+from ..robot_model.robot import FIXED, NotDriven, posed, Robot
 from ..words import listed
 
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
@@ -109,7 +109,7 @@ def _closed(robot: Robot, seed: int) -> Closed:
                 _check_driven(component, pose, motors, followers)
         except ValueError as error:
             made.faults.update((joint.name, error) for joint in component.joints)
-    return made._replace(robot=displaced(robot, moves, positions))
+    return made._replace(robot=posed(robot, positions, moves))
 
 
 def _added(*options: tuple[str, Iterable[str]]) -> str:

@@ -172,7 +172,7 @@ class Component:
                 first, second = cut.axes
                 offsets.append(np.array([first, second if first @ second > 0.0 else -second]))
             if cut.kind == FIXED:
-                offsets += [np.array([turn[:, k] for turn in cut.turns]) for k in range(3)]
+                offsets += [np.array(axes) for axes in zip(*(turn.T for turn in cut.axes))]
             points += [places + self.size * offset for offset in offsets]
             ends += [end] * len(offsets)
         self._ends = np.array(ends, int).reshape(-1, 2)

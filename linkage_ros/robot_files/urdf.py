@@ -147,8 +147,9 @@ def _change(robot: Robot, name: str, kind: str) -> None:
         # The URDF still has it, so that its position is published.
         robot.held[name] = joint.position
         return
+    frame = robot.frames[joint.bodies[1]]
     first, second = (np.eye(3)['xyz'.index(axis)] for axis in kind[-2:]) \
-        if kind.startswith('ujoint') else (joint.turns[0].T @ joint.axis, None)
+        if kind.startswith('ujoint') else (frame[:3, :3].T @ joint.axis, None)
     robot.joints.remove(joint)
-    robot.join(name, kind if second is None else UNIVERSAL, joint.bodies,
-               at(joint.places[0], joint.turns[0]), first, second=second)
+    robot.join(name, kind if second is None else UNIVERSAL, joint.bodies, frame, first,
+               second=second)
