@@ -130,6 +130,8 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
     motions = component.free_ways(pose, component.is_of([]), LEANING)
     count = len(chosen := component.chosen(motions, motors))
     if count < len(motors):
+        # Motors that nothing lets move are replaced.
+        chosen = chosen or component.chosen(motions, [*component.positions])
         raise NotDriven(
             f'{listed(motors)} drive it, and hold each other, as {count} of them tell where all '
             f'is: {_added(("driven", chosen))}')

@@ -68,7 +68,7 @@ def _blaming(path: str) -> Iterator[None]:
         raise RequestError(f'{path} has links or frames that hang on themselves') from None
     except LookupError as error:
         raise RequestError(f'{path} names {error}, which is not there') from None
-    except (ValueError, TypeError, AttributeError) as error:
+    except (ValueError, TypeError, AttributeError, RuntimeError) as error:
         raise RequestError(f'{path} cannot be read: {error}') from None
 
 

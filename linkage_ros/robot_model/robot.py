@@ -120,11 +120,6 @@ class Joint:
         return self.axes[0] if self.bodies[1] == body else -self.axes[1]
 
     @property
-    def axis(self) -> Any:
-        """Return the axis on the first body."""
-        return self.axes[0]
-
-    @property
     def start(self) -> float:
         """Return the position in the file [rad or m], 0 for a joint without one."""
         return self.position or 0.0
