@@ -102,6 +102,9 @@ REFUSED = [
     ('four_bar.urdf', [], 'motor, shoulder drive it, and hold each other, as 1 of them tell where '
      'all is: add --driven motor to the command', '--driven', 'motor', 'shoulder'),
     ('four_bar.sdf', [], f'{HELD}.\n', '--hold', 'joint_A=0'),
+    *(('whitworth.xml', [], f'{names} drive it, and hold each other, as 1 of them tell where all '
+       'is: add --driven ', '--driven', *names.split(', ')) for names in (
+           'lever_joint, crank_joint', 'rod_joint, crank_joint')),
     # It cannot move, but others can.
     ('four_bar.xml', [(' axis="0 -1 0"', '')],
      'motor drive it, and hold each other, as 0 of them tell where all is: add --driven shoulder '

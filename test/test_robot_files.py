@@ -186,6 +186,16 @@ def test_limits_of_all_joints_that_follow_a_motor_bound_it(tmp_path):
     drive = mechanism.first
     assert (drive.source, drive.ratio) == ('motor', -1.0)
     assert sweep(drive) == pytest.approx([-1.2, 1.2])
+    # What is read is not published, too.
+    assert published(mechanism, motor=0.4) == pytest.approx({'motor': 0.4, 'elbow': -0.4})
+    assert {called.name for called in mechanism.joints.values() if called.published} == {'elbow'}
+
+
+def test_a_joint_that_follows_a_passive_one_is_no_motor(tmp_path):
+    knee = '"front_knee" type="continuous">'
+    file = written(tmp_path, 'five_bar.urdf', (knee, f'{knee}<mimic joint="back_knee"/>'))
+    assert 'not driven: 1 of mot_back, front_knee, back_knee must be moved' in refused(
+        file, *loops_of(tmp_path, 'name_mot: [mot_front]'))
 
 
 def loops_of(folder, more, pair='front_foot, back_foot', kind='3d'):

@@ -97,8 +97,8 @@ def _closed(robot: Robot, seed: int) -> Closed:
     moves: dict[str, np.ndarray] = {}
     positions: dict[str, float] = {}
     for component in components(robot):
-        motors, followers = ([name for name in component.positions if name in names]
-                             for names in (robot.driven, robot.follows))
+        motors = [name for name in component.positions if name in robot.driven]
+        followers = robot.followers(component.positions)
         try:
             pose, report = nearest(component, motors, followers, seed)
             made.report.extend([report] * bool(report))
@@ -132,7 +132,7 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
     if count < len(motors):
         # Motors that nothing lets move are replaced.
         chosen = chosen or component.chosen(motions, [*component.positions])
-        raise NotDriven(
+        raise ValueError(
             f'{listed(motors)} drive it, and hold each other, as {count} of them tell where all '
             f'is: {_added(("driven", chosen))}')
     loose, motions = component.loose(pose, motors + followers)

@@ -260,8 +260,8 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
     """Return the lines of loops, with the inputs that place the most bodies."""
     names = [joint.name for joint in group.joints if joint.position is not None]
     motors = [name for name in names if name in robot.driven]
-    tries: list[tuple[Sequence[str], str]] = [(motors, group.ground), ([
-        name for name in names if name in motors or name in robot.follows], group.ground)]
+    followers = [name for name in names if name in motors + robot.followers(names)]
+    tries: list[tuple[Sequence[str], str]] = [(motors, group.ground), (followers, group.ground)]
     if not robot.driven:
         tries += ((pair, group.ground) for count in (1, 2)[:1 + (len(names) <= MAX_PAIRED)]
                   for pair in combinations(names, count))
@@ -299,9 +299,10 @@ def _why(drawing: Drawing) -> str:
 def _joints(drawing: Drawing) -> list[tuple[str, float, str, float]]:
     """Return the link, the sign, the name and the position of each joint that links measure."""
     measured = []
+    read = {joint.name for joint in drawing.driven} | {drive.source for drive in drawing.drives}
     for joint in drawing.joints:
         with suppress(ValueError):
-            if joint.position is not None and joint not in drawing.driven:
+            if joint.position is not None and joint.name not in read:
                 measured.append((joint, *drawing.measured_by(joint)))
     links = {link.name: link for link in mechanisms.create('custom', joints=drawing.lines).links}
     joints = []

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 import math
 import re
-from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Sequence
+from typing import Any, Collection, Iterable, Iterator, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
@@ -338,6 +338,12 @@ class Robot:
     def source(self, name: str) -> tuple[str, float, float]:
         """Return the joint that another depends on, or itself, with ratio and offset."""
         return self.sources(name)[-1]
+
+    def followers(self, names: Collection[str]) -> list[str]:
+        """Return which joints of a loop follow motors, or joints elsewhere; all without motors."""
+        sources = {name: self.source(name)[0] for name in names if name in self.follows}
+        return [name for name, source in sources.items()
+                if not self.driven or source in self.driven or source not in names]
 
     def limits(self, joints: Iterable[Joint]) -> tuple[dict[str, tuple[float, float]], list[str]]:
         """
