@@ -60,7 +60,7 @@ class Closed(NamedTuple):
     faults: dict[str, ValueError]
 
 
-# Two closed poses of which one has to be chosen: a text, and positions to type for each.
+# Two closed poses of which one has to be chosen: a text, and what to type for each joint.
 Question = tuple[str, Mapping[str, str], Mapping[str, str]]
 
 
@@ -146,7 +146,7 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
     raise NotDriven(
         f'not driven: {len(more)} of {listed(loose)} must be moved, named by --driven, or held, '
         'named by --hold: '
-        + _added(('driven', [*motors, *more]), ('hold', (f'{name}={at[name]}' for name in more)))
+        + _added(('driven', [*motors, *more]), ('hold', (at[name] for name in more)))
         + f'; the limits of {listed(stiff)} leave no range' * bool(stiff))
 
 
@@ -156,7 +156,7 @@ def _choice(questions: Sequence[Question], why: str) -> ValueError:
     poses = [{name: value for side in choices for name, value in side.items()}
              for choices in sides]
     return ValueError(f'{why} {", and ".join(texts)}: ' + _added(*(
-        ('pose', (f'{name}={value}' for name, value in pose.items())) for pose in poses)))
+        ('pose', pose.values()) for pose in poses)))
 
 
 def _question(component: Component, poses: np.ndarray, which: np.ndarray,
@@ -168,10 +168,9 @@ def _question(component: Component, poses: np.ndarray, which: np.ndarray,
     if not name or apart[component.named[name]] < DISTINCT:
         return []
     poses = poses[np.argsort(component.read(poses)[name])]
-    first, second = component.read(poses)[name]
     side, other = (component.texts(pose, which) for pose in poses)
-    where = ''.join(f'{motor}={side[motor]} ' for motor in motors)
-    return [(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', side, other)]
+    where = ' '.join(side[motor] for motor in (*motors, name))
+    return [(f'with {where} as with {other[name]}', side, other)]
 
 
 def _check_unfolded(component: Component, pose: np.ndarray, motors: list[str], least: float

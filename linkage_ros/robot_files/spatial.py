@@ -272,9 +272,9 @@ class Component:
         return basis
 
     def texts(self, pose: np.ndarray, which: Any) -> dict[str, str]:
-        """Return the positions of some screws with names in a pose."""
+        """Return the positions of some screws with names in a pose, each as NAME=VALUE."""
         positions = self.read(pose[None])
-        return {name: f'{round(float(positions[name][0]), 6) + 0.0:.5g}'
+        return {name: f'{name}={round(float(positions[name][0]), 6) + 0.0:.5g}'
                 for name, i in self.named.items() if which[i]}
 
     def moves(self, pose: np.ndarray) -> dict[str, np.ndarray]:
