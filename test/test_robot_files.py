@@ -173,6 +173,12 @@ def test_limits_of_a_joint_are_those_of_all_that_it_follows(tmp_path, servos, en
             f'the limits of servo, from 5 to 2.6: {BEYOND}') in said(file)
 
 
+def test_what_a_fixed_joint_follows_may_be_held(tmp_path):
+    file = mimicking(tmp_path, ('middle', '', '<mimic joint="servo"/>', 'fixed'),
+                     ('servo', '<limit lower="-1" upper="1"/>', ''))
+    assert 'it cannot move, as its joints hold each other' in refused(file, '--hold', 'servo=0.1')
+
+
 def test_limits_of_all_joints_that_follow_a_motor_bound_it(tmp_path):
     axis = '<axis xyz="0 -1 0"/>'
     file = written(tmp_path, 'five_bar.urdf', (

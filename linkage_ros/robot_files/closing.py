@@ -38,9 +38,10 @@ INSIDE = 0.1
 
 def held(robot: Robot, values: Mapping[str, float]) -> Robot:
     """Return a robot with some joints, and those that follow them, fixed at given positions."""
-    values = {**values, **{name: ratio * values[source] + offset for name in robot.follows
-                           for source, ratio, offset in reversed(robot.sources(name))
-                           if source in values and name not in values}}
+    values = {**values, **{
+        name: ratio * values[source] + offset for name in robot.follows.keys() & robot.positions
+        for source, ratio, offset in reversed(robot.sources(name))
+        if source in values and name not in values}}
     made = posed(robot, values)
     return replace(made, joints=[
         replace(joint, kind=FIXED, position=None) if joint.name in values else joint
