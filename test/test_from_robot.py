@@ -102,6 +102,10 @@ REFUSED = [
     ('four_bar.urdf', [], 'motor, shoulder drive it, and hold each other, as 1 of them tell where '
      'all is: add --driven motor to the command', '--driven', 'motor', 'shoulder'),
     ('four_bar.sdf', [], f'{HELD}.\n', '--hold', 'joint_A=0'),
+    ('four_bar.sdf', [], 'its loops cannot be closed: they stay open by 0.121 m', '--hold',
+     'joint_A=0.31', 'joint_D=-0.61'),
+    ('foot.urdf', [], 'its loops cannot be closed: they stay open by ', '--hold', 'z_1=-0.27',
+     'x_0=1.23'),
     *(('whitworth.xml', [], f'{names} drive it, and hold each other, as 1 of them tell where all '
        'is: add --driven ', '--driven', *names.split(', ')) for names in (
            'lever_joint, crank_joint', 'rod_joint, crank_joint')),

@@ -19,6 +19,8 @@ from ..words import listed
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
 # Such loops are closed without a search, as far as they can be.
 NEAR = 1e-3
+# Loops with a larger gap, of their size, are open: files have rounded numbers.
+OPEN = 1e-4
 # Number of random starts of a search for closed poses, less where that many screws take long.
 STARTS, SCREWS = 96, 1400
 # Two poses are equally near if their distances differ by less than this factor and this [rad];
@@ -106,6 +108,10 @@ def _closed(robot: Robot, seed: int) -> Closed:
             moves.update(component.moves(pose))
             positions.update((name, float(value[0]))
                              for name, value in component.read(pose[None]).items())
+            apart = np.linalg.norm(component.errors(pose[None])[0].reshape(-1, 3), axis=1).max()
+            if apart > LEANING * component.size:
+                raise ValueError(f'its loops cannot be closed: they stay open by {apart:.3g} m, '
+                                 f'more than {OPEN:g} of their size')
             if component.gap(pose[None])[0] < component.near:
                 _check_driven(component, pose, motors, followers)
         except ValueError as error:

@@ -18,15 +18,13 @@ from typing import Sequence
 
 import numpy as np
 
-from . import check, loops
+from . import check, closing, loops
 from .spatial import CROSSING, EXACT
 from .. import mechanisms, scene
 from ..linkage import bar_name, Dyads, Hinge, Pin, ROUNDING, short, Slide, theta_of
 from ..robot_model.robot import at, coordinates, HINGE, Joint, NotDriven, plain, Robot, SLIDE
 from ..scene import FARTHEST
 
-# Loops with a smaller gap, of their size, are closed: files have rounded numbers.
-OPEN = 1e-4
 # The most joints of which pairs are tried as motors.
 MAX_PAIRED = 30
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
@@ -66,9 +64,9 @@ class Drawing(Dyads):
         size = max(abs(place - other) for place in places for other in places)
         if size < CROSSING:
             raise ValueError('all its joints are at one place')
-        if self.gap > OPEN * size:
+        if self.gap > closing.OPEN * size:
             raise ValueError(f'its loops cannot be closed: they stay open by {self.gap:.3g} m, '
-                             f'more than {OPEN:g} of their size')
+                             f'more than {closing.OPEN:g} of their size')
         near = size * min(max(ROUNDING, 10.0 * self.gap / size), 1e-6)
         pins: list[dict[str, complex]] = []
         for pin in (dict(zip(joint.bodies, joint.places)) for joint in self.joints
