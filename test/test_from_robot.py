@@ -103,6 +103,21 @@ REFUSED = [
     ('four_bar.urdf', [], 'motor, shoulder drive it, and hold each other, as 1 of them tell where '
      'all is: add --driven motor to the command', '--driven', 'motor', 'shoulder'),
     ('four_bar.sdf', [], f'{HELD}.\n', '--hold', 'joint_A=0'),
+    ('four_bar.sdf', [], 'its loops cannot be closed: they stay open by 0.121 m', '--hold',
+     'joint_A=0.31', 'joint_D=-0.61'),
+    ('foot.urdf', [], 'its loops cannot be closed: they stay open by ', '--hold', 'z_1=-0.27',
+     'x_0=1.23'),
+    *(('whitworth.xml', [], f'{names} drive it, and hold each other, as 1 of them tell where all '
+       'is: add --driven ', '--driven', *names.split(', ')) for names in (
+           'lever_joint, crank_joint', 'rod_joint, crank_joint')),
+    # It cannot move, but others can.
+    ('four_bar.xml', [(' axis="0 -1 0"', '')],
+     'motor drive it, and hold each other, as 0 of them tell where all is: add --driven shoulder '
+     'to the command'),
+    ('four_bar.sdf', [('<child>AB</child><axis>', '<child>AB</child><axis><mimic joint="joint_B">'
+                       '<multiplier>inf</multiplier></mimic>')],
+     "cannot be read: 'inf 0 0' must be 3 numbers within 1e+09\n"),
+    ('four_bar.xml', [('anchor="0.3 0 0"', 'anchor=""')], 'four_bar.xml cannot be read: '),
     # What follows a joint that is held is held.
     ('four_bar.urdf', [('<limit', '<mimic joint="elbow"/><limit')], HELD, '--hold', 'elbow=0'),
     # A fold, without motors.
@@ -140,6 +155,9 @@ SAID = [
     ('four_bar.sdf', [], ['--pose', 'joint_D=0.1'], 'Checked: joint_A: in 240 poses'),
     ('four_bar.sdf', [], ['--driven', 'joint_D', '--pose', 'joint_D=0.1'],
      'Checked: joint_D: in 240 poses'),
+    # Three bodies on a pin, of which a motor turns two against each other.
+    ('four_bar.sdf', [('      <pose>0 0 -0.2 0 0 0</pose>\n', '')], [],
+     'Checked: joint_C: in 240 poses'),
     ('toe_rod.xml', [], [], ': a ball or a free joint has no one position'),
     ('folded.urdf', within(0.5, 2.0), [], 'Started inside the limits of the file: motor at 0.6')]
 

@@ -102,7 +102,7 @@ def test_a_tie_is_open_as_far_as_mujoco_has_it(tmp_path, tie, seed):
     if 'weld' in tie:
         # MuJoCo has the sine of half the angle.
         half = np.linalg.norm(turned[0])
-        assert np.trace(cut.turns[0].T @ cut.turns[1]) == pytest.approx(3.0 - 4.0 * half ** 2)
+        assert np.trace(cut.axes[0].T @ cut.axes[1]) == pytest.approx(3.0 - 4.0 * half ** 2)
     else:
         assert not turned[0].size
 

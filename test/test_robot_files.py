@@ -173,6 +173,12 @@ def test_limits_of_a_joint_are_those_of_all_that_it_follows(tmp_path, servos, en
             f'the limits of servo, from 5 to 2.6: {BEYOND}') in said(file)
 
 
+def test_what_a_fixed_joint_follows_may_be_held(tmp_path):
+    file = mimicking(tmp_path, ('middle', '', '<mimic joint="servo"/>', 'fixed'),
+                     ('servo', '<limit lower="-1" upper="1"/>', ''))
+    assert 'it cannot move, as its joints hold each other' in refused(file, '--hold', 'servo=0.1')
+
+
 def test_limits_of_all_joints_that_follow_a_motor_bound_it(tmp_path):
     axis = '<axis xyz="0 -1 0"/>'
     file = written(tmp_path, 'five_bar.urdf', (
@@ -186,6 +192,16 @@ def test_limits_of_all_joints_that_follow_a_motor_bound_it(tmp_path):
     drive = mechanism.first
     assert (drive.source, drive.ratio) == ('motor', -1.0)
     assert sweep(drive) == pytest.approx([-1.2, 1.2])
+    # What is read is not published, too.
+    assert published(mechanism, motor=0.4) == pytest.approx({'motor': 0.4, 'elbow': -0.4})
+    assert {called.name for called in mechanism.joints.values() if called.published} == {'elbow'}
+
+
+def test_a_joint_that_follows_a_passive_one_is_no_motor(tmp_path):
+    knee = '"front_knee" type="continuous">'
+    file = written(tmp_path, 'five_bar.urdf', (knee, f'{knee}<mimic joint="back_knee"/>'))
+    assert 'not driven: 1 of mot_back, front_knee, back_knee must be moved' in refused(
+        file, *loops_of(tmp_path, 'name_mot: [mot_front]'))
 
 
 def loops_of(folder, more, pair='front_foot, back_foot', kind='3d'):
@@ -747,8 +763,10 @@ def leaning(robot, lean, seed):
     """Return a robot whose axes lean at random by so much [rad], as those of rounded files."""
     rng = np.random.default_rng(seed)
     for joint in robot.joints:
-        axis = joint.axes[0] + lean * rng.uniform(-1.0, 1.0, 3) * (joint.kind == 'hinge')
-        joint.axes = (axis / np.linalg.norm(axis),) * 2
+        way = lean * rng.uniform(-1.0, 1.0, 3)
+        if joint.kind == 'hinge':
+            axis = joint.axes[0] + way
+            joint.axes = (axis / np.linalg.norm(axis),) * 2
     return robot
 
 

@@ -13,12 +13,14 @@ from typing import Iterable, Mapping, NamedTuple, Sequence
 import numpy as np
 
 from .spatial import ASKEW, Component, components, DEAD_POINT, is_free
-from ..robot_model.robot import displaced, FIXED, NotDriven, posed, Robot
+from ..robot_model.robot import FIXED, NotDriven, posed, Robot
 from ..words import listed
 
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
 # Such loops are closed without a search, as far as they can be.
 NEAR = 1e-3
+# Loops with a larger gap, of their size, are open: files have rounded numbers.
+OPEN = 1e-4
 # Number of random starts of a search for closed poses, less where that many screws take long.
 STARTS, SCREWS = 96, 1400
 # Two poses are equally near if their distances differ by less than this factor and this [rad];
@@ -38,9 +40,10 @@ INSIDE = 0.1
 
 def held(robot: Robot, values: Mapping[str, float]) -> Robot:
     """Return a robot with some joints, and those that follow them, fixed at given positions."""
-    values = {**values, **{name: ratio * values[source] + offset for name in robot.follows
-                           for source, ratio, offset in reversed(robot.sources(name))
-                           if source in values and name not in values}}
+    values = {**values, **{
+        name: ratio * values[source] + offset for name in robot.follows.keys() & robot.positions
+        for source, ratio, offset in reversed(robot.sources(name))
+        if source in values and name not in values}}
     made = posed(robot, values)
     return replace(made, joints=[
         replace(joint, kind=FIXED, position=None) if joint.name in values else joint
@@ -60,7 +63,7 @@ class Closed(NamedTuple):
     faults: dict[str, ValueError]
 
 
-# Two closed poses of which one has to be chosen: a text, and positions to type for each.
+# Two closed poses of which one has to be chosen: a text, and what to type for each joint.
 Question = tuple[str, Mapping[str, str], Mapping[str, str]]
 
 
@@ -97,19 +100,23 @@ def _closed(robot: Robot, seed: int) -> Closed:
     moves: dict[str, np.ndarray] = {}
     positions: dict[str, float] = {}
     for component in components(robot):
-        motors, followers = ([name for name in component.positions if name in names]
-                             for names in (robot.driven, robot.follows))
+        motors = [name for name in component.positions if name in robot.driven]
+        followers = robot.followers(component.positions)
         try:
             pose, report = nearest(component, motors, followers, seed)
             made.report.extend([report] * bool(report))
             moves.update(component.moves(pose))
             positions.update((name, float(value[0]))
                              for name, value in component.read(pose[None]).items())
+            apart = np.linalg.norm(component.errors(pose[None])[0].reshape(-1, 3), axis=1).max()
+            if apart > LEANING * component.size:
+                raise ValueError(f'its loops cannot be closed: they stay open by {apart:.3g} m, '
+                                 f'more than {OPEN:g} of their size')
             if component.gap(pose[None])[0] < component.near:
                 _check_driven(component, pose, motors, followers)
         except ValueError as error:
             made.faults.update((joint.name, error) for joint in component.joints)
-    return made._replace(robot=displaced(robot, moves, positions))
+    return made._replace(robot=posed(robot, positions, moves))
 
 
 def _added(*options: tuple[str, Iterable[str]]) -> str:
@@ -130,7 +137,9 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
     motions = component.free_ways(pose, component.is_of([]), LEANING)
     count = len(chosen := component.chosen(motions, motors))
     if count < len(motors):
-        raise NotDriven(
+        # Motors that nothing lets move are replaced.
+        chosen = chosen or component.chosen(motions, [*component.positions])
+        raise ValueError(
             f'{listed(motors)} drive it, and hold each other, as {count} of them tell where all '
             f'is: {_added(("driven", chosen))}')
     loose, motions = component.loose(pose, motors + followers)
@@ -144,7 +153,7 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
     raise NotDriven(
         f'not driven: {len(more)} of {listed(loose)} must be moved, named by --driven, or held, '
         'named by --hold: '
-        + _added(('driven', [*motors, *more]), ('hold', (f'{name}={at[name]}' for name in more)))
+        + _added(('driven', [*motors, *more]), ('hold', (at[name] for name in more)))
         + f'; the limits of {listed(stiff)} leave no range' * bool(stiff))
 
 
@@ -154,7 +163,7 @@ def _choice(questions: Sequence[Question], why: str) -> ValueError:
     poses = [{name: value for side in choices for name, value in side.items()}
              for choices in sides]
     return ValueError(f'{why} {", and ".join(texts)}: ' + _added(*(
-        ('pose', (f'{name}={value}' for name, value in pose.items())) for pose in poses)))
+        ('pose', pose.values()) for pose in poses)))
 
 
 def _question(component: Component, poses: np.ndarray, which: np.ndarray,
@@ -166,10 +175,9 @@ def _question(component: Component, poses: np.ndarray, which: np.ndarray,
     if not name or apart[component.named[name]] < DISTINCT:
         return []
     poses = poses[np.argsort(component.read(poses)[name])]
-    first, second = component.read(poses)[name]
     side, other = (component.texts(pose, which) for pose in poses)
-    where = ''.join(f'{motor}={side[motor]} ' for motor in motors)
-    return [(f'with {where}{name}={first:.3g} as with {name}={second:.3g}', side, other)]
+    where = ' '.join(side[motor] for motor in (*motors, name))
+    return [(f'with {where} as with {other[name]}', side, other)]
 
 
 def _check_unfolded(component: Component, pose: np.ndarray, motors: list[str], least: float

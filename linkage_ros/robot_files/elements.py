@@ -65,19 +65,21 @@ def numbers(values: str | Sequence[Any], count: int = 3) -> np.ndarray:
     return array
 
 
-def weld(robot: Robot, plugins: Iterable[Element]) -> None:
-    """Fix the links of Gazebo's DetachableJoint to each other, if plugins are one."""
+def obey(robot: Robot, plugins: Iterable[Element]) -> None:
+    """Fix the links of Gazebo's DetachableJoint to each other, and note what others drive."""
     for plugin in plugins:
-        if 'detachable' in f'{plugin.get("name")} {plugin.get("filename")}'.lower():
+        kind = f'{plugin.get("name")} {plugin.get("filename")}'.lower()
+        if 'detachable' in kind:
             parent, child = (text(plugin, tag) for tag in ('parent_link', 'child_link'))
             robot.join(f'{parent}={child}', FIXED, (parent, child), robot.frames[parent])
+        if 'state' not in kind:
+            robot.driven += [(joint.text or '').strip() for joint in plugin.findall('joint_name')]
 
 
-def origin(part: Element | None) -> np.ndarray:
-    """Return the pose in the attributes xyz and rpy of an element, if there is one."""
-    if part is None:
-        return np.eye(4)
-    return pose(*numbers(f'{part.get("xyz", "0 0 0")} {part.get("rpy", "0 0 0")}', 6))
+def origin(part: Element) -> np.ndarray:
+    """Return the pose in the attributes xyz and rpy of a part's origin, or of the part."""
+    place = next(part.iterfind('origin'), part)
+    return pose(*numbers(f'{place.get("xyz", "0 0 0")} {place.get("rpy", "0 0 0")}', 6))
 
 
 def turned_by(quaternion: Any) -> np.ndarray:

@@ -53,9 +53,9 @@ def _parts(robot: Robot, group: Group) -> list[Group]:
     left = group.joints
     for joint in group.joints:
         if joint.kind == HINGE and joint in left:
-            parts += [part for part in _groups(robot, [
-                other for other in left if other.kind in FLAT and lean(other, joint.axis) < ASKEW
-                ]) if not part.why]
+            flat = [other for other in left
+                    if other.kind in FLAT and lean(other, joint.axes[0]) < ASKEW]
+            parts += [part for part in _groups(robot, flat) if not part.why]
             left = [other for other in left if not any(other in part.joints for part in parts)]
     return parts
 
@@ -90,7 +90,7 @@ def _with_balls(robot: Robot) -> list[Joint]:
         places = first.place(ends[0]), second.place(ends[1])
         if ends[0] != ends[1] and np.linalg.norm(places[0] - places[1]) < CROSSING \
                 and (BALL in (first.kind, second.kind)
-                     or np.linalg.norm(np.cross(first.axis, second.axis)) > ASKEW):
+                     or np.linalg.norm(np.cross(first.axes[0], second.axes[0])) > ASKEW):
             ball = Joint(f'{first.name}+{second.name}', BALL, ends, places, first.axes,
                          parts=(*_chain(first, ends[0]), *_chain(second, body)))
             joints = [*(joint for joint in joints if joint not in held), ball]
@@ -114,13 +114,13 @@ def check_planar(ground: str, joints: Sequence[Joint], drives: Sequence[str] = (
     for joint in joints:
         if joint.kind not in FLAT:
             raise ValueError(f'not planar: {joint.name} is a joint of type {joint.kind}')
-        askew = lean(joint, hinges[0].axis)
+        askew = lean(joint, hinges[0].axes[0])
         largest = max(largest, askew)
         if askew > ASKEW:
             raise ValueError(f'not planar: the axes of {hinges[0].name} and {joint.name} are '
                              f'{np.degrees(np.arcsin(min(askew, 1.0))):.3g} degrees from it, more '
                              f'than {np.degrees(ASKEW):.2g}')
-    _check_rods(ground, joints, hinges[0].axis)
+    _check_rods(ground, joints, hinges[0].axes[0])
     return hinges, largest
 
 

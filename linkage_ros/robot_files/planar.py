@@ -18,15 +18,13 @@ from typing import Sequence
 
 import numpy as np
 
-from . import check, loops
+from . import check, closing, loops
 from .spatial import CROSSING, EXACT
 from .. import mechanisms, scene
 from ..linkage import bar_name, Dyads, Hinge, Pin, ROUNDING, short, Slide, theta_of
 from ..robot_model.robot import at, coordinates, HINGE, Joint, NotDriven, plain, Robot, SLIDE
 from ..scene import FARTHEST
 
-# Loops with a smaller gap, of their size, are closed: files have rounded numbers.
-OPEN = 1e-4
 # The most joints of which pairs are tried as motors.
 MAX_PAIRED = 30
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
@@ -66,27 +64,25 @@ class Drawing(Dyads):
         size = max(abs(place - other) for place in places for other in places)
         if size < CROSSING:
             raise ValueError('all its joints are at one place')
-        if self.gap > OPEN * size:
+        if self.gap > closing.OPEN * size:
             raise ValueError(f'its loops cannot be closed: they stay open by {self.gap:.3g} m, '
-                             f'more than {OPEN:g} of their size')
+                             f'more than {closing.OPEN:g} of their size')
         near = size * min(max(ROUNDING, 10.0 * self.gap / size), 1e-6)
         pins: list[dict[str, complex]] = []
-        for joint in self.joints:
-            pin = dict(zip(joint.bodies, joint.places))
+        for pin in (dict(zip(joint.bodies, joint.places)) for joint in self.joints
+                    if joint.kind != SLIDE):
             same = [other for other in pins if any(
                 abs(other[body] - pin[body]) < near for body in other.keys() & pin.keys())]
-            if joint.kind != SLIDE:
-                pins = [other for other in pins if other not in same]
-                pins.append({body: place for other in (*same, pin)
-                             for body, place in other.items()})
+            pins = [other for other in pins if other not in same]
+            pins.append({body: place for other in (*same, pin) for body, place in other.items()})
         slides = {joint: Slide(
-            joint.bodies, (joint.places[1] - joint.axis * joint.start, joint.places[1]),
-            (joint.axis, joint.axis), joint) for joint in self.joints if joint.kind == SLIDE}
+            joint.bodies, (joint.places[1] - joint.axes[0] * joint.start, joint.places[1]),
+            joint.axes, joint) for joint in self.joints if joint.kind == SLIDE}
         super().__init__(
             group.ground, [body for joint in self.joints for body in joint.bodies], pins,
             [slide for joint, slide in slides.items() if joint not in self.driven],
-            [slides.get(joint) or Hinge(joint.bodies, joint.places, joint.axis,
-                                        -joint.axis * joint.start, joint)
+            [slides.get(joint) or Hinge(joint.bodies, joint.places, joint.axes[0],
+                                        -joint.axes[0] * joint.start, joint)
              for joint in self.driven], size, near)
         self.take_apart()
 
@@ -94,8 +90,8 @@ class Drawing(Dyads):
         """Set the plane, and the joints in it."""
         ground = group.ground
         hinges, self.lean = loops.check_planar(ground, group.joints, drives)
-        base = self._robot.frames[ground]
-        normal = base[:3, :3].T @ hinges[0].axis
+        base, up = self._robot.frames[ground], hinges[0].axes[0]
+        normal = base[:3, :3].T @ up
         right = np.eye(3)[int(abs(normal[0]) > 0.9)]
         right = (right - right @ normal * normal) / np.linalg.norm(np.cross(right, normal))
         turned = np.column_stack([right, np.cross(normal, right), normal])
@@ -104,7 +100,6 @@ class Drawing(Dyads):
         seen = np.linalg.inv(base @ self.frame)
         self.joints: list[Joint] = []
         self.gap = 0.0
-        up = hinges[0].axis
         stiff = {body for joint in group.joints for body in joint.bodies
                  if len(joint.hinges) == 2 and not loops.pins(joint, up)}
         for joint in group.joints:
@@ -114,9 +109,9 @@ class Drawing(Dyads):
             if pins and not stiff & {*joint.bodies}:
                 (hinge, sign), *_ = pins
                 joint = replace(joint, name=hinge.name, kind=HINGE, position=hinge.position,
-                                axes=(sign * hinge.axis,) * 2)
+                                axes=(sign * hinge.axes[0],) * 2)
             first, second = (complex(*(seen @ [*place, 1.0])[:2]) for place in joint.places)
-            axis, slides = seen[:3, :3] @ joint.axis, joint.kind == SLIDE
+            axis, slides = seen[:3, :3] @ joint.axes[0], joint.kind == SLIDE
             along = complex(*axis[:2]) / np.hypot(*axis[:2]) if slides else float(np.sign(axis[2]))
             self.joints.append(replace(joint, places=(first, second), axes=[along] * 2))
             apart = second - first
@@ -148,7 +143,10 @@ class Drawing(Dyads):
         pin = self.joint_at(child, joint.places[1]) or ''
         base, body = (parent, child) if self.placed_on[pin] == parent else (child, parent)
         link, hangs, along, slide, _ = self.parts[body]
-        if self.placed_on[pin] != base or hangs != pin or slide or not link:
+        # A motor on a pin of three bodies may turn this one against the third.
+        is_turned = {base, body} in [{*motor.bodies} for motor in self.driven]
+        if self.placed_on[pin] != base or hangs != pin or slide or not link \
+                or link.startswith('crank') and not is_turned:
             link, along = self._measuring(pin, base, body)
         return link, joint.motion(body), phase(along / self.parts[base].along)
 
@@ -260,8 +258,8 @@ def _drawn(robot: Robot, group: loops.Group) -> Drawing:
     """Return the lines of loops, with the inputs that place the most bodies."""
     names = [joint.name for joint in group.joints if joint.position is not None]
     motors = [name for name in names if name in robot.driven]
-    tries: list[tuple[Sequence[str], str]] = [(motors, group.ground), ([
-        name for name in names if name in motors or name in robot.follows], group.ground)]
+    followers = [name for name in names if name in motors + robot.followers(names)]
+    tries: list[tuple[Sequence[str], str]] = [(motors, group.ground), (followers, group.ground)]
     if not robot.driven:
         tries += ((pair, group.ground) for count in (1, 2)[:1 + (len(names) <= MAX_PAIRED)]
                   for pair in combinations(names, count))
@@ -299,9 +297,10 @@ def _why(drawing: Drawing) -> str:
 def _joints(drawing: Drawing) -> list[tuple[str, float, str, float]]:
     """Return the link, the sign, the name and the position of each joint that links measure."""
     measured = []
+    read = {joint.name for joint in drawing.driven} | {drive.source for drive in drawing.drives}
     for joint in drawing.joints:
         with suppress(ValueError):
-            if joint.position is not None and joint not in drawing.driven:
+            if joint.position is not None and joint.name not in read:
                 measured.append((joint, *drawing.measured_by(joint)))
     links = {link.name: link for link in mechanisms.create('custom', joints=drawing.lines).links}
     joints = []

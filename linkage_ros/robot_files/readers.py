@@ -11,11 +11,13 @@ from graphlib import CycleError
 from pathlib import Path
 from typing import Any, Iterator, Mapping
 
+import numpy as np
+
 from . import sdf, urdf
 from .elements import parse
 from ..cli import RequestError
 from ..optional import needs
-from ..robot_model.robot import Robot
+from ..robot_model.robot import MAX_NUMBER, Robot
 from ..robot_model.urdf import write
 
 
@@ -43,6 +45,9 @@ def read(path: str, loops: str | None = None) -> Robot:
         with _blaming(loops):
             urdf.close(robot, content)
     with _blaming(path):
+        if far := [joint.name for joint in robot.joints
+                   if not np.all(np.abs(joint.places) < MAX_NUMBER)]:
+            raise RequestError(f'joint {far[0]} must be within {MAX_NUMBER:g} m')
         for name in robot.follows:
             robot.source(name)
     return robot.cut_loops()
@@ -63,7 +68,7 @@ def _blaming(path: str) -> Iterator[None]:
         raise RequestError(f'{path} has links or frames that hang on themselves') from None
     except LookupError as error:
         raise RequestError(f'{path} names {error}, which is not there') from None
-    except (ValueError, TypeError, AttributeError) as error:
+    except (ValueError, TypeError, AttributeError, RuntimeError) as error:
         raise RequestError(f'{path} cannot be read: {error}') from None
 
 

@@ -150,12 +150,12 @@ class Rods:
     def _cylinder(self, half: Joint, balls: Sequence[Joint]) -> None:
         ends = [ball.place(body) for ball, body in zip(balls, half.bodies)]
         way = ends[1] - ends[0]
-        if np.linalg.norm(np.cross(half.axis, way)) > 1e-6 * np.linalg.norm(way):
+        if np.linalg.norm(np.cross(half.axes[0], way)) > 1e-6 * np.linalg.norm(way):
             raise ValueError(f'{half.name} does not slide along the line of its balls')
         name = self._named(half.name)
         self.rods.append(f'{name} cylinder ' + ' '.join(
             self._end(ball, body) for ball, body in zip(balls, half.bodies)))
-        length, sign = float(np.linalg.norm(way)), float(np.sign(half.axis @ way))
+        length, sign = float(np.linalg.norm(way)), float(np.sign(half.axes[0] @ way))
         self.drives.append(check.Source(name, half.name, sign, length - sign * half.start, length))
 
     def lines(self, limits: Mapping[str, tuple[float, float]] = {}) -> list[str]:

@@ -11,7 +11,7 @@ from typing import Iterable, Iterator
 
 import numpy as np
 
-from .elements import attribute, Element, numbers, once, text, turned_by, weld
+from .elements import attribute, Element, numbers, obey, once, text, turned_by
 from ..cli import RequestError
 from ..robot_model.robot import at, pose, Robot
 
@@ -70,12 +70,7 @@ class _Model:
         for name, part in joints.items():
             self.join(robot, name, part, ends[name], 0.0)
         for model in (part for part in self._parts.values() if part.tag == 'model'):
-            for plugin in model.findall('plugin'):
-                kind = f'{plugin.get("name")} {plugin.get("filename")}'.lower()
-                if 'state' not in kind:
-                    robot.driven += [(element.text or '').strip()
-                                     for element in plugin.findall('joint_name')]
-            weld(robot, model.findall('plugin'))
+            obey(robot, model.findall('plugin'))
         return robot
 
     def named(self, where: str, name: str, is_model: bool = False) -> str:
@@ -112,7 +107,7 @@ class _Model:
         seen = attribute(part, 'pose', 'relative_to') or part.get('attached_to') or text(
             part, 'child')
         base = self.named(name, seen or '__model__') if name else 'world'
-        made = self.frame(base) @ _pose(part.find('pose'))
+        made = self.frame(base) @ _pose(part)
         if part.get('placement_frame'):
             raise RequestError(f'the model {name or part.get("name")} has a placement_frame, '
                                'which is not read: give it a pose of its own')
@@ -129,8 +124,9 @@ class _Model:
                    None if second is None else self._axis(name, second))
         mimic = part.find('axis/mimic')
         if mimic is not None:
-            ratio, start, offset = (float(text(mimic, tag, otherwise)) for tag, otherwise in (
+            values = (text(mimic, tag, otherwise) for tag, otherwise in (
                 ('multiplier', '1'), ('reference', '0'), ('offset', '0')))
+            ratio, start, offset = numbers(' '.join(values))
             robot.follow(name, self.named(name, mimic.get('joint', '')), ratio,
                          offset - ratio * start)
 
@@ -146,12 +142,11 @@ class _Model:
         return way
 
 
-def _pose(part: Element | None) -> np.ndarray:
-    text = (part.text or '').strip() if part is not None else ''
-    if part is None or not text:
+def _pose(part: Element) -> np.ndarray:
+    if not (values := text(part, 'pose')):
         return np.eye(4)
-    if part.get('rotation_format') == 'quat_xyzw':
-        x, y, z, *turn = numbers(text, 7)
-        return at((x, y, z), turned_by((turn[3], *turn[:3])))
-    unit = math.pi / 180.0 if part.get('degrees') in ('1', 'true') else 1.0
-    return pose(*numbers(text, 6) * [1.0, 1.0, 1.0, unit, unit, unit])
+    if attribute(part, 'pose', 'rotation_format') == 'quat_xyzw':
+        *place, x, y, z, w = numbers(values, 7)
+        return at(place, turned_by((w, x, y, z)))
+    unit = math.pi / 180.0 if attribute(part, 'pose', 'degrees') in ('1', 'true') else 1.0
+    return pose(*numbers(values, 6) * [1.0, 1.0, 1.0, unit, unit, unit])

@@ -41,7 +41,7 @@ DEAD_POINT = 3e-4
 def lean(joint: Joint, normal: np.ndarray) -> float:
     """Return the inclination of a joint's axes against those of a plane [rad]."""
     if joint.kind == SLIDE:
-        return float(abs(joint.axis @ normal))
+        return float(abs(joint.axes[0] @ normal))
     return float(max(np.linalg.norm(np.cross(axis, normal)) for axis in joint.axes)) \
         if joint.kind == HINGE else 0.0
 
@@ -113,6 +113,8 @@ class Component:
                           if joint.position is not None}
         places = np.array([place for joint in self.joints for place in joint.places])
         self.size = float(np.max(np.linalg.norm(places - places[0], axis=1))) or 1.0
+        self._up = next((joint.axes[0] for joint in self.joints if joint.kind == HINGE),
+                        np.zeros(3))
         self._screws: list[Screw] = []
         # The last screw that moves each body.
         last = {robot.root: -1}
@@ -132,13 +134,11 @@ class Component:
                       if screw.joint.position is not None}
         self._starts = np.array([screw.joint.start for screw in self._screws])
         self._slides = np.array([screw.kind == SLIDE for screw in self._screws], bool)
-        self._in_balls = np.array([any(
-            np.linalg.norm(screw.place - other.place) < CROSSING
-            and np.linalg.norm(np.cross(screw.axis, other.axis)) > 0.1
-            for other in self._screws if HINGE == screw.kind == other.kind)
-            for screw in self._screws], bool)
         axes, places = (np.array([getattr(screw, key) for screw in self._screws]).reshape(-1, 3)
                         for key in ('axis', 'place'))
+        is_crossed = (np.linalg.norm(places[:, None] - places, axis=2) < CROSSING) & (
+            np.linalg.norm(np.cross(axes[:, None], axes), axis=2) > 0.1)
+        self._in_balls = ~self._slides & np.any(is_crossed[:, ~self._slides], axis=1)
         self._twists = screws(axes, places, self._slides)
         self.unit = np.where(self._slides, self.size, 1.0)
         self.start = np.zeros((1, len(self._screws)))
@@ -148,8 +148,7 @@ class Component:
         """Return kind and axis of the screws of a joint; far from a ball's singular poses."""
         if joint.kind in (HINGE, SLIDE):
             return [(joint.kind, joint.motion(body))]
-        axis = next((other.axis for other in self.joints if other.kind == HINGE), np.eye(3)[2])
-        turns = [(HINGE, way) for way in np.linalg.svd(axis[None])[2]]
+        turns = [(HINGE, way) for way in np.linalg.svd(self._up[None])[2]]
         return {BALL: turns, FREE: [*((SLIDE, way) for way in np.eye(3)), *turns]}.get(
             joint.kind, [])
 
@@ -157,8 +156,7 @@ class Component:
                        ) -> None:
         """Set the points that coincide on both ends of each cut."""
         ends, points = [], []
-        up = next((joint.axis for joint in self.joints if joint.kind == HINGE), np.zeros(3))
-        leans = max(lean(joint, up) for joint in self.joints)
+        leans = max(lean(joint, self._up) for joint in self.joints)
         is_flat = leans < ASKEW and all(joint in cuts or joint.kind in (HINGE, SLIDE)
                                         for joint in self.joints)
         self.near = CLOSED + 2.0 * leans * is_flat
@@ -166,13 +164,13 @@ class Component:
             end = [last[body] for body in cut.bodies]
             places = np.array(cut.places)
             # Nothing moves along the axes of a planar loop, and a gap there changes no angle.
-            places[1] += up * (up @ (places[0] - places[1])) * is_flat
+            places[1] += self._up * (self._up @ (places[0] - places[1])) * is_flat
             offsets = [np.zeros((2, 3))]
             if cut.kind == HINGE:
                 first, second = cut.axes
                 offsets.append(np.array([first, second if first @ second > 0.0 else -second]))
             if cut.kind == FIXED:
-                offsets += [np.array([turn[:, k] for turn in cut.turns]) for k in range(3)]
+                offsets += [np.array(axes) for axes in zip(*(turn.T for turn in cut.axes))]
             points += [places + self.size * offset for offset in offsets]
             ends += [end] * len(offsets)
         self._ends = np.array(ends, int).reshape(-1, 2)
@@ -274,9 +272,9 @@ class Component:
         return basis
 
     def texts(self, pose: np.ndarray, which: Any) -> dict[str, str]:
-        """Return the positions of some screws with names in a pose."""
+        """Return the positions of some screws with names in a pose, each as NAME=VALUE."""
         positions = self.read(pose[None])
-        return {name: f'{round(float(positions[name][0]), 6) + 0.0:.5g}'
+        return {name: f'{name}={round(float(positions[name][0]), 6) + 0.0:.5g}'
                 for name, i in self.named.items() if which[i]}
 
     def moves(self, pose: np.ndarray) -> dict[str, np.ndarray]:

@@ -19,7 +19,7 @@ from typing import Any, Mapping, Sequence
 import numpy as np
 
 from . import sdf
-from .elements import attribute, Element, numbers, once, origin, weld
+from .elements import attribute, Element, numbers, obey, once, origin
 from ..cli import RequestError
 from ..robot_model.robot import at, BALL, FIXED, HINGE, Robot, UNIVERSAL
 from ..words import quoted, suggestion
@@ -44,7 +44,7 @@ def read(root: Element) -> Robot:
     robot = Robot(roots[0], {roots[0]: np.eye(4)})
     for link in TopologicalSorter({link: [base] for link, base in bases.items()}).static_order():
         if link in joints and link in links:
-            robot.frames[link] = robot.frames[bases[link]] @ origin(joints[link].find('origin'))
+            robot.frames[link] = robot.frames[bases[link]] @ origin(joints[link])
     for child, joint in joints.items():
         name, mimic, limit = joint.get('name', ''), joint.find('mimic'), joint.find('limit')
         robot.join(name, joint.get('type', ''), (bases[child], child), robot.frames[child],
@@ -57,10 +57,9 @@ def read(root: Element) -> Robot:
     if 'world' in links and 'world' not in robot.frames:
         robot.hang('world', roots[0], [0.0] * 6)
     _close_by_elements(robot, root)
-    _close_by_drake(robot, root)
     _close_by_frames(robot)
     sdf.join(robot, root.findall('gazebo/joint'))
-    weld(robot, root.findall('gazebo/plugin'))
+    obey(robot, root.findall('gazebo/plugin'))
     robot.driven = [joint.get('name', '') for joint in (
         *root.findall('transmission/joint'),
         *root.findall('ros2_control/joint[command_interface]'))]
@@ -79,19 +78,15 @@ def _pair(robot: Robot, name: str, kind: str, ends: Sequence[str], *axes: Any) -
 
 
 def _close_by_elements(robot: Robot, root: Element) -> None:
-    for tag, ends in (('loop_joint', ('link1', 'link2')), ('loop', ('predecessor', 'successor'))):
+    for tag, *words in (('loop_joint', 'link1', 'link2'), ('loop', 'predecessor', 'successor')):
         for cut in root.findall(tag):
             # An example of Isaac Sim has an empty end first.
-            parts = [part for end in ends if (part := cut.find(f'{end}[@link]')) is not None]
+            parts = [part for word in words if (part := cut.find(f'{word}[@link]')) is not None]
             if len(parts) < 2:
-                raise RequestError(f'{tag} {cut.get("name")} has no {ends[0]} or {ends[1]}')
+                raise RequestError(f'{tag} {cut.get("name")} has no {" or ".join(words)}')
             robot.close(cut.get('name', ''), cut.get('type', ''),
                         (parts[0].attrib['link'], parts[1].attrib['link']),
-                        [origin(part if part.find('origin') is None else part.find('origin'))
-                         for part in parts], numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
-
-
-def _close_by_drake(robot: Robot, root: Element) -> None:
+                        [*map(origin, parts)], numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
     for cut in root.findall('ball_constraint'):
         ends = [attribute(cut, f'ball_constraint_body_{end}', 'name') for end in 'AB']
         robot.close('='.join(ends), BALL, (ends[0], ends[1]), [
@@ -147,8 +142,9 @@ def _change(robot: Robot, name: str, kind: str) -> None:
         # The URDF still has it, so that its position is published.
         robot.held[name] = joint.position
         return
+    frame = robot.frames[joint.bodies[1]]
     first, second = (np.eye(3)['xyz'.index(axis)] for axis in kind[-2:]) \
-        if kind.startswith('ujoint') else (joint.turns[0].T @ joint.axis, None)
+        if kind.startswith('ujoint') else (frame[:3, :3].T @ joint.axes[0], None)
     robot.joints.remove(joint)
-    robot.join(name, kind if second is None else UNIVERSAL, joint.bodies,
-               at(joint.places[0], joint.turns[0]), first, second=second)
+    robot.join(name, kind if second is None else UNIVERSAL, joint.bodies, frame, first,
+               second=second)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 import math
 import re
-from typing import Any, Iterable, Iterator, Mapping, NamedTuple, Sequence
+from typing import Any, Collection, Iterable, Iterator, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
@@ -83,9 +83,7 @@ class Joint:
     places : pair of array
         Its place on each body [m].
     axes : pair of array
-        Its unit axis on each body.
-    turns : pair of array
-        Rotation matrices of its frame on each body.
+        Its unit axis on each body; of a fixed joint the axes of its frame, as columns.
     limits : pair of float, optional
         Its lower and upper limit [rad or m], one of which may be infinite.
     no_limits : str
@@ -106,7 +104,6 @@ class Joint:
     position: float | None = None
     limits: tuple[float, float] | None = None
     no_limits: str = ''
-    turns: Any = (np.eye(3), np.eye(3))
     is_cut: bool = False
     parts: Sequence[tuple[Joint, float]] = ()
 
@@ -121,11 +118,6 @@ class Joint:
     def motion(self, body: str) -> Any:
         """Return the axis on the other body about or along which positions move a body."""
         return self.axes[0] if self.bodies[1] == body else -self.axes[1]
-
-    @property
-    def axis(self) -> Any:
-        """Return the axis on the first body."""
-        return self.axes[0]
 
     @property
     def start(self) -> float:
@@ -201,11 +193,10 @@ class Robot:
              limits: tuple[float, float] | None = None, joint: str = '',
              position: float = 0.0) -> None:
         """Add a body on another one, at x, y, z [m], roll, pitch, yaw [rad], and its joint."""
-        frame = self.frames[name] = self.frames[parent] @ pose(*place)
-        self.joints.append(Joint(
-            joint or f'{name}_fixed', kind, (parent, name), (frame[:3, 3],) * 2,
-            (frame[:3, :3] @ axis,) * 2, None if kind == FIXED else position, limits, '',
-            (frame[:3, :3],) * 2))
+        self.frames[name] = self.frames[parent] @ pose(*place)
+        self.join(joint or f'{name}_fixed', kind, (parent, name), self.frames[name], axis,
+                  position=position)
+        self.joints[-1].limits = limits
 
     def bodies(self) -> Iterator[Body]:
         """Yield the bodies except the root, parents first; joints are at origins."""
@@ -240,7 +231,7 @@ class Robot:
             elif joint.position is None:
                 joint.is_cut = True
             else:
-                welded, frame = f'{body}/{joint.name}', at(joint.places[1], joint.turns[1])
+                welded, frame = f'{body}/{joint.name}', at(joint.places[1])
                 joint.bodies, self.frames[welded] = (base, welded), self.frames[body]
                 self.join('', FIXED, (body, welded), frame, other=frame)
         return self
@@ -284,16 +275,14 @@ class Robot:
         directions = axis, axis if second is None else second
         turns, places = zip(*((matrix[:3, :3], matrix[:3, 3]) for matrix in frames))
         sizes = np.linalg.norm(directions, axis=1)
-        if not np.all(np.abs((*places, *directions)) < MAX_NUMBER):
-            raise RequestError(f'joint {name} must be within {MAX_NUMBER:g} m')
         if kind in (HINGE, SLIDE, UNIVERSAL) and not np.all(sizes > 0.0):
             raise RequestError(f'the axis of joint {name} has no length')
         if kind != UNIVERSAL:
             self.joints.append(Joint(
-                name, kind, bodies, places, tuple(
+                name, kind, bodies, places, turns if kind == FIXED else tuple(
                     turn @ direction / (size or 1.0)
                     for turn, direction, size in zip(turns, directions, sizes)),
-                position if kind in (HINGE, SLIDE) else None, ends, no_limits, turns,
+                position if kind in (HINGE, SLIDE) else None, ends, no_limits,
                 other is not None))
             return
         if second is None:
@@ -350,6 +339,12 @@ class Robot:
         """Return the joint that another depends on, or itself, with ratio and offset."""
         return self.sources(name)[-1]
 
+    def followers(self, names: Collection[str]) -> list[str]:
+        """Return which joints of a loop follow motors, or joints elsewhere; all without motors."""
+        sources = {name: self.source(name)[0] for name in names if name in self.follows}
+        return [name for name, source in sources.items()
+                if not self.driven or source in self.driven or source not in names]
+
     def limits(self, joints: Iterable[Joint]) -> tuple[dict[str, tuple[float, float]], list[str]]:
         """
         Return the limits of each source, and a report on those that do not count.
@@ -404,12 +399,22 @@ def _limits(limits: Sequence[Any], is_continuous: bool) -> tuple[tuple[float, fl
     return ((low, high), '') if low < high else (None, f'{text}: they are no range')
 
 
-def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[str, float]
-              ) -> Robot:
-    """Return a robot with some bodies displaced on their parents, and new positions of joints."""
+def posed(robot: Robot, values: Mapping[str, float],
+          moves: Mapping[str, np.ndarray] = {}) -> Robot:
+    """
+    Return a robot with some joints moved; raise RequestError for an unknown joint.
+
+    `moves` has displacements of bodies on their parents, by these joints or by others.
+    """
+    robot.check_names(values)
     moved = {robot.root: np.eye(4)}
-    for body, (base, _) in robot.spanning_tree()[0].items():
-        moved[body] = moved[base] @ moves.get(body, np.eye(4))
+    for body, (base, joint) in robot.spanning_tree()[0].items():
+        step = moves.get(body, np.eye(4))
+        if body not in moves and joint.name in values and joint.position is not None:
+            slides, change = joint.kind == SLIDE, np.array(values[joint.name] - joint.position)
+            screw = screws(joint.motion(body), joint.place(base), slides)
+            step = exponentials(screw, change, slides)
+        moved[body] = moved[base] @ step
     joints = []
     for joint in robot.joints:
         turned, shifted = zip(*((moved[body][:3, :3], moved[body][:3, 3])
@@ -417,20 +422,6 @@ def displaced(robot: Robot, moves: Mapping[str, np.ndarray], positions: Mapping[
         joints.append(replace(
             joint, places=tuple(map(np.add, map(np.matmul, turned, joint.places), shifted)),
             axes=tuple(map(np.matmul, turned, joint.axes)),
-            turns=tuple(map(np.matmul, turned, joint.turns)),
-            position=None if joint.position is None else positions.get(
-                joint.name, joint.position)))
+            position=None if joint.position is None else values.get(joint.name, joint.position)))
     return replace(robot, joints=joints, frames={
         body: moved[body] @ frame for body, frame in robot.frames.items()})
-
-
-def posed(robot: Robot, values: Mapping[str, float]) -> Robot:
-    """Return a robot with some joints moved; raise RequestError for an unknown joint."""
-    robot.check_names(values)
-    moves = {}
-    for body, (base, joint) in robot.spanning_tree()[0].items():
-        if joint.name in values and joint.position is not None:
-            slides, change = joint.kind == SLIDE, np.array(values[joint.name] - joint.position)
-            screw = screws(joint.motion(body), joint.place(base), slides)
-            moves[body] = exponentials(screw, change, slides)
-    return displaced(robot, moves, values)
