@@ -86,10 +86,15 @@ struct Pose
 Pose pose(const double (&q)[n])
 {
   Pose made{};
-  double zero[n] = {};
   made.good = model.at(q, 1, &made.point) != 0;
-  for (int side = 0; side < 2; ++side) {
-    made.good = made.good && lkr_solve(&model, side, &made.point, 0, 1e-2, zero) != 0;
+  for (int k = 0; k < 2 * n; ++k) {
+    // What a change of one position by its size asks of the inputs.
+    double change[n] = {};
+    change[k / 2] = 1.0 / model.axis[k % 2][k / 2].scale;
+    made.good = made.good && lkr_solve(&model, k % 2, &made.point, 0, change) != 0;
+    for (int i = 0; i < n; ++i) {
+      made.good = made.good && std::fabs(change[i]) * model.input[i].scale < 100.0;
+    }
   }
   return made;
 }
