@@ -4,6 +4,7 @@
 """Shared parts of the commands other than nodes, which report an error in one sentence."""
 
 import argparse
+import io
 import math
 import os
 import re
@@ -52,6 +53,12 @@ def run(name: str, work: Callable, args: Sequence[str] | None) -> int:
         The arguments; None: those of this process.
 
     """
+    # A closed one is None, for which `print` takes the other one.
+    sys.stdout, sys.stderr = (stream or open(os.devnull, 'w')
+                              for stream in (sys.stdout, sys.stderr))
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        # Robots, scenes and C are UTF-8 in every locale, and paths are bytes.
+        sys.stdout.reconfigure(encoding='utf-8', errors='surrogateescape')
     try:
         work(args)
         sys.stdout.flush()

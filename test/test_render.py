@@ -415,6 +415,10 @@ def test_an_svg_has_every_part_in_its_order_where_it_was_solved(tmp_path, size, 
     (['jansen.yaml', '--out', 'a.gif', '--frames', '1', '--fps', '0.001'], 'must be from 0.002'),
     (['jansen.yaml', '--out', 'a.png', '--data', 'a.png'], '--data must be another file than'),
     (['still.yaml', '--out', 'a.png', '--data', './still.yaml'], '--data must be another file'),
+    (['link.yaml', '--out', 'a.png', '--data', 'still.yaml'], '--data must be another file'),
+    # A crank is twice at the same place.
+    (['jansen.yaml', '--out', 'a.gif', '--turns', '2', '--frames', '2', '--fps', '0.002',
+      '--size', '200x200'], 'for 655 s at most, but here'),
     (['jansen.yaml', '--out', 'a.png', '--angle', '-pi/6'],
      'expected one argument, after an = if it begins with a minus sign'),
     (['jansen.yaml', '--out', 'a.gif', '--fps', 'x'], "--fps: invalid number value: 'x'"),
@@ -446,6 +450,7 @@ def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
     scene_file = CONFIG / args[0]
     (tmp_path / 'still.yaml').write_text(
         '/**: {ros__parameters: {mechanisms: [leg], leg.type: jansen, leg.crank.speed: 0.0}}')
+    (tmp_path / 'link.yaml').symlink_to('still.yaml')
     (tmp_path / 'picture.png').write_bytes(b'\x89PNG\r\n\xff')
     before = set(tmp_path.iterdir())
     assert main([str(scene_file) if scene_file.is_file() else args[0], *args[1:]]) == 1
@@ -455,6 +460,17 @@ def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
 
 
 @pytest.mark.nightly
+def test_what_a_link_leads_to_is_replaced_and_a_device_is_written(tmp_path):
+    link, fifo = tmp_path / 'link.png', tmp_path / 'data.csv'
+    link.symlink_to('leg.png')
+    os.mkfifo(fifo)
+    reader = os.open(fifo, os.O_RDONLY | os.O_NONBLOCK)
+    assert main([str(CONFIG / 'jansen.yaml'), '--out', str(link), '--data', str(fifo)]) == 0
+    assert os.read(reader, 4) == b'time' and fifo.is_fifo()
+    os.close(reader)
+    assert link.is_symlink() and (tmp_path / 'leg.png').is_file()
+
+
 def test_the_readings_of_one_picture_are_not_written_over_those_of_another():
     mechanisms = [*scene.load(str(CONFIG / 'excavator.yaml')).mechanisms.values(),
                   *scene.load(str(CONFIG / 'scissor_lift.yaml')).mechanisms.values(),

@@ -15,6 +15,7 @@ from linkage_ros import scene
 from linkage_ros.cli import RequestError
 from linkage_ros.linkage import theta_of
 from linkage_ros.robot_files import check, cli, closing, loops, readers
+from linkage_ros.robot_model import bodies, mjcf
 import numpy as np
 import pytest
 from robots import (
@@ -498,6 +499,14 @@ def test_bars_in_line_move_on_as_they_are_told(tmp_path, side):
     is_parallel = {'elbow': -start, 'shoulder': -start}[joint] == pytest.approx(
         float(ends[side]), abs=0.02)
     assert elbows == {is_parallel}
+
+
+def test_both_ways_out_of_a_fold_are_seen_if_one_is_reached_from_both_sides(tmp_path):
+    crossed = scene.read({'mechanisms': ['m'], 'm.type': 'custom', 'm.joints': [
+        'O ground 0 0', 'Q ground 0.1 0', 'A crank O 0.25', 'B antiparallelogram O A Q']})
+    robot = bodies.robot(crossed.mechanisms.values(), 'world', density=1.0)
+    line = refused(of_text(tmp_path / 'robot.xml', mjcf.write(robot)))
+    assert 'it moves on with m_crank=0.1 m_AB=-0.1 as with m_AB=0.232: add' in line
 
 
 def test_a_pose_at_the_end_of_its_loops_is_left_on_the_other_side(tmp_path):

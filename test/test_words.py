@@ -117,6 +117,21 @@ def test_a_reader_that_has_gone_ends_a_command_quietly_and_a_full_disk_with_a_se
             assert (ended.returncode, ended.stderr) == (code, text)
 
 
+@pytest.mark.parametrize('work, closed, code, out, err', [
+    ('lambda args: print(*args)', '', 0, '\u89d2 '.encode() + b'\xff\n', b''),
+    ('print', '>&-', 0, b'', b''),
+    ('lambda args: open("none/x")', '>&-', 1, b'', b'draw: none/x: No such file or directory\n'),
+    ('lambda args: open("none/x")', '2>&-', 1, b'', b'')])
+def test_output_is_utf_8_in_every_locale_and_each_stream_may_be_closed(
+        work, closed, code, out, err):
+    command = ('import sys; from linkage_ros.cli import run; '
+               f'sys.exit(run("draw", {work}, ["\\u89d2", "\\udcff"]))')
+    ended = subprocess.run(
+        ['sh', '-c', f'exec "$@" {closed}', '-', sys.executable, '-c', command],
+        capture_output=True, env={**os.environ, 'PYTHONIOENCODING': 'ascii'})
+    assert (ended.returncode, ended.stdout, ended.stderr) == (code, out, err)
+
+
 def test_a_file_that_is_not_there_is_suggested_by_its_name(capsys, tmp_path):
     (tmp_path / 'scene.yaml').touch()
     for error, end in (

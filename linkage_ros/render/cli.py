@@ -6,6 +6,7 @@
 import argparse
 from dataclasses import replace
 import math
+from os.path import realpath
 from pathlib import Path
 import shutil
 
@@ -55,7 +56,8 @@ def parsed(args):
     if ending == '.gif' and (arguments.fps or FPS) > MAX_GIF_FPS:
         raise RequestError(
             f'--fps must be at most {MAX_GIF_FPS:g} for .gif, not {arguments.fps:g}')
-    if arguments.data in (arguments.out, Path(arguments.scene)):
+    if arguments.data and realpath(arguments.data) in map(
+            realpath, (arguments.out, arguments.scene)):
         raise RequestError('--data must be another file than SCENE and --out')
     for file in filter(None, (arguments.out, arguments.data)):
         if not file.absolute().parent.is_dir():

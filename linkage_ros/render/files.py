@@ -3,15 +3,19 @@
 
 """Writes pictures as PNG, SVG, GIF or MP4 and their data as CSV: the same bytes each time."""
 
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 import csv
+import os
 from pathlib import Path
+import struct
 import subprocess
 import tempfile
 
 import matplotlib
 import numpy as np
 from PIL import Image
+
+from ..words import RequestError
 
 PALETTE_FRAMES = 8
 # Pillow looks colours up in a palette by their upper six bits: white would become another grey.
@@ -70,9 +74,14 @@ def gif(picture, times, fps, loop, colours, file: Path):
     # A GIF counts hundredths of a second, Pillow milliseconds.
     ends = [10 * round(100.0 * k / fps) for k in range(len(frames) + 1)]
     repeats = {} if loop == 1 else {'loop': max(loop - 1, 0)}
-    with replacing(file) as new:
-        frames[0].save(new, 'GIF', save_all=True, append_images=frames[1:],
-                       duration=np.diff(ends).tolist(), **repeats)
+    try:
+        with replacing(file) as new:
+            frames[0].save(new, 'GIF', save_all=True, append_images=frames[1:],
+                           duration=np.diff(ends).tolist(), **repeats)
+    except (OverflowError, struct.error):
+        # Pillow makes one picture of equal ones that follow each other.
+        raise RequestError('a .gif shows a picture for 655 s at most, but here nothing that is '
+                           'seen moves for longer: choose a higher --fps, or .mp4') from None
 
 
 def mp4(picture, times, fps, file: Path):
@@ -84,13 +93,10 @@ def mp4(picture, times, fps, file: Path):
             '-video_size', f'{width}x{height}', '-framerate', f'{fps:g}', '-i', '-',
             '-c:v', 'libx264', '-crf', '18', '-pix_fmt', 'yuv420p', '-movflags', '+faststart',
             *REPRODUCIBLE, '-f', 'mp4', new], stdin=subprocess.PIPE, stderr=messages)
-        try:
-            assert encoder.stdin
-            with encoder.stdin as pipe:
-                for turns in times:
-                    pipe.write(picture.at(turns).tobytes())
-        except BrokenPipeError:
-            pass
+        assert encoder.stdin
+        with suppress(BrokenPipeError), encoder.stdin as pipe:
+            for turns in times:
+                pipe.write(picture.at(turns).tobytes())
         if encoder.wait():
             messages.seek(0)
             raise OSError(f'ffmpeg failed: {messages.read().decode(errors="replace").strip()}')
@@ -109,8 +115,16 @@ def data(picture, times, file: Path):
 
 @contextmanager
 def replacing(file: Path):
-    """Yield the path of a new file, which replaces the old one on success."""
-    new = file.with_name(f'.{file.name}.new')
+    """
+    Yield the path of a new file, which replaces the old one on success.
+
+    What a link leads to is replaced. A device, such as /dev/stdout, is written itself.
+    """
+    if file.exists() and not file.is_file():
+        yield file
+        return
+    file = Path(os.path.realpath(file))
+    new = file.with_name(f'.{file.name}.{os.getpid()}.new')
     try:
         yield new
         new.replace(file)

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 import math
 import shlex
 from typing import Iterable, Mapping, NamedTuple, Sequence
@@ -198,10 +199,11 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: list[str], l
         still = fixed | ~which
         motions = component.free_ways(pose, still, least)
         for way in motions if len(motions) > component.nullity(still) else ():
-            aside = 3.0 * ASIDE * component.unit * np.array([way, -way])
-            pairs = [component.closed(step + aside, fixed, 40) for step in steps]
-            pairs = [poses for poses in pairs
-                     if np.max(component.gap(poses, rows)) < component.near]
+            # Where branches are near, both sides of one distance may end on the same.
+            aside = ASIDE * component.unit * np.outer((3.0, -3.0, 1.0, -1.0), way)
+            tried = [component.closed(step + aside, fixed, 40) for step in steps]
+            pairs = [np.array(pair) for poses in tried for pair in combinations(
+                poses[component.gap(poses, rows) < component.near], 2)]
             if not pairs:
                 raise ValueError(f'its loops end where the file has {listed(motors)}: choose '
                                  'another pose by --pose, or mend lengths or places in the file')
