@@ -305,7 +305,7 @@ class _Drawing:
             self._check_joint(joint)
         for name, line in self._assembly.lines.items():
             if line.word == 'rod':
-                self._lengths[name] = [*self._numbers[name][6:], self._drawn(line)][0]
+                self._lengths[name] = [*self._numbers[name][6:], self._apart(line)][0]
         for name in self._assembly.inputs:
             self._drive(name)
         for rods, links in self._assembly.order():
@@ -314,9 +314,8 @@ class _Drawing:
             elif links:
                 self._place_joint(rods[0], self._joints[links[0]])
             else:
-                (first, second), (name,) = self._ends(rods[0]), rods[0].names
-                self._lengths[name] = self._within(name, self._on_link(
-                    second, first.link).minus(first.point).length())
+                (name,) = rods[0].names
+                self._lengths[name] = self._within(name, self._apart(rods[0]))
         for name, line in self._assembly.lines.items():
             (self._add_rod if line.word in _RODS else self._add_joint)(name, line)
 
@@ -352,9 +351,10 @@ class _Drawing:
         numbers = self._numbers[line.names[0]]
         return _End(first, Vector(*numbers[:3])), _End(second, Vector(*numbers[3:6]))
 
-    def _drawn(self, line: Line) -> Real:
+    def _apart(self, line: Line) -> Real:
+        """Return the length between a rod's ends; joints that are not placed are as drawn."""
         first, second = self._ends(line)
-        return second.point.minus(first.point).length()
+        return self._on_link(second, first.link).minus(first.point).length()
 
     def _on_link(self, end: _End, link: str) -> Vector:
         """Return a point of one link in the coordinates of another."""
@@ -449,14 +449,13 @@ class _Drawing:
                 if pivot.turn else real(0.0)
             rods.append(Rod(pivot._replace(path=frame.transformed(pivot.path)),
                             frame.transformed(second.hinge.circle(end.point)), length, side))
-        limits = first.limits, second.limits
         self._builder.windows.append(TwoRodLink(
             (first.line, second.line), tuple(inputs),
-            tuple(tuple(ends) or None for ends in limits), tuple(WindowRod(
+            tuple(tuple(joint.limits) or None for joint in (first, second)), tuple(WindowRod(
                 rod.pivot.path, rod.end, None if rod.length.varies else rod.length, rod.side)
                 for rod in rods)))
         first.turn, second.turn, limit = two_rods(rods, [
-            0.5 * (each[0] + each[1]) if each else real(0.0) for each in limits])
+            0.5 * sum(joint.limits, real(0.0)) for joint in (first, second)])
         drawn = [rod.drawn(first.turn, second.turn, self._magnitude)
                  for rod in rods if rod.pivot.turn]
         self._builder.limits += [limit, *drawn]
