@@ -104,11 +104,34 @@ def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong
             (lambda: bars.is_angle(wrong), 'has no output'),
             (lambda: bars.input_for(wrong, 1.0), 'four_bar has no'),
             (lambda: bars.extremes(wrong), 'has no output'),
+            (lambda: bars.monotone(wrong), 'has no output'),
             (lambda: bars.extremes('QB', [wrong]), 'arcs must be'),
             (lambda: bars.function(xp=wrong or 'x'), 'xp must be a package'),
             (lambda: ankle.driven_by(wrong), 'can be driven by 1 of O, S, not by')):
         with pytest.raises(ValueError, match=text):
             ask()
+
+
+def test_sides_of_rods_are_checked_whatever_drives():
+    lever = mechanisms.create('rods', joints=(
+        'O motor ground at 0 0 0 axis 0 0 1', 'S slide ground at 1 0 0 axis 1 0 0',
+        'R rod O 0 0.5 0 S 1.5 0 0.1'))
+    assert lever.driven_by('S', branches={'R': -1}).branches == {'R': -1}
+    for wrong, text in (({'R': 5}, 'branch R must be'), ({'X': 1}, "has no branch 'X'")):
+        with pytest.raises(ValueError, match=text):
+            lever.driven_by('S', branches=wrong)
+
+
+def test_pieces_of_the_first_of_several_inputs_are_for_others_that_are_given(arm):
+    (low, *_), *_, (_, high, *_) = arm.monotone('P.x', [1.0])
+    np.testing.assert_allclose([[low, high]], arm.reach(1.0))
+    with pytest.raises(ValueError, match='the values of all except the first'):
+        arm.monotone('P.x')
+
+
+def test_a_function_for_arrays_of_dimensions_is_refused(bars):
+    with pytest.raises(ValueError, match='one set of dimensions, not for arrays'):
+        bars.with_dimensions(a=[1.0, 1.1]).function('B')
 
 
 def test_there_are_as_many_numbers_as_inputs(bars, arm):

@@ -440,6 +440,37 @@ def test_a_cylinder_turns_a_lever():
     np.testing.assert_allclose(back, length, atol=1e-15)
 
 
+def test_a_cylinder_is_as_long_as_drawn_however_near_to_the_origin_its_first_end_is():
+    lever = made(('lever hinge ground at 1 0 0 axis 0 1 0',
+                  'C cylinder ground 0 0 0 lever -1 0 1'))
+    ends = math.sqrt(5.0) - 1.0, math.sqrt(5.0) + 1.0
+    np.testing.assert_allclose(lever.reach(), [ends], rtol=1e-12)
+    assert lever.input_for('lever', 0.0)[0] == pytest.approx(math.sqrt(2.0))
+
+
+@pytest.mark.parametrize('joint', ['hinge', 'slide'])
+def test_there_is_no_pose_beyond_the_limits_of_lengths_whatever_drives(joint):
+    def ends(of, name):
+        return np.isnan(of.joint_angles([-1.2, -1.05, 1.05, 1.2])[name]).tolist()
+
+    line = f'x {joint} ground at 0 0 0 axis 0 1 0'
+    free, bound = (made((line, f'C cylinder ground -0.5 0.2 0.1 x 0 0.3 1{limits}'))
+                   for limits in ('', ' within 1 1.1'))
+    assert ends(free, 'x') == [True, True, False, False]
+    assert ends(bound, 'x') == [True, True, False, True]
+    values = free.joint_angles([1.05, 1.2])['x']
+    assert np.isnan(bound.driven_by('x').joint_angles(values)['C']).tolist() == [False, True]
+    low, high = sorted(values)
+    line += f' within {low - 0.01} {0.5 * (low + high)}'
+    back = made((line, 'C cylinder ground -0.5 0.2 0.1 x 0 0.3 1')).driven_by('x')
+    assert np.isnan(back.joint_angles([low, high])['C']).tolist() == [False, True]
+
+
+def test_limits_of_hinges_are_ends_of_the_reach_once_among_dead_points(g1):
+    reach, = g1.reach(0.1)
+    assert g1.dead_points(0.1) == [*reach]
+
+
 def test_dimensions_may_be_names_and_are_checked_again():
     lines = [line.replace('0.2112', 'high') for line in G1]
     linkage = made(lines, high=0.2112)

@@ -107,7 +107,7 @@ def invertible(mechanism: SceneMechanism, axes: list[Axis]) -> list[Axis]:
     if len(axes) > 1:
         raise ValueError(f'{what} have no inverse in closed form, and a search of several inputs '
                          'may miss; choose other joints, or the inputs')
-    if not len(linkage.monotone(*names)):
+    if not len(linkage.monotone(names[0])):
         raise ValueError(f'{what} moves nowhere')
     return axes
 

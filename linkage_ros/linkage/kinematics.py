@@ -19,7 +19,7 @@ from .formulas import formulas_of, LinkPoint, Points
 from .geometry.spatial import IN_SINGLE
 from .inputs import FASTEST, Input, MAX_PERIOD, MOST_TURNS, PART, spread
 from .text import joint_lines
-from .text.arguments import checked_dimensions, numbers
+from .text.arguments import checked_branches, checked_dimensions, numbers
 from .text.design import Design
 from .tolerances import SINGULAR
 from ..cache import Cache
@@ -170,14 +170,14 @@ class Kinematics:
 
         `outputs` are as many joints as it has inputs, which they replace; `branches` is the side
         of the crank for each rod, 1 as drawn or -1, by default its own. Raises ValueError if a
-        joint does not exist, or the linkage cannot be solved from these.
+        joint or rod does not exist, or the linkage cannot be solved from these.
         """
         unknown = [name for name in outputs if name not in self.joints]
         if self.axes != 'xyz' or unknown or len({*outputs}) != len(self.inputs):
             raise ValueError(f'{self.type} can be driven by {len(self.inputs)} of '
                              f'{listed(self.joints if self.axes == "xyz" else ())}, '
                              f'not by {quoted(list(outputs))}')
-        sides = {**self.branches, **(branches or {})}
+        sides = checked_branches(self.design, {**self.branches, **(branches or {})})
         made = self.cache.get_or_make(('driven by', outputs, *sides.values()), lambda: type(self)(
             replace(self.design, inputs=outputs), self.dimensions, sides, self.is_accelerated))
         made.check()
@@ -355,10 +355,10 @@ class Kinematics:
         of the inputs. The package's own differentiation, vectorization and compilation apply.
         Where a pose cannot be assembled, values are NaN and their gradients finite.
         """
+        if any(map(np.ndim, self.dimensions.values())):
+            raise ValueError('a function is for one set of dimensions, not for arrays')
         if xp is None:
             return self.posed(points, joints, rates).at
-        if any(map(np.ndim, self.dimensions.values())):
-            raise ValueError('xp is for one set of dimensions, not for arrays')
         if not hasattr(xp, 'float64'):
             raise ValueError(f"xp must be a package with Python's array API, got {quoted(xp)}")
         outputs = self.structure.parts(self._requested(points, joints, rates))

@@ -200,10 +200,11 @@ class Mechanism(Kinematics):
             raise ValueError(f'arcs must be pairs of two numbers, got {quoted(arcs)}')
         return extremes_of(self, output, arcs, self._fixed(others))
 
-    def monotone(self, output: str) -> np.ndarray:
+    def monotone(self, output: str, others: Sequence[float] = ()) -> np.ndarray:
         """
         Return pieces of the reach on which an output rises, or falls, by half a turn at most.
 
         Each row has the input [rad or m] at both ends, and the output.
         """
-        return segments_of(self, output).pieces()
+        self.check_there(output)
+        return segments_of(self, output, self._fixed(others)).pieces()

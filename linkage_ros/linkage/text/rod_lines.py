@@ -296,8 +296,8 @@ class _Drawing:
         self._joints = {name: _Joint(self._assembly.lines[name], self._numbers[name])
                         for name in self._assembly.parents}
         self._lengths: dict[str, Real] = {}
-        self._magnitude = sum((part for numbers in self._numbers.values() for part in map(
-            abs, numbers[:3])), real(0.0))
+        self._magnitude = sum((abs(part) for name, numbers in self._numbers.items() for part in
+                               numbers[:3 if name in self._joints else 6]), real(0.0))
 
     def draw(self) -> None:
         """Fill the builder."""
@@ -305,7 +305,7 @@ class _Drawing:
             self._check_joint(joint)
         for name, line in self._assembly.lines.items():
             if line.word == 'rod':
-                self._lengths[name] = [*self._numbers[name][6:], self._drawn(line)][0]
+                self._lengths[name] = [*self._numbers[name][6:], self._apart(line)][0]
         for name in self._assembly.inputs:
             self._drive(name)
         for rods, links in self._assembly.order():
@@ -314,9 +314,8 @@ class _Drawing:
             elif links:
                 self._place_joint(rods[0], self._joints[links[0]])
             else:
-                first, second = self._ends(rods[0])
-                self._lengths[rods[0].names[0]] = self._on_link(second, first.link).minus(
-                    first.point).length()
+                (name,) = rods[0].names
+                self._lengths[name] = self._within(name, self._apart(rods[0]))
         for name, line in self._assembly.lines.items():
             (self._add_rod if line.word in _RODS else self._add_joint)(name, line)
 
@@ -337,14 +336,12 @@ class _Drawing:
         """Make an angle or a length an input."""
         self._builder.drawn = self._assembly.lines[name]
         joint, ends = self._joints.get(name), self._numbers[name][6:]
-        if joint and joint.line.word != 'slide':
-            joint.turn = Turn.by(self._builder.drive(Input(name, ANGLE), None))
-            limits = self._add_limits(joint, joint.turn.angle)
-            joint.turn = Turn.by(valid_within(joint.turn.angle, limits))
-            return
-        value = self._builder.drive(Input(name, LENGTH, *(
-            ends or (real(0.0) if joint is None else -self._magnitude, self._magnitude))), None)
-        if joint:
+        turns, longest = joint and joint.line.word != 'slide', 2.0 * self._magnitude
+        value = self._within(name, self._builder.drive(Input(name, ANGLE) if turns else Input(
+            name, LENGTH, *(ends or (-longest if joint else real(0.0), longest))), None))
+        if joint and turns:
+            joint.turn = Turn.by(value)
+        elif joint:
             joint.shift = value
         else:
             self._lengths[name] = value
@@ -354,9 +351,10 @@ class _Drawing:
         numbers = self._numbers[line.names[0]]
         return _End(first, Vector(*numbers[:3])), _End(second, Vector(*numbers[3:6]))
 
-    def _drawn(self, line: Line) -> Real:
+    def _apart(self, line: Line) -> Real:
+        """Return the length between a rod's ends; joints that are not placed are as drawn."""
         first, second = self._ends(line)
-        return second.point.minus(first.point).length()
+        return self._on_link(second, first.link).minus(first.point).length()
 
     def _on_link(self, end: _End, link: str) -> Vector:
         """Return a point of one link in the coordinates of another."""
@@ -403,7 +401,7 @@ class _Drawing:
             joint.turn, *limits, self._builder.transmissions[name] = rod_on_hinge(
                 hinge, base, point, length, side, magnitude)
         self._builder.limits += limits
-        joint.gate(self._add_limits(joint, joint.turn.angle if joint.turn else joint.shift))
+        joint.gate(self._add_limits(link, joint.turn.angle if joint.turn else joint.shift))
 
     def _side(self, line: Line, joint: _Joint, pivot: _End, end: _End) -> Real:
         """Return the side on which a rod is drawn, seen from a joint, or its other side."""
@@ -414,14 +412,19 @@ class _Drawing:
             'neither side; draw the linkage in another pose', line)
         return side * self._signs.get(line.names[0], 1)
 
-    def _add_limits(self, joint: _Joint, value: Any) -> list[Limit]:
-        """Add the limits of a joint to the linkage, and return them."""
-        if not joint.limits:
-            return []
-        slack = TOLERANCE * self._magnitude if joint.line.word == 'slide' else real(EDGE)
-        found = [Limit(value - joint.limits[0], slack), Limit(joint.limits[1] - value, slack)]
+    def _add_limits(self, name: str, value: Any) -> list[Limit]:
+        """Add the limits of a joint or a cylinder to the linkage, and return them."""
+        word, ends = self._assembly.lines[name].word, self._numbers[name][6:]
+        slack = real(EDGE) if word == 'hinge' else TOLERANCE * self._magnitude
+        margins = [value - ends[0], ends[1] - value] if ends else [value] * (word == 'cylinder')
+        found = [Limit(margin, slack) for margin in margins]
         self._builder.limits += found
+        self._builder.ways += found
         return found
+
+    def _within(self, name: str, value: Real) -> Real:
+        """Return the value of a joint or a cylinder, NaN beyond its limits."""
+        return valid_within(value, self._add_limits(name, value))
 
     def _place_hinges(self, lines: tuple[Line, ...], first: _Joint, second: _Joint) -> None:
         """Turn two hinges in a row so that two rods fit."""
@@ -446,19 +449,18 @@ class _Drawing:
                 if pivot.turn else real(0.0)
             rods.append(Rod(pivot._replace(path=frame.transformed(pivot.path)),
                             frame.transformed(second.hinge.circle(end.point)), length, side))
-        limits = first.limits, second.limits
         self._builder.windows.append(TwoRodLink(
             (first.line, second.line), tuple(inputs),
-            tuple(tuple(ends) or None for ends in limits), tuple(WindowRod(
+            tuple(tuple(joint.limits) or None for joint in (first, second)), tuple(WindowRod(
                 rod.pivot.path, rod.end, None if rod.length.varies else rod.length, rod.side)
                 for rod in rods)))
         first.turn, second.turn, limit = two_rods(rods, [
-            0.5 * (each[0] + each[1]) if each else real(0.0) for each in limits])
+            0.5 * sum(joint.limits, real(0.0)) for joint in (first, second)])
         drawn = [rod.drawn(first.turn, second.turn, self._magnitude)
                  for rod in rods if rod.pivot.turn]
         self._builder.limits += [limit, *drawn]
-        edges = [limit, *drawn, *self._add_limits(first, first.turn.angle),
-                 *self._add_limits(second, second.turn.angle)]
+        edges = [limit, *drawn, *self._add_limits(first.line.names[0], first.turn.angle),
+                 *self._add_limits(link, second.turn.angle)]
         for joint in (first, second):
             joint.gate(edges)
 
