@@ -476,7 +476,8 @@ def followed(subject):
         scale = 1.0 if mechanism.is_angle(output) else mechanism.longest
 
         def value(theta, output=output):
-            return float(mechanism.joint_angles(theta_of([theta, *subject.held]), [output])[output])
+            given = theta_of([theta, *subject.held])
+            return float(mechanism.joint_angles(given, [output])[output])
 
         for near in rng.choice(subject.values, 10).tolist():
             wanted = value(near) + rng.uniform(-0.2, 0.2) * scale
