@@ -134,11 +134,13 @@ class Solver:
         spots = self._placed(values)
         found = {}
         for id_, pieces in self.shown.items():
-            legs = _on_each_side(pose.legs) if id_ == GROUND else pose.legs
+            # Each side's legs stand on one ground.
+            legs = {leg.prefix[:1] if id_ == GROUND else leg.number: leg
+                    for leg in reversed(pose.legs)}
             found[id_] = [
                 spots[leg.number][point] if isinstance(point, LinkPoint)
                 else leg.places[self.mechanism.linkage.points.index(point)]
-                for leg in legs for piece in pieces for point in piece]
+                for leg in reversed(legs.values()) for piece in pieces for point in piece]
         return found
 
     def _placed(self, values):
@@ -146,11 +148,6 @@ class Solver:
         place, at_rest = self.mechanism.linkage.legs(self._spots, (), ()), [0.0] * len(values)
         rows = [place.at(*values, *at_rest, *leg) for leg in self.assembly.legs.values()]
         return [dict(zip(self._spots, zip(row[::2], row[1::2]))) for row in rows]
-
-
-def _on_each_side(legs):
-    """Return the first leg on the left and on the right: each side's stand on one ground."""
-    return list({leg.prefix[:1]: leg for leg in reversed(legs)}.values())
 
 
 def _shown(mechanism):
@@ -689,15 +686,8 @@ class Generator:
 
     def _arrangement(self):
         """Return the inputs that a source tells of."""
-        kind = self._random.integers(4)
-        if kind == 0:
-            return self._drives
-        if kind == 1:
-            name = self._pick(list(self._scene.mechanisms))
-            return [(m, d) for m, d in self._drives if m.name == name]
-        if kind == 2:
-            return [self._pick(self._drives)]
-        chosen = [drive for drive in self._drives if self._random.random() < 0.6]
+        share = self._pick([0.0, 0.6, 1.0])
+        chosen = [drive for drive in self._drives if self._random.random() < share]
         return chosen or [self._pick(self._drives)]
 
     def _message(self, drives, moving):

@@ -232,43 +232,29 @@ def test_a_loop_is_where_a_dialect_says(tmp_path, dialect):
     assert robot.driven == (['motor'] if is_file and 'motor' in text else [])
 
 
-def test_joints_that_no_mechanism_publishes_are_one_of_cranks(tmp_path):
-    # What is held stays where it is held, what follows another goes with it.
+def test_joints_that_no_mechanism_publishes_are_one_of_cranks_where_they_are(tmp_path):
+    # What is held stays where it is held, what follows another goes with it; after many turns and
+    # far along a rail, too.
     robot = readers.read(str(of_text(tmp_path / 'robot.urdf', """<robot name="r">
-      <link name="a"/><link name="b"/><link name="c"/><link name="d"/>
-      <joint name="j" type="revolute"><parent link="a"/><child link="b"/></joint>
-      <joint name="k 2" type="revolute"><parent link="b"/><child link="c"/>
+      <link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="e"/>
+      <joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint>
+      <joint name="k 2" type="continuous"><parent link="b"/><child link="c"/>
         <mimic joint="j" multiplier="-0.5" offset="0.1"/></joint>
-      <joint name="l" type="revolute"><parent link="c"/><child link="d"/></joint></robot>""")))
-    given, lost = cli.others(robot, {}, {'l': 0.25, 'nobody': 1.0})
+      <joint name="l" type="revolute"><parent link="c"/><child link="d"/></joint>
+      <joint name="rail" type="prismatic"><parent link="d"/><child link="e"/></joint></robot>""")))
+    given, lost = cli.others(posed(robot, {'rail': -15.0, 'j': 200.0}), {}, {
+        'l': 0.25, 'nobody': 1.0})
     assert not lost and given == {
         'mechanisms': ['others'], 'others.type': 'custom', 'others.only_named': True,
-        'others.joints': [
-            'A ground 0 0', 'B1 crank A 1', 'B2 crank A 1', 'B3 crank A 1'],
-        'others.joint_names': ['crank2="k 2"'], **{
+        'others.joints': ['A ground 0 0', *(f'B{i} crank A 1' for i in (1, 2, 3, 4))],
+        'others.joint_names': ['crank2="k 2"-99.9'], **{
             f'others.{crank}.{key}': value for crank, source, ratio, offset, start in (
-                ('crank', 'j', 1.0, 0.0, 0.0), ('crank2', 'j', -0.5, 0.1, 0.1),
-                ('crank3', 'l', 1.0, 0.0, 0.25)) for key, value in (
-                    ('source', source), ('ratio', ratio), ('offset', offset), ('start', start),
-                    ('speed', 0.0))}}
+                ('crank', 'j', 1.0, -200.0, 0.0), ('crank2', 'j', -0.5, 100.0, 0.0),
+                ('crank3', 'l', 1.0, 0.0, 0.25), ('crank4', 'rail', 1.0, 15.0, 0.0))
+            for key, value in (('source', source), ('ratio', ratio), ('offset', offset),
+                               ('start', start), ('speed', 0.0))}}
     robot = readers.read(str(ROBOTS / 'four_bar.sdf'))
     assert cli.others(robot, scene.read(cli.described(robot)[0]).mechanisms, {}) == ({}, [])
-
-
-def test_others_start_where_they_are_after_many_turns_and_far_along_a_rail(tmp_path):
-    robot = readers.read(str(of_text(tmp_path / 'robot.urdf', """<robot name="r">
-      <link name="a"/><link name="b"/><link name="c"/><link name="d"/>
-      <joint name="rail" type="prismatic"><parent link="a"/><child link="b"/></joint>
-      <joint name="wheel" type="continuous"><parent link="b"/><child link="c"/></joint>
-      <joint name="belt" type="continuous"><parent link="c"/><child link="d"/>
-        <mimic joint="wheel" multiplier="-2" offset="0.5"/></joint></robot>""")))
-    given, _ = cli.others(posed(robot, {'rail': -15.0, 'wheel': 200.0}), {}, {})
-    mechanism = scene.read(given).mechanisms['others']
-    inputs, joints = mechanism.inputs.values(), mechanism.joints.values()
-    assert [(drive.start - drive.offset) / drive.ratio for drive in inputs] == [
-        -15.0, 200.0, 200.0]
-    assert [called.of(drive.start) for drive, called in zip(inputs, joints)
-            if called.published] == [0.5 - 2.0 * 200.0]
 
 
 MOTOR = """<robot name="r"><link name="base"/><link name="crank"/>

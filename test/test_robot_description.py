@@ -84,12 +84,6 @@ def test_whoever_comes_late_hears_the_description_once(graph):
     assert all('xyz="1.0 0.0 0.0"' in texts[1].data for texts in (heard, whole))
 
 
-def test_the_command_prints_those_that_are_named(capsys):
-    assert main(['--mechanism', 'jansen', '--ros-args', '--params-file', str(CATALOGUE)]) == 0
-    jansen = scene.load(str(CATALOGUE)).mechanisms['jansen']
-    assert capsys.readouterr().out == urdf.describe([jansen], 'world') + '\n'
-
-
 FILES = {'rate.yaml': 'rate: 5.0\n', 'empty.yaml': '',
          'foreign.yaml': '/another_node:\n  ros__parameters:\n    rate: 5.0\n',
          'date.yaml': 'a: 2020-13-45\n', 'itself.yaml': '/**: {ros__parameters: &a {b: *a}}\n',
@@ -103,11 +97,13 @@ def files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def test_arguments_of_the_process_may_follow_those_for_ros(capsys, monkeypatch):
-    monkeypatch.setattr('sys.argv', [
-        'urdf', '--ros-args', '-p', 'jansen.scale:=0.5', '--', '--mechanism', 'jansen'])
-    assert main() == 0
-    assert '<robot name="jansen">' in capsys.readouterr().out
+def test_arguments_of_the_process_may_be_beside_those_for_ros(capsys, monkeypatch):
+    own, other = ['--mechanism', 'jansen'], ['--ros-args', '--params-file', str(CATALOGUE)]
+    for argv in ([*own, *other], [*other, '-p', 'jansen.scale:=0.005', '--', *own]):
+        monkeypatch.setattr('sys.argv', ['urdf', *argv])
+        assert main() == 0
+        assert capsys.readouterr().out == urdf.describe(
+            [scene.load(str(CATALOGUE)).mechanisms['jansen']], 'world') + '\n'
 
 
 @pytest.mark.parametrize('arguments, complaint', [

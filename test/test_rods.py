@@ -87,12 +87,17 @@ def test_a_rod_on_a_hinge_is_right_to_the_last_digits(seed, count):
     assert assembled > 0.4 * count
 
 
+def offers(error):
+    """Return the window [rad] that a refusal says to paste; None if it says none."""
+    found = re.findall(r'within (\S+)deg (\S+)deg(?=[,;]|$)', str(error))
+    return np.array(found, float).T * DEGREE if found else None
+
+
 def offered(lines):
-    """Return the window [rad] that is offered where there are no limits; None if there is none."""
+    """Return the window that is offered where there are no limits."""
     with pytest.raises(ValueError, match='line "roll .*both hinges need limits') as error:
         made(lines)
-    found = re.findall(r'within (\S+)deg (\S+)deg', str(error.value))
-    return np.array(found, float).T * DEGREE if found else None
+    return offers(error.value)
 
 
 def ankles(seed, count):
@@ -216,21 +221,12 @@ def test_limits_with_a_second_or_a_singular_pose_are_refused(seed, count):
             ambiguous += rods.is_ambiguous(ankle, middle - half, middle + half)
             # The largest that is offered instead is as near to a second pose as the proof goes.
             if error.limits:
-                low, high = np.transpose(list(error.limits.values()))
-                made(ankle.within(low, high))
+                low, high = offers(error)
+                alone('rods', joints=ankle.within(low, high))
                 assert not rods.is_ambiguous(ankle, low, high), (seed, i)
         else:
             assert not rods.is_ambiguous(ankle, middle - half, middle + half), (seed, i)
     assert ambiguous > 0.3 * count
-
-
-def test_a_scene_refuses_too_wide_limits_with_the_widest_that_it_allows():
-    def limited(*limits):
-        return [*(re.sub('within .*', text, line) for line, text in zip(G1, limits)), *G1[2:]]
-
-    with pytest.raises(ValueError, match='a second pose') as error:
-        alone('rods', joints=limited('within -100deg 100deg', 'within -80deg 80deg'))
-    alone('rods', joints=limited(*re.findall(r'within \S+deg \S+deg(?=[,;])', str(error.value))))
 
 
 @pytest.mark.nightly(all_but=1)
@@ -289,16 +285,6 @@ def g1():
     return made(G1)
 
 
-def check_lengths(linkage, inputs, rods_):
-    place, there = linkage.solve(inputs), 0
-    for ends in rods_:
-        length = np.linalg.norm(place[ends[0]] - place[ends[1]], axis=-1)
-        there += np.isfinite(length).sum()
-        np.testing.assert_allclose(length[np.isfinite(length)], linkage.bar_lengths[ends],
-                                   atol=2e-15)
-    return there
-
-
 def test_a_pose_is_that_of_the_motors_alone(g1):
     motors = np.random.default_rng(6).uniform(-1.0, 1.0, (2, 500))
     alone = np.array([g1.function((), ('pitch', 'roll'))(*each) for each in motors.T.tolist()]).T
@@ -338,11 +324,6 @@ def test_accelerations_are_those_of_the_motion(g1):
             found, (values[0] - 2.0 * values[1] + values[2]) / step ** 2, rtol=1e-5, atol=1e-6)
 
 
-def test_every_rod_keeps_its_length(g1):
-    motors = np.random.default_rng(9).uniform(-0.6, 0.6, (2, 1000))
-    assert check_lengths(g1, motors, [('R_right', 'R_roll'), ('L_left', 'L_roll')]) > 600
-
-
 def test_the_reach_of_one_rod_ends_where_it_is_stretched():
     # A crank of 1 under a hinge of 1, both about z, a rod between them that is a little too short.
     linkage = made(('out hinge ground at 3 0 0 axis 0 0 1',
@@ -362,6 +343,11 @@ def test_the_reach_of_one_rod_ends_where_it_is_stretched():
      'all joints between its ends are placed already'),
     (G1[:5], 'roll, pitch between its ends are unplaced: one rod places one hinge or slide'),
     (G1[:4], 'no rod places (pitch|roll)'),
+    # A platform on more rods.
+    (('x hinge ground at 0 0 0 axis 1 0 0', 'y hinge x at 0 0 0 axis 0 1 0',
+      'z hinge y at 0 0 0 axis 0 0 1', *(f'C{i} cylinder ground {i} {i} -1 z {i} {-i} 0'
+                                         for i in range(3))),
+     'z, y, x between its ends are unplaced, as for C1, C2: one rod places one hinge or slide'),
     (('a hinge ground at 0 0 0 axis 0 0 0', *G1[2:5]), 'link roll is not placed before'),
     ((G1[0].replace('0 1 0', '0 0 0'), *G1[1:]), 'its axis has no direction'),
     ((G1[0].replace('-50deg', '50deg'), *G1[1:]), 'the first end of within must be less than'),
@@ -403,23 +389,16 @@ def test_lines_of_any_text_are_read_or_refused_in_a_line():
             assert len(str(error)) <= 240
 
 
-def test_platforms_on_more_rods_are_refused_by_name():
-    legs = [f'{a}{b} hinge {c} at 0 0 {z} axis {axis}' for a, b, c, z, axis in (
-        ('x', '', 'ground', 0, '1 0 0'), ('y', '', 'x', 0, '0 1 0'), ('z', '', 'y', 0, '0 0 1'))]
-    rods_ = [f'C{i} cylinder ground {x} {y} -1 z {x} {y + 0.1} 0' for i, (x, y) in enumerate(
-        ((1, 0), (0, 1), (-1, -1)))]
-    with pytest.raises(ValueError, match='z, y, x between its ends are unplaced, as for C1, C2: '
-                       'one rod places one hinge or slide'):
-        made((*legs, *rods_))
-
-
 def test_a_rod_on_a_slide_and_a_hinge_on_a_moving_link_are_solved():
     linkage = made((
         'crank motor ground at 0 0 0 axis 0 0 1', 'block slide ground at 2 0 0 axis 1 0.1 0.2',
         'R rod crank 0.5 0 0 block 2 0 0.1', 'arm hinge block at 2 0 1 axis 0 1 0',
         'S rod crank 0.3 0.1 0 arm 2.5 0 1', 'tip fixed arm'))
     theta = np.linspace(-0.3, 0.3, 50)
-    assert check_lengths(linkage, theta, [('R_crank', 'R_block'), ('S_crank', 'S_arm')]) == 100
+    place = linkage.solve(theta)
+    for ends in ('R_crank', 'R_block'), ('S_crank', 'S_arm'):
+        length = np.linalg.norm(place[ends[0]] - place[ends[1]], axis=-1)
+        np.testing.assert_allclose(length, linkage.bar_lengths[ends], atol=2e-15)
     rate = linkage.joint_rates(theta, ['block', 'arm'])
     later, before = (linkage.joint_angles(theta + step, ['block', 'arm'])
                      for step in (1e-6, -1e-6))

@@ -31,6 +31,7 @@ from typing import NamedTuple
 
 import gmpy2
 from gmpy2 import mpc, mpfr
+from linkage_ros.linkage import theta_of
 import numpy as np
 
 from .drawing import DIGITS, draw, half_ulp, Linkage, precisely, SLIDING
@@ -134,15 +135,12 @@ def outputs(linkage, links):
 
 def answers(mechanism, values, poses, rates=False, motion=None):
     """Return {output: array} of a mechanism at values of its inputs, shape (n, inputs)."""
-    def each(row):
-        return row if len(mechanism.inputs) > 1 else row[0]
-
-    given, found = each(values.T), {}
+    given, found = theta_of(values.T), {}
     asked = [(None, mechanism.solve(given), mechanism.joint_angles(given))]
     for by in range(len(mechanism.inputs) if rates else 0):
         asked.append((by, mechanism.velocity(given, by=by), mechanism.joint_rates(given, by=by)))
     if motion:
-        moving = given, each(motion.speeds), each(motion.changes)
+        moving = given, *map(theta_of, motion)
         asked.append((TIME, mechanism.acceleration(*moving),
                       mechanism.joint_accelerations(*moving)))
     for by, points, angles in asked:

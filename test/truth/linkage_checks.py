@@ -14,6 +14,7 @@ import math
 from typing import NamedTuple
 import warnings
 
+from linkage_ros.linkage import theta_of
 import numpy as np
 
 from . import drawing_accuracy, inverse_judge, random_linkages
@@ -277,8 +278,7 @@ def accelerated(subject):
 def _given(given, shape):
     """Return values of inputs, shape (n, inputs), as a mechanism takes them."""
     columns = [column.reshape(shape)[()] for column in given.T]
-    columns = [float(column) if shape == () else column for column in columns]
-    return columns[0] if len(columns) == 1 else columns
+    return theta_of([float(column) if shape == () else column for column in columns])
 
 
 def _all(mechanism, given):
@@ -315,7 +315,8 @@ def reach(subject):
     drawing, _ = subject.drawn(subject.values)
     held = subject.reachable(drawing)
     is_in = inside(arcs, subject.values, subject.inputs[0].turn if subject.periodic else 0.0)
-    for i in _some(np.flatnonzero(held != is_in)):
+    wrong = np.flatnonzero(held != is_in)
+    for i in wrong[::len(wrong) // 4 + 1]:
         value = float(subject.values[i])
         states = subject.states(value)
         if held[i] and states <= {'meets', 'undirected'}:
@@ -329,15 +330,11 @@ def reach(subject):
             yield 'reach arcs', f'{arcs}'
         for value in (lo, hi, *subject.rng.uniform(lo, hi, 3)):
             missing = [name for name, place in subject.mechanism.solve(
-                _with(subject, float(value))).items() if np.any(np.isnan(place))]
+                theta_of([float(value), *subject.held])).items() if np.any(np.isnan(place))]
             if missing and hi - lo > NARROWEST * subject.scale \
                     and not subject.without_direction(float(value)):
                 where = 'end' if value in (lo, hi) else 'inside'
                 yield f'reach {where} is NaN', f'{missing} at {float(value)!r}, reach {arcs}'
-
-
-def _with(subject, value):
-    return [value, *subject.held] if subject.held else value
 
 
 def inside(arcs, values, turn):
@@ -347,12 +344,6 @@ def inside(arcs, values, turn):
         away = np.mod(values - lo, turn) if turn else values - lo
         held |= (away >= 0.0) & (away <= hi - lo)
     return held
-
-
-def _some(indices, most=4):
-    """Return a few of many."""
-    return indices[np.unique(np.linspace(0, len(indices) - 1, most).astype(int))] \
-        if len(indices) > most else indices
 
 
 @checked
@@ -485,7 +476,8 @@ def followed(subject):
         scale = 1.0 if mechanism.is_angle(output) else mechanism.longest
 
         def value(theta, output=output):
-            return float(mechanism.joint_angles(_with(subject, theta), [output])[output])
+            given = theta_of([theta, *subject.held])
+            return float(mechanism.joint_angles(given, [output])[output])
 
         for near in rng.choice(subject.values, 10).tolist():
             wanted = value(near) + rng.uniform(-0.2, 0.2) * scale
