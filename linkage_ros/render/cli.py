@@ -18,8 +18,7 @@ from ..optional import needs
 from ..words import suggestion
 
 IMAGES, VIDEOS = ('.png', '.svg'), ('.gif', '.mp4')
-# A GIF shows a picture for 655 s at most.
-FPS, MIN_FPS, MAX_GIF_FPS, MAX_FPS = 25.0, 0.002, 50.0, 240.0
+FPS, MAX_GIF_FPS, MAX_FPS = 25.0, 50.0, 240.0
 MIN_SIDE, MAX_SIDE = 64, 8192
 MAX_FRAMES, MAX_COLOURS = 10000, 255
 
@@ -195,7 +194,7 @@ OPTIONS = {
               'pi/2 or 90deg (default: where it starts, as all others)'),
     'turns': (VIDEOS, 'N', within(float, 0.001, 1000.0), "turns of the first mechanism's crank, "
               'or periods of its oscillation (default: 1)'),
-    'fps': (VIDEOS, 'N', within(float, MIN_FPS, MAX_FPS), f'frames per second (default: {FPS:g})'),
+    'fps': (VIDEOS, 'N', within(float, 0.001, MAX_FPS), f'frames per second (default: {FPS:g})'),
     'frames': (VIDEOS, 'N', within(int, 1, MAX_FRAMES),
                "frames in all (default: in real time, by the crank's speed)"),
     'loop': (('.gif',), 'N', within(int, 0, 65536),

@@ -7,7 +7,6 @@ from contextlib import contextmanager, suppress
 import csv
 import os
 from pathlib import Path
-import struct
 import subprocess
 import tempfile
 
@@ -18,6 +17,8 @@ from PIL import Image
 from ..words import RequestError
 
 PALETTE_FRAMES = 8
+# How long a GIF shows a picture at most [ms]: Pillow makes one of equal ones.
+LONGEST = 655350
 # Pillow looks colours up in a palette by their upper six bits: white would become another grey.
 SIX_BITS = 0b11111100
 
@@ -73,15 +74,12 @@ def gif(picture, times, fps, loop, colours, file: Path):
         frames.append(frame)
     # A GIF counts hundredths of a second, Pillow milliseconds.
     ends = [10 * round(100.0 * k / fps) for k in range(len(frames) + 1)]
+    if ends[-1] > LONGEST:
+        raise RequestError('a .gif lasts 655 s at most: choose a higher --fps, or .mp4')
     repeats = {} if loop == 1 else {'loop': max(loop - 1, 0)}
-    try:
-        with replacing(file) as new:
-            frames[0].save(new, 'GIF', save_all=True, append_images=frames[1:],
-                           duration=np.diff(ends).tolist(), **repeats)
-    except (OverflowError, struct.error):
-        # Pillow makes one picture of equal ones that follow each other.
-        raise RequestError('a .gif shows a picture for 655 s at most, but here nothing that is '
-                           'seen moves for longer: choose a higher --fps, or .mp4') from None
+    with replacing(file) as new:
+        frames[0].save(new, 'GIF', save_all=True, append_images=frames[1:],
+                       duration=np.diff(ends).tolist(), **repeats)
 
 
 def mp4(picture, times, fps, file: Path):
