@@ -415,7 +415,6 @@ def test_an_svg_has_every_part_in_its_order_where_it_was_solved(tmp_path, size, 
     (['jansen.yaml', '--out', 'a.png', '--data', 'a.png'], '--data must be another file than'),
     (['still.yaml', '--out', 'a.png', '--data', './still.yaml'], '--data must be another file'),
     (['link.yaml', '--out', 'a.png', '--data', 'still.yaml'], '--data must be another file'),
-    # A crank is twice at the same place.
     (['jansen.yaml', '--out', 'a.gif', '--frames', '1', '--fps', '0.001'], 'lasts 655 s at most'),
     (['jansen.yaml', '--out', 'a.png', '--angle', '-pi/6'],
      'expected one argument, after an = if it begins with a minus sign'),
