@@ -166,6 +166,18 @@ def check_mjcf(one, root, starts, places, weight):
             sorted(map(joint.of, drive.sweep or ())))
 
 
+@pytest.mark.parametrize('name', ['five-bar with a gear', 'Cardan gears'])
+def test_geared_joints_follow_as_they_are_published(name):
+    one = simulated(name)
+    follows = model([one]).follows
+    assert len(follows) == len(one.linkage.geared) * len(one.assembly().legs)
+    for thetas in np.random.default_rng(1).uniform(-3.0, 3.0, (4, len(one.inputs))):
+        found, _ = posed(one, thetas)
+        for geared, (driving, ratio, offset) in follows.items():
+            assert math.remainder(ratio * found[driving] + offset - found[geared], math.tau
+                                  ) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_gazebo_has_a_plugin_for_each_cut_and_each_motor():
     root, = ElementTree.fromstring(sdf.write(model([simulated('five_bar')])))
     found = [(plugin.get('filename'), plugin.get('name').rpartition('::')[2],
