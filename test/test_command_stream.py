@@ -306,10 +306,8 @@ def test_a_trajectory_becomes_that_of_the_actuators(graph, plan):
 REFUSED = [
     (['flap'], [([0.0], []), ([4.0], [])],
      r'point 1: flap cannot be 4 \(lever at -3.9\): lever reaches \[.*'),
-    (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions, and as many velocities or '
-     'none, not 2 and 0'),
-    (['flap', 'wing'], [([0.0, 0.0], [])], 'no output is called wing; an output is called '
-     '<mechanism>_<link>, <mechanism>_<joint>.x, or as joint_names has it'),
+    (['flap'], [([0.0, 1.0], [])], 'point 0 must have 1 positions, .*, not 2 and 0'),
+    (['flap', 'wing'], [([0.0, 0.0], [])], 'no output is called wing; an output .*'),
     (['flap', 'lever_A.x'], [([0.0, 0.0], [])],
      'flap and lever_A.x are moved by one actuator, servo: name one of them'),
     (['flap', 'flap'], [([0.0, 0.0], [])], 'joint_names has a name twice'),

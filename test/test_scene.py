@@ -129,17 +129,14 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
         '<world/>', 'w\u200bw', '\u2028', 'w\u2028', 'w\x85', 'w\ud800')],
     ({'frame_prefix': '/left'}, 'frame_prefix must be a text .* up to 100 characters'),
     ({'jansen.frame_id': 'my\nthigh'}, 'jansen.frame_id must be a text .* up to 100 characters'),
-    *[({'jansen.joint_names': [text]}, 'jansen.joint_names must be texts such as .* each for a '
-       'different one of crank, BC, .*, not ') for text in (
+    *[({'jansen.joint_names': [text]}, 'jansen.joint_names must be .* one of crank') for text in (
         '', 'BC', 'BC=', '=shin', 'BC=3', 'BC=left shin', 'ZZ=shin', 'left0_BC=shin', 'BC=shin+',
         'BC=""', 'BC="', 'BC="shin', 'BC="sh"in"', r'BC="\x"',
         'BC=shin+x', 'BC=shin+1+1', 'BC==shin', 'BC=--shin', 'BC=' + 'x' * 900 + '!')],
     ({'jansen.joint_names': ['BC=a', 'BC=b']},
      "jansen.joint_names must be .* different one .*'BC=b'"),
-    ({'jansen.joint_names': ['BC=knee', 'EF=-knee']}, 'jansen.joint_names must give each joint '
-     'of the scene a name of its own: jansen.BC and jansen.EF are both knee'),
-    ({'jansen.joint_names': ['BC=water_drop_CB']}, 'jansen.joint_names must give .* '
-     'water_drop.CB and jansen.BC are both water_drop_CB'),
+    ({'jansen.joint_names': ['BC=knee', 'EF=-knee']}, '.* jansen.EF are both knee'),
+    ({'jansen.joint_names': ['BC=water_drop_CB']}, '.* water_drop.CB and jansen.BC are both '),
     ({'mechanisms': ['leg', 'leg_left0'], 'leg.type': 'jansen', 'leg.leg_pairs': 2,
       'leg_left0.type': 'jansen'}, 'leg_left0.joint_names must give .* both leg_left0_BC'),
     ({'jansen.only_named': 1}, 'jansen.only_named must be true or false'),
@@ -160,7 +157,7 @@ def test_only_more_than_one_pair_is_mirrored_by_default():
     ({**OWN, 'own.joints': ['Base ground 0 0', 'A crank base 1']}, r'.*; did you mean Base\?$'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O r']}, 'own.joints: .* dimension r'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1', 'B crank O 1'], 'own.mirrored': True},
-     'own.leg_pairs must be 1 and mirrored false: only a linkage whose one crank'),
+     'own.leg_pairs must be 1 and mirrored false: only'),
     ({**OWN, 'own.joints': ['O ground 0 0', 'A crank O 1'], 'own.dimensions.r': 1.0},
      'own.dimensions.r is not a parameter'),
     ({'jansen.joints': ['O ground 0 0']}, 'jansen.joints is not a parameter'),
@@ -328,34 +325,22 @@ def test_scenes_of_the_same_values_are_equal_however_they_are_written():
 
 
 @pytest.mark.parametrize('given, reason', [
-    ({'own.tilt.ratio': 0.0}, 'own.tilt.ratio must be a finite number, of a size from 1e-30 to '
-     '1e30, not 0.0'),
+    ({'own.tilt.ratio': 0.0}, 'of a size from 1e-30 to 1e30, not 0.0'),
     # With this, positions of the source were infinite.
     ({'own.tilt.ratio': -1e-310}, 'of a size from 1e-30 to 1e30, not -1e-310'),
     ({'own.tilt.ratio': 1e31}, 'of a size from 1e-30 to 1e30, not 1e+31'),
-    ({'own.tilt.measures': 'OC'}, 'own.tilt.measures: only a linkage with one input '
-     'can be solved for an output, and own has 2'),
-    ({'own.cylinder.sweep': [0.4, 1.0]},
-     'own.cylinder.sweep must be inside the reach [0.5, 2.5] m, not [0.4, 1.0]'),
-    ({'own.cylinder.sweep': [1.0, 1.0]}, 'own.cylinder.sweep must be a list of finite '
-     'numbers, the lower end and the higher end, within 1e+06 of zero, or none, not '
-     '[1.0, 1.0]'),
-    ({'own.loads': ['c=1']}, "own.loads must be texts such as 'C=0 -9.81', a force [N] at a "
-     "joint, or 'EF=2.5', a moment [N m] on a link, each for a different one of O, P, B, C, "
-     "OB, barrel, cylinder, tilt, not 'c=1'; did you mean C?"),
+    ({'own.tilt.measures': 'OC'}, 'own.tilt.measures: only a linkage with one input '),
+    ({'own.cylinder.sweep': [0.4, 1.0]}, 'inside the reach [0.5, 2.5] m, not [0.4, 1.0]'),
+    ({'own.cylinder.sweep': [1.0, 1.0]}, 'the lower end and the higher end, '),
+    ({'own.loads': ['c=1']}, "OB, barrel, cylinder, tilt, not 'c=1'; did you mean C?"),
     ({'own.loads': ['C=1 2', 'C=1 2']}, "not 'C=1 2'"),
     ({'own.loads': ['OB=1 2']}, "own.loads: the load of OB must have one number, not 'OB=1 2'"),
-    *[({'own.loads': [line]}, "own.loads: the load of C must have the components x, y, not "
-       f"'{line}'") for line in ('C=1', 'C=1 2 3')],
-    ({'mechanisms': ['klann'], 'klann.crank.measures': 'ZZ'}, 'klann.crank.measures: klann has no '
-     "output 'ZZ'"),
+    *[({'own.loads': [line]}, 'must have the components x, y, ') for line in ('C=1', 'C=1 2 3')],
+    ({'mechanisms': ['klann'], 'klann.crank.measures': 'ZZ'}, "has no output 'ZZ'"),
     ({'mechanisms': ['klann'], 'klann.crank.measures': 'crank.x'}, 'klann.crank.measures: '),
-    ({'mechanisms': ['klann'], 'klann.crank.measures': 'distance(O,B)'},
-     'klann.crank.measures: distance(O,B) of klann does not move'),
-    ({'jansen.loads': ['BC=1'], 'jansen.leg_pairs': 2},
-     'jansen.loads must be empty for more than one leg'),
-    ({'jansen.loads': ['BC=1'], 'jansen.mirrored': True},
-     'jansen.loads must be empty for more than one leg'),
+    ({'mechanisms': ['klann'], 'klann.crank.measures': 'distance(O,B)'}, 'does not move'),
+    *[({'jansen.loads': ['BC=1'], **more}, 'jansen.loads must be empty for more than one leg')
+      for more in ({'jansen.leg_pairs': 2}, {'jansen.mirrored': True})],
 ])
 def test_settings_of_inputs_and_loads_that_cannot_be_are_refused(given, reason):
     with pytest.raises(scene.SceneError) as refused:
