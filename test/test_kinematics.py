@@ -137,26 +137,6 @@ def test_what_comes_while_the_node_is_kept_waiting_is_not_lost(graph):
     assert stamps == list(range(1051, 1151))
 
 
-@pytest.mark.parametrize('given, change, position, angle', [
-    ({}, {'ratio': 2.0, 'offset': 0.1}, 0.3, 0.7),
-    # What a sensor has said is that of another crank angle, too.
-    ({'crank.measures': 'QB', 'crank.start': 0.5}, {'ratio': -1.0},
-     -float(mechanisms.create('four_bar').joint_angles(0.9)['QB']), 0.9)])
-def test_what_a_motor_has_said_is_read_anew(graph, given, change, position, angle):
-    node = graph.start(Kinematics, {'mechanisms': ['m'], 'm.type': 'four_bar',
-                                    'm.crank.source': 'motor',
-                                    **{f'm.{key}': value for key, value in given.items()}})
-    answers = graph.listen(JointState, 'm/joint_states')
-    publisher, = [each for each in node.publishers if each.topic_name == '/m/joint_states']
-    graph.until(publisher.get_subscription_count)
-    graph.publisher(JointState, 'crank_states').publish(
-        JointState(name=['motor'], position=[position]))
-    graph.set(node, **{f'm__crank__{key}': value for key, value in change.items()})
-    graph.until(lambda: answers and answers[-1].position[0] == pytest.approx(angle))
-    assert answers[-1].position[1] == pytest.approx(
-        mechanisms.create('four_bar').joint_angles(angle)['AB'])
-
-
 KNEE = {'mechanisms': ['left', 'right'], 'left.type': 'four_bar', 'right.type': 'slotted_lever',
         'left.crank.source': 'left_knee_motor', 'right.crank.source': 'right_hip_motor',
         'left.joint_names': ['AB=left_shin', 'QB=-left_ankle+7'], 'left.only_named': True,

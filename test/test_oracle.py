@@ -60,6 +60,11 @@ SHORT = {
     'an input of two': (FIVE_BAR, [
         *everything(FIVE_BAR), message({'m_crank': 0.5}), message({'m_crank': 0.6}),
         message({'m_crank2': 0.1})]),
+    # What was received is read anew.
+    **{f'what was received of a {source} before a change': (MEASURED, [
+        *everything(MEASURED), GOOD, OTHER, ('set', change)]) for source, change in (
+            ('motor', {'b.crank.ratio': 2.0, 'b.crank.offset': 0.1}),
+            ('sensor', {'a.crank.ratio': -2.0}))},
     # What a sensor cannot say is no pose.
     **{f'a sensor at {bad}': (MEASURED, [
         *everything(MEASURED), odd, GOOD, odd, unmoved, GOOD, OTHER, odd, OTHER, ('compiled',),
