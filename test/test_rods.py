@@ -339,8 +339,7 @@ def test_the_reach_of_one_rod_ends_where_it_is_stretched():
 
 
 @pytest.mark.parametrize('lines, problem', [
-    ((*G1, 'S rod pitch 0.1 0 0 left 0.1 0 0.2'),
-     'all joints between its ends are placed already'),
+    ((*G1, 'S rod pitch 0.1 0 0 left 0.1 0 0.2'), 'between its ends are placed already'),
     (G1[:5], 'roll, pitch between its ends are unplaced: one rod places one hinge or slide'),
     (G1[:4], 'no rod places (pitch|roll)'),
     # A platform on more rods.

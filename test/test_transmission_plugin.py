@@ -280,16 +280,14 @@ JOINT, MOTOR = 'joint_handle\tknee_QB', 'actuator_handle\tknee_motor'
     # Handles of others.
     ('knee', ['actuator_handle\telbow\tposition\t0'], {}, ''),
     # Each interface: one handle, on all axes or on none.
-    ('knee', [f'{JOINT}\tposition\t5'], {},
-     "joint 'knee_QB' has several handles for position"),
-    ('knee', [f'{JOINT}\ttorque\t5'], {}, "joint 'knee_QB' has several handles for effort"),
+    *(('knee', [f'{JOINT}\t{kind}\t5'], {}, f"joint 'knee_QB' has several handles for {same}")
+      for kind, same in (('position', 'position'), ('torque', 'effort'))),
     ('knee', [f'{JOINT}\ttemperature\t5'], {}, ''),
     ('knee', [f'{JOINT}\tvelocity\t0'], {}, 'need a handle for velocity'),
     ('knee', [f'{MOTOR}\teffort\t0'], {'kinds': ['position']}, 'need a handle for effort'),
     ('knee', [], {'kinds': ['effort']}, 'need a handle for position'),
     # A handle without a value is none.
-    ('knee', [f'{JOINT}\tvelocity\t', f'{MOTOR}\tvelocity\t0'], {},
-     'need a handle for velocity'),
+    ('knee', [f'{JOINT}\tvelocity\t', f'{MOTOR}\tvelocity\t0'], {}, 'a handle for velocity'),
     # A reduction that cannot be, and other lengths.
     *(('knee', [f'joint\tknee_QB\tQB\t{numbers}'], {'joints': {}},
        "joint 'knee_QB' needs a finite offset")
