@@ -111,11 +111,10 @@ def compiled_c(kind):
 
 def original(kind):
     """Return the formulas of the original documents."""
-    names, dimensions = POINTS[kind], DIMENSIONS[kind]
-    yield Method('original formulas', original_formulas.one_pose(kind, dimensions),
-                 lambda theta: original_formulas.solve(kind, dimensions, theta),
-                 lambda answer: np.concatenate([answer[name] for name in names], -1)
-                 if isinstance(answer, dict) else np.array(answer))
+    yield Method('original formulas', *(
+        original_formulas.written(functions, kind, DIMENSIONS[kind])
+        for functions in (original_formulas.FLOATS, original_formulas.ARRAYS)),
+        lambda answer: np.stack(answer, -1))
 
 
 def numba(_):

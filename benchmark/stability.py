@@ -28,6 +28,7 @@ from truth import (
 )
 
 from . import document
+from .peers import POINTS
 
 # Samples and random linkages of a task; angles of a random design; one task in four has rates.
 CHUNK, LINKAGES, ANGLES, RATES = 50, 10, 5, 4
@@ -63,9 +64,12 @@ def measured(kind, dimensions, rng, count, rates, label):
     exact = [measure.at(row, rates) for row in given]
     found = {label: (drawing_accuracy.answers(mechanism, given, measure.poses, rates), rates)}
     if branches == usual and not (kind == 'slotted_lever' and dimensions['e']):
-        places = original_formulas.solve(kind, dimensions, given[:, 0])
+        with np.errstate(all='ignore'):
+            numbers = original_formulas.written(
+                original_formulas.ARRAYS, kind, dimensions)(given[:, 0])
+        places = dict(zip(POINTS[kind], np.reshape(numbers, (-1, 2, count)).swapaxes(1, 2)))
         found['original formulas'] = {out: places[out.name] for out in measure.poses
-                                      if out.what == 'point'}, False
+                                      if out.what == 'point' and out.name in places}, False
     return [(kind, title, str(row.output), row.ratio, row.problem)
             for title, (each, has_rates) in found.items()
             for row in drawing_accuracy.judge(measure, given, each, has_rates, exact)

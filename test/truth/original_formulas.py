@@ -27,53 +27,14 @@ ARRAYS = SimpleNamespace(
     sign=lambda theta: np.where((0.0 <= theta) & (theta <= np.pi), 1.0, -1.0).astype(theta.dtype))
 
 
-def one_pose(kind, dimensions):
+def written(functions, kind, dimensions):
     """
-    Return a function of a crank angle [rad] that returns x and y of each moving joint, as floats.
+    Return a function of a crank angle [rad] that returns x and y of each moving joint [m].
 
-    It raises ValueError where an acos or a root ends.
+    Of floats it raises ValueError where an acos or a root ends. A slot offset is not known to the
+    documents and is left out.
     """
-    _, _, pose = _formulas(FLOATS, kind, dimensions)
-    return pose
-
-
-def solve(kind, dimensions, theta):
-    """
-    Place the joints of a linkage.
-
-    Parameters
-    ----------
-    kind : str
-        The type, as in the catalogue.
-    dimensions : mapping of str to float
-        Lengths [m]; a slot offset is not known to the documents and is left out.
-    theta : array
-        Crank angle [rad].
-
-    Returns
-    -------
-    dict
-        For each joint an array of shape (*theta.shape, 2) [m].
-
-    """
-    theta = np.asarray(theta)
-    ground, moving, pose = _formulas(ARRAYS, kind, dimensions)
-    with np.errstate(invalid='ignore', divide='ignore'):
-        found = pose(theta)
-    joints = {**ground, **dict(zip(moving, zip(found[::2], found[1::2])))}
-    return {name: _stack(theta, *joint) for name, joint in joints.items()}
-
-
-def _formulas(functions, kind, dimensions):
-    """Return the ground's joints, the names of those that move, and the function of a pose."""
-    lengths = {name: float(value) for name, value in dimensions.items()}
-    with np.errstate(invalid='ignore'):
-        return _FORMULAS[kind](functions, **lengths)
-
-
-def _stack(theta, x, y):
-    shaped = [np.broadcast_to(np.asarray(part, theta.dtype), theta.shape) for part in (x, y)]
-    return np.stack(shaped, -1)
+    return _FORMULAS[kind](functions, **dimensions)
 
 
 def _water_drop(f, a):
@@ -90,7 +51,7 @@ def _water_drop(f, a):
         bx, by = -4 * a * cosine * sine, -2.0 * a + 2 * a * (2 * cosine * cosine - 1)
         return ax, ay, bx, by, 4 * ax - 3 * bx, 4 * ay - 3 * by
 
-    return {'O': (0.0, 0.0), 'C': (0.0, -2.0 * a)}, 'ABP', pose
+    return pose
 
 
 def _jansen(function, a, b, c, d, e, f, g, h, i, j, k, l, m):  # noqa: E741
@@ -117,7 +78,7 @@ def _jansen(function, a, b, c, d, e, f, g, h, i, j, k, l, m):  # noqa: E741
         return (ax, ay, cx, cy, dx, dy, ex, ey, ex + g * cos(zeta), ey + g * sin(zeta),
                 ex + i * cos(zeta + eta), ey + i * sin(zeta + eta))
 
-    return {'O': (0.0, 0.0), 'B': (bx, by)}, 'ACDEFG', pose
+    return pose
 
 
 def _peaucellier(f, r, a, b):
@@ -134,7 +95,7 @@ def _peaucellier(f, r, a, b):
         dx, dy = x * cosine + y * sine, y * cosine - x * sine
         return ax, ay, ax + bx, ay + by, ax + bx + dx, ay + by + dy, ax + dx, ay + dy
 
-    return {'O': (0.0, 0.0), 'P': (-r, 0.0)}, 'ABCD', pose
+    return pose
 
 
 def _slotted_lever(f, a, b, e=0.0):
@@ -147,7 +108,7 @@ def _slotted_lever(f, a, b, e=0.0):
         lever = atan(across / (up + b)) + math.pi / 2
         return -across, up, length * cos(lever), -b + length * sin(lever)
 
-    return {'O': (0.0, 0.0), 'Q': (0.0, -b)}, 'AL', pose
+    return pose
 
 
 _FORMULAS = {'water_drop': _water_drop, 'jansen': _jansen, 'peaucellier': _peaucellier,
