@@ -138,18 +138,6 @@ def test_another_assembly_mode_leads_to_no_solution():
         assert found == pytest.approx([-theta, theta], abs=1e-12)
 
 
-@pytest.mark.parametrize('output, most', [('angle(A,L)', math.pi), ('angle(S,B)', 0.12)])
-def test_an_output_that_jumps_has_extremes_on_both_sides(output, most):
-    lines, = (case[0] for case in SPECIAL.values() if output in case[2])
-    extremes = mechanisms.create('custom', joints=lines).extremes(output)
-    with_rail = mechanisms.create('custom', joints=[*lines, 'Z carriage O along Q 100 200'])
-    assert with_rail.extremes(output, others=[150.0]) == extremes
-    # A fast gear has another unit of the crank's angle.
-    geared = mechanisms.create('custom', joints=[*lines, 'Z crank O 1 geared crank 20 0'])
-    assert np.ravel(geared.extremes(output)) == pytest.approx(np.ravel(extremes), abs=1e-3)
-    assert all(high - low < most + 1e-9 for (low, _), (high, _) in extremes)
-
-
 def test_rates_where_a_pose_has_none_are_those_of_the_nearest_float_that_has_them():
     found = mechanisms.create('custom', joints=[
         'A ground 0 0', 'B ground 2.1 -0.0714483557885009', 'C crank A 1.100977588441',

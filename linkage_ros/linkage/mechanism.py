@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from . import statics
 from .inputs import Arc
-from .inverse import extremes_of, Inverse, inverse_of, segments_of, Solution
+from .inverse import Inverse, inverse_of, segments_of, Solution
 from .kinematics import Inputs, Kinematics
-from .motion.reach import reach_of
+from .motion.reach import extremes_of, reach_of
 from .motion.singularities import Analysis
 from .text.arguments import numbers
 from ..words import quoted
@@ -193,8 +193,8 @@ class Mechanism(Kinematics):
         Return the extremes of an output on arcs of the first input, by default its reach.
 
         Each arc has its minimum and the input there, then its maximum; an angle continues
-        past -pi and pi. By default an arc in which the output jumps, as an angle may where its
-        ends meet, counts as several.
+        past -pi and pi. Where the output jumps, as an angle may where its ends meet, not all
+        values between the two are reached; see `monotone`.
         """
         if arcs is not None and np.shape(numbers('arcs', arcs))[1:] != (2,):
             raise ValueError(f'arcs must be pairs of two numbers, got {quoted(arcs)}')

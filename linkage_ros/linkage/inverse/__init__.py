@@ -5,10 +5,10 @@
 
 from .inverse import Inverse, inverse_of, Solution
 from .linkage import InverseLinkage
-from .segments import extremes_of, Segments, segments_of
+from .segments import Segments, segments_of
 
 # The former name of a solution; deprecated.
 Answer = Solution
 
-__all__ = ['Answer', 'extremes_of', 'Inverse', 'inverse_of', 'InverseLinkage',
-           'Segments', 'segments_of', 'Solution']
+__all__ = ['Answer', 'Inverse', 'inverse_of', 'InverseLinkage', 'Segments', 'segments_of',
+           'Solution']

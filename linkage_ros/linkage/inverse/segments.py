@@ -20,8 +20,7 @@ import numpy as np
 from .problem import Candidate
 from ..inputs import Arc, Input
 from ..kinematics import Kinematics
-from ..motion.curves import CUTS, extremes, refined, sampled, turning_points
-from ..motion.reach import reach_of
+from ..motion.curves import CUTS, refined, sampled, turning_points
 from ..motion.singularities import Analysis, NEAR
 from ..tolerances import CLOSE, LEAST, ONE, ROUNDING, SINGULAR, TOLERANCE
 
@@ -78,7 +77,6 @@ class Segments:
         # Where a dyad is at a dead point, or nearly is.
         marks = normalized.distinct(
             x.value for x in analysis.near_zeros() if x.gap <= NEAR * x.size)
-        self.jumps: list[float] = []
         # Next to an end of the reach there is a pose also when turns are added, and behind gears.
         farthest = math.pi if first.is_part else normalized.high
         offset = math.tau * abs(dict(linkage.design.turned).get(first.name, 0.0)) / self._unit
@@ -91,7 +89,7 @@ class Segments:
         arcs = [(inside(low, 1.0), inside(high, -1.0)) for low, high in arcs]
         runs = [run for arc in _cut(arcs, marks) for run in self._runs(*arc)]
         if not runs or not self._moves(runs):
-            runs, self.jumps = [], []
+            runs = []
         self.all = [segment for run in runs for segment in self._monotone(*run)]
         self.all.sort(key=lambda segment: float(segment.theta[0]))
         self._answers = [*map(self._answered, range(len(self.all)))]
@@ -174,17 +172,7 @@ class Segments:
                 float(here.theta[end] - there.theta[-1 - end]) * self._unit)
         return None
 
-    # --- for other uses ---
-
-    @property
-    def arcs(self) -> list[Arc]:
-        """Return the reach without jumps, cut at them [rad or m]."""
-        joined: list[Arc] = []
-        for theta, *_ in self.all:
-            low, high = (theta[[0, -1]] * self._unit).tolist()
-            joined.append((joined.pop()[0], high) if joined and low == joined[-1][1] else (
-                low, high))
-        return joined
+    # --- for another use ---
 
     def pieces(self) -> np.ndarray:
         """Return pieces of the segments: two inputs, and two outputs within half a period."""
@@ -218,7 +206,6 @@ class Segments:
         theta, jumped = self._divided(theta, most)
         if len(theta) > most:
             return
-        self.jumps += theta[jumped].tolist()
         ulps = ULPS * np.spacing(np.abs(theta).clip(1e-3))
         around = (theta + ulps * np.array([[0.0], [1.0], [-1.0]])).clip(lo, hi)
         value, rate = self._curve(around.ravel()).reshape(2, *around.shape)
@@ -318,18 +305,6 @@ def segments_of(linkage: Kinematics, output: str, others: Sequence[float] = (),
     first = first or linkage.inputs[0]
     return linkage.cache.get_or_make(('segments', output, first.period, *others),
                                      lambda: Segments(linkage, output, others, first))
-
-
-def extremes_of(linkage: Kinematics, output: str, arcs: Sequence[Arc] | None,
-                others: Sequence[float]) -> list:
-    """Implement `Mechanism.extremes`."""
-    linkage.check_output(output)
-    pose, is_angle = linkage.compiled('output', output), linkage.is_angle(output)
-    if arcs is None:
-        segments = segments_of(linkage, output, others)
-        arcs = segments.arcs if segments.jumps else reach_of(linkage, tuple(others))
-    return [tuple(extremes(lambda value: pose.searched(value, *others)[0], low, high, is_angle))
-            for low, high in arcs]
 
 
 def _cut(arcs: Sequence[Arc], marks: Any) -> Iterator[Arc]:

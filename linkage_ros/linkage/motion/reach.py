@@ -16,7 +16,7 @@ from typing import Any, Callable, Iterable, Sequence
 
 import numpy as np
 
-from .curves import ascending, HALVINGS, lowest, near_misses, refined, sampled
+from .curves import ascending, extremes, HALVINGS, lowest, near_misses, refined, sampled
 from ..geometry.planar import Limit
 from ..inputs import Arc, CRANK, Input
 from ..kinematics import Kinematics
@@ -31,6 +31,15 @@ MAX_ENDS = 100
 def reach_of(linkage: Kinematics, others: tuple[float, ...] = ()) -> list[Arc]:
     """Implement `Mechanism.reach`."""
     return linkage.cache.get_or_make(('reach', *others), lambda: _reach(linkage, others))
+
+
+def extremes_of(linkage: Kinematics, output: str, arcs: Sequence[Arc] | None,
+                others: tuple[float, ...]) -> list:
+    """Implement `Mechanism.extremes`."""
+    linkage.check_output(output)
+    pose, is_angle = linkage.compiled('output', output), linkage.is_angle(output)
+    return [tuple(extremes(lambda value: pose.searched(value, *others)[0], low, high, is_angle))
+            for low, high in (reach_of(linkage, others) if arcs is None else arcs)]
 
 
 def over_first(linkage: Kinematics, kind: str, names: Any, others: tuple[float, ...]) -> Callable:
