@@ -161,12 +161,11 @@ class Tables:
                 closed: InverseLinkage) -> tuple[int, str]:
         """Return the number of solutions of an inverse linkage, and the function for them."""
         found, solutions = closed.solutions(), []
-        for (mode, turns), inputs in zip(product(closed.modes, product(*closed.turns)), found):
+        for (signs, turns), inputs in zip(product(closed.modes, product(*closed.turns)), found):
             # If an input has a period of several turns, each turn has its own pose.
             if not any(turns[i] for i in counted):
-                sides = ', '.join(
-                    f'{joint} {"left" if mode.linkage.branches[joint] > 0 else "right"}'
-                    for joint in closed.branches)
+                sides = ', '.join(f'{joint} {"left" if sign > 0.0 else "right"}'
+                                  for joint, sign in zip(closed.branches, signs))
                 solutions.append((f'/* {sides} */' if sides and not any(turns) else '', {
                     i: counted.get(i, value) for i, value in enumerate(inputs)}))
         if len(axes) == 1:

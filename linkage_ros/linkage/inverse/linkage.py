@@ -44,24 +44,6 @@ MAX_MODES = 64
 TRIES = 400
 
 
-class Mode(NamedTuple):
-    """
-    An assembly mode of an inverse linkage.
-
-    Attributes
-    ----------
-    linkage : LinkageFormulas
-        Its joints, as expressions of its own inputs.
-    inputs : tuple of Real
-        The values [rad or m] of the original linkage's inputs in this mode. An input that is also
-        an output is that argument of the program.
-
-    """
-
-    linkage: LinkageFormulas
-    inputs: tuple[Real, ...]
-
-
 class InverseLinkage(NamedTuple):
     """
     The joint lines of an inverse linkage, and its assembly modes.
@@ -75,28 +57,26 @@ class InverseLinkage(NamedTuple):
         drives it, and the ratio and offset from that output to the input's value.
     branches : tuple of str
         The joints whose dyads have two sides.
-    modes : tuple of Mode
-        One for each choice of these sides.
+    modes : dict
+        For each choice of these sides, +1 left, the values [rad or m] of the original linkage's
+        inputs as expressions of the outputs, which are arguments of a program. An input that is
+        also an output is that argument.
     turns : tuple of tuple of float
         For each input, the angles [rad] that may be added to its value in a mode: 0, and whole
         turns of the link that it is read from, up to the input's period.
-    arguments : dict
-        The inputs of the modes, as expressions of the outputs, which are arguments of a program.
 
     """
 
     lines: tuple[str, ...]
     drives: dict[str, tuple[str, float, float]]
     branches: tuple[str, ...]
-    modes: tuple[Mode, ...]
+    modes: dict[tuple[float, ...], tuple[Real, ...]]
     turns: tuple[tuple[float, ...], ...]
-    arguments: dict[Real, Real]
 
     def solutions(self) -> list[list[Real]]:
         """Return the inputs in each mode and its turns, as expressions of the outputs."""
-        return [substituted([value + turn for value, turn in zip(mode.inputs, turns)],
-                            self.arguments)
-                for mode in self.modes for turns in product(*self.turns)]
+        return [[value + turn for value, turn in zip(inputs, turns)]
+                for inputs in self.modes.values() for turns in product(*self.turns)]
 
     def __str__(self) -> str:
         comments = {}
@@ -123,15 +103,14 @@ def _of_sketch(outputs: Names, sketch: _Sketch) -> InverseLinkage:
     if 2 ** len(branches) * math.prod(map(len, turns)) > MAX_MODES:
         raise ValueError(f'more than {MAX_MODES} assembly modes')
     design = Design('inverse', {}, tuple(line.text for line in lines), lines[-1].names[0])
-    linkages = [LinkageFormulas(design, dict(zip(branches, signs)))
-                for signs in product((1, -1), repeat=len(branches))]
-    modes = tuple(Mode(linkage, tuple(read.value(linkage.built) for read in sketch.reads))
-                  for linkage in linkages)
     given = [ratio * argument(outputs.index(name)) + offset
              for name, ratio, offset in drives.values()]
-    # Each mode has arguments of its own.
-    return InverseLinkage(design.joints, drives, tuple(branches), modes, turns, {
-        leaf: value for mode in modes for leaf, value in zip(mode.linkage.built.arguments, given)})
+    modes = {}
+    for signs in product((1.0, -1.0), repeat=len(branches)):
+        built = LinkageFormulas(design, dict(zip(branches, signs))).built
+        modes[signs] = tuple(substituted([read.value(built) for read in sketch.reads],
+                                         dict(zip(built.arguments, given))))
+    return InverseLinkage(design.joints, drives, tuple(branches), modes, turns)
 
 
 class _Read(NamedTuple):

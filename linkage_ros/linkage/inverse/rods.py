@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from itertools import product
 
-from .linkage import InverseLinkage, MAX_MODES, Mode
+from .linkage import InverseLinkage, MAX_MODES
 from ..formulas import LinkageFormulas, Names
 from ..kinematics import Kinematics
 from ..text.rod_lines import turning_rods
@@ -31,10 +31,9 @@ def decompose(linkage: Kinematics, outputs: Names) -> InverseLinkage | None:
         leaves = {rod: argument(n + i) for i, rod in enumerate(rods)}
         structure = LinkageFormulas(design, {**linkage.branches, **leaves})
         values = [structure.output(input_.name) for input_ in linkage.inputs]
-        modes = tuple(Mode(structure, tuple(substituted(
-            values, dict(zip(leaves.values(), map(real, sides))))))
-            for sides in product((1.0, -1.0), repeat=len(rods)))
+        modes = {sides: tuple(substituted(values, dict(zip(leaves.values(), map(real, sides)))))
+                 for sides in product((1.0, -1.0), repeat=len(rods))}
         return InverseLinkage(design.joints, {name: (name, 1.0, 0.0) for name in outputs}, rods,
-                              modes, ((0.0,),) * n, {})
+                              modes, ((0.0,),) * n)
     except ValueError:
         return None
