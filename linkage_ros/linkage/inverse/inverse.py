@@ -30,13 +30,11 @@ from .refine import distinct, refine, solve_arrays
 from .segments import Segments, segments_of
 from ..inputs import theta_of
 from ..kinematics import Kinematics
-from ..text.arguments import numbers
+from ..text.arguments import checked_ends, Ends, numbers
 from ..tolerances import SINGULAR
 from ...formula.namespace import array_function
 from ...formula.program import FEW_POSES
 from ...words import listed, plain_text, quoted
-
-Ends = Sequence[tuple[float, float] | None] | None
 
 
 class Solution(NamedTuple):
@@ -304,19 +302,6 @@ class Inverse:
         return ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
                           f'numbers, got {quoted(values)}')
 
-    def _limits(self, ends: Ends) -> tuple[tuple[float, ...], ...]:
-        """Return the ends of each input as floats, () if it has none."""
-        try:
-            limits = tuple(() if pair is None else tuple(map(float, pair))
-                           for pair in ([None] * self._n if ends is None else ends))
-            if len(limits) == self._n and all(
-                    -math.inf < low <= high < math.inf for low, high in filter(None, limits)):
-                return limits
-        except (TypeError, ValueError):
-            pass
-        raise ValueError('ends must be two finite numbers in order, or None, for each input, '
-                         'got ' + quoted(ends))
-
     # --- one of the solutions ---
 
     def nearest(self, values: Sequence[Any], near: Sequence[Any] | None = None,
@@ -349,7 +334,7 @@ class Inverse:
             If there is not one value for each output, or ends are not finite and in order.
 
         """
-        n, limits, values = self._n, self._limits(ends), self._each(values)
+        n, limits, values = self._n, checked_ends(self._n, ends), self._each(values)
         seed = () if near is None else self._each(near, 'near')
         if {float} == {*map(type, values), *map(type, seed)}:
             row = self._choice.of(self._all(values, seed), seed, limits)
@@ -379,7 +364,7 @@ class Inverse:
             As `nearest` does.
 
         """
-        limits = self._limits(ends)
+        limits = checked_ends(self._n, ends)
         seed: Row = () if near is None else self._numbers(near, 'near', finite=True)
         rows = [np.atleast_1d(row) for row in np.broadcast_arrays(*self._each(values))]
         if rows[0].ndim > 1:

@@ -192,10 +192,9 @@ class _Sketch(Dyads):
                 self.slides.append(motion)
         for block, pin in linkage.yokes.items():
             self.slides.append(self._guided(pin, f'{block}-{pin}', block, 1j, self._at[block][1]))
-        done = [motor.joint for motor in self.motors]
         for output in sorted(outputs, key=lambda name: name.startswith('angle(')):
-            if output not in done:
-                done += self._add(output)
+            if output not in [motor.joint for motor in self.motors]:
+                self._add(output)
         # A joint on a single body is placed only if an input is read from it.
         self.pins = [pin for pin in self._named.values() if len(pin) > 1]
         self.on = {body: {} for body in self._at}
@@ -230,8 +229,8 @@ class _Sketch(Dyads):
         """Put a joint on a line through the origin of a body; `turn` is the body's direction."""
         return Slide((base, self._pin(joint, body, turn)), (0.0j, 0.0j), (axis, axis), body)
 
-    def _add(self, output: str) -> list[str]:
-        """Add bodies that measure an output other than a joint's value; return what they do."""
+    def _add(self, output: str) -> None:
+        """Add bodies that measure an output other than a joint's value."""
         if pair := PAIR.fullmatch(output):
             first, second = pair.groups()
             apart = self._place(second) - self._place(first)
@@ -240,16 +239,14 @@ class _Sketch(Dyads):
                 'angle') else Slide((self._pin(first, f'{output} barrel', along),
                                      self._pin(second, f'{output} rod', along)),
                                     (0.0j, 0.0j), (1.0 + 0.0j, 1.0 + 0.0j), output))
-            return [output]
+            return
         joint, axis = output.split('.')
         along, other = (1.0 + 0.0j, f'{joint}.y') if axis == 'x' else (1j, f'{joint}.x')
         self._at[output] = self._place(joint), 1.0 + 0.0j
         self.motors.append(Slide((GROUND, output), (0.0j, 0.0j), (along, along), output))
         # Along the other axis, whose coordinate may drive it.
-        across = self._guided(joint, f'{joint}.xy', output, 1.0 + 1.0j - along)
-        (self.motors if other in self._outputs else self.slides).append(
-            across._replace(joint=other))
-        return [output, other]
+        across = self._guided(joint, f'{joint}.xy', output, 1 + 1j - along)._replace(joint=other)
+        (self.motors if other in self._outputs else self.slides).append(across)
 
     def _aimed(self, output: str, first: str, second: str, along: complex) -> Hinge:
         """Return the motor for the angle of two joints, relative to the ground."""

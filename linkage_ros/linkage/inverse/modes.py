@@ -42,12 +42,9 @@ class Modes:
         self._pose = problem.linkage.bind(Program([*chain(*closed.solutions())], problem.n))
 
     def candidates(self, values: Sequence[float]) -> Iterator[Candidate]:
-        """Yield the inputs of each mode that can be assembled."""
-        flat, n = self._pose.at(*values), self._problem.n
-        for start in range(0, len(flat), n):
-            inputs = flat[start:start + n]
-            if math.isfinite(sum(inputs)):
-                yield Candidate(inputs)
+        """Return the inputs of each mode that can be assembled."""
+        modes = zip(*[iter(self._pose.at(*values))] * self._problem.n)
+        return (Candidate(inputs) for inputs in modes if math.isfinite(sum(inputs)))
 
     def candidate_arrays(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return numbers of modes, of values (outputs, m) that they have, and the inputs there."""

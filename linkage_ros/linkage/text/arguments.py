@@ -3,7 +3,8 @@
 
 """Validation of mechanisms' arguments; errors name the argument and the allowed values."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+import math
 from numbers import Real
 from typing import Any
 
@@ -12,6 +13,8 @@ import numpy as np
 from .design import Design
 from ...words import listed, quoted, suggestion
 
+# For each input of a linkage the lower and the upper end [rad or m], or None.
+Ends = Sequence[tuple[float, float] | None] | None
 # The eighth power of a length is a normal number.
 SHORTEST_LENGTH, LONGEST_LENGTH = 1e-30, 1e30
 
@@ -89,3 +92,17 @@ def checked_branches(design: Design, given: Mapping[str, int] | None) -> dict:
                              f'got {quoted(sign)}')
         signs[name] = int(sign)
     return signs
+
+
+def checked_ends(count: int, ends: Ends) -> tuple[tuple[float, ...], ...]:
+    """Return the ends of each input as floats, () without any; raise ValueError if invalid."""
+    try:
+        checked = tuple(() if pair is None else tuple(map(float, pair))
+                        for pair in ([None] * count if ends is None else ends))
+        if len(checked) == count and all(
+                -math.inf < low <= high < math.inf for low, high in filter(None, checked)):
+            return checked
+    except (TypeError, ValueError):
+        pass
+    raise ValueError('ends must be two finite numbers in order, or None, for each input, '
+                     'got ' + quoted(ends))
