@@ -728,18 +728,15 @@ static inline int lever_solutions_angle_lever(const float *position,
     /* A left */
     const float v3 = 0.5f * x0;
     const float v4 = sinf(v3);
-    const float v9 = ((2.0f * v4) * cosf(v3)) * 0.081f;
-    const float v15 = (1.0f - (2.0f * (v4 * v4))) * 0.081f;
-    const float v18 = sqrtf((v9 * v9) + (v15 * v15));
-    const float v19 = v9 / v18;
-    const float v22 = v19 * 0.045f;
-    const float v27 = lkr_root((0.02f + v22) * (0.02f - v22), 6.198883e-10f);
-    const float v30 = v15 / v18;
-    const float v31 = v30 * v22;
-    const float v35 = -(v19 * v22);
-    q[0][0] = lkr_angle(-((-(v19 * v27)) - v31), v35 + (v30 * v27));
+    const float v7 = (2.0f * v4) * cosf(v3);
+    const float v10 = v7 * 0.045f;
+    const float v15 = lkr_root((0.02f + v10) * (0.02f - v10), 6.198883e-10f);
+    const float v21 = 1.0f - (2.0f * (v4 * v4));
+    const float v22 = v21 * v10;
+    const float v26 = -(v7 * v10);
+    q[0][0] = lkr_angle(-((-(v7 * v15)) - v22), v26 + (v21 * v15));
     /* A right */
-    q[1][0] = lkr_angle(-((v27 * v19) - v31), v35 - (v27 * v30));
+    q[1][0] = lkr_angle(-((v15 * v7) - v22), v26 - (v15 * v21));
     return 2;
 }
 

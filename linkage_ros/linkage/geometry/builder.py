@@ -248,8 +248,9 @@ class Builder:
 
     def _direction(self, origin: str, towards: str) -> tuple[str, Complex, Real]:
         """Return the link of two joints, the direction between them, and its angle on the link."""
-        side = self._side(origin, towards)
-        along = side.vector.direction()
+        side, crank = self._side(origin, towards), self.points[towards].crank
+        along = crank.bar(real(1.0)) if crank and crank.centre is self.points[origin].place \
+            else side.vector.direction()
         seen = along
         if side.link != GROUND:
             frame = self.frames[side.link]

@@ -69,11 +69,12 @@ class Crank:
     angle: Real
     backwards: bool = False
 
-    def bar(self) -> Complex:
-        """Return the vector from the centre to the pin."""
+    def bar(self, length: Real | None = None) -> Complex:
+        """Return the vector from the centre to the pin, or one of another length in its place."""
         s, h = sine(0.5 * self.angle), cosine(0.5 * self.angle)
         turned = self.zero * Complex(1.0 - 2.0 * square(s), 2.0 * s * h)
-        return with_spin(turned * self.length, Rate((self.angle,), lambda rate: rate))
+        return with_spin(turned * (length or self.length),
+                         Rate((self.angle,), lambda rate: rate))
 
 
 class CrankEnds(NamedTuple):
