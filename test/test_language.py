@@ -100,18 +100,15 @@ def test_a_wrong_line_is_refused_with_the_line_and_what_is_allowed(line, problem
 
 CHAIN = ('O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'P dyad A Q 3 2.5 left',
          'R dyad P Q 2 2 left', 'S dyad R P 3 3 left', 'T dyad S R 2 2.5 right')
-MANY = [f'P{i} ground {i} 0' for i in range(500)]
 
 
 @pytest.mark.parametrize('lines, problem', [
     ([CHAIN[i] for i in (0, 1, 2, 4, 3, 5, 6)], 'joint P is placed later, in line 5: move it up'),
     ([CHAIN[i] for i in (0, 1, 2, 3, 4, 6, 5)], 'joint S is placed later, in line 7: move it up'),
-    ([CHAIN[i] for i in (0, 1, 2, 6, 5, 4, 3)], 'joint S is placed later, in line 5: move it up'),
     ((*CHAIN[:3], 'P dyad A R 2 2 left', 'R dyad Q P 2 2 left'),
      'in line 5: move it up; if it depends on P, they cannot be solved: only dyads'),
     ((*CHAIN[:3], 'P dyad A S 2 2 left', 'R dyad Q P 2 2 left', 'S rigid P R 1 1 left'),
-     'joint S is placed later, in line 6: move it up; if it depends on P, they cannot be solved'),
-    ((*CHAIN[:3], *MANY, 'Z dyad X Q 1 1 left'), r'there are: O, Q, A, P0, .*, \.\.\. \(503\)$')])
+     'joint S is placed later, in line 6: move it up; if it depends on P, they cannot be solved')])
 def test_a_line_that_comes_too_early_says_which_one_to_move(lines, problem):
     assert mechanisms.create('custom', joints=CHAIN).reach()
     with pytest.raises(ValueError, match=problem):

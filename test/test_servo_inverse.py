@@ -58,8 +58,6 @@ def cut(letter):
          f'{MECHANISMS}; did you mean slotted_lever?'),
         ({'mechanism': 'jansen'}, f"jansen has no output 'lever'{OUTPUTS}"),
         ({'output': 'C.y'}, f'{ONE} mechanism; allowed: {MECHANISMS}'),
-        ({'mechanism': 'arm', 'output': 'C.y'},
-         f"there is no mechanism 'arm'; allowed: {MECHANISMS}"),
         *(({'mechanism': 'jansen', 'output': name}, f'jansen has no output {shown}{OUTPUTS}{hint}')
           for name, shown, hint in (
             ('Z.y', "'Z.y'", ''), ('y' * 10 ** 6, cut('y'), ''),
