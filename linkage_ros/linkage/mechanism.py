@@ -112,7 +112,8 @@ class Mechanism(Kinematics):
         value beyond an extreme by rounding counts as the extreme. Raises ValueError if the
         output's formula does not depend on the input.
         """
-        fixed = self._fixed(others) if len(self.inputs) > 1 or others else ()
+        is_alone = len(self.inputs) == 1 and type(others) is tuple and not others
+        fixed = () if is_alone else self._fixed(others)
         inverse = self.inverse((output, *(input_.name for input_ in self.inputs[1:])))
         if near is not None:
             return inverse.nearest((value, *fixed), (near, *fixed))[0][0]
@@ -184,7 +185,8 @@ class Mechanism(Kinematics):
     def distance_to_dead_point(self, theta: ArrayLike, *others: float) -> Any:
         """Return the distance of the first input to the nearest dead point [rad or m], or inf."""
         theta = numbers('theta', theta)
-        away = [self.inputs[0].apart(theta, dead) for dead in self.dead_points(*others)]
+        with np.errstate(invalid='ignore'):  # of infinite angles
+            away = [self.inputs[0].apart(theta, dead) for dead in self.dead_points(*others)]
         return np.min([np.full(np.shape(theta), np.inf), *away], axis=0)[()]
 
     def extremes(self, output: str, arcs: Sequence[Arc] | None = None,

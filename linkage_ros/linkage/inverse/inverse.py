@@ -307,7 +307,7 @@ class Inverse:
     def _limits(self, ends: Ends) -> tuple[tuple[float, ...], ...]:
         """Return the ends of each input as floats, () if it has none."""
         try:
-            limits = tuple(() if pair is None else tuple(map(float, pair))
+            limits = tuple(() if pair is None else tuple(numbers('ends', pair).tolist())
                            for pair in ([None] * self._n if ends is None else ends))
             if len(limits) == self._n and all(
                     -math.inf < low <= high < math.inf for low, high in filter(None, limits)):

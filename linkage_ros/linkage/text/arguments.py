@@ -74,12 +74,17 @@ def numbers(name: str, value: Any) -> np.ndarray:
                          f'got {quoted(value)}') from None
 
 
-def checked_branches(design: Design, given: Mapping[str, int] | None) -> dict:
-    """Return all assembly signs of a design; raise ValueError if one is invalid."""
+def checked_branches(design: Design, given: Mapping[str, int] | None,
+                     others: Mapping[str, int] | None = None) -> dict:
+    """
+    Return all assembly signs of a design; raise ValueError if one is invalid.
+
+    `others` are those that are not given, by default those of the design.
+    """
     if given is not None and not isinstance(given, Mapping):
         raise ValueError(f'{design.name}: branches must be a mapping from joint to +1 or -1, '
                          f'got {quoted(given)}')
-    signs = dict(design.branches)
+    signs = dict(others or design.branches)
     for name, sign in (given or {}).items():
         if name not in signs:
             raise ValueError(f'{design.name} has no branch {quoted(name)}'
