@@ -49,7 +49,7 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P crank O 1 geared gear 2 0', 'it cannot be geared to gear; allowed: crank'),
     ('P crank O 1 geared crank 2deg 0', "'2deg' is in degrees, but RATIO is not an angle"),
     ('P cylinder O A 1 left geared crank 2 0',
-     'it cannot be geared to crank; allowed: none'),
+     'it cannot be geared to crank; allowed: none in m'),
     ('P carriage O Q 0 1', 'expected "NAME carriage ORIGIN along TOWARDS DISTANCE DISTANCE'),
     ('P carriage O along B 0 1', 'O and B are not joints of one moving link'),
     ('P carriage O along A 1 1',
