@@ -347,6 +347,12 @@ def test_of_arrays_of_dimensions_one_may_have_no_rate():
     assert np.isfinite(linkage.velocity(0.0)['B']).all(axis=-1).tolist() == [False, True]
 
 
+def test_of_no_arcs_there_are_no_extremes(bars):
+    assert bars.extremes('QB', []) == []
+    with pytest.raises(ValueError, match='arcs must be pairs of two finite numbers'):
+        bars.extremes('QB', [(0.0, math.nan)])
+
+
 def test_of_arrays_of_dimensions_change_points_are_ignored():
     kite = mechanisms.create('four_bar', a=40.0, b=100.0, c=40.0, d=100.0, p=[60.0, 70.0])
     assert kite.period() == 1 and kite.solve(0.3)['P'].shape == (2, 2)
@@ -355,7 +361,10 @@ def test_of_arrays_of_dimensions_change_points_are_ignored():
 
 def test_questions_about_the_reach_are_for_one_set_of_dimensions():
     linkage = made(b=np.array([3.0, 3.1]))
-    for ask in (linkage.reach, linkage.dead_points, lambda: linkage.input_for('QB', 1.0)):
+    boom = mechanisms.create('custom', r=[1.0, 1.1], joints=(
+        'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O r right'))
+    for ask in (linkage.reach, linkage.dead_points, lambda: linkage.input_for('QB', 1.0),
+                boom.dead_points, lambda: boom.extremes('B.x', [(0.8, 0.9)])):
         with pytest.raises(ValueError, match='for one set of dimensions, not for arrays'):
             ask()
 
@@ -365,8 +374,9 @@ def test_arrays_of_dimensions_are_checked_too():
         made(b=np.array([3.0, -3.0]))
     for line, wrong in (('P line A B b-c', 'the bar A-P must be longer'),
                         ('P rigid A B 2 0.7 left', 'no triangle has these sides'),
-                        ('P carriage O along Q 2.75 b', 'the lower end of the carriage must be')):
-        with pytest.raises(ValueError, match=f'line "{line}": {wrong}'):
+                        ('P carriage O along Q 2.75 b', 'the lower end of the carriage must be'),
+                        ('P crank Q 1 geared crank b*500 0', 'crank2 turns 1500 times as fast')):
+        with pytest.raises(ValueError, match=f'line "{line}": {wrong}|custom: {wrong}'):
             made(line, b=np.array([3.0, 2.5]))
 
 

@@ -122,8 +122,9 @@ MANY = [f'P{i} ground {i} 0' for i in range(500)]
      'only dyads'),
     ((*CHAIN[:3], 'P dyad A S 2 2 left', 'R dyad Q P 2 2 left', 'S rigid P R 1 1 left'),
      'joint S is placed later, in line 6: move it up; if it depends on P, they cannot be solved'),
+    ((*CHAIN[:3], 'P crank O 1 geared crank 2'), r'called NAME\]"$'),
     ((*CHAIN[:3], *MANY, 'Z dyad X Q 1 1 left'), r'there are: O, Q, A, P0, .*, \.\.\. \(503\)$')])
-def test_a_line_that_comes_too_early_says_which_one_to_move(lines, problem):
+def test_a_line_that_comes_too_early_or_is_too_short_says_what_to_do(lines, problem):
     assert mechanisms.create('custom', joints=CHAIN).reach()
     with pytest.raises(ValueError, match=problem):
         mechanisms.create('custom', joints=lines)

@@ -155,8 +155,8 @@ class Kinematics:
             window.check()
         for by, input_ in enumerate(self.inputs):
             for name in self.geared if input_.speed > FASTEST else ():
-                if abs(ratio := self.gear(name, by)[0]) > FASTEST:
-                    raise ValueError(f'{self.type}: {name} turns {abs(ratio):g} times as fast as '
+                if (ratio := np.max(np.abs(self.gear(name, by)[0]))) > FASTEST:
+                    raise ValueError(f'{self.type}: {name} turns {ratio:g} times as fast as '
                                      f'the {input_.name}; allowed: {FASTEST} times')
 
     def with_dimensions(self: Own, /, **changed: ArrayLike) -> Own:

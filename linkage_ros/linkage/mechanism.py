@@ -125,6 +125,9 @@ class Mechanism(Kinematics):
 
     def _fixed(self, others: Any) -> tuple[float, ...]:
         """Return the values of all inputs but the first; raise ValueError if they are not that."""
+        if self.shape:
+            raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
+                             'not for arrays')
         values = numbers('others', others)
         if values.shape != (len(self.inputs) - 1,):
             raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the values of all '
@@ -198,8 +201,9 @@ class Mechanism(Kinematics):
         past -pi and pi. By default an arc in which the output jumps, as an angle may where its
         ends meet, counts as several.
         """
-        if arcs is not None and np.shape(numbers('arcs', arcs))[1:] != (2,):
-            raise ValueError(f'arcs must be pairs of two numbers, got {quoted(arcs)}')
+        given = numbers('arcs', () if arcs is None else arcs)
+        if given.size and given.shape[1:] != (2,) or not np.isfinite(given).all():
+            raise ValueError(f'arcs must be pairs of two finite numbers, got {quoted(arcs)}')
         return extremes_of(self, output, arcs, self._fixed(others))
 
     def monotone(self, output: str, others: Sequence[float] = ()) -> np.ndarray:

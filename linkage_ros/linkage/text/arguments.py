@@ -74,8 +74,7 @@ def numbers(name: str, value: Any) -> np.ndarray:
                          f'got {quoted(value)}') from None
 
 
-def checked_branches(design: Design, given: Mapping[str, int] | None,
-                     others: Mapping[str, int] | None = None) -> dict:
+def checked_branches(design: Design, given: Mapping[str, int] | None, others: Any = None) -> dict:
     """
     Return all assembly signs of a design; raise ValueError if one is invalid.
 
