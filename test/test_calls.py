@@ -114,6 +114,7 @@ def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong
             (lambda: bars.velocity(0.1, by=wrong), 'by must be the number of an input, from 0'),
             (lambda: ankle.is_angle(wrong), 'allowed: O, S, O_origin.x'),
             (lambda: LEVER.mechanisms['lever'].assembly().solution((), (wrong,)), 'joint'),
+            (lambda: bars.driven_by(wrong), 'can be driven by 1 of none in a plane, not by'),
             (lambda: ankle.driven_by(wrong), 'can be driven by 1 of O, S, not by')):
         with pytest.raises(ValueError, match=text):
             ask()

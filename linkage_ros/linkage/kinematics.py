@@ -177,9 +177,9 @@ class Kinematics:
         """
         unknown = [x for x in outputs if not isinstance(x, str) or x not in self.joints]
         if self.axes != 'xyz' or unknown or len({*outputs}) != len(self.inputs):
+            allowed = self.joints if self.axes == 'xyz' else ('none in a plane',)
             raise ValueError(f'{self.type} can be driven by {len(self.inputs)} of '
-                             f'{listed(self.joints if self.axes == "xyz" else ())}, '
-                             f'not by {quoted(list(outputs))}')
+                             f'{listed(allowed)}, not by {quoted(list(outputs))}')
         sides = checked_branches(self.design, branches, self.branches)
         made = self.cache.get_or_make(('driven by', outputs, *sides.values()), lambda: type(self)(
             replace(self.design, inputs=outputs), self.dimensions, sides, self.is_accelerated))
