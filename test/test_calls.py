@@ -50,6 +50,8 @@ def test_integers_are_numbers(bars, arm):
     assert bars.servo_for('QB', 1) == bars.servo_for('QB', 1.0)
     assert bars.input_for('P.x', 50, near=1) == bars.input_for('P.x', 50.0, near=1.0)
     assert arm.reach(2) == arm.reach(2.0) and arm.dead_points(np.int64(2)) == arm.dead_points(2.0)
+    given = {'jansen.leg_pairs': np.int64(2), 'jansen.pose': np.zeros(6), 'rate': np.float32(1.0)}
+    assert scene.read(given) == scene.read({'jansen.leg_pairs': 2, 'rate': 1.0})
 
 
 @pytest.mark.parametrize('shape', [(), (1,), (3, 2), (0,)])
@@ -94,7 +96,8 @@ def test_what_is_no_number_is_refused_with_its_name(bars, arm, wrong):
 
 @pytest.mark.parametrize('wrong', [
     'x', None, {}, object(), [[1.0], 'x'], True, math.nan, 'distance(A,A)', 'distance(A,Z)',
-    'angle(A)', 'angle(A,B,C)', 'distance(A, B)', 'A.z', '', 'distance', '(A,B)', 7])
+    'angle(A)', 'angle(A,B,C)', 'distance(A, B)', 'A.z', '', 'distance', '(A,B)', 7,
+    np.array(['QB', 'AB'])])
 def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong):
     ankle = mechanisms.create('rods', joints=(
         'O motor ground at 0 0 0 axis 0 0 1', 'S slide ground at 1 0 0 axis 1 0 0',
@@ -106,7 +109,12 @@ def test_what_is_no_output_joint_or_package_is_refused_with_its_name(bars, wrong
             (lambda: bars.extremes(wrong), 'has no output'),
             (lambda: bars.monotone(wrong), 'has no output'),
             (lambda: bars.extremes('QB', [wrong]), 'arcs must be'),
-            (lambda: bars.function(xp=wrong or 'x'), 'xp must be a package'),
+            (lambda: bars.function(xp='x' if wrong is None else wrong), 'xp must be a package'),
+            (lambda: bars.inverse('QB').function(wrong), 'xp must be a package'),
+            (lambda: bars.velocity(0.1, by=wrong), 'by must be the number of an input, from 0'),
+            (lambda: ankle.is_angle(wrong), 'allowed: O, S, O_origin.x'),
+            (lambda: LEVER.mechanisms['lever'].assembly().solution((), (wrong,)), 'joint'),
+            (lambda: bars.driven_by(wrong), 'can be driven by 1 of none in a plane, not by'),
             (lambda: ankle.driven_by(wrong), 'can be driven by 1 of O, S, not by')):
         with pytest.raises(ValueError, match=text):
             ask()
@@ -117,7 +125,8 @@ def test_sides_of_rods_are_checked_whatever_drives():
         'O motor ground at 0 0 0 axis 0 0 1', 'S slide ground at 1 0 0 axis 1 0 0',
         'R rod O 0 0.5 0 S 1.5 0 0.1'))
     assert lever.driven_by('S', branches={'R': -1}).branches == {'R': -1}
-    for wrong, text in (({'R': 5}, 'branch R must be'), ({'X': 1}, "has no branch 'X'")):
+    for wrong, text in (({'R': 5}, 'branch R must be'), ({'X': 1}, "has no branch 'X'"),
+                        ('R', 'branches must be a mapping')):
         with pytest.raises(ValueError, match=text):
             lever.driven_by('S', branches=wrong)
 
@@ -153,6 +162,7 @@ def test_there_are_as_many_numbers_as_inputs(bars, arm):
             arm.input_for('P.x', 0.1, others=others)
     with pytest.raises(ValueError, match='four_bar has 1 inputs: the values of all except'):
         bars.reach(0.1)
+    assert bars.input_for('QB', 1.0, others=np.empty(0)).tolist() == [*bars.input_for('QB', 1.0)]
     with pytest.raises(ValueError, match='theta must be a sequence of as many values'):
         arm.solve(0.5)
 
@@ -175,9 +185,11 @@ def test_a_path_starts_next_to_an_input_of_zero(bars):
             inverse.path([np.array([value])], near)
 
 
+@pytest.mark.filterwarnings('error')
 def test_nothing_leads_to_a_value_whose_distance_is_infinite():
     drop = mechanisms.create('water_drop')
     assert math.isnan(drop.inverse('P.x').follow([sys.float_info.max], [0.3])[0][0])
+    assert math.isnan(mechanisms.create('peaucellier').distance_to_dead_point(math.inf))
 
 
 # --- what is printed ---
@@ -287,8 +299,8 @@ ASKED = {
     'header': lambda made: header.written(LEVER.mechanisms['lever'], [made('lever')]),
     'several outputs': lambda made: FIVE_BAR.inputs_for(
         [made('P.x'), made('P.y')], FIVE_BAR.solve((0.5, 2.0), 'P')['P']),
-    'scene': lambda made: scene.read({
-        made(name): value for name, value in GIVEN.items()}).parameters,
+    'scene': lambda made: scene.read({made('mechanisms'): [made('lever')], made(
+        'lever.type'): made('slotted_lever')}).parameters,
     'changed scene': lambda made: [each.name for each in scene.changed(
         LEVER, {made('lever.dimensions.e'): 1.5}).changed_from(LEVER)]}
 
@@ -317,6 +329,8 @@ def test_an_array_of_dimensions_is_broadcast_against_the_angle(shape, turned):
         pytest.skip('not broadcast')
     linkage = made(b=swept)
     place = linkage.solve(theta)
+    for found in (linkage.solve(theta, 'O')['O'][..., 0], linkage.effort(theta, {})[..., 0]):
+        assert found.shape == expected
     assert place['B'].shape == (*expected, 2) and place['O'].shape == (*expected, 2)
     lengths, thetas = np.broadcast_arrays(swept, theta)
     for index in np.ndindex(expected):
@@ -334,9 +348,24 @@ def test_of_arrays_of_dimensions_one_may_have_no_rate():
     assert np.isfinite(linkage.velocity(0.0)['B']).all(axis=-1).tolist() == [False, True]
 
 
+def test_of_no_arcs_there_are_no_extremes(bars):
+    assert bars.extremes('QB', []) == []
+    with pytest.raises(ValueError, match='arcs must be pairs of two finite numbers'):
+        bars.extremes('QB', [(0.0, math.nan)])
+
+
+def test_of_arrays_of_dimensions_change_points_are_ignored():
+    kite = mechanisms.create('four_bar', a=40.0, b=100.0, c=40.0, d=100.0, p=[60.0, 70.0])
+    assert kite.period() == 1 and kite.solve(0.3)['P'].shape == (2, 2)
+    assert made(b=[2.0, 9.0]).longest.tolist() == [made(b=b).longest for b in (2.0, 9.0)]
+
+
 def test_questions_about_the_reach_are_for_one_set_of_dimensions():
     linkage = made(b=np.array([3.0, 3.1]))
-    for ask in (linkage.reach, linkage.dead_points, lambda: linkage.input_for('QB', 1.0)):
+    boom = mechanisms.create('custom', r=[1.0, 1.1], joints=(
+        'O ground 0 0', 'P ground 0.5 -0.2', 'B cylinder P O r right'))
+    for ask in (linkage.reach, linkage.dead_points, lambda: linkage.input_for('QB', 1.0),
+                boom.dead_points, lambda: boom.extremes('B.x', [(0.8, 0.9)])):
         with pytest.raises(ValueError, match='for one set of dimensions, not for arrays'):
             ask()
 
@@ -346,8 +375,9 @@ def test_arrays_of_dimensions_are_checked_too():
         made(b=np.array([3.0, -3.0]))
     for line, wrong in (('P line A B b-c', 'the bar A-P must be longer'),
                         ('P rigid A B 2 0.7 left', 'no triangle has these sides'),
-                        ('P carriage O along Q 2.75 b', 'the lower end of the carriage must be')):
-        with pytest.raises(ValueError, match=f'line "{line}": {wrong}'):
+                        ('P carriage O along Q 2.75 b', 'the lower end of the carriage must be'),
+                        ('P crank Q 1 geared crank b*500 0', 'crank2 turns 1500 times as fast')):
+        with pytest.raises(ValueError, match=f'line "{line}": {wrong}|custom: {wrong}'):
             made(line, b=np.array([3.0, 2.5]))
 
 

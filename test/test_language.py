@@ -46,7 +46,7 @@ def made(*more, lines=FOUR_BAR, branches=None, **dimensions):
     ('P crank O 1 zero B', 'O and B are not joints of one moving link'),
     ('P crank O 1 geared gear 2 0', 'it cannot be geared to gear; allowed: crank'),
     ('P crank O 1 geared crank 2deg 0', "'2deg' is in degrees, but RATIO is not an angle"),
-    ('P cylinder O A 1 left geared crank 2 0', 'cannot be geared to crank; allowed: none'),
+    ('P cylinder O A 1 left geared crank 2 0', 'cannot be geared to crank; allowed: none in m'),
     ('P carriage O Q 0 1', 'expected "NAME carriage ORIGIN along TOWARDS DISTANCE DISTANCE'),
     ('P carriage O along B 0 1', 'O and B are not joints of one moving link'),
     ('P carriage O along A 1 1', 'the lower end of the carriage must be less than its upper'),
@@ -108,8 +108,9 @@ CHAIN = ('O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'P dyad A Q 3 2.5 left',
     ((*CHAIN[:3], 'P dyad A R 2 2 left', 'R dyad Q P 2 2 left'),
      'in line 5: move it up; if it depends on P, they cannot be solved: only dyads'),
     ((*CHAIN[:3], 'P dyad A S 2 2 left', 'R dyad Q P 2 2 left', 'S rigid P R 1 1 left'),
-     'joint S is placed later, in line 6: move it up; if it depends on P, they cannot be solved')])
-def test_a_line_that_comes_too_early_says_which_one_to_move(lines, problem):
+     'joint S is placed later, in line 6: move it up; if it depends on P, they cannot be solved'),
+    ((*CHAIN[:3], 'P crank O 1 geared crank 2'), r'called NAME\]"$')])
+def test_a_line_that_comes_too_early_or_is_too_short_says_what_to_do(lines, problem):
     assert mechanisms.create('custom', joints=CHAIN).reach()
     with pytest.raises(ValueError, match=problem):
         mechanisms.create('custom', joints=lines)

@@ -24,7 +24,7 @@ from typing import Any, Callable, Sequence
 from .expression import argument, operation, Real, substituted, unknown, where
 from .listing import Dialect
 from .program import ARRAYS, in_order, Program, tolerant
-from ..words import listed
+from ..words import listed, quoted
 
 
 def array_function(outputs: Sequence[Real], arguments: int, xp: Any, dimensions: dict,
@@ -34,6 +34,9 @@ def array_function(outputs: Sequence[Real], arguments: int, xp: Any, dimensions:
 
     `single` are the numbers that take the place of others in single precision.
     """
+    if not hasattr(xp, 'float64'):
+        raise ValueError(f"xp must be a package with Python's array API, got {quoted(xp)}")
+
     def code(dtype: Any, numbers: dict[float, float]) -> Callable:
         names = {name: _of_floats_too(name, xp, dtype) for name in (
             'sin', 'cos', 'sqrt', 'absolute', 'rint', 'where', 'atan2')}

@@ -191,17 +191,16 @@ class Program:
 
     def bind(self, dimensions: Mapping, known: dict, accelerate: bool = False) -> CompiledFunction:
         """Return the outputs as functions of the arguments; dimensions are floats or arrays."""
-        swept = any(np.ndim(v) for v in dimensions.values())
-        if not swept:
+        shape = np.broadcast_shapes(*map(np.shape, dimensions.values()))
+        if not shape:
             evaluate_in_order(self._deciding, dimensions, known)
-        decisions = () if swept else tuple(bool(known[c]) for c in self._conditions)
+        decisions = () if shape else tuple(bool(known[c]) for c in self._conditions)
         variant = self._variants.get_or_make(decisions, lambda: _Variant(
             self._outputs, dict(zip(self._conditions, decisions)), self._arguments))
         evaluate_in_order(variant.steps, dimensions, known)
         constants = [known[c] for c in variant.constants]
-        if not swept:
+        if not shape:
             constants = list(map(float, constants))
-        shape = np.broadcast_shapes(*map(np.shape, constants)) if swept else ()
         return CompiledFunction(variant, constants, shape, accelerate)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, reduce
 import math
 from types import MappingProxyType
 from typing import Any, Callable, Mapping, Sequence, TypeVar
@@ -59,6 +59,8 @@ class Kinematics:
                  accelerate: bool = False):
         self.type, self.design, self.tracer = design.name, design, design.tracer
         self.dimensions, self.branches = dict(dimensions), dict(branches)
+        # Of arrays of dimensions, and so of all results.
+        self.shape = np.broadcast_shapes(*map(np.shape, self.dimensions.values()))
         self.is_accelerated = accelerate
         # Equal linkages share it, including unpickled ones.
         self.structure = formulas_of(design, tuple(self.branches.items()))
@@ -100,10 +102,11 @@ class Kinematics:
             for link, frame in self.structure.built.frames.items()})
 
     @property
-    def longest(self) -> float:
+    def longest(self) -> Any:
         """Return the longest bar [m], or without bars the longest stroke of an input."""
-        return max(self.bar_lengths.values() or [
+        longest = reduce(np.maximum, self.bar_lengths.values() or [
             input_.high - input_.low for input_ in self.inputs])
+        return longest if self.shape else float(longest)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -152,8 +155,8 @@ class Kinematics:
             window.check()
         for by, input_ in enumerate(self.inputs):
             for name in self.geared if input_.speed > FASTEST else ():
-                if abs(ratio := self.gear(name, by)[0]) > FASTEST:
-                    raise ValueError(f'{self.type}: {name} turns {abs(ratio):g} times as fast as '
+                if (ratio := np.max(np.abs(self.gear(name, by)[0]))) > FASTEST:
+                    raise ValueError(f'{self.type}: {name} turns {ratio:g} times as fast as '
                                      f'the {input_.name}; allowed: {FASTEST} times')
 
     def with_dimensions(self: Own, /, **changed: ArrayLike) -> Own:
@@ -172,12 +175,12 @@ class Kinematics:
         of the crank for each rod, 1 as drawn or -1, by default its own. Raises ValueError if a
         joint or rod does not exist, or the linkage cannot be solved from these.
         """
-        unknown = [name for name in outputs if name not in self.joints]
+        unknown = [x for x in outputs if not isinstance(x, str) or x not in self.joints]
         if self.axes != 'xyz' or unknown or len({*outputs}) != len(self.inputs):
+            allowed = self.joints if self.axes == 'xyz' else ('none in a plane',)
             raise ValueError(f'{self.type} can be driven by {len(self.inputs)} of '
-                             f'{listed(self.joints if self.axes == "xyz" else ())}, '
-                             f'not by {quoted(list(outputs))}')
-        sides = checked_branches(self.design, {**self.branches, **(branches or {})})
+                             f'{listed(allowed)}, not by {quoted(list(outputs))}')
+        sides = checked_branches(self.design, branches, self.branches)
         made = self.cache.get_or_make(('driven by', outputs, *sides.values()), lambda: type(self)(
             replace(self.design, inputs=outputs), self.dimensions, sides, self.is_accelerated))
         made.check()
@@ -242,8 +245,8 @@ class Kinematics:
         gaps = [(limit.tolerance, *limit.ends[:2]) for limit in self.structure.built.limits
                 if limit.ends and limit.ends.theta.args[0] == by]
         values = [tuple(map(self.value, each)) for each in gaps]
-        return any(np.ndim(tolerance + start + end) == 0 and min(abs(start), abs(end)) <= tolerance
-                   for tolerance, start, end in values)
+        return not self.shape and any(min(abs(start), abs(end)) <= tolerance
+                                         for tolerance, start, end in values)
 
     def repeats(self, by: int, turns: float, kind: str, outputs: tuple[str, ...], high: float,
                 middles: ArrayLike = ()) -> bool:
@@ -355,12 +358,10 @@ class Kinematics:
         of the inputs. The package's own differentiation, vectorization and compilation apply.
         Where a pose cannot be assembled, values are NaN and their gradients finite.
         """
-        if any(map(np.ndim, self.dimensions.values())):
+        if self.shape:
             raise ValueError('a function is for one set of dimensions, not for arrays')
         if xp is None:
             return self.posed(points, joints, rates).at
-        if not hasattr(xp, 'float64'):
-            raise ValueError(f"xp must be a package with Python's array API, got {quoted(xp)}")
         outputs = self.structure.parts(self._requested(points, joints, rates))
         return array_function(outputs, len(self.inputs), xp, self.dimensions, IN_SINGLE)
 
@@ -384,6 +385,8 @@ class Kinematics:
         link), the angles of `joints` [rad; a slide: m], and the velocities of the links in
         `moving`.
         """
+        _, joints, moving = self._requested(
+            [point for point in points if not isinstance(point, LinkPoint)], joints, moving)
         named = tuple(LinkPoint(point.link, f'[x{i}]', f'[y{i}]')
                       if isinstance(point, LinkPoint) else point for i, point in enumerate(points))
         places = {name: value for point, names in zip(points, named)
@@ -399,7 +402,8 @@ class Kinematics:
         Return whether there is an output of this name.
 
         Outputs are a link's name, for its joint angle [rad] or slide [m]; a joint's coordinate
-        such as 'C.x' [m]; 'distance(A,C)' [m] of two joints; 'angle(A,C)' [rad] from +x to A -> C.
+        such as 'C.x' [m]; and, in a plane, 'distance(A,C)' [m] of two joints and 'angle(A,C)'
+        [rad] from +x to A -> C.
         """
         return isinstance(name, str) and self.structure.has(name)
 
@@ -423,11 +427,11 @@ class Kinematics:
         """Raise ValueError if an output does not exist."""
         if not self.has_output(output):
             named = (*self.joints, *self.coordinates)
-            own = listed([name for name in named if output == name[:-2]])
+            own = [x for x in self.coordinates if isinstance(output, str) and output == x[:-2]]
+            pairs = 'distance(A,B) and angle(A,B) of two joints, ' * (self.axes == 'xy')
             raise ValueError(
-                f'{self.type} has no output {quoted(output)}; allowed: distance(A,B) and '
-                f'angle(A,B) of two joints, {listed(named)}'
-                + (f'; did you mean {own}?' if output in self.points else meant(output, named)))
+                f'{self.type} has no output {quoted(output)}; allowed: {pairs}{listed(named)}'
+                + (f'; did you mean {listed(own)}?' if own else meant(output, named)))
 
     def gear(self, name: str, by: int = 0) -> tuple[float, float]:
         """Return ratio and offset [rad or m] by which an input drives a link, anywhere."""
@@ -475,7 +479,7 @@ class Kinematics:
 
     def _checked_by(self, by: Any) -> int:
         """Return the index of an input; raise ValueError if it is invalid."""
-        if isinstance(by, (bool, np.bool_)) or not hasattr(by, '__index__') \
+        if isinstance(by, (bool, np.bool_, np.ndarray)) or not hasattr(by, '__index__') \
                 or not 0 <= by.__index__() < len(self.inputs):
             raise ValueError(f'by must be the number of an input, from 0 to '
                              f'{len(self.inputs) - 1}, got {quoted(by)}')

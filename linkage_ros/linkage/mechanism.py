@@ -112,7 +112,8 @@ class Mechanism(Kinematics):
         value beyond an extreme by rounding counts as the extreme. Raises ValueError if the
         output's formula does not depend on the input.
         """
-        fixed = self._fixed(others) if len(self.inputs) > 1 or others else ()
+        is_alone = len(self.inputs) == 1 and type(others) is tuple and not others
+        fixed = () if is_alone else self._fixed(others)
         inverse = self.inverse((output, *(input_.name for input_ in self.inputs[1:])))
         if near is not None:
             return inverse.nearest((value, *fixed), (near, *fixed))[0][0]
@@ -124,6 +125,9 @@ class Mechanism(Kinematics):
 
     def _fixed(self, others: Any) -> tuple[float, ...]:
         """Return the values of all inputs but the first; raise ValueError if they are not that."""
+        if self.shape:
+            raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
+                             'not for arrays')
         values = numbers('others', others)
         if values.shape != (len(self.inputs) - 1,):
             raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the values of all '
@@ -184,7 +188,8 @@ class Mechanism(Kinematics):
     def distance_to_dead_point(self, theta: ArrayLike, *others: float) -> Any:
         """Return the distance of the first input to the nearest dead point [rad or m], or inf."""
         theta = numbers('theta', theta)
-        away = [self.inputs[0].apart(theta, dead) for dead in self.dead_points(*others)]
+        with np.errstate(invalid='ignore'):  # of infinite angles
+            away = [self.inputs[0].apart(theta, dead) for dead in self.dead_points(*others)]
         return np.min([np.full(np.shape(theta), np.inf), *away], axis=0)[()]
 
     def extremes(self, output: str, arcs: Sequence[Arc] | None = None,
@@ -196,8 +201,9 @@ class Mechanism(Kinematics):
         past -pi and pi. Where the output jumps, as an angle may where its ends meet, not all
         values between the two are reached; see `monotone`.
         """
-        if arcs is not None and np.shape(numbers('arcs', arcs))[1:] != (2,):
-            raise ValueError(f'arcs must be pairs of two numbers, got {quoted(arcs)}')
+        given = numbers('arcs', () if arcs is None else arcs)
+        if given.size and given.shape[1:] != (2,) or not np.isfinite(given).all():
+            raise ValueError(f'arcs must be pairs of two finite numbers, got {quoted(arcs)}')
         return extremes_of(self, output, arcs, self._fixed(others))
 
     def monotone(self, output: str, others: Sequence[float] = ()) -> np.ndarray:

@@ -27,7 +27,7 @@ def effort(linkage: Kinematics, theta: Inputs, loads: Mapping[str, ArrayLike]) -
     if not isinstance(loads, abc.Mapping):
         raise ValueError('loads must be a mapping from joints to forces and from links to '
                          f'moments, got {quoted(loads)}')
-    shape = np.broadcast_shapes(*map(np.shape, linkage.each_input(theta)))
+    shape = np.broadcast_shapes(linkage.shape, *map(np.shape, linkage.each_input(theta)))
     with np.errstate(invalid='ignore', over='ignore'):
         return np.stack([0.0 - sum(_powers(linkage, theta, loads, by), np.zeros(shape))
                          for by in range(len(linkage.inputs))], -1)

@@ -12,8 +12,10 @@ import re
 import sys
 from typing import Any, Callable, Collection, Iterable, Mapping, NamedTuple, Sequence
 
+import numpy as np
+
 from ..cache import cached
-from ..words import elided, listed, meant, MESSAGE, quoted, suggestion
+from ..words import elided, listed, meant, MESSAGE, plain_text, quoted, suggestion
 
 # The nodes that use parameters; KINEMATICS owns each that it uses.
 DRIVER, INVERSE, KINEMATICS = ALL = 'crank_driver', 'servo_inverse', 'kinematics'
@@ -231,5 +233,7 @@ def read_lines(name: str, lines: Iterable[str], pattern: re.Pattern, names: Coll
 
 
 def plain(value: Any) -> Any:
-    """Return a value, with any kind of list as a tuple."""
-    return tuple(value) if isinstance(value, (list, tuple, array)) else value
+    """Return a value of numpy or a text of any class as a plain one, any list as a tuple."""
+    value = value.tolist() if isinstance(value, (np.ndarray, np.generic)) else plain_text(value)
+    return tuple([x if isinstance(x, list) else plain(x) for x in value]) if isinstance(
+        value, (list, tuple, array)) else value

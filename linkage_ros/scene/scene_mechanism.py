@@ -169,7 +169,7 @@ class SceneMechanism:
 
         Each arc has the minimum and the input there, then the maximum [rad or m].
         """
-        (scale,), unit, first = self.scales, self.scale_of(output), self.first.input
+        scale, unit, first = self.scales[0], self.scale_of(output), self.first.input
         turn = first.turn if first.wraps else math.inf
         arcs = [(low / scale, min(high, low + turn) / scale) for low, high in self.first.arcs]
         return [((least * unit, low * scale), (greatest * unit, high * scale))

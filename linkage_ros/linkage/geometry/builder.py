@@ -234,7 +234,7 @@ class Builder:
             if other is None or driving is None or other.turns != input_.turns:
                 alike = [name for name, (x, _) in self.driven.items() if x.turns == input_.turns]
                 raise ConstructionError(f'it cannot be geared to {geared.input}; allowed: '
-                                        f'{", ".join(alike) or "none"}')
+                                        f'{", ".join(alike) or f"none in {input_.unit}"}')
             value = geared.ratio * driving + geared.offset
             if geared.input in self._turned:
                 turns = geared.ratio * self._turned[geared.input]

@@ -69,7 +69,7 @@ class InverseProblem:
 
     def __init__(self, linkage: Kinematics, outputs: tuple[str, ...]):
         self.linkage, self.outputs, self.n = linkage, outputs, len(outputs)
-        if any(map(np.ndim, linkage.dimensions.values())):
+        if linkage.shape:
             raise ValueError('the inverse is for one set of dimensions, not for arrays')
         self.scales = [1.0 if linkage.is_angle(name) else linkage.longest for name in outputs]
         self.sizes = [input_.size for input_ in linkage.inputs]

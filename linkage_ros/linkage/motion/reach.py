@@ -45,9 +45,6 @@ def extremes_of(linkage: Kinematics, output: str, arcs: Sequence[Arc] | None,
 def over_first(linkage: Kinematics, kind: str, names: Any, others: tuple[float, ...]) -> Callable:
     """Return the function from values of the first input (n,), in its step, to numbers."""
     pose, step = linkage.compiled(kind, names), linkage.inputs[0].step
-    if pose.shape:
-        raise ValueError('the reach, dead points and inverse are for one set of dimensions, '
-                         'not for arrays')
     return lambda value: pose.searched(value * step, *others)
 
 

@@ -77,12 +77,16 @@ def numbers(name: str, value: Any) -> np.ndarray:
                          f'got {quoted(value)}') from None
 
 
-def checked_branches(design: Design, given: Mapping[str, int] | None) -> dict:
-    """Return all assembly signs of a design; raise ValueError if one is invalid."""
+def checked_branches(design: Design, given: Mapping[str, int] | None, others: Any = None) -> dict:
+    """
+    Return all assembly signs of a design; raise ValueError if one is invalid.
+
+    `others` are those that are not given, by default those of the design.
+    """
     if given is not None and not isinstance(given, Mapping):
         raise ValueError(f'{design.name}: branches must be a mapping from joint to +1 or -1, '
                          f'got {quoted(given)}')
-    signs = dict(design.branches)
+    signs = dict(others or design.branches)
     for name, sign in (given or {}).items():
         if name not in signs:
             raise ValueError(f'{design.name} has no branch {quoted(name)}'
@@ -97,7 +101,7 @@ def checked_branches(design: Design, given: Mapping[str, int] | None) -> dict:
 def checked_ends(count: int, ends: Ends) -> tuple[tuple[float, ...], ...]:
     """Return the ends of each input as floats, () without any; raise ValueError if invalid."""
     try:
-        checked = tuple(() if pair is None else tuple(map(float, pair))
+        checked = tuple(() if pair is None else tuple(numbers('ends', pair).tolist())
                         for pair in ([None] * count if ends is None else ends))
         if len(checked) == count and all(
                 -math.inf < low <= high < math.inf for low, high in filter(None, checked)):

@@ -217,7 +217,8 @@ def parsed(text: str, forms: Mapping[str, tuple[str, ...]] = FORMS) -> Line:
     fitting = [arguments for form in forms[line.word]
                if (arguments := _matched(form, line.args)) is not None]
     if len(line.names) != names or not fitting:
-        several = '; one line per joint' if len(found) > 1 else ''
+        words = [i for i in found if parts[i - 1] not in ('geared', 'called')]
+        several = '; one line per joint' if len(words) > 1 else ''
         expected = ' or '.join(f'"{"NAME " * names}{form}"' for form in forms[line.word])
         raise line.error(f'expected {expected}{several}')
     line = line._replace(arguments=tuple(fitting[-1]))
