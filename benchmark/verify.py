@@ -25,7 +25,6 @@ import sys
 
 from linkage_ros import mechanisms, scene
 from linkage_ros.robot_model import bodies, mjcf
-from linkage_ros.robot_model.bodies import assembled
 import numpy as np
 
 from . import document
@@ -159,7 +158,7 @@ def mujoco(_, count):
     for kind in mechanisms.TYPES:
         mechanism = scene.read({'mechanisms': ['m'], 'm.type': kind}).mechanisms['m']
         linkage, size = mechanism.linkage, bodies.size(mechanism)
-        robot = assembled(bodies.robot([mechanism], 'world'))
+        robot = bodies.robot([mechanism], 'world', density=bodies.DENSITY)
         model = mj.MjModel.from_xml_string(mjcf.write(robot))
         data, names = mj.MjData(model), [model.joint(i).name for i in range(model.njnt)]
         outputs = [name.removeprefix('m_') for name in names]

@@ -35,7 +35,7 @@ class ServoInverse(scene_node.SceneNode):
 
     def __init__(self, **kwargs: Any):
         with needs('linkage_interfaces'):
-            from linkage_interfaces.srv import (  # type: ignore[attr-defined]
+            from linkage_interfaces.srv import (
                 InputsFor,
                 ServoInverse as ServoInverseType,
             )
