@@ -80,6 +80,13 @@ typedef double lkr_real;
 #define LKR_PURE static inline
 #endif
 
+/* A struct of zeros; memset would keep it in memory. */
+#ifdef __cplusplus
+#define LKR_ZERO { }
+#else
+#define LKR_ZERO { 0 }
+#endif
+
 /* Series stay in the flash memory of an AVR, which has another address space than its RAM. */
 #ifdef __AVR__
 #include <avr/pgmspace.h>
@@ -740,20 +747,18 @@ static inline int lever_solutions_angle_lever(const float *position,
     return 2;
 }
 
-/* Positions, with has_rates rates too, at inputs; returns 0 if it cannot be assembled. */
+/* Positions, and rates if has_rates, else 0, at inputs; returns 0 if it cannot be assembled. */
 static inline int lever_at(const float *q, int has_rates, lkr_point *p)
 {
-    lever_pose s, by_crank;
+    lever_pose s, by_crank = LKR_ZERO;
     if (!lever_formulas(q[0], has_rates, &s, &by_crank)) {
         return 0;
     }
     p->position[0][0] = s.angle_crank;
+    p->rate[0][0][0] = by_crank.angle_crank;
     p->position[1][0] = s.angle_lever;
-    if (has_rates) {
-        p->rate[0][0][0] = by_crank.angle_crank;
-        p->rate[1][0][0] = by_crank.angle_lever;
-        p->load[0] = 0.0f;
-    }
+    p->rate[1][0][0] = by_crank.angle_lever;
+    p->load[0] = 0.0f;
     return isfinite(p->position[0][0] + p->position[1][0]);
 }
 
@@ -765,17 +770,15 @@ static const lkr_model lever_model = {
     { { 1.0f, 1.0f, -LKR_ENDLESS, LKR_ENDLESS, { INFINITY, 6.2831855f } } }, { 0.0f }
 };
 
-/* Positions, with has_rates rates too, at inputs; returns 0 if it cannot be assembled. */
+/* Positions, and rates if has_rates, else 0, at inputs; returns 0 if it cannot be assembled. */
 static inline int lever_at_angle_lever(const float *q, int has_rates, lkr_point *p)
 {
-    lever_pose s, by_crank;
+    lever_pose s, by_crank = LKR_ZERO;
     if (!lever_formulas(q[0], has_rates, &s, &by_crank)) {
         return 0;
     }
     p->position[1][0] = s.angle_lever;
-    if (has_rates) {
-        p->rate[1][0][0] = by_crank.angle_lever;
-    }
+    p->rate[1][0][0] = by_crank.angle_lever;
     return isfinite(p->position[1][0]);
 }
 

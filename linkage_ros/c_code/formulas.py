@@ -46,6 +46,7 @@ class Formulas:
         self._parameters = [f'{name}_' for name in mechanism.inputs]
         self.names = {
             'name': mechanism.name, 'number': code.number, 'by': ', '.join(self.by),
+            'by_zero': ', '.join(f'{by} = LKR_ZERO' for by in self.by),
             'by_places': ', '.join(f'&{by}' for by in self.by),
             'by_pointers': ', '.join(f'{mechanism.name}_pose *{by}' for by in self.by),
             'arguments': ', '.join(self._parameters),

@@ -77,7 +77,7 @@ class Tables:
     def _at(self, sides: tuple[Sequence[Axis], Sequence[Axis]], commanded: int) -> Iterator[str]:
         """Yield the statements for values, rates by each input, and loads."""
         code, formulas, scale_of = self._code, self._formulas, self.mechanism.scale_of
-        needed, moving = [], []
+        needed = []
         for side, axes in enumerate(sides):
             for i, each in enumerate(axes):
                 field, factor = formulas.fields[each.output], each.factor / scale_of(each.output)
@@ -88,14 +88,13 @@ class Tables:
                 if each.wraps:
                     position = f'lkr_wrapped({position}, {code.literal(each.turn)})'
                 yield f'p->position[{side}][{i}] = {position};'
-                moving += [f'p->rate[{side}][{i}][{j}] = {rate};' for j, rate in enumerate(rates)]
+                yield from (f'p->rate[{side}][{i}][{j}] = {rate};' for j, rate in enumerate(rates))
                 needed += [f'p->position[{side}][{i}]'] * (i < commanded)
         # An inverse alone needs no efforts.
         for j, by in enumerate(formulas.by if sides[0] else ()):
             terms = [code.times(f'{by}.{formulas.fields[output]}', -load / scale_of(output))
                      for output, load in loads(self.mechanism)]
-            moving.append(f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};')
-        yield from ('if (has_rates) {', *indented(moving).splitlines(), '}')
+            yield f'p->load[{j}] = {" + ".join(terms) or code.literal(0.0)};'
         yield f'return isfinite({" + ".join(needed)});'
 
     # --- tables ---

@@ -61,6 +61,13 @@ typedef double lkr_real;
 #define LKR_PURE static inline
 #endif
 
+/* A struct of zeros; memset would keep it in memory. */
+#ifdef __cplusplus
+#define LKR_ZERO { }
+#else
+#define LKR_ZERO { 0 }
+#endif
+
 /* Series stay in the flash memory of an AVR, which has another address space than its RAM. */
 #ifdef __AVR__
 #include <avr/pgmspace.h>
