@@ -109,6 +109,7 @@ CHAIN = ('O ground 0 0', 'Q ground 4 0', 'A crank O 1', 'P dyad A Q 3 2.5 left',
      'in line 5: move it up; if it depends on P, they cannot be solved: only dyads'),
     ((*CHAIN[:3], 'P dyad A S 2 2 left', 'R dyad Q P 2 2 left', 'S rigid P R 1 1 left'),
      'joint S is placed later, in line 6: move it up; if it depends on P, they cannot be solved'),
+    ((CHAIN[0], 'A crank O 1', 'M mirrored O Q'), 'M mirrored O Q": joint Q is not placed before'),
     ((*CHAIN[:3], 'P crank O 1 geared crank 2'), r'called NAME\]"$')])
 def test_a_line_that_comes_too_early_or_is_too_short_says_what_to_do(lines, problem):
     assert mechanisms.create('custom', joints=CHAIN).reach()

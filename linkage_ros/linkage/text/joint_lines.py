@@ -157,14 +157,18 @@ def parse(texts: Iterable[str]) -> list[Line]:
         if len(lines) > MOST_LINES:
             raise line.error(f'a linkage has up to {MOST_LINES} lines, images included')
     check_order(lines)
-    return lines
+    return [line for line in lines if line.names]
 
 
 def _mirrored(lines: list[Line], mirror: Line) -> list[Line]:
-    """Return the images of lines in a mirror line; lines placed from it alone have none."""
+    """
+    Return a mirror line, which places nothing, and the images of lines in it.
+
+    Lines placed from it alone have none.
+    """
     own = set(mirror.depends_on)
     count: dict[str, int] = {}
-    found = []
+    found = [mirror._replace(names=())]
     for line in lines:
         count[line.word] = count.get(line.word, 0) + (not line.input_name)
         if own >= {*line.names} or line.depends_on and own >= {*line.depends_on} \
@@ -280,8 +284,9 @@ def check_order(lines: Sequence[Line], what: str = 'joint', placed: Sequence[str
             if name not in known and where.get(name, 0) > number:
                 raise line.error(
                     f'{what} {name} is placed later, in line {where[name]}: move it up; if it '
-                    f'depends on {line.names[0]}, they cannot be solved: only dyads, groups of '
-                    'two bars, can, not Assur groups of class III as a platform on three bars')
+                    f'depends on {(line.names or line.text.split())[0]}, they cannot be solved: '
+                    'only dyads, groups of two bars, can, not Assur groups of class III as a '
+                    'platform on three bars')
             if name not in known:
                 raise line.error(f'{what} {elided(name)} is not placed before; there are: '
                                  f'{listed(known)}{meant(name, known)}')
