@@ -235,5 +235,5 @@ def read_lines(name: str, lines: Iterable[str], pattern: re.Pattern, names: Coll
 def plain(value: Any) -> Any:
     """Return a value of numpy or a text of any class as a plain one, any list as a tuple."""
     value = value.tolist() if isinstance(value, (np.ndarray, np.generic)) else plain_text(value)
-    return tuple([x if isinstance(x, list) else plain(x) for x in value]) if isinstance(
-        value, (list, tuple, array)) else value
+    return value if not isinstance(value, (list, tuple, array)) else tuple([
+        x.tolist() if isinstance(x, np.generic) else plain_text(x) for x in value])
