@@ -336,12 +336,12 @@ class Kinematics:
         """
         Return the transmission angle of each joint [rad] in [0, pi]; the best is pi/2.
 
-        The joints are the first ones of dyad, cylinder, mirror, inversor, slot and slider lines;
-        0 and pi are dead points. For a dyad it is the angle between its bars (a cylinder is a
-        bar); for a slider between its rod and the normal of its line; for a slot between its
-        line and the normal of the radius from pivot to pin. Sources: Norton, "Design of
-        Machinery", sec. 3.3; Balli and Chand, "Transmission angle in mechanisms", Mechanism and
-        Machine Theory 37 (2002).
+        The joints are the first ones of dyad, cylinder, mirror, parallelogram, antiparallelogram,
+        inversor, slot and slider lines; 0 and pi are dead points. For a dyad it is the angle
+        between its bars (a cylinder is a bar); for a slider between its rod and the normal of its
+        line; for a slot between its line and the normal of the radius from pivot to pin. Sources:
+        Norton, "Design of Machinery", sec. 3.3; Balli and Chand, "Transmission angle in
+        mechanisms", Mechanism and Machine Theory 37 (2002).
         """
         return self._scalars('transmissions', theta, joints)
 
