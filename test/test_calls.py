@@ -360,6 +360,16 @@ def test_of_arrays_of_dimensions_change_points_are_ignored():
     assert made(b=[2.0, 9.0]).longest.tolist() == [made(b=b).longest for b in (2.0, 9.0)]
 
 
+def test_a_linkage_stays_what_it_was_created_as():
+    swept = np.array([3.0, 3.1])
+    linkage = made(b=swept)
+    swept[:] = 2.0
+    assert np.array_equal(linkage.velocity(0.3)['B'], made(b=[3.0, 3.1]).velocity(0.3)['B'])
+    for own in linkage.dimensions, linkage.branches:
+        with pytest.raises(TypeError, match='does not support item assignment'):
+            own['B'] = 1
+
+
 def test_questions_about_the_reach_are_for_one_set_of_dimensions():
     linkage = made(b=np.array([3.0, 3.1]))
     boom = mechanisms.create('custom', r=[1.0, 1.1], joints=(

@@ -19,7 +19,7 @@ from __future__ import annotations
 from functools import reduce
 import math
 from operator import or_
-from typing import Any, Callable, Sequence
+from typing import Any, Callable, Mapping, Sequence
 
 from .expression import argument, operation, Real, substituted, unknown, where
 from .listing import Dialect
@@ -27,7 +27,7 @@ from .program import ARRAYS, in_order, Program, tolerant
 from ..words import listed, quoted
 
 
-def array_function(outputs: Sequence[Real], arguments: int, xp: Any, dimensions: dict,
+def array_function(outputs: Sequence[Real], arguments: int, xp: Any, dimensions: Mapping,
                    single: dict[float, float]) -> Callable:
     """
     Return outputs as a function of arrays of a namespace, which returns a tuple of arrays.

@@ -58,7 +58,8 @@ class Kinematics:
     def __init__(self, design: Design, dimensions: Mapping, branches: Mapping[str, int],
                  accelerate: bool = False):
         self.type, self.design, self.tracer = design.name, design, design.tracer
-        self.dimensions, self.branches = dict(dimensions), dict(branches)
+        # Others may have the same linkage, and its constants are computed once.
+        self.dimensions, self.branches = map(MappingProxyType, (dict(dimensions), dict(branches)))
         # Of arrays of dimensions, and so of all results.
         self.shape = np.broadcast_shapes(*map(np.shape, self.dimensions.values()))
         self.is_accelerated = accelerate
@@ -79,7 +80,8 @@ class Kinematics:
                            for link in built.links)
 
     def __reduce__(self) -> tuple:
-        return type(self), (self.design, self.dimensions, self.branches, self.is_accelerated)
+        given = dict(self.dimensions), dict(self.branches)
+        return type(self), (self.design, *given, self.is_accelerated)
 
     def __repr__(self) -> str:
         lengths = ', '.join(f'{k}={v}' for k, v in self.dimensions.items())

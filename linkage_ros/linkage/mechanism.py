@@ -38,9 +38,9 @@ class Mechanism(Kinematics):
         Name of its type.
     design : Design
         Its joint lines and default dimensions.
-    dimensions : dict
-        Dimensions [m] by name.
-    branches : dict
+    dimensions : mapping
+        Dimensions [m] by name; `with_dimensions` returns a linkage with others.
+    branches : mapping
         Assembly sign, +1 or -1, of each joint with two.
     inputs : tuple of Input
         Cranks, by their angles [rad], and cylinders and carriages, by their lengths [m].

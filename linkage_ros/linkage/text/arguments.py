@@ -56,7 +56,7 @@ def _checked(design: Design, name: str, value: Any) -> Any:
     size = np.abs(length[length != 0.0])
     if np.any((size < SHORTEST_LENGTH) | (size > LONGEST_LENGTH)):
         raise error(f'lie between {SHORTEST_LENGTH:g} and {LONGEST_LENGTH:g}')
-    return length if length.ndim else float(length)
+    return length.copy() if length.ndim else float(length)
 
 
 # What numpy takes for numbers.
