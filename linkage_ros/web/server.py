@@ -118,12 +118,15 @@ class Server:
         """
         host = request.headers.get('Host', '')
         origin = request.headers.get('Origin')
-        if not self._is_own(host):
-            raise web.HTTPForbidden(text=f'{host!r} is not a name of this server.\n')
-        if origin is not None and origin.lower() not in (
-                f'http://{host.lower()}', f'https://{host.lower()}'):
-            raise web.HTTPForbidden(text=f'{origin!r} is a foreign origin.\n')
-        response = await handler(request)
+        try:
+            if not self._is_own(host):
+                raise web.HTTPForbidden(text=f'{host!r} is not a name of this server.\n')
+            if origin is not None and origin.lower() not in (
+                    f'http://{host.lower()}', f'https://{host.lower()}'):
+                raise web.HTTPForbidden(text=f'{origin!r} is a foreign origin.\n')
+            response = await handler(request)
+        except web.HTTPException as refusal:
+            response = web.Response(status=refusal.status, text=refusal.text)
         if not response.prepared:
             response.headers.update(HEADERS)
             # On an open connection, pipelined requests would accumulate without limit.
