@@ -238,6 +238,10 @@ def test_changes_are_saved_undone_and_reset(start, tmp_path):
     seen.click(seen.button('Reset'))
     becomes(g=36.7, h=65.7)
     seen.becomes(f'{seen.button("Reset")}.disabled')
+    # The keys of "Undo" repeat.
+    seen.value(f'for (let i = 0; i < 9; i++) {seen.button("Undo")}.click()')
+    seen.becomes(f'{seen.button("Undo")}.disabled')
+    becomes(g=36.7, h=65.7)
 
 
 @pytest.mark.nightly
