@@ -73,9 +73,8 @@ def draw(args):
     with needs('matplotlib'):
         from matplotlib import style
 
-        from .picture import Picture
-    with needs('PIL'):
         from . import files
+        from .picture import Picture
 
     for mechanism in mechanisms:
         mechanism.check_planar()

@@ -107,8 +107,6 @@ class Picture:
 
     def _turns(self, panel, turns):
         """Return the turns of one mechanism in the time of some turns of the first."""
-        if panel.cycle.period == self.period:
-            return turns
         return self.seconds(turns) / panel.cycle.period
 
 
