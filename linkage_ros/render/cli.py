@@ -115,8 +115,8 @@ def moments(arguments, picture):
         return [0.0]
     if not math.isfinite(picture.period):
         first = picture.panels[0].mechanism
-        raise RequestError(f'{first.name}.{first.first.input.name}.speed is 0, and its turns are what '
-                           'an animation shows')
+        raise RequestError(f'{first.name}.{first.first.input.name}.speed is 0, and its turns are '
+                           'what an animation shows')
     turns = arguments.turns or 1.0
     frames = arguments.frames or max(round(turns * picture.period * (arguments.fps or FPS)), 1)
     if frames > MAX_FRAMES:
