@@ -21,7 +21,8 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raise RequestError."""
         raise RequestError(message.replace(
-            'one argument', 'one argument, after an = if it begins with a minus sign'))
+            'one argument', 'one argument, after an = if it begins with a minus sign').replace(
+            'required: SCENE', 'required: SCENE, before any --mechanism'))
 
     def parse_args(self, args=None, namespace=None) -> argparse.Namespace:  # type: ignore
         """Return the arguments; raise RequestError for unknown ones."""

@@ -238,6 +238,27 @@ def test_changes_are_saved_undone_and_reset(start, tmp_path):
     seen.click(seen.button('Reset'))
     becomes(g=36.7, h=65.7)
     seen.becomes(f'{seen.button("Reset")}.disabled')
+    # The keys of "Undo" repeat.
+    seen.value(f'for (let i = 0; i < 9; i++) {seen.button("Undo")}.click()')
+    seen.becomes(f'{seen.button("Undo")}.disabled')
+
+
+@pytest.mark.nightly
+def test_of_another_linkage_with_the_same_name_nothing_is_undone(start):
+    running, seen = start(LEG)
+    seen.output('leg', 'BC')
+    seen.type('leg', 'h', '60.5')
+    seen.becomes(f'!{seen.button("Undo")}.disabled && !{seen.button("Reset")}.disabled')
+    for node in (running.viewer, *running.nodes):
+        running.graph.end(node)
+    seen.becomes('/^Connection lost/.test(notice.textContent)')
+    running.nodes = [running.graph.start(kind, {**LEG, 'leg.type': 'klann'})
+                     for kind in (CrankDriver, Kinematics)]
+    running.viewer = running.graph.start(
+        Viewer, {'port': int(re.search(r'(\d+)/$', running.url)[1])})
+    seen.becomes(f'{seen.section("leg")}?.querySelector(".about").textContent === "klann"')
+    seen.becomes(f'{seen.button("Undo")}.disabled && {seen.button("Reset")}.disabled')
+    seen.complaints.clear()
 
 
 # --- dragging ---

@@ -426,7 +426,7 @@ def test_an_svg_has_every_part_in_its_order_where_it_was_solved(tmp_path, size, 
     (['jansen.yaml', '--out', 'a.mp4', '--colours', '9'], '--colours is for .gif only, not for'),
     (['jansen.yaml', '--out', 'a.mp4', '--size', '99x98'], '--size must be two even numbers'),
     (['jansen.yaml', '--out', 'a.svg', '--size', '64x8193'], 'must be from 64 to 8192, not 8193'),
-    (['jansen.yaml', '--out', 'a.svg', '--size', '720'], "--size: invalid size value: '720'"),
+    (['jansen.yaml', '--out', 'a.svg', '--size', '720'], "--size: invalid WxH value: '720'"),
     (['excavator.yaml', '--out', 'a.svg', '--angle', '1'], '--angle is for a crank: excavator is'),
     (['jansen.yaml', '--out', 'a.gif', '--turns', 'nan'], 'from 0.001'),
     (['jansen.yaml', '--out', 'a.gif', '--turns', '999'], 'frames, more than'),
@@ -438,7 +438,8 @@ def test_an_svg_has_every_part_in_its_order_where_it_was_solved(tmp_path, size, 
     (['jansen.yaml', '--out', 'a.png', '--angle', 'inf'], 'such as 30, pi/6 or 30deg, not inf'),
     (['jansen.yaml', '--out', 'a.png', '--show', 'lables'], 'did you mean labels?'),
     (['picture.png', '--out', 'a.png'], 'picture.png'),
-    (['still.yaml', '--out', 'a.gif'], 'nothing moves'),
+    (['--mechanism', 'jansen', 'all.yaml', '--out', 'a.png'], ': SCENE, before any --mechanism'),
+    (['still.yaml', '--out', 'a.gif'], 'speed is 0, and its turns are what an animation shows'),
 ])
 def test_what_cannot_be_is_said_in_one_line_and_no_file_is_left(
         args, said, tmp_path, monkeypatch, capsys):

@@ -116,6 +116,16 @@ def test_an_input_goes_again_to_where_it_started_though_that_is_a_middle_or_an_e
         assert page.pose('/bar', output='crank', value=value)['reason'] == ''
 
 
+def test_an_input_at_its_end_stays_there_though_its_source_rounds_beyond_it(show):
+    low = 1.6
+    page = show({**RATE, 'mechanisms': ['bar'], 'bar.type': 'five_bar', 'bar.crank.start': low,
+                 'bar.crank.sweep': [low, 2.2], 'bar.crank.speed': 0.0, 'bar.crank.ratio': 0.7,
+                 'bar.crank.offset': 10.0, 'bar.crank2.start': 1.24}).page()
+    until(lambda: page.pose('/bar')['inputs']['crank'] < low)
+    for value in (1.25, 1.26, 1.27):
+        assert page.pose('/bar', output='crank2', value=value)['reason'] == ''
+
+
 def test_the_page_learns_how_far_dimensions_go_and_which_bars_follow(page):
     whole = scene.read(LEVER)
     for name, fixed, bars in (

@@ -67,7 +67,7 @@ REQUESTS = [
     ('pose', '"want": {"output": "Z", "value": 1}', "no output 'Z'"),
     ('pose', '"want": {"joint": "Z", "place": [0, 0]}', "has no point 'Z'; allowed: O, Q, "),
     ('pose', '"key": []', 'the request fails'), ('tune', '"key": ""', "no mechanism ''$"),
-    ('curve', '"output": "Z.x"', "slotted_lever has no joint 'Z.x'; allowed: .*"),
+    ('curve', '"output": "Z.x"', "no output 'Z.x'; allowed: distance.*crank, lever, .*A.x"),
     ('curve', '"kind": "transmission angle", "output": "L.x"', 'lever'),
     ('curve', '"colour": 1', 'the request fails'), ('export', '"a": 1', 'the request fails'),
     (50000 * 'x', '"a": 1', "unknown request 'x*[.]{3}x*'$"),
@@ -241,7 +241,8 @@ def test_the_page_is_served_with_nothing_from_outside(lever, name):
     '%2e%2e%2fserver.py', 'vendor%2f..%2f..%2fserver.py', 'server.py', 'none.html',
     'page/main.js'])
 def test_only_the_page_is_served(lever, name):
-    assert status(lever.url + name) == 404
+    code, headers, _ = answer(lever.url + name)
+    assert code == 404 and headers['Connection'] == 'close' and 'Referrer-Policy' in headers
 
 
 def test_a_refused_address_says_what_was_asked(lever):

@@ -73,9 +73,8 @@ def draw(args):
     with needs('matplotlib'):
         from matplotlib import style
 
-        from .picture import Picture
-    with needs('PIL'):
         from . import files
+        from .picture import Picture
 
     for mechanism in mechanisms:
         mechanism.check_planar()
@@ -116,7 +115,8 @@ def moments(arguments, picture):
         return [0.0]
     if not math.isfinite(picture.period):
         first = picture.panels[0].mechanism
-        raise RequestError(f'{first.name}.{first.first.input.name}.speed is 0: nothing moves')
+        raise RequestError(f'{first.name}.{first.first.input.name}.speed is 0, and its turns are '
+                           'what an animation shows')
     turns = arguments.turns or 1.0
     frames = arguments.frames or max(round(turns * picture.period * (arguments.fps or FPS)), 1)
     if frames > MAX_FRAMES:
@@ -187,6 +187,8 @@ def size(text):
     width, height = map(within(int, MIN_SIDE, MAX_SIDE), text.lower().split('x'))
     return width, height
 
+
+size.__name__ = 'WxH'
 
 # Options that are for some endings only: these, a name of the value, its type, and what it is.
 OPTIONS = {

@@ -143,12 +143,10 @@ class Legs:
             places = pose.places[leg]
             for part, artist in parts.items():
                 indices = self._indices[part]
-                if part == 'plates':
-                    artist.set_verts([places[plate] for plate in indices])
-                elif part in LINES:
-                    artist.set_segments(places[indices])
-                else:
+                if part in DOTS:
                     artist.set_data(*places[indices].T)
+                else:
+                    artist.set_verts([places[ends] for ends in indices])
 
 
 def lines_of(mechanism, cycle):

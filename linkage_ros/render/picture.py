@@ -8,7 +8,6 @@ import warnings
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 import numpy as np
 
 from . import layers
@@ -21,10 +20,6 @@ DOTS_PER_INCH = 100
 CROWDED = 'the size is too small for the drawn parts: choose a larger one, or hide a part'
 PADDING = 0.1  # inches, around everything
 MAX_POSES = 24  # poses in which the joints' names keep clear of the links
-
-
-class PictureError(SceneError):
-    """A picture that cannot be drawn; the text has the reason."""
 
 
 class Picture:
@@ -71,7 +66,7 @@ class Picture:
 
         Raises
         ------
-        PictureError
+        SceneError
             If there is too little room.
 
         """
@@ -82,7 +77,7 @@ class Picture:
                 try:
                     self._canvas.draw()
                 except UserWarning:
-                    raise PictureError(CROWDED) from None
+                    raise SceneError(CROWDED) from None
                 for panel in self.panels:
                     panel.fill()
         self.figure.set_layout_engine('none')
@@ -107,8 +102,6 @@ class Picture:
 
     def _turns(self, panel, turns):
         """Return the turns of one mechanism in the time of some turns of the first."""
-        if panel.cycle.period == self.period:
-            return turns
         return self.seconds(turns) / panel.cycle.period
 
 
@@ -152,16 +145,14 @@ class Panel:
         self._axes.set_axisbelow(True)
         self._axes.grid(color=GRID)
         self._axes.spines[:].set_color(FRAME)
-        for axis in (self._axes.xaxis, self._axes.yaxis):
-            axis.set_major_locator(MaxNLocator(min(max(int(8 * unit), 4), 10),
-                                               steps=[1, 2, 2.5, 5, 10]))
+        self._axes.locator_params(nbins=min(max(int(8 * unit), 4), 10))
 
     def fill(self):
-        """Set limits around all that is drawn, at one scale; PictureError if too small."""
+        """Set limits around all that is drawn, at one scale; SceneError if too small."""
         low, high = self._drawn()
         pixels = np.array(self._axes.get_window_extent().size)
         if pixels.min() < 3.0 * self._margin:
-            raise PictureError(CROWDED)
+            raise SceneError(CROWDED)
         half = 0.5 * pixels * ((high - low) / (pixels - 2.0 * self._margin)).max()
         centre = 0.5 * (low + high)
         self._axes.set(xlim=(centre[0] - half[0], centre[0] + half[0]),

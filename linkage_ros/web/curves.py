@@ -98,7 +98,7 @@ def curve(mechanism: SceneMechanism, present: Sequence[float], kind: str = POSIT
     sweep = Sweep(mechanism, present, dense_ends=True)
     names = sweep.names(kind)
     output = names[0] if names and output is None else output or ''
-    x, y, unit = sweep.values, sweep.of(kind, (output,))[output], sweep.unit(kind, output)
+    x, unit, y = sweep.values, sweep.unit(kind, output), sweep.of(kind, (output,))[output]
     # No line is drawn through a pole.
     after = np.searchsorted(x, sweep.dead[(x[0] < sweep.dead) & (sweep.dead < x[-1])])
     if kind == FORCE:

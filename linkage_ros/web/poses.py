@@ -12,7 +12,7 @@ import numpy as np
 from .nearest_pose import nearest_inputs
 from ..linkage import Formula, Mechanism, theta_of
 from ..robot_model.shapes import ground_frame
-from ..scene import Parameter, SceneError, SceneMechanism, slider
+from ..scene import InputSettings, Parameter, SceneError, SceneMechanism, slider
 from ..words import listed, quoted
 
 ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
@@ -169,19 +169,24 @@ def reached(mechanism: SceneMechanism, present: Sequence[float],
     return _output_at(mechanism, present, name, value)
 
 
+def inside(settings: InputSettings, value: float) -> float:
+    """Return the value on an input's arcs [rad or m] that is nearest to another."""
+    arcs, input_ = settings.arcs, settings.input
+    nearest = [input_.wrapped(value)] if input_.is_whole(arcs) else [
+        min(max(input_.nearest_equivalent(value, 0.5 * (low + high)), low), high)
+        for low, high in arcs]
+    return float(min(nearest, key=lambda end: input_.apart(end, value)))
+
+
 def _input_at(mechanism: SceneMechanism, present: Sequence[float], name: str,
               value: float) -> Reached:
     arcs, input_ = mechanism.inputs[name].arcs, mechanism.inputs[name].input
-    is_whole = input_.is_whole(arcs)
-    nearest = [float(input_.wrapped(value))] if is_whole else [
-        min(max(input_.nearest_equivalent(value, 0.5 * (low + high)), low), high)
-        for low, high in arcs]
-    new = min(nearest, key=lambda end: input_.apart(end, value))
+    new = inside(mechanism.inputs[name], value)
     inputs = [new if key == name else old for key, old in zip(mechanism.inputs, present)]
     places = mechanism.linkage.solve(mechanism.theta(inputs))
     if not all(math.isfinite(part) for place in places.values() for part in place):
         raise SceneError(f'{mechanism.name} cannot be assembled there')
-    is_missed = not is_whole and input_.apart(new, value) > CLOSE * input_.size
+    is_missed = input_.apart(new, input_.wrapped(value)) > CLOSE * input_.size
     return inputs, {'name': name, 'arcs': arcs, 'unit': input_.unit} if is_missed else None
 
 

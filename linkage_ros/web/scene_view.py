@@ -169,13 +169,14 @@ class SceneView:
                     inputs: list[float]) -> None:
         """Stop the inputs at requested values."""
         values = {}
-        for (name, settings), value in zip(mechanism.inputs.items(), inputs):
+        for (name, settings), received in zip(mechanism.inputs.items(), inputs):
+            value = poses.inside(settings, received)
             if f'{mechanism.name}.{name}.start' not in shown.nodes:
                 raise SceneError(f'the {name} cannot be moved: no crank_driver is running')
             # An input moves only to a start that differs from the last one.
-            values[f'{name}.start'] = value if value != settings.start else next(
-                near for near in (math.nextafter(value, way) for way in (-math.inf, math.inf))
-                if any(settings.input.holds(arc, near, near) for arc in settings.arcs))
+            values[f'{name}.start'] = next(
+                start for way in (value, -math.inf, math.inf) if settings.start != (
+                    start := poses.inside(settings, math.nextafter(value, way))))
             values[f'{name}.speed'] = 0.0
         await self.set(shown.key, values)
 

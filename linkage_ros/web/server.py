@@ -117,13 +117,15 @@ class Server:
         or by a host name that the page's owner directs to this machine, with that as the Host.
         """
         host = request.headers.get('Host', '')
-        origin = request.headers.get('Origin')
-        if not self._is_own(host):
-            raise web.HTTPForbidden(text=f'{host!r} is not a name of this server.\n')
-        if origin is not None and origin.lower() not in (
-                f'http://{host.lower()}', f'https://{host.lower()}'):
-            raise web.HTTPForbidden(text=f'{origin!r} is a foreign origin.\n')
-        response = await handler(request)
+        origin = request.headers.get('Origin', f'http://{host}')
+        try:
+            if not self._is_own(host):
+                raise web.HTTPForbidden(text=f'{host!r} is not a name of this server.\n')
+            if origin.lower() not in (f'http://{host.lower()}', f'https://{host.lower()}'):
+                raise web.HTTPForbidden(text=f'{origin!r} is a foreign origin.\n')
+            response = await handler(request)
+        except web.HTTPException as refusal:
+            response = web.Response(status=refusal.status, text=refusal.text)
         if not response.prepared:
             response.headers.update(HEADERS)
             # On an open connection, pipelined requests would accumulate without limit.
@@ -150,10 +152,9 @@ class Server:
         client = Client(self._view, socket_)
         self._clients.add(client)
         try:
-            await client.serve()
-        except (ConnectionError, asyncio.TimeoutError):
-            # The browser has left, or does not read.
-            pass
+            # The browser may leave, or not read.
+            with suppress(ConnectionError, asyncio.TimeoutError):
+                await client.serve()
         finally:
             self._clients.discard(client)
             transport = request.transport

@@ -26,6 +26,8 @@ export class Mechanism {
   describe({ settings, ...description }) {
     Object.assign(this, description);
     const changed = settings.filter(({ name, value }) => String(value) !== String(this.value(name)));
+    // Nothing is undone of another linkage that had the same name.
+    if (changed.some(({ name }) => name === 'type' || name === 'joints')) Object.assign(this, { steps: [], first: new Map() });
     this.settings = new Map(settings.map(setting => [setting.name, setting]));
     for (const { name, value } of settings.filter(isTuned)) {
       if (!this.first.has(name)) this.first.set(name, value);

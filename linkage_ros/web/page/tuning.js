@@ -95,6 +95,7 @@ export class Tuning {
 
   async undo() {
     const step = this.mechanism.steps.pop();
+    this.renderTools();
     if (!await this.put(step.values)) this.mechanism.steps.push(step);
     this.renderTools();
   }
