@@ -47,7 +47,7 @@ PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], independ
 
 @pytest.mark.parametrize('file, args, why', [
     ('nowhere.urdf', [], f'{ROBOTS}/nowhere.urdf: No such file or directory\n'),
-    ('four_bar.sdf', ['--loops', 'a'], f'{ROBOTS}/four_bar.sdf has its own loops; '),
+    ('four_bar.sdf', ['--loops', 'a'], f'{ROBOTS}/four_bar.sdf: only a URDF has its loops '),
     ('four_bar.urdf', ['--pose', 'motor'], f"'motor'{POSES}"),
     ('four_bar.urdf', ['--pose', 'elbow=0', 'motor=a'], f"'motor=a'{POSES}"),
     ('four_bar.urdf', ['--hold', 'motor=1e9'], f"'motor=1e9'{POSES}"),
@@ -55,7 +55,7 @@ PIN = '{pin_loops: [{parent: coupler, child: rocker, %s: [0.3, 0, 0]}], independ
     ('four_bar.sdf', ['--driven', 'joint_a'], "there is no joint 'joint_a'; allowed: joint_A, "),
     ('five_bar.urdf', [], 'no joint of this robot closes a loop; those of a URDF are'),
     *(('four_bar.urdf', ['--loops', text], why) for text, why in (
-        ('{closed_loop: [{link_a: front', '/loops.yaml is no YAML: '),
+        ('{closed_loop: [{link_a: front', '/loops.yaml cannot be read: while parsing a flow mapping'),
         (PIN % 'parent_xzy', "/loops.yaml names 'parent_xyz', which is not there\n"),
         (PIN.replace('independent', 'indepndent') % 'parent_xyz',
          "/loops.yaml: there is no key 'indepndent'; allowed: closures, closed_loop, pin_lo"),

@@ -6,7 +6,7 @@
 from itertools import combinations
 
 from linkage_ros import mechanisms, scene
-from linkage_ros.linkage import LinkPoint
+from linkage_ros.linkage import GROUND, LinkPoint
 from linkage_ros.robot_model import shapes
 from linkage_ros.robot_model.shapes import BARREL, BLOCK, GUIDE, ROD
 import numpy as np
@@ -74,7 +74,7 @@ def test_what_slides_is_where_its_joints_say(name):
     assert count >= 40 * len(shapes.shapes(one))
     if len(one.assembly().legs) == 1:
         for shape, moved in ends.items():
-            assert shape.is_fixed == (np.ptp(moved, axis=0).max() < 1e-9 * size)
+            assert (shape.start.link == GROUND) == (np.ptp(moved, axis=0).max() < 1e-9 * size)
 
 
 @pytest.mark.parametrize('name, kinds', [
@@ -99,7 +99,7 @@ def test_a_barrel_is_as_long_as_the_stroke_from_half_to_nine_tenths(sweep, barre
         LinkPoint('barrel', 0.0, 0.0), pytest.approx(barrel), 0.0)
     assert (rod.start.x, rod.start.y, rod.end) == (
         pytest.approx(barrel - sweep[1]), 0.0, LinkPoint('cylinder', 0.0, 0.0))
-    assert not outer.is_fixed and not rod.is_fixed
+    assert GROUND not in (outer.start.link, rod.start.link)
 
 
 @pytest.mark.parametrize('name', ['jansen', 'gripper', 'Cassie', 'flat'])

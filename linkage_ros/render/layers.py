@@ -18,6 +18,7 @@ from matplotlib.patheffects import withStroke
 import numpy as np
 
 from .cycle import SAMPLES
+from ..linkage import GROUND
 from ..palette import BAR, DARK, DRIVEN, EARTH, FLOOR, GREY, LOCUS, TRACK
 from ..robot_model import shapes
 
@@ -103,7 +104,7 @@ def guides(axes, mechanism, cycle, unit):
     if line is not None:
         axes.axline(*line, **dashed)
     for shape, ends in cycle.slides:
-        if shape.kind == shapes.GUIDE and shape.is_fixed:
+        if shape.kind == shapes.GUIDE and shape.start.link == GROUND:
             for track in cycle.course[0, :1 + mechanism.mirrored, ends]:
                 axes.plot(*track.T, color=TRACK, lw=8 * unit, zorder=1, solid_capstyle='round')
 
@@ -160,7 +161,7 @@ def lines_of(mechanism, cycle):
     for shape, ends in cycle.slides:
         part = 'slots' if shape.kind == shapes.GUIDE else (
             'driven' if shape.slide.name in mechanism.inputs else 'bodies')
-        if part != 'slots' or not shape.is_fixed:
+        if part != 'slots' or shape.start.link != GROUND:
             lines[part].append(ends)
     return {part: np.array(ends, int).reshape(-1, 2) for part, ends in lines.items()}
 

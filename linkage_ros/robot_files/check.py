@@ -51,11 +51,6 @@ class Imported(NamedTuple):
     slack: float = 0.0
 
 
-def name_beside(others: Sequence[Imported], name: str) -> str:
-    """Return a name that no other mechanism has."""
-    return f'{name}_{len(others)}' if name in [made.name for made in others] else name
-
-
 class Source(NamedTuple):
     """An input: ratio * position + offset of its source."""
 
@@ -80,6 +75,14 @@ def parameters(mechanism: str, kind: str, lines: Sequence[str], drives: Sequence
         for link, sign, name, position in joints]
     values['only_named'] = True
     return {f'{mechanism}.{key}': value for key, value in values.items()}
+
+
+def mechanism(others: Sequence[Imported], name: str, *args: Any, **more: Any
+              ) -> tuple[str, dict[str, Any], scene.SceneMechanism]:
+    """Return a mechanism beside others: its name, which none of them has, `parameters`, itself."""
+    name = f'{name}_{len(others)}' if name in [made.name for made in others] else name
+    values = parameters(name, *args, **more)
+    return name, values, scene.read({'mechanisms': [name], **values}).mechanisms[name]
 
 
 class Walk(NamedTuple):

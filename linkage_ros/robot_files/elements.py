@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, Iterable, Sequence
 import xml.etree.ElementTree as ElementTree
 from xml.parsers import expat
@@ -18,21 +19,20 @@ Element = ElementTree.Element
 
 
 def parse(path: str) -> Element:
-    """Return the root element of a file; names lose the prefix of their namespace."""
+    """
+    Return the root element of a file; names lose the prefix of their namespace.
+
+    Raises RequestError for xacro, and what expat raises for other files that are no XML.
+    """
     # Files use prefixes, such as Drake's, without declaring them, which ElementTree refuses.
     builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
-    try:
-        with open(path, 'rb') as file:
-            parser.Parse(file.read(), True)
-    except (expat.ExpatError, LookupError, ValueError) as error:
-        raise RequestError(f'{path} is no XML: {error}') from None
+    parser.Parse(Path(path).read_bytes(), True)
     root = builder.close()
     for part in root.iter():
         if part.tag.startswith('xacro:') or any('${' in text for text in part.attrib.values()):
-            raise RequestError(f'{path} is xacro: run xacro first, as in xacro {path} > '
-                               'robot.urdf')
+            raise RequestError(f'run xacro first, as in xacro {path} > robot.urdf')
         part.tag = part.tag.split(':')[-1]
     return root
 

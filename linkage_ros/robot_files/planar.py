@@ -213,11 +213,10 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
     joints = _joints(drawing) if drawing.drives else []
     if not joints:
         raise NotDriven(_why(drawing))
-    name = check.name_beside(others, plain(drawing.driven[0].name, 60))
-    parameters = check.parameters(
-        name, 'custom', drawing.lines, drawing.drives, joints, frame_id=drawing.ground,
+    name, parameters, mechanism = check.mechanism(
+        others, plain(drawing.driven[0].name, 60), 'custom', drawing.lines, drawing.drives, joints,
+        frame_id=drawing.ground,
         pose=[float(short(value)) for value in coordinates(drawing.frame)])
-    mechanism = scene.read({'mechanisms': [name], **parameters}).mechanisms[name]
     limits, reports = robot.limits(drawing.driven)
     if drawing.left:
         reports.append(f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.')

@@ -9,7 +9,8 @@ from collections import Counter
 from contextlib import contextmanager
 from graphlib import CycleError
 from pathlib import Path
-from typing import Any, Iterator, Mapping
+from typing import Iterator
+from xml.parsers.expat import ExpatError
 
 import numpy as np
 
@@ -23,12 +24,12 @@ from ..robot_model.urdf import write
 
 def read(path: str, loops: str | None = None) -> Robot:
     """Return the robot in a file; raise RequestError if there is none."""
-    root = parse(path)
-    if root.tag not in ('mujoco', 'sdf', 'robot'):
-        raise RequestError(f'{path} must be MJCF, SDF or URDF, not <{root.tag}>')
-    if loops and root.tag != 'robot':
-        raise RequestError(f'{path} has its own loops; --loops is for a URDF')
     with _blaming(path):
+        root = parse(path)
+        if root.tag not in ('mujoco', 'sdf', 'robot'):
+            raise RequestError(f'a robot must be MJCF, SDF or URDF, not <{root.tag}>')
+        if loops and root.tag != 'robot':
+            raise RequestError('only a URDF has its loops in another file; omit --loops')
         if root.tag == 'mujoco':
             with needs('mujoco'):
                 from . import mjcf
@@ -41,9 +42,10 @@ def read(path: str, loops: str | None = None) -> Robot:
         if twice := [name for name, count in names.items() if count > 1]:
             raise RequestError(f'two joints are called {twice[0]!r}')
     if loops:
-        content = _loops(loops)
-        with _blaming(loops):
-            urdf.close(robot, content)
+        with needs('yaml'):
+            from yaml import safe_load, YAMLError
+        with _blaming(loops, YAMLError), open(loops, encoding='utf-8') as file:
+            urdf.close(robot, safe_load(file))
     with _blaming(path):
         if far := [joint.name for joint in robot.joints
                    if not np.all(np.abs(joint.places) < MAX_NUMBER)]:
@@ -59,24 +61,16 @@ def description(path: str, robot: Robot) -> str:
 
 
 @contextmanager
-def _blaming(path: str) -> Iterator[None]:
+def _blaming(path: str, *errors: type[Exception]) -> Iterator[None]:
+    """Raise RequestError for what readers raise, and for other errors, with the file's name."""
     try:
         yield
     except RequestError as error:
         raise RequestError(f'{path}: {error}') from None
     except (RecursionError, CycleError):
         raise RequestError(f'{path} has links or frames that hang on themselves') from None
-    except LookupError as error:
+    except KeyError as error:
         raise RequestError(f'{path} names {error}, which is not there') from None
-    except (ValueError, TypeError, AttributeError, RuntimeError) as error:
+    except (ValueError, TypeError, AttributeError, RuntimeError, LookupError, ExpatError,
+            *errors) as error:
         raise RequestError(f'{path} cannot be read: {error}') from None
-
-
-def _loops(path: str) -> Mapping[str, Any]:
-    with needs('yaml'):
-        from yaml import safe_load, YAMLError
-    try:
-        with open(path, encoding='utf-8') as file:
-            return safe_load(file)
-    except (YAMLError, UnicodeDecodeError) as error:
-        raise RequestError(f'{path} is no YAML: {error}') from None

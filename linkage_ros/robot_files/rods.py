@@ -199,11 +199,10 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]) -> c
         angles = ' (angles from the pose of the file)' * (' at ' in error.problem)
         reports.append(f'Limits: {error.problem}{angles}; these are the largest proved to have '
                        f'one pose at most: {ranges}.')
-    name = check.name_beside(others, f'{made.drives[0].name}_rods')
-    parameters = check.parameters(name, 'rods', lines, made.drives, [
-        (link, 1.0, joint.name, joint.start) for link, joint in made.links.items()
-        if joint.name not in sources and joint.position is not None], frame_id=group.ground)
-    mechanism = scene.read({'mechanisms': [name], **parameters}).mechanisms[name]
+    name, parameters, mechanism = check.mechanism(
+        others, f'{made.drives[0].name}_rods', 'rods', lines, made.drives, [
+            (link, 1.0, joint.name, joint.start) for link, joint in made.links.items()
+            if joint.name not in sources and joint.position is not None], frame_id=group.ground)
     for drive, (low, high) in zip(mechanism.inputs.values(), _sweeps(mechanism, limits)):
         parameters[f'{name}.{drive.input.name}.sweep'] = [float(short(low)), float(short(high))]
     return check.Imported(name, parameters, reports, sources)

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 import math
 from typing import Iterable, Iterator
 
@@ -56,7 +55,6 @@ class _Model:
     def __init__(self, parts: dict[str, Element], is_old: bool, known: dict[str, np.ndarray]):
         self._parts, self._known = parts, known
         self._axes_in_model = '1' if is_old else ''
-        self.frame = lru_cache(None)(self._frame)
 
     def robot(self) -> Robot:
         """Return the robot of the model."""
@@ -100,18 +98,18 @@ class _Model:
         return self.body(self.named(name, part.get('attached_to') or text(
             part, 'child', '__model__')))
 
-    def _frame(self, name: str) -> np.ndarray:
-        if name in self._known:
-            return self._known[name]
-        part = self._parts[name]
-        seen = attribute(part, 'pose', 'relative_to') or part.get('attached_to') or text(
-            part, 'child')
-        base = self.named(name, seen or '__model__') if name else 'world'
-        made = self.frame(base) @ _pose(part)
-        if part.get('placement_frame'):
-            raise RequestError(f'the model {name or part.get("name")} has a placement_frame, '
-                               'which is not read: give it a pose of its own')
-        return made
+    def frame(self, name: str) -> np.ndarray:
+        """Return the pose of a part."""
+        if name not in self._known:
+            part = self._parts[name]
+            seen = attribute(part, 'pose', 'relative_to') or part.get('attached_to') or text(
+                part, 'child')
+            base = self.named(name, seen or '__model__') if name else 'world'
+            self._known[name] = self.frame(base) @ _pose(part)
+            if part.get('placement_frame'):
+                raise RequestError(f'the model {name or part.get("name")} has a placement_frame, '
+                                   'which is not read: give it a pose of its own')
+        return self._known[name]
 
     def join(self, robot: Robot, name: str, part: Element, ends: tuple[str, str],
              position: float | None = None) -> None:

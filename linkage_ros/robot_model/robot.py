@@ -271,28 +271,25 @@ class Robot:
                 raise RequestError(f'joint {name} is on {body!r}, which is no link')
         ends, no_limits = _limits(limits, kind.lower() == 'continuous')
         kind = KINDS.get(kind.lower(), kind.lower() or 'none')
-        frames = frame, frame if other is None else other
-        directions = axis, axis if second is None else second
-        turns, places = zip(*((matrix[:3, :3], matrix[:3, 3]) for matrix in frames))
-        sizes = np.linalg.norm(directions, axis=1)
-        if kind in (HINGE, SLIDE, UNIVERSAL) and not np.all(sizes > 0.0):
-            raise RequestError(f'the axis of joint {name} has no length')
-        if kind != UNIVERSAL:
-            self.joints.append(Joint(
-                name, kind, bodies, places, turns if kind == FIXED else tuple(
-                    turn @ direction / (size or 1.0)
-                    for turn, direction, size in zip(turns, directions, sizes)),
-                position if kind in (HINGE, SLIDE) else None, ends, no_limits,
-                other is not None))
+        if kind == UNIVERSAL:
+            if second is None:
+                raise RequestError(f'joint {name} is universal and must have two axes')
+            # Two hinges with a cross between them.
+            cross = f'{name}/cross'
+            self.frames[cross] = frame
+            self.join(name, HINGE, (bodies[0], cross), frame, axis, None, position)
+            self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame, second, other, position)
             return
-        if second is None:
-            raise RequestError(f'joint {name} is universal and must have two axes')
-        # Two hinges with a cross between them.
-        cross = f'{name}/cross'
-        self.frames[cross] = frame
-        self.join(name, HINGE, (bodies[0], cross), frame, axis, None, position)
-        self.join(f'{name}/second', HINGE, (cross, bodies[1]), frame, second, other,
-                  position if other is None else None)
+        turns, places = zip(*((matrix[:3, :3], matrix[:3, 3])
+                              for matrix in (frame, frame if other is None else other)))
+        axes = axis, axis if second is None else second
+        sizes = np.linalg.norm(axes, axis=1)
+        if kind in (HINGE, SLIDE) and not np.all(sizes > 0.0):
+            raise RequestError(f'the axis of joint {name} has no length')
+        self.joints.append(Joint(
+            name, kind, bodies, places, turns if kind == FIXED else tuple(
+                turn @ axis / (size or 1.0) for turn, axis, size in zip(turns, axes, sizes)),
+            position if kind in (HINGE, SLIDE) else None, ends, no_limits, other is not None))
 
     def close(self, name: str, kind: str, bodies: tuple[str, str], frames: Sequence[np.ndarray],
               axis: Any = (0.0, 0.0, 1.0), second: Any = None) -> None:

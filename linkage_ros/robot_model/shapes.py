@@ -45,11 +45,6 @@ class Shape(NamedTuple):
     start: LinkPoint
     end: LinkPoint
 
-    @property
-    def is_fixed(self) -> bool:
-        """Whether it is on the ground."""
-        return self.start.link == GROUND
-
 
 def ground_frame(linkage: Mechanism) -> dict[str, tuple[float, ...]]:
     """Return the places of the joints on the ground [m]."""
