@@ -214,9 +214,8 @@ class _Loops:
         pose = np.repeat(component.start, len(targets), axis=0)
         gaps, poses = np.empty(isnan.shape), []
         for k in range(steps):
-            here = {name: np.where(isnan[:, k], component.positions[name], values[:, k])
-                    for name, values in joints.items()}
-            pose = component.moved_to(pose, here)
+            pose = component.moved_to(pose, {name: at[:, k] for name, at in joints.items()})
+            pose[isnan[:, k]] = component.start
             pose = pose if fixed.all() else component.closed(pose, fixed)
             gaps[:, k] = np.max(np.abs(component.errors(pose)[0] - self._misfit), axis=1)
             poses.append(pose)

@@ -37,10 +37,8 @@ def read(path: str, loops: str | None = None) -> Robot:
         else:
             robot = sdf.read(root) if root.tag == 'sdf' else urdf.read(root)
         names = Counter(joint.name for joint in robot.joints if joint.position is not None)
-        if '' in names:
-            raise RequestError('a joint has no name')
-        if twice := [name for name, count in names.items() if count > 1]:
-            raise RequestError(f'two joints are called {twice[0]!r}')
+        if wrong := [name for name, count in names.items() if not name or count > 1]:
+            raise RequestError(f'each joint must have a name of its own, not {wrong[0]!r}')
     if loops:
         with needs('yaml'):
             from yaml import safe_load, YAMLError

@@ -62,14 +62,16 @@ class Rods:
                   and all(len(held_by[body]) == 2 and body != ground for body in joint.bodies)]
         self._bodies = {ground: 'ground'}
         apart = {*rods, *(body for half in halves for body in half.bodies)}
-        left = [joint for joint in joints if not apart & {*joint.bodies}]
-        while reached := [joint for joint in left
+        links = [joint for joint in joints if not apart & {*joint.bodies} and (
+            joint.kind == HINGE or joint.kind == SLIDE and joint.name not in self._driven)]
+        while reached := [joint for joint in links
                           if len({*joint.bodies} & self._bodies.keys()) == 1]:
             self._add(reached[0])
-            left.remove(reached[0])
-        if left:
-            raise ValueError(f'{listed(joint.name for joint in left)} close loops that have more '
-                             'than rods in them')
+        # All others are between a link and a rod or a cylinder.
+        if wrong := [joint.name for joint in joints if joint not in (*self.links.values(), *halves)
+                     and not (apart & {*joint.bodies} and self._bodies.keys() & {*joint.bodies})]:
+            raise ValueError('in space, links on hinges and undriven slides can be joined by rods '
+                             f'and cylinders, not by {listed(wrong)}')
         for body, held in rods.items():
             one, two = held
             self._rod(one.name, self._end(one, body), self._end(two, body),
@@ -93,20 +95,14 @@ class Rods:
     def _add(self, joint: Joint) -> None:
         """Add a link, and its joint with a link that is there."""
         base, body = sorted(joint.bodies, key=self._bodies.__contains__, reverse=True)
-        is_driven = joint.name in self._driven
-        if joint.kind != HINGE and (is_driven or joint.kind != SLIDE):
-            raise ValueError(f'{joint.name} is a joint of type {joint.kind}, no end of a rod and '
-                             'no cylinder')
         name = self._bodies[body] = self._link(
             joint, self._bodies[base], joint.place(base), joint.motion(body))
-        if is_driven:
+        if joint.name in self._driven:
             self.drives.append(check.Source(name, joint.name, 1.0, 0.0 - joint.start, 0.0))
 
     def _end(self, joint: Joint, body: str) -> str:
         """Return the other end of a ball of a rod: its link and place."""
         other = joint.other(body)
-        if other not in self._bodies:
-            raise ValueError(f'{joint.name} holds {body} to {other}, which hangs on rods alone')
         return f'{self._bodies[other]} {self._text(joint.place(other))}'
 
     def _link(self, joint: Joint, base: str, place: np.ndarray, axis: np.ndarray) -> str:

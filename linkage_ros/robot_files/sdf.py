@@ -37,14 +37,14 @@ def join(robot: Robot, joints: Iterable[Element]) -> None:
 
 def _parts(model: Element, name: str) -> Iterator[tuple[str, Element]]:
     """Yield the parts of a model and of the models in it, with their full names."""
+    if model.find('include') is not None or model.get('placement_frame'):
+        raise RequestError(f'the model {model.get("name")} has an include or a placement_frame, '
+                           'which are not read: write the content, and a pose, in their place')
     yield name, model
     for part in model:
         inner = f'{name}::{part.get("name", "")}'.lstrip(':')
         if part.tag == 'model':
             yield from _parts(part, inner)
-        elif part.tag == 'include':
-            raise RequestError(f'the model includes {text(part, "uri")!r}, which is not read: '
-                               'write it in its place')
         elif part.tag in ('link', 'joint', 'frame'):
             yield inner, part
 
@@ -106,9 +106,6 @@ class _Model:
                 part, 'child')
             base = self.named(name, seen or '__model__') if name else 'world'
             self._known[name] = self.frame(base) @ _pose(part)
-            if part.get('placement_frame'):
-                raise RequestError(f'the model {name or part.get("name")} has a placement_frame, '
-                                   'which is not read: give it a pose of its own')
         return self._known[name]
 
     def join(self, robot: Robot, name: str, part: Element, ends: tuple[str, str],
