@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 from linkage_ros import scene
 from linkage_ros.cli import RequestError
 from linkage_ros.linkage import theta_of
-from linkage_ros.robot_files import check, cli, closing, loops, readers
+from linkage_ros.robot_files import check, cli, closing, planar, readers
 from linkage_ros.robot_model import bodies, mjcf
 import numpy as np
 import pytest
@@ -312,7 +312,7 @@ def test_hinges_of_a_ball_lead_from_its_first_body_to_its_second(seed):
     rng.shuffle(robot.joints)
     for joint in robot.joints:
         joint.bodies = joint.bodies[::rng.choice([1, -1])]
-    group, = loops.groups(robot)
+    group, = planar.groups(robot)
     ball, = (joint for joint in group.joints if joint.parts)
     body = ball.bodies[0]
     for hinge, sign in ball.parts:

@@ -19,7 +19,7 @@ import numpy as np
 from .spatial import Component, components, EXACT
 from .. import scene
 from ..linkage import short, theta_of
-from ..robot_model.robot import Robot
+from ..robot_model.robot import plain, Robot
 from ..scene.joint_names import quoted_name
 
 # Number of paths of several motors, of poses on all paths, and of poses that a check needs.
@@ -80,6 +80,7 @@ def parameters(mechanism: str, kind: str, lines: Sequence[str], drives: Sequence
 def mechanism(others: Sequence[Imported], name: str, *args: Any, **more: Any
               ) -> tuple[str, dict[str, Any], scene.SceneMechanism]:
     """Return a mechanism beside others: its name, which none of them has, `parameters`, itself."""
+    name = plain(name, 60)
     name = f'{name}_{len(others)}' if name in [made.name for made in others] else name
     values = parameters(name, *args, **more)
     return name, values, scene.read({'mechanisms': [name], **values}).mechanisms[name]

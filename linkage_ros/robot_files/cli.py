@@ -13,7 +13,7 @@ from typing import Any, Mapping, Sequence
 
 import numpy as np
 
-from . import check, closing, loops, planar, readers, rods
+from . import check, closing, planar, readers, rods
 from .spatial import components
 from .. import cli, scene
 from ..linkage import short
@@ -87,7 +87,7 @@ def described(robot: Robot) -> tuple[dict[str, Any], list[str], dict[str, float]
     closed = closing.closed(robot)
     robot, reports = closed.robot, closed.report
     imported: list[check.Imported] = []
-    groups = loops.groups(robot)
+    groups = planar.groups(robot)
     for group in groups:
         fault = next((closed.faults[joint.name] for joint in group.joints
                       if joint.name in closed.faults), None)

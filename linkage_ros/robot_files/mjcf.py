@@ -11,8 +11,7 @@ import mujoco
 from mujoco import MjSpec
 import numpy as np
 
-from .elements import turned_by
-from ..robot_model.robot import at, BALL, FIXED, Robot
+from ..robot_model.robot import at, BALL, FIXED, Robot, turned_by
 
 
 def read(path: str) -> Robot:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 
 """
-Planar loops of a robot as mechanisms of a scene, compared with the robot.
+The planar loops of a robot, each in its plane, as mechanisms of a scene.
 
 The lines of a mechanism have its inputs first, then its dyads.
 """
@@ -14,20 +14,146 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 import math
-from typing import Sequence
+from typing import NamedTuple, Sequence
 
 import numpy as np
 
-from . import check, closing, loops
-from .spatial import CROSSING, EXACT
+from . import check, closing
+from .spatial import ASKEW, CROSSING, EXACT, lean, loops_of
 from .. import mechanisms, scene
 from ..linkage import bar_name, Dyads, Hinge, Pin, ROUNDING, short, Slide, theta_of
-from ..robot_model.robot import at, coordinates, HINGE, Joint, NotDriven, plain, Robot, SLIDE
+from ..robot_model.robot import at, BALL, coordinates, FIXED, HINGE, Joint, NotDriven, Robot, SLIDE
 from ..scene import FARTHEST
 
+# Kinds of joints in planar loops.
+_FLAT = (HINGE, SLIDE, BALL)
 # The most joints of which pairs are tried as motors.
 MAX_PAIRED = 30
 _OTHER = {'left': 'right', 'right': 'left', 'out': 'in', 'in': 'out'}
+
+
+class Group(NamedTuple):
+    """Loops that share bars: ground, joints, why not planar, and planar parts."""
+
+    ground: str
+    joints: list[Joint]
+    why: str
+    parts: list['Group']
+
+
+def groups(robot: Robot) -> list[Group]:
+    """Return the loops of a robot, with their planar parts; bodies fixed to others are one."""
+    # Whatever closes a loop joins bodies as all others do.
+    fixed = [replace(joint, is_cut=False) for joint in robot.joints if joint.kind == FIXED]
+    home = {robot.root: robot.root}
+    for body, (base, joint) in replace(robot, joints=fixed).spanning_tree()[0].items():
+        home[body] = home[base] if joint.kind == FIXED else body
+    # Several bodies that are one have the name of the first that a joint moves.
+    names = {home[body]: body for joint in robot.joints[::-1] if joint.kind != FIXED
+             for body in joint.bodies[::-1]}
+    home = {body: names.get(first, first) for body, first in home.items()}
+    joints = [replace(joint, bodies=(home[joint.bodies[0]], home[joint.bodies[1]]), is_cut=False)
+              for joint in robot.joints]
+    robot = replace(robot, root=home[robot.root], joints=[
+        joint for joint in joints if len({*joint.bodies}) == 2], frames={
+        body: robot.frames[body] for body in home.values()})
+    return [group._replace(parts=_parts(robot, group) if group.why else [group])
+            for group in _groups(robot, _with_balls(robot))]
+
+
+def _parts(robot: Robot, group: Group) -> list[Group]:
+    """Return the planar parts of loops that are not planar as a whole."""
+    parts: list[Group] = []
+    left = group.joints
+    for joint in group.joints:
+        if joint.kind == HINGE and joint in left:
+            flat = [other for other in left
+                    if other.kind in _FLAT and lean(other, joint.axes[0]) < ASKEW]
+            parts += [part for part in _groups(robot, flat) if not part.why]
+            left = [other for other in left if not any(other in part.joints for part in parts)]
+    return parts
+
+
+def _groups(robot: Robot, joints: list[Joint]) -> list[Group]:
+    """Return the loops of some joints, those that share bars together."""
+    tree, cuts = replace(robot, joints=joints).spanning_tree()
+    groups = []
+    for bodies, closures in loops_of(tree, cuts):
+        edges = {tree[body][1] for body in bodies} | {*closures}
+        # The parent of the first body is nearest to the root.
+        ground = next(base for body, (base, _) in tree.items() if body in bodies)
+        group = Group(ground, [joint for joint in joints if joint in edges], '', [])
+        try:
+            _check_planar(ground, group.joints)
+        except ValueError as error:
+            group = group._replace(why=str(error))
+        groups.append(group)
+    return groups
+
+
+def _with_balls(robot: Robot) -> list[Joint]:
+    """Return the joints with a ball in place of two or three hinges that cross in a point."""
+    joints = robot.joints
+    for body in reversed(robot.frames):
+        held = [joint for joint in joints if body in joint.bodies]
+        if body == robot.root or len(held) != 2 or any(
+                joint.name in robot.driven or joint.kind not in (HINGE, BALL) for joint in held):
+            continue
+        first, second = held
+        ends = first.other(body), second.other(body)
+        places = first.place(ends[0]), second.place(ends[1])
+        if ends[0] != ends[1] and np.linalg.norm(places[0] - places[1]) < CROSSING \
+                and (BALL in (first.kind, second.kind)
+                     or np.linalg.norm(np.cross(first.axes[0], second.axes[0])) > ASKEW):
+            ball = Joint(f'{first.name}+{second.name}', BALL, ends, places, first.axes,
+                         parts=(*chain(first, ends[0]), *chain(second, body)))
+            joints = [*(joint for joint in joints if joint not in held), ball]
+    return joints
+
+
+def chain(joint: Joint, start: str) -> Sequence[tuple[Joint, float]]:
+    """Return the hinges of a joint from one of its bodies to the other, with their signs."""
+    parts = joint.parts or [(joint, 1.0)]
+    return parts if joint.bodies[0] == start else [(hinge, -sign) for hinge, sign in parts[::-1]]
+
+
+def _check_planar(ground: str, joints: Sequence[Joint], drives: Sequence[str] = ()
+                 ) -> list[Joint]:
+    """Return the hinges, the first of which has the plane's normal; raise ValueError if none."""
+    hinges = sorted((joint for joint in joints if joint.kind == HINGE),
+                    key=lambda joint: (joint.name not in drives, ground not in joint.bodies))
+    if not hinges:
+        raise ValueError('not planar: no hinge says in which plane')
+    for joint in joints:
+        if joint.kind not in _FLAT:
+            raise ValueError(f'not planar: {joint.name} is a joint of type {joint.kind}')
+        if (askew := lean(joint, hinges[0].axes[0])) > ASKEW:
+            raise ValueError(f'not planar: the axes of {hinges[0].name} and {joint.name} are '
+                             f'{np.degrees(np.arcsin(min(askew, 1.0))):.3g} degrees from it, more '
+                             f'than {np.degrees(ASKEW):.2g}')
+    _check_rods(ground, joints, hinges[0].axes[0])
+    return hinges
+
+
+def _pins(joint: Joint, normal: np.ndarray) -> list[Joint]:
+    """Return the hinges of a joint that turn in a plane."""
+    return [hinge for hinge in joint.hinges
+            if hinge.kind == HINGE and lean(hinge, normal) < ASKEW]
+
+
+def _check_rods(ground: str, joints: Sequence[Joint], normal: np.ndarray) -> None:
+    """Raise ValueError if a body can leave the plane: only rods may be on balls alone."""
+    held = {ground}
+    # A universal joint with an axis normal to the plane is a pin.
+    held_by = [joint for joint in joints if joint.kind != BALL
+               or len(joint.hinges) == 2 and _pins(joint, normal)]
+    while more := {end for joint in held_by for end in joint.bodies
+                   if held & {*joint.bodies}} - held:
+        held |= more
+    for body in dict.fromkeys(end for joint in joints for end in joint.bodies):
+        ends = [joint.bodies for joint in joints if body in joint.bodies]
+        if body not in held and (len(ends) != 2 or not all(held & {*pair} for pair in ends)):
+            raise ValueError(f'not planar: {body} hangs on balls alone, and is no rod')
 
 
 class Drawing(Dyads):
@@ -55,7 +181,7 @@ class Drawing(Dyads):
 
     """
 
-    def __init__(self, robot: Robot, group: loops.Group, drives: Sequence[str]):
+    def __init__(self, robot: Robot, group: Group, drives: Sequence[str]):
         self._robot = robot
         self._flatten(group, drives)
         self.drives: list[check.Source] = []
@@ -86,11 +212,12 @@ class Drawing(Dyads):
              for joint in self.driven], size, near)
         self.take_apart()
 
-    def _flatten(self, group: loops.Group, drives: Sequence[str]) -> None:
+    def _flatten(self, group: Group, drives: Sequence[str]) -> None:
         """Set the plane, and the joints in it."""
         ground = group.ground
-        hinges, self.lean = loops.check_planar(ground, group.joints, drives)
+        hinges = _check_planar(ground, group.joints, drives)
         base, up = self._robot.frames[ground], hinges[0].axes[0]
+        self.lean = max(lean(joint, up) for joint in group.joints)
         normal = base[:3, :3].T @ up
         right = np.eye(3)[int(abs(normal[0]) > 0.9)]
         right = (right - right @ normal * normal) / np.linalg.norm(np.cross(right, normal))
@@ -101,11 +228,11 @@ class Drawing(Dyads):
         self.joints: list[Joint] = []
         self.gap = 0.0
         stiff = {body for joint in group.joints for body in joint.bodies
-                 if len(joint.hinges) == 2 and not loops.pins(joint, up)}
+                 if len(joint.hinges) == 2 and not _pins(joint, up)}
         for joint in group.joints:
             # A rod turns in the plane about one hinge of the ball at its end; the others stay,
             # unless its other end needs them.
-            pins = [(hinge, sign) for hinge, sign in joint.parts if hinge in loops.pins(joint, up)]
+            pins = [(hinge, sign) for hinge, sign in joint.parts if hinge in _pins(joint, up)]
             if pins and not stiff & {*joint.bodies}:
                 (hinge, sign), *_ = pins
                 joint = replace(joint, name=hinge.name, kind=HINGE, position=hinge.position,
@@ -206,7 +333,7 @@ class Drawing(Dyads):
         return None
 
 
-def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
+def described(robot: Robot, group: Group, others: Sequence[check.Imported]
               ) -> check.Imported:
     """Return a mechanism; raise ValueError for loops that are no dyads."""
     drawing = _drawn(robot, group)
@@ -214,7 +341,7 @@ def described(robot: Robot, group: loops.Group, others: Sequence[check.Imported]
     if not joints:
         raise NotDriven(_why(drawing))
     name, parameters, mechanism = check.mechanism(
-        others, plain(drawing.driven[0].name, 60), 'custom', drawing.lines, drawing.drives, joints,
+        others, drawing.driven[0].name, 'custom', drawing.lines, drawing.drives, joints,
         frame_id=drawing.ground,
         pose=[float(short(value)) for value in coordinates(drawing.frame)])
     limits, reports = robot.limits(drawing.driven)
@@ -253,7 +380,7 @@ def _sweep(drive: check.Source, limits: tuple[float, float], settings: scene.Inp
     return [low, high]
 
 
-def _drawn(robot: Robot, group: loops.Group) -> Drawing:
+def _drawn(robot: Robot, group: Group) -> Drawing:
     """Return the lines of loops, with the inputs that place the most bodies."""
     names = [joint.name for joint in group.joints if joint.position is not None]
     motors = [name for name in names if name in robot.driven]

@@ -10,12 +10,12 @@ from contextlib import contextmanager
 from graphlib import CycleError
 from pathlib import Path
 from typing import Iterator
-from xml.parsers.expat import ExpatError
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
 
 import numpy as np
 
 from . import sdf, urdf
-from .elements import parse
 from ..cli import RequestError
 from ..optional import needs
 from ..robot_model.robot import MAX_NUMBER, Robot
@@ -25,7 +25,7 @@ from ..robot_model.urdf import write
 def read(path: str, loops: str | None = None) -> Robot:
     """Return the robot in a file; raise RequestError if there is none."""
     with _blaming(path):
-        root = parse(path)
+        root = _parse(path)
         if root.tag not in ('mujoco', 'sdf', 'robot'):
             raise RequestError(f'a robot must be MJCF, SDF or URDF, not <{root.tag}>')
         if loops and root.tag != 'robot':
@@ -55,12 +55,12 @@ def read(path: str, loops: str | None = None) -> Robot:
 
 def description(path: str, robot: Robot) -> str:
     """Return a robot as robot_state_publisher takes it: its URDF as it is, else its tree."""
-    return Path(path).read_text() if parse(path).tag == 'robot' else write(robot)
+    return Path(path).read_text() if _parse(path).tag == 'robot' else write(robot)
 
 
 @contextmanager
-def _blaming(path: str, *errors: type[Exception]) -> Iterator[None]:
-    """Raise RequestError for what readers raise, and for other errors, with the file's name."""
+def _blaming(path: str, syntax: type[Exception] = expat.ExpatError) -> Iterator[None]:
+    """Raise RequestError, with the file's name, for what readers raise, and for wrong syntax."""
     try:
         yield
     except RequestError as error:
@@ -69,6 +69,20 @@ def _blaming(path: str, *errors: type[Exception]) -> Iterator[None]:
         raise RequestError(f'{path} has links or frames that hang on themselves') from None
     except KeyError as error:
         raise RequestError(f'{path} names {error}, which is not there') from None
-    except (ValueError, TypeError, AttributeError, RuntimeError, LookupError, ExpatError,
-            *errors) as error:
+    except (ValueError, TypeError, AttributeError, RuntimeError, LookupError, syntax) as error:
         raise RequestError(f'{path} cannot be read: {error}') from None
+
+
+def _parse(path: str) -> Element:
+    """Return the root element of a file; names lose the prefix of their namespace."""
+    # Files use prefixes, such as Drake's, without declaring them, which ElementTree refuses.
+    builder, parser = TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.CharacterDataHandler = builder.data
+    parser.Parse(Path(path).read_bytes(), True)
+    root = builder.close()
+    for part in root.iter():
+        if part.tag.startswith('xacro:') or any('${' in text for text in part.attrib.values()):
+            raise RequestError(f'run xacro first, as in xacro {path} > robot.urdf')
+        part.tag = part.tag.split(':')[-1]
+    return root

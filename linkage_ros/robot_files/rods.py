@@ -18,7 +18,7 @@ from typing import Mapping, Sequence
 import numpy as np
 
 from . import check
-from .loops import Group
+from .planar import chain, Group
 from .. import mechanisms, scene
 from ..linkage import FORMS, short, theta_of, WindowError
 from ..robot_model.robot import BALL, HINGE, Joint, NotDriven, plain, Robot, SLIDE
@@ -120,23 +120,21 @@ class Rods:
     def _universal(self, body: str, held: Sequence[Joint]) -> None:
         """Add two hinges of a ball at an end of a rod, if it has some; a third one stays."""
         for ball, other in held, held[::-1]:
-            base, place, chain = ball.other(body), ball.place(body), ball.hinges
+            base, place = ball.other(body), ball.place(body)
+            hinges, axes = zip(*((hinge, sign * hinge.axes[0])
+                                 for hinge, sign in chain(ball, base)))
+            way = other.place(body) - place
             # A third hinge stays, unless the other end needs it.
-            if not 2 <= len(chain) <= 2 + (len(other.hinges) != 2) or None in [
-                    hinge.position for hinge in chain]:
+            if not 2 <= len(hinges) <= 2 + (len(other.hinges) != 2) or None in [
+                    hinge.position for hinge in hinges]:
                 continue
-            (first, second), way = (chain if ball.bodies[1] == body else chain[::-1])[:2], (
-                other.place(body) - place)
-            cross = {*first.bodies} & {*second.bodies}
-            (middle,), (end,) = cross, {*second.bodies} - cross
-            axes = first.motion(middle), second.motion(end)
             # Along the second axis, and a quarter turn about it: no dead point is near.
             marks = axes[1] * np.linalg.norm(way), np.cross(axes[1], way)
             if min(abs(axis @ np.cross(mark, way)) for mark, axis in zip(marks, axes)
                    ) < _SQUARE * way @ way:
                 continue
             link = self._bodies[base]
-            for hinge, axis, mark in zip((first, second), axes, marks):
+            for hinge, axis, mark in zip(hinges, axes, marks):
                 # The limits of a rod's hinges do not count.
                 link = self._link(replace(hinge, limits=None), link, place, axis)
                 self._rod(f'{hinge.name}_mark', self._end(other, body),

@@ -6,13 +6,52 @@
 from __future__ import annotations
 
 import math
-from typing import Iterable, Iterator
+from typing import Any, Iterable, Iterator, Sequence
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from .elements import attribute, Element, numbers, obey, once, text, turned_by
 from ..cli import RequestError
-from ..robot_model.robot import at, pose, Robot
+from ..robot_model.robot import at, FIXED, MAX_NUMBER, pose, Robot, turned_by
+
+
+def once(parts: Iterable[tuple[str, Element]]) -> dict[str, Element]:
+    """Return parts by name; raise RequestError if two have the same name."""
+    named: dict[str, Element] = {}
+    for name, part in parts:
+        if named.setdefault(name, part) is not part:
+            raise RequestError(f'there are two of <{part.tag}> for {name!r}, which may have one')
+    return named
+
+
+def attribute(part: Element, tag: str, key: str, otherwise: str = '') -> str:
+    """Return an attribute of an element in a part."""
+    element = part.find(tag)
+    return otherwise if element is None else element.get(key, otherwise)
+
+
+def text(part: Element, tag: str, otherwise: str = '') -> str:
+    """Return the text of an element in a part."""
+    return (part.findtext(tag) or otherwise).strip()
+
+
+def numbers(values: str | Sequence[Any], count: int = 3) -> np.ndarray:
+    """Return the numbers of a text or a list; raise ValueError if they are not `count`."""
+    array = np.array(values.split() if isinstance(values, str) else values, float)
+    if array.shape != (count,) or not np.all(np.abs(array) < MAX_NUMBER):
+        raise ValueError(f'{values!r} must be {count} numbers within {MAX_NUMBER:g}')
+    return array
+
+
+def obey(robot: Robot, plugins: Iterable[Element]) -> None:
+    """Fix the links of Gazebo's DetachableJoint to each other, and note what others drive."""
+    for plugin in plugins:
+        kind = f'{plugin.get("name")} {plugin.get("filename")}'.lower()
+        if 'detachable' in kind:
+            parent, child = (text(plugin, tag) for tag in ('parent_link', 'child_link'))
+            robot.join(f'{parent}={child}', FIXED, (parent, child), robot.frames[parent])
+        if 'state' not in kind:
+            robot.driven += [(joint.text or '').strip() for joint in plugin.findall('joint_name')]
 
 
 def read(root: Element) -> Robot:

@@ -15,13 +15,14 @@ from __future__ import annotations
 from graphlib import TopologicalSorter
 import re
 from typing import Any, Mapping, Sequence
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from . import sdf
-from .elements import attribute, Element, numbers, obey, once, origin
+from .sdf import attribute, numbers, once
 from ..cli import RequestError
-from ..robot_model.robot import at, BALL, FIXED, HINGE, Robot, UNIVERSAL
+from ..robot_model.robot import at, BALL, FIXED, HINGE, pose, Robot, UNIVERSAL
 from ..words import quoted, suggestion
 
 # The keys of a file of loops; the last two have no effect.
@@ -44,7 +45,7 @@ def read(root: Element) -> Robot:
     robot = Robot(roots[0], {roots[0]: np.eye(4)})
     for link in TopologicalSorter({link: [base] for link, base in bases.items()}).static_order():
         if link in joints and link in links:
-            robot.frames[link] = robot.frames[bases[link]] @ origin(joints[link])
+            robot.frames[link] = robot.frames[bases[link]] @ _origin(joints[link])
     for child, joint in joints.items():
         name, mimic, limit = joint.get('name', ''), joint.find('mimic'), joint.find('limit')
         robot.join(name, joint.get('type', ''), (bases[child], child), robot.frames[child],
@@ -59,7 +60,7 @@ def read(root: Element) -> Robot:
     _close_by_elements(robot, root)
     _close_by_frames(robot)
     sdf.join(robot, root.findall('gazebo/joint'))
-    obey(robot, root.findall('gazebo/plugin'))
+    sdf.obey(robot, root.findall('gazebo/plugin'))
     robot.driven = [joint.get('name', '') for joint in (
         *root.findall('transmission/joint'),
         *root.findall('ros2_control/joint[command_interface]'))]
@@ -68,6 +69,12 @@ def read(root: Element) -> Robot:
         robot.driven = [name for joint in joints.values() if joint.get(
             'independent') != 'false' and (name := joint.get('name', '')) in robot.positions]
     return robot
+
+
+def _origin(part: Element) -> np.ndarray:
+    """Return the pose in the attributes xyz and rpy of a part's origin, or of the part."""
+    place = next(part.iterfind('origin'), part)
+    return pose(*numbers(f'{place.get("xyz", "0 0 0")} {place.get("rpy", "0 0 0")}', 6))
 
 
 def _pair(robot: Robot, name: str, kind: str, ends: Sequence[str], *axes: Any) -> None:
@@ -86,13 +93,13 @@ def _close_by_elements(robot: Robot, root: Element) -> None:
                 raise RequestError(f'{tag} {cut.get("name")} has no {" or ".join(words)}')
             robot.close(cut.get('name', ''), cut.get('type', ''),
                         (parts[0].attrib['link'], parts[1].attrib['link']),
-                        [*map(origin, parts)], numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
+                        [*map(_origin, parts)], numbers(attribute(cut, 'axis', 'xyz', '0 0 1')))
     for cut in root.findall('ball_constraint'):
         ends = [attribute(cut, f'ball_constraint_body_{end}', 'name') for end in 'AB']
         robot.close('='.join(ends), BALL, (ends[0], ends[1]), [
             at(numbers(attribute(cut, f'ball_constraint_p_{end}', 'value', '0 0 0')))
             for end in ('AP', 'BQ')])
-    frames = {frame.get('name', ''): (frame.get('link', ''), origin(frame))
+    frames = {frame.get('name', ''): (frame.get('link', ''), _origin(frame))
               for frame in root.findall('frame')}
     for cut in root.findall('linear_bushing_rpy'):
         ends = [attribute(cut, f'bushing_frame{end}', 'name') for end in 'AC']

@@ -45,6 +45,13 @@ def pose(x: float, y: float, z: float, roll: float, pitch: float, yaw: float) ->
         [-sp, cp * sr, cp * cr, z], [0.0, 0.0, 0.0, 1.0]])
 
 
+def turned_by(quaternion: Any) -> np.ndarray:
+    """Return the rotation matrix of a quaternion w, x, y, z."""
+    w, *axis = np.asarray(quaternion) / np.linalg.norm(quaternion)
+    across = np.cross(np.eye(3), axis)
+    return np.eye(3) + 2.0 * (w * across + across @ across)
+
+
 def coordinates(matrix: np.ndarray) -> tuple[float, ...]:
     """Return x, y, z [m], roll, pitch and yaw [rad] of a pose (4, 4)."""
     (a, d, g, x), (b, e, h, y), (c, _, _, z), _ = matrix.tolist()
