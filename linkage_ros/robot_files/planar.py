@@ -23,7 +23,6 @@ from .spatial import ASKEW, CROSSING, EXACT, lean, loops_of
 from .. import mechanisms, scene
 from ..linkage import bar_name, Dyads, Hinge, Pin, ROUNDING, short, Slide, theta_of
 from ..robot_model.robot import at, BALL, coordinates, FIXED, HINGE, Joint, NotDriven, Robot, SLIDE
-from ..scene import FARTHEST
 
 # Kinds of joints in planar loops.
 _FLAT = (HINGE, SLIDE, BALL)
@@ -135,9 +134,9 @@ def _check_planar(ground: str, joints: Sequence[Joint], drives: Sequence[str] = 
     return hinges
 
 
-def _pins(joint: Joint, normal: np.ndarray) -> list[Joint]:
-    """Return the hinges of a joint that turn in a plane."""
-    return [hinge for hinge in joint.hinges
+def _pins(joint: Joint, normal: np.ndarray) -> list[tuple[Joint, float]]:
+    """Return the hinges of a ball that turn in a plane, with their signs."""
+    return [(hinge, sign) for hinge, sign in joint.parts
             if hinge.kind == HINGE and lean(hinge, normal) < ASKEW]
 
 
@@ -232,9 +231,8 @@ class Drawing(Dyads):
         for joint in group.joints:
             # A rod turns in the plane about one hinge of the ball at its end; the others stay,
             # unless its other end needs them.
-            pins = [(hinge, sign) for hinge, sign in joint.parts if hinge in _pins(joint, up)]
-            if pins and not stiff & {*joint.bodies}:
-                (hinge, sign), *_ = pins
+            if (pins := _pins(joint, up)) and not stiff & {*joint.bodies}:
+                hinge, sign = pins[0]
                 joint = replace(joint, name=hinge.name, kind=HINGE, position=hinge.position,
                                 axes=(sign * hinge.axes[0],) * 2)
             first, second = (complex(*(seen @ [*place, 1.0])[:2]) for place in joint.places)
@@ -375,7 +373,7 @@ def _sweep(drive: check.Source, limits: tuple[float, float], settings: scene.Inp
             # An end that is a dead point is not quite reached.
             edge = ROUNDING * (end - start)
             low, high = max(low, start + turns + edge), min(high, end + turns - edge)
-    if not -FARTHEST < low < high - 1e-6 * settings.input.size < FARTHEST:
+    if not -scene.FARTHEST < low < high - 1e-6 * settings.input.size < scene.FARTHEST:
         raise ValueError('its loops do not reach them')
     return [low, high]
 

@@ -92,8 +92,7 @@ class _Model:
     """Frames of a model's parts; a name is relative to the model in which it stands."""
 
     def __init__(self, parts: dict[str, Element], is_old: bool, known: dict[str, np.ndarray]):
-        self._parts, self._known = parts, known
-        self._axes_in_model = '1' if is_old else ''
+        self._parts, self._is_old, self._known = parts, is_old, known
 
     def robot(self) -> Robot:
         """Return the robot of the model."""
@@ -171,7 +170,7 @@ class _Model:
         way, turned = numbers(text(axis, 'xyz', '0 0 1')), self.frame(name)[:3, :3]
         if seen := attribute(axis, 'xyz', 'expressed_in'):
             return turned.T @ self.frame(self.named(name, seen))[:3, :3] @ way
-        if text(axis, 'use_parent_model_frame', self._axes_in_model) in ('1', 'true'):
+        if text(axis, 'use_parent_model_frame', str(self._is_old).lower()) in ('1', 'true'):
             return turned.T @ self.frame(name.rpartition('::')[0])[:3, :3] @ way
         return way
 
