@@ -83,8 +83,8 @@ REFUSED = [
      'joint wrist is universal and must have two axes'),
     ('four_bar.urdf', [('"wrist" type="revolute"', '"wrist" type="screw"')],
      'from_robot: Left out: base_link, crank, coupler, rocker: not planar: wrist is a joint of '
-     'type screw; as rods in space: in space, links on hinges and undriven slides can be joined '
-     'by rods and cylinders, not by wrist.\n'),
+     'type screw; as rods in space: links on hinges and undriven slides can be joined by rods '
+     'and cylinders, not by wrist.\n'),
     ('four_bar.urdf', [('"wrist" type="revolute"', '"wrist"')], 'wrist is a joint of type none'),
     ('four_bar.urdf', SPHERES, 'not planar: no hinge says in which plane; '),
     ('four_bar.urdf', [('xyz="0.3 0 0"', 'xyz="0 0 0"'), ('xyz="0 0 0.2"', 'xyz="0 0 0"')],

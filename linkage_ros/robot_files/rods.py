@@ -70,7 +70,7 @@ class Rods:
         # All others are between a link and a rod or a cylinder.
         if wrong := [joint.name for joint in joints if joint not in (*self.links.values(), *halves)
                      and not (apart & {*joint.bodies} and self._bodies.keys() & {*joint.bodies})]:
-            raise ValueError('in space, links on hinges and undriven slides can be joined by rods '
+            raise ValueError('links on hinges and undriven slides can be joined by rods '
                              f'and cylinders, not by {listed(wrong)}')
         for body, held in rods.items():
             one, two = held
