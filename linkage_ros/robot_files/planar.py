@@ -347,13 +347,11 @@ def described(robot: Robot, group: Group, others: Sequence[check.Imported]
         reports.append(f'Left out: {", ".join(drawing.left)}: {_why(drawing)}.')
     for drive in drawing.drives:
         if drive.source in limits:
-            low, high = limits[drive.source]
             try:
                 parameters[f'{name}.{drive.name}.sweep'] = _sweep(
-                    drive, (low, high), mechanism.inputs[drive.name])
+                    drive, limits[drive.source], mechanism.inputs[drive.name])
             except ValueError as error:
-                reports.append(f'Left out: the limits of {drive.source}, from {low:.4g} to '
-                               f'{high:.4g}: {error}.')
+                reports.append(f'Left out: {error}.')
     slack = drawing.lean + drawing.gap / drawing.size
     if slack > EXACT:
         reports.append(f'Warning: the file is not exact: axes lean by {drawing.lean:.2g} rad, and '
@@ -374,7 +372,8 @@ def _sweep(drive: check.Source, limits: tuple[float, float], settings: scene.Inp
             edge = ROUNDING * (end - start)
             low, high = max(low, start + turns + edge), min(high, end + turns - edge)
     if not -scene.FARTHEST < low < high - 1e-6 * settings.input.size < scene.FARTHEST:
-        raise ValueError('its loops do not reach them')
+        raise ValueError(f'the limits of {drive.source}, from {limits[0]:.4g} to {limits[1]:.4g}: '
+                         'its loops do not reach them')
     return [low, high]
 
 
