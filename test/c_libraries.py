@@ -142,6 +142,9 @@ def prove(package, mechanism, compiler, flags=PLUGIN):
     arcs = [max(settings.arcs, key=np.ptp) for settings in mechanism.inputs.values()]
     ranges = ', '.join('{%r, %r}' % (*map(float, arc),) for arc in arcs)
     for count, more in ((100_000, ()), (5000, SANITIZED)):
+        if more and subprocess.run([compiler, *more, '-xc++', '-', '-o', program],
+                                   input=b'int main() {}', stderr=subprocess.DEVNULL).returncode:
+            pytest.skip(f'the sanitizers of {compiler} are not installed')
         subprocess.run([
             compiler, *flags, '-O2', *more, f'-DNAME={name}', f'-DNAMESPACE={space}',
             f'-DINPUTS={len(arcs)}', f'-DRANGES={{{ranges}}}', '-I', package / 'src', '-I',
