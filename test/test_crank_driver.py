@@ -158,7 +158,7 @@ def on_system_time(graph):
     return node, heard
 
 
-@pytest.mark.parametrize('seconds, speed', [(3600, 1.0), (-3600, 1.0), (1000, 0.5)])
+@pytest.mark.parametrize('seconds, speed', [(3600, 1.0), (-1000, 1.0), (1000, 0.5)])
 def test_system_time_that_is_set_makes_no_jump_not_even_amid_a_change(
         graph, on_system_time, seconds, speed):
     node, heard = on_system_time
