@@ -96,14 +96,6 @@ def test_the_crank_moves_as_the_parameters_say(parameters, steps):
                 assert driver.at(round(step[0] * SECOND)) == step[1]
 
 
-def test_a_new_rate_acts_at_once():
-    with Graph(executor=Executor) as graph:
-        node = graph.start(CrankDriver, {'mechanisms': ['jansen'], 'rate': 0.01})
-        heard = graph.listen(JointState, 'crank_states')
-        assert graph.set(node, rate=50.0).successful
-        graph.until(lambda: len(heard) > 2)
-
-
 def test_a_new_dimension_keeps_the_crank_in_its_new_reach(graph):
     driver = Driver(graph, {**CELL, 'cell.crank.speed': 0.0, 'cell.crank.start': 1.1})
     assert driver.at(SECOND) == (1.1, 0.0)
