@@ -491,9 +491,12 @@ class Bench:
         # It is accepted at once, and acts when it is prepared.
         assert self._until(lambda: self.node.is_settled)
         self._drain()
-        after = self._contents()
-        self._check_changed({topic for topic in after if after[topic] != before.get(topic)}
-                            & before.keys() if not reason else set(), changed)
+        if reason:
+            self._check(set(), False)
+        else:
+            after = self._contents()
+            self._check_changed({topic for topic in after if after[topic] != before.get(topic)}
+                                & before.keys(), changed)
         self._check_latched()
 
     def _contents(self):
