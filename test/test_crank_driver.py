@@ -12,7 +12,9 @@ from pytest import approx
 from rclpy.clock import ClockType
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter
+from rclpy.time import Time
 from ros_harness import Graph
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 SECOND = 10 ** 9
@@ -29,12 +31,16 @@ class Driver:
         self.node = graph.start(CrankDriver, parameters, **kwargs)
         self._graph = graph
         self._heard = graph.listen(JointState, 'crank_states')
-        self._clock = graph.clock()
+        self._clock = graph.node.create_publisher(Clock, '/clock', 10)
+
+    def _tick(self, now):
+        """Set the simulated time [ns] that the nodes see."""
+        self._clock.publish(Clock(clock=Time(nanoseconds=now).to_msg()))
 
     def at(self, now):
         """Return position and velocity in the message with a stamp [ns]."""
         def message():
-            self._clock(now)
+            self._tick(now)
             return [m for m in self._heard if m.header.stamp.sec * SECOND
                     + m.header.stamp.nanosec == now]
 
@@ -44,7 +50,7 @@ class Driver:
     def back_to(self, now):
         """Set the time back and let the node notice."""
         def noticed():
-            self._clock(now)
+            self._tick(now)
             return self.node.get_clock().now().nanoseconds == now
 
         self._graph.until(noticed)
