@@ -22,7 +22,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
-from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 DEADLINE = 20.0
@@ -169,17 +168,6 @@ class Graph:
             return [future for future in futures if future.done()]
 
         return self.until(answered)[0].result()
-
-    def clock(self):
-        """Return a function that sets the simulated time [ns] that the nodes see."""
-        publisher = self.node.create_publisher(Clock, '/clock', 10)
-
-        def tick(nanoseconds):
-            message = Clock()
-            message.clock.sec, message.clock.nanosec = divmod(nanoseconds, 10 ** 9)
-            publisher.publish(message)
-
-        return tick
 
     def crank(self, names, topic='crank_states'):
         """Return a publisher of crank angles."""

@@ -166,27 +166,20 @@ def test_motors_and_passive_joints_share_a_topic_and_nobody_hears_himself(graph)
 
 # --- crank messages, however they come and whatever they say ---
 
-FIVE_BAR = {'mechanisms': ['five_bar']}
-
-
 class Hand:
     """A kinematics node, what it publishes and says, and a publisher of crank messages."""
 
-    def __init__(self, graph, mechanism='jansen', parameters=None):
+    def __init__(self, graph, mechanism='jansen'):
         self._graph = graph
         self.said = graph.log()
         self.joints = graph.listen(JointState, f'{mechanism}/joint_states', 100)
-        self.markers = graph.listen(MarkerArray, f'{mechanism}/markers', 100)
-        self.node = graph.start(Kinematics, parameters or {'mechanisms': [mechanism]})
-        self._publisher = graph.publisher(JointState, 'crank_states', 100)
-        graph.until(lambda: self.node.count_subscribers(f'{mechanism}/joint_states')
-                    and self.node.count_subscribers(f'{mechanism}/markers'))
+        self.node = graph.start(Kinematics, {'mechanisms': [mechanism]})
+        self.publisher = graph.publisher(JointState, 'crank_states', 100)
+        graph.until(lambda: self.node.count_subscribers(f'{mechanism}/joint_states'))
 
-    def send(self, names=(), positions=(), velocities=(), stamp=None, text=None):
-        """Publish a crank message, or bytes instead of one."""
-        message = JointState(name=list(names), position=positions, velocity=velocities)
-        message.header.stamp.sec = 1 if stamp is None else stamp
-        self._publisher.publish(text or message)
+    def send(self, names, positions, velocities=()):
+        """Publish a crank message."""
+        self.publisher.publish(JointState(name=names, position=positions, velocity=velocities))
 
     def warnings(self, words):
         """Return the warnings with some words in them."""
@@ -212,7 +205,7 @@ BAD = {
 def test_bytes_that_are_no_joint_states_are_passed_over_with_one_warning(graph, text):
     hand = Hand(graph)
     for _ in range(5):
-        hand.send(text=text)
+        hand.publisher.publish(text)
     said = graph.until(lambda: hand.warnings('no JointState'))
     assert len(said[0]) < 400 and said[0].startswith(
         f'/crank_states: a message of {len(text)} bytes is ignored, since it is no JointState: ')
@@ -256,7 +249,7 @@ def test_a_stream_of_new_names_is_said_within_bounds(graph):
     ([], 'five_bar_crank, five_bar_crank2'), (['five_bar_crank'], 'five_bar_crank2'),
     (['five_bar_crank', 'five_bar_crank2'], '')])
 def test_inputs_that_nobody_sends_are_said_once(graph, sent, missing):
-    hand = Hand(graph, 'five_bar', FIVE_BAR)
+    hand = Hand(graph, 'five_bar')
     if sent:
         hand.send([*sent, 'nobody'], [0.1, 0.2, 0.3][:len(sent) + 1])
         graph.until(lambda: hand.warnings('called nobody'))

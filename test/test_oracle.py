@@ -59,7 +59,7 @@ SHORT = {
         *everything(LEG), message({'m_crank': 0.5}), ('set', {'m.points': ['O', 'G']})]),
     'an input of two': (FIVE_BAR, [
         *everything(FIVE_BAR), message({'m_crank': 0.5}), message({'m_crank': 0.6}),
-        message({'m_crank2': 0.1})]),
+        message({'m_crank2': 0.1}), ('set', {'frame_id': 'map'})]),
     # What was received is read anew.
     **{f'what was received of a {source} before a change': (MEASURED, [
         *everything(MEASURED), GOOD, OTHER, ('set', change)]) for source, change in (

@@ -11,40 +11,37 @@ from linkage_ros.nodes import messages
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.publishers import LATCHED
 import numpy as np
+from oracle import Bench, everything, message
 import pytest
 from ros_harness import Graph, Process
-from sensor_msgs.msg import JointState
-from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 # The markers of a leg and its locus, by id.
 LEG_IDS = set(range(9)) - {3, 4, 6}
 
 
-class Picture:
-    """What somebody sees who draws every marker and deletes what he is told to."""
+def picture(graph):
+    """Return a function that returns the ids of a leg's markers that are there; now all are."""
+    arrays = graph.listen(MarkerArray, 'jansen/markers', 100)
+    loci = graph.listen(Marker, 'jansen/locus', LATCHED)
 
-    def __init__(self, graph, mechanism):
-        self._arrays = graph.listen(MarkerArray, f'{mechanism}/markers', 100)
-        self._loci = graph.listen(Marker, f'{mechanism}/locus', LATCHED)
-        self._mechanism = mechanism
-
-    def __call__(self):
-        """Return the ids of the markers that are there."""
+    def ids():
         shown = set()
-        for marker in [*(m for array in self._arrays for m in array.markers), *self._loci]:
-            assert marker.ns == self._mechanism
+        for marker in [*(m for array in arrays for m in array.markers), *loci]:
+            assert marker.ns == 'jansen'
             (shown.discard if marker.action == Marker.DELETE else shown.add)(marker.id)
         return shown
+
+    graph.crank(['jansen_crank'])([0.3], arrays)
+    graph.until(lambda: ids() == LEG_IDS)
+    return ids
 
 
 def test_nothing_is_left_of_a_node_that_is_destroyed(graph):
     node = graph.start(Kinematics)
-    picture = Picture(graph, 'jansen')
-    graph.crank(['jansen_crank'])([0.3], graph.listen(MarkerArray, 'jansen/markers'))
-    graph.until(lambda: picture() == LEG_IDS)
+    shown = picture(graph)
     node.destroy_node()
-    graph.until(lambda: not picture())
+    graph.until(lambda: not shown())
 
 
 @pytest.mark.nightly
@@ -53,11 +50,9 @@ def test_nothing_is_left_of_a_process_that_is_told_to_end(tmp_path):
     path.write_text('/**:\n  ros__parameters:\n    mechanisms: [jansen]\n')
     process = Process('kinematics', path)
     with Graph(process.domain) as graph:
-        picture = Picture(graph, 'jansen')
-        graph.crank(['jansen_crank'])([0.3], graph.listen(MarkerArray, 'jansen/markers'))
-        graph.until(lambda: picture() == LEG_IDS)
+        shown = picture(graph)
         process.interrupt(signal.SIGINT)
-        graph.until(lambda: not picture())
+        graph.until(lambda: not shown())
         code, printed = process.end()
     assert code == 0 and 'Traceback' not in printed
 
@@ -87,20 +82,10 @@ UNPUBLISHABLE = [
 
 
 def test_what_cannot_be_published_is_refused_and_what_was_there_goes_on(graph):
-    node = graph.start(Kinematics, {'mechanisms': ['jansen']})
-    states = graph.listen(JointState, 'jansen/joint_states')
-    loci = graph.listen(Marker, 'jansen/locus', LATCHED)
-    models = graph.listen(String, 'jansen/robot_description', LATCHED)
-    turn = graph.crank(['jansen_crank'])
-    before = turn([0.5], states)
-    graph.until(lambda: loci and models)
+    leg, turn = {'mechanisms': ['jansen']}, message({'jansen_crank': 0.5})
+    Bench(graph, leg).run([*everything(leg), turn, *(
+        ('set', {**bad, **more}) for bad, _ in UNPUBLISHABLE
+        for more in ({}, {'jansen.dimensions.m': 14.0})), turn])
     for bad, named in UNPUBLISHABLE:
-        for values in (bad, {**bad, 'jansen.dimensions.m': 14.0}):
-            refused = graph.set(node, **values)
-            assert not refused.successful and named in refused.reason
-            assert len(refused.reason) < 300
-        assert all(node.get_parameter(name).value != bad[name] for name in bad)
         with pytest.raises(scene.SceneError, match=re.escape(named)):
-            graph.start(Kinematics, {'mechanisms': ['jansen'], **bad})
-    assert turn([0.5], states).position == before.position
-    assert len(loci) == len(models) == 1
+            graph.start(Kinematics, {**leg, **bad})

@@ -363,9 +363,6 @@ def test_of_a_message_what_is_deleted_or_no_line_joint_or_triangle_is_not_drawn(
         Marker(type=Marker.LINE_STRIP, points=bars.points)]
     topic.newest = serialize_message(message)
     assert read(topic) == frame_of([joints, bars, *message.markers[4:]])
-    (head, _), = read(topic)
-    assert [marker['kind'] for marker in head['markers']] == [
-        'joints', 'lines', 'triangles', 'locus']
 
 
 @pytest.mark.parametrize('type_, id_, kind', [

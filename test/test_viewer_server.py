@@ -205,11 +205,6 @@ def answer(url, **headers):
     return asyncio.run(fetched())
 
 
-def status(url, **headers):
-    """Return the status of an answer."""
-    return answer(url, **headers)[0]
-
-
 @pytest.mark.parametrize('name', ['', *sorted(
     path.relative_to(PAGE).as_posix() for path in PAGE.rglob('*') if path.is_file())])
 def test_the_page_is_served_with_nothing_from_outside(lever, name):
@@ -258,7 +253,7 @@ def test_a_refused_address_says_what_was_asked(lever):
     ('evil.example:80@localhost', False), ('[::1].evil.example', False)])
 def test_a_foreign_host_is_refused(lever, host, own):
     host = host.format(port=urlsplit(lever.url).port)
-    assert status(lever.url, Host=host) == (200 if own else 403)
+    assert answer(lever.url, Host=host)[0] == (200 if own else 403)
 
 
 @pytest.mark.parametrize('origin, own', [
@@ -291,7 +286,7 @@ def test_where_a_port_is_taken_another_is_used_or_the_viewer_says_how(graph):
         taken.listen()
         port = taken.getsockname()[1]
         other = graph.start(Viewer, {'port': port, 'or_any_port': True})
-        assert status(other.url) == 200
+        assert answer(other.url)[0] == 200
         # Ports below are for the administrator.
         assert port != int(re.search(r':(\d+)/', other.url)[1]) >= 1024
         with pytest.raises(scene.SceneError, match=(
@@ -310,7 +305,7 @@ def test_where_a_port_is_taken_another_is_used_or_the_viewer_says_how(graph):
 def test_a_viewer_answers_by_the_names_and_numbers_of_its_mechanism(graph, host, shown, numbers):
     viewer = graph.start(Viewer, {'port': 0, 'host': host})
     url = re.fullmatch(rf'http://{shown}:\d+/', viewer.url)[0]
-    assert [status(url, Host=name) == 200 for name in (
+    assert [answer(url, Host=name)[0] == 200 for name in (
         'evil.example', '10.1.2.3', socket.gethostname().upper(), 'LOCALHOST', '127.0.0.2')] == [
         False, numbers, True, True, True]
     graph.end(viewer)
