@@ -354,7 +354,7 @@ export class Picture {
   }
 
   /** Write a text at the first of some places that is clear of what is written, if any is good at one that is. */
-  label(words, places, written, isGood) {
+  label(words, places, written, isGood = () => true) {
     const free = places.filter(place => isClear(place, written));
     const place = free.find(isGood) ?? free[0];
     if (!place) return;
@@ -397,23 +397,24 @@ export class Picture {
     return Math.min(this.context.measureText(words).width, this.canvas.clientWidth - 8);
   }
 
-  /** Write the mechanisms' names below them, or above, where the picture has room. */
+  /** Write the mechanisms' names below or above them where there is room; the list of mechanisms has all of them. */
   titles() {
     const boxes = this.mechanisms.filter(({ key }) => this.boxes.has(key)).map(mechanism => {
       const { low, high } = this.boxes.get(mechanism.key);
       const [[left, bottom], [right, top]] = [low, high].map(([x, y]) => this.at(x + this.aside(mechanism), y));
       return { title: mechanism.title, x: (left + right) / 2, y: (top + bottom) / 2, half: (right - left) / 2, high: (bottom - top) / 2 };
     });
-    const lines = [1, -1, ...Array.from({ length: 2 * boxes.length }, (_, i) => i + 2)];
+    const gap = (place, box) => apart({ half: place.half + box.half, high: place.high + box.high, x: place.x, y: place.y }, [box.x, box.y]);
     const written = [];
     for (const box of boxes) {
       const half = this.width(box.title) / 2 + 4;
       const x = this.isSeen(box.x, 0) ? this.inside({ x: box.x, y: 0, half, high: 0 }).x : box.x;
-      const places = lines.map(line => ({ line, x, y: box.y + Math.sign(line) * box.high + (line - Math.sign(line) / 2) * LINE, half, high: LINE / 2 }))
-        .filter(({ y }) => y > LINE / 2 && y + LINE / 2 < this.canvas.clientHeight);
-      // A title on another mechanism would be read as that mechanism's.
       const others = boxes.filter(other => other !== box);
-      this.label(box.title, places, written, place => place.line < 3 && isClear(place, others));
+      // A title on another mechanism, or nearer to it, would be read as that mechanism's.
+      const places = [1, -1, 2, -2].map(line => ({ x, y: box.y + Math.sign(line) * box.high + (line - Math.sign(line) / 2) * LINE, half, high: LINE / 2 }))
+        .filter(place => place.y > LINE / 2 && place.y + LINE / 2 < this.canvas.clientHeight
+          && isClear(place, others) && others.every(other => gap(place, other) >= gap(place, box)));
+      this.label(box.title, places, written);
     }
   }
 
