@@ -40,6 +40,7 @@ NEEDS = {
     'rclpy': r'rclpy|\w+_msgs|oracle|ros_harness|viewer_harness|linkage_ros\.(?:nodes|web)',
     'linkage_interfaces': r'linkage_interfaces|viewer_harness|linkage_ros\.nodes\.servo_inverse',
     'aiohttp': 'aiohttp|browser|viewer_harness',
+    'gmpy2': 'gmpy2|truth|test_(?:operations|robot_files|simulators|urdf)',
     'matplotlib': r'matplotlib|linkage_ros\.render', 'yaml': 'yaml'}
 MISSING = [name for name in NEEDS if not find_spec(name)]
 

@@ -43,11 +43,10 @@ from rclpy.executors import TimeoutException
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
 from ros_harness import DEADLINE
-from scenes import example
+from scenes import example, G1
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from test_reading import big_endian
-from test_rods import G1
 from visualization_msgs.msg import Marker, MarkerArray
 
 # Of fewer bytes no message is made.

@@ -22,6 +22,15 @@ LIFT = ['O ground 0 0', 'Q ground 1 0', 'A crank O 0.3', 'B dyad A Q 1 0.6 left'
 DRAG = ['O ground 0 0', 'Q ground 0.3 0', 'A crank O 1', 'B dyad A Q 0.9 1.1 left']
 SLOT = ['O ground 0 0', 'Q ground 0 -0.045', 'A crank O 0.02 up', 'L slot Q A 0 out 0.08']
 
+# The ankle of a Unitree G1, from its maker's model.
+G1 = (
+    'pitch hinge ground at 0 0 0 axis 0 1 0 within -50deg 30deg',
+    'roll hinge pitch at 0 0 -0.0176 axis 1 0 0 within -15deg 15deg',
+    'right motor ground at 0.022 0 0.2159 axis 1 0 0',
+    'left motor ground at 0.022 0 0.1509 axis 1 0 0',
+    'R rod right 0.0395 -0.0164 0.2112 roll 0.022 -0.015 -0.0096',
+    'L rod left 0.035 0.0165 0.1469 roll 0.022 0.015 -0.0096')
+
 
 def example(name):
     """Return the parameters of an example."""

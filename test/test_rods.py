@@ -14,20 +14,12 @@ from linkage_ros.linkage import FORMS, WindowError
 from linkage_ros.linkage.geometry import window as proof
 import numpy as np
 import pytest
-from scenes import alone
+from scenes import alone, G1
 from truth import rods
 from truth.hostile_texts import NUMBERS
 
 RULE, RATE_RULE = 4.0, 8.0
 DEGREE = math.pi / 180.0
-# The ankle of a Unitree G1, from its maker's model.
-G1 = (
-    'pitch hinge ground at 0 0 0 axis 0 1 0 within -50deg 30deg',
-    'roll hinge pitch at 0 0 -0.0176 axis 1 0 0 within -15deg 15deg',
-    'right motor ground at 0.022 0 0.2159 axis 1 0 0',
-    'left motor ground at 0.022 0 0.1509 axis 1 0 0',
-    'R rod right 0.0395 -0.0164 0.2112 roll 0.022 -0.015 -0.0096',
-    'L rod left 0.035 0.0165 0.1469 roll 0.022 0.015 -0.0096')
 # Ankles of public models, and the ranges that their makers name [deg].
 REAL = {
     'Digit': (([-0.325998, -0.038658, -0.014], [0.0, 0.0, -1.0],

@@ -17,8 +17,7 @@ from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
 from pytest import approx
-from scenes import EXAMPLES, ROOT
-from test_rods import G1
+from scenes import EXAMPLES, G1, ROOT
 
 CELL = {'mechanisms': ['cell'], 'cell.type': 'peaucellier'}
 OWN = {'mechanisms': ['own'], 'own.type': 'custom'}

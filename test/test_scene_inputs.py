@@ -16,8 +16,7 @@ from linkage_ros import mechanisms
 from linkage_ros.scene.inverse_request import InverseRequest, present_inputs
 import numpy as np
 import pytest
-from scenes import alone
-from test_rods import G1
+from scenes import alone, G1
 from truth.working_modes import five_bar
 
 BOOM = ('O ground 0 0', 'P ground x -y', 'B cylinder P O l right called boom',

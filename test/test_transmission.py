@@ -24,8 +24,7 @@ from linkage_ros.c_code.axes import joints
 from linkage_ros.c_code.package import package
 import numpy as np
 import pytest
-from scenes import alone, BOOM, DRAG, LIFT, ROOT, SLOT
-from test_rods import G1
+from scenes import alone, BOOM, DRAG, G1, LIFT, ROOT, SLOT
 
 COMPILERS = [pytest.param(name, marks=pytest.mark.skipif(
     not shutil.which(name), reason=f'{name} is not installed')) for name in ('g++', 'clang++')]
