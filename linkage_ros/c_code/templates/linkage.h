@@ -543,8 +543,8 @@ static inline int lkr_efforts(const lkr_model *model, const lkr_point *p, int si
     return LKR_OK;
 }
 
-/* From one side's positions, velocities and efforts to the other's; returns a status. What cannot be
-   had is held, a velocity 0. What is not commanded is not written. */
+/* From one side's positions, velocities and efforts to the other's; returns a status. A position or
+   an effort without a value is held, a velocity is 0. What is not commanded is not written. */
 static inline int lkr_transmit(const lkr_model *model, lkr_memory *m, int side, const lkr_side *from,
     lkr_side *to)
 {
