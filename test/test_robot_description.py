@@ -100,7 +100,6 @@ def test_arguments_of_the_process_may_be_beside_those_for_ros(capsys, monkeypatc
         'empty.yaml', 'foreign.yaml') else name) for name in ('nowhere.yaml', *FILES, '.')),
     # As of a variable that is not set.
     ([''], 'No such file'), (['', '--ros-args', '-p', 'rate:=1.0'], 'either as SCENE or'),
-    (['--scene', 'a.yaml'], 'unrecognized arguments: --scene'),
     ([str(CATALOGUE), 'b.yaml'], 'unrecognized arguments: b.yaml'),
     ([str(CATALOGUE), '--mechanism', 'leg'], "there is no mechanism 'leg'; allowed: water_drop, "),
     ([str(CATALOGUE), '--ros-args', '-p', 'rate:=1.0'], 'either as SCENE or with --ros-args'),

@@ -290,8 +290,7 @@ def test_the_command_prints_what_its_options_ask_for(tmp_path, capsys):
     (['--density', '2e30'], 'argument --density: must be from 1e-30 to 1e+30, not 2e30'),
     (['--mechanism', 'jansn'], "there is no mechanism 'jansn'; allowed: water_drop, jansen, "
      'peaucellier, slotted_lever; did you mean jansen?'),
-    (['--format', 'dae'], "argument --format: invalid choice: 'dae' (choose from "),
-    (['nowhere.yaml'], 'nowhere.yaml: No such file or directory')])
+    (['--format', 'dae'], "argument --format: invalid choice: 'dae' (choose from ")])
 def test_the_command_says_what_is_wrong(capsys, arguments, complaint):
     assert main(arguments) == 1
     result = capsys.readouterr()

@@ -39,11 +39,6 @@ FAR = 'servo_near must be finite and within 1e+06 rad of zero'
 ONE = 'mechanism may be empty only if the scene has a single'
 
 
-def cut(letter):
-    """Return a long name as it is shortened."""
-    return f"'{27 * letter}...{28 * letter}'"
-
-
 @pytest.mark.parametrize('parameters, refused', [
     (None, [
         ({'lever_angle': []}, 'lever_angle is empty; give at least one value'),
@@ -52,16 +47,14 @@ def cut(letter):
         ({'servo_near': [0.1, 0.2]}, 'servo_near must be empty, have one angle, or one for each '
          'of the 1 in lever_angle, not 2'),
         *(({'servo_near': [bad]}, FAR) for bad in (math.nan, 1e308, -1.1 * scene.FARTHEST)),
-        *(({'mechanism': name}, f'there is no mechanism {shown}; allowed: {MECHANISMS}')
-          for name, shown in (('arm', "'arm'"), ('x' * 10 ** 6, cut('x')))),
+        ({'mechanism': 10 ** 6 * 'x'},
+         f"there is no mechanism '{27 * 'x'}...{28 * 'x'}'; allowed: {MECHANISMS}"),
         ({'mechanism': 'slotted_levr'}, "there is no mechanism 'slotted_levr'; allowed: "
          f'{MECHANISMS}; did you mean slotted_lever?'),
         ({'mechanism': 'jansen'}, f"jansen has no output 'lever'{OUTPUTS}"),
         ({'output': 'C.y'}, f'{ONE} mechanism; allowed: {MECHANISMS}'),
-        *(({'mechanism': 'jansen', 'output': name}, f'jansen has no output {shown}{OUTPUTS}{hint}')
-          for name, shown, hint in (
-            ('Z.y', "'Z.y'", ''), ('y' * 10 ** 6, cut('y'), ''),
-            ('G.x.x', "'G.x.x'", '; did you mean G.x?'))),
+        ({'mechanism': 'jansen', 'output': 'G.x.x'},
+         f"jansen has no output 'G.x.x'{OUTPUTS}; did you mean G.x?"),
         ({'mechanism': 'jansen', 'output': 'O.x'}, 'O.x of jansen does not move with the crank')]),
     (TWO, [({'output': output}, f'{ONE} slotted lever; allowed: left, right, drop')
            for output in ('', 'lever')]),
@@ -127,10 +120,8 @@ INPUTS_REFUSED = [
     *(({'near': [0.0, bad]}, 'near must be finite and within 1e+06 of zero')
       for bad in (1e9, -1e9, math.nan)),
     ({'outputs': ['P.x']}, 'leg has 2 inputs: as many outputs are needed, not 1'),
-    ({'outputs': ['P.x', 'Z.y']}, "five_bar has no output 'Z.y'; allowed: distance(A,B) and "
-     'angle(A,B) of two joints, crank, crank2, AP, CP, O.x, O.y, Q.x, Q.y, A.x, A.y, C.x, '
-     '... (14)'),
-    ({'mechanism': 'boom'}, "there is no mechanism 'boom'; allowed: leg, drop"),
+    ({'outputs': ['P.x', 'P.x']},
+     'P.x, P.x do not determine all inputs: too few of them move P.x, P.x'),
     ({'mechanism': 'drop'}, 'drop has 1 inputs: as many outputs are needed, not 2')]
 
 

@@ -68,6 +68,7 @@ def test_a_slider_sets_the_node_that_owns_the_parameter_and_others_changes_are_s
     assert running.page().mechanisms('/leg')['/leg']['inputs']['crank']['speed'] == -2.5
     saved = page.ask('export', key='/leg', form='yaml')['text']
     assert 'leg.crank.speed: -2.5\n' in saved and 'leg.leg_pairs: 3\n' in saved
+    assert 'leg_left2_' in page.ask('export', key='/leg', form='urdf')['text']
     running.set('leg.mirrored', True)
     both = page.setting('/leg', 'mirrored', True)
     assert [(told['legs'], told['pairs']) for told in (first, more, both)] == [
