@@ -10,7 +10,6 @@ from pathlib import Path
 from pkgutil import resolve_name
 import re
 import shlex
-import signal
 import subprocess
 import sys
 import textwrap
@@ -247,15 +246,11 @@ def test_ros2_control_moves_the_motors_of_the_scene(graph, reader):
 
 @pytest.mark.nightly
 def test_the_example_without_the_ros2_command_line_works():
-    running = Process('scene', ROOT / 'config' / 'all.yaml')
-    try:
+    with Process('scene', ROOT / 'config' / 'all.yaml') as running:
         done = subprocess.run(
             [sys.executable, ROOT / 'examples' / 'without_ros2.py'], text=True,
             capture_output=True, timeout=60.0,
             env={**os.environ, 'ROS_DOMAIN_ID': str(running.domain)})
-    finally:
-        running.interrupt(signal.SIGINT)
-        running.end()
     assert done.returncode == 0, done.stderr
     names, changed, angle = done.stdout.splitlines()
     assert "'jansen_BC'" in names and 'successful=True' in changed

@@ -17,11 +17,6 @@ from truth.drawing_accuracy import strict
 KINDS = [kind for kind in mechanisms.TYPES if kind != 'five_bar']
 
 
-def value_at(linkage, output, theta):
-    """Return an output at crank angles."""
-    return linkage.joint_angles(theta, (output,))[output]
-
-
 def inside(linkage, rng, count):
     """Return crank angles inside the reach."""
     arcs = linkage.reach()
@@ -35,7 +30,7 @@ def test_every_answer_is_right_to_the_last_digits(kind, values):
     linkage, rng = mechanisms.create(kind), np.random.default_rng(1)
     measure, count = strict(linkage), 0
     for output in linkage_checks.moved(linkage):
-        wanted = value_at(linkage, output, inside(linkage, rng, values))
+        wanted = linkage.joint_angles(inside(linkage, rng, values), (output,))[output]
         for value, answers in [*zip(wanted.tolist(), linkage.input_for(output, wanted))][:6]:
             answers = answers[np.isfinite(answers)]
             assert (np.diff(answers) > 0.0).all() and (np.abs(answers) <= math.pi).all()

@@ -93,10 +93,6 @@ def description(one):
     return urdf.describe([one], 'world')
 
 
-def links(text):
-    return [link.get('name') for link in ElementTree.fromstring(text).iter('link')]
-
-
 def limits(one):
     """Return the ends of each joint by the link's name, None where it has none."""
     moving = [joint for joint in ElementTree.fromstring(description(one)).iter('joint')
@@ -115,7 +111,8 @@ def test_every_joint_is_met_and_every_loop_is_closed(name, library, count):
     one = {**MACHINES, **OWN}[name]()
     text = description(one)
     robot = library(text)
-    frames = [link for link in links(text) if not re.search('_link$|^world$', link)]
+    frames = [name for link in ElementTree.fromstring(text).iter('link')
+              if not re.search('_link$|^world$', name := link.get('name'))]
     near = TOLERANCE * one.scale * one.linkage.longest
     for thetas in drives(one, count):
         positions, places = posed(one, thetas)
