@@ -89,7 +89,6 @@ def test_a_signal_ends_what_is_still_being_imported(tmp_path, name, stop):
 
 ARGUMENTS = [
     (['--foo'], "unknown argument '--foo': allowed are only those of ROS, "),
-    (['scene.yaml'], "bad arguments: unknown argument 'scene.yaml'"),
     (['x' * 10 ** 4], "bad arguments: unknown argument 'xxx"),
     (['--ros-args', '--bar'], 'bad arguments: .*--bar'),
     (['--ros-args', '-p', 'rate'], "bad arguments: .*Couldn't parse parameter override"),
@@ -100,6 +99,7 @@ ARGUMENTS = [
 
 @pytest.mark.parametrize('name, arguments, said', [
     *((name, *row) for name in NODES for row in ARGUMENTS),
+    ('scene', ['--ros-args', '-p', 'mechanisms:=[leg]'], 'leg.type must be a text'),
     ('viewer', ['--ros-args', '-p', 'use_sim_time:=5'], "'use_sim_time' to '5'")])
 def test_arguments_that_there_are_not_end_in_one_sentence(capfd, name, arguments, said):
     main = import_module(module(name)).main

@@ -7,7 +7,6 @@ import math
 
 from linkage_interfaces.srv import InputsFor, ServoInverse as Service
 from linkage_ros import mechanisms, scene
-from linkage_ros.nodes import scene_process
 from linkage_ros.nodes.crank_driver import CrankDriver
 from linkage_ros.nodes.kinematics import Kinematics
 from linkage_ros.nodes.servo_inverse import ServoInverse
@@ -160,9 +159,3 @@ def test_the_service_answers_on_the_working_branch_wherever_the_crank_is(graph):
         graph.until(lambda start=start: cranks and cranks[-1].position[0] == start)
         found = graph.call(client, Service.Request(lever_angle=[lever_of(0.4)]))
         assert found.success and found.servo_angle[0] == pytest.approx(0.4, abs=1e-9)
-
-
-def test_a_bad_scene_ends_them_all_in_one_sentence(capfd):
-    assert scene_process.main(['scene', '--ros-args', '-p', 'mechanisms:=[leg]']) == 1
-    printed = capfd.readouterr().err
-    assert printed.count('[FATAL]') == 1 and 'leg.type must be a text' in printed

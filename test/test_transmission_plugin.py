@@ -169,7 +169,7 @@ def test_an_effort_is_not_held_over_a_pause(plugins):
     assert status & SINGULAR and effort == 0.0
 
 
-def test_the_nearest_input_is_that_to_the_newest_position(plugins):
+def test_inputs_are_nearest_to_the_newest_position_and_efforts_at_the_measured_one(plugins):
     # The motor turns on by commands alone: none of them goes back by a turn.
     mechanism, component = plugins.mechanisms['drag'], plugins.component('drag')
     component.read(0.0)

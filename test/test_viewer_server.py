@@ -289,9 +289,8 @@ def test_where_a_port_is_taken_another_is_used_or_the_viewer_says_how(graph):
         assert answer(other.url)[0] == 200
         # Ports below are for the administrator.
         assert port != int(re.search(r':(\d+)/', other.url)[1]) >= 1024
-        with pytest.raises(scene.SceneError, match=(
-                '^the viewer cannot be started: .*in use; for another port use -p port:=8021, '
-                'with ros2 launch port:=8021, with make view PORT=8021; port 0 is any free one$')):
+        with pytest.raises(scene.SceneError, match='^the viewer cannot be started: .*in use; for '
+                           'another port use .* make view PORT=8021; port 0 is any free one$'):
             graph.start(Viewer, {'port': port})
     for given in ({'port': 0, 'host': '192.0.2.1', 'or_any_port': True}, {'port': 70000},
                   {'port': 'eighty'}):
