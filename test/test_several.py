@@ -31,16 +31,11 @@ def agree(linkage, outputs, values, expected, sure=1e-3):
     return worst
 
 
-def made(name):
-    """Return a collected case and its numbers."""
-    return CASES[name].linkage(), CASES[name].dimensions
-
-
 @pytest.mark.parametrize('name, outputs, truth', [
     pytest.param('excavator', BUCKET, excavator, marks=pytest.mark.nightly),
     ('parallelogram arm', ('W.x', 'W.y'), arm)])
 def test_an_arm_has_both_elbows(name, outputs, truth):
-    rng, (linkage, numbers) = np.random.default_rng(3), made(name)
+    rng, linkage, numbers = np.random.default_rng(3), CASES[name].linkage(), CASES[name].dimensions
     for _ in range(5):
         pose = [rng.uniform(input_.low, input_.high) for input_ in linkage.inputs]
         values = list(map(float, linkage.joint_angles(pose, outputs).values()))
