@@ -17,7 +17,7 @@ from linkage_ros.scene.motion import Motion
 import numpy as np
 import pytest
 from pytest import approx
-from scenes import EXAMPLES, G1, ROOT
+from scenes import alone, EXAMPLES, G1, ROOT
 
 CELL = {'mechanisms': ['cell'], 'cell.type': 'peaucellier'}
 OWN = {'mechanisms': ['own'], 'own.type': 'custom'}
@@ -73,17 +73,14 @@ def test_a_frame_is_called_as_links_of_robots_are(tmp_path, name):
 
 
 def test_a_branch_is_an_assembly_sign_and_0_the_usual_one():
-    given = {'mechanisms': ['jansen'], 'jansen.branches.E': 0, 'jansen.branches.F': -1}
-    assert scene.read(given).mechanisms['jansen'].linkage.branches == {'C': 1, 'E': -1, 'F': -1}
+    assert alone('jansen', branches__E=0, branches__F=-1).linkage.branches == {
+        'C': 1, 'E': -1, 'F': -1}
 
 
 def test_only_more_than_one_pair_is_mirrored_by_default():
-    def mirrored(**given):
-        given = {f'jansen.{key}': value for key, value in given.items()}
-        return scene.read({'mechanisms': ['jansen'], **given}).mechanisms['jansen'].mirrored
-
-    assert not mirrored() and mirrored(leg_pairs=2)
-    assert mirrored(mirrored=True) and not mirrored(leg_pairs=3, mirrored=False)
+    for given, mirrored in (({}, False), ({'leg_pairs': 2}, True), ({'mirrored': True}, True),
+                            ({'leg_pairs': 3, 'mirrored': False}, False)):
+        assert alone('jansen', **given).mirrored == mirrored
 
 
 @pytest.mark.parametrize('given, named', [
@@ -165,8 +162,7 @@ def test_a_wrong_parameter_is_named_with_what_is_allowed(given, named):
 
 def test_joints_bear_a_robots_own_names_signs_and_zeros():
     lines = ['crank=hip', 'left0_BC=-left-knee', 'right1_EF=-ankle.2-1.5e-1']
-    joints = scene.read({'jansen.leg_pairs': 2, 'jansen.only_named': True,
-                         'jansen.joint_names': lines}).mechanisms['jansen'].joints
+    joints = alone('jansen', 'jansen', leg_pairs=2, only_named=True, joint_names=lines).joints
     named = {joint: called for joint, called in joints.items() if called.published}
     assert named == {'crank': ('hip', 1.0, 0.0, True, False),
                      'left0_BC': ('left-knee', -1.0, 0.0, True, False),
