@@ -270,7 +270,6 @@ def test_the_command_prints_what_its_options_ask_for(tmp_path, capsys):
             ([], scene.read({}).mechanisms.values(), 'world', None, []),
             (['config/slotted_lever.yaml', '--width', '0.5'], lever.mechanisms.values(),
              lever.frame_id, 0.5, ['--density', '7.8e3']),
-            ([str(file), '--mechanism', 'b'], [several['b']], 'base', None, []),
             ([str(file), '--mechanism', 'b', 'a'], [several['b'], several['a']], 'base', None,
              [])):
         robot = bodies.robot(mechanisms, frame, width)

@@ -19,7 +19,6 @@ import pytest
 from pytest import approx
 from scenes import alone, EXAMPLES, G1, ROOT
 
-CELL = {'mechanisms': ['cell'], 'cell.type': 'peaucellier'}
 OWN = {'mechanisms': ['own'], 'own.type': 'custom'}
 YEAR = 365 * 86400 * 10 ** 9
 
@@ -189,17 +188,17 @@ def test_only_mechanisms_that_are_given_something_else_are_read_again():
 
 
 def test_a_crank_that_cannot_turn_swings_within_its_reach():
-    mechanism = scene.read(CELL).mechanisms['cell']
+    mechanism = alone('peaucellier')
     (low, high), = mechanism.reach
     assert mechanism.first.sweep == pytest.approx((0.98 * low, 0.98 * high))
 
 
 def test_a_crank_swings_in_the_arc_that_its_start_is_in():
-    stiff = {**CELL, 'cell.dimensions.r': 10.0}
-    first, second = scene.read(stiff).mechanisms['cell'].reach
+    stiff = alone('peaucellier', dimensions__r=10.0)
+    first, second = stiff.reach
     middle = 0.5 * (second[0] + second[1])
-    assert scene.read(stiff).mechanisms['cell'].first.sweep[1] < first[1]
-    crank = scene.read({**stiff, 'cell.crank.start': middle - math.tau}).mechanisms['cell'].first
+    assert stiff.first.sweep[1] < first[1]
+    crank = alone('peaucellier', dimensions__r=10.0, crank__start=middle - math.tau).first
     assert second[0] < crank.sweep[0] < middle < crank.sweep[1] < second[1]
 
 
