@@ -19,7 +19,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from linkage_ros import scene
 from linkage_ros.robot_model import rviz, urdf
-from linkage_ros.words import meant
+from linkage_ros.words import did_you_mean
 import yaml
 
 PACKAGE = 'linkage_ros'
@@ -101,7 +101,7 @@ def _scene_path(share, name):
     if not path.is_file():
         names = ', '.join(sorted(p.stem for p in (share / 'config').glob('*.yaml')))
         raise RuntimeError(f'scene must be one of {names}, or the path of a file, not {name}'
-                           f'{meant(name, names.split(", "))}')
+                           f'{did_you_mean(name, names.split(", "))}')
     return path
 
 

@@ -12,7 +12,7 @@ import sys
 from typing import Any, Callable, Mapping, NoReturn, Sequence
 
 from .scene import SceneError, SceneMechanism
-from .words import meant, RequestError, sentence, suggestion
+from .words import did_you_mean, RequestError, sentence, suggestion
 
 
 class Parser(argparse.ArgumentParser):
@@ -29,7 +29,8 @@ class Parser(argparse.ArgumentParser):
         arguments, unknown = self.parse_known_args(args, namespace)
         if unknown:
             options = re.findall(r'--[\w-]+', self.format_usage())
-            self.error(f'unrecognized arguments: {" ".join(unknown)}{meant(unknown[0], options)}')
+            self.error(
+                f'unrecognized arguments: {" ".join(unknown)}{did_you_mean(unknown[0], options)}')
         return arguments
 
 
@@ -88,7 +89,7 @@ def _beside(error: OSError) -> str:
     folder, name = os.path.split(str(error.filename))
     if not isinstance(error, FileNotFoundError) or not os.path.isdir(folder or '.'):
         return ''
-    return meant(name, os.listdir(folder or '.'))
+    return did_you_mean(name, os.listdir(folder or '.'))
 
 
 def chosen(mechanisms: Mapping[str, SceneMechanism], names: Sequence[str]) -> list[SceneMechanism]:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from traceback import walk_tb
 from typing import Iterator
 
-from .words import elided, MESSAGE
+from .words import MESSAGE, truncated
 
 # How to install each of them. All code imports them inside `needs`.
 INSTALL = {
@@ -50,5 +50,5 @@ def needs(package: str) -> Iterator[None]:
             raise ModuleNotFoundError(f'{fault} is not installed: {INSTALL[fault]}',
                                       name=fault) from error
         raise ImportError(f'{fault} is installed but cannot be used ({type(error).__name__}: '
-                          f'{elided(str(error), MESSAGE)}): {INSTALL[fault]}',
+                          f'{truncated(str(error), MESSAGE)}): {INSTALL[fault]}',
                           name=fault) from error

@@ -21,7 +21,7 @@ def plain_text(value: Any) -> Any:
     return str.__str__(value) if isinstance(value, str) else value
 
 
-def elided(text: str, most: int = MAX_QUOTED) -> str:
+def truncated(text: str, most: int = MAX_QUOTED) -> str:
     """Return a text as one line of limited length, with unprintable letters escaped."""
     start = ''.join(c if c.isprintable() else ascii(c)[1:-1] for c in text[:most + 1])
     return start if len(start) <= most else start[:most - 3] + '...'
@@ -29,7 +29,7 @@ def elided(text: str, most: int = MAX_QUOTED) -> str:
 
 def sentence(text: Any) -> str:
     """Return a text for a terminal: one line of limited length, as is each of its words."""
-    return elided(' '.join(elided(word, MESSAGE) for word in str(text).split()), MAX_LINE)
+    return truncated(' '.join(truncated(word, MESSAGE) for word in str(text).split()), MAX_LINE)
 
 
 class RequestError(Exception):
@@ -39,35 +39,35 @@ class RequestError(Exception):
         super().__init__(sentence(text))
 
 
-def quoted(value: Any) -> str:
+def short_repr(value: Any) -> str:
     """Return a value as Python writes it, at most MAX_QUOTED letters of it."""
     try:
-        return elided(_short.repr(value))
+        return truncated(_short.repr(value))
     except Exception:
         # An integer of more digits than Python writes, or a class that cannot write itself.
-        return f'a {elided(type(value).__name__, MAX_QUOTED - 2)}'
+        return f'a {truncated(type(value).__name__, MAX_QUOTED - 2)}'
 
 
-def meant(word: Any, names: Iterable[str]) -> str:
+def did_you_mean(word: Any, names: Iterable[str]) -> str:
     """Return a suggestion, to end a sentence, of the name most similar to a word; '' if none."""
     by_case = {name.lower(): name for name in names}
     text = word[:MAX_QUOTED].lower() if isinstance(word, str) else ''
     near = get_close_matches(text, by_case, 1, 0.7)
-    return ''.join(f'; did you mean {elided(by_case[name])}?' for name in near)
+    return ''.join(f'; did you mean {truncated(by_case[name])}?' for name in near)
 
 
 def suggestion(word: Any, names: Iterable[str], most: int = MAX_QUOTED) -> str:
     """Return the end of a sentence on an unknown word: the allowed names, and the most similar."""
     names = list(names)
-    return f'; allowed: {listed(names, most)}{meant(word, names)}'
+    return f'; allowed: {join_names(names, most)}{did_you_mean(word, names)}'
 
 
-def listed(names: Iterable[str], most: int = MAX_QUOTED) -> str:
+def join_names(names: Iterable[str], most: int = MAX_QUOTED) -> str:
     """Return names separated by commas; of many, the first ones and the number of all."""
     names = list(names)
     shown, text = [], ''
     for name in names:
-        shown.append(elided(name, most // 2))
+        shown.append(truncated(name, most // 2))
         text = ', '.join(shown)
         if len(text) > most:
             return ', '.join((*shown[:-1], f'... ({len(names)})'))

@@ -13,7 +13,7 @@ from hypothesis import given, settings, strategies as st
 from linkage_ros import palette, scene
 from linkage_ros.cli import RequestError, run
 from linkage_ros.optional import needs
-from linkage_ros.words import elided, listed, meant, plain_text, quoted, sentence
+from linkage_ros.words import did_you_mean, join_names, plain_text, sentence, short_repr, truncated
 import numpy as np
 import pytest
 
@@ -22,9 +22,10 @@ ANY = st.one_of(st.text(max_size=200), st.text('ab\n\x00\u2028\ud800', max_size=
 
 @settings(max_examples=20)
 @given(ANY, st.integers(10, 100))
-def test_an_elided_text_is_its_beginning_on_one_line(text, most):
+def test_a_truncated_text_is_its_beginning_on_one_line(text, most):
     escaped = ''.join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-    assert elided(text, most) == (escaped if len(escaped) <= most else escaped[:most - 3] + '...')
+    assert truncated(text, most) == (
+        escaped if len(escaped) <= most else escaped[:most - 3] + '...')
 
 
 @pytest.mark.parametrize('text, said', [
@@ -41,12 +42,12 @@ def test_a_sentence_is_one_line_of_words_of_limited_length(text, said):
     pytest.param(10 ** 5000, 'a int', id='digits'), (10 ** 70, f'1{"0" * 27}...{"0" * 29}'),
     ([[[[[1]]]]], '[[[[...]]]]'), ({'k': 2}, "{'k': 2}"), ('\n', r"'\n'")])
 def test_a_value_is_quoted_as_python_writes_it_shortened(value, text):
-    assert quoted(value) == text and len(text) <= 60
+    assert short_repr(value) == text and len(text) <= 60
 
 
 def test_a_value_that_cannot_write_itself_is_named_by_its_class():
     unwritable = type('Unwritable', (), {'__repr__': lambda self: 1 / 0})()
-    assert quoted(unwritable).startswith('<Unwritable instance at 0x')
+    assert short_repr(unwritable).startswith('<Unwritable instance at 0x')
 
 
 @pytest.mark.parametrize('names, text', [
@@ -55,8 +56,8 @@ def test_a_value_that_cannot_write_itself_is_named_by_its_class():
     ([c * 10 for c in 'abcdefg'],
      'aaaaaaaaaa, bbbbbbbbbb, cccccccccc, dddddddddd, eeeeeeeeee, ... (7)')])
 def test_a_list_names_the_first_and_counts_all(names, text):
-    assert listed(iter(names)) == text
-    assert listed(names, 10 ** 6) == (', '.join(names) or 'none')
+    assert join_names(iter(names)) == text
+    assert join_names(names, 10 ** 6) == (', '.join(names) or 'none')
 
 
 @pytest.mark.parametrize('word, names, name', [
@@ -65,7 +66,7 @@ def test_a_list_names_the_first_and_counts_all(names, text):
     ('abcdefghij', ['abcdef____'], None), ('x' * 70, ['x' * 60], 'x' * 60),
     ('ab', ['abc', 'ab'], 'ab'), ('x' * 60, ['x' * 70], f'{"x" * 57}...')])
 def test_the_most_similar_name_is_meant(word, names, name):
-    assert meant(word, names) == ('' if name is None else f'; did you mean {name}?')
+    assert did_you_mean(word, names) == ('' if name is None else f'; did you mean {name}?')
 
 
 def test_a_text_of_any_class_becomes_plain_and_all_else_stays():

@@ -11,7 +11,7 @@ from ..linkage import GROUND, Link, loaded_links
 from ..scene import SceneMechanism
 from ..scene.joint_names import JointName
 from ..scene.motion import Motion
-from ..words import listed
+from ..words import join_names
 
 
 class Axis(NamedTuple):
@@ -78,7 +78,7 @@ def joints(mechanism: SceneMechanism, names: Sequence[str] = ()) -> list[Axis]:
                ] if names else _chain(mechanism)
     if len({*outputs}) != len(mechanism.inputs):
         raise ValueError(f'{mechanism.name} has {len(mechanism.inputs)} inputs: as many of its '
-                         f'joints are needed, not {listed(names)}')
+                         f'joints are needed, not {join_names(names)}')
     return invertible(mechanism, [_joint(mechanism, output) for output in outputs])
 
 
@@ -97,7 +97,7 @@ def _joint(mechanism: SceneMechanism, output: str) -> Axis:
 def invertible(mechanism: SceneMechanism, axes: list[Axis]) -> list[Axis]:
     """Return axes; raise ValueError if positions of them do not give the inputs for certain."""
     linkage, names = mechanism.linkage, [each.output for each in axes]
-    what = f'{listed(names)} of {mechanism.name}'
+    what = f'{join_names(names)} of {mechanism.name}'
     if len({each.input for each in axes} - {None}) == len(axes):
         return axes
     if any(input_.is_part for input_ in linkage.inputs):

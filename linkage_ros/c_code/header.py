@@ -20,7 +20,7 @@ from .names import comment, distinct, field, filled, prefix, template
 from .tables import Tables
 from ..linkage import Mechanism
 from ..scene import SceneMechanism
-from ..words import listed, plain_text
+from ..words import join_names, plain_text
 
 # Poses of a solution of an inverse: the first, again with its rates, and after a step of Newton's
 # method. A sweep's end adds one to the answer's.
@@ -115,7 +115,7 @@ def _inverses(mechanism: SceneMechanism, texts: Sequence[str]) -> dict[str, list
         mechanism.linkage.check_output(output)
     if outputs and n > 1 and len(outputs) != n:
         raise ValueError(f'{mechanism.name} has {n} inputs: as many outputs are needed, '
-                         f'got {listed(outputs)}')
+                         f'got {join_names(outputs)}')
     groups = [invertible(mechanism, [axis(mechanism, output, output)
                                      for output in outputs[i:i + n]])
               for i in range(0, len(outputs), n)]

@@ -24,7 +24,7 @@ from typing import Any, Callable, Mapping, Sequence
 from .expression import argument, operation, Real, substituted, unknown, where
 from .listing import Dialect
 from .program import ARRAYS, in_order, Program, tolerant
-from ..words import listed, quoted
+from ..words import join_names, short_repr
 
 
 def array_function(outputs: Sequence[Real], arguments: int, xp: Any, dimensions: Mapping,
@@ -35,7 +35,7 @@ def array_function(outputs: Sequence[Real], arguments: int, xp: Any, dimensions:
     `single` are the numbers that take the place of others in single precision.
     """
     if not hasattr(xp, 'float64'):
-        raise ValueError(f"xp must be a package with Python's array API, got {quoted(xp)}")
+        raise ValueError(f"xp must be a package with Python's array API, got {short_repr(xp)}")
 
     def code(dtype: Any, numbers: dict[float, float]) -> Callable:
         names = {name: _of_floats_too(name, xp, dtype) for name in (
@@ -54,8 +54,9 @@ def array_function(outputs: Sequence[Real], arguments: int, xp: Any, dimensions:
         for dtype, pose in codes:
             if [getattr(x, 'dtype', None) == dtype for x in arrays] == arguments * [True]:
                 return pose(*broadcast(*arrays))
-        raise ValueError(f'needed: {arguments} arrays of {xp.__name__}, all float64 or all float32'
-                         f'; got {listed([str(getattr(x, "dtype", type(x))) for x in arrays])}')
+        raise ValueError(
+            f'needed: {arguments} arrays of {xp.__name__}, all float64 or all float32; '
+            f'got {join_names([str(getattr(x, "dtype", type(x))) for x in arrays])}')
 
     return function
 

@@ -27,7 +27,7 @@ from ..formula.expression import derivative, Real, real
 from ..formula.namespace import array_function
 from ..formula.program import CompiledFunction, evaluate, evaluate_in_order, Program
 from ..optional import needs
-from ..words import listed, meant, plain_text, quoted, suggestion
+from ..words import did_you_mean, join_names, plain_text, short_repr, suggestion
 
 # Quantities of joints; all others are of links.
 OF_POINTS = 'points', 'velocities', 'point accelerations'
@@ -49,7 +49,7 @@ def _hashable(names: Any) -> Any:
         return names
     except TypeError:
         raise ValueError('points and joints must be a name or a list of names, '
-                         f'got {quoted(names)}') from None
+                         f'got {short_repr(names)}') from None
 
 
 class Kinematics:
@@ -181,7 +181,7 @@ class Kinematics:
         if self.axes != 'xyz' or unknown or len({*outputs}) != len(self.inputs):
             allowed = self.joints if self.axes == 'xyz' else ('none in a plane',)
             raise ValueError(f'{self.type} can be driven by {len(self.inputs)} of '
-                             f'{listed(allowed)}, not by {quoted(list(outputs))}')
+                             f'{join_names(allowed)}, not by {short_repr(list(outputs))}')
         sides = checked_branches(self.design, branches, self.branches)
         made = self.cache.get_or_make(('driven by', outputs, *sides.values()), lambda: type(self)(
             replace(self.design, inputs=outputs), self.dimensions, sides, self.is_accelerated))
@@ -432,8 +432,9 @@ class Kinematics:
             own = [x for x in self.coordinates if isinstance(output, str) and output == x[:-2]]
             pairs = 'distance(A,B) and angle(A,B) of two joints, ' * (self.axes == 'xy')
             raise ValueError(
-                f'{self.type} has no output {quoted(output)}; allowed: {pairs}{listed(named)}'
-                + (f'; did you mean {listed(own)}?' if own else meant(output, named)))
+                f'{self.type} has no output {short_repr(output)}; allowed: {pairs}'
+                + join_names(named) + (
+                    f'; did you mean {join_names(own)}?' if own else did_you_mean(output, named)))
 
     def gear(self, name: str, by: int = 0) -> tuple[float, float]:
         """Return ratio and offset [rad or m] by which an input drives a link, anywhere."""
@@ -484,7 +485,7 @@ class Kinematics:
         if isinstance(by, (bool, np.bool_, np.ndarray)) or not hasattr(by, '__index__') \
                 or not 0 <= by.__index__() < len(self.inputs):
             raise ValueError(f'by must be the number of an input, from 0 to '
-                             f'{len(self.inputs) - 1}, got {quoted(by)}')
+                             f'{len(self.inputs) - 1}, got {short_repr(by)}')
         return int(by)
 
     def _ready(self, kind: str, requested: Any, *by: int
@@ -507,6 +508,6 @@ class Kinematics:
         names = tuple(map(plain_text, (requested,) if isinstance(requested, str) else requested))
         for name in names:
             if name not in allowed and not (what == 'joint' and self.has_output(name)):
-                raise ValueError(f'{self.type} has no {what} {quoted(name)}'
+                raise ValueError(f'{self.type} has no {what} {short_repr(name)}'
                                  f'{suggestion(name, allowed)}')
         return names

@@ -18,7 +18,7 @@ from .kinematics import Inputs, Kinematics
 from .motion.reach import extremes_of, reach_of
 from .motion.singularities import Analysis
 from .text.arguments import numbers
-from ..words import quoted
+from ..words import short_repr
 
 
 class Mechanism(Kinematics):
@@ -131,7 +131,7 @@ class Mechanism(Kinematics):
         values = numbers('others', others)
         if values.shape != (len(self.inputs) - 1,):
             raise ValueError(f'{self.type} has {len(self.inputs)} inputs: the values of all '
-                             f'except the first are needed, got {quoted(values.tolist())}')
+                             f'except the first are needed, got {short_repr(values.tolist())}')
         return tuple(values.tolist())
 
     def servo_for(self, output: str, value: ArrayLike, near: ArrayLike | None = None,
@@ -203,7 +203,7 @@ class Mechanism(Kinematics):
         """
         given = numbers('arcs', () if arcs is None else arcs)
         if given.size and given.shape[1:] != (2,) or not np.isfinite(given).all():
-            raise ValueError(f'arcs must be pairs of two finite numbers, got {quoted(arcs)}')
+            raise ValueError(f'arcs must be pairs of two finite numbers, got {short_repr(arcs)}')
         return extremes_of(self, output, arcs, self._fixed(others))
 
     def monotone(self, output: str, others: Sequence[float] = ()) -> np.ndarray:

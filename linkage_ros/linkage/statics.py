@@ -19,14 +19,14 @@ from numpy.typing import ArrayLike
 
 from .kinematics import Inputs, Kinematics
 from .text.arguments import numbers
-from ..words import listed, plain_text, quoted
+from ..words import join_names, plain_text, short_repr
 
 
 def effort(linkage: Kinematics, theta: Inputs, loads: Mapping[str, ArrayLike]) -> np.ndarray:
     """Implement `Mechanism.effort`."""
     if not isinstance(loads, abc.Mapping):
         raise ValueError('loads must be a mapping from joints to forces and from links to '
-                         f'moments, got {quoted(loads)}')
+                         f'moments, got {short_repr(loads)}')
     shape = np.broadcast_shapes(linkage.shape, *map(np.shape, linkage.each_input(theta)))
     with np.errstate(invalid='ignore', over='ignore'):
         return np.stack([0.0 - sum(_powers(linkage, theta, loads, by), np.zeros(shape))
@@ -45,15 +45,15 @@ def _powers(linkage: Kinematics, theta: Inputs, loads: Mapping[str, ArrayLike],
         if name in velocities:
             if force.shape[-1:] != (len(linkage.axes),):
                 raise ValueError(f'the load on the joint {name} must be a force '
-                                 f'{", ".join(linkage.axes)} [N], not {quoted(load)}')
+                                 f'{", ".join(linkage.axes)} [N], not {short_repr(load)}')
             # A zero load does no work, even at an infinite velocity.
             yield np.where(force == 0.0, 0.0, force * velocities[name]).sum(axis=-1)
         elif name in chains:
             turning = sum((rates[link] for link in chains[name]), np.zeros(()))
             yield np.where(force == 0.0, 0.0, force * turning)
         else:
-            raise ValueError(f'{linkage.type} has no joint or link {quoted(name)} to load; '
-                             f'allowed: {listed((*linkage.points, *linkage.joints))}')
+            raise ValueError(f'{linkage.type} has no joint or link {short_repr(name)} to load; '
+                             f'allowed: {join_names((*linkage.points, *linkage.joints))}')
 
 
 def loaded_links(linkage: Kinematics, name: str) -> Iterator[str]:

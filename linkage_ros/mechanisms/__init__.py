@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from . import custom
 from ..linkage import checked_branches, checked_dimensions, Design, Mechanism
-from ..words import plain_text, quoted, suggestion
+from ..words import plain_text, short_repr, suggestion
 
 # The mechanisms of a scene without names, and their scales: they are 0.5 m to 1.5 m in size.
 CATALOGUE = {'water_drop': 0.1, 'jansen': 0.005, 'peaucellier': 0.1, 'slotted_lever': 0.002}
@@ -50,7 +50,7 @@ def design(type_: str, /, joints: Sequence[str] | None = None, tracer: str | Non
 
     """
     if not isinstance(type_, str) or type_ not in (*TYPES, *WRITTEN):
-        raise ValueError(f'unknown mechanism type {quoted(type_)}'
+        raise ValueError(f'unknown mechanism type {short_repr(type_)}'
                          f'{suggestion(type_, (*TYPES, *WRITTEN), 200)}')
     if type_ in WRITTEN:
         return custom.checked_design(plain_text(type_), joints, tracer, dimensions)
@@ -63,7 +63,7 @@ def design(type_: str, /, joints: Sequence[str] | None = None, tracer: str | Non
 def defaults(type_: str, /) -> dict:
     """Return the dimensions [m] of a type; ValueError if it is not in the catalogue."""
     if not isinstance(type_, str) or type_ not in TYPES:
-        raise ValueError(f'no defaults for type {quoted(type_)}; allowed: {", ".join(TYPES)}')
+        raise ValueError(f'no defaults for type {short_repr(type_)}; allowed: {", ".join(TYPES)}')
     return dict(TYPES[type_].DESIGN.dimensions)
 
 

@@ -9,7 +9,7 @@ from typing import Any, Iterable
 
 from ..cache import cached
 from ..linkage import Design, joint_lines, rod_lines
-from ..words import listed, meant, plain_text, quoted, suggestion
+from ..words import did_you_mean, join_names, plain_text, short_repr, suggestion
 
 # The modules that read joint lines, by the type of the linkage.
 WORDS = {'custom': joint_lines, 'rods': rod_lines}
@@ -36,12 +36,12 @@ def design(type_: str, joints: tuple[str, ...], tracer: str | None,
         for name in joint_lines.lengths([line]):
             joint_lines.check_name(name)
             if name not in names:
-                raise line.error(f'dimension {name} has no value; given: {listed(names)}'
-                                 f'{meant(name, names)}')
+                raise line.error(f'dimension {name} has no value; given: {join_names(names)}'
+                                 f'{did_you_mean(name, names)}')
     used = joint_lines.lengths(lines)
     placed = words.points(lines)
     if tracer is not None and tracer not in placed:
-        raise ValueError(f'tracer {quoted(tracer)} is not a joint{suggestion(tracer, placed)}')
+        raise ValueError(f'tracer {short_repr(tracer)} is not a joint{suggestion(tracer, placed)}')
     signed = frozenset(name for name, length in used.items() if not length)
     return Design(type_, dict.fromkeys(used, 1.0), joints, tracer or placed[-1], signed,
                   words is rod_lines, is_written=True)
@@ -51,13 +51,13 @@ def checked_design(type_: str, joints: Iterable[str] | None, tracer: str | None,
                    dimensions: Iterable[str]) -> Design:
     """Return the design of a user's arguments; raise ValueError if they are invalid."""
     if tracer is not None and not isinstance(tracer, str):
-        raise ValueError(f'tracer must be the name of a joint, got {quoted(tracer)}')
+        raise ValueError(f'tracer must be the name of a joint, got {short_repr(tracer)}')
     lines = checked_lines(joints)
     try:
         names = tuple(map(plain_text, dimensions))
     except TypeError:
         raise ValueError('dimensions must be a list of names, '
-                         f'got {quoted(dimensions)}') from None
+                         f'got {short_repr(dimensions)}') from None
     for name in names:
         joint_lines.check_name(name)
     return design(type_, lines, plain_text(tracer), names)
@@ -72,10 +72,12 @@ def checked_lines(joints: Any) -> tuple[str, ...]:
     except TypeError:
         lines = ()
     if not lines:
-        raise ValueError(f'joints must be a list of lines, one per joint, got {quoted(joints)}')
+        raise ValueError(
+            f'joints must be a list of lines, one per joint, got {short_repr(joints)}')
     if len(lines) > joint_lines.MOST_LINES:
         raise ValueError(f'joints must be up to {joint_lines.MOST_LINES} lines, got more')
     for number, line in enumerate(lines, 1):
         if not isinstance(line, str):
-            raise ValueError(f'joints must be lines of text, but line {number} is {quoted(line)}')
+            raise ValueError(
+                f'joints must be lines of text, but line {number} is {short_repr(line)}')
     return tuple(map(plain_text, lines))

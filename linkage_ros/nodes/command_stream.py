@@ -21,7 +21,7 @@ from .publishers import TrackedPublisher
 from ..scene.inverse_request import ActuatorCommand, InverseRequest
 from ..scene.joint_names import JointName
 from ..scene.scene_mechanism import SceneMechanism
-from ..words import elided, listed
+from ..words import join_names, truncated
 
 # Maximum number of points of a trajectory, which take the worker some seconds.
 MAX_POINTS = 10_000
@@ -65,7 +65,7 @@ class Target(NamedTuple):
         # The reason is about the linkage's outputs, without signs and offsets of the names.
         commands, outputs = ([f'{value:.6g}' for value in numbers] for numbers in (
             [positions[index] for index in self.indices], values))
-        meaning = '' if outputs == commands else ' ({})'.format(listed(
+        meaning = '' if outputs == commands else ' ({})'.format(join_names(
             map('{} at {}'.format, self.request.outputs, outputs)))
         return f'{self.named} cannot be {", ".join(commands)}{meaning}: {reason}'
 
@@ -134,11 +134,11 @@ class CommandStream:
             else:
                 unknown.append(named)
         if unknown:
-            reasons.append(f'no output is called {listed(unknown, 150)}; an output is called '
+            reasons.append(f'no output is called {join_names(unknown, 150)}; an output is called '
                            '<mechanism>_<link>, <mechanism>_<joint>.x, or as joint_names has it')
         for (name, _), outputs in groups.items():
             mechanism, (indices, joints, published) = self._mechanisms[name], zip(*outputs)
-            n, called = len(mechanism.inputs), ' and '.join(elided(names[i]) for i in indices)
+            n, called = len(mechanism.inputs), ' and '.join(truncated(names[i]) for i in indices)
             try:
                 if len(outputs) != n:
                     raise ValueError(f'{name} has {n} inputs: name {n} of its outputs, not '
@@ -148,7 +148,7 @@ class CommandStream:
                 for other in targets:
                     if shared := {*target.actuators} & {*other.actuators}:
                         raise ValueError(f'{other.named} and {called} are moved by one actuator, '
-                                         f'{listed(sorted(shared))}: name one of them')
+                                         f'{join_names(sorted(shared))}: name one of them')
                 targets.append(target)
             except ValueError as error:
                 reasons.append(str(error))

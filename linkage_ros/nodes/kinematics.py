@@ -21,7 +21,7 @@ from .message_layout import NEVER, subscribe
 from .scene_joint_states import SceneJointStates
 from .. import scene
 from ..robot_model import bodies, urdf
-from ..words import listed
+from ..words import join_names
 
 # Time from the start to a warning about inputs that were not received [s].
 MISSING_AFTER_S = 5.0
@@ -187,7 +187,7 @@ class Kinematics(scene_node.SceneNode):
         if unknown:
             self.get_logger().warning(
                 f'{self.resolve_topic_name("crank_states")}: no input is called '
-                f'{listed(unknown, 150)}; the inputs are {listed(self._inputs, 150)}'
+                f'{join_names(unknown, 150)}; the inputs are {join_names(self._inputs, 150)}'
                 f'{self._unknown.ending}')
 
     def _warn_of_missing(self) -> None:
@@ -198,8 +198,8 @@ class Kinematics(scene_node.SceneNode):
         if waiting:
             self.get_logger().warning(
                 f'{self.resolve_topic_name("crank_states")}: no position of '
-                f'{listed(waiting, 150)} was received, without which '
-                f'{listed(dict.fromkeys(waiting.values()), 150)} cannot move')
+                f'{join_names(waiting, 150)} was received, without which '
+                f'{join_names(dict.fromkeys(waiting.values()), 150)} cannot move')
 
 
 def main(args: Any = None) -> int:

@@ -21,7 +21,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from .log import Throttle
 from .parameters import SceneParameters, typed
 from .. import scene
-from ..words import elided, listed, quoted
+from ..words import join_names, short_repr, truncated
 
 TOPIC = 'scene_parameters'
 LATCHED = QoSProfile(depth=500, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -96,12 +96,12 @@ class Follower:
         missing = present.keys() ^ set(mechanisms)
         self._mechanisms = present.keys() - missing - unlike.keys()
         self._warn('another mechanism, which is not followed', [
-            f'{name} is {quoted(here[name])} here and {quoted(there[name])} there'
+            f'{name} is {short_repr(here[name])} here and {short_repr(there[name])} there'
             for name in unlike.values()])
         self._warn('other mechanisms; only one of the nodes has', sorted(missing))
         if event.new_parameters:
             self._warn('other values, which are followed', [
-                f'{name} was {quoted(here[name])} and is now {quoted(there[name])}'
+                f'{name} was {short_repr(here[name])} and is now {short_repr(there[name])}'
                 for name in sorted(there) if name.partition('.')[0] in self._mechanisms
                 and here[name] != there[name]])
 
@@ -109,4 +109,4 @@ class Follower:
         """Warn that the owner has `what`, if it has any; throttled."""
         if particulars:
             self._throttle.warn(what, lambda: (
-                f'{elided(self._owner)} has {what}: {listed(particulars, 1000)}'))
+                f'{truncated(self._owner)} has {what}: {join_names(particulars, 1000)}'))

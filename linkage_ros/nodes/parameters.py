@@ -20,7 +20,7 @@ from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter
 
 from .. import scene as scenes
-from ..words import elided
+from ..words import truncated
 
 
 class Undeclared(ParameterNotDeclaredException):
@@ -144,7 +144,7 @@ class SceneParameters:
         field = self.followed.get(name)
         owner = f'; set it on {field.owner}' if field else ''
         node = self._node.get_fully_qualified_name()
-        return f'{elided(name)} is not a parameter of {node}{owner}'
+        return f'{truncated(name)} is not a parameter of {node}{owner}'
 
     def _changed_scene(self, values: Mapping[str, Any]) -> scenes.Scene:
         """Return the scene with changed values; raise SceneError if it is refused."""

@@ -29,7 +29,7 @@ from .parameters import SceneParameters
 from .shutdown import ShutdownHandler
 from .worker import Worker
 from .. import scene as scenes
-from ..words import elided, listed, quoted
+from ..words import join_names, short_repr, truncated
 
 try:
     from rclpy.experimental import EventsExecutor as Executor
@@ -151,7 +151,7 @@ class SceneNode(Node):
             return callback(request, response)
         except Exception as error:
             self.report('a request', error)
-            return _refused(response, elided(f'internal error: {error!r}', 299))
+            return _refused(response, truncated(f'internal error: {error!r}', 299))
 
     async def _respond_in_turn(self, callback: Callable, request: Any, response: Any) -> Any:
         """
@@ -245,12 +245,12 @@ def run(node_classes: Iterable[Callable[[], Node]], name: str, args: Any = None,
         try:
             rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
             if unknown := remove_ros_args(args)[1:]:
-                raise scenes.SceneError(f'unknown argument {quoted(unknown[0])}: allowed are only '
-                                        'those of ROS, after --ros-args')
+                raise scenes.SceneError(f'unknown argument {short_repr(unknown[0])}: allowed are '
+                                        'only those of ROS, after --ros-args')
         except (RuntimeError, scenes.SceneError) as error:
             # The message of rclpy may quote a long argument.
             try_shutdown()
-            return _failed(name, elided(f'bad arguments: {error}', 240))
+            return _failed(name, truncated(f'bad arguments: {error}', 240))
         try:
             # The creation of nodes leaves no garbage; collecting would only delay it.
             gc.disable()
@@ -259,7 +259,7 @@ def run(node_classes: Iterable[Callable[[], Node]], name: str, args: Any = None,
                 nodes.append(node)
                 if isinstance(node, SceneNode):
                     node.get_logger().info('ready: ' + node.task.format(
-                        mechanisms=listed(node.scene.mechanisms, 200), rate=node.scene.rate))
+                        mechanisms=join_names(node.scene.mechanisms, 200), rate=node.scene.rate))
             # All objects so far are permanent; collections need not visit them.
             gc.freeze()
             gc.enable()

@@ -20,7 +20,7 @@ from ..cache import Cache
 from ..optional import needs
 from ..robot_model import bodies
 from ..scene.inverse_request import InverseRequest, LEVER, present_inputs
-from ..words import elided, listed, MESSAGE, quoted, suggestion
+from ..words import join_names, MESSAGE, short_repr, suggestion, truncated
 
 # Other callers and messages wait for an answer: the maximum number of values in a request.
 MAX_VALUES = 10_000
@@ -93,7 +93,7 @@ class ServoInverse(scene_node.SceneNode):
         try:
             fill()
         except ValueError as problem:
-            response.message = elided(str(problem), MESSAGE)
+            response.message = truncated(str(problem), MESSAGE)
         return response
 
     def _interpret(self, message: JointState) -> list[tuple[str, int]]:
@@ -136,7 +136,7 @@ def solve(inverse: InverseRequest, request: Any, response: Any) -> None:
     response.reachable = np.isfinite(np.ravel(positions)).tolist()
     response.success = all(response.reachable)
     if not response.success:
-        response.message = elided(_unreachable(inverse, [
+        response.message = truncated(_unreachable(inverse, [
             value for value, reached in zip(values, response.reachable) if not reached]), MESSAGE)
 
 
@@ -159,7 +159,7 @@ def solve_inputs_for(mechanism: scene.SceneMechanism, request: Any, response: An
     response.modes = [solution.mode for _, solution in answers]
     response.singular = [solution.is_singular for _, solution in answers]
     response.success = bool(answers)
-    response.message = '' if answers else elided(inverse.reason(*values), MESSAGE)
+    response.message = '' if answers else truncated(inverse.reason(*values), MESSAGE)
 
 
 def _chosen(mechanisms: Mapping[str, scene.SceneMechanism], name: str,
@@ -169,7 +169,7 @@ def _chosen(mechanisms: Mapping[str, scene.SceneMechanism], name: str,
         return mechanisms[name]
     if not name and len(default) == 1:
         return next(iter(default.values()))
-    problem = (f'there is no mechanism {quoted(name)}' if name else
+    problem = (f'there is no mechanism {short_repr(name)}' if name else
                f'mechanism may be empty only if the scene has a single {what}')
     raise ValueError(f'{problem}{suggestion(name, mechanisms, MAX_NAMES_LENGTH)}')
 
@@ -179,7 +179,7 @@ def _unreachable(inverse: InverseRequest, values: Sequence[float]) -> str:
     named = ', '.join(f'{value:.6g}' for value in values[:MAX_NAMED_VALUES])
     more = f' and {len(values) - MAX_NAMED_VALUES} more' if len(values) > MAX_NAMED_VALUES else ''
     first = next(filter(math.isfinite, values), math.nan)
-    return f'{listed(inverse.outputs)} cannot be {named}{more}; {inverse.reason(first)}'
+    return f'{join_names(inverse.outputs)} cannot be {named}{more}; {inverse.reason(first)}'
 
 
 def main(args: Any = None) -> int:

@@ -19,7 +19,7 @@ from .. import cli, scene
 from ..linkage import short
 from ..robot_model.robot import FIXED, HINGE, MAX_NUMBER, NotDriven, posed, Robot, SLIDE
 from ..scene.writing import in_yaml
-from ..words import elided, listed, sentence
+from ..words import join_names, sentence, truncated
 
 NAME = 'from_robot'
 # The report on a mechanism that differs from its robot, or could not be compared.
@@ -58,7 +58,7 @@ def show(args: list[str] | None) -> None:
         robot = closing.held(robot, {**robot.held, **positions(arguments.hold)})
         parameters, reports, still = described(robot)
     # Unprintable characters in names of the file could end a comment.
-    head = [elided(line, 10 ** 6) for line in (
+    head = [truncated(line, 10 ** 6) for line in (
         f'From {arguments.file}. Its joints on /joint_states, and its model:',
         _launch(arguments, still), READING)]
     lines = [*map(sentence, reports)]
@@ -107,7 +107,7 @@ def described(robot: Robot) -> tuple[dict[str, Any], list[str], dict[str, float]
             why = fault if fault and (is_driven or isinstance(error, NotDriven)) else error
             in_space = f'{group.why}; ' + 'as rods in space: ' * (why is not fault)
             bodies = dict.fromkeys(body for joint in joints for body in joint.bodies)
-            reports.append(f'Left out: {listed(bodies, 200)}: '
+            reports.append(f'Left out: {join_names(bodies, 200)}: '
                            f'{in_space * bool(group.why)}{why}.')
     balls = [[hinge.name for hinge in joint.hinges if hinge.position is not None]
              for group in groups for joint in group.joints]

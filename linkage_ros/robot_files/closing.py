@@ -15,7 +15,7 @@ import numpy as np
 
 from .spatial import ASKEW, Component, components, DEAD_POINT, is_free
 from ..robot_model.robot import FIXED, NotDriven, posed, Robot
-from ..words import listed
+from ..words import join_names
 
 # A gap that is smaller, of the size of its loops, is rounding: files have angles such as 1.5708.
 # Such loops are closed without a search, as far as they can be.
@@ -133,7 +133,7 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
         fixed = [joint.name for joint in component.joints
                  if joint.kind == FIXED and joint.is_cut and joint.name]
         raise ValueError('it cannot move, as its joints hold each other' + (
-            f': {listed(fixed)} makes one body of two, where a pin has the type 3d'
+            f': {join_names(fixed)} makes one body of two, where a pin has the type 3d'
             if fixed else ''))
     motions = component.free_ways(pose, component.is_of([]), LEANING)
     count = len(chosen := component.chosen(motions, motors))
@@ -141,8 +141,8 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
         # Motors that nothing lets move are replaced.
         chosen = chosen or component.chosen(motions, [*component.positions])
         raise ValueError(
-            f'{listed(motors)} drive it, and hold each other, as {count} of them tell where all '
-            f'is: {_added(("driven", chosen))}')
+            f'{join_names(motors)} drive it, and hold each other, as {count} of them tell where '
+            f'all is: {_added(("driven", chosen))}')
     loose, motions = component.loose(pose, motors + followers)
     if not loose:
         return
@@ -152,10 +152,10 @@ def _check_driven(component: Component, pose: np.ndarray, motors: list[str], fol
     more = component.chosen(motions, loose, stiff)
     at = component.texts(pose, component.is_of(more))
     raise NotDriven(
-        f'not driven: {len(more)} of {listed(loose)} must be moved, named by --driven, or held, '
-        'named by --hold: '
+        f'not driven: {len(more)} of {join_names(loose)} must be moved, named by --driven, or '
+        'held, named by --hold: '
         + _added(('driven', [*motors, *more]), ('hold', (at[name] for name in more)))
-        + f'; the limits of {listed(stiff)} leave no range' * bool(stiff))
+        + f'; the limits of {join_names(stiff)} leave no range' * bool(stiff))
 
 
 def _choice(questions: Sequence[Question], why: str) -> ValueError:
@@ -205,7 +205,7 @@ def _check_unfolded(component: Component, pose: np.ndarray, motors: list[str], l
             pairs = [np.array(pair) for poses in tried for pair in combinations(
                 poses[component.gap(poses, rows) < component.near], 2)]
             if not pairs:
-                raise ValueError(f'its loops end where the file has {listed(motors)}: choose '
+                raise ValueError(f'its loops end where the file has {join_names(motors)}: choose '
                                  'another pose by --pose, or mend lengths or places in the file')
             # What moves as freely beside it, such as a ring on two pins, is no dead point.
             if min(len(component.free_ways(beside, still, least))

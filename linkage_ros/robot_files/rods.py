@@ -22,7 +22,7 @@ from .planar import chain, Group
 from .. import mechanisms, scene
 from ..linkage import FORMS, short, theta_of, WindowError
 from ..robot_model.robot import BALL, HINGE, Joint, NotDriven, plain, Robot, SLIDE
-from ..words import listed
+from ..words import join_names
 
 # A hinge with wider limits [rad] has none.
 _ANY = 0.999 * math.pi
@@ -71,7 +71,7 @@ class Rods:
         if wrong := [joint.name for joint in joints if joint not in (*self.links.values(), *halves)
                      and not (apart & {*joint.bodies} and self._bodies.keys() & {*joint.bodies})]:
             raise ValueError('links on hinges and undriven slides can be joined by rods '
-                             f'and cylinders, not by {listed(wrong)}')
+                             f'and cylinders, not by {join_names(wrong)}')
         for body, held in rods.items():
             one, two = held
             self._rod(one.name, self._end(one, body), self._end(two, body),

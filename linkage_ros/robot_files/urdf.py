@@ -23,7 +23,7 @@ from . import sdf
 from .sdf import attribute, numbers, once
 from ..cli import RequestError
 from ..robot_model.robot import at, BALL, FIXED, HINGE, pose, Robot, UNIVERSAL
-from ..words import quoted, suggestion
+from ..words import short_repr, suggestion
 
 # The keys of a file of loops; the last two have no effect.
 _KEYS = ('closures', 'closed_loop', 'pin_loops', 'ball_loops', 'type', 'joint_name',
@@ -123,7 +123,7 @@ def close(robot: Robot, loops: Mapping[str, Any]) -> None:
     """Add the loops of another file; raise RequestError for a key that is not known."""
     for key in loops:
         if key not in _KEYS:
-            raise RequestError(f'there is no key {quoted(key)}{suggestion(key, _KEYS, 200)}')
+            raise RequestError(f'there is no key {short_repr(key)}{suggestion(key, _KEYS, 200)}')
     for i, cut in enumerate(loops.get('closures', ())):
         point = at(numbers(cut['point']))
         robot.join(f'closures[{i}]', HINGE, (cut['link_a'], cut['link_b']), point,

@@ -35,7 +35,7 @@ from .. import palette
 from ..linkage import Arc, extremes, GROUND, Leg, Link
 from ..scene import SceneError, SceneMechanism
 from ..scene.motion import Motion
-from ..words import listed
+from ..words import join_names
 
 # The colours of the markers, red, green, blue and opacity: bars, driven bodies, guides, joints.
 COLOURS = {name: (*palette.rgb(code), 1.0) for name, code in (
@@ -108,11 +108,11 @@ def merged(robots: Sequence[Robot]) -> Robot:
     if more or root in links or FREE in [
             joint.kind for _, joint in made.spanning_tree()[0].values()]:
         raise SceneError('frame_id must be the same for all mechanisms of one robot model, or a '
-                         f'link of another one of them, not {listed(roots, 120)}')
+                         f'link of another one of them, not {join_names(roots, 120)}')
     for tag, names in (('link', [root, *links]), ('joint', [joint.name for joint in joints])):
         (name, count), = Counter(names).most_common(1)
         if count > 1:
-            raise SceneError(f'{listed(f"{robot.name}.joints" for robot in robots)} must have '
+            raise SceneError(f'{join_names(f"{robot.name}.joints" for robot in robots)} must have '
                              f'other names: the robot model would have two {tag}s {name}')
     return made
 

@@ -17,7 +17,7 @@ from typing import Any, Collection, Iterable, Iterator, Mapping, NamedTuple, Seq
 import numpy as np
 
 from .shapes import Piece
-from ..words import meant, RequestError, suggestion
+from ..words import did_you_mean, RequestError, suggestion
 
 HINGE, SLIDE, BALL, FIXED, UNIVERSAL, FREE = (
     'hinge', 'slide', 'ball', 'fixed', 'universal', 'free')
@@ -336,7 +336,7 @@ class Robot:
             sources.append((name, ratio * factor, offset + ratio * start))
         if name not in self.positions:
             raise RequestError(f'{passed[-1]} follows {name!r}, which is no joint'
-                               f'{meant(name, self.positions)}')
+                               f'{did_you_mean(name, self.positions)}')
         return sources
 
     def source(self, name: str) -> tuple[str, float, float]:

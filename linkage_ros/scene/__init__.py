@@ -21,7 +21,7 @@ from .parameter_file import overrides, sections
 from .parameters import DRIVER, Field, INVERSE, KINEMATICS, Parameter, plain, SceneError, Values
 from .scene_mechanism import FRAME, is_distinct, read_mechanism, SceneMechanism
 from .. import mechanisms
-from ..words import plain_text, quoted
+from ..words import plain_text, short_repr
 
 __all__ = ['changed', 'InputSettings', 'DRIVER', 'FARTHEST', 'Field', 'in_words', 'INVERSE',
            'KINEMATICS', 'load', 'SceneMechanism', 'Parameter', 'plain', 'read', 'Scene',
@@ -145,7 +145,7 @@ def _by_mechanism(values: Any) -> dict[str, dict[str, Any]]:
     """Return {mechanism: {full name: value}}, with '' as the mechanism of general parameters."""
     if not isinstance(values, Mapping) or not all(isinstance(name, str) for name in values):
         raise SceneError('a scene must map names of parameters to their values, not be '
-                         f'{quoted(values)}')
+                         f'{short_repr(values)}')
     parts: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         mechanism, dot, _ = name.partition('.')

@@ -11,7 +11,7 @@ from typing import Any, Iterable
 
 from .parameters import DRIVER, Field, SceneError, Values
 from ..linkage import Arc, Input, Mechanism
-from ..words import elided
+from ..words import truncated
 
 # Distance of a default sweep from each end of the reach, as a fraction of the reach.
 SWEEP_MARGIN = 0.01
@@ -113,7 +113,7 @@ class InputSettings:
 
 def in_words(arcs: Iterable[Arc]) -> str:
     """Return intervals as text, such as '[0, 1] or [2, 3]'; of many, the first ones."""
-    return elided(' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs), MAX_ARCS)
+    return truncated(' or '.join(f'[{low:.6g}, {high:.6g}]' for low, high in arcs), MAX_ARCS)
 
 
 def read_settings(name: str, linkage: Mechanism, input_: Input, reach: tuple[Arc, ...],

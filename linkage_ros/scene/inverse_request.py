@@ -14,7 +14,7 @@ import numpy as np
 from .input_settings import in_words, InputSettings
 from .scene_mechanism import divided, SceneMechanism
 from ..linkage import Solution
-from ..words import listed
+from ..words import join_names
 
 LEVER = 'lever'
 
@@ -185,7 +185,7 @@ class InverseRequest:
                    for settings in self._settings]
         answers = self.inverse.all(
             divided(values, self._units), divided(middles, self._scales))
-        what = f'{listed(self.outputs)} at ' * (len(values) > 1) + listed(
+        what = f'{join_names(self.outputs)} at ' * (len(values) > 1) + join_names(
             f'{value:.6g}' for value in values)
         if self._inside(answers):
             return f'the way to {what} leads through a singular pose, out of the reach or a sweep'

@@ -16,7 +16,7 @@ from typing import Any, Iterator, Sequence
 
 from .parameters import SceneError
 from ..optional import needs
-from ..words import quoted
+from ..words import short_repr
 
 KEY = 'ros__parameters'
 _TOKEN = re.compile(r'\*\*?|[A-Za-z_]\w*', re.ASCII)
@@ -77,7 +77,7 @@ def _distinct(entries: Iterator[tuple[str, Any, Any]]) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for name, node, value in entries:
         if name in values:
-            raise ValueError(f'{quoted(name)} is given twice{_line(node)}')
+            raise ValueError(f'{short_repr(name)} is given twice{_line(node)}')
         values[name] = value
     return values
 
@@ -98,7 +98,7 @@ def _values(node: Any, prefix: str) -> Iterator[tuple[str, Any, Any]]:
             yield prefix + key, value, _value(value)
             continue
         if prefix and '.' in key:
-            raise ValueError(f'ROS loses track of names below {quoted(key)}, which has a point'
+            raise ValueError(f'ROS loses track of names below {short_repr(key)}, which has a point'
                              f'{_line(value)}')
         yield from _values(value, f'{prefix}{key}.')
 
@@ -134,7 +134,7 @@ def _scalar(node: Any) -> Any:
     reader = next((reader for pattern, reader in _READERS if pattern.fullmatch(text)), str)
     value = None if node.style else reader(text)
     if value is None:
-        raise ValueError(f'{quoted(text)} is unclear or out of range{_line(node)}: write a '
+        raise ValueError(f'{short_repr(text)} is unclear or out of range{_line(node)}: write a '
                          'decimal number, .inf, .nan, or text in quotes')
     return value
 
@@ -148,7 +148,7 @@ def _checked(names: Sequence[str]) -> str:
     name = reduce(lambda space, part: f'{space.removesuffix("/")}/{part}', names) if names else ''
     if not all(map(_TOKEN.fullmatch, name.removeprefix('/').split('/'))):
         raise ValueError(f'{KEY} must be below the name of a node, such as /**, not '
-                         f'{quoted(name)}')
+                         f'{short_repr(name)}')
     return name
 
 

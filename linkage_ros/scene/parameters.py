@@ -15,7 +15,15 @@ from typing import Any, Callable, Collection, Iterable, Mapping, NamedTuple, Seq
 import numpy as np
 
 from ..cache import cached
-from ..words import elided, listed, meant, MESSAGE, plain_text, quoted, suggestion
+from ..words import (
+    did_you_mean,
+    join_names,
+    MESSAGE,
+    plain_text,
+    short_repr,
+    suggestion,
+    truncated,
+)
 
 # The nodes that use parameters; KINEMATICS owns each that it uses.
 DRIVER, INVERSE, KINEMATICS = ALL = 'crank_driver', 'servo_inverse', 'kinematics'
@@ -44,7 +52,7 @@ class SceneError(ValueError):
     """A parameter is invalid; the text names it and says what is allowed."""
 
     def __init__(self, text: str):
-        super().__init__(elided(text, MESSAGE))
+        super().__init__(truncated(text, MESSAGE))
 
 
 @dataclass(frozen=True)
@@ -136,8 +144,8 @@ class Field:
                     self.holds is None or self.holds(result)):
                 return result
         shown = list(value) if isinstance(value, tuple) else value
-        raise SceneError(f'{elided(name, 100)} must be {self.allowed}, not {quoted(shown)}'
-                         f'{meant(value, self.choices)}')
+        raise SceneError(f'{truncated(name, 100)} must be {self.allowed}, not {short_repr(shown)}'
+                         f'{did_you_mean(value, self.choices)}')
 
     def _converted(self, value: Any) -> Any:
         is_whole = type(value) is int and KINDS[self.kind][0] is float
@@ -209,7 +217,7 @@ class Values:
         for name in sorted(self._unused):
             if not _ROS.match(name):
                 names = [f'{name}.type'] * (f'{name}.*' in known) + [*known]
-                raise SceneError(f'{elided(name)} is not a parameter of the scene'
+                raise SceneError(f'{truncated(name)} is not a parameter of the scene'
                                  f'{suggestion(name, names, 120)}')
 
 
@@ -226,8 +234,8 @@ def read_lines(name: str, lines: Iterable[str], pattern: re.Pattern, names: Coll
         if not match or match[1] not in names or match[1] in matches:
             raise SceneError(
                 f'{name} must be texts such as {examples}, each for a different one of '
-                f'{listed(names, 90)}, not {elided(line)!r}'
-                f'{meant(match and match[1], {*names} - {*matches})}')
+                f'{join_names(names, 90)}, not {truncated(line)!r}'
+                f'{did_you_mean(match and match[1], {*names} - {*matches})}')
         matches[match[1]] = match
     return matches
 

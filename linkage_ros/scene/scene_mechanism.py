@@ -20,7 +20,7 @@ from .parameters import Field, INVERSE, KINEMATICS, Parameter, SceneError, Value
 from .. import mechanisms
 from ..cache import cached
 from ..linkage import Arc, Design, Mechanism, theta_of
-from ..words import listed
+from ..words import join_names
 
 TYPES = (*mechanisms.TYPES, *mechanisms.WRITTEN)
 
@@ -238,7 +238,7 @@ def read_mechanism(name: str, entries: Mapping[str, Any],
     linkage, reaches = _linkage(name, take('type', TYPE, name), values)
     scale, (leg_pairs, mirrored) = take('scale', SCALE), _legs(name, linkage, values)
     points = take('points', POINTS.about(
-        rule=f'some of {listed(linkage.points)}, each once', choices=linkage.points),
+        rule=f'some of {join_names(linkage.points)}, each once', choices=linkage.points),
         linkage.points)
     pose = take('pose', POSE)
     inputs = {input_.name: read_settings(name, linkage, input_, reach, scale, values)

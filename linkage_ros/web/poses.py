@@ -13,7 +13,7 @@ from .nearest_pose import nearest_inputs
 from ..linkage import Formula, Mechanism, theta_of
 from ..robot_model.shapes import ground_frame
 from ..scene import InputSettings, Parameter, SceneError, SceneMechanism, slider
-from ..words import listed, quoted
+from ..words import join_names, short_repr
 
 ARROWS = {'velocity': 'm/s', 'acceleration': 'm/s²', 'force': 'N'}
 _, ACCELERATION, FORCE = ARROWS
@@ -134,7 +134,8 @@ def number(text: str) -> dict[str, Any]:
     # A number may have a decimal comma; arithmetic has commas in parentheses only.
     formula = Formula(text if '(' in text else text.replace(',', '.'))
     if formula.names:
-        raise SceneError(f'{quoted(text)} is not a number: {listed(formula.names)} is unknown')
+        raise SceneError(
+            f'{short_repr(text)} is not a number: {join_names(formula.names)} is unknown')
     return {'value': float(formula.value({})), 'turns': formula.is_angle}
 
 

@@ -33,7 +33,7 @@ from ..nodes.publishers import LATCHED
 from ..robot_model import urdf
 from ..scene import SceneError, SceneMechanism, writing
 from ..scene.inverse_request import present_inputs
-from ..words import quoted
+from ..words import short_repr
 
 EVENTS_TYPE, INPUTS_TYPE = 'rcl_interfaces/msg/ParameterEvent', 'sensor_msgs/msg/JointState'
 SETTER = 'set_parameters_atomically'
@@ -251,7 +251,7 @@ class SceneView:
 
     def _find(self, key: str) -> ShownMechanism:
         if key not in self._mechanisms:
-            raise SceneError(f'there is no mechanism {quoted(key)}')
+            raise SceneError(f'there is no mechanism {short_repr(key)}')
         return self._mechanisms[key]
 
     def _show(self, client: Any) -> None:

@@ -22,7 +22,7 @@ from aiohttp import web, WSCloseCode, WSMsgType
 from .feed import Feed
 from .scene_view import Answer, SceneView
 from .. import palette
-from ..words import elided, MESSAGE, quoted
+from ..words import MESSAGE, short_repr, truncated
 
 PAGE = Path(__file__).parent / 'page'
 # Files with placeholders for the palette's colours, which are their names in lower case.
@@ -240,13 +240,13 @@ class Client:
                 request = dict(json.loads(text))
                 number, op = request.pop('id', None), request.pop('op', None)
                 if op not in REQUESTS:
-                    raise ValueError(f'unknown request {quoted(op)}')
+                    raise ValueError(f'unknown request {short_repr(op)}')
                 answer = await getattr(self._view, op)(**request)
             except ValueError as reason:
-                answer = {'reason': elided(str(reason), MESSAGE)}
+                answer = {'reason': truncated(str(reason), MESSAGE)}
             except Exception as error:
                 # Without an answer the browser would wait forever.
-                answer = {'reason': f'the request fails: {elided(repr(error), 200)}'}
+                answer = {'reason': f'the request fails: {truncated(repr(error), 200)}'}
                 self._view.warn(answer['reason'])
             await self._send_message({'op': 'answer', 'reason': '', **answer, 'id': number})
 

@@ -22,7 +22,7 @@ from .segments import segments_of
 from ..inputs import spread
 from ..motion.curves import HALVINGS
 from ..tolerances import CLOSE, SINGULAR
-from ...words import listed
+from ...words import join_names
 
 # Starts, more of them where fewer than this number can be assembled.
 COUNTS, ASSEMBLED = (4096, 65536), 500
@@ -110,8 +110,8 @@ class Grid:
                                        0.9) <= CLOSE:
             some = np.median(np.abs(weights[:, :, -1]), axis=0) > CLOSE
             raise ValueError(
-                f'{listed(outputs)} do not determine all inputs: too few of them move '
-                f'{listed([name for name, depends in zip(outputs, some) if depends])}')
+                f'{join_names(outputs)} do not determine all inputs: too few of them move '
+                f'{join_names([name for name, depends in zip(outputs, some) if depends])}')
 
     def _descended(self, q: np.ndarray, values: Sequence[float]) -> list[Row]:
         """Return the inputs next to solutions that steps of Newton's method reach."""

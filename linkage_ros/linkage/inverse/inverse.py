@@ -34,7 +34,7 @@ from ..text.arguments import checked_ends, Ends, numbers
 from ..tolerances import SINGULAR
 from ...formula.namespace import array_function
 from ...formula.program import FEW_POSES
-from ...words import listed, plain_text, quoted
+from ...words import join_names, plain_text, short_repr
 
 
 class Solution(NamedTuple):
@@ -129,7 +129,7 @@ class Inverse:
         self.linkage, self.outputs, self._n = linkage, outputs, len(outputs)
         if len(outputs) != len(linkage.inputs):
             raise ValueError(f'{linkage.type} has {len(linkage.inputs)} inputs: as many outputs '
-                             f'are needed, got {listed(outputs)}')
+                             f'are needed, got {join_names(outputs)}')
         if self._n == 1:
             linkage.check_output(outputs[0])
         self.problem = InverseProblem(linkage, outputs)
@@ -163,10 +163,10 @@ class Inverse:
         return inverse_of, (self.linkage, self.outputs)
 
     def __repr__(self) -> str:
-        return f'<inverse of {self.linkage.type} for {listed(self.outputs)}>'
+        return f'<inverse of {self.linkage.type} for {join_names(self.outputs)}>'
 
     def __str__(self) -> str:
-        what = listed(self.outputs)
+        what = join_names(self.outputs)
         if not self.closed:
             return f'the inverse of {self.linkage.type} for {what} is searched'
         return f'# {self.linkage.type} driven by {what}\n{self.closed}'
@@ -286,7 +286,7 @@ class Inverse:
         except ValueError:
             raise self._miscounted(values, name) from None
         if finite and not all(map(math.isfinite, row)):
-            raise ValueError(f'{name} must be finite, got {quoted([*row])}')
+            raise ValueError(f'{name} must be finite, got {short_repr([*row])}')
         return row
 
     def _each(self, values: Any, name: str = 'values') -> tuple[Any, ...]:
@@ -300,7 +300,7 @@ class Inverse:
 
     def _miscounted(self, values: Any, name: str) -> ValueError:
         return ValueError(f'{self.linkage.type} has {self._n} inputs: {name} must be as many '
-                          f'numbers, got {quoted(values)}')
+                          f'numbers, got {short_repr(values)}')
 
     # --- one of the solutions ---
 
@@ -449,7 +449,7 @@ def inverse_of(linkage: Kinematics, outputs: str | Sequence[str]) -> Inverse:
     except (KeyError, TypeError):  # the first time, and for a list
         names = (outputs,) if isinstance(outputs, str) else outputs
     if not isinstance(names, (list, tuple)):
-        raise ValueError(f'outputs must be a list of names, got {quoted(outputs)}')
+        raise ValueError(f'outputs must be a list of names, got {short_repr(outputs)}')
     for name in names:
         linkage.check_there(name)
     plain = tuple(map(plain_text, names))

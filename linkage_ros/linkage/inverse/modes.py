@@ -24,7 +24,7 @@ from ..geometry.spatial import IN_SINGLE
 from ..tolerances import CLOSE
 from ...formula.expression import argument, Real, real, substituted, valid_where
 from ...formula.program import Program
-from ...words import listed
+from ...words import join_names
 
 # A mode whose outputs are off by more than this [sizes] is no solution.
 OFF = 2.0 ** -20
@@ -60,7 +60,8 @@ def modes_of(problem: InverseProblem, closed: InverseLinkage | None) -> list[tup
     Beside them are the rates of each output by the first input, by the second and so on.
     """
     if not closed:
-        raise ValueError(f'from {listed(problem.outputs)} there is no closed form, only a search')
+        raise ValueError(
+            f'from {join_names(problem.outputs)} there is no closed form, only a search')
     modes, forward = [], problem.linkage.structure.checked(problem.outputs)
     for inputs in closed.solutions():
         results = substituted(forward, dict(enumerate(inputs)))

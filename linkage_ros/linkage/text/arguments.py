@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .design import Design
-from ...words import listed, quoted, suggestion
+from ...words import join_names, short_repr, suggestion
 
 # For each input of a linkage the lower and the upper end [rad or m], or None.
 Ends = Sequence[tuple[float, float] | None] | None
@@ -23,7 +23,7 @@ def checked_dimensions(design: Design, given: Mapping[str, Any]) -> dict:
     """Return all dimensions of a design with defaults; raise ValueError if one is invalid."""
     for name in given:
         if name not in design.dimensions:
-            raise ValueError(f'{design.name} has no dimension {quoted(name)}'
+            raise ValueError(f'{design.name} has no dimension {short_repr(name)}'
                              f'{suggestion(name, design.dimensions)}')
     lengths = {name: _checked(design, name, given.get(name, default))
                for name, default in design.dimensions.items()}
@@ -32,7 +32,7 @@ def checked_dimensions(design: Design, given: Mapping[str, Any]) -> dict:
     except ValueError:
         shapes = [f'{name} {np.shape(length)}' for name, length in lengths.items()]
         raise ValueError(f'{design.name}: arrays of dimensions must have shapes that broadcast, '
-                         f'got {listed(shapes)}') from None
+                         f'got {join_names(shapes)}') from None
     return lengths
 
 
@@ -41,7 +41,7 @@ def _checked(design: Design, name: str, value: Any) -> Any:
         return value
 
     def error(rule: str) -> ValueError:
-        return ValueError(f'{design.name}: dimension {name} must {rule}, got {quoted(value)}')
+        return ValueError(f'{design.name}: dimension {name} must {rule}, got {short_repr(value)}')
 
     try:
         length = numbers(name, value)
@@ -74,7 +74,7 @@ def numbers(name: str, value: Any) -> np.ndarray:
         return found.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError, RecursionError):
         raise ValueError(f'{name} must be a number or an array of numbers, '
-                         f'got {quoted(value)}') from None
+                         f'got {short_repr(value)}') from None
 
 
 def checked_branches(design: Design, given: Mapping[str, int] | None, others: Any = None) -> dict:
@@ -85,15 +85,15 @@ def checked_branches(design: Design, given: Mapping[str, int] | None, others: An
     """
     if given is not None and not isinstance(given, Mapping):
         raise ValueError(f'{design.name}: branches must be a mapping from joint to +1 or -1, '
-                         f'got {quoted(given)}')
+                         f'got {short_repr(given)}')
     signs = dict(others or design.branches)
     for name, sign in (given or {}).items():
         if name not in signs:
-            raise ValueError(f'{design.name} has no branch {quoted(name)}'
+            raise ValueError(f'{design.name} has no branch {short_repr(name)}'
                              f'{suggestion(name, signs)}')
         if not isinstance(sign, Real) or isinstance(sign, bool) or sign not in (1, -1):
             raise ValueError(f'{design.name}: branch {name} must be +1 or -1, '
-                             f'got {quoted(sign)}')
+                             f'got {short_repr(sign)}')
         signs[name] = int(sign)
     return signs
 
@@ -109,4 +109,4 @@ def checked_ends(count: int, ends: Ends) -> tuple[tuple[float, ...], ...]:
     except (TypeError, ValueError):
         pass
     raise ValueError('ends must be two finite numbers in order, or None, for each input, '
-                     'got ' + quoted(ends))
+                     'got ' + short_repr(ends))

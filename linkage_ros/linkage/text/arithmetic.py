@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from ...formula.expression import dimension, Real, real, square_root, where
 from ...formula.program import evaluate
-from ...words import quoted
+from ...words import short_repr
 
 # A number, or the name of a dimension or an operation.
 Step = float | str
@@ -69,7 +69,7 @@ class Formula:
             self._parse(tokens)
         except LookupError:
             raise ValueError(
-                f'{quoted(text)} is not a number, dimension or arithmetic on them; '
+                f'{short_repr(text)} is not a number, dimension or arithmetic on them; '
                 'allowed: + - * / ( ) max(a,b) sqrt(a) pi 30deg') from None
 
     @property
@@ -141,5 +141,5 @@ class Formula:
 
     def _add_constant(self, number: float) -> None:
         if not in_range(number):
-            raise ValueError(f'{quoted(self.text)} must be {IN_RANGE}')
+            raise ValueError(f'{short_repr(self.text)} must be {IN_RANGE}')
         self._steps.append(number)

@@ -29,7 +29,7 @@ from .arithmetic import ARITHMETIC_WORDS, Formula, IN_RANGE, in_range
 from ..geometry.builder import Builder, ConstructionError, Gear
 from ...cache import cached
 from ...formula.expression import Real
-from ...words import elided, listed, meant, quoted
+from ...words import did_you_mean, join_names, short_repr, truncated
 
 _WORDS = {'left': 1.0, 'right': -1.0, 'out': 1.0, 'in': -1.0}
 _JOINTS = ('CENTRE', 'BASE', 'FIRST', 'SECOND', 'POINT', 'CORNER', 'POLE', 'PIN', 'PIVOT',
@@ -133,7 +133,7 @@ class Line(NamedTuple):
 
 
 def _error(line: str, problem: object) -> ValueError:
-    return ValueError(elided(f'joint line "{elided(line)}": {problem}', _LONGEST_ERROR))
+    return ValueError(truncated(f'joint line "{truncated(line)}": {problem}', _LONGEST_ERROR))
 
 
 def _hint(args: Iterable[str]) -> str:
@@ -212,8 +212,8 @@ def parsed(text: str, forms: Mapping[str, tuple[str, ...]] = FORMS) -> Line:
     found = [i for i, part in enumerate(parts) if part in forms and i > 0]
     if not found:
         for part in parts[1:]:
-            if near := meant(part, forms):
-                raise _error(text, f'unknown construction {quoted(part)}{near}')
+            if near := did_you_mean(part, forms):
+                raise _error(text, f'unknown construction {short_repr(part)}{near}')
         raise _error(text, f'expected NAME and one of the constructions {", ".join(forms)}')
     at = found[0]
     line = Line(text, tuple(parts[:at]), parts[at], tuple(parts[at + 1:]))
@@ -228,19 +228,20 @@ def parsed(text: str, forms: Mapping[str, tuple[str, ...]] = FORMS) -> Line:
     line = line._replace(arguments=tuple(fitting[-1]))
     for name in line.names:
         if not _NAME.fullmatch(name) or name in forms:
-            raise line.error(f'{quoted(name)} cannot name a joint: a name is a letter, then up to '
-                             '63 letters, digits and underscores, but not a construction')
+            raise line.error(f'{short_repr(name)} cannot name a joint: a name is a letter, then '
+                             'up to 63 letters, digits and underscores, but not a construction')
     if line.input_name and (
             not _NAME.fullmatch(line.input_name) or line.input_name in _RESERVED_INPUTS):
-        raise line.error(f'{quoted(line.input_name)} cannot name an input: a name is a letter, '
-                         'then up to 63 letters, digits and underscores, but not '
+        raise line.error(f'{short_repr(line.input_name)} cannot name an input: a name is a letter'
+                         ', then up to 63 letters, digits and underscores, but not '
                          f'{", ".join(_RESERVED_INPUTS)}')
     for kind, arg, _ in line.arguments:
         if '|' in kind and arg not in kind.split('|'):
-            raise line.error(f'{quoted(arg)} must be {kind.replace("|", " or ")}')
+            raise line.error(f'{short_repr(arg)} must be {kind.replace("|", " or ")}')
     for kind, number in line.numbers():
         if 'deg' in number.words and kind != 'ANGLE':
-            raise line.error(f'{quoted(number.text)} is in degrees, but {kind} is not an angle')
+            raise line.error(
+                f'{short_repr(number.text)} is in degrees, but {kind} is not an angle')
     return line
 
 
@@ -288,8 +289,8 @@ def check_order(lines: Sequence[Line], what: str = 'joint', placed: Sequence[str
                     'only dyads, groups of two bars, can, not Assur groups of class III as a '
                     'platform on three bars')
             if name not in known:
-                raise line.error(f'{what} {elided(name)} is not placed before; there are: '
-                                 f'{listed(known)}{meant(name, known)}')
+                raise line.error(f'{what} {truncated(name)} is not placed before; there are: '
+                                 f'{join_names(known)}{did_you_mean(name, known)}')
         for name in line.names:
             if name in taken:
                 raise line.error(f'{what} {name} is placed already')
@@ -304,14 +305,14 @@ def check_numbers(design: Any, dimensions: Mapping) -> None:
         for kind, number in line.numbers():
             value, text = number.value(dimensions), number.text
             if not np.all(in_range(value)):
-                raise line.error(f'{quoted(text)} must be {IN_RANGE}')
+                raise line.error(f'{short_repr(text)} must be {IN_RANGE}')
             if kind == 'LENGTH' and not np.all(value > 0.0):
-                raise line.error(f'a bar must be longer than zero, got {elided(text)}')
+                raise line.error(f'a bar must be longer than zero, got {truncated(text)}')
             if kind == 'ANGLE' and np.any(np.abs(value) > _TURN) and not number.is_angle:
                 plain = text.lstrip('-').replace('.', '').isdigit()
                 degrees = f'{text}deg' if plain else f'({text})deg'
-                raise line.error(f'an angle is in rad, and {elided(text)} is more than a turn; '
-                                 f'in degrees it is written {elided(degrees)}')
+                raise line.error(f'an angle is in rad, and {truncated(text)} is more than a turn; '
+                                 f'in degrees it is written {truncated(degrees)}')
 
 
 def branches(lines: Iterable[Line]) -> dict:
@@ -329,8 +330,8 @@ def points(lines: Iterable[Line]) -> list[str]:
 def check_name(name: str) -> None:
     """Raise ValueError if a name is not valid for a dimension."""
     if not isinstance(name, str) or not _NAME.fullmatch(name) or name in _RESERVED:
-        raise ValueError(f'{quoted(name)} cannot name a dimension: a name is a letter, then up to '
-                         f'63 letters, digits and underscores, but not {", ".join(_RESERVED)}')
+        raise ValueError(f'{short_repr(name)} cannot name a dimension: a name is a letter, then up'
+                         f' to 63 letters, digits and underscores, but not {", ".join(_RESERVED)}')
 
 
 def lengths(lines: Iterable[Line]) -> dict:

@@ -61,7 +61,7 @@ from ..geometry.window import Window, WindowRod
 from ..inputs import ANGLE, Input, LENGTH
 from ..tolerances import SINGULAR, TOLERANCE
 from ...formula.expression import Real, real
-from ...words import listed
+from ...words import join_names
 
 FORMS = {
     'hinge': ('hinge LINK at X Y Z axis U V W [within ANGLE ANGLE]',),
@@ -242,8 +242,8 @@ class _Assembly:
         others = [other.names[0] for other, also in left
                   if other is not line and set(also) & set(links)]
         raise line.error(
-            f'{listed(links)} between its ends are unplaced'
-            f'{f", as for {listed(others)}" if others else ""}: one rod places one hinge or '
+            f'{join_names(links)} between its ends are unplaced'
+            f'{f", as for {join_names(others)}" if others else ""}: one rod places one hinge or '
             'slide, and two rods place the same two hinges in a row')
 
     def _in_a_row(self, links: tuple[str, ...]) -> bool:
@@ -437,8 +437,8 @@ class _Drawing:
             end, base = self._beyond(line, link)
             pivot, length = self._pivot(base, first.parent), self._lengths[line.names[0]]
             if moving := self._moving(end.link, link):
-                raise line.error(f'{listed(moving)} moves between {link} and its end; where two '
-                                 f'rods share two hinges, their ends must be fixed to {link}')
+                raise line.error(f'{join_names(moving)} moves between {link} and its end; where '
+                                 f'two rods share two hinges, their ends must be fixed to {link}')
             if any(part.varies for part in pivot.path.centre) or pivot.turn and length.varies:
                 what = 'be fixed to' if length.varies else 'turn about one axis on'
                 raise line.error(f'its end on {base.link} must {what} {first.parent}, which '
